@@ -1,0 +1,1 @@
+"""The damper: the paper's Bingham element and the effects around it."""

@@ -1,0 +1,79 @@
+"""A damper as data: the Bingham parameters over voltage and temperature, and its effects."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+
+from pydantic import Field, model_validator
+
+from pzd.damper.effects import library
+from pzd.schema.model import Frozen
+
+EffectValues = Mapping[str, float | tuple[float, ...]]
+
+
+class BaseRow(Frozen):
+    """The Bingham parameters at one voltage and one temperature."""
+
+    voltage_V: float | None = None
+    """Control signal; empty where the damper has none."""
+    temperature_degC: float | None = None
+    """Temperature; empty where none was recorded."""
+    T0_N: float = Field(ge=0.0)
+    """Dry friction force."""
+    C_Ns_per_m: float = Field(gt=0.0)
+    """Damping coefficient."""
+    k_N_per_m: float = Field(gt=0.0)
+    """Stiffness of the oil spring."""
+
+
+class Damper(Frozen):
+    """A damper: base rows (interpolated between, held beyond) and effects by name.
+
+    An effect's parameter is one number, or a list of numbers beside `at_voltage_V`, piecewise
+    linear in the voltage. The rows form a grid: the same voltages at every temperature.
+    """
+
+    base: tuple[BaseRow, ...] = Field(min_length=1)
+    """Bingham parameters, one row a voltage and temperature."""
+    effects: dict[str, dict[str, float | tuple[float, ...]]] = Field(default_factory=dict)
+    """Parameters of each effect, by the effect's name; see `pzd effects`."""
+    reference_temperature_degC: float | None = None
+    """T_ref of `temperature_drift`; needed only with that effect."""
+
+    @model_validator(mode="after")
+    def _known_effects(self) -> Damper:
+        for name, values in self.effects.items():
+            _check_effect(name, values)
+        if "temperature_drift" in self.effects and self.reference_temperature_degC is None:
+            raise ValueError("temperature_drift needs reference_temperature_degC")
+        return self
+
+    def with_effect(self, name: str, values: EffectValues) -> Damper:
+        """The same damper with one effect more, or with other values of it."""
+        effects = {**self.effects, name: dict(values)}
+        return Damper(base=self.base, effects=effects, reference_temperature_degC=self.reference_temperature_degC)
+
+
+def _check_effect(name: str, values: EffectValues) -> None:
+    effects = library()
+    if name not in effects:
+        near = difflib.get_close_matches(name, effects, 1)
+        raise ValueError(f"no effect is called {name}" + (f"; is it {near[0]}?" if near else ""))
+    wanted = {p.name for p in effects[name].parameters}
+    given = set(values) - {"at_voltage_V"}
+    if given != wanted:
+        raise ValueError(f"{name} takes {', '.join(sorted(wanted))} (got {', '.join(sorted(given)) or 'nothing'})")
+    nodes = values.get("at_voltage_V")
+    for key in sorted(given):
+        value = values[key]
+        listed = value if isinstance(value, tuple) else (value,)
+        if isinstance(value, tuple) and (not isinstance(nodes, tuple) or len(nodes) != len(value)):
+            raise ValueError(f"{name}.{key} is a list, so at_voltage_V must be a list of the same length")
+        parameter = effects[name].parameter(key)
+        for number in listed:
+            if not parameter.admits(number):
+                raise ValueError(
+                    f"{name}.{key} must lie in [{parameter.low:g}, {parameter.high:g}] {parameter.unit} (got {number:g})"
+                )

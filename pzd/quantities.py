@@ -1,0 +1,81 @@
+"""Every physical quantity once: its name, symbol, unit and meaning.
+
+CSV headers, axis labels, config keys and the docs are made from this list, so a
+quantity cannot carry two names or two units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+# How a unit is spelled inside a column name or a JSON key; the rest stand as they are.
+_SPELLED = {
+    "m/s": "m_per_s",
+    "m/s2": "m_per_s2",
+    "m/s3": "m_per_s3",
+    "N s/m": "Ns_per_m",
+    "N/m": "N_per_m",
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One measured or computed quantity."""
+
+    name: str
+    """What code and column names call it."""
+    symbol: str
+    """What the paper and axis labels call it."""
+    unit: str
+    """SI, but for temperature in degC; empty for a pure number."""
+    meaning: str
+
+    @property
+    def column(self) -> str:
+        """The header of its CSV column, e.g. ``velocity_m_per_s``."""
+        return f"{self.name}_{_SPELLED.get(self.unit, self.unit)}" if self.unit else self.name
+
+    @property
+    def label(self) -> str:
+        """The label of an axis, e.g. ``velocity v [m/s]``."""
+        return f"{self.name.replace('_', ' ')} {self.symbol} [{self.unit or '-'}]"
+
+
+TIME = Quantity("time", "t", "s", "time; may start anywhere")
+DISPLACEMENT = Quantity("displacement", "x", "m", "extension of the damper, rebound positive")
+VELOCITY = Quantity("velocity", "v", "m/s", "rate of extension, rebound positive")
+ACCELERATION = Quantity("acceleration", "a", "m/s2", "second derivative of the extension")
+FORCE = Quantity("force", "F", "N", "damper force; F v > 0 dissipates")
+VOLTAGE = Quantity("voltage", "U", "V", "control signal of the valve")
+TEMPERATURE = Quantity("temperature", "T", "degC", "temperature of the damper")
+PRESSURE = Quantity("pressure", "p", "Pa", "chamber pressure, carried and not used")
+
+FRICTION = Quantity("T0", "T0", "N", "dry friction force of the Bingham element")
+DAMPING = Quantity("C", "C", "N s/m", "damping coefficient of the Bingham element")
+STIFFNESS = Quantity("k", "k", "N/m", "stiffness of the oil spring of the Bingham element")
+
+CHANNELS = (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)
+"""The canonical columns of a rig record, in the order in which they are written."""
+
+
+@dataclass(frozen=True)
+class Control:
+    """The control signal of the valve: a voltage unless the config says otherwise."""
+
+    name: str = VOLTAGE.name
+    unit: str = VOLTAGE.unit
+
+    @property
+    def quantity(self) -> Quantity:
+        """The control signal as a quantity of its own, for labels and column names."""
+        if self == Control():
+            return VOLTAGE
+        return Quantity(self.name, self.name, self.unit, "control signal of the valve")
+
+    def renamed(self, column: str) -> str:
+        """The name a canonical column has under this control: voltage_1_V -> current_1_A."""
+        if VOLTAGE.name not in column or self == Control():
+            return column
+        return column.replace(VOLTAGE.name, self.name).removesuffix(f"_{VOLTAGE.unit}") + (
+            f"_{_SPELLED.get(self.unit, self.unit)}" if column.endswith(f"_{VOLTAGE.unit}") else ""
+        )

@@ -1,0 +1,125 @@
+"""One rig record in SI, and which records are one condition."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+CONSTANT_SHARE = 0.02
+"""A voltage whose r.m.s. about its median stays within this share of the scale is constant."""
+SAME_TEMPERATURE = 2.0
+"""Records within this many degC are one condition."""
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """What one test recorded; every array is (n,), extension positive, in SI and degC."""
+
+    name: str
+    setting: str | None
+    time: Array
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+    force: Array
+    voltage: Array | None = None
+    temperature: Array | None = None
+    pressure: Array | None = None
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate [Hz], from the median step."""
+        return float(1.0 / np.median(np.diff(self.time)))
+
+    def median_voltage(self) -> float | None:
+        """The voltage that labels the record, None where none was recorded."""
+        return None if self.voltage is None else float(np.median(self.voltage))
+
+    def median_temperature(self) -> float | None:
+        """The temperature that labels the record [degC], None where none was recorded."""
+        return None if self.temperature is None else float(np.median(self.temperature))
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """Records of one setting taken at one constant voltage and one temperature."""
+
+    setting: str | None
+    voltage: float | None
+    temperature: float | None
+    records: tuple[Record, ...]
+
+
+def voltage_scale(records: Iterable[Record]) -> float:
+    """The larger of the rig's voltage span and its largest magnitude [V]; 0 without voltages."""
+    extremes = [(float(r.voltage.min()), float(r.voltage.max())) for r in records if r.voltage is not None]
+    if not extremes:
+        return 0.0
+    low, high = min(e[0] for e in extremes), max(e[1] for e in extremes)
+    return max(high - low, abs(low), abs(high))
+
+
+def is_constant(record: Record, scale: float) -> bool:
+    """Whether the record's voltage stands still: r.m.s. about the median within 2 % of the scale."""
+    if record.voltage is None:
+        return True
+    deviation = record.voltage - np.median(record.voltage)
+    return bool(np.sqrt(np.mean(deviation**2)) <= CONSTANT_SHARE * scale)
+
+
+def conditions(
+    records: Sequence[Record], voltage_within: float | None = None, temperature_within: float = SAME_TEMPERATURE
+) -> tuple[tuple[Condition, ...], tuple[Record, ...]]:
+    """Group the constant records of every setting into conditions; the moving ones come second.
+
+    Parameters
+    ----------
+    records : the rig's records, of any setting
+    voltage_within : largest spread of voltage inside one condition [V]; None for 2 % of the scale
+    temperature_within : largest spread of temperature inside one condition [degC]
+
+    Returns
+    -------
+    conditions sorted by setting, temperature and voltage; and the records whose voltage moves
+    """
+    scale = voltage_scale(records)
+    within = CONSTANT_SHARE * scale if voltage_within is None else voltage_within
+    still = [r for r in records if is_constant(r, scale)]
+    found: list[Condition] = []
+    for setting in sorted({r.setting for r in still}, key=lambda s: s or ""):
+        mine = [r for r in still if r.setting == setting]
+        for by_temperature in _bands(mine, [r.median_temperature() for r in mine], temperature_within):
+            for members in _bands(by_temperature, [r.median_voltage() for r in by_temperature], within):
+                found.append(_condition(setting, members))
+    return tuple(found), tuple(r for r in records if not is_constant(r, scale))
+
+
+def _condition(setting: str | None, members: Sequence[Record]) -> Condition:
+    voltages = [r.voltage for r in members if r.voltage is not None]
+    temperatures = [r.temperature for r in members if r.temperature is not None]
+    return Condition(
+        setting,
+        float(np.median(np.concatenate(voltages))) if voltages else None,
+        float(np.median(np.concatenate(temperatures))) if temperatures else None,
+        tuple(members),
+    )
+
+
+def _bands(records: Sequence[Record], labels: Sequence[float | None], within: float) -> list[list[Record]]:
+    """Split records into bands of labels no wider than `within`, lowest first; no label is a band of its own."""
+    bands: list[list[Record]] = []
+    start: float | None = None
+    order = sorted(range(len(records)), key=lambda i: (labels[i] is not None, labels[i] or 0.0))
+    for i in order:
+        label = labels[i]
+        if bands and (label is None) == (start is None) and (label is None or label - (start or 0.0) <= within):
+            bands[-1].append(records[i])
+        else:
+            bands.append([records[i]])
+            start = label
+    return bands

@@ -1,0 +1,1 @@
+"""Reading and checking what people and programs write: models, YAML, CSV, errors."""
