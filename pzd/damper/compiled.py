@@ -1,0 +1,50 @@
+"""Compiles the laws to machine code, and keeps what was compiled apart by the laws' sources.
+
+Numba keys a cached kernel by the file of the outermost function alone, so an edited law would
+leave a stale kernel behind. The cache folder therefore carries a hash of every source of this
+package and of the versions: edit a law, and the kernels are new.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+import numba
+import numpy as np
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def cache_folder() -> Path:
+    """The folder of compiled kernels: in the user's cache, or a temporary one where that cannot be written."""
+    digest = hashlib.sha256()
+    for part in (sys.version, platform.machine(), numba.__version__, np.__version__):
+        digest.update(part.encode())
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(source.read_bytes())
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    for root in (home, Path(tempfile.gettempdir())):
+        folder = root / "pzd" / digest.hexdigest()[:16]
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    return Path(tempfile.mkdtemp(prefix="pzd-"))
+
+
+numba.config.CACHE_DIR = str(cache_folder())
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """The same function as machine code, cached across processes."""
+    return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]  # numba is untyped

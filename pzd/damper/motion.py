@@ -1,0 +1,37 @@
+"""What the damper is put through: the sampled motion, voltage and temperature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.record import Record
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Sampled kinematics and conditions; every array is (n,), None where not recorded."""
+
+    time: Array
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+    voltage: Array | None = None
+    temperature: Array | None = None
+
+    @classmethod
+    def of(cls, record: Record) -> Self:
+        """The motion of a rig record."""
+        return cls(
+            record.time,
+            record.displacement,
+            record.velocity,
+            record.acceleration,
+            record.voltage,
+            record.temperature,
+        )
