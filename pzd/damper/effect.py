@@ -41,10 +41,10 @@ class Effect:
     law: str
     """The equation, as the documentation prints it."""
     parameters: tuple[Parameter, ...]
-    tests: tuple[tuple[Mapping[str, float], Mapping[str, float], Mapping[str, float]], ...]
-    """Reference numbers: (inputs of the law, parameters, outputs)."""
     source: str
     """Where the law comes from."""
+    tests: tuple[tuple[Mapping[str, float], float], ...]
+    """Reference numbers: the arguments of the module's `law`, and what it gives."""
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name.

@@ -1,0 +1,23 @@
+"""Rebound and compression differ: other ports or shims for the two directions.
+
+Law: T0 and C times (1 + alpha sign(F)). Range: passenger cars damp rebound two to three times
+as hard, alpha 0.3-0.5; a symmetric prototype shows a few percent.
+"""
+
+from __future__ import annotations
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="asymmetry",
+    place="flow",
+    law="T0 and C times (1 + alpha sign(F))",
+    parameters=(Parameter("alpha", "-", 0.0, -0.95, 0.95, "share by which rebound is harder"),),
+    source="Dixon 2007, The Shock Absorber Handbook, sec. 1.7",
+    tests=(({"direction": 1.0, "alpha": 0.1}, 1.1), ({"direction": -1.0, "alpha": 0.1}, 0.9)),
+)
+
+
+def law(direction: float, alpha: float) -> float:
+    """Factor on T0 and C for the sign of the force."""
+    return 1.0 + alpha * direction

@@ -1,0 +1,32 @@
+"""Rubber or hydraulic stops near the ends of the stroke.
+
+Law: k_e (|x| - x_e)^2 sign(x) beyond x_e. Range: the last 10-30 % of the stroke.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="end_stop",
+    place="parallel",
+    law="k_e (|x| - x_e)^2 sign(x) beyond x_e",
+    parameters=(
+        Parameter("k_e", "N/m2", 0.0, 0.0, 1.0e12, "progressive stiffness of the stop"),
+        Parameter("x_e", "m", 0.02, 0.0, 1.0, "displacement at which it begins"),
+    ),
+    source="quadratic bump stop; Dixon 2007, The Shock Absorber Handbook, sec. 1.9",
+    tests=(
+        ({"x": 0.03, "v": 0.0, "a": 0.0, "k_e": 1.0e6, "x_e": 0.02}, 100.0),
+        ({"x": -0.03, "v": 0.0, "a": 0.0, "k_e": 1.0e6, "x_e": 0.02}, -100.0),
+        ({"x": 0.01, "v": 0.0, "a": 0.0, "k_e": 1.0e6, "x_e": 0.02}, 0.0),
+    ),
+)
+
+
+def law(x: float, v: float, a: float, k_e: float, x_e: float) -> float:
+    """Force [N] beside the element at a displacement x [m]."""
+    beyond = max(abs(x) - x_e, 0.0)
+    return math.copysign(k_e * beyond * beyond, x)

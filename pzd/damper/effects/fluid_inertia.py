@@ -1,0 +1,23 @@
+"""Oil that is accelerated through a long duct, or a mass that moves with the rod.
+
+Law: m a. Range: inertance of a duct 1-100 kg; the sign is left free, for on a single frequency
+a mass and a spring of the other sign are the same thing.
+"""
+
+from __future__ import annotations
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="fluid_inertia",
+    place="parallel",
+    law="m a",
+    parameters=(Parameter("m", "kg", 0.0, -1.0e5, 1.0e5, "apparent mass of the oil column"),),
+    source="fluid inerter; Swift et al. 2013, Vehicle System Dynamics 51(11), eq. (4)",
+    tests=(({"x": 0.01, "v": 1.0, "a": 4.0, "m": 5.0}, 20.0),),
+)
+
+
+def law(x: float, v: float, a: float, m: float) -> float:
+    """Force [N] beside the element at an acceleration a [m/s2]."""
+    return m * a

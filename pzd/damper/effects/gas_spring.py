@@ -1,0 +1,22 @@
+"""The gas charge pushes the rod out: a force that rises with the displacement.
+
+Law: k_g x. Range: monotube dampers 1-5 kN/m; the sign is left free, for the mount may pull.
+"""
+
+from __future__ import annotations
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="gas_spring",
+    place="parallel",
+    law="k_g x",
+    parameters=(Parameter("k_g", "N/m", 0.0, -1.0e7, 1.0e7, "stiffness beside the element"),),
+    source="Dixon 2007, The Shock Absorber Handbook, sec. 5.2",
+    tests=(({"x": 0.01, "v": 1.0, "a": 1.0, "k_g": 2000.0}, 20.0),),
+)
+
+
+def law(x: float, v: float, a: float, k_g: float) -> float:
+    """Force [N] beside the element at a displacement x [m]."""
+    return k_g * x

@@ -1,0 +1,27 @@
+"""Turbulent flow through a sharp orifice: a force that grows with the square of the flow.
+
+Law: + q w^2, w = |dy/dt|. Range: 1-50 % of the peak force of a hydraulic damper.
+"""
+
+from __future__ import annotations
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="orifice_quadratic",
+    place="flow",
+    law="+ q w^2",
+    parameters=(Parameter("q", "N s2/m2", 0.0, 0.0, 1.0e8, "force over the square of the flow speed"),),
+    source="orifice equation dp = rho Q^2 / (2 Cd^2 A^2); Merritt 1967, eq. (3-25)",
+    tests=(({"w": 0.3, "q": 1500.0}, 135.0),),
+)
+
+
+def law(w: float, q: float) -> float:
+    """Force [N] beside friction and viscous force at a flow speed w >= 0 [m/s]."""
+    return q * w * w
+
+
+def slope(w: float, q: float) -> float:
+    """Derivative of the law by w [N s/m]."""
+    return 2.0 * q * w

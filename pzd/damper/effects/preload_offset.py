@@ -1,0 +1,22 @@
+"""A constant force: the gas charge at mid-stroke, a weight on the cell, or a load cell off zero.
+
+Law: F_0. Range: gas-charged dampers 50-300 N.
+"""
+
+from __future__ import annotations
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="preload_offset",
+    place="parallel",
+    law="F_0",
+    parameters=(Parameter("F_0", "N", 0.0, -1.0e6, 1.0e6, "constant force beside the element"),),
+    source="Dixon 2007, The Shock Absorber Handbook, sec. 5.2",
+    tests=(({"x": 0.01, "v": 1.0, "a": 1.0, "F_0": 55.0}, 55.0),),
+)
+
+
+def law(x: float, v: float, a: float, F_0: float) -> float:
+    """Force [N] beside the element."""
+    return F_0

@@ -1,0 +1,28 @@
+"""A blow-off valve opens: beyond its force the characteristic goes on with a flatter slope.
+
+Law: where the flow curve passes b = max(F_r, T0) it goes on with slope C_r < C. Range: passenger
+car dampers open between 0.05 and 0.3 m/s.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="relief_valve",
+    place="flow",
+    law="beyond b = max(F_r, T0) the slope is C_r",
+    parameters=(
+        Parameter("F_r", "N", inf, 0.0, 1.0e7, "force at which the valve opens"),
+        Parameter("C_r", "N s/m", 0.0, 1.0e-3, 1.0e8, "slope beyond it"),
+    ),
+    source="two-stage damper valve; Dixon 2007, The Shock Absorber Handbook, sec. 7.6",
+    tests=(({"F_r": 900.0, "T0": 300.0}, 900.0), ({"F_r": 200.0, "T0": 300.0}, 300.0)),
+)
+
+
+def law(F_r: float, T0: float) -> float:
+    """Force b [N] beyond which the slope is C_r."""
+    return max(F_r, T0)

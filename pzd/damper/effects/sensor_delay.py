@@ -1,0 +1,22 @@
+"""The force channel comes late: a filter or another converter than that of the displacement.
+
+Law: F recorded at t - tau; negative where the displacement is the late one. Range: 0.1-5 ms.
+"""
+
+from __future__ import annotations
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="sensor_delay",
+    place="sensor",
+    law="F recorded at t - tau",
+    parameters=(Parameter("tau", "s", 0.0, -0.1, 0.1, "delay of the force channel"),),
+    source="pure dead time of a measuring chain",
+    tests=(({"time": 1.0, "tau": 0.002}, 0.998),),
+)
+
+
+def law(time: float, tau: float) -> float:
+    """Moment [s] whose force the channel shows at `time` [s]."""
+    return time - tau

@@ -1,0 +1,33 @@
+"""Seal friction that falls once the lip floats on its oil film.
+
+Law: F_s exp(-(v/v_s)^2) sign(v). Range: 10-200 N, v_s 5-50 mm/s.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="stribeck_friction",
+    place="parallel",
+    law="F_s exp(-(v/v_s)^2) sign(v)",
+    parameters=(
+        Parameter("F_s", "N", 0.0, 0.0, 1.0e6, "friction at rest above that at speed"),
+        Parameter("v_s", "m/s", 0.02, 1.0e-4, 2.0, "speed over which it falls"),
+    ),
+    source="Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30(7), eq. (6)",
+    tests=(
+        ({"x": 0.0, "v": 0.02, "a": 0.0, "F_s": 100.0, "v_s": 0.02}, 36.787944117144235),
+        ({"x": 0.0, "v": -0.02, "a": 0.0, "F_s": 100.0, "v_s": 0.02}, -36.787944117144235),
+        ({"x": 0.0, "v": 0.0, "a": 0.0, "F_s": 100.0, "v_s": 0.02}, 0.0),
+    ),
+)
+
+
+def law(x: float, v: float, a: float, F_s: float, v_s: float) -> float:
+    """Force [N] beside the element at a piston speed v [m/s]."""
+    if v == 0.0:
+        return 0.0
+    return math.copysign(F_s * math.exp(-((v / v_s) ** 2)), v)

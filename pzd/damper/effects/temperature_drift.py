@@ -1,0 +1,28 @@
+"""Warm oil is thin: T0 and C fall exponentially with the recorded temperature.
+
+Law: T0 exp(-beta_T0 (T - T_ref)), C exp(-beta_C (T - T_ref)). Range: hydraulic oil loses
+1-4 % of its viscosity a kelvin near room temperature.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="temperature_drift",
+    place="material",
+    law="T0 exp(-beta_T0 (T - T_ref)), C exp(-beta_C (T - T_ref))",
+    parameters=(
+        Parameter("beta_T0", "1/K", 0.0, -0.2, 0.2, "relative fall of T0 a kelvin"),
+        Parameter("beta_C", "1/K", 0.0, -0.2, 0.2, "relative fall of C a kelvin"),
+    ),
+    source="Reynolds' viscosity law, 1886; falls with heat in Makowski and Knap 2021, fig. 8 and 9",
+    tests=(({"temperature": 43.0, "reference": 23.0, "beta": 0.01}, 0.8187307530779818),),
+)
+
+
+def law(temperature: float, reference: float, beta: float) -> float:
+    """Factor on T0 or C at a temperature [degC]."""
+    return math.exp(-beta * (temperature - reference))

@@ -1,0 +1,32 @@
+"""The valve answers the voltage late, as a first-order lag.
+
+Law: tau dUe/dt + Ue = U, exact for U linear over the step. Range: piezo valves 1-10 ms,
+magneto-rheological ones 5-50 ms. The 9 ms of the paper is a response time over the whole range,
+not this constant (to 90 % of a first-order lag they mean tau = 3.9 ms).
+"""
+
+from __future__ import annotations
+
+import math
+
+from pzd.damper.effect import Effect, Parameter
+
+EFFECT = Effect(
+    name="valve_lag",
+    place="drive",
+    law="tau dUe/dt + Ue = U",
+    parameters=(Parameter("tau", "s", 0.0, 0.0, 0.5, "time constant of the valve and its supply"),),
+    source="first-order lag; response times in Makowski and Knap 2021, sec. 1",
+    tests=(
+        ({"felt": 0.0, "before": 100.0, "now": 100.0, "step": 0.01, "tau": 0.01}, 63.21205588285577),
+        ({"felt": 7.0, "before": 0.0, "now": 100.0, "step": 0.01, "tau": 0.0}, 100.0),
+    ),
+)
+
+
+def law(felt: float, before: float, now: float, step: float, tau: float) -> float:
+    """Voltage felt [V] a step [s] later, the voltage going linearly from `before` to `now` [V]."""
+    if tau <= 0.0:
+        return now
+    lag = (now - before) * tau / step
+    return now - lag + (felt - before + lag) * math.exp(-step / tau)
