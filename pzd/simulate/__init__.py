@@ -1,0 +1,1 @@
+"""The half-car of the paper on the identified damper: policies, fidelities, energy."""

@@ -1,0 +1,22 @@
+"""Wheel load: each damper is asked to cancel the spring force that changes the load of the wheel."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pzd.record import Array
+from pzd.simulate.car import HalfCar
+from pzd.simulate.policy import Policy
+
+
+def feedback(car: HalfCar, damping: float) -> Array:
+    """T_i = -k_i U_i: the dynamic load S_i + T_i of each wheel goes to nought where that is within reach.
+
+    Source: Makowski and Knap 2021, section 6 (criterion of wheel dynamic load change)
+    """
+    gains = np.zeros((2, 8))
+    gains[:, :2] = -np.diag(car.stiffnesses)
+    return gains
+
+
+POLICY = Policy("wheel_load", "smallest change of each wheel's load", "feedback", feedback)

@@ -1,0 +1,27 @@
+"""What a policy asks of the dampers, as numbers that the compiled loop reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from pzd.record import Array
+from pzd.simulate.car import HalfCar
+
+Aim = Literal["feedback", "minimise", "voltage"]
+"""A force proportional to the state; the smallest |a_K|; or no force but a voltage."""
+
+
+@dataclass(frozen=True)
+class Policy:
+    """A way of controlling the dampers."""
+
+    name: str
+    """As in configs and in the names of cases."""
+    meaning: str
+    """What it does, in one sentence."""
+    aim: Aim
+    feedback: Callable[[HalfCar, float], Array] | None = None
+    """(car, constant damping) -> (2, 8) gains on (deflection 1, 2, its rate 1, 2, z, phi, dz, dphi):
+    the force that a policy with the aim `feedback` asks of each axle."""
