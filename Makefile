@@ -1,0 +1,64 @@
+# Everything lives in .venv and is made from the hashed locks; stamps in .venv say what is up to date.
+PYTHON ?= python3
+JOBS ?= 2
+BIN := .venv/bin
+RUNTIME := .venv/.runtime
+DEV := .venv/.dev
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest \
+        --generate-hashes --no-emit-index-url --custom-compile-command "make lock"
+
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+.PHONY: help
+help:  ## Explain the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' Makefile
+
+.PHONY: demo
+demo: $(RUNTIME)  ## Install pzd into .venv, run configs/quickstart.yaml, say where the report lies
+	$(BIN)/pzd run configs/quickstart.yaml
+	@echo "The report lies in runs/quickstart/6-report/report.html"
+
+.PHONY: test
+test: $(DEV)  ## Run the tests, but for those that build and install the whole
+	$(BIN)/python -m pytest -n $(JOBS) -m "not ci" --durations 10
+
+.PHONY: check
+check: $(DEV)  ## Check style (ruff), format (ruff) and types (mypy --strict)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+.PHONY: ci
+ci: check  ## What a merge must pass besides `make test`: check, every config, the wheel installed elsewhere
+	$(BIN)/python -m pytest -m ci --durations 10
+
+.PHONY: format
+format: $(DEV)  ## Format the code and mend what ruff can mend
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+.PHONY: lock
+lock: $(DEV)  ## Resolve the dependencies again, for Python 3.11 to 3.13 and every platform
+	$(LOCK) --upgrade pyproject.toml --output-file requirements.lock
+	$(LOCK) --upgrade --group build --output-file requirements-build.lock
+	$(LOCK) --upgrade --group dev pyproject.toml --constraint requirements.lock --constraint requirements-build.lock \
+	        --output-file requirements-dev.lock
+
+.PHONY: clean
+clean:  ## Remove .venv, caches and builds; results in runs/ and figures/ stay
+	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist
+	find pzd tests -name __pycache__ -prune -exec rm -rf {} +
+
+$(RUNTIME): requirements.lock requirements-build.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(None if (3, 11) <= sys.version_info[:2] <= (3, 13) else \
+	    "pzd needs Python 3.11, 3.12 or 3.13, but $(PYTHON) is " + sys.version.split()[0] + "; try make PYTHON=python3.11")'
+	$(PYTHON) -m venv .venv
+	$(PIP) --require-hashes -r requirements.lock -r requirements-build.lock
+	$(PIP) --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(DEV): $(RUNTIME) requirements-dev.lock
+	$(PIP) --require-hashes -r requirements-dev.lock
+	@touch $@

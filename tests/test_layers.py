@@ -1,0 +1,144 @@
+"""Imports point down only: a module imports its own package and what stands above it in ORDER."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import pkgutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import pzd
+
+ORDER = (
+    "quantities",
+    "schema",
+    "record",
+    "damper",
+    "artefacts",
+    "rig",
+    "identify",
+    "diagnose",
+    "table",
+    "simulate",
+    "paper",
+    "report",
+    "export",
+    "config",
+    "runs",
+    "pipeline",
+    "figures",
+    "blind",
+    "sweep",
+    "cli",
+)
+"""The one place where the order of the house stands."""
+
+SAYS_NOTHING = {"base", "common", "helper", "helpers", "misc", "util", "utils"}
+LONGEST = 300
+PACKAGE = Path(pzd.__file__).parent
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def dotted(module: Path, package: Path) -> str:
+    """The name under which a file is imported: pzd.damper.effect."""
+    parts = module.relative_to(package.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imported(tree: ast.AST, own: str, *, is_package: bool) -> Iterator[tuple[int, str]]:
+    """Line and name of everything of pzd that a module imports, wherever in the file and by whatever means."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = own.split(".")[: len(own.split(".")) - node.level + is_package] if node.level else []
+            source = ".".join([*above, *([node.module] if node.module else [])])
+            yield from ((node.lineno, f"{source}.{alias.name}") for alias in node.names)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in {"import_module", "__import__"}:
+            first = node.args[0] if node.args else None
+            if isinstance(first, ast.Constant) and isinstance(first.value, str):
+                yield node.lineno, first.value
+
+
+def layer(name: str, package: str = "pzd") -> str | None:
+    """The layer that a dotted name belongs to; None for the package itself and for what is not of pzd."""
+    parts = name.split(".")
+    return parts[1] if parts[0] == package and len(parts) > 1 else None
+
+
+def faults(module: Path, package: Path) -> list[str]:
+    """What a module imports from below or beside it."""
+    own = dotted(module, package)
+    tree = ast.parse(module.read_text(encoding="utf-8"), str(module))
+    place = layer(own)
+    reachable = ORDER[: ORDER.index(place) + 1] if place else ()
+    return [
+        f"{module.relative_to(package.parent)}:{line}: {own} imports {name}"
+        for line, name in imported(tree, own, is_package=module.stem == "__init__")
+        if (target := layer(name)) in ORDER and target not in reachable
+    ]
+
+
+def test_every_module_has_its_place_in_the_order() -> None:
+    assert {layer(dotted(module, PACKAGE)) for module in MODULES} - {None} <= set(ORDER)
+
+
+def test_imports_point_down_only() -> None:
+    assert [fault for module in MODULES for fault in faults(module, PACKAGE)] == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "import pzd.cli",
+        "from pzd.cli import main",
+        "from pzd import cli",
+        "from ..cli import main",
+        "def f():\n    from pzd.cli import main",
+        "if TYPE_CHECKING:\n    from pzd.runs import Folder",
+        "import importlib\nimportlib.import_module('pzd.cli')",
+    ],
+)
+def test_an_import_from_below_is_found(line: str, tmp_path: Path) -> None:
+    module = tmp_path / "pzd" / "damper" / "wrong.py"
+    module.parent.mkdir(parents=True)
+    module.write_text(line)
+    assert faults(module, tmp_path / "pzd")
+
+
+def test_an_import_from_above_or_of_its_own_package_is_none(tmp_path: Path) -> None:
+    module = tmp_path / "pzd" / "damper" / "right.py"
+    module.parent.mkdir(parents=True)
+    module.write_text("import numpy\nfrom pzd.quantities import TIME\nfrom pzd.damper.model import Damper\nimport pzd")
+    assert not faults(module, tmp_path / "pzd")
+
+
+def test_no_module_is_longer_than_it_should_be() -> None:
+    lengths = {dotted(module, PACKAGE): len(module.read_text(encoding="utf-8").splitlines()) for module in MODULES}
+    assert {name: length for name, length in lengths.items() if length > LONGEST} == {}
+
+
+def test_names_of_modules_say_something() -> None:
+    names = [dotted(module, PACKAGE) for module in MODULES]
+    assert [name for name in names if SAYS_NOTHING & set(name.split("."))] == []
+
+
+def sets() -> list[str]:
+    """The packages that are sets of files: those that offer a library()."""
+    return [
+        dotted(module, PACKAGE)
+        for module in MODULES
+        if module.stem == "__init__" and "def library(" in module.read_text(encoding="utf-8")
+    ]
+
+
+@pytest.mark.parametrize("name", sets())
+def test_a_set_holds_what_its_folder_holds(name: str) -> None:
+    package = importlib.import_module(name)
+    files = {info.name for info in pkgutil.iter_modules(package.__path__) if not info.name.startswith("_")}
+    assert len(package.library()) == len(files)
+    for module in files:
+        importlib.import_module(f"{name}.{module}")
