@@ -1,0 +1,113 @@
+"""What is shipped: locks that hold for every supported Python, declared imports, and a wheel that stands alone."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from importlib.metadata import distribution, packages_distributions
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+DECLARED = [Requirement(text) for text in PROJECT["project"]["dependencies"]]
+LOCKS = ("requirements.lock", "requirements-build.lock", "requirements-dev.lock")
+PYTHONS = ("3.11", "3.12", "3.13")
+
+
+def pins(lock: str) -> dict[str, Requirement]:
+    """Every pin of a lock by its canonical name."""
+    lines = re.findall(r"^(\S+==[^\\\n]+?)\s*\\$", (ROOT / lock).read_text(encoding="utf-8"), re.MULTILINE)
+    return {canonicalize_name(pin.name): pin for pin in map(Requirement, lines)}
+
+
+def version(pin: Requirement) -> str:
+    """The one version that a pin admits."""
+    (specifier,) = pin.specifier
+    return specifier.version
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_a_lock_pins_and_hashes_everything_and_names_no_host(lock: str) -> None:
+    text = (ROOT / lock).read_text(encoding="utf-8")
+    entries = re.split(r"^(?=\S)", re.sub(r"^\s*#.*$", "", text, flags=re.MULTILINE), flags=re.MULTILINE)
+    entries = [entry for entry in entries if entry.strip()]
+    assert len(entries) == len(pins(lock))
+    assert all("--hash=sha256:" in entry for entry in entries)
+    assert not re.search(r"://|--(find-links|index-url|extra-index-url|trusted-host)", text)
+
+
+def test_the_lock_satisfies_what_the_project_declares() -> None:
+    locked = pins("requirements.lock")
+    assert [str(need) for need in DECLARED if version(locked[canonicalize_name(need.name)]) not in need.specifier] == []
+
+
+def test_the_locks_agree_with_each_other() -> None:
+    runtime, build, dev = map(pins, LOCKS)
+    assert {name: version(pin) for name, pin in (runtime | build).items()} == {
+        name: version(pin) for name, pin in dev.items() if name in runtime | build
+    }
+
+
+def test_every_locked_version_runs_on_every_supported_python() -> None:
+    supported = SpecifierSet(PROJECT["project"]["requires-python"])
+    assert all(python in supported for python in PYTHONS)
+    refused = []
+    for name, pin in pins("requirements-dev.lock").items():
+        if pin.marker and not pin.marker.evaluate():
+            continue
+        installed = distribution(name)
+        wanted = SpecifierSet(installed.metadata["Requires-Python"] or "")
+        refused += [f"{name} on {python}" for python in PYTHONS if python not in wanted]
+        assert installed.version == version(pin), f"{name}: installed {installed.version}, locked {version(pin)}"
+    assert refused == []
+
+
+def test_every_import_is_declared() -> None:
+    providers = packages_distributions()
+    declared = {canonicalize_name(need.name) for need in DECLARED}
+    undeclared = set()
+    for module in (ROOT / "pzd").rglob("*.py"):
+        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names = [node.module]
+            for top in {name.split(".")[0] for name in names} - set(sys.stdlib_module_names) - {"pzd"}:
+                if not declared & {canonicalize_name(name) for name in providers.get(top, ())}:
+                    undeclared.add(f"{module.relative_to(ROOT)}:{node.lineno}: {top}")
+    assert undeclared == set()
+
+
+def test_starting_the_command_imports_nothing_heavy() -> None:
+    heavy = ("jinja2", "matplotlib", "numba", "pandas", "pint", "scipy")
+    code = f"import sys, pzd.cli; print(*({{*{heavy}}} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+@pytest.fixture(scope="session")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The built wheel."""
+    folder = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(ROOT)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+def test_the_wheel_holds_the_package_with_its_data_and_nothing_else(wheel: Path) -> None:
+    held = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    package = ROOT / "pzd"
+    wanted = {
+        str(path.relative_to(ROOT)) for path in package.rglob("*") if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert held == wanted
