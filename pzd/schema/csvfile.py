@@ -103,7 +103,7 @@ def _numbers(path: Path, name: str, cells: Sequence[str]) -> NDArray[np.float64]
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
         raise DataError(
-            f"{at(path, int(row) + 2)}: {name}: a finite number is needed (got {cells[row]!r})" for row in bad
+            f"{at(path, int(row) + 2)}: {name}: a finite number is needed (got {cells[int(row)]!r})" for row in bad
         )
     return values
 

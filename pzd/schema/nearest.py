@@ -1,0 +1,70 @@
+"""Which keys a model takes at a place, and which of them a wrong key most likely meant."""
+
+from __future__ import annotations
+
+import difflib
+import types
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+
+Path = tuple[str | int, ...]
+
+
+def nearest(given: str, valid: Iterable[str]) -> str | None:
+    """The valid name most like the given one, None where none is like it."""
+    lower = {name.lower(): name for name in valid}
+    found = difflib.get_close_matches(given.lower(), lower, 1, 0.6)
+    return lower[found[0]] if found else None
+
+
+def keys_at(annotation: Any, path: Path, data: Any) -> list[str]:
+    """The keys that the model of this annotation takes in the mapping at a path of the data."""
+    candidates = _alternatives(annotation, data)
+    for part in path:
+        data = _inside(data, part)
+        candidates = [deeper for one in candidates for deeper in _alternatives(_under(one, part), data)]
+    return list(dict.fromkeys(key for one in candidates if _is_model(one) for key in one.model_fields))
+
+
+def _is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def _alternatives(annotation: Any, data: Any) -> list[Any]:
+    """The members of a union, without models whose discriminator the data contradict."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        return _alternatives(get_args(annotation)[0], data)
+    if origin in (Union, types.UnionType):
+        return [found for member in get_args(annotation) for found in _alternatives(member, data)]
+    return [] if _is_model(annotation) and _contradicts(annotation, data) else [annotation]
+
+
+def _contradicts(model: type[BaseModel], data: Any) -> bool:
+    if not isinstance(data, Mapping):
+        return False
+    return any(
+        get_origin(info.annotation) is Literal and name in data and data[name] not in get_args(info.annotation)
+        for name, info in model.model_fields.items()
+    )
+
+
+def _under(annotation: Any, part: str | int) -> Any:
+    """The annotation of one field or item; None where there is none."""
+    if _is_model(annotation):
+        info = annotation.model_fields.get(part)
+        return info.annotation if info else None
+    arguments = [argument for argument in get_args(annotation) if argument is not Ellipsis]
+    origin = get_origin(annotation)
+    if not arguments or not isinstance(origin, type):
+        return None
+    return arguments[-1] if issubclass(origin, Mapping) or issubclass(origin, Sequence) else None
+
+
+def _inside(data: Any, part: str | int) -> Any:
+    try:
+        return data[part]
+    except (KeyError, IndexError, TypeError):
+        return None

@@ -1,0 +1,177 @@
+"""A tree of nodes against a model: every fault at once, each with its place and what to do."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from pzd.quantities import Control
+from pzd.schema.errors import UserError
+from pzd.schema.nearest import Path, keys_at, nearest
+from pzd.schema.nodes import Node
+
+_LONGEST = 60
+"""Characters of a wrong value that a message repeats."""
+
+
+def validated(annotation: Any, root: Node, control: Control, error: type[UserError]) -> Any:
+    """The model that a tree describes.
+
+    Parameters
+    ----------
+    annotation : the model, or a type made of models
+    root : the tree, with canonical keys
+    control : how the control signal is called in messages
+    error : the kind of error to raise
+
+    Returns
+    -------
+    the validated model
+
+    Raises
+    ------
+    UserError : of the kind `error`, with every fault
+    """
+    data = root.data()
+    try:
+        return TypeAdapter(annotation).validate_json(json.dumps(data))
+    except ValidationError as found:
+        faults = _merged([_fault(detail, root) for detail in found.errors(include_url=False)])
+        raise error(_message(group, annotation, root, data, control) for group in faults) from None
+
+
+@dataclass(frozen=True)
+class _Fault:
+    """What pydantic found, at a path of the tree."""
+
+    path: Path
+    node: Node
+    """The deepest node of the path that is there."""
+    detail: Mapping[str, Any]
+    in_union: bool
+    """Whether it is the complaint of one member of a union."""
+
+
+def _fault(detail: Mapping[str, Any], root: Node) -> _Fault:
+    """Follow pydantic's location, which also names members of unions, through the tree."""
+    path: list[str | int] = []
+    node, skipped = root, False
+    location = detail["loc"]
+    for number, part in enumerate(location):
+        below = _below(node, part)
+        if below is not None:
+            node = below
+            path.append(part)
+        elif number == len(location) - 1 and "missing" in detail["type"]:
+            path.append(part)
+        else:
+            skipped = True
+    return _Fault(tuple(path), node, detail, skipped)
+
+
+def _below(node: Node, part: str | int) -> Node | None:
+    if isinstance(node.value, Mapping) and isinstance(part, str) and part in node.value:
+        return node.value[part].node
+    if isinstance(node.value, tuple) and isinstance(part, int) and part < len(node.value):
+        return node.value[part]
+    return None
+
+
+def _merged(faults: list[_Fault]) -> list[list[_Fault]]:
+    """The faults by path; of a union's members only those that got furthest are heard."""
+    furthest = [fault.path for fault in faults if fault.in_union]
+    groups: dict[tuple[Path, str], list[_Fault]] = {}
+    for fault in faults:
+        deeper = any(len(path) > len(fault.path) and path[: len(fault.path)] == fault.path for path in furthest)
+        if not (fault.in_union and deeper and fault.detail["type"].endswith("_type")) and not _follows(fault):
+            groups.setdefault((fault.path, "" if fault.in_union else fault.detail["type"]), []).append(fault)
+    return list(groups.values())
+
+
+def _follows(fault: _Fault) -> bool:
+    """Whether a list is only too short since items of it are faulty, which is said of the items."""
+    items = fault.node.value if isinstance(fault.node.value, tuple) else ()
+    return bool(fault.detail["type"] == "too_short" and len(items) >= fault.detail["ctx"]["min_length"])
+
+
+def _message(faults: list[_Fault], annotation: Any, root: Node, data: Any, control: Control) -> str:
+    """One line about one place; several faults there are the members of a union."""
+    fault = faults[0]
+    kind, path, node = fault.detail["type"], fault.path, fault.node
+    place, got = node.place, _shown(node.data())
+    if kind == "extra_forbidden":
+        valid = [control.renamed(key) for key in keys_at(annotation, path[:-1], data)]
+        place, got = _key_place(root, path), control.renamed(str(path[-1]))
+        text = _unknown(got, valid)
+    elif "missing" in kind:
+        text, got = "is missing", _shown(list(node.value) if isinstance(node.value, Mapping) else [])
+    elif kind.startswith("union_tag"):
+        context = fault.detail["ctx"]
+        key = context["discriminator"].strip("'")
+        tag = _below(node, key)
+        path, place, got = (*path, key), (tag or node).place, _shown(tag.data() if tag else None)
+        text = _one_of(context.get("expected_tags", ""), context.get("tag"))
+    else:
+        text = _alternatives([_worded(each) for each in faults])
+    shown = ".".join(control.renamed(str(part)) for part in path)
+    shown = "" if place == f"--set {shown}" else shown
+    return ": ".join(part for part in (place, shown, text) if part) + ("" if "(got" in text else f" (got {got})")
+
+
+def _key_place(root: Node, path: Path) -> str:
+    node = root
+    for part in path[:-1]:
+        node = _below(node, part) or node
+    return node.value[str(path[-1])].place if isinstance(node.value, Mapping) else node.place
+
+
+def _unknown(given: str, valid: list[str]) -> str:
+    near = nearest(given, valid)
+    if near:
+        return f"no such key; did you mean {near}?"
+    return f"no such key; there is {', '.join(valid)}" if valid else "no such key here"
+
+
+def _one_of(expected: str, given: Any) -> str:
+    choices = re.findall(r"'([^']*)'", expected)
+    near = nearest(given, choices) if isinstance(given, str) else None
+    listed = ", ".join(choices) or expected
+    return f"must be one of {listed}" + (f"; did you mean {near}?" if near else "")
+
+
+_WORDS = {
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "bool_type": "must be true or false",
+    "string_type": "must be text",
+    "tuple_type": "must be a list",
+    "list_type": "must be a list",
+    "dict_type": "must be a mapping",
+    "model_type": "must be a mapping",
+    "model_attributes_type": "must be a mapping",
+}
+
+
+def _worded(fault: _Fault) -> str:
+    kind = fault.detail["type"]
+    if kind == "literal_error":
+        return _one_of(fault.detail["ctx"]["expected"], fault.node.value)
+    text = str(fault.detail["msg"]).removeprefix("Value error, ").replace("Input should", "must")
+    if kind == "string_type" and isinstance(fault.node.value, int | float):
+        return "must be text; put it in quotes"
+    return _WORDS.get(kind, text)
+
+
+def _alternatives(texts: list[str]) -> str:
+    first, *others = dict.fromkeys(texts)
+    return " or ".join([first, *(other.removeprefix("must be ") for other in others)])
+
+
+def _shown(value: Any) -> str:
+    text = value if isinstance(value, str) and value.isprintable() and value else json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."

@@ -1,0 +1,158 @@
+"""YAML 1.2 files: read with the place of every value, overridden from the command line, written plainly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Self, TypeVar
+
+from pzd.quantities import Control
+from pzd.schema.control import canonical_nodes, misnamed, renamed_keys
+from pzd.schema.errors import ConfigError, DataError, UserError
+from pzd.schema.model import Frozen
+from pzd.schema.nodes import Entry, Node, collection, compose
+from pzd.schema.scalars import written
+from pzd.schema.text import read_text
+from pzd.schema.validate import validated
+
+Model = TypeVar("Model", bound=Frozen)
+
+
+@dataclass(frozen=True)
+class Document:
+    """One YAML document: plain data, and where each value stands."""
+
+    path: Path
+    root: Node
+    error: type[UserError] = ConfigError
+    """The kind of error that a fault in it is."""
+
+    @property
+    def data(self) -> Any:
+        """The document as plain Python data."""
+        return self.root.data()
+
+    def overridden(self, overrides: Iterable[str]) -> Self:
+        """The document with ``a.b=VALUE`` set, VALUE one YAML scalar; items of lists by index.
+
+        Raises
+        ------
+        ConfigError : when an override cannot be read or has no place in the document, all at once
+        """
+        root = self.root
+        faults: list[str] = []
+        for override in overrides:
+            try:
+                root = _with(root, override)
+            except ConfigError as error:
+                faults += error.messages
+        if faults:
+            raise ConfigError(faults)
+        return replace(self, root=root)
+
+    def validated(self, model: type[Model], control: Control) -> Model:
+        """The model that the document describes.
+
+        The keys of the control signal may stand under the control's own name.
+
+        Raises
+        ------
+        UserError : of the document's kind, with every fault at once
+        """
+        found: Model = validated(model, canonical_nodes(self.root, control), control, self.error)
+        return found
+
+
+def read_yaml(path: Path, error: type[UserError] = ConfigError) -> Document:
+    """Read one YAML document.
+
+    Raises
+    ------
+    UserError : of the kind `error`, when it is not one, with the places
+    """
+    return Document(path, compose(read_text(path, error, "check the path"), path, error), error)
+
+
+def read_yaml_model(path: Path, model: type[Model], control: Control) -> Model:
+    """Read an artefact that `write_yaml_model` wrote (or a person edited).
+
+    Raises
+    ------
+    DataError : when the file is not what the model asks for, with every place
+    """
+    document = read_yaml(path, DataError)
+    if faults := misnamed(document.root, control):
+        raise DataError(faults)
+    return document.validated(model, control)
+
+
+def write_yaml_model(path: Path, model: Frozen, control: Control) -> None:
+    """Write a model with every default, in the order of its fields, so that it reads back equal."""
+    path.write_text(yaml_text(model, control), encoding="utf-8", newline="\n")
+
+
+def yaml_text(model: Frozen, control: Control) -> str:
+    """A model as YAML, keys of the control under its own name."""
+    return "".join(f"{line}\n" for line in _lines(renamed_keys(model.model_dump(mode="json"), control)))
+
+
+def _with(root: Node, override: str) -> Node:
+    path, equals, text = override.partition("=")
+    name = f"--set {path}"
+    if not equals or not all(path.split(".")):
+        raise ConfigError(f"--set {override}: must read a.b=VALUE (got {override})")
+    try:
+        value = compose(text, name, ConfigError) if text.strip() else Node(None, name)
+    except ConfigError as error:
+        reason = error.messages[0].rpartition(": ")[2]
+        raise ConfigError(f"{name}: VALUE must be one YAML scalar; put text in quotes: {reason} (got {text})") from None
+    if isinstance(value.value, tuple | Mapping):
+        raise ConfigError(f"{name}: VALUE must be one YAML scalar (got {text})")
+    return _put(root, path.split("."), Node(value.value, name), name)
+
+
+def _put(node: Node, path: list[str], value: Node, name: str) -> Node:
+    if not path:
+        return value
+    key, rest = path[0], path[1:]
+    if isinstance(node.value, tuple):
+        if not (key.isdecimal() and int(key) < len(node.value)):
+            raise ConfigError(f"{name}: a list of {len(node.value)} stands here, its items are 0, 1, ... (got {key})")
+        items = list(node.value)
+        items[int(key)] = _put(items[int(key)], rest, value, name)
+        return collection(tuple(items), node.place)
+    if node.value is not None and not isinstance(node.value, Mapping):
+        raise ConfigError(f"{name}: a single value stands before {key}, it has no keys (got {written(node.value)})")
+    entries = dict(node.value or {})
+    old = entries.get(key, Entry(name, Node(None, name)))
+    entries[key] = Entry(old.place, _put(old.node, rest, value, name))
+    return collection(entries, node.place)
+
+
+def _lines(data: Any) -> Iterator[str]:
+    if isinstance(data, Mapping) and data:
+        for key, value in data.items():
+            yield from _under(f"{written(key)}:", value)
+    elif isinstance(data, list) and any(isinstance(item, Mapping | list) and item for item in data):
+        for item in data:
+            inner = list(_lines(item))
+            yield f"- {inner[0]}"
+            yield from (f"  {line}" for line in inner[1:])
+    else:
+        yield _flow(data)
+
+
+def _under(head: str, value: Any) -> Iterator[str]:
+    inner = list(_lines(value))
+    if isinstance(value, Mapping | list) and value and not inner[0].startswith("["):
+        yield head
+        yield from (f"  {line}" for line in inner)
+    else:
+        yield f"{head} {inner[0]}"
+
+
+def _flow(data: Any) -> str:
+    if isinstance(data, list):
+        return f"[{', '.join(_flow(item) for item in data)}]"
+    return "{}" if isinstance(data, Mapping) else written(data)
