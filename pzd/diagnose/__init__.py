@@ -1,0 +1,1 @@
+"""Where simulation and measurement disagree above the noise."""

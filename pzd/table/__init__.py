@@ -1,0 +1,1 @@
+"""Force over temperature, voltage and velocity at steady slip, and its inverse."""

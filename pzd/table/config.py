@@ -1,0 +1,33 @@
+"""The `table` block of the config."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pzd.schema.model import Frozen
+
+
+class TableConfig(Frozen):
+    """How the identified damper becomes a table of force over voltage and velocity."""
+
+    outside: Literal["clamp", "error", "model"] = "model"
+    """Beyond the speeds that the rig reached: hold the last force, leave the cells empty (a ride
+    that needs them is refused), or go on with the identified law, marked `inside` = 0."""
+    unreachable: Literal["empty", "clamp"] = "empty"
+    """A force that no voltage gives: an empty cell of the inverse, or the voltage that comes nearest."""
+    speed_max_m_per_s: float = Field(default=1.0, gt=0.0, le=10.0)
+    """Largest speed of the table, what the car may need; never less than the rig reached."""
+    speed_points: int = Field(default=24, ge=2, le=1000)
+    """Speeds between 0 and the largest, spaced by their square root, so that they lie dense near 0."""
+    voltages_V: Annotated[tuple[float, ...], Field(min_length=1)] | None = None
+    """Voltages of the table; by default those of the damper's parameters and effects."""
+    temperatures_degC: Annotated[tuple[float, ...], Field(min_length=1)] | None = None
+    """Temperatures of the table; by default those of the damper's parameters, or with
+    `temperature_drift` five from the lowest to the highest that the rig saw."""
+    tolerance: float = Field(default=1e-3, gt=0.0, le=0.1)
+    """Nodes are added until the line between two of them keeps to the law within this share of the
+    largest force."""
+    force_levels: int = Field(default=41, ge=2, le=1000)
+    """Force levels of the inverse, evenly from the lowest to the highest force of each direction."""

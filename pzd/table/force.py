@@ -1,0 +1,155 @@
+"""Force over temperature, voltage and velocity, from the damper at steady slip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.artefacts import ForceRow
+from pzd.damper.compose import steady_force
+from pzd.damper.model import Damper
+from pzd.table.config import TableConfig
+from pzd.table.reach import Reach
+
+Array = NDArray[np.float64]
+
+HALVINGS = 5
+"""Most often that an interval between two nodes is halved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The nodes of the table."""
+
+    temperatures: tuple[float | None, ...]
+    voltages: tuple[float | None, ...]
+    speeds: Array
+    """(n,) rising from 0 [m/s]."""
+
+    @property
+    def velocities(self) -> Array:
+        """(2 n,) rising velocities, with -0 and +0 in the middle [m/s]."""
+        return np.concatenate([-self.speeds[::-1], self.speeds])
+
+
+def forces(damper: Damper, temperature: float | None, voltage: float | None, velocity: Array) -> Array:
+    """(n,) force at steady slip [N], at mid-stroke."""
+    out: Array = np.broadcast_to(steady_force(damper, voltage, temperature, velocity), velocity.shape)
+    return out
+
+
+def voltages_of(damper: Damper) -> tuple[float | None, ...]:
+    """The voltages at which the damper's parameters are given, rising; (None,) without a control signal."""
+    nodes = {row.voltage_V for row in damper.base if row.voltage_V is not None}
+    if not nodes:
+        return (None,)
+    for values in damper.effects.values():
+        listed = values.get("at_voltage_V")
+        nodes |= set(listed) if isinstance(listed, tuple) else set()
+    return tuple(sorted(nodes))
+
+
+def temperatures_of(damper: Damper) -> tuple[float | None, ...]:
+    """The temperatures at which the damper's parameters are given, rising; (None,) where none was recorded."""
+    nodes = {row.temperature_degC for row in damper.base if row.temperature_degC is not None}
+    return tuple(sorted(nodes)) or (None,)
+
+
+def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | None], reach: Reach) -> Grid:
+    """Nodes between which straight lines keep to the damper's law within the tolerance."""
+    voltages = voltages_of(damper)
+    if config.voltages_V is not None and voltages != (None,):
+        voltages = tuple(sorted(set(config.voltages_V)))
+    speeds = _speeds(config, reach)
+    both = np.concatenate([-speeds[::-1], speeds])
+    warm = temperatures[0]
+
+    def over_voltage(voltage: float) -> Array:
+        return forces(damper, warm, voltage, both)
+
+    allowed = config.tolerance * max(float(np.max(np.abs(forces(damper, warm, u, both)))) for u in voltages)
+    known = [u for u in voltages if u is not None]
+    if config.voltages_V is None and known:
+        known = refined(known, over_voltage, allowed)
+
+    def over_speed(speed: float) -> Array:
+        pair = np.array([-speed, speed])
+        return np.concatenate([forces(damper, warm, u, pair) for u in known or (None,)])
+
+    return Grid(tuple(temperatures), tuple(known) or (None,), np.array(refined(list(speeds), over_speed, allowed)))
+
+
+def _speeds(config: TableConfig, reach: Reach) -> Array:
+    """Speeds spaced by their square root, and those that the rig reached."""
+    fastest = np.unique(reach.speeds[np.isfinite(reach.speeds)])
+    largest = max(config.speed_max_m_per_s, *fastest) if fastest.size else config.speed_max_m_per_s
+    even = largest * np.linspace(0.0, 1.0, config.speed_points + 1) ** 2
+    apart = [v for v in even[1:] if fastest.size == 0 or np.min(np.abs(fastest - v)) > 1e-3 * largest]
+    return np.unique(np.concatenate([[0.0], apart, fastest[fastest > 0.0]]))
+
+
+def refined(nodes: Sequence[float], law: Callable[[float], Array], allowed: float) -> list[float]:
+    """The nodes, with intervals halved until the straight line between two is off by no more than `allowed`.
+
+    Parameters
+    ----------
+    nodes : rising
+    law : values (n,) of the law at a node
+    allowed : largest error at the middle of an interval, in units of the law
+
+    Returns
+    -------
+    the nodes and those added between them, rising
+    """
+    found = [nodes[0]]
+    for low, high in pairwise(nodes):
+        found += [*_halved(low, high, law, allowed, HALVINGS), high]
+    return found
+
+
+def _halved(low: float, high: float, law: Callable[[float], Array], allowed: float, left: int) -> list[float]:
+    middle = (low + high) / 2.0
+    off = np.max(np.abs(law(middle) - (law(low) + law(high)) / 2.0))
+    if left == 0 or off <= allowed:
+        return []
+    return [
+        *_halved(low, middle, law, allowed, left - 1),
+        middle,
+        *_halved(middle, high, law, allowed, left - 1),
+    ]
+
+
+def force_rows(config: TableConfig, damper: Damper, nodes: Grid, reach: Reach) -> tuple[ForceRow, ...]:
+    """One row a node; beyond the rig's reach held, empty or the law itself, as the config says."""
+    rows: list[ForceRow] = []
+    for temperature in nodes.temperatures:
+        for voltage in nodes.voltages:
+            rows += _column(config, damper, temperature, voltage, nodes.velocities, reach.at(temperature, voltage))
+    return tuple(rows)
+
+
+def _column(
+    config: TableConfig,
+    damper: Damper,
+    temperature: float | None,
+    voltage: float | None,
+    velocity: Array,
+    limit: float,
+) -> list[ForceRow]:
+    inside = np.abs(velocity) <= limit * (1.0 + 1e-9)
+    asked = np.copysign(np.minimum(np.abs(velocity), limit), velocity) if config.outside == "clamp" else velocity
+    values = forces(damper, temperature, voltage, asked)
+    return [
+        ForceRow(
+            temperature_degC=temperature,
+            voltage_V=voltage,
+            velocity_m_per_s=float(v),
+            force_N=None if config.outside == "error" and not within else float(force),
+            inside=1 if within else 0,
+        )
+        for v, force, within in zip(velocity, values, inside, strict=True)
+    ]
