@@ -1,0 +1,1 @@
+"""Identification: the Bingham parameters of every condition, with intervals and their trust."""

@@ -1,0 +1,46 @@
+"""The `identify` block of the config."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from pzd.record import SAME_TEMPERATURE
+from pzd.schema.model import Frozen
+
+
+class GroupConfig(Frozen):
+    """Which constant records are one condition."""
+
+    voltage_V: float | None = Field(default=None, ge=0.0)
+    """Largest spread of the control signal inside one condition; empty for 2 % of the rig's scale."""
+    temperature_degC: float = Field(default=SAME_TEMPERATURE, ge=0.0)
+    """Largest spread of temperature inside one condition."""
+
+
+class EvolutionaryConfig(Frozen):
+    """The search of `method: evolutionary`, in the terms of scipy's differential_evolution."""
+
+    population: int = Field(default=15, ge=5)
+    """Members of the population per parameter."""
+    generations: int = Field(default=300, ge=1)
+    """Largest number of generations."""
+    tolerance: float = Field(default=1e-4, gt=0.0)
+    """The search ends when the criterion's spread over the population is this share of its mean."""
+
+
+class IdentifyConfig(Frozen):
+    """How the Bingham parameters are found."""
+
+    method: Literal["separable", "evolutionary"] = "separable"
+    """`separable`: grid and least squares with the stiffness solved linearly; `evolutionary`: as the paper's
+    genetic algorithm. Both minimise the same criterion (4)."""
+    group: GroupConfig = GroupConfig()
+    """Which constant records are one condition."""
+    nodes: tuple[float, ...] | None = Field(default=None, min_length=1)
+    """Voltages (or other control values) at which records with moving voltage are fitted, parameters being
+    piecewise linear in between; empty for the constant voltages, or where there are fewer than two, the levels
+    that the voltage dwells on."""
+    evolutionary: EvolutionaryConfig = EvolutionaryConfig()
+    """Settings of `method: evolutionary`."""

@@ -1,0 +1,128 @@
+"""Intervals of least-squares parameters that allow for correlated residuals.
+
+The residuals of a rig record are correlated, so the textbook interval covers far too seldom. An
+autoregression fitted to the residuals of each record gives their covariance Omega, and with it
+the covariance of the ordinary least-squares estimate that the criterion asks for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.record import Array
+
+LARGEST_ORDER = 30
+"""Largest order of the autoregression; the one used is chosen by BIC."""
+SAMPLES_PER_ORDER = 20
+"""At least this many samples stand behind each coefficient."""
+
+
+@dataclass(frozen=True)
+class Autoregression:
+    """e_t = - sum a_i e_(t-i) + white noise."""
+
+    coefficients: Array
+    """(order + 1,) 1, a_1, ... a_order."""
+    variance: float
+    """Variance of the white noise."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """How well the data pin the parameters down."""
+
+    covariance: Array
+    """(p, p) covariance of the estimates, correlation of the residuals allowed for."""
+    degrees_of_freedom: float
+    """Independent residuals less parameters, for Student's t."""
+
+    def half_widths(self, level: float = 0.95) -> Array:
+        """(p,) half widths of the two-sided intervals."""
+        from scipy.stats import t
+
+        quantile = float(t.ppf(0.5 + 0.5 * level, max(self.degrees_of_freedom, 1.0)))
+        return quantile * np.sqrt(np.diag(self.covariance))
+
+
+def uncertainty(slopes: Array, residuals: Array, lengths: Sequence[int]) -> Uncertainty:
+    """Covariance of a least-squares estimate whose residuals are correlated within each record.
+
+    Equation: cov = (J'J)^-1 J' Omega J (J'J)^-1,  Omega = s2 A^-1 A^-T      Source: Box and Jenkins 1976, ch. 7
+
+    Parameters
+    ----------
+    slopes : (N, p) J, derivatives of the model by the parameters
+    residuals : (N,) measured less model
+    lengths : samples of each record, in order; their sum is N
+
+    Returns
+    -------
+    covariance with the small-sample factor N / (N - p), and degrees of freedom
+    """
+    from scipy.signal import lfilter
+
+    size = np.linalg.norm(slopes, axis=0)
+    size[size == 0.0] = 1.0
+    scaled = slopes / size
+    bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True)
+    meat = np.zeros((slopes.shape[1],) * 2)
+    independent, start = 0.0, 0
+    for length in lengths:
+        part = slice(start, start + length)
+        noise = autoregression(residuals[part])
+        filtered = lfilter([1.0], noise.coefficients, scaled[part][::-1], axis=0)
+        meat += noise.variance * filtered.T @ filtered
+        independent += length * _independent_share(noise)
+        start += length
+    small_sample = start / max(start - slopes.shape[1], 1)
+    covariance = small_sample * bread @ meat @ bread / np.outer(size, size)
+    return Uncertainty(covariance, independent - slopes.shape[1])
+
+
+def autoregression(residuals: Array) -> Autoregression:
+    """The autoregression of the order that BIC prefers, by Burg's recursion.
+
+    Equation: minimise the forward and backward prediction errors together      Source: Burg 1975
+
+    Parameters
+    ----------
+    residuals : (n,) residuals of one record, mean not taken off
+
+    Returns
+    -------
+    coefficients and the variance of the white noise
+    """
+    n = residuals.size
+    forward, backward = residuals[1:].copy(), residuals[:-1].copy()
+    coefficients = np.ones(1)
+    variance = float(residuals @ residuals) / max(n, 1)
+    best = (n * _log(variance), Autoregression(coefficients, variance))
+    for order in range(1, min(LARGEST_ORDER, n // SAMPLES_PER_ORDER) + 1):
+        total = float(forward @ forward + backward @ backward)
+        if total <= 0.0:
+            break
+        reflection = -2.0 * float(forward @ backward) / total
+        padded = np.append(coefficients, 0.0)
+        coefficients = padded + reflection * padded[::-1]
+        variance *= 1.0 - reflection**2
+        forward, backward = (forward + reflection * backward)[1:], (backward + reflection * forward)[:-1]
+        score = n * _log(variance) + order * np.log(n)
+        if score < best[0]:
+            best = (score, Autoregression(coefficients, variance))
+    return best[1]
+
+
+def _log(variance: float) -> float:
+    return float(np.log(max(variance, np.finfo(float).tiny)))
+
+
+def _independent_share(noise: Autoregression) -> float:
+    """Share of the samples that count as independent for the variance.
+
+    Equation: (mean of P)^2 / mean of P^2, P the noise spectrum      Source: Bartlett 1946
+    """
+    spectrum = 1.0 / np.abs(np.fft.rfft(noise.coefficients, 4096)) ** 2
+    return float(np.mean(spectrum) ** 2 / np.mean(spectrum**2))

@@ -1,0 +1,152 @@
+"""What ties one test to an equivalent viscous damper: work per cycle, c_eq, dynamic range."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.artefacts import MeasureRow
+from pzd.identify.trial import reversals, warm_up
+from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
+from pzd.rig.cycles import cycles
+
+SAME_SPEED = 0.05
+"""Tests whose peak speeds differ by less, relative, are at the same speed."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A closed loop of displacement, speed and force, or a record without one from its warm-up on."""
+
+    displacement: Array
+    velocity: Array
+    force: Array
+    step: float
+    closed: bool
+    frequency: float | None
+    cycles: float
+    """How many cycles the arrays cover."""
+
+
+def measures(records: Sequence[Record]) -> tuple[MeasureRow, ...]:
+    """The measures of every test, in the records' order."""
+    scale = voltage_scale(records)
+    rows = [_row(record, is_constant(record, scale)) for record in records]
+    return tuple(row.model_copy(update={"dynamic_range": _dynamic_range(row, rows)}) for row in rows)
+
+
+def work(displacement: Array, force: Array, closed: bool) -> float:
+    """Work done on the damper along the path.
+
+    Equation: W = integral of F dx, the area of the loop of force over displacement      Source: definition
+
+    Parameters
+    ----------
+    displacement : (n,) extension [m]
+    force : (n,) force [N]
+    closed : whether the last sample is followed by the first
+
+    Returns
+    -------
+    work [J]
+    """
+    if closed:
+        displacement, force = np.append(displacement, displacement[0]), np.append(force, force[0])
+    return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(displacement)))
+
+
+def equivalent_damping(work_done: float, velocity: Array, step: float) -> float:
+    """The viscous coefficient that would do the same work under the same motion.
+
+    Equation: c_eq = W / integral of v^2 dt      Source: definition
+
+    Parameters
+    ----------
+    work_done : W [J]
+    velocity : (n,) speed over the same path [m/s]
+    step : sampling interval [s]
+
+    Returns
+    -------
+    c_eq [N s/m]
+    """
+    return work_done / (float(velocity @ velocity) * step)
+
+
+def force_at_rest(velocity: Array, force: Array, closed: bool) -> float:
+    """Mean of abs(F) where the speed passes through zero, both branches alike [N].
+
+    0 where the speed never changes its sign.
+    """
+    if closed:
+        velocity, force = np.append(velocity, velocity[0]), np.append(force, force[0])
+    before = np.flatnonzero((velocity[:-1] >= 0.0) != (velocity[1:] >= 0.0))
+    if before.size == 0:
+        return 0.0
+    share = velocity[before] / (velocity[before] - velocity[before + 1])
+    return float(np.mean(np.abs(force[before] + share * (force[before + 1] - force[before]))))
+
+
+def loop_of(record: Record) -> Loop:
+    """The record's average cycle where its motion repeats, else all of it after the warm-up."""
+    run = cycles(record.time, record.displacement)
+    if run is None:
+        start = warm_up(record.displacement)
+        turns = len([i for i in reversals(record.displacement) if i >= start])
+        return Loop(
+            record.displacement[start:],
+            record.velocity[start:],
+            record.force[start:],
+            1.0 / record.rate,
+            False,
+            None,
+            max(0.5 * turns, 0.5),
+        )
+    displacement = run.mean(record.time, record.displacement)
+    step = run.period / displacement.size
+    velocity = (np.roll(displacement, -1) - np.roll(displacement, 1)) / (2.0 * step)
+    force = run.mean(record.time, record.force)
+    return Loop(displacement, velocity, force, step, True, run.frequency, 1.0)
+
+
+def _row(record: Record, still: bool) -> MeasureRow:
+    loop = loop_of(record)
+    total = work(loop.displacement, loop.force, loop.closed)
+    return MeasureRow(
+        record=record.name,
+        setting=record.setting,
+        voltage_V=record.median_voltage() if still else None,
+        temperature_degC=record.median_temperature(),
+        frequency_Hz=loop.frequency,
+        amplitude_m=0.5 * float(np.ptp(loop.displacement)),
+        peak_velocity_m_per_s=float(np.max(np.abs(loop.velocity))),
+        peak_force_N=float(np.max(np.abs(loop.force))),
+        force_at_zero_velocity_N=force_at_rest(loop.velocity, loop.force, loop.closed),
+        work_per_cycle_J=total / loop.cycles,
+        equivalent_damping_Ns_per_m=equivalent_damping(total, loop.velocity, loop.step),
+        dynamic_range=None,
+    )
+
+
+def _dynamic_range(row: MeasureRow, rows: Sequence[MeasureRow]) -> float | None:
+    """Peak force over that of the lowest voltage at the same speed, setting and temperature."""
+    if row.voltage_V is None or row.frequency_Hz is None:
+        return None
+    others = [r for r in rows if r.voltage_V is not None and r.frequency_Hz is not None and _same_test(r, row)]
+    lowest = min(others, key=lambda r: r.voltage_V or 0.0)
+    if lowest.voltage_V == max(r.voltage_V or 0.0 for r in others):
+        return None
+    return row.peak_force_N / lowest.peak_force_N
+
+
+def _same_test(a: MeasureRow, b: MeasureRow) -> bool:
+    speeds = a.peak_velocity_m_per_s, b.peak_velocity_m_per_s
+    strokes = a.amplitude_m, b.amplitude_m
+    warm = abs((a.temperature_degC or 0.0) - (b.temperature_degC or 0.0)) <= SAME_TEMPERATURE
+    return a.setting == b.setting and warm and _close(*speeds) and _close(*strokes)
+
+
+def _close(a: float, b: float) -> bool:
+    return abs(a - b) <= SAME_SPEED * max(a, b)

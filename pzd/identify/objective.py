@@ -1,0 +1,105 @@
+"""Criterion (4) over the records of one condition, and the bounds of the search.
+
+Equation: W_s = sum (F - F_sim)^2 / sum F^2      Source: Makowski and Knap 2021, eq. (4)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from pzd.damper.element import element_force, element_force_sensitivities
+from pzd.identify.trial import Trial
+from pzd.record import Array
+
+
+class Bingham(NamedTuple):
+    """The three parameters of the element, or one number for each of them."""
+
+    friction: float
+    damping: float
+    stiffness: float
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """What both methods minimise: criterion (4) pooled over the counted samples of the trials."""
+
+    trials: tuple[Trial, ...]
+
+    @cached_property
+    def measured(self) -> Array:
+        """(N,) measured force at the counted samples, trial by trial [N]."""
+        return np.concatenate([t.force[t.counted] for t in self.trials])
+
+    @cached_property
+    def energy(self) -> float:
+        """Denominator of the criterion [N2]."""
+        return float(self.measured @ self.measured)
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Counted samples of each trial."""
+        return tuple(int(np.count_nonzero(t.counted)) for t in self.trials)
+
+    def residuals(self, parameters: Bingham) -> Array:
+        """(N,) measured less simulated force [N]."""
+        parts = [
+            t.at_samples(element_force(t.displacement, t.step, *parameters, float(t.force[0])))[t.counted]
+            for t in self.trials
+        ]
+        return self.measured - np.concatenate(parts)
+
+    def residuals_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
+        """(N,) residuals and (N, 3) derivatives of the simulated force by T0, C and k."""
+        forces, slopes = [], []
+        for t in self.trials:
+            force, slope = element_force_sensitivities(t.displacement, t.step, *parameters, float(t.force[0]))
+            forces.append(t.at_samples(force)[t.counted])
+            slopes.append(t.at_samples(slope)[t.counted])
+        return self.measured - np.concatenate(forces), np.concatenate(slopes)
+
+    def criterion(self, parameters: Bingham) -> float:
+        """W_s at the parameters."""
+        residuals = self.residuals(parameters)
+        return float(residuals @ residuals) / self.energy
+
+    @cached_property
+    def scales(self) -> tuple[float, float, float]:
+        """Peak force [N], peak speed [m/s] and range of displacement [m] over the trials."""
+        speed = max(float(np.max(np.abs(np.diff(t.displacement)))) / t.step for t in self.trials)
+        stroke = max(float(np.ptp(t.displacement)) for t in self.trials)
+        return float(np.max(np.abs(self.measured))), speed, stroke
+
+    @cached_property
+    def bounds(self) -> tuple[Bingham, Bingham]:
+        """Smallest and largest parameters worth a look, from the data's own scales.
+
+        T0 up to the peak force; C from 1e-4 to 1e2 of peak force over peak speed; k from 0.1 to
+        1e4 of peak force over the range of displacement.
+        """
+        force, speed, stroke = self.scales
+        return (
+            Bingham(0.0, 1e-4 * force / speed, 0.1 * force / stroke),
+            Bingham(force, 1e2 * force / speed, 1e4 * force / stroke),
+        )
+
+    def clipped(self, parameters: Bingham) -> Bingham:
+        """The parameters, brought inside the bounds."""
+        low, high = self.bounds
+        return Bingham(*(float(np.clip(p, a, b)) for p, a, b in zip(parameters, low, high, strict=True)))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An optimum of the criterion."""
+
+    parameters: Bingham
+    criterion: float
+    residuals: Array
+    """(N,) measured less simulated force at the counted samples [N]."""
+    slopes: Array
+    """(N, 3) derivatives of the simulated force by T0, C and k."""

@@ -1,0 +1,126 @@
+"""The separable method: a coarse grid in two parameters, then least squares with exact sensitivities.
+
+Scaling T0 and C with k scales the force, F = k f(T0/k, C/k), so on the grid the stiffness follows
+linearly from the rest and only delta = T0/k and tau = C/k are searched.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pzd.damper.element import element_force
+from pzd.identify.objective import Bingham, Fit, Objective
+from pzd.identify.starts import graphical_start
+from pzd.identify.trial import Trial
+from pzd.record import Array
+
+GRID = (12, 10)
+"""Points of the grid in delta = T0/k and in tau = C/k."""
+GRID_SAMPLES = 10_000
+"""The grid is evaluated on at most this many samples, shared out among the trials."""
+DESCENTS = 3
+"""How many of the best grid points are followed down."""
+SAME_OPTIMUM = 1e-6
+"""Two descents whose criteria differ by less, relative, have reached the same optimum."""
+TOLERANCE = 1e-12
+"""Tolerance of the least squares, relative, on parameters and criterion."""
+
+
+def fit_separable(objective: Objective) -> Fit:
+    """The global optimum of the criterion, from the graphical starting values and the grid.
+
+    Starts are followed down until the best optimum has been reached twice.
+    """
+    best = descend(objective, graphical_start(objective.trials))
+    for start in grid_starts(objective):
+        fit = descend(objective, start)
+        if abs(fit.criterion - best.criterion) <= SAME_OPTIMUM * best.criterion:
+            return best
+        best = min(best, fit, key=lambda f: f.criterion)
+    return best
+
+
+def grid_starts(objective: Objective, count: int = DESCENTS) -> list[Bingham]:
+    """The best points of the grid, best first.
+
+    Equation: k = sum F f / sum f^2 with f = F(T0/k, C/k, 1)      Source: eq. (1)-(3), scaled by k
+    """
+    _, _, stroke = objective.scales
+    pieces = [_piece(t, GRID_SAMPLES // len(objective.trials)) for t in objective.trials]
+    slowest = max((t.displacement.size - 1) * t.step for t in objective.trials)
+    deltas = np.geomspace(1e-4 * stroke, 0.5 * stroke, GRID[0])
+    taus = np.geomspace(min(p[1] for p in pieces), 0.1 * slowest, GRID[1])
+    found: list[tuple[float, Bingham]] = []
+    for delta in deltas:
+        for tau in taus:
+            match, energy = _overlap(pieces, float(delta), float(tau))
+            if match > 0.0:
+                k = match / energy
+                found.append((-match * k, Bingham(float(delta) * k, float(tau) * k, k)))
+    return [objective.clipped(start) for _, start in sorted(found)[:count]]
+
+
+def descend(objective: Objective, start: Bingham) -> Fit:
+    """The optimum reached from a starting point by trust-region least squares within the bounds."""
+    from scipy.optimize import least_squares
+
+    force = objective.scales[0]
+    norm = np.sqrt(objective.energy)
+    low, high = (_to_search(b, force) for b in objective.bounds)
+
+    def both(x: Array) -> tuple[Array, Array]:
+        parameters = _from_search(x, force)
+        residuals, slopes = objective.residuals_and_slopes(parameters)
+        return residuals / norm, -slopes * np.array([force, parameters.damping, parameters.stiffness]) / norm
+
+    memory: dict[bytes, tuple[Array, Array]] = {}
+
+    def at(x: Array) -> tuple[Array, Array]:
+        key = x.tobytes()
+        if key not in memory:
+            memory.clear()
+            memory[key] = both(x)
+        return memory[key]
+
+    inside = np.clip(_to_search(start, force), low + 1e-6, high - 1e-6)
+    found = least_squares(
+        lambda x: at(x)[0],
+        inside,
+        jac=lambda x: at(x)[1],
+        bounds=(low, high),
+        x_scale="jac",
+        xtol=TOLERANCE,
+        ftol=TOLERANCE,
+        gtol=TOLERANCE,
+        max_nfev=100,
+    )
+    parameters = _from_search(found.x, force)
+    residuals, slopes = objective.residuals_and_slopes(parameters)
+    return Fit(parameters, float(residuals @ residuals) / objective.energy, residuals, slopes)
+
+
+def _to_search(parameters: Bingham, force: float) -> Array:
+    return np.array([parameters.friction / force, np.log(parameters.damping), np.log(parameters.stiffness)])
+
+
+def _from_search(x: Array, force: float) -> Bingham:
+    return Bingham(float(x[0]) * force, float(np.exp(x[1])), float(np.exp(x[2])))
+
+
+def _piece(trial: Trial, samples: int) -> tuple[Array, float, Array, int]:
+    """Coarse displacement, its step, the force, and the first counted sample, of the trial's first part."""
+    first = int(np.argmax(trial.counted))
+    stop = max(first + samples, 2 * first)
+    displacement = np.ascontiguousarray(trial.at_samples(trial.displacement)[:stop])
+    step = trial.step * (trial.displacement.size - 1) / (trial.force.size - 1)
+    return displacement, step, trial.force[:stop], first
+
+
+def _overlap(pieces: list[tuple[Array, float, Array, int]], delta: float, tau: float) -> tuple[float, float]:
+    """Sums of F f and of f^2 over the pieces."""
+    match = energy = 0.0
+    for displacement, step, force, first in pieces:
+        shape = element_force(displacement, step, delta, tau, 1.0)[first:]
+        match += float(force[first:] @ shape)
+        energy += float(shape @ shape)
+    return match, energy

@@ -1,0 +1,74 @@
+"""Starting values read off the dissipative characteristic, as the paper's first stage does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pzd.identify.objective import Bingham
+from pzd.identify.trial import Trial
+from pzd.record import Array
+
+FLANK = 0.5
+"""The slip flank is where the speed exceeds this share of its peak."""
+PRE_SLIP = 0.5
+"""The pre-slip branch is read where abs(F) stays below this share of the force at the foot of the flank."""
+
+
+def graphical_start(trials: Sequence[Trial]) -> Bingham:
+    """Starting values of T0, C and k from the characteristic of force over speed.
+
+    Equation: abs(F) = T0 + C abs(v) on the slip flank; k = dF/dx before slip      Source: eq. (1)-(3)
+
+    T0 is where the slip flank, extended, meets zero piston speed (the force measured there is
+    larger, the oil spring being still loaded); C is the flank's slope; k the slope of force over
+    displacement where the force passes through zero.
+
+    Parameters
+    ----------
+    trials : the records of one condition
+
+    Returns
+    -------
+    T0 [N], C [N s/m], k [N/m], all positive
+    """
+    speed, force = _flank(trials)
+    peak = max(float(np.max(force, initial=0.0)), 1e-12)
+    slope, intercept = np.polyfit(speed, force, 1) if np.ptp(speed) > 0.0 else (0.0, peak)
+    damping = slope if slope > 0.0 else 0.1 * peak / max(float(np.max(speed)), 1e-12)
+    friction = float(np.clip(intercept, 0.01 * peak, peak))
+    return Bingham(friction, float(damping), _pre_slip_slope(trials, friction))
+
+
+def _flank(trials: Sequence[Trial]) -> tuple[Array, Array]:
+    """Speed and force along the direction of motion, where the element surely slips."""
+    speeds, forces = [], []
+    for t in trials:
+        velocity = t.at_samples(np.gradient(t.displacement, t.step))[t.counted]
+        fast = np.abs(velocity) > FLANK * np.max(np.abs(velocity))
+        speeds.append(np.abs(velocity[fast]))
+        forces.append((t.force[t.counted] * np.sign(velocity))[fast])
+    return np.concatenate(speeds), np.concatenate(forces)
+
+
+def _pre_slip_slope(trials: Sequence[Trial], friction: float) -> float:
+    """Slope of force over displacement where the force passes through zero, pooled over all passages."""
+    covariance = variance = 0.0
+    for t in trials:
+        displacement = t.at_samples(t.displacement)[t.counted]
+        force = t.force[t.counted]
+        for part in _runs(np.abs(force) < PRE_SLIP * friction):
+            dx = displacement[part] - displacement[part].mean()
+            covariance += float(dx @ (force[part] - force[part].mean()))
+            variance += float(dx @ dx)
+    if covariance > 0.0:
+        return covariance / variance
+    stroke = max(float(np.ptp(t.displacement)) for t in trials)
+    return 20.0 * friction / stroke
+
+
+def _runs(inside: np.ndarray) -> list[slice]:  # type: ignore[type-arg]  # boolean (n,)
+    """Stretches of at least three samples inside."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], inside.astype(int), [0]))))
+    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 3]

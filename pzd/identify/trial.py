@@ -1,0 +1,151 @@
+"""A record made ready for fitting: displacement on a fine grid, force to be met, warm-up left out.
+
+The exact element takes the displacement as linear between samples. A sine sampled at 1 kHz and
+read that way biases k by 0.04 %, so the displacement is first laid on a finer grid by a cubic
+spline. The force at the first sample is unknown to the model (it depends on what went before):
+simulation starts from the measured force, and a warm-up is left out of the criterion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pzd.damper.motion import Motion
+from pzd.record import Array, Record
+
+FINE_RATE = 4000.0
+"""The fine grid has at least this rate [Hz]."""
+FINE_ANGLE = 1.0 / 256.0
+"""The fine step is at most this share of 1/omega of the fastest half cycle."""
+FINEST = 64
+"""Largest factor between the fine grid and the samples."""
+REVERSAL_SHARE = 0.1
+"""A reversal counts when the motion before and after it exceeds this share of the range."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One record as the fit sees it."""
+
+    name: str
+    displacement: Array
+    """(m,) displacement on the fine grid [m]."""
+    step: float
+    """Step of the fine grid [s]."""
+    factor: int
+    """Fine steps in one sample."""
+    force: Array
+    """(n,) measured force [N]."""
+    counted: Array | np.ndarray[Any, np.dtype[np.bool_]]
+    """(n,) whether the sample enters the criterion."""
+    positions: Array | None = None
+    """(n,) where the samples lie on the fine grid, in fine steps; None where every `factor`-th one is a sample."""
+
+    def at_samples(self, fine: Array) -> Array:
+        """What a fine signal, (m,) or (m, p), reads at the n samples."""
+        if self.positions is None:
+            return fine[:: self.factor]
+        low = np.minimum(self.positions.astype(int), fine.shape[0] - 2)
+        share = (self.positions - low).reshape(-1, *([1] * (fine.ndim - 1)))
+        return np.asarray(fine[low] * (1.0 - share) + fine[low + 1] * share)
+
+
+def trial_of(record: Record) -> Trial:
+    """The record made ready for fitting, its warm-up left out."""
+    time, factor, positions = _fine_time(record)
+    return Trial(
+        record.name,
+        _spline(record.time, record.displacement, positions is None)(time),
+        float((time[-1] - time[0]) / (time.size - 1)),
+        factor,
+        record.force,
+        np.arange(record.time.size) >= warm_up(record.displacement),
+        positions,
+    )
+
+
+def fine_motion(record: Record) -> Motion:
+    """The record's motion on the fine grid of `trial_of`; voltage and temperature linear between samples."""
+    time, _, positions = _fine_time(record)
+    regular = positions is None
+    stamps = np.linspace(record.time[0], record.time[-1], record.time.size) if regular else record.time
+
+    def linear(channel: Array | None) -> Array | None:
+        return None if channel is None else np.interp(time, stamps, channel)
+
+    return Motion(
+        time,
+        _spline(record.time, record.displacement, regular)(time),
+        _spline(record.time, record.velocity, regular)(time),
+        _spline(record.time, record.acceleration, regular)(time),
+        linear(record.voltage),
+        linear(record.temperature),
+    )
+
+
+def reversals(displacement: Array, share: float = REVERSAL_SHARE) -> list[int]:
+    """Samples at which the motion turns, each between strokes larger than that share of the range."""
+    enough = share * float(np.ptp(displacement))
+    steps = np.sign(np.diff(displacement))
+    candidates = [0, *(np.flatnonzero(steps[1:] != steps[:-1]) + 1).tolist(), displacement.size - 1]
+    turns: list[int] = []
+    low = high = 0
+    direction = 0
+    for i in candidates:
+        low = i if displacement[i] < displacement[low] else low
+        high = i if displacement[i] > displacement[high] else high
+        if direction >= 0 and displacement[high] - displacement[i] > enough:
+            if direction or displacement[high] - displacement[0] > enough:
+                turns.append(high)
+            direction, low = -1, i
+        elif direction <= 0 and displacement[i] - displacement[low] > enough:
+            if direction or displacement[0] - displacement[low] > enough:
+                turns.append(low)
+            direction, high = 1, i
+    return turns
+
+
+def warm_up(displacement: Array) -> int:
+    """How many samples to leave out until the force no longer depends on how the record began.
+
+    The force at the first sample decays only while the element slips. It has slipped both ways
+    once the motion has turned a first time, with more than 10 % of its range before the turn, and
+    gone as far again after it. At most half the record is left out.
+    """
+    turns = reversals(displacement)
+    if not turns:
+        return displacement.size // 2
+    away = np.abs(displacement[turns[0] :] - displacement[turns[0]])
+    travelled = turns[0] + int(np.argmax(away > REVERSAL_SHARE * np.ptp(displacement)))
+    return min(travelled, displacement.size // 2)
+
+
+def upsampling_factor(record: Record) -> int:
+    """Fine steps in one sample, from the sampling rate and the fastest half cycle of the motion."""
+    step = 1.0 / record.rate
+    half_cycle = min(np.diff(reversals(record.displacement)), default=record.displacement.size) * step
+    wanted = max(FINE_RATE * step, np.pi / half_cycle * step / FINE_ANGLE)
+    return int(np.clip(np.ceil(wanted - 1e-6), 1, FINEST))
+
+
+def _fine_time(record: Record) -> tuple[Array, int, Array | None]:
+    """Fine time stamps; their factor; and where samples lie among them, None where the clock is regular.
+
+    Stamps off a regular clock by less than half a step are rounded ones, not an irregular clock.
+    """
+    time, factor = record.time, upsampling_factor(record)
+    clock = np.linspace(time[0], time[-1], time.size)
+    if np.max(np.abs(time - clock)) < 0.5 * (clock[1] - clock[0]):
+        return np.linspace(time[0], time[-1], (time.size - 1) * factor + 1), factor, None
+    count = int(np.ceil((time[-1] - time[0]) * record.rate * factor)) + 1
+    fine = np.linspace(time[0], time[-1], count)
+    return fine, factor, (time - time[0]) / (fine[1] - fine[0])
+
+
+def _spline(time: Array, channel: Array, regular: bool) -> Any:
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(np.linspace(time[0], time[-1], time.size) if regular else time, channel)
