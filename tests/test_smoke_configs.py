@@ -1,0 +1,79 @@
+"""Every config in configs/ runs from end to end; those over measured data that is absent are skipped and say so."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parent.parent
+CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
+CONTRACT = (
+    "config.yaml",
+    "1-rig/records.json",
+    "1-rig/*.csv",
+    "2-identify/parameters.csv",
+    "3-diagnose/diagnosis.json",
+    "3-diagnose/damper.yaml",
+    "4-table/force.csv",
+    "4-table/inverse.csv",
+    "5-simulate/*.csv",
+    "5-simulate/summary.csv",
+    "6-report/comfort.csv",
+    "6-report/report.html",
+    "*/manifest.json",
+)
+DONE, UNTRUSTED = 0, 4
+
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
+pytestmark = pytest.mark.ci
+
+
+def measured(config: Path) -> list[str]:
+    """The patterns of the rig files that a config reads."""
+    rig: dict[str, Any] = yaml.safe_load(config.read_text(encoding="utf-8"))["rig"]
+    return [entry["path"] for entry in rig.get("files", ())]
+
+
+def absent(config: Path) -> list[str]:
+    """The patterns that match no file, seen from the config."""
+    return [pattern for pattern in measured(config) if not any(_matches(config.parent, pattern))]
+
+
+def _matches(folder: Path, pattern: str) -> list[Path]:
+    while pattern.startswith("../"):
+        folder, pattern = folder.parent, pattern.removeprefix("../")
+    return list(folder.glob(pattern))
+
+
+def written(folder: Path) -> dict[str, int]:
+    """When each file of a run was written last."""
+    return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+
+
+def test_there_are_configs_to_run() -> None:
+    assert "quickstart" in {config.stem for config in CONFIGS}
+
+
+@pytest.mark.parametrize("config", CONFIGS, ids=lambda config: config.stem)
+def test_a_config_runs_from_end_to_end_and_once_only(config: Path, pzd: Command, tmp_path: Path) -> None:
+    if absent(config):
+        pytest.skip(f"configs/{config.name}: measured data absent, nothing matches {', '.join(absent(config))}")
+    assert pzd("check", config, "--runs", tmp_path).returncode == DONE
+    assert written(tmp_path) == {}
+
+    first = pzd("run", config, "--runs", tmp_path)
+    # What the virtual stand gives must be trusted; of a measured damper it may be a finding that it cannot.
+    admitted = {DONE, UNTRUSTED} if measured(config) else {DONE}
+    assert first.returncode in admitted, first.stdout + first.stderr
+    folder = tmp_path / config.stem
+    assert [pattern for pattern in CONTRACT if not any(folder.glob(pattern))] == []
+
+    before = written(folder)
+    second = pzd("run", config, "--runs", tmp_path)
+    assert second.returncode == first.returncode, second.stdout + second.stderr
+    assert written(folder) == before
