@@ -1,0 +1,1 @@
+"""What the passengers feel, and one page that tells the whole story."""

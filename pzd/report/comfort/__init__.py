@@ -1,0 +1,1 @@
+"""Human vibration: frequency weighting, measures, and what three standards make of them."""
