@@ -13,7 +13,7 @@ EFFECT = Effect(
     place="flow",
     law="T0 and C times (1 + alpha sign(F))",
     parameters=(Parameter("alpha", "-", 0.0, -0.95, 0.95, "share by which rebound is harder"),),
-    source="Dixon 2007, The Shock Absorber Handbook, sec. 1.7",
+    source="Dixon 2007, The Shock Absorber Handbook",
     tests=(({"direction": 1.0, "alpha": 0.1}, 1.1), ({"direction": -1.0, "alpha": 0.1}, 0.9)),
 )
 

@@ -17,7 +17,7 @@ EFFECT = Effect(
         Parameter("k_e", "N/m2", 0.0, 0.0, 1.0e12, "progressive stiffness of the stop"),
         Parameter("x_e", "m", 0.02, 0.0, 1.0, "displacement at which it begins"),
     ),
-    source="quadratic bump stop; Dixon 2007, The Shock Absorber Handbook, sec. 1.9",
+    source="quadratic bump stop; Dixon 2007, The Shock Absorber Handbook",
     tests=(
         ({"x": 0.03, "v": 0.0, "a": 0.0, "k_e": 1.0e6, "x_e": 0.02}, 100.0),
         ({"x": -0.03, "v": 0.0, "a": 0.0, "k_e": 1.0e6, "x_e": 0.02}, -100.0),

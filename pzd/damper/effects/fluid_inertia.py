@@ -13,7 +13,7 @@ EFFECT = Effect(
     place="parallel",
     law="m a",
     parameters=(Parameter("m", "kg", 0.0, -1.0e5, 1.0e5, "apparent mass of the oil column"),),
-    source="fluid inerter; Swift et al. 2013, Vehicle System Dynamics 51(11), eq. (4)",
+    source="fluid inerter; Swift et al. 2013, Vehicle System Dynamics 51(11)",
     tests=(({"x": 0.01, "v": 1.0, "a": 4.0, "m": 5.0}, 20.0),),
 )
 

@@ -12,7 +12,7 @@ EFFECT = Effect(
     place="parallel",
     law="k_g x",
     parameters=(Parameter("k_g", "N/m", 0.0, -1.0e7, 1.0e7, "stiffness beside the element"),),
-    source="Dixon 2007, The Shock Absorber Handbook, sec. 5.2",
+    source="Dixon 2007, The Shock Absorber Handbook",
     tests=(({"x": 0.01, "v": 1.0, "a": 1.0, "k_g": 2000.0}, 20.0),),
 )
 

@@ -13,7 +13,7 @@ EFFECT = Effect(
     place="stroke",
     law="F = k e, e = dead zone of x - y, whole width delta",
     parameters=(Parameter("delta", "m", 0.0, 0.0, 0.05, "whole width of the free play"),),
-    source="dead-zone nonlinearity; Slotine and Li 1991, sec. 5.2",
+    source="dead-zone nonlinearity; Slotine and Li 1991, Applied Nonlinear Control",
     tests=(
         ({"deflection": 0.0004, "delta": 0.001}, 0.0),
         ({"deflection": -0.0008, "delta": 0.001}, -0.0003),

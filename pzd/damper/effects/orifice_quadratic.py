@@ -12,7 +12,7 @@ EFFECT = Effect(
     place="flow",
     law="+ q w^2",
     parameters=(Parameter("q", "N s2/m2", 0.0, 0.0, 1.0e8, "force over the square of the flow speed"),),
-    source="orifice equation dp = rho Q^2 / (2 Cd^2 A^2); Merritt 1967, eq. (3-25)",
+    source="orifice equation dp = rho Q^2 / (2 Cd^2 A^2); Merritt 1967, Hydraulic Control Systems",
     tests=(({"w": 0.3, "q": 1500.0}, 135.0),),
 )
 

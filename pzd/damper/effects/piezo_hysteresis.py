@@ -13,7 +13,7 @@ EFFECT = Effect(
     place="drive",
     law="Ue = max(U - r, min(U + r, Ue))",
     parameters=(Parameter("r", "V", 0.0, 0.0, 1.0e4, "half-width of the play, in the unit of the control signal"),),
-    source="Prandtl-Ishlinskii play operator; Brokate and Sprekels 1996, sec. 2.3",
+    source="Prandtl-Ishlinskii play operator; Brokate and Sprekels 1996, Hysteresis and Phase Transitions",
     tests=(
         ({"felt": 0.0, "now": 30.0, "r": 10.0}, 20.0),
         ({"felt": 20.0, "now": 15.0, "r": 10.0}, 20.0),

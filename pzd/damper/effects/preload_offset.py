@@ -12,7 +12,7 @@ EFFECT = Effect(
     place="parallel",
     law="F_0",
     parameters=(Parameter("F_0", "N", 0.0, -1.0e6, 1.0e6, "constant force beside the element"),),
-    source="Dixon 2007, The Shock Absorber Handbook, sec. 5.2",
+    source="Dixon 2007, The Shock Absorber Handbook",
     tests=(({"x": 0.01, "v": 1.0, "a": 1.0, "F_0": 55.0}, 55.0),),
 )
 

@@ -18,7 +18,7 @@ EFFECT = Effect(
         Parameter("F_r", "N", inf, 0.0, 1.0e7, "force at which the valve opens"),
         Parameter("C_r", "N s/m", 0.0, 1.0e-3, 1.0e8, "slope beyond it"),
     ),
-    source="two-stage damper valve; Dixon 2007, The Shock Absorber Handbook, sec. 7.6",
+    source="two-stage damper valve; Dixon 2007, The Shock Absorber Handbook",
     tests=(({"F_r": 900.0, "T0": 300.0}, 900.0), ({"F_r": 200.0, "T0": 300.0}, 300.0)),
 )
 

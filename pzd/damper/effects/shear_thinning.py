@@ -16,7 +16,7 @@ EFFECT = Effect(
     place="flow",
     law="C w becomes C w_r (w/w_r)^n, w_r = 0.3 m/s",
     parameters=(Parameter("n", "-", 1.0, 0.1, 1.0, "flow index; 1 is a Newtonian fluid"),),
-    source="Ostwald-de Waele power law; Bird, Stewart and Lightfoot 2002, eq. (8.3-4)",
+    source="Ostwald-de Waele power law; Bird, Stewart and Lightfoot 2002, Transport Phenomena",
     tests=(
         ({"w": 0.3, "C": 2000.0, "n": 0.7}, 600.0),
         ({"w": 0.03, "C": 2000.0, "n": 0.5}, 189.73665961010275),

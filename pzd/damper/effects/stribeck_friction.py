@@ -17,7 +17,7 @@ EFFECT = Effect(
         Parameter("F_s", "N", 0.0, 0.0, 1.0e6, "friction at rest above that at speed"),
         Parameter("v_s", "m/s", 0.02, 1.0e-4, 2.0, "speed over which it falls"),
     ),
-    source="Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30(7), eq. (6)",
+    source="Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30(7)",
     tests=(
         ({"x": 0.0, "v": 0.02, "a": 0.0, "F_s": 100.0, "v_s": 0.02}, 36.787944117144235),
         ({"x": 0.0, "v": -0.02, "a": 0.0, "F_s": 100.0, "v_s": 0.02}, -36.787944117144235),

@@ -1,0 +1,191 @@
+"""The whole damper: drive, material, stroke, flow, parallel forces and sensor in their order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.beside import COLUMNS, beside_all
+from pzd.damper.drive import felt_voltage
+from pzd.damper.effects import library
+from pzd.damper.effects.sensor_delay import law as moment
+from pzd.damper.flow import ROW, flow_force
+from pzd.damper.material import base_voltages, material
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
+from pzd.damper.path import march, row_of
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-9
+"""Admissible error of one piece of the path, as a share of the force."""
+
+_FLOW_COLUMNS = tuple(
+    (effect.name, parameter.name)
+    for column in ROW[3:]
+    for effect in library().values()
+    for parameter in effect.parameters
+    if parameter.name == column and effect.place in ("stroke", "flow")
+)
+_EVEN = 1e-6  # of the median sampling interval
+
+
+def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, tolerance: float = TOLERANCE) -> Array:
+    """Force that the force channel records while the damper goes through a motion.
+
+    Parameters
+    ----------
+    damper : the damper with its effects
+    motion : (n,) sampled motion; the extension is a parabola inside each step, voltage and
+        temperature go linearly
+    initial_force : force of the oil spring at the first sample [N]
+    tolerance : admissible error of a piece, as a share of the force
+
+    Returns
+    -------
+    (n,) force [N]
+
+    Raises
+    ------
+    ValueError : when the damper needs a voltage or temperature that the motion does not have
+    """
+    steps = sampling_steps(motion.time)
+    felt = felt_by_valve(damper, motion.voltage, steps)
+    rows = element_rows(damper, felt, motion.temperature)
+    force = march(motion.displacement, motion.velocity, steps, rows, initial_force, tolerance)
+    force += parallel_force(damper, felt, motion)
+    return recorded(damper, motion.time, force)
+
+
+def sampling_steps(time: Array) -> Array:
+    """(1,) sampling interval [s] where it is even, else (n - 1,)."""
+    steps = np.diff(time)
+    usual = (time[-1] - time[0]) / steps.size
+    return np.array([usual]) if np.max(np.abs(steps - usual)) <= _EVEN * usual else steps
+
+
+def felt_by_valve(damper: Damper, voltage: Array | None, steps: Array) -> Array | None:
+    """(n,) voltage as the valve feels it [V]; None where none is given."""
+    tau, r = value_of(damper, "valve_lag", "tau"), value_of(damper, "piezo_hysteresis", "r")
+    if voltage is None or (tau == 0.0 and r == 0.0):
+        return voltage
+    return felt_voltage(voltage, steps, tau, r)
+
+
+def element_rows(damper: Damper, felt: Array | None, temperature: Array | float | None) -> Array:
+    """(n, 10) parameter rows of the element with its stroke and flow effects, (1, 10) where nothing moves."""
+    base = material(damper, felt, temperature)
+    extra = _effect_columns(damper, _FLOW_COLUMNS, felt)
+    rows = np.hstack([np.broadcast_to(part, (max(len(base), len(extra)), part.shape[1])) for part in (base, extra)])
+    return rows[:1] if np.all(rows == rows[0]) else rows
+
+
+def parallel_force(damper: Damper, felt: Array | None, motion: Motion) -> Array:
+    """(n,) force beside the element [N]."""
+    if not any(effect in damper.effects for effect, _ in COLUMNS):
+        return np.zeros(motion.time.size)
+    rows = _effect_columns(damper, COLUMNS, felt)
+    return np.asarray(beside_all(motion.displacement, motion.velocity, motion.acceleration, rows))
+
+
+def recorded(damper: Damper, time: Array, force: Array) -> Array:
+    """(n,) force as the delayed channel shows it [N], linear between samples, held before the first."""
+    tau = value_of(damper, "sensor_delay", "tau")
+    return force if tau == 0.0 else np.interp(moment(time, tau), time, force)  # type: ignore[arg-type]  # law takes arrays as well
+
+
+def steady_force(
+    damper: Damper, voltage: Array | float | None, temperature: float | None, velocity: Array | float
+) -> Array:
+    """Force at steady slip: what a table of force over voltage and velocity can carry.
+
+    The oil spring has settled, so w = |v|. A force that is there at rest (a preload) is carried by
+    the static balance and left out, as are forces by displacement and acceleration.
+
+    Parameters
+    ----------
+    damper : the damper
+    voltage : voltage [V], broadcast against velocity; None where the damper has a single one
+    temperature : [degC]; None where the damper has a single one
+    velocity : extension speed [m/s]; -0.0 and +0.0 give the two one-sided limits
+
+    Returns
+    -------
+    force [N] in the broadcast shape
+    """
+    speeds, voltages = np.broadcast_arrays(
+        np.asarray(velocity, dtype=np.float64), np.asarray(0.0 if voltage is None else voltage, dtype=np.float64)
+    )
+    v, u = speeds.ravel(), voltages.ravel()
+    felt = None if voltage is None else u
+    rows = np.broadcast_to(element_rows(damper, felt, temperature), (v.size, len(ROW)))
+    side = np.copysign(1.0, v)
+    force = np.array([s * flow_force(abs(w), row_of(row), s) for w, s, row in zip(v, side, rows, strict=True)])
+    beside = _effect_columns(damper, COLUMNS, felt)
+    rest = np.zeros(v.size)
+    moving = np.where(v == 0.0, side * np.finfo(np.float64).tiny, v)
+    force += beside_all(rest, moving, rest, beside) - beside_all(rest, rest, rest, beside)
+    return force.reshape(speeds.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """A damper at one temperature, laid out for compiled loops: everything piecewise linear in the voltage felt."""
+
+    voltages: Array
+    """(m,) rising nodes [V]; held beyond."""
+    rows: Array
+    """(m, 10) parameter rows of the element."""
+    beside: Array
+    """(m, b) rows of the parallel effects, columns as `beside.COLUMNS`."""
+    tau: float
+    """Time constant of the valve lag [s]."""
+    r: float
+    """Half-width of the play [V]."""
+
+
+def nodes_of(damper: Damper, temperature: float | None) -> Nodes:
+    """The damper at one temperature [degC], laid out for compiled loops."""
+    listed = [values["at_voltage_V"] for values in damper.effects.values() if "at_voltage_V" in values]
+    voltages = np.unique(np.concatenate([base_voltages(damper), *(np.atleast_1d(v) for v in listed)]))
+    shape = (voltages.size, -1)
+    rows = element_rows(damper, voltages, temperature)
+    beside = _effect_columns(damper, COLUMNS, voltages)
+    return Nodes(
+        voltages,
+        np.broadcast_to(rows, (voltages.size, rows.shape[1])).reshape(shape).copy(),
+        np.broadcast_to(beside, (voltages.size, beside.shape[1])).reshape(shape).copy(),
+        value_of(damper, "valve_lag", "tau"),
+        value_of(damper, "piezo_hysteresis", "r"),
+    )
+
+
+def value_of(damper: Damper, effect: str, parameter: str) -> float:
+    """A parameter that is one number: the damper's, or the neutral one where it lacks the effect.
+
+    Raises
+    ------
+    ValueError : when the damper gives it by voltage
+    """
+    value = damper.effects.get(effect, {}).get(parameter, library()[effect].parameter(parameter).neutral)
+    if isinstance(value, tuple):
+        raise ValueError(f"{effect}.{parameter} must be one number, not a list by voltage")
+    return value
+
+
+def _effect_columns(damper: Damper, columns: tuple[tuple[str, str], ...], felt: Array | None) -> Array:
+    """(n, m) or (1, m) values of effect parameters, by the voltage felt where they are lists."""
+    values = [_column(damper, effect, parameter, felt) for effect, parameter in columns]
+    return np.stack(np.broadcast_arrays(*values), axis=-1)
+
+
+def _column(damper: Damper, effect: str, parameter: str, felt: Array | None) -> Array:
+    given = damper.effects.get(effect, {})
+    value = given.get(parameter, library()[effect].parameter(parameter).neutral)
+    if not isinstance(value, tuple):
+        return np.array([value])
+    if felt is None:
+        raise ValueError(f"{effect}.{parameter} depends on the voltage, and none is given")
+    return np.interp(felt, np.atleast_1d(given["at_voltage_V"]), np.array(value))

@@ -1,0 +1,99 @@
+"""T0, C and k as they are now: interpolated between the damper's base rows, held beyond them.
+
+Over temperature first, at each voltage, then over voltage; `temperature_drift` multiplies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.effects.temperature_drift import law as drift
+from pzd.damper.model import BaseRow, Damper
+
+Array = NDArray[np.float64]
+
+_SAME_VOLTAGE = 0.02  # of the largest voltage; labels of one voltage at two temperatures differ a little
+
+
+def base_voltages(damper: Damper) -> Array:
+    """(m,) voltages of the base rows [V], rising; one zero where the damper has no voltage."""
+    return np.array([voltage for voltage, _ in _by_voltage(damper.base)])
+
+
+def material(damper: Damper, voltage: Array | float | None, temperature: Array | float | None) -> Array:
+    """T0 [N], C [N s/m] and k [N/m] at a voltage as felt and a temperature.
+
+    Parameters
+    ----------
+    damper : the damper
+    voltage : (n,) or a number, voltage felt [V]; None where the damper has a single one
+    temperature : (n,) or a number [degC]; None where the damper has a single one
+
+    Returns
+    -------
+    (n, 3), n = 1 for numbers
+
+    Raises
+    ------
+    ValueError : when the damper depends on a voltage or temperature that is not given
+    """
+    groups = _by_voltage(damper.base)
+    if voltage is None and len(groups) > 1:
+        raise ValueError("the damper depends on the voltage, and none is given")
+    at_nodes = np.stack([_over_temperature(rows, temperature) for _, rows in groups])
+    nodes = np.array([node for node, _ in groups])
+    values = _over_voltage(nodes, at_nodes, np.atleast_1d(0.0 if voltage is None else voltage))
+    return values * _drift_factors(damper, temperature)
+
+
+def _by_voltage(rows: Sequence[BaseRow]) -> list[tuple[float, list[BaseRow]]]:
+    scale = max(abs(row.voltage_V or 0.0) for row in rows)
+    groups: list[tuple[float, list[BaseRow]]] = []
+    for row in sorted(rows, key=lambda r: (r.voltage_V or 0.0, r.temperature_degC or 0.0)):
+        voltage = row.voltage_V or 0.0
+        if groups and voltage - groups[-1][0] <= _SAME_VOLTAGE * scale:
+            groups[-1][1].append(row)
+        else:
+            groups.append((voltage, [row]))
+    return groups
+
+
+def _over_temperature(rows: Sequence[BaseRow], temperature: Array | float | None) -> Array:
+    rows = sorted(rows, key=lambda row: row.temperature_degC or 0.0)
+    if temperature is None and len(rows) > 1:
+        raise ValueError("the damper depends on the temperature, and none is given")
+    at = np.array([row.temperature_degC or 0.0 for row in rows])
+    columns = np.array([(row.T0_N, row.C_Ns_per_m, row.k_N_per_m) for row in rows])
+    wanted = np.atleast_1d(at[0] if temperature is None else temperature)
+    return np.stack([np.interp(wanted, at, column) for column in columns.T], axis=-1)
+
+
+def _over_voltage(nodes: Array, at_nodes: Array, voltage: Array) -> Array:
+    """Piecewise linear over the first axis of (m, n or 1, 3), held beyond its ends."""
+    if nodes.size == 1:
+        return np.broadcast_to(at_nodes[0], (max(voltage.size, at_nodes.shape[1]), 3))
+    inside = np.clip(voltage, nodes[0], nodes[-1])
+    left = np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, nodes.size - 2)
+    share = ((inside - nodes[left]) / (nodes[left + 1] - nodes[left]))[:, None]
+    columns = np.arange(at_nodes.shape[1]) if at_nodes.shape[1] > 1 else np.zeros(1, dtype=int)
+    below, above = at_nodes[left, columns], at_nodes[left + 1, columns]
+    return np.asarray(below + share * (above - below))
+
+
+def _drift_factors(damper: Damper, temperature: Array | float | None) -> Array:
+    values = damper.effects.get("temperature_drift")
+    if values is None or temperature is None:
+        return np.ones((1, 3))
+    betas = [_single(values["beta_T0"]), _single(values["beta_C"])]
+    reference = damper.reference_temperature_degC or 0.0
+    factors = np.ones((np.size(temperature), 3))
+    for column, beta in enumerate(betas):
+        factors[:, column] = [drift(float(t), reference, beta) for t in np.atleast_1d(temperature)]
+    return factors
+
+
+def _single(value: float | tuple[float, ...]) -> float:
+    return value if isinstance(value, float) else value[0]
