@@ -569,5 +569,3 @@ def _filled(row: ParameterRow, rows: list[ParameterRow]) -> BaseRow:
         C_Ns_per_m=value("C_Ns_per_m"),
         k_N_per_m=value("k_N_per_m"),
     )
-
-

@@ -1,0 +1,112 @@
+"""The voltage as felt, and T0, C, k as they are now."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pzd
+from pzd.damper.compose import nodes_of, respond
+from pzd.damper.drive import felt_voltage
+from pzd.damper.material import material
+from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
+from pzd.damper.path import row_at
+
+TIME = np.arange(0, 1, 1e-3)
+
+
+def test_the_lag_answers_a_step_as_an_exponential_and_a_ramp_late_by_tau() -> None:
+    steps = np.array([1e-3])
+    step = felt_voltage(np.where(TIME > 0, 100.0, 0.0), steps, 0.05, 0.0)
+    np.testing.assert_allclose(step[200], 100 * (1 - np.exp(-(0.2 - 5e-4) / 0.05)), rtol=1e-5)
+    ramp = felt_voltage(100 * TIME, steps, 0.05, 0.0)
+    np.testing.assert_allclose(ramp[-1], 100 * (TIME[-1] - 0.05), rtol=1e-6)
+
+
+def test_the_play_turns_only_after_its_whole_width() -> None:
+    triangle = np.interp(TIME, [0, 0.25, 0.5, 1.0], [0, 100, 0, 100])
+    felt = felt_voltage(triangle, np.array([1e-3]), 0.0, 10.0)
+    assert felt.max() == pytest.approx(90.0)
+    assert felt[400] == pytest.approx(min(90.0, triangle[400] + 10.0))
+    assert np.max(np.abs(felt - triangle)) == pytest.approx(10.0)
+
+
+GRID = Damper(
+    base=tuple(
+        BaseRow(
+            voltage_V=u, temperature_degC=t, T0_N=100 + u - t, C_Ns_per_m=2000 + u + 10 * t, k_N_per_m=1e5 + 1e3 * u
+        )
+        for u in (0.0, 50.0, 150.0)
+        for t in (22.0, 43.0)
+    )
+)
+
+
+def test_a_bilinear_damper_is_met_everywhere_inside_and_held_beyond(fresh_seeds) -> None:
+    rng = np.random.default_rng(fresh_seeds(1)[0])
+    u, t = rng.uniform(0, 150, 50), rng.uniform(22, 43, 50)
+    expected = np.stack([100 + u - t, 2000 + u + 10 * t, 1e5 + 1e3 * u], axis=-1)
+    np.testing.assert_allclose(material(GRID, u, t), expected, rtol=1e-12)
+    np.testing.assert_allclose(material(GRID, 400.0, 90.0), material(GRID, 150.0, 43.0))
+
+
+def test_drift_is_exponential_about_the_reference() -> None:
+    warm = Damper(
+        base=(BaseRow(T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e5),),
+        effects={"temperature_drift": {"beta_T0": 0.04, "beta_C": 0.01}},
+        reference_temperature_degC=22.0,
+    )
+    np.testing.assert_allclose(material(warm, None, 42.0), [[100 * np.exp(-0.8), 1000 * np.exp(-0.2), 1e5]])
+
+
+def test_the_nodes_for_compiled_loops_give_the_same_rows() -> None:
+    damper = GRID.with_effect("orifice_quadratic", {"q": (10.0, 30.0), "at_voltage_V": (20.0, 100.0)})
+    nodes = nodes_of(damper, 30.0)
+    for voltage in (-5.0, 10.0, 60.0, 149.0, 200.0):
+        row = row_at(nodes.voltages, nodes.rows, voltage)
+        np.testing.assert_allclose(row[:3], material(damper, voltage, 30.0)[0])
+        assert row[4] == pytest.approx(np.interp(voltage, [20.0, 100.0], [10.0, 30.0]))
+
+
+def test_an_edited_law_is_seen_although_the_kernels_are_cached(tmp_path: Path) -> None:
+    copy = tmp_path / "pzd"
+    shutil.copytree(Path(pzd.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    program = (
+        "import numpy as np; from pzd.damper.flow import flow_force;"
+        "print(float(flow_force(0.5, (0., 1000., 1e5, 0., 100., 1., np.inf, 1., 0., 0.), 1.0)))"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+
+    def force() -> float:
+        run = subprocess.run(
+            [sys.executable, "-c", program], env=environment, cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        return float(run.stdout)
+
+    assert force() == pytest.approx(525.0)
+    assert force() == pytest.approx(525.0)
+    law = copy / "damper" / "effects" / "orifice_quadratic.py"
+    law.write_text(law.read_text().replace("return q * w * w", "return 2.0 * q * w * w"))
+    assert force() == pytest.approx(550.0)
+
+
+def test_time_need_not_be_even() -> None:
+    rng = np.random.default_rng(3)
+    uneven = np.sort(rng.uniform(0, 1, 3000))
+    omega = 2 * np.pi * 2
+    single = Damper(base=(BaseRow(T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e5),))
+
+    def force(time: np.ndarray) -> np.ndarray:
+        x = 0.02 * np.sin(omega * time)
+        return respond(single, Motion(time, x, 0.02 * omega * np.cos(omega * time), -(omega**2) * x), 0.0)
+
+    even = np.arange(uneven[0], 1, 1e-4)
+    late = uneven > 0.5
+    np.testing.assert_allclose(force(uneven)[late], np.interp(uneven[late], even, force(even)), atol=0.5)

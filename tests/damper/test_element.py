@@ -1,0 +1,127 @@
+"""The exact Bingham element against solvers of other kinds, limits in closed form, and the published rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pzd.damper.element import element_force, element_force_sensitivities
+
+STEP = 1e-3
+
+
+def multisine(seed: int, samples: int = 1500) -> np.ndarray:
+    """A few sines of random phase, up to 12 Hz."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(samples) * STEP
+    return sum(
+        a * np.sin(2 * np.pi * f * time + rng.uniform(0, 2 * np.pi))
+        for f, a in ((1.0, 0.02), (3.7, 0.006), (12.0, 0.001))
+    )
+
+
+def restarted(x: np.ndarray, T0: float, C: float, k: float) -> np.ndarray:
+    """The same element by DOP853, restarted at every sample and at every change of regime."""
+    force = [0.0]
+    for before, after in zip(x[:-1], x[1:], strict=True):
+        speed, F, t = (after - before) / STEP, force[-1], 0.0
+        while t < STEP * (1 - 1e-12):
+            # the regime that the motion leads into decides on an edge
+            sticks = abs(F) < T0 * (1 - 1e-13) or (abs(F) <= T0 * (1 + 1e-13) and F * speed <= 0)
+            edges = [lambda _, y: y[0] - T0, lambda _, y: y[0] + T0]
+            for edge in edges:
+                edge.terminal = True
+            rate = (
+                (lambda _, __: [k * speed])
+                if sticks
+                else (lambda _, y, s=np.sign(F): [k * speed - k / C * (y[0] - s * T0)])
+            )
+            run = solve_ivp(rate, (t, STEP), [F], "DOP853", rtol=1e-13, atol=1e-10, events=edges)
+            advanced = run.t[-1] > t + 1e-15
+            t, F = run.t[-1], run.y[0, -1]
+            if not advanced:
+                F = np.sign(F) * T0 * (1 + 1e-12 * np.sign(F * speed))
+                t += 1e-16
+        force.append(F)
+    return np.array(force)
+
+
+def test_agrees_with_an_event_restarted_high_order_solver_to_1e_9(fresh_seeds) -> None:
+    for seed in fresh_seeds(2):
+        rng = np.random.default_rng(seed)
+        T0, C, k = 400 * rng.uniform(0.5, 2), 2500 * rng.uniform(0.5, 2), 4e5 * rng.uniform(0.5, 2)
+        x = multisine(seed, 400)
+        ours = element_force(x, STEP, T0, C, k)
+        assert np.max(np.abs(ours - restarted(x, T0, C, k))) <= 1e-9 * np.max(np.abs(ours))
+
+
+@pytest.mark.parametrize("column", [0, 1, 2])
+def test_sensitivities_are_the_limit_of_central_differences(fresh_seeds, column: int) -> None:
+    (seed,) = fresh_seeds(1)
+    x, values = multisine(seed), np.array([400.0, 2500.0, 4e5])
+    step = np.zeros(3)
+    step[column] = 1e-6 * values[column]
+    difference = element_force(x, STEP, *(values + step)) - element_force(x, STEP, *(values - step))
+    _, slopes = element_force_sensitivities(x, STEP, *values)
+    expected = difference / (2 * step[column])
+    assert np.max(np.abs(slopes[:, column] - expected)) <= 1e-6 * np.max(np.abs(expected))
+
+
+def test_steady_slip_gives_T0_plus_C_v() -> None:
+    x = 0.2 * STEP * np.arange(3000)
+    assert element_force(x, STEP, 301.0, 2720.0, 1.99e5)[-1] == pytest.approx(301.0 + 2720.0 * 0.2, rel=1e-12)
+
+
+def test_stick_is_a_spring() -> None:
+    x = 1e-4 * np.sin(np.linspace(0, 20, 500))
+    np.testing.assert_allclose(element_force(x, STEP, 301.0, 2720.0, 1.99e5), 1.99e5 * x, rtol=0, atol=1e-9)
+
+
+def test_without_friction_the_element_is_a_maxwell_element() -> None:
+    time, C, k, omega = np.arange(8000) * 1e-4, 2500.0, 4e5, 2 * np.pi * 3
+    force = element_force(0.02 * np.sin(omega * time), 1e-4, 0.0, C, k)
+    transfer = 1j * omega * C / (1 + 1j * omega * C / k) * 0.02
+    late = time > 0.4
+    steady = (transfer * np.exp(1j * omega * time)).imag
+    np.testing.assert_allclose(force[late], steady[late], atol=1e-5 * np.abs(transfer))
+
+
+def test_refining_a_straight_path_changes_nothing() -> None:
+    x = np.interp(np.arange(0, 401) / 400, np.linspace(0, 1, 5), [0.0, 0.01, -0.01, 0.002, 0.0])
+    coarse = element_force(x, 4 * STEP, 400.0, 2500.0, 4e5)
+    fine = element_force(np.interp(np.arange(1601) / 4, np.arange(401), x), STEP, 400.0, 2500.0, 4e5)
+    np.testing.assert_allclose(fine[::4], coarse, rtol=0, atol=1e-9)
+
+
+def test_the_error_of_a_sampled_sine_falls_with_the_square_of_the_step() -> None:
+    def force(rate: int) -> np.ndarray:
+        time = np.arange(rate + 1) / rate
+        return element_force(0.03 * np.sin(4 * np.pi * time), 1 / rate, 301.0, 2720.0, 1.99e5)[:: rate // 250]
+
+    truth = force(64000)
+    errors = [np.max(np.abs(force(rate) - truth)) for rate in (500, 1000, 2000)]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all((orders > 1.7) & (orders < 2.3)), orders
+
+
+PEAKS = [
+    ("T1", 0.022, 1.0, [(820, 9200, 5.81e5, 2085), (1985, 16400, 7.78e5, 4232), (3410, 13700, 1.11e6, 5298)]),
+    ("T2", 0.030, 2.0, [(301, 2720, 1.99e5, 1311), (356, 3300, 3.58e5, 1592), (796, 3040, 3.75e5, 1936)]),
+]
+
+
+@pytest.mark.parametrize(("table", "amplitude", "frequency", "rows"), PEAKS)
+def test_the_published_parameters_give_the_peaks_computed_ahead(table, amplitude, frequency, rows) -> None:
+    time = np.arange(int(3e3 / frequency)) * STEP
+    for T0, C, k, peak in rows:
+        force = element_force(amplitude * np.sin(2 * np.pi * frequency * time), STEP, T0, C, k)
+        assert np.max(force[time > 1.5 / frequency]) == pytest.approx(peak, abs=1.5), table
+
+
+def test_the_element_never_gives_energy_back(fresh_seeds) -> None:
+    for seed in fresh_seeds(3):
+        x = multisine(seed)
+        force = element_force(x, STEP, 400.0, 2500.0, 4e5)
+        work = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(x))])
+        assert np.min(work - 0.5 * force**2 / 4e5) > -1e-3

@@ -1,0 +1,204 @@
+"""The general path: against independent solvers, convergence in the tolerance, energies, and the steady limit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from pzd.damper.compose import TOLERANCE, element_rows, respond, steady_force
+from pzd.damper.element import element_force
+from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
+from pzd.damper.path import DEFLECTION, DISSIPATED, STAGES, STATES, VALVE_WORK, advance, row_of
+
+STEP = 1e-3
+TIME = np.arange(600) * STEP
+PLAIN = Damper(
+    base=(
+        BaseRow(voltage_V=0.0, T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e5),
+        BaseRow(voltage_V=150.0, T0_N=1300.0, C_Ns_per_m=2500.0, k_N_per_m=4e5),
+    )
+)
+FLOWS = [
+    {"orifice_quadratic": {"q": 3000.0}},
+    {"shear_thinning": {"n": 0.6}},
+    {"rounded_yield": {"w_s": 0.02}},
+    {"asymmetry": {"alpha": 0.2}},
+    {"relief_valve": {"F_r": 900.0, "C_r": 400.0}},
+    {"lash": {"delta": 4e-4}},
+    {"lash": {"delta": 4e-4}, "rounded_yield": {"w_s": 0.03}, "orifice_quadratic": {"q": 2000.0}},
+    {"shear_thinning": {"n": 0.8}, "relief_valve": {"F_r": 900.0, "C_r": 400.0}, "asymmetry": {"alpha": -0.1}},
+]
+
+
+def sine(voltage: np.ndarray | float, frequency: float = 3.0, amplitude: float = 0.02) -> Motion:
+    """A sine under a given voltage."""
+    omega = 2 * np.pi * frequency
+    x = amplitude * np.sin(omega * TIME)
+    v = amplitude * omega * np.cos(omega * TIME)
+    return Motion(TIME, x, v, -(omega**2) * x, np.broadcast_to(np.asarray(voltage, float), TIME.shape).copy())
+
+
+def with_effects(effects: dict) -> Damper:
+    """The plain damper with several effects."""
+    damper = PLAIN
+    for name, values in effects.items():
+        damper = damper.with_effect(name, values)
+    return damper
+
+
+def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
+    """dF/dt written out by hand and integrated by LSODA piece by piece, w(F) found by bracketing."""
+    values = {name: v for effect in damper.effects.values() for name, v in effect.items()}
+    q, n, ws = values.get("q", 0.0), values.get("n", 1.0), values.get("w_s", 0.0)
+    alpha, delta = values.get("alpha", 0.0), values.get("delta", 0.0)
+    F_r, C_r = values.get("F_r", np.inf), values.get("C_r", 1.0)
+
+    def parameters(u: float) -> tuple[float, float, float]:
+        share = u / 150.0
+        return 300 + 1000 * share, 2700 - 200 * share, 2e5 + 2e5 * share
+
+    def speed(F: float, T0: float, C: float) -> float:
+        side = 1 + alpha * np.sign(F)
+
+        def curve(w: float) -> float:
+            friction = T0 * side * (np.tanh(w / ws) if ws else 1.0)
+            return friction + C * side * 0.3 * (w / 0.3) ** n + q * w * w
+
+        def inverse(force: float) -> float:
+            return 0.0 if force <= curve(0.0) else brentq(lambda w: curve(w) - force, 0.0, 50.0, xtol=1e-15, rtol=1e-15)
+
+        bound = max(F_r, T0 * side)
+        return inverse(min(abs(F), bound)) + max(abs(F) - bound, 0.0) / C_r
+
+    def rate(t: float, e: np.ndarray, i: int) -> list[float]:
+        share = (t - motion.time[i]) / STEP
+        T0, C, k = parameters(motion.voltage[i] + share * (motion.voltage[i + 1] - motion.voltage[i]))
+        F = k * np.sign(e[0]) * max(abs(e[0]) - delta / 2, 0.0)
+        half = 0.5 * (motion.velocity[i + 1] - motion.velocity[i])
+        u = (motion.displacement[i + 1] - motion.displacement[i]) / STEP + half * (2 * share - 1)
+        return [u - np.sign(F) * speed(F, T0, C)]
+
+    e, forces = 0.0, [0.0]
+    for i in range(until - 1):
+        run = solve_ivp(rate, motion.time[i : i + 2], [e], "RK45", rtol=1e-9, atol=1e-13, args=(i,), max_step=STEP / 4)
+        e = run.y[0, -1]
+        k = parameters(motion.voltage[i + 1])[2]
+        forces.append(k * np.sign(e) * max(abs(e) - delta / 2, 0.0))
+    return np.array(forces)
+
+
+@pytest.mark.parametrize("effects", FLOWS, ids=lambda e: "+".join(e))
+@pytest.mark.parametrize("voltage", [60.0, "moving"])
+def test_agrees_with_an_independent_solver(effects: dict, voltage: float | str) -> None:
+    motion = sine(75 + 70 * np.sin(2 * np.pi * 2.3 * TIME) if voltage == "moving" else voltage)
+    damper = with_effects(effects)
+    truth = independent(damper, motion, 260)
+    ours = respond(damper, motion)[:260]
+    assert np.max(np.abs(ours - truth)) <= 2e-6 * np.max(np.abs(truth))
+
+
+def test_a_moving_stiffness_agrees_with_a_restarted_high_order_solver_to_1e_9() -> None:
+    motion = sine(75 + 70 * np.sin(2 * np.pi * 2.3 * TIME))
+    e, forces = 0.0, [0.0]
+    for i in range(399):
+        mean = (motion.displacement[i + 1] - motion.displacement[i]) / STEP
+        half = 0.5 * (motion.velocity[i + 1] - motion.velocity[i])
+        share0, share1 = motion.voltage[i] / 150, motion.voltage[i + 1] / 150
+
+        def state(t, i=i, share0=share0, share1=share1):
+            s = share0 + (share1 - share0) * (t - motion.time[i]) / STEP
+            return 300 + 1000 * s, 2700 - 200 * s, 2e5 + 2e5 * s
+
+        def rate(t, y, i=i, mean=mean, half=half, state=state):
+            T0, C, k = state(t)
+            u = mean + half * (2 * (t - motion.time[i]) / STEP - 1)
+            return [u - np.sign(y[0]) * max(k * abs(y[0]) - T0, 0.0) / C]
+
+        run = solve_ivp(rate, motion.time[i : i + 2], [e], "DOP853", rtol=1e-13, atol=1e-17, max_step=STEP / 4)
+        e = run.y[0, -1]
+        forces.append(state(motion.time[i + 1])[2] * e)
+    ours = respond(PLAIN, motion)[:400]
+    assert np.max(np.abs(ours - forces)) <= 1e-9 * np.max(np.abs(forces))
+
+
+def test_dropping_the_moving_stiffness_would_be_seen() -> None:
+    jumping = np.where((TIME // 0.05) % 2 == 0, 20.0, 140.0)
+    force = respond(PLAIN, sine(jumping))
+    jumps = np.flatnonzero(np.diff(jumping))
+    assert np.max(np.abs(np.diff(force)[jumps])) > 5 * np.median(np.abs(np.diff(force)))
+
+
+def test_the_plain_damper_is_the_exact_element() -> None:
+    x = np.interp(TIME, [0, 0.15, 0.3, 0.45, 0.6], [0.0, 0.02, -0.02, 0.02, 0.0])
+    flat = np.zeros_like(x)
+    ours = respond(PLAIN, Motion(TIME, x, flat, flat, flat))
+    np.testing.assert_allclose(ours, element_force(x, STEP, 300.0, 2700.0, 2e5), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("effects", FLOWS[:3], ids=lambda e: "+".join(e))
+def test_the_error_falls_with_the_tolerance(effects: dict) -> None:
+    damper, motion = with_effects(effects), sine(40.0)
+    truth = respond(damper, motion, tolerance=1e-12)
+    errors = [np.max(np.abs(respond(damper, motion, tolerance=t) - truth)) for t in (1e-3, 1e-9)]
+    assert errors[1] <= max(1e-2 * errors[0], 1e-6 * np.max(np.abs(truth)))
+
+
+def test_the_parabola_inside_a_step_makes_a_sampled_sine_four_hundred_times_better() -> None:
+    coarse = sine(0.0)
+    fine_time = np.arange(599 * 64 + 1) * STEP / 64
+    omega = 2 * np.pi * 3.0
+    x, v = 0.02 * np.sin(omega * fine_time), 0.02 * omega * np.cos(omega * fine_time)
+    truth = respond(PLAIN, Motion(fine_time, x, v, v, 0 * v))[::64]
+    bent = np.max(np.abs(respond(PLAIN, coarse) - truth))
+    flat = Motion(TIME, coarse.displacement, 0 * TIME, 0 * TIME, coarse.voltage)
+    straight = np.max(np.abs(respond(PLAIN, flat) - truth))
+    assert bent * 400 < straight
+
+
+@pytest.mark.parametrize("effects", [{}, *FLOWS], ids=lambda e: "+".join(e) or "plain")
+def test_energy_goes_into_the_spring_the_oil_and_the_valve_and_nowhere_else(effects: dict) -> None:
+    motion = sine(75 + 70 * np.sin(2 * np.pi * 2.3 * TIME))
+    rows = element_rows(with_effects(effects), motion.voltage, None)
+    state, stages, stored, work = np.zeros(STATES), np.empty(STAGES), 0.0, 0.0
+    delta = rows[0, 3]
+    points, weights = np.polynomial.legendre.leggauss(4)
+    for i in range(len(TIME) - 1):
+        p0, p1 = row_of(rows[i]), row_of(rows[i + 1])
+        mean = (motion.displacement[i + 1] - motion.displacement[i]) / STEP
+        half = 0.5 * (motion.velocity[i + 1] - motion.velocity[i])
+        for x, w in zip(points, weights, strict=True):  # work of the actuator by Gauss' rule on F u
+            share = 0.5 * (1 + x)
+            middle = tuple(a + share * (b - a) if a != b else a for a, b in zip(p0, p1, strict=True))
+            probe, u = state.copy(), mean + half * (2 * share - 1)
+            advance(probe, p0, middle, True, share * STEP, mean - half, u, TOLERANCE, stages, False)
+            e = probe[DEFLECTION]
+            work += 0.5 * w * STEP * middle[2] * np.sign(e) * max(abs(e) - delta / 2, 0.0) * u
+        advance(state, p0, p1, True, STEP, mean - half, mean + half, TOLERANCE, stages, True)
+    stored = 0.5 * rows[-1, 2] * max(abs(state[DEFLECTION]) - delta / 2, 0.0) ** 2
+    assert state[DISSIPATED] > 0.0
+    assert abs(stored + state[DISSIPATED] - state[VALVE_WORK] - work) <= 2e-6 * state[DISSIPATED]
+
+
+@pytest.mark.parametrize("effects", [{}, *FLOWS], ids=lambda e: "+".join(e) or "plain")
+def test_a_long_even_stroke_ends_at_the_steady_force(effects: dict) -> None:
+    damper = with_effects(effects)
+    for speed in (-0.4, -0.02, 0.05, 0.6):
+        x = speed * TIME * 5
+        moving = np.full_like(x, speed)
+        long = Motion(TIME * 5, x, moving, 0 * x, np.full_like(x, 100.0))
+        assert respond(damper, long)[-1] == pytest.approx(float(steady_force(damper, 100.0, None, speed)), rel=1e-6)
+
+
+def test_at_rest_the_steady_force_has_two_sides_and_a_preload_is_left_to_the_balance() -> None:
+    damper = PLAIN.with_effect("preload_offset", {"F_0": 50.0})
+    np.testing.assert_allclose(steady_force(damper, 0.0, None, np.array([-0.0, 0.0])), [-300.0, 300.0])
+
+
+def test_a_voltage_that_is_needed_and_not_given_is_said() -> None:
+    motion = sine(0.0)
+    blind = Motion(motion.time, motion.displacement, motion.velocity, motion.acceleration)
+    with pytest.raises(ValueError, match="depends on the voltage"):
+        respond(PLAIN, blind)
