@@ -37,7 +37,7 @@ def lost(damper: Damper, temperatures: tuple[float | None, ...], velocity: Array
 
 def _words(name: str) -> str:
     effect = library()[name]
-    return f"{name}: {effect.law} (the table holds steady slip at mid-stroke, where it does not show)"
+    return f"{name}: {effect.law} (steady slip does not show it)"
 
 
 def _carried(damper: Damper, name: str, temperatures: tuple[float | None, ...], velocity: Array) -> bool:
