@@ -10,7 +10,7 @@ import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,9 +48,9 @@ def read_rows(path: Path, model: type[Row], control: Control) -> tuple[Row, ...]
         if len(cells) != len(model.model_fields):
             faults.append(f"{at(path, number)}: {len(cells)} fields where the header has {len(model.model_fields)}")
             continue
-        given = {n: c or None for n, c in zip(model.model_fields, cells, strict=True)}
+        fields = zip(model.model_fields.items(), cells, strict=True)
         try:
-            rows.append(model.model_validate_strings({n: c for n, c in given.items() if c is not None} | _nones(given)))
+            rows.append(model.model_validate({n: _plain(cell, field.annotation) for (n, field), cell in fields}))
         except ValidationError as error:
             faults += [_fault(path, number, detail, control) for detail in error.errors()]
     if faults:
@@ -136,8 +136,19 @@ def _cell(value: Any) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def _nones(given: Mapping[str, str | None]) -> dict[str, Any]:
-    return {name: None for name, cell in given.items() if cell is None}
+def _plain(cell: str, annotation: Any) -> str | float | None:
+    """What a cell stands for: nothing, a number where the field takes one, else its text."""
+    if not cell:
+        return None
+    kinds = {annotation, *get_args(annotation)}
+    if kinds.isdisjoint({int, float}) and not any(isinstance(kind, int) for kind in kinds):
+        return cell
+    for number in (int, float):
+        try:
+            return number(cell)
+        except ValueError:
+            continue
+    return cell
 
 
 def _fault(path: Path, number: int, detail: Any, control: Control) -> str:
