@@ -26,7 +26,7 @@ class EvolutionaryConfig(Frozen):
     """Members of the population per parameter."""
     generations: int = Field(default=300, ge=1)
     """Largest number of generations."""
-    tolerance: float = Field(default=1e-4, gt=0.0)
+    tolerance: float = Field(default=1e-2, gt=0.0)
     """The search ends when the criterion's spread over the population is this share of its mean."""
 
 

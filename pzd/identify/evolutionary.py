@@ -11,6 +11,8 @@ from pzd.record import Array
 
 LEAST_FRICTION = 1e-4
 """Smallest friction of the search, as a share of the peak force: its logarithm needs one."""
+LEAST_SPREAD = 1e-8
+"""Spread of the criterion over the population at which the search ends in any case; the rest is polish."""
 
 
 def fit_evolutionary(objective: Objective, config: EvolutionaryConfig, seed: int) -> Fit:
@@ -33,7 +35,7 @@ def search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingh
     -------
     parameters, not yet polished
     """
-    from scipy.optimize import differential_evolution
+    from scipy.optimize import Bounds, differential_evolution
 
     low, high = objective.bounds
     low = low._replace(friction=LEAST_FRICTION * high.friction)
@@ -43,10 +45,11 @@ def search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingh
 
     found = differential_evolution(
         criterion,
-        list(zip(np.log(low), np.log(high), strict=True)),
+        Bounds(np.log(low), np.log(high)),
         popsize=config.population,
         maxiter=config.generations,
         tol=config.tolerance,
+        atol=LEAST_SPREAD,
         seed=seed,
         init="sobol",
         polish=False,

@@ -65,9 +65,7 @@ def evidence_of(
         stationary = (True, *stationary[1:])
     return [
         Evidence(*facts)
-        for facts in zip(
-            NAMES, scales.tolist(), widths.tolist(), visible.tolist(), bounded, stationary, strict=True
-        )
+        for facts in zip(NAMES, scales.tolist(), widths.tolist(), visible.tolist(), bounded, stationary, strict=True)
     ]
 
 

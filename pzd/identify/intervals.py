@@ -65,7 +65,8 @@ def uncertainty(slopes: Array, residuals: Array, lengths: Sequence[int]) -> Unce
     from scipy.signal import lfilter
 
     size = np.linalg.norm(slopes, axis=0)
-    size[size == 0.0] = 1.0
+    unseen = size == 0.0
+    size[unseen] = 1.0
     scaled = slopes / size
     bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True)
     meat = np.zeros((slopes.shape[1],) * 2)
@@ -79,6 +80,7 @@ def uncertainty(slopes: Array, residuals: Array, lengths: Sequence[int]) -> Unce
         start += length
     small_sample = start / max(start - slopes.shape[1], 1)
     covariance = small_sample * bread @ meat @ bread / np.outer(size, size)
+    covariance[unseen, unseen] = np.inf
     return Uncertainty(covariance, independent - slopes.shape[1])
 
 

@@ -51,7 +51,8 @@ class Objective:
             t.at_samples(element_force(t.displacement, t.step, *parameters, float(t.force[0])))[t.counted]
             for t in self.trials
         ]
-        return self.measured - np.concatenate(parts)
+        residuals: Array = self.measured - np.concatenate(parts)
+        return residuals
 
     def residuals_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
         """(N,) residuals and (N, 3) derivatives of the simulated force by T0, C and k."""
@@ -103,3 +104,13 @@ class Fit:
     """(N,) measured less simulated force at the counted samples [N]."""
     slopes: Array
     """(N, 3) derivatives of the simulated force by T0, C and k."""
+
+
+def to_search(parameters: Bingham, force: float) -> Array:
+    """(3,) what least squares searches: T0 as a share of the peak force, the logarithms of C and k."""
+    return np.array([parameters.friction / force, np.log(parameters.damping), np.log(parameters.stiffness)])
+
+
+def from_search(x: Array, force: float) -> Bingham:
+    """The parameters from what least squares searches."""
+    return Bingham(float(x[0]) * force, float(np.exp(x[1])), float(np.exp(x[2])))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.damper.element import element_force
-from pzd.identify.objective import Bingham, Fit, Objective
+from pzd.identify.objective import Bingham, Fit, Objective, from_search, to_search
 from pzd.identify.starts import graphical_start
 from pzd.identify.trial import Trial
 from pzd.record import Array
@@ -66,10 +66,10 @@ def descend(objective: Objective, start: Bingham) -> Fit:
 
     force = objective.scales[0]
     norm = np.sqrt(objective.energy)
-    low, high = (_to_search(b, force) for b in objective.bounds)
+    low, high = (to_search(b, force) for b in objective.bounds)
 
     def both(x: Array) -> tuple[Array, Array]:
-        parameters = _from_search(x, force)
+        parameters = from_search(x, force)
         residuals, slopes = objective.residuals_and_slopes(parameters)
         return residuals / norm, -slopes * np.array([force, parameters.damping, parameters.stiffness]) / norm
 
@@ -82,11 +82,17 @@ def descend(objective: Objective, start: Bingham) -> Fit:
             memory[key] = both(x)
         return memory[key]
 
-    inside = np.clip(_to_search(start, force), low + 1e-6, high - 1e-6)
+    def residuals_at(x: Array) -> Array:
+        return at(x)[0]
+
+    def slopes_at(x: Array) -> Array:
+        return at(x)[1]
+
+    inside = np.clip(to_search(start, force), low + 1e-6, high - 1e-6)
     found = least_squares(
-        lambda x: at(x)[0],
+        residuals_at,
         inside,
-        jac=lambda x: at(x)[1],
+        jac=slopes_at,
         bounds=(low, high),
         x_scale="jac",
         xtol=TOLERANCE,
@@ -94,17 +100,9 @@ def descend(objective: Objective, start: Bingham) -> Fit:
         gtol=TOLERANCE,
         max_nfev=100,
     )
-    parameters = _from_search(found.x, force)
+    parameters = from_search(found.x, force)
     residuals, slopes = objective.residuals_and_slopes(parameters)
     return Fit(parameters, float(residuals @ residuals) / objective.energy, residuals, slopes)
-
-
-def _to_search(parameters: Bingham, force: float) -> Array:
-    return np.array([parameters.friction / force, np.log(parameters.damping), np.log(parameters.stiffness)])
-
-
-def _from_search(x: Array, force: float) -> Bingham:
-    return Bingham(float(x[0]) * force, float(np.exp(x[1])), float(np.exp(x[2])))
 
 
 def _piece(trial: Trial, samples: int) -> tuple[Array, float, Array, int]:

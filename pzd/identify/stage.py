@@ -7,7 +7,9 @@ from collections.abc import Sequence
 
 from pzd.artefacts import Identified, ParameterRow, Rig
 from pzd.identify.config import IdentifyConfig
-from pzd.record import Record, conditions
+from pzd.record import Condition, Record, conditions
+
+Labels = tuple[str | None, float | None, float | None]
 
 log = logging.getLogger(__name__)
 
@@ -27,16 +29,15 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
     """
     from pzd.identify.measures import measures
 
-    rows = _constant_rows(rig.records, identify, seed)
-    rows += _moving_rows(rig.records, identify, rows)
-    rows.sort(key=_order)
-    return Identified(tuple(rows), measures(rig.records))
+    constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
+    rows = {_labels(row): row for row in _constant_rows(constant, identify, seed)}
+    rows |= {_labels(row): row for row in _moving_rows(moving, constant, list(rows.values()), identify)}
+    return Identified(tuple(rows[labels] for labels in sorted(rows, key=_order)), measures(rig.records))
 
 
-def _constant_rows(records: Sequence[Record], config: IdentifyConfig, seed: int) -> list[ParameterRow]:
+def _constant_rows(found: Sequence[Condition], config: IdentifyConfig, seed: int) -> list[ParameterRow]:
     from pzd.identify.fit import fit_condition
 
-    found, _ = conditions(records, config.group.voltage_V, config.group.temperature_degC)
     rows = []
     for index, condition in enumerate(found):
         rows.append(fit_condition(condition, config, seed + index))
@@ -45,22 +46,27 @@ def _constant_rows(records: Sequence[Record], config: IdentifyConfig, seed: int)
 
 
 def _moving_rows(
-    records: Sequence[Record], config: IdentifyConfig, known: Sequence[ParameterRow]
+    moving: Sequence[Record], constant: Sequence[Condition], known: Sequence[ParameterRow], config: IdentifyConfig
 ) -> list[ParameterRow]:
     from pzd.identify.moving import fit_moving
 
-    _, moving = conditions(records, config.group.voltage_V, config.group.temperature_degC)
     rows = []
     for setting in sorted({r.setting for r in moving}, key=lambda s: s or ""):
-        of_setting = [row for row in known if row.setting == setting]
-        for row in fit_moving([r for r in moving if r.setting == setting], config, of_setting):
+        mine = [(c, row) for c, row in zip(constant, known, strict=True) if c.setting == setting]
+        of_setting = [r for r in moving if r.setting == setting]
+        for row in fit_moving(of_setting, [c for c, _ in mine], [row for _, row in mine], config):
             rows.append(row)
-            log.info("node from moving records: %s", _line(row))
+            log.info("node from records with moving voltage: %s", _line(row))
     return rows
 
 
-def _order(row: ParameterRow) -> tuple[str, float, float]:
-    return row.setting or "", row.temperature_degC or 0.0, row.voltage_V or 0.0
+def _labels(row: ParameterRow) -> Labels:
+    return row.setting, row.voltage_V, row.temperature_degC
+
+
+def _order(labels: Labels) -> tuple[str, float, float]:
+    setting, voltage, temperature = labels
+    return setting or "", temperature or 0.0, voltage or 0.0
 
 
 def _line(row: ParameterRow) -> str:

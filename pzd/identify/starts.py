@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.identify.objective import Bingham
 from pzd.identify.trial import Trial
@@ -68,7 +69,7 @@ def _pre_slip_slope(trials: Sequence[Trial], friction: float) -> float:
     return 20.0 * friction / stroke
 
 
-def _runs(inside: np.ndarray) -> list[slice]:  # type: ignore[type-arg]  # boolean (n,)
+def _runs(inside: NDArray[np.bool_]) -> list[slice]:
     """Stretches of at least three samples inside."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], inside.astype(int), [0]))))
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 3]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.damper.motion import Motion
 from pzd.record import Array, Record
@@ -39,7 +40,7 @@ class Trial:
     """Fine steps in one sample."""
     force: Array
     """(n,) measured force [N]."""
-    counted: Array | np.ndarray[Any, np.dtype[np.bool_]]
+    counted: NDArray[np.bool_]
     """(n,) whether the sample enters the criterion."""
     positions: Array | None = None
     """(n,) where the samples lie on the fine grid, in fine steps; None where every `factor`-th one is a sample."""

@@ -58,6 +58,8 @@ class Evidence:
             return "at a bound of the search"
         if not self.stationary:
             return "the search did not converge"
+        if self.visible <= 0.0:
+            return "the force does not depend on it, or another parameter makes it up"
         if self.shift > UNDETERMINED:
             return f"a force error of {SENSOR_ERROR:.1%} may shift it by {_percent(self.shift)}"
         if not self.half_width <= UNDETERMINED * self.scale:
@@ -107,7 +109,8 @@ def visible_shares(slopes: Array, scales: Array, energy: float) -> Array:
         others = np.delete(np.arange(size.size), j)
         solved = np.linalg.lstsq(gram[np.ix_(others, others)], gram[others, j], rcond=1e-12)[0]
         shares[j] = np.sqrt(max(float(gram[j, j] - gram[others, j] @ solved), 0.0)) * size[j]
-    return shares / np.sqrt(energy)
+    result: Array = shares / np.sqrt(energy)
+    return result
 
 
 def is_stationary(slopes: Array, residuals: Array, energy: float) -> tuple[bool, ...]:
