@@ -94,8 +94,8 @@ def conditions(
     for setting in sorted({r.setting for r in still}, key=lambda s: s or ""):
         mine = [r for r in still if r.setting == setting]
         for by_temperature in _bands(mine, [r.median_temperature() for r in mine], temperature_within):
-            for members in _bands(by_temperature, [r.median_voltage() for r in by_temperature], within):
-                found.append(_condition(setting, members))
+            bands = _bands(by_temperature, [r.median_voltage() for r in by_temperature], within)
+            found.extend(_condition(setting, members) for members in bands)
     return tuple(found), tuple(r for r in records if not is_constant(r, scale))
 
 

@@ -42,9 +42,9 @@ def cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="pzd-"))
 
 
-numba.config.CACHE_DIR = str(cache_folder())
+numba.config.CACHE_DIR = str(cache_folder())  # type: ignore[attr-defined]  # numba sets its options up at run time
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """The same function as machine code, cached across processes."""
-    return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]  # numba is untyped
+    return numba.njit(cache=True, error_model="numpy")(function)

@@ -15,7 +15,8 @@ from pzd.damper.flow import ROW, flow_force
 from pzd.damper.material import base_voltages, material
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.damper.path import march, row_of
+from pzd.damper.path import march
+from pzd.damper.rows import row_of
 
 Array = NDArray[np.float64]
 
@@ -93,7 +94,7 @@ def parallel_force(damper: Damper, felt: Array | None, motion: Motion) -> Array:
 def recorded(damper: Damper, time: Array, force: Array) -> Array:
     """(n,) force as the delayed channel shows it [N], linear between samples, held before the first."""
     tau = value_of(damper, "sensor_delay", "tau")
-    return force if tau == 0.0 else np.interp(moment(time, tau), time, force)  # type: ignore[arg-type]  # law takes arrays as well
+    return force if tau == 0.0 else np.interp([moment(t, tau) for t in time], time, force)
 
 
 def steady_force(
@@ -171,7 +172,7 @@ def value_of(damper: Damper, effect: str, parameter: str) -> float:
     """
     value = damper.effects.get(effect, {}).get(parameter, library()[effect].parameter(parameter).neutral)
     if isinstance(value, tuple):
-        raise ValueError(f"{effect}.{parameter} must be one number, not a list by voltage")
+        raise ValueError(f"{effect}.{parameter} must be one number, not a list by voltage")  # noqa: TRY004  # a wrong value of a config
     return value
 
 
@@ -188,4 +189,4 @@ def _column(damper: Damper, effect: str, parameter: str, felt: Array | None) -> 
         return np.array([value])
     if felt is None:
         raise ValueError(f"{effect}.{parameter} depends on the voltage, and none is given")
-    return np.interp(felt, np.atleast_1d(given["at_voltage_V"]), np.array(value))
+    return np.asarray(np.interp(felt, np.atleast_1d(given["at_voltage_V"]), np.array(value)))

@@ -32,7 +32,7 @@ class Damper(Frozen):
     """A damper: base rows (interpolated between, held beyond) and effects by name.
 
     An effect's parameter is one number, or a list of numbers beside `at_voltage_V`, piecewise
-    linear in the voltage. The rows form a grid: the same voltages at every temperature.
+    linear in the voltage. Base rows of one voltage are interpolated over temperature first.
     """
 
     base: tuple[BaseRow, ...] = Field(min_length=1)
@@ -74,6 +74,5 @@ def _check_effect(name: str, values: EffectValues) -> None:
         parameter = effects[name].parameter(key)
         for number in listed:
             if not parameter.admits(number):
-                raise ValueError(
-                    f"{name}.{key} must lie in [{parameter.low:g}, {parameter.high:g}] {parameter.unit} (got {number:g})"
-                )
+                limits = f"[{parameter.low:g}, {parameter.high:g}] {parameter.unit}"
+                raise ValueError(f"{name}.{key} must lie in {limits} (got {number:g})")

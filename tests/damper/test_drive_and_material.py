@@ -17,7 +17,7 @@ from pzd.damper.drive import felt_voltage
 from pzd.damper.material import material
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.damper.path import row_at
+from pzd.damper.rows import row_at
 
 TIME = np.arange(0, 1, 1e-3)
 

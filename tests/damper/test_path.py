@@ -11,7 +11,9 @@ from pzd.damper.compose import TOLERANCE, element_rows, respond, steady_force
 from pzd.damper.element import element_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.damper.path import DEFLECTION, DISSIPATED, STAGES, STATES, VALVE_WORK, advance, row_of
+from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance
+from pzd.damper.pieces import STAGES, Step
+from pzd.damper.rows import row_of
 
 STEP = 1e-3
 TIME = np.arange(600) * STEP
@@ -90,7 +92,7 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
     return np.array(forces)
 
 
-@pytest.mark.parametrize("effects", FLOWS, ids=lambda e: "+".join(e))
+@pytest.mark.parametrize("effects", FLOWS, ids="+".join)
 @pytest.mark.parametrize("voltage", [60.0, "moving"])
 def test_agrees_with_an_independent_solver(effects: dict, voltage: float | str) -> None:
     motion = sine(75 + 70 * np.sin(2 * np.pi * 2.3 * TIME) if voltage == "moving" else voltage)
@@ -138,7 +140,7 @@ def test_the_plain_damper_is_the_exact_element() -> None:
     np.testing.assert_allclose(ours, element_force(x, STEP, 300.0, 2700.0, 2e5), rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("effects", FLOWS[:3], ids=lambda e: "+".join(e))
+@pytest.mark.parametrize("effects", FLOWS[:3], ids="+".join)
 def test_the_error_falls_with_the_tolerance(effects: dict) -> None:
     damper, motion = with_effects(effects), sine(40.0)
     truth = respond(damper, motion, tolerance=1e-12)
@@ -173,10 +175,10 @@ def test_energy_goes_into_the_spring_the_oil_and_the_valve_and_nowhere_else(effe
             share = 0.5 * (1 + x)
             middle = tuple(a + share * (b - a) if a != b else a for a, b in zip(p0, p1, strict=True))
             probe, u = state.copy(), mean + half * (2 * share - 1)
-            advance(probe, p0, middle, True, share * STEP, mean - half, u, TOLERANCE, stages, False)
+            advance(probe, Step(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, stages, False)
             e = probe[DEFLECTION]
             work += 0.5 * w * STEP * middle[2] * np.sign(e) * max(abs(e) - delta / 2, 0.0) * u
-        advance(state, p0, p1, True, STEP, mean - half, mean + half, TOLERANCE, stages, True)
+        advance(state, Step(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, stages, True)
     stored = 0.5 * rows[-1, 2] * max(abs(state[DEFLECTION]) - delta / 2, 0.0) ** 2
     assert state[DISSIPATED] > 0.0
     assert abs(stored + state[DISSIPATED] - state[VALVE_WORK] - work) <= 2e-6 * state[DISSIPATED]

@@ -1,0 +1,161 @@
+"""One piece of the path inside one regime: in closed form where it is straight, else by Runge-Kutta.
+
+Straight pieces with standing parameters are solved in closed form. The others are integrated by
+Dormand and Prince's pair of order 5(4) in the viscous force s = visc(w), in which w(s) and F(s)
+are both explicit and dF/ds >= 1, so that nothing is inverted.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.compiled import compiled
+from pzd.damper.flow import (
+    C_R,
+    DELTA,
+    W_S,
+    K,
+    N,
+    Q,
+    Row,
+    breakaway,
+    smooth_force_of,
+    smooth_rise,
+    viscous_force,
+    viscous_speed,
+)
+from pzd.damper.regimes import RELIEF, STICK, speed_at, spring_force
+from pzd.damper.rows import interpolate
+
+Array = NDArray[np.float64]
+
+STAGES = 7
+
+# Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2: nodes, stages, and error weights.
+_NODES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
+_STAGES = np.array(
+    [
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0],
+        [44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0],
+        [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+)
+_ERROR = np.array([-71 / 57600, 0.0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40])
+
+_DIFFERENCE = 1e-3  # of a step, for the drift of the flow curve with moving parameters
+_SMALL = 1e-3  # below it the exponential's quotients are taken from their series
+
+
+class Step(NamedTuple):
+    """One step: length h [s], extension speed from u0 to u1 [m/s], parameter rows from p0 to p1."""
+
+    h: float
+    u0: float
+    u1: float
+    p0: Row
+    p1: Row
+    moving: bool
+    """Whether the two rows differ."""
+
+
+@compiled
+def row_in(step: Step, at: float) -> Row:
+    """The parameter row at a moment [s] of the step."""
+    return interpolate(step.p0, step.p1, at / step.h) if step.moving else step.p0
+
+
+@compiled
+def extension_speed(step: Step, at: float) -> float:
+    """dx/dt [m/s] at a moment [s] of the step."""
+    return step.u0 + (step.u1 - step.u0) * at / step.h
+
+
+@compiled
+def piece(
+    e: float, w: float, at: float, dt: float, regime: int, side: float, step: Step, stages: Array
+) -> tuple[float, float, float]:
+    """Elastic deflection and flow speed after a piece of length dt, and its embedded error as a force [N]."""
+    if regime == STICK:
+        return e + dt * extension_speed(step, at + 0.5 * dt), 0.0, 0.0
+    p = row_in(step, at)
+    force = abs(spring_force(e, p))
+    if not step.moving and (regime == RELIEF or (p[Q] == 0.0 and p[N] == 1.0 and p[W_S] <= 0.0)):
+        slope = p[C_R] if regime == RELIEF else viscous_force(1.0, p, side)
+        pull = side * extension_speed(step, at)
+        end = _straight(force, p[K], slope, p[K] * (pull - w), side * (step.u1 - step.u0) / step.h, dt)
+        return side * (end / p[K] + 0.5 * p[DELTA]), w + (end - force) / slope, 0.0
+    y, error = _runge_kutta(
+        force if regime == RELIEF else viscous_force(w, p, side), at, dt, regime, side, step, stages
+    )
+    p = row_in(step, at + dt)
+    if regime == RELIEF:
+        return side * (y / p[K] + 0.5 * p[DELTA]), speed_at(y, p, regime, side, w), abs(error)
+    if y < 0.0:
+        return side * (0.5 * p[DELTA] + (breakaway(p, side) + y) / p[K]), 0.0, abs(error)
+    w = viscous_speed(y, p, side)
+    error *= smooth_rise(y, w, p, side)
+    return side * (smooth_force_of(y, p, side) / p[K] + 0.5 * p[DELTA]), w, abs(error)
+
+
+@compiled
+def _straight(force: float, k: float, slope: float, approach: float, bend: float, dt: float) -> float:
+    """|F| after dt on a straight piece of the flow curve.
+
+    Equation: d|F|/dt = approach + k bend t - (k/slope) (|F| - |F|_0), closed form
+    """
+    z = -k / slope * dt
+    if z > -_SMALL:
+        second = 0.5 + z * (1.0 / 6.0 + z * (1.0 / 24.0 + z / 120.0))
+        first = 1.0 + z * second
+    else:
+        first = math.expm1(z) / z
+        second = (first - 1.0) / z
+    return force + dt * (first * approach + dt * second * k * bend)
+
+
+@compiled
+def _runge_kutta(
+    y: float, at: float, dt: float, regime: int, side: float, step: Step, stages: Array
+) -> tuple[float, float]:
+    """The integrated variable after dt, and its embedded error."""
+    end, error = y, 0.0
+    for i in range(STAGES):
+        change = 0.0
+        for j in range(i):
+            change += _STAGES[i, j] * stages[j]
+        end = y + dt * change
+        stages[i] = _rate(end, at + _NODES[i] * dt, regime, side, step)
+        error += _ERROR[i] * stages[i]
+    return end, dt * error
+
+
+@compiled
+def _rate(y: float, at: float, regime: int, side: float, step: Step) -> float:
+    """Rate of the integrated variable: of s in SMOOTH, of |F| in RELIEF.
+
+    Equation: d|F|/dt = k (side u - w) + (dk/dt)/k |F|; in SMOOTH less what the moving curve does by itself
+    """
+    p = row_in(step, at)
+    pull = side * extension_speed(step, at)
+    softening = (step.p1[K] - step.p0[K]) / (step.h * p[K]) if step.moving else 0.0
+    if regime == RELIEF:
+        return p[K] * (pull - speed_at(y, p, regime, side, 0.0)) + softening * y
+    s = max(y, 0.0)
+    w = viscous_speed(s, p, side)
+    rate = p[K] * (pull - w)
+    if step.moving:
+        span = _DIFFERENCE * step.h
+        ahead, behind = (
+            smooth_force_of(s, row_in(step, at + span), side),
+            smooth_force_of(s, row_in(step, at - span), side),
+        )
+        rate += softening * smooth_force_of(s, p, side) - (ahead - behind) / (2.0 * span)
+    return rate / smooth_rise(s, w, p, side)
