@@ -110,11 +110,11 @@ def test_a_moving_stiffness_agrees_with_a_restarted_high_order_solver_to_1e_9() 
         half = 0.5 * (motion.velocity[i + 1] - motion.velocity[i])
         share0, share1 = motion.voltage[i] / 150, motion.voltage[i + 1] / 150
 
-        def state(t, i=i, share0=share0, share1=share1):
+        def state(t, i=i, share0=share0, share1=share1) -> tuple[float, float, float]:
             s = share0 + (share1 - share0) * (t - motion.time[i]) / STEP
             return 300 + 1000 * s, 2700 - 200 * s, 2e5 + 2e5 * s
 
-        def rate(t, y, i=i, mean=mean, half=half, state=state):
+        def rate(t, y, i=i, mean=mean, half=half, state=state) -> list[float]:
             T0, C, k = state(t)
             u = mean + half * (2 * (t - motion.time[i]) / STEP - 1)
             return [u - np.sign(y[0]) * max(k * abs(y[0]) - T0, 0.0) / C]
