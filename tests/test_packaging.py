@@ -65,7 +65,7 @@ def test_every_locked_version_runs_on_every_supported_python() -> None:
         if pin.marker and not pin.marker.evaluate():
             continue
         installed = distribution(name)
-        wanted = SpecifierSet(installed.metadata.get("Requires-Python", ""))
+        wanted = SpecifierSet(str(installed.metadata.json.get("requires_python", "")))
         refused += [f"{name} on {python}" for python in PYTHONS if python not in wanted]
         assert installed.version == version(pin), f"{name}: installed {installed.version}, locked {version(pin)}"
     assert refused == []
