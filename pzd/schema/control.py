@@ -36,10 +36,11 @@ def canonical_nodes(root: Node, control: Control) -> Node:
         return root
     if isinstance(root.value, tuple):
         return collection(tuple(canonical_nodes(item, control) for item in root.value), root.place)
-    entries = {
-        canonical(key, control): Entry(entry.place, canonical_nodes(entry.node, control))
-        for key, entry in root.value.items()
-    }
+    entries: dict[str, Entry] = {}
+    for key, entry in root.value.items():
+        name = canonical(key, control)
+        name = key if name in root.value else name  # both names stand here: the model refuses one of them
+        entries[name] = Entry(entry.place, canonical_nodes(entry.node, control))
     return collection(entries, root.place)
 
 

@@ -33,6 +33,17 @@ class Document:
         """The document as plain Python data."""
         return self.root.data()
 
+    def place(self, path: Iterable[str]) -> str:
+        """The place of a value by its keys and indices, or of the last thing on the way to it that is there."""
+        node = self.root
+        for part in path:
+            below = node.value.get(part) if isinstance(node.value, Mapping) else None
+            if below is not None:
+                node = below.node
+            elif isinstance(node.value, tuple) and part.isdecimal() and int(part) < len(node.value):
+                node = node.value[int(part)]
+        return node.place
+
     def overridden(self, overrides: Iterable[str]) -> Self:
         """The document with ``a.b=VALUE`` set, VALUE one YAML scalar; items of lists by index.
 

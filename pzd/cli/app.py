@@ -1,0 +1,102 @@
+"""The commands put together, and how each way of ending becomes an exit code."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+import typer
+
+from pzd.cli import look, stages, start
+from pzd.cli.exits import DONE, INTERRUPTED, OWN_FAULT
+from pzd.cli.output import complain, own_fault, silence
+from pzd.schema.errors import ConfigError, FilesError, UserError
+
+_USAGE_ERROR: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
+"""The base of what typer says about wrong usage; it is click's own or typer's copy of it."""
+
+app = typer.Typer(
+    name="pzd",
+    help="Says what a controlled damper does: rig files in, comfort report out.",
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    no_args_is_help=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+_COMMANDS = (*stages.COMMANDS, *look.COMMANDS, *start.COMMANDS)
+for _command in _COMMANDS:
+    app.command()(_command)
+
+
+@app.callback(invoke_without_command=True)
+def _bare(context: typer.Context) -> None:
+    """Say what a controlled damper does: rig files in, comfort report out."""
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def main() -> NoReturn:
+    """Run the command line and exit by the codes of the contract."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    code = status(sys.argv[1:])
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        silence(sys.stdout)
+    sys.exit(code)
+
+
+def status(arguments: Sequence[str]) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    arguments : what stands behind ``pzd``
+
+    Returns
+    -------
+    0 done, 1 our own fault, 2 config or usage, 3 data, 4 not to be trusted, 5 files, 130 interrupted
+    """
+    try:
+        return app(list(arguments), prog_name="pzd", standalone_mode=False) or DONE
+    except (KeyboardInterrupt, typer.Abort):
+        complain(["interrupted; finished stages stand, the one at work left what was there before"])
+        return INTERRUPTED
+    except BrokenPipeError:
+        silence(sys.stdout)
+        return DONE
+    except Exception as error:  # noqa: BLE001  # every ending has its exit code
+        return _failed(error)
+
+
+def _failed(error: Exception) -> int:
+    if isinstance(error, UserError):
+        complain(error.messages)
+        return error.exit_code
+    if isinstance(error, _USAGE_ERROR):
+        complain([_usage(error)])
+        return ConfigError.exit_code
+    if isinstance(error, OSError) and error.errno is not None:
+        complain([f"{error.filename or 'system'}: {error.strerror}"])
+        return FilesError.exit_code
+    complain([own_fault(error)])
+    return OWN_FAULT
+
+
+def _usage(error: Exception) -> str:
+    """What is wrong with the usage, as one line."""
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context else "pzd"
+    message = " ".join(str(getattr(error, "format_message", error.__str__)()).split())
+    unknown = re.search(r"No such command '([^']*)'", message)
+    if unknown:
+        near = difflib.get_close_matches(unknown[1], [one.__name__ for one in _COMMANDS], 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        message = f"no such command{hint} (got {unknown[1]})"
+    return f"{command}: {message}; see {command} --help"

@@ -1,0 +1,28 @@
+"""Numbers and rows as aligned text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def number(value: float | str | None) -> str:
+    """A number with the digits that matter; a dash where there is none."""
+    if value is None or value == "":
+        return "-"
+    return value if isinstance(value, str) else f"{value:.4g}"
+
+
+def interval(value: float | None, low: float | None, high: float | None) -> str:
+    """A value with its 95 % interval."""
+    if value is None or low is None or high is None:
+        return number(value)
+    return f"{number(value)} ({number(low)} to {number(high)})"
+
+
+def aligned(rows: Sequence[Sequence[str]], indent: str = "") -> list[str]:
+    """Rows as lines whose columns stand below each other."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        (indent + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))).rstrip()
+        for row in rows
+    ]

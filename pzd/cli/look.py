@@ -1,0 +1,132 @@
+"""The commands that only look: at a config, at a run, at several runs side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pzd.cli.exits import DONE
+from pzd.cli.layout import aligned, interval, number
+from pzd.cli.options import RUNS, Config, Quiet, Runs, Set, Verbose
+from pzd.cli.output import Output
+
+if TYPE_CHECKING:
+    from pzd.artefacts import ParameterRow, RecordEntry
+    from pzd.pipeline.standing import Standing
+
+RunFolders = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of runs, e.g. runs/quickstart.")]
+
+
+def check(
+    config: Config, runs: Runs = RUNS, overrides: Set = None, quiet: Quiet = False, verbose: Verbose = False
+) -> int:
+    """Check config and rig records; write nothing."""
+    from pzd.pipeline.command import opened, preflight
+
+    output = Output(quiet=quiet, verbose=verbose)
+    entries = preflight(opened(config, runs, overrides or ()))
+    for entry in entries:
+        output.say(*_entry(entry))
+    found = sum(len(entry.findings) for entry in entries)
+    output.say(f"{len(entries)} records, {found} findings; the config is in order, nothing was written")
+    return DONE
+
+
+def _entry(entry: RecordEntry) -> Iterator[str]:
+    yield f"{entry.name}: {number(entry.cycles)} cycles at {number(entry.rate_Hz)} Hz"
+    for finding in entry.findings:
+        yield f"  {finding.check}: {finding.where}: {number(finding.size)} {finding.unit}; {finding.follows}"
+
+
+def show(
+    config: Config, runs: Runs = RUNS, overrides: Set = None, quiet: Quiet = False, verbose: Verbose = False
+) -> int:
+    """Print what stands in the run of a config."""
+    from pzd.cli.story import story
+    from pzd.pipeline.command import opened
+    from pzd.pipeline.standing import standing
+
+    found = standing(opened(config, runs, overrides or ()).run)
+    output = Output(quiet=quiet, verbose=verbose)
+    output.say(f"run: {found.folder}")
+    _section(output, "parameters", _parameters(found))
+    _section(output, "diagnosis", [[line] for line in story(found.diagnosis)] if found.diagnosis else [])
+    _section(output, "rides", _rides(found))
+    _section(output, "comfort", _comfort(found))
+    output.say(*(f"not to be trusted: {mark}" for mark in found.marks))
+    output.say(f"report: {found.page or 'not written yet'}")
+    return DONE
+
+
+def _section(output: Output, title: str, rows: list[list[str]]) -> None:
+    if rows:
+        output.say("", f"{title}:", *aligned(rows, "  "))
+
+
+def _parameters(found: Standing) -> list[list[str]]:
+    if not found.parameters:
+        return []
+    control = found.control
+    head = [
+        "setting",
+        f"{control.name} [{control.unit}]",
+        "T [degC]",
+        "T0 [N]",
+        "C [N s/m]",
+        "k [N/m]",
+        "W_s",
+        "status",
+    ]
+    return [head, *(_parameter_row(row) for row in found.parameters)]
+
+
+def _parameter_row(row: ParameterRow) -> list[str]:
+    return [
+        number(row.setting),
+        number(row.voltage_V),
+        number(row.temperature_degC),
+        interval(row.T0_N, row.T0_N_low95, row.T0_N_high95),
+        interval(row.C_Ns_per_m, row.C_Ns_per_m_low95, row.C_Ns_per_m_high95),
+        interval(row.k_N_per_m, row.k_N_per_m_low95, row.k_N_per_m_high95),
+        number(row.W_s),
+        row.status,
+    ]
+
+
+def _rides(found: Standing) -> list[list[str]]:
+    head = ["case", "point", "peak |a_K| [m/s2]", "rms a_K [m/s2]", "peak deflection [m]", "outside the table"]
+    rows = [
+        [
+            row.case,
+            row.point,
+            number(row.peak_abs_aK_m_per_s2),
+            number(row.rms_aK_m_per_s2),
+            number(row.peak_deflection_m),
+            f"{row.outside_table:.1%}",
+        ]
+        for row in found.summary
+    ]
+    return [head, *rows] if rows else []
+
+
+def _comfort(found: Standing) -> list[list[str]]:
+    return [
+        [row.case, row.point, row.edition, row.measure, f"{number(row.value)} {row.unit}", row.status]
+        for row in found.comfort
+    ]
+
+
+def compare(runs: RunFolders, quiet: Quiet = False, verbose: Verbose = False) -> int:
+    """Print the numbers of several runs side by side."""
+    from pzd.cli.beside import beside
+    from pzd.pipeline.standing import standing_in
+
+    output = Output(quiet=quiet, verbose=verbose)
+    output.say(*aligned(beside([standing_in(folder) for folder in runs])))
+    return DONE
+
+
+COMMANDS = (check, show, compare)

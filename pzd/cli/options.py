@@ -1,0 +1,28 @@
+"""The options that commands share, each with its help."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Config = Annotated[
+    Path, typer.Argument(metavar="CONFIG", help="The YAML file that describes the run.", show_default=False)
+]
+Runs = Annotated[Path, typer.Option("--runs", metavar="DIR", help="Folder of the results.")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="a.b=VALUE",
+        help="Set a value of the config, items of lists by index; can be given again.",
+        show_default=False,
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Run the stage although it is fresh; with run, every stage.")]
+Jobs = Annotated[int, typer.Option("--jobs", metavar="N", min=1, help="Processes that a stage may use.")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print what the stages say, and tracebacks.")]
+
+RUNS = Path("runs")

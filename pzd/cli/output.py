@@ -1,0 +1,110 @@
+"""What the command line prints: lines to stdout, complaints to stderr, progress to a terminal."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import sys
+import tempfile
+import traceback
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TextIO
+
+_BAR = 24
+"""Width of the progress bar in characters."""
+_PROGRESS = "%d of %d"
+"""How a log message begins that tells how far a stage is."""
+
+
+class Output:
+    """Prints as much as the user wants to see."""
+
+    def __init__(self, *, quiet: bool, verbose: bool) -> None:
+        self.quiet = quiet
+        logger = logging.getLogger("pzd")
+        logger.handlers = [_Handler(self, verbose=verbose and not quiet)]
+        logger.setLevel(logging.DEBUG if verbose else logging.INFO)
+        logging.captureWarnings(capture=True)
+        logging.getLogger("py.warnings").handlers = [logging.NullHandler()]
+
+    def say(self, *lines: str) -> None:
+        """Print lines to stdout, unless the user wants it quiet or nobody listens any more."""
+        if not self.quiet:
+            clear_progress()
+            for line in lines:
+                _print(line, sys.stdout)
+
+
+class _Handler(logging.Handler):
+    """Shows what the stages log: progress as a bar, warnings as complaints, the rest where asked for."""
+
+    def __init__(self, output: Output, *, verbose: bool) -> None:
+        super().__init__()
+        self.output, self.verbose = output, verbose
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show one message."""
+        if record.levelno >= logging.WARNING:
+            complain([record.getMessage()])
+        elif self.verbose:
+            self.output.say(f"  {record.getMessage()}")
+        elif str(record.msg).startswith(_PROGRESS) and not self.output.quiet and sys.stderr.isatty():
+            _draw(record)
+
+
+def _draw(record: logging.LogRecord) -> None:
+    done, whole = record.args[:2] if isinstance(record.args, tuple) else (0, 0)
+    filled = _BAR * int(str(done)) // max(int(str(whole)), 1)
+    line = f"[{'#' * filled}{'.' * (_BAR - filled)}] {record.getMessage()}"
+    sys.stderr.write(f"\r\x1b[K{line[: shutil.get_terminal_size().columns - 1]}")
+    sys.stderr.flush()
+
+
+def clear_progress() -> None:
+    """Take the progress bar away."""
+    if sys.stderr.isatty():
+        sys.stderr.write("\r\x1b[K")
+        sys.stderr.flush()
+
+
+def complain(lines: Iterable[str]) -> None:
+    """Print plain lines to stderr."""
+    clear_progress()
+    for line in lines:
+        _print(line, sys.stderr)
+
+
+def _print(line: str, stream: TextIO) -> None:
+    try:
+        stream.write(f"{line}\n")
+        stream.flush()
+    except BrokenPipeError:
+        silence(stream)
+
+
+def silence(stream: TextIO) -> None:
+    """Send what else is printed to a stream nowhere: whoever read it has gone."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+def own_fault(error: BaseException) -> str:
+    """One line about an error of ours, its traceback written to a file, and shown where tracebacks are wanted."""
+    text = "".join(traceback.format_exception(error))
+    if logging.getLogger("pzd").isEnabledFor(logging.DEBUG):
+        complain(text.splitlines())
+    summary = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"pzd: this is a fault of pzd, not yours: {summary} ({_filed(text)})"
+
+
+def _filed(text: str) -> str:
+    try:
+        handle, name = tempfile.mkstemp(prefix="pzd-traceback-", suffix=".txt")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        return f"the traceback could not be written: {error.strerror}; -v shows it"
+    return f"traceback in {Path(name)}; -v shows it"

@@ -1,0 +1,69 @@
+"""The commands that bring a run up to date: all of it, or as far as one stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from pzd.cli.exits import DONE, UNTRUSTED
+from pzd.cli.options import RUNS, Config, Force, Jobs, Quiet, Runs, Set, Verbose
+from pzd.cli.output import Output, complain
+
+if TYPE_CHECKING:
+    from pzd.runs import Run
+
+_COMMANDS = {
+    "run": "Every stage: rig records in, comfort report out.",
+    "synthesise": "Test the virtual damper of the config.",
+    "ingest": "Read the rig files of the config, and check them.",
+    "identify": "Find the Bingham parameters of every condition.",
+    "diagnose": "Find what the model misses, and tell the story.",
+    "table": "Tabulate force over voltage and speed.",
+    "simulate": "Drive the half-car on the damper.",
+    "report": "Rate the rides by comfort, and write the page.",
+}
+
+
+def _page(run: Run) -> list[str]:
+    from pzd.pipeline.standing import page_of
+
+    return [f"report: {page_of(run)}"]
+
+
+def _story(run: Run) -> list[str]:
+    from pzd.cli.story import story
+    from pzd.pipeline.standing import standing
+
+    found = standing(run).diagnosis
+    return story(found) if found else []
+
+
+_AT_THE_END: dict[str, Callable[[Run], list[str]]] = {"run": _page, "report": _page, "diagnose": _story}
+"""What a command says once its stages are up to date."""
+
+
+def _command(name: str, summary: str) -> Callable[..., int]:
+    def command(
+        config: Config,
+        runs: Runs = RUNS,
+        overrides: Set = None,
+        force: Force = False,
+        jobs: Jobs = 1,
+        quiet: Quiet = False,
+        verbose: Verbose = False,
+    ) -> int:
+        from pzd.pipeline.command import bring, opened
+
+        output = Output(quiet=quiet, verbose=verbose)
+        given = opened(config, runs, overrides or ())
+        marks = bring(given, name, force=force, jobs=jobs, say=output.say)
+        if name in _AT_THE_END:
+            output.say(*_AT_THE_END[name](given.run))
+        complain(f"not to be trusted: {mark}" for mark in marks)
+        return UNTRUSTED if marks else DONE
+
+    command.__name__, command.__doc__ = name, summary
+    return command
+
+
+COMMANDS = tuple(_command(name, summary) for name, summary in _COMMANDS.items())

@@ -1,0 +1,55 @@
+"""The commands for beginners: a config from rig files, what a config may hold, which effects there are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pzd.cli.exits import DONE
+from pzd.cli.layout import aligned
+from pzd.cli.options import Verbose
+from pzd.cli.output import Output
+
+RigFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Rig files to make a config for.")]
+
+
+def init(files: RigFiles, verbose: Verbose = False) -> int:
+    """Print a config guessed from rig files."""
+    from pzd.rig.guess import guessed
+    from pzd.schema.errors import ConfigError
+
+    output = Output(quiet=False, verbose=verbose)
+    absent = [path for path in files if not path.is_file()]
+    if absent:
+        raise ConfigError(f"{path}: no such file" for path in absent)
+    output.say(*guessed(files))
+    return DONE
+
+
+def schema(verbose: Verbose = False) -> int:
+    """Print the JSON schema of a config."""
+    import json
+
+    from pzd.config import RunConfig
+
+    Output(quiet=False, verbose=verbose).say(json.dumps(RunConfig.model_json_schema(), indent=2, ensure_ascii=False))
+    return DONE
+
+
+def effects(verbose: Verbose = False) -> int:
+    """Print the library of effects."""
+    from pzd.damper.effects import library
+
+    head = ["effect", "place", "parameter", "unit", "from", "to", "off at", "law"]
+    rows = [
+        [effect.name, effect.place, p.name, p.unit, f"{p.low:g}", f"{p.high:g}", f"{p.neutral:g}", effect.law]
+        for effect in library().values()
+        for p in effect.parameters
+    ]
+    Output(quiet=False, verbose=verbose).say(*aligned([head, *rows]))
+    return DONE
+
+
+COMMANDS = (init, schema, effects)

@@ -1,0 +1,78 @@
+"""Tells a diagnosis in about ten lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from pzd.artefacts import Diagnosis, NextTest, Value
+from pzd.cli.layout import interval, number
+
+_VERDICTS = {
+    "named": "one answer fits, and no other does",
+    "ambiguous": "several answers fit the data equally well",
+    "none": "nothing is missing that the data can show",
+    "unexplained": "a gap remains that no effect of the library accounts for",
+}
+_MOST = 3
+"""How many places and candidates are told."""
+
+
+def story(diagnosis: Diagnosis) -> list[str]:
+    """What is missing, where, how sure that is, what it was worth, and what to test next."""
+    lines = [
+        f"verdict: {diagnosis.verdict}, {_VERDICTS[diagnosis.verdict]}",
+        f"reason: {diagnosis.reason}",
+        _gap(diagnosis),
+    ]
+    lines += [f"where: {where.region}, {where.share_of_gap:.0%} of the gap" for where in diagnosis.where[:_MOST]]
+    lines += [f"adopted: {name}, {_parameters(diagnosis.parameters.get(name, {}))}" for name in diagnosis.effects]
+    if diagnosis.confidence is not None:
+        lines.append(f"confidence: {diagnosis.confidence:.0%}")
+    if diagnosis.rivals:
+        lines.append(f"rivals: {', '.join(diagnosis.rivals)}")
+    lines += _rejected(diagnosis)
+    if diagnosis.next_test:
+        lines.append(_next(diagnosis.next_test))
+    return lines
+
+
+def _gap(diagnosis: Diagnosis) -> str:
+    gap = diagnosis.gap
+    share = f", {1.0 - gap.after / gap.before:.0%} less" if gap.after < gap.before else ""
+    held = f"{len(gap.held_out)} {gap.hold_out}" if gap.hold_out != "mixed" else f"{len(gap.held_out)} parts"
+    return (
+        f"gap on what no fit has seen ({held}): W_s {number(gap.before)} before, {number(gap.after)} after{share}; "
+        f"noise alone gives {number(gap.noise_floor)}"
+    )
+
+
+def _parameters(values: Mapping[str, Value]) -> str:
+    return ", ".join(f"{name} = {_value(value)} {value.unit}" for name, value in values.items())
+
+
+def _value(value: Value) -> str:
+    if isinstance(value.value, tuple):
+        places = zip(value.value, value.at_voltage_V or (), strict=False)
+        return "; ".join(f"{number(one)} at {number(voltage)}" for one, voltage in places)
+    low = None if isinstance(value.low95, tuple) else value.low95
+    high = None if isinstance(value.high95, tuple) else value.high95
+    return interval(value.value, low, high)
+
+
+def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
+    told = {*diagnosis.effects, *diagnosis.rivals}
+    others = [one for one in diagnosis.ranking if one.effect not in told]
+    for one in others[:_MOST]:
+        yield f"not taken: {one.effect}, W_s {number(one.gap_after)}, {one.reason}"
+
+
+def _next(test: NextTest) -> str:
+    voltages = test.voltage_V if isinstance(test.voltage_V, tuple) else (test.voltage_V,)
+    parts = [
+        test.waveform,
+        f"{number(test.frequency_Hz)} Hz" if test.frequency_Hz is not None else "",
+        f"{number(test.amplitude_m)} m" if test.amplitude_m is not None else "",
+        f"at {', '.join(number(v) for v in voltages)}" if voltages != (None,) else "",
+    ]
+    between = f" to tell {' from '.join(test.separates)}" if test.separates else ""
+    return f"next test: {' '.join(part for part in parts if part)}{between}"

@@ -1,0 +1,131 @@
+"""The run config: what holds for the whole run, and one block a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, TypeAdapter, ValidationError, field_validator
+
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.identify.config import IdentifyConfig
+from pzd.quantities import CHANNELS, VOLTAGE, Control
+from pzd.report.config import ReportConfig
+from pzd.rig.config import RigConfig
+from pzd.schema.errors import ConfigError
+from pzd.schema.model import Frozen
+from pzd.schema.nearest import nearest
+from pzd.schema.yamlfile import Document, read_yaml
+from pzd.simulate.config import SimulateConfig
+from pzd.table.config import TableConfig
+
+
+class ControlConfig(Frozen):
+    """The control signal of the valve."""
+
+    name: str = Field(default=VOLTAGE.name, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    """What it is called: `voltage_V` reads `current_A` with `{name: current, unit: A}`."""
+    unit: str = Field(default=VOLTAGE.unit, pattern=r'^[^\s,;"]+$')
+    """Its unit."""
+
+    @field_validator("name")
+    @classmethod
+    def _not_another_channel(cls, name: str) -> str:
+        if name in {channel.name for channel in CHANNELS} - {VOLTAGE.name}:
+            raise ValueError(f"{name} is another channel of the rig; the control needs a name of its own")
+        return name
+
+    def signal(self) -> Control:
+        """The control signal as the files name it."""
+        return Control(self.name, self.unit)
+
+
+class RunConfig(Frozen):
+    """One run: rig files in, comfort report out."""
+
+    seed: int = Field(default=1, ge=0)
+    """Seed of every random draw."""
+    control: ControlConfig = ControlConfig()
+    """The control signal of the valve."""
+    setting: str | None = None
+    """Which of the rig's settings diagnose and everything behind it use; needed where there are several."""
+    rig: RigConfig
+    """Where the rig records come from."""
+    identify: IdentifyConfig = IdentifyConfig()
+    """How the Bingham parameters are found."""
+    diagnose: DiagnoseConfig = DiagnoseConfig()
+    """How the missing effect is looked for."""
+    table: TableConfig = TableConfig()
+    """The table of force over voltage and speed."""
+    simulate: SimulateConfig = SimulateConfig()
+    """The half-car and its rides."""
+    report: ReportConfig = ReportConfig()
+    """The comfort report."""
+
+
+def load(path: Path, overrides: Sequence[str] = ()) -> RunConfig:
+    """Read a config, override values of it, and validate the whole.
+
+    Parameters
+    ----------
+    path : the YAML file
+    overrides : any number of ``a.b=VALUE``, VALUE one YAML scalar
+
+    Returns
+    -------
+    the config with every default filled in
+
+    Raises
+    ------
+    ConfigError : when anything is wrong with it, with every place
+    """
+    return validated(read_yaml(path).overridden(overrides))
+
+
+def validated(document: Document) -> RunConfig:
+    """The config that a document describes.
+
+    Raises
+    ------
+    ConfigError : when anything is wrong with it, with every place
+    """
+    return document.validated(RunConfig, control_of(document.data))
+
+
+def control_of(data: Any) -> Control:
+    """The control that the document names; the usual one where that block is itself at fault."""
+    block = data.get("control", {}) if isinstance(data, dict) else {}
+    try:
+        return TypeAdapter(ControlConfig).validate_python(block).signal()
+    except ValidationError:
+        return Control()
+
+
+def setting_in_use(chosen: str | None, found: Sequence[str | None]) -> str | None:
+    """The setting that diagnose and everything behind it use.
+
+    Parameters
+    ----------
+    chosen : the config's `setting`
+    found : the settings of the rig's records
+
+    Returns
+    -------
+    the chosen one, or the only one there is
+
+    Raises
+    ------
+    ConfigError : when several stand to choose from, or none is the one chosen
+    """
+    names = sorted({name for name in found if name is not None})
+    listed = ", ".join(names) or "none that has a name"
+    if chosen is None and len(set(found)) > 1:
+        raise ConfigError(f"setting: the rig has several, say which one diagnose and the rest are about: {listed}")
+    if chosen is None:
+        return found[0] if found else None
+    if chosen not in names:
+        near = nearest(chosen, names)
+        hint = f"; did you mean {near}?" if near else ""
+        raise ConfigError(f"setting: no record of the rig has this setting; there is {listed}{hint} (got {chosen})")
+    return chosen

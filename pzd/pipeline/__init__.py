@@ -1,0 +1,1 @@
+"""The stages in order, which of them are stale and why."""

@@ -1,0 +1,118 @@
+"""Brings the stages up to date, as make would, and says of each why it runs or does not."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pzd.artefacts import Artefact
+from pzd.config import RunConfig
+from pzd.pipeline.dependencies import block_of, changes, dependencies, is_artefact, key_of, setting_of
+from pzd.pipeline.stages import Stage
+from pzd.quantities import Control
+from pzd.runs import Kept, Run
+
+Say = Callable[[str], None]
+
+
+@dataclass
+class Pipeline:
+    """One config, its run, and how the command wants it done."""
+
+    config: RunConfig
+    run: Run
+    stages: Sequence[Stage]
+    say: Say
+    """Takes a line about each stage."""
+    jobs: int = 1
+    """Processes that a stage may use, where it can use several."""
+    marks: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    """Why the results so far are not to be trusted, by folder."""
+
+    def bring_up_to_date(self, target: str, forced: Sequence[str] = ()) -> tuple[str, ...]:
+        """Run every stage up to the target that is stale.
+
+        Parameters
+        ----------
+        target : name of the last stage
+        forced : stages that run even when they are fresh
+
+        Returns
+        -------
+        the marks of all these stages: why their results are not to be trusted
+
+        Raises
+        ------
+        UserError : what the user can mend; the stage at fault leaves what was there before
+        """
+        wanted = self.stages[: [stage.name for stage in self.stages].index(target) + 1]
+        for number, stage in enumerate(wanted):
+            self._bring(stage, force=stage.name in forced)
+            if number == 0 and any("setting" in later.takes for later in wanted):
+                setting_of(self.config, self.run)
+        return tuple(dict.fromkeys(mark for marks in self.marks.values() for mark in marks))
+
+    def _bring(self, stage: Stage, *, force: bool) -> None:
+        inputs = dependencies(stage, self.config, self.run)
+        kept = self.run.kept(stage.folder)
+        reason = "forced" if force else stale(kept, inputs)
+        if reason is None:
+            self.marks[stage.folder] = self._marks_as_it_stands(stage, kept)
+            by_hand = f"; edited by hand and kept: {', '.join(kept.edited)}" if kept.edited else ""
+            self._say(stage, f"fresh: nothing it depends on has changed{by_hand}")
+            return
+        lost = f"; edited by hand, now beside the new as .edited: {', '.join(kept.edited)}" if kept.edited else ""
+        self._say(stage, f"runs: {reason}{lost}")
+        self._run(stage, inputs)
+
+    def _run(self, stage: Stage, inputs: dict[str, str]) -> None:
+        begun = time.monotonic()
+        artefact = self.made(stage)
+        marks = self._carried(stage, getattr(artefact, "untrusted", ()))
+        seconds = time.monotonic() - begun
+        self.run.write(stage.name, artefact, inputs, key_of(inputs), marks, seconds)
+        self.marks[stage.folder] = marks
+        self._say(stage, f"done in {seconds:.1f} s: {self.run.folder / stage.folder}")
+
+    def made(self, stage: Stage) -> Artefact:
+        """What a stage makes of its inputs, written nowhere."""
+        return stage.function(**{name: self._argument(name, kind) for name, kind in stage.takes.items()})
+
+    def _argument(self, name: str, annotation: Any) -> Any:
+        """What a parameter of a stage is given; artefacts are read back from their files, never passed on."""
+        if is_artefact(annotation):
+            return self.run.read(annotation)
+        if block := block_of(self.config, annotation):
+            return block[1]
+        if annotation is Control:
+            return self.run.control
+        if name == "setting":
+            return setting_of(self.config, self.run)
+        return {"seed": self.config.seed, "folder": self.run.config.parent, "jobs": self.jobs}[name]
+
+    def _marks_as_it_stands(self, stage: Stage, kept: Kept) -> tuple[str, ...]:
+        """The marks of the manifest, or of the artefact itself where it was edited, which checks it too."""
+        if kept.edited:
+            return self._carried(stage, getattr(self.run.read(stage.makes), "untrusted", ()))
+        return kept.manifest.marks if kept.manifest else ()
+
+    def _carried(self, stage: Stage, own: Sequence[str]) -> tuple[str, ...]:
+        """A stage's own marks behind those of what it was made from."""
+        before = [self.marks.get(kind.folder, ()) for kind in stage.takes.values() if is_artefact(kind)]
+        return tuple(dict.fromkeys([mark for marks in before for mark in marks] + list(own)))
+
+    def _say(self, stage: Stage, line: str) -> None:
+        self.say(f"{stage.name:<10} {line}")
+
+
+def stale(kept: Kept, inputs: dict[str, str]) -> str | None:
+    """Why a stage must run, in words; None where it need not."""
+    if kept.manifest is None:
+        return "no result of it stands here"
+    if kept.missing:
+        return f"{', '.join(kept.missing)} missing"
+    if kept.manifest.key != key_of(inputs):
+        return changes(kept.manifest.inputs, inputs) or "its manifest was edited"
+    return None

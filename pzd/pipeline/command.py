@@ -1,0 +1,106 @@
+"""What a command does with a config: bring its stages up to date, or check it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from pzd.artefacts import RecordEntry, Rig
+from pzd.config import RunConfig, setting_in_use, validated
+from pzd.pipeline.bring import Pipeline, Say
+from pzd.pipeline.stages import LAST, Stage, stages
+from pzd.runs import Run
+from pzd.schema.errors import ConfigError
+from pzd.schema.yamlfile import Document, read_yaml, yaml_text
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A config as a command was given it, and where its results stand."""
+
+    document: Document
+    config: RunConfig
+    run: Run
+
+    @contextmanager
+    def placed(self) -> Iterator[None]:
+        """Put file, line and column in front of a stage's complaint about the config."""
+        try:
+            yield
+        except ConfigError as error:
+            raise ConfigError(self._placed(message) for message in error.messages) from error
+
+    def _placed(self, message: str) -> str:
+        path = re.match(r"[\w.]+(?=: )", message)
+        parts = path.group().split(".") if path else [""]
+        return f"{self.document.place(parts)}: {message}" if parts[0] in RunConfig.model_fields else message
+
+
+def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:
+    """Read a config and find its run.
+
+    Parameters
+    ----------
+    path : the config
+    runs : the folder of all runs
+    overrides : any number of ``a.b=VALUE``
+
+    Raises
+    ------
+    ConfigError : when the config is wrong, or its run belongs to another config
+    """
+    document = read_yaml(path).overridden(overrides)
+    config = validated(document)
+    return Opened(document, config, Run.of(path, runs, config.control.signal()))
+
+
+def bring(given: Opened, target: str, *, force: bool, jobs: int, say: Say) -> tuple[str, ...]:
+    """Bring a run up to date as far as a stage.
+
+    Parameters
+    ----------
+    given : config and run
+    target : name of the last stage, or ``run`` for all
+    force : run the target again although it is fresh; with ``run`` every stage
+    jobs : processes that a stage may use
+    say : takes a line about each stage
+
+    Returns
+    -------
+    why the results are not to be trusted, a line a reason
+
+    Raises
+    ------
+    UserError : what the user can mend
+    """
+    line = stages(given.config)
+    last = LAST if target == "run" else target
+    _right_source(line, last)
+    forced = [stage.name for stage in line if target in ("run", stage.name)] if force else []
+    with given.placed(), given.run.locked(f"pzd {target}"):
+        given.run.write_config(yaml_text(given.config, given.run.control))
+        return Pipeline(given.config, given.run, line, say, jobs).bring_up_to_date(last, forced)
+
+
+def _right_source(line: Sequence[Stage], target: str) -> None:
+    if target not in [stage.name for stage in line]:
+        held = "rig.virtual" if line[0].name == "synthesise" else "rig.files"
+        raise ConfigError(f"pzd {target}: the config has {held}, so the command is pzd {line[0].name}")
+
+
+def preflight(given: Opened) -> tuple[RecordEntry, ...]:
+    """The rig's records and what the preflight finds in them, written nowhere.
+
+    Raises
+    ------
+    UserError : what a run would be refused for
+    """
+    first = stages(given.config)[0]
+    with given.placed():
+        made = Pipeline(given.config, given.run, (first,), lambda _: None).made(first)
+        entries = made.entries if isinstance(made, Rig) else ()
+        setting_in_use(given.config.setting, [entry.setting for entry in entries])
+    return entries

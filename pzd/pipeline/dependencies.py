@@ -1,0 +1,124 @@
+"""What a stage depends on, each part as a hash; and what of it has changed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from pzd.artefacts import RecordEntry, Rig
+from pzd.config import RunConfig, setting_in_use
+from pzd.pipeline.sources import code_hash
+from pzd.pipeline.stages import Stage
+from pzd.quantities import Control
+from pzd.rig.config import RigConfig
+from pzd.runs import Run, file_hash
+from pzd.schema.errors import FilesError
+from pzd.schema.jsonfile import read_json_list
+
+_NAMED = 3
+"""How many changes a line names before it only counts them."""
+
+
+def setting_of(config: RunConfig, run: Run) -> str | None:
+    """The setting in use, by the config and by what the rig's records are.
+
+    Raises
+    ------
+    ConfigError : when it is not clear which one, or there is no such setting
+    """
+    entries = read_json_list(run.folder / Rig.folder / "records.json", RecordEntry, run.control)
+    return setting_in_use(config.setting, [entry.setting for entry in entries])
+
+
+def block_of(config: BaseModel, annotation: Any) -> tuple[str, BaseModel] | None:
+    """Name and value of the config's block of a type; None where the type is no block."""
+    for name in type(config).model_fields:
+        block = getattr(config, name)
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel) and isinstance(block, annotation):
+            return name, block
+    return None
+
+
+def is_artefact(annotation: Any) -> bool:
+    """Whether a parameter asks for what an earlier stage made."""
+    return hasattr(annotation, "folder") and hasattr(annotation, "read")
+
+
+def dependencies(stage: Stage, config: RunConfig, run: Run) -> dict[str, str]:
+    """Everything that a stage depends on, by name, each as a hash.
+
+    Parameters
+    ----------
+    stage : the stage
+    config : the run's config
+    run : the run's folder, in which the stages before this one are up to date
+
+    Returns
+    -------
+    hashes of the values of its config blocks, of the files that it reads and of its code
+    """
+    found: dict[str, str] = {}
+    for name, annotation in stage.takes.items():
+        if is_artefact(annotation):
+            found |= {f"{annotation.folder}/{file}": h for file, h in run.outputs(annotation.folder).items()}
+        elif block := block_of(config, annotation):
+            found |= {path: _hash(value) for path, value in _leaves(block[0], block[1].model_dump(mode="json"))}
+            if isinstance(block[1], RigConfig):
+                found |= _files_read(stage, block[1], run.config.parent)
+        elif name == "setting":
+            found[name] = _hash(setting_of(config, run))
+        elif annotation is Control:
+            found[name] = _hash(config.control.model_dump())
+        elif name == "seed":
+            found[name] = _hash(config.seed)
+    return found | {"code": code_hash(stage.function.__module__.split(".")[1])}
+
+
+def key_of(inputs: Mapping[str, str]) -> str:
+    """The hash of everything that a stage depends on."""
+    return _hash(dict(sorted(inputs.items())))
+
+
+def changes(before: Mapping[str, str], now: Mapping[str, str]) -> str:
+    """In words, what a stage depends on that is not as it was."""
+    told = [
+        _told(name, "is new" if name not in before else "is gone" if name not in now else "has changed")
+        for name in dict.fromkeys((*before, *now))
+        if before.get(name) != now.get(name)
+    ]
+    more = len(told) - _NAMED
+    return ", ".join(told[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _told(name: str, change: str) -> str:
+    return f"the code {change}" if name == "code" else f"{name} {change}"
+
+
+def _hash(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value).encode()).hexdigest()
+
+
+def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Every single value of a block under its dotted path."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    if not inner:
+        yield path, value
+    for key, below in inner:
+        yield from _leaves(f"{path}.{key}", below)
+
+
+def _files_read(stage: Stage, rig: RigConfig, folder: Path) -> dict[str, str]:
+    """Hashes of the files beside the config that the first stage reads."""
+    from pzd.rig.listing import listed
+
+    if "folder" not in stage.takes:
+        return {}
+    try:
+        return {str(one.path): file_hash(one.path) for one in listed(rig.files or (), folder)}
+    except OSError as error:
+        raise FilesError(f"{error.filename}: {error.strerror}") from error

@@ -1,0 +1,60 @@
+"""The stages in order; the signature of a stage's function is its declaration."""
+
+from __future__ import annotations
+
+import inspect
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from pzd.artefacts import Artefact
+from pzd.config import RunConfig
+
+LAST = "report"
+"""The stage that `pzd run` brings up to date."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage: its name as a command, and its function."""
+
+    name: str
+    function: Callable[..., Artefact]
+
+    @cached_property
+    def takes(self) -> Mapping[str, Any]:
+        """What the function asks for: the annotation of every parameter."""
+        hints = typing.get_type_hints(self.function)
+        return {name: hints[name] for name in inspect.signature(self.function).parameters}
+
+    @cached_property
+    def makes(self) -> type[Artefact]:
+        """The artefact that the function returns."""
+        made: type[Artefact] = typing.get_type_hints(self.function)["return"]
+        return made
+
+    @property
+    def folder(self) -> str:
+        """Where in the run its artefact stands."""
+        return self.makes.folder
+
+
+def stages(config: RunConfig) -> tuple[Stage, ...]:
+    """The stages of a config, first to last."""
+    from pzd.diagnose.stage import diagnose
+    from pzd.identify.stage import identify
+    from pzd.report.stage import report
+    from pzd.rig.stage import ingest, synthesise
+    from pzd.simulate.stage import simulate
+    from pzd.table.stage import tabulate
+
+    return (
+        Stage("synthesise", synthesise) if config.rig.virtual else Stage("ingest", ingest),
+        Stage("identify", identify),
+        Stage("diagnose", diagnose),
+        Stage("table", tabulate),
+        Stage("simulate", simulate),
+        Stage(LAST, report),
+    )

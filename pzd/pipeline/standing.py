@@ -1,0 +1,86 @@
+"""What stands in a run's folder, for those who only want to look."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pzd.artefacts import (
+    ComfortRow,
+    Diagnosed,
+    Diagnosis,
+    Identified,
+    ParameterRow,
+    Report,
+    Rides,
+    SummaryRow,
+)
+from pzd.config import control_of
+from pzd.quantities import Control
+from pzd.runs import CONFIG, Run
+from pzd.schema.csvfile import read_rows
+from pzd.schema.errors import ConfigError
+from pzd.schema.jsonfile import read_json
+from pzd.schema.yamlfile import read_yaml
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The numbers of a run; empty or None where a stage has not run."""
+
+    folder: Path
+    control: Control
+    parameters: tuple[ParameterRow, ...]
+    diagnosis: Diagnosis | None
+    summary: tuple[SummaryRow, ...]
+    comfort: tuple[ComfortRow, ...]
+    page: Path | None
+    """The report's page."""
+    marks: tuple[str, ...]
+    """Why the results are not to be trusted."""
+
+
+def page_of(run: Run) -> Path:
+    """Where the page of a run's report stands."""
+    return run.folder / Report.folder / "report.html"
+
+
+def standing(run: Run) -> Standing:
+    """What stands in a run's folder, checked.
+
+    Raises
+    ------
+    ConfigError : when nothing stands there
+    DataError : when a file of it is at fault
+    """
+    kept = {kind: run.kept(kind.folder).manifest for kind in (Identified, Diagnosed, Rides, Report)}
+    there = {kind for kind, manifest in kept.items() if manifest is not None}
+    if not there:
+        raise ConfigError(f"{run.folder}: no results stand here yet; pzd run {run.config} makes them")
+    at, control = run.folder, run.control
+    diagnosis = at / Diagnosed.folder / "diagnosis.json"
+    comfort = at / Report.folder / "comfort.csv"
+    return Standing(
+        at,
+        control,
+        run.read(Identified).rows if Identified in there else (),
+        read_json(diagnosis, Diagnosis, control) if Diagnosed in there else None,
+        read_rows(at / Rides.folder / "summary.csv", SummaryRow, control) if Rides in there else (),
+        read_rows(comfort, ComfortRow, control) if Report in there else (),
+        page_of(run) if Report in there else None,
+        tuple(dict.fromkeys(mark for manifest in kept.values() if manifest for mark in manifest.marks)),
+    )
+
+
+def standing_in(folder: Path) -> Standing:
+    """What stands in a folder that a run wrote.
+
+    Raises
+    ------
+    ConfigError : when it is no such folder
+    DataError : when a file of it is at fault
+    """
+    written = folder / CONFIG
+    if not written.is_file():
+        raise ConfigError(f"{folder}: no run stands here, it has no {CONFIG}; give a folder like runs/quickstart")
+    return standing(Run(folder, written, control_of(read_yaml(written).data)))
