@@ -1,0 +1,167 @@
+"""The `rig` block of the config: measured files, or a virtual stand, and what the stand can do."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from pzd.schema.model import Frozen
+
+VirtualEntry = dict[str, Any]
+
+
+def _text(value: object) -> object:
+    if isinstance(value, int | float):
+        # pydantic turns a ValueError alone into a fault of the config.
+        raise ValueError(f"a value needs its unit: write {value} V, {value} degC, ...")  # noqa: TRY004
+    return value
+
+
+WithUnit = Annotated[str, BeforeValidator(_text)]
+"""A number with its unit, like `100 V`."""
+
+
+class Fixture(Frozen):
+    """What stands between the damper and the sensors, where it is known; taken out of the records."""
+
+    mass_kg: float = Field(default=0.0, ge=0.0)
+    """Moving mass between the load cell and the damper: its inertia m a is taken out of the force."""
+    stiffness_N_per_m: float | None = Field(default=None, gt=0.0)
+    """Stiffness of frame and joints: F/k is taken out of the displacement."""
+    tare_N: float = 0.0
+    """Force that the cell shows without a damper: taken out of the force."""
+
+
+class Split(Frozen):
+    """Where one test ends and the next begins in a file that holds several; exactly one way."""
+
+    column: str | None = None
+    """Header of a column of labels: a test is a stretch of rows with one label."""
+    event: str | None = None
+    """Header of a column of events, mostly empty; the last column may be left out of rows without an event."""
+    begins: str | None = None
+    """Text in the event that begins a new test, e.g. `DAQ Resume`."""
+    gap_s: float | None = Field(default=None, gt=0.0)
+    """A pause of the clock longer than this [s] begins a new test."""
+    constants: dict[str, tuple[WithUnit, ...]] = Field(default={})
+    """Quantity -> one value with unit for each test in the file, in their order."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if sum(way is not None for way in (self.column, self.event, self.gap_s)) != 1:
+            raise ValueError("say exactly one of column, event (with begins), gap_s")
+        if (self.event is None) != (self.begins is None):
+            raise ValueError("event and begins belong together")
+        return self
+
+
+class FilesEntry(Frozen):
+    """Measured files of one layout, and how to read them."""
+
+    path: str = Field(min_length=1)
+    """Path or glob pattern (`*`, `?`, `**`), relative to the folder of this config."""
+    columns: dict[str, str] = Field(default={})
+    """Quantity -> header in the file, e.g. `{time: t, force: Load}`; what is not named has its canonical header."""
+    units: dict[str, str] = Field(default={})
+    """Quantity -> unit in the file (`mm`, `kN`, `degF`), or what one recorded unit stands for (`980.665 N`).
+    For time also a format of date and time (`%m/%d/%Y %H:%M:%S.%f`)."""
+    constants: dict[str, WithUnit] = Field(default={})
+    """Quantity -> value with unit (`100 V`) that no column holds."""
+    sign: dict[str, int] = Field(default={})
+    """Quantity -> 1 or -1; -1 turns a channel that counts compression positive."""
+    pattern: str | None = None
+    """Regular expression searched in the file's name, its groups named after quantities or `setting`,
+    e.g. `(?P<voltage>[0-9.]+)V`; `x` in a number is a decimal point; units as under `units`."""
+    setting: str | None = None
+    """Which setting of the damper these files measured."""
+    fixture: Fixture | None = None
+    """A known fixture, taken out and said in records.json."""
+    split: Split | None = None
+    """How a file with several tests is cut; not cut by default."""
+    format: str | None = None
+    """Reader of the files, e.g. `text`; by the ending of the name where nothing is said."""
+    separator: str | None = Field(default=None, min_length=1, max_length=1)
+    """Between fields: `,`, `;`, a tab, or a blank for any run of blanks; seen from the header by default."""
+    decimal: str = Field(default=".", pattern=r"^[.,]$")
+    """Decimal point or comma."""
+    skip: int = Field(default=0, ge=0)
+    """Lines before the header (a preamble)."""
+    header: tuple[str, ...] | None = None
+    """Headers of files that have no header line."""
+    units_row: bool = False
+    """Whether the line below the header holds the units."""
+    comment: str | None = Field(default=None, min_length=1, max_length=1)
+    """Lines that begin with this character are left out."""
+    encoding: str = "utf-8"
+    """Encoding of the text."""
+    source: str | None = None
+    """Where the files can be had: shown when they are absent."""
+
+    @field_validator("sign")
+    @classmethod
+    def _one_or_minus_one(cls, sign: dict[str, int]) -> dict[str, int]:
+        if any(value not in (1, -1) for value in sign.values()):
+            raise ValueError("a sign is 1 or -1")
+        return sign
+
+    @field_validator("pattern")
+    @classmethod
+    def _compiles(cls, pattern: str | None) -> str | None:
+        if pattern is not None:
+            try:
+                groups = re.compile(pattern).groupindex
+            except re.error as error:
+                raise ValueError(f"not a regular expression: {error}") from None
+            if not groups:
+                raise ValueError("needs a named group, e.g. (?P<voltage>[0-9.]+)V")
+        return pattern
+
+    @field_validator("encoding")
+    @classmethod
+    def _known_encoding(cls, encoding: str) -> str:
+        try:
+            "".encode(encoding)
+        except LookupError:
+            raise ValueError("an encoding that Python knows is needed, e.g. utf-8, latin-1, utf-16") from None
+        return encoding
+
+
+class Limits(Frozen):
+    """What the test stand can do; where nothing is said, what the records reached."""
+
+    stroke_m: float | None = Field(default=None, gt=0.0)
+    """Largest stroke, end to end [m]."""
+    speed_m_per_s: float | None = Field(default=None, gt=0.0)
+    """Largest speed [m/s]."""
+    force_N: float | None = Field(default=None, gt=0.0)
+    """Largest force, also the range of the load cell [N]."""
+    frequency_Hz: float | None = Field(default=None, gt=0.0)
+    """Largest frequency [Hz]."""
+    voltage_V: tuple[float, float] | None = None
+    """Smallest and largest control signal."""
+
+    @field_validator("voltage_V")
+    @classmethod
+    def _rising(cls, voltage: tuple[float, float] | None) -> tuple[float, float] | None:
+        if voltage is not None and not voltage[0] < voltage[1]:
+            raise ValueError("the smallest comes first")
+        return voltage
+
+
+class RigConfig(Frozen):
+    """Where the rig records come from: exactly one of `files` and `virtual`."""
+
+    files: tuple[FilesEntry, ...] | None = Field(default=None, min_length=1)
+    """Measured files."""
+    virtual: tuple[VirtualEntry, ...] | None = Field(default=None, min_length=1)
+    """Virtual test stands, one a setting."""
+    limits: Limits = Limits()
+    """What the stand can do."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.files is None) == (self.virtual is None):
+            raise ValueError("say exactly one of files and virtual")
+        return self

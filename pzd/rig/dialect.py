@@ -1,0 +1,81 @@
+"""The dialect of a text file: its characters, its lines, its separator, its fields."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.schema.errors import DataError, FilesError, at
+
+SEPARATORS = (",", ";", "\t")
+"""Separators that are recognised from the header line."""
+BLANKS = " "
+"""Stands for any run of blanks."""
+
+
+def text_of(path: Path, encoding: str) -> str:
+    """The characters of a file, lines ending in a newline.
+
+    Raises
+    ------
+    FilesError : when the file cannot be read
+    DataError : when it is no text of this encoding
+    """
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise FilesError(f"{at(path)}: cannot be read ({error.strerror})") from None
+    try:
+        text = raw.decode("utf-8-sig" if encoding.lower().replace("_", "-") in ("utf-8", "utf8") else encoding)
+    except UnicodeError as error:
+        place = raw[: error.start].count(b"\n") + 1 if isinstance(error, UnicodeDecodeError) else None
+        raise DataError(f"{at(path, place)}: not {encoding} text; say its encoding, e.g. encoding: latin-1") from None
+    if "\r" in text:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if "\0" in text:
+        raise DataError(f"{at(path, text[: text.index(chr(0))].count(chr(10)) + 1)}: not a text file (a zero byte)")
+    return text
+
+
+def without_blank_end(text: str) -> str:
+    """The text without the blank lines at its end."""
+    text = text.rstrip("\n")
+    while text and not text[text.rfind("\n") + 1 :].strip():
+        text = text[: max(text.rfind("\n"), 0)]
+    return text
+
+
+def after_lines(text: str, count: int) -> int:
+    """Position behind the first `count` lines."""
+    position = 0
+    for _ in range(count):
+        end = text.find("\n", position)
+        if end < 0:
+            return len(text)
+        position = end + 1
+    return position
+
+
+def separator_of(line: str, wanted: Collection[str], decimal: str) -> str:
+    """The separator that shows most of the wanted headers, then most fields."""
+    possible = [s for s in SEPARATORS if s != decimal]
+    return max(possible, key=lambda s: (len(set(wanted) & set(fields_of(line, s))), line.count(s)))
+
+
+def fields_of(line: str, separator: str) -> list[str]:
+    """The fields of one line, stripped."""
+    return line.split() if separator == BLANKS else [cell.strip() for cell in line.split(separator)]
+
+
+def field_counts(body: str, separator: str) -> NDArray[np.int64]:
+    """Number of fields in every line."""
+    if separator == BLANKS or not separator.isascii():
+        return np.array([len(fields_of(line, separator)) for line in body.split("\n")], dtype=np.int64)
+    codes = np.frombuffer(body.encode("utf-8"), dtype=np.uint8)
+    ends = np.append(np.flatnonzero(codes == ord("\n")), codes.size)
+    before = np.searchsorted(np.flatnonzero(codes == ord(separator)), ends)
+    result: NDArray[np.int64] = np.diff(np.concatenate(([0], before))) + 1
+    return result

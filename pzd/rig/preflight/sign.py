@@ -1,0 +1,41 @@
+"""Whether the damper takes work out of every cycle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pzd.artefacts import Finding
+from pzd.rig.believable import work_done
+from pzd.rig.measured import Measured
+
+
+def check(test: Measured) -> list[Finding]:
+    """Cycles with negative work, and a record whose steady force outweighs its loops."""
+    record = test.record
+    if work_done(record.displacement, record.force) < 0.0:
+        return [
+            Finding(
+                check="sign",
+                where="the whole record",
+                size=work_done(record.displacement, record.force),
+                unit="J",
+                follows="a steady force over the net displacement outweighs the loops: take the tare out",
+            )
+        ]
+    if test.run is None:
+        return []
+    number = test.run.number(record.time)
+    works = [work_done(record.displacement[number == n], record.force[number == n]) for n in range(test.run.count)]
+    negative = np.flatnonzero(np.array(works) < 0.0)
+    if negative.size == 0:
+        return []
+    first = test.run.start + float(negative[0]) * test.run.period
+    return [
+        Finding(
+            check="sign",
+            where=f"{negative.size} of {test.run.count} cycles, the first at {first:.4g} s",
+            size=float(min(works)),
+            unit="J",
+            follows="the damper does work on the rig there: check the cell, or leave these cycles out",
+        )
+    ]
