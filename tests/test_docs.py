@@ -13,8 +13,8 @@ import typer
 from typer.core import TyperGroup, TyperOption
 
 import pzd
-import pzd.cli
 from pzd import artefacts
+from pzd.cli.app import app
 from pzd.config import RunConfig
 from pzd.damper.effects import library
 
@@ -50,7 +50,6 @@ def names(word: str, text: str) -> bool:
 
 def commands() -> Mapping[str, Any]:
     """Every command of the command line by name."""
-    (app,) = (value for value in vars(pzd.cli).values() if isinstance(value, typer.Typer))
     group = typer.main.get_command(app)
     assert isinstance(group, TyperGroup)
     return group.commands

@@ -33,6 +33,7 @@ ORDER = (
     "blind",
     "sweep",
     "cli",
+    "__main__",
 )
 """The one place where the order of the house stands."""
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import ast
+import json
+import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -15,6 +18,10 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name
+from typer.core import TyperGroup
+from typer.main import get_command
+
+from pzd.cli.app import app
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -118,3 +125,56 @@ def test_the_wheel_holds_the_package_with_its_data_and_nothing_else(wheel: Path)
         str(path.relative_to(ROOT)) for path in package.rglob("*") if path.is_file() and "__pycache__" not in path.parts
     }
     assert held == wanted
+
+
+# ---------------------------------------------------------------- the wheel, installed elsewhere
+
+
+@pytest.fixture(scope="module")
+def elsewhere(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the wheel installed from the hashed lock, one config, and nothing of the repository."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    subprocess.run([sys.executable, "-m", "venv", folder / "venv"], check=True)
+    pip = [folder / "venv" / "bin" / "python", "-m", "pip", "--disable-pip-version-check", "install", "--quiet"]
+    subprocess.run([*pip, "--require-hashes", "-r", ROOT / "requirements.lock"], check=True)
+    subprocess.run([*pip, "--no-deps", wheel], check=True)
+    shutil.copy(ROOT / "configs" / "quickstart.yaml", folder / "first.yaml")
+    shutil.copy(ROOT / "configs" / "quickstart.yaml", folder / "second.yaml")
+    return folder
+
+
+def alone(folder: Path, *arguments: str) -> str:
+    """What the installed command prints; it must exit 0."""
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    command = [str(folder / "venv" / "bin" / "pzd"), *arguments]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"pzd {' '.join(arguments)}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+@pytest.mark.ci
+def test_the_wheel_alone_runs_every_command(elsewhere: Path) -> None:
+    where = "import pzd; print(pzd.__file__)"
+    python = elsewhere / "venv" / "bin" / "python"
+    assert str(elsewhere) in subprocess.check_output([python, "-c", where], cwd=elsewhere, text=True)
+
+    tried = set()
+
+    def pzd(command: str, *arguments: str) -> str:
+        tried.add(command)
+        return alone(elsewhere, command, *arguments)
+
+    for stage in ("check", "synthesise", "identify", "diagnose", "table", "simulate", "report"):
+        pzd(stage, "first.yaml")
+    pzd("run", "second.yaml", "--set", "seed=2")
+    assert pzd("show", "first.yaml")
+    assert pzd("compare", "runs/first", "runs/second")
+    assert "orifice_quadratic" in pzd("effects")
+    assert "properties" in json.loads(pzd("schema"))
+    records = sorted((elsewhere / "runs" / "first" / "1-rig").glob("*.csv"))
+    (elsewhere / "own.yaml").write_text(pzd("init", *map(str, records)), encoding="utf-8")
+    pzd("ingest", "own.yaml")
+    assert (elsewhere / "runs" / "own" / "1-rig" / records[0].name).exists()
+    group = get_command(app)
+    assert isinstance(group, TyperGroup)
+    assert tried == set(group.commands)
