@@ -2,7 +2,7 @@
 
 Numba keys a cached kernel by the file of the outermost function alone, so an edited law would
 leave a stale kernel behind. The cache folder therefore carries a hash of every source of this
-package and of the versions: edit a law, and the kernels are new.
+package, of every module that compiles, and of the versions: edit a law, and the kernels are new.
 """
 
 from __future__ import annotations
@@ -23,12 +23,19 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
+def _sources() -> list[Path]:
+    """Every module of this package, and every other one that compiles something."""
+    here = Path(__file__).parent
+    others = (path for path in here.parent.rglob("*.py") if b"import compiled" in path.read_bytes())
+    return sorted({*here.rglob("*.py"), *others})
+
+
 def cache_folder() -> Path:
     """The folder of compiled kernels: in the user's cache, or a temporary one where that cannot be written."""
     digest = hashlib.sha256()
     for part in (sys.version, platform.machine(), numba.__version__, np.__version__):
         digest.update(part.encode())
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
+    for source in _sources():
         digest.update(source.read_bytes())
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     for root in (home, Path(tempfile.gettempdir())):

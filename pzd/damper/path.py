@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.compiled import compiled
+from pzd.damper.dormand_prince import STAGES
 from pzd.damper.flow import DELTA, T0, K, smooth_force, spring_extension
-from pzd.damper.pieces import STAGES, Step, piece, row_in
+from pzd.damper.pieces import Step, piece, row_in
 from pzd.damper.regimes import SMOOTH, STICK, beyond, deflection_at, onto_edge, regime_of, speed_at, spring_force
 from pzd.damper.rows import interpolate, row_of
 

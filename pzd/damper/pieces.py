@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.compiled import compiled
+from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
 from pzd.damper.flow import (
     C_R,
     DELTA,
@@ -32,23 +33,6 @@ from pzd.damper.regimes import RELIEF, STICK, speed_at, spring_force
 from pzd.damper.rows import interpolate
 
 Array = NDArray[np.float64]
-
-STAGES = 7
-
-# Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2: nodes, stages, and error weights.
-_NODES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
-_STAGES = np.array(
-    [
-        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0],
-        [44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0],
-        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0],
-        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0],
-        [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
-    ]
-)
-_ERROR = np.array([-71 / 57600, 0.0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40])
 
 _DIFFERENCE = 1e-3  # of a step, for the drift of the flow curve with moving parameters
 _SMALL = 1e-3  # below it the exponential's quotients are taken from their series
@@ -130,10 +114,10 @@ def _runge_kutta(
     for i in range(STAGES):
         change = 0.0
         for j in range(i):
-            change += _STAGES[i, j] * stages[j]
+            change += STAGE_WEIGHTS[i, j] * stages[j]
         end = y + dt * change
-        stages[i] = _rate(end, at + _NODES[i] * dt, regime, side, step)
-        error += _ERROR[i] * stages[i]
+        stages[i] = _rate(end, at + TIMES[i] * dt, regime, side, step)
+        error += ERROR_WEIGHTS[i] * stages[i]
     return end, dt * error
 
 
