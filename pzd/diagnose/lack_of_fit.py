@@ -15,6 +15,8 @@ TREND_CYCLES = 4
 """Fewest cycles on which a trend is judged."""
 TREND_HARMONICS = 15
 """Harmonics on which a trend is judged."""
+FEWEST = 100
+"""Fewest differences between cycles that tell the colour of noise; with fewer nothing is judged."""
 
 
 def bands(last: int) -> list[tuple[int, int]]:
@@ -35,8 +37,11 @@ def by_harmonics(error: PureError) -> Array:
     from scipy.stats import f
 
     ratio = np.abs(error.mean) ** 2 / np.where(error.of_mean > 0.0, error.of_mean, np.inf)
+    octaves = bands(error.mean.size - 1)
+    if (error.count - 1) * error.points < FEWEST:
+        return np.ones(len(octaves))
     found = []
-    for low, high in bands(error.mean.size - 1):
+    for low, high in octaves:
         freedom = 1 if low == 0 else 2 * (high + 1 - low)
         found.append(float(f.sf(ratio[low : high + 1].mean(), freedom, error.freedom[low : high + 1].max())))
     return np.array(found)

@@ -21,6 +21,8 @@ BAND_LIMIT = 0.4
 """Harmonics are judged up to this share of the sampling rate."""
 LOCAL = 16
 """Fewest harmonics over which the local level of the noise is averaged."""
+COLOUR = 5.0
+"""Noise counts as at least so coloured (density at its peak over variance): a short record hides colour."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,7 @@ def pure_error(folded: Array) -> PureError:
     low, high = _window(last)
     total = np.concatenate([[0.0], np.cumsum(own)])
     local = (total[high + 1] - total[low]) / (high + 1 - low)
-    freedom = _freedom(count) * (high + 1 - low)
+    freedom = _with_shape(_freedom(count) * (high + 1 - low), shape * points, noise, differences.size)
     return PureError(
         count,
         points,
@@ -109,6 +111,20 @@ def _freedom(count: int) -> float:
     Equation: nu = 4 (n - 1)^2 / (3 n - 4)                          Source: von Neumann 1941
     """
     return 4.0 * (count - 1) ** 2 / (3.0 * count - 4.0)
+
+
+def _with_shape(freedom: Array, density: Array, noise: Autoregression, samples: int) -> Array:
+    """Degrees of freedom that also allow for the uncertain shape: few independent samples, little is known.
+
+    Equation: 2 / nu = 2 / nu_local + (4 / n_eff) S_h / S_max, n_eff = n var / S_max; S_max at least `COLOUR` var
+                                        Source: delta method on S(0) = sigma_w^2 / (1 - a)^2, var a = (1 - a^2) / n
+    """
+    largest = float(density.max())
+    if noise.variance <= 0.0 or largest <= 0.0:
+        return freedom
+    independent = samples / max(largest / noise.variance, COLOUR)
+    total: Array = 2.0 / (2.0 / freedom + 4.0 / independent * density / largest)
+    return total
 
 
 def repeatable_power(error: PureError) -> Array:

@@ -1,0 +1,133 @@
+"""Records made ready for judging: displacement freed of its noise without a fixed corner.
+
+Noise of the displacement goes through a stiff oil spring into the force, and a second derivative
+makes it look like inertia. Where the motion repeats, cycles are averaged and only harmonics well
+above their own scatter are kept; where it does not, the spectrum is cut where it sinks into its floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.diagnose.noise import pure_error
+from pzd.record import Record, is_constant, voltage_scale
+from pzd.rig.cycles import Cycles, cycles
+
+Array = NDArray[np.float64]
+
+CLEAR = 4.0
+"""A harmonic of the displacement is kept from this many standard errors on."""
+FINER = 16
+"""Points per sample on which the cleaned cycle is laid."""
+COVERS = 0.5
+"""The repeating run must cover this share of the record, else the record counts as not repeating."""
+DERIVATIVES = ("displacement", "velocity", "acceleration")
+ABOVE_FLOOR = 4.0
+"""The spectrum of a motion that does not repeat is cut where it comes within this factor of its floor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """One record as the diagnosis sees it."""
+
+    record: Record
+    """With cleaned displacement and its derivatives; only the repeating run where there is one."""
+    cycles: Cycles | None
+    """The run of cycles, where motion and voltage both repeat."""
+    lead: Record | None
+    """The same motion for one cycle more in front, for the simulation to settle."""
+
+    @property
+    def lead_samples(self) -> int:
+        """Samples by which the lead is longer."""
+        return 0 if self.lead is None else self.lead.time.size - self.record.time.size
+
+
+def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
+    """Every record of one rig, its displacement cleaned."""
+    scale = voltage_scale(records)
+    return tuple(_prepared(record, is_constant(record, scale)) for record in records)
+
+
+def _prepared(record: Record, constant: bool) -> Prepared:
+    run = cycles(record.time, record.displacement)
+    if run is None or run.count * run.period < COVERS * (record.time[-1] - record.time[0]):
+        return Prepared(_smoothed(record), None, None)
+    inside = run.inside(record.time)
+    motion = _mean_motion(record, run)
+    kept = sliced(record, inside)
+    cleaned = replace(kept, **motion(kept.time))
+    if not constant:
+        return Prepared(cleaned, None, None)
+    step = 1.0 / record.rate
+    early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
+    return Prepared(cleaned, run, _led_in(cleaned, early, motion(early)))
+
+
+def sliced(record: Record, kept: NDArray[np.bool_]) -> Record:
+    """The record's samples where the mask (n,) is set."""
+    channels = ("time", "displacement", "velocity", "acceleration", "force", "voltage", "temperature", "pressure")
+    values = {name: getattr(record, name) for name in channels}
+    return replace(record, **{name: None if v is None else v[kept] for name, v in values.items()})
+
+
+def _led_in(cleaned: Record, early: Array, motion: dict[str, Array]) -> Record:
+    def longer(channel: Array | None) -> Array | None:
+        return None if channel is None else np.concatenate([np.full(early.size, channel[0]), channel])
+
+    return replace(
+        cleaned,
+        time=np.concatenate([early, cleaned.time]),
+        force=np.concatenate([np.full(early.size, cleaned.force[0]), cleaned.force]),
+        voltage=longer(cleaned.voltage),
+        temperature=longer(cleaned.temperature),
+        pressure=None,
+        **{name: np.concatenate([values, getattr(cleaned, name)]) for name, values in motion.items()},
+    )
+
+
+def _mean_motion(record: Record, run: Cycles) -> Callable[[Array], dict[str, Array]]:
+    """Displacement, velocity and acceleration of the average cycle at any time, by its clear harmonics."""
+    from scipy.interpolate import CubicSpline
+
+    error = pure_error(run.fold(record.time, record.displacement))
+    clear = np.abs(error.mean) > CLEAR * np.sqrt(error.of_mean)
+    clear[0] = True
+    rate = 2j * np.pi * np.arange(error.mean.size) / run.period
+    fine = FINER * error.points
+    phase = np.arange(fine + 1) / fine
+    splines = {}
+    for order, name in enumerate(DERIVATIVES):
+        cycle = np.fft.irfft(np.where(clear, error.mean, 0.0) * rate**order, fine) * fine
+        splines[name] = CubicSpline(phase, np.append(cycle, cycle[0]), bc_type="periodic")
+    return lambda time: {name: np.asarray(spline(run.phase(time))) for name, spline in splines.items()}
+
+
+def _smoothed(record: Record) -> Record:
+    """The record with its displacement cut where the spectrum sinks into its floor; derivatives by the spectrum."""
+    n = record.time.size
+    line = np.linspace(record.displacement[0], record.displacement[-1], n)
+    odd = record.displacement - line
+    spectrum = np.fft.rfft(np.concatenate([odd, -odd[:0:-1]]))
+    frequency = np.fft.rfftfreq(2 * n - 1, 1.0 / record.rate)
+    spectrum[frequency > _corner(frequency, np.abs(spectrum) ** 2, record.rate)] = 0.0
+    slope = float(line[-1] - line[0]) / ((n - 1) / record.rate)
+    trends = (line, slope, 0.0)
+    motion = {
+        name: np.fft.irfft(spectrum * (2j * np.pi * frequency) ** order, 2 * n - 1)[:n] + trends[order]
+        for order, name in enumerate(DERIVATIVES)
+    }
+    return replace(record, **motion)
+
+
+def _corner(frequency: Array, power: Array, rate: float) -> float:
+    """Frequency beyond which nothing rises above the floor, read on an average over neighbouring lines [Hz]."""
+    floor = float(np.median(power[frequency > 0.3 * rate]))
+    width = max(power.size // 200, 3)
+    level = np.convolve(power, np.full(width, 1.0 / width), "same")
+    above = np.flatnonzero(level > ABOVE_FLOOR * floor)
+    return float(frequency[above[-1]]) if above.size else float(frequency[-1])

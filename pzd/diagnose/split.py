@@ -1,0 +1,121 @@
+"""Which samples are fitted, which choose, and which nothing has seen before the final figures.
+
+Records are held out where a condition has three or more; of two, one is held out whole and the
+other is parted; a lone record is parted by cycles, or where nothing repeats by segments. The same
+rig always splits the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.diagnose.inputs import Prepared, sliced
+from pzd.record import Record, conditions
+
+TRAINING, VALIDATION, UNTOUCHED = 0, 1, 2
+"""Fitted to; looked at to choose; seen by nothing but the final figures."""
+Roles = NDArray[np.int64]
+HoldOut = Literal["records", "cycles", "segments", "mixed"]
+
+ALONE = (TRAINING, VALIDATION, TRAINING, UNTOUCHED, TRAINING, VALIDATION, TRAINING, UNTOUCHED)
+"""Segments of a record that is alone in its condition and does not repeat."""
+BESIDE_UNTOUCHED = (TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION)
+"""Segments of such a record when another of its condition is untouched."""
+FEWEST = 50
+"""A stretch of fewer samples is not fitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """The role of every sample of every record, in the order of the records."""
+
+    roles: tuple[Roles, ...]
+    """(n,) role of each sample."""
+    held_out: tuple[str, ...]
+    """Names of the records that are untouched, wholly or in part."""
+    hold_out: HoldOut
+    """What was held out."""
+
+
+def split(prepared: Sequence[Prepared], voltage_within: float | None, temperature_within: float) -> Split:
+    """The split of the records of one setting.
+
+    Parameters
+    ----------
+    prepared : the records
+    voltage_within : largest spread of voltage inside one condition [V]; None for 2 % of the scale
+    temperature_within : largest spread of temperature inside one condition [degC]
+    """
+    place = {id(p.record): i for i, p in enumerate(prepared)}
+    found, moving = conditions([p.record for p in prepared], voltage_within, temperature_within)
+    groups = [condition.records for condition in found] + ([moving] if moving else [])
+    roles: dict[int, Roles] = {}
+    kinds: set[HoldOut] = set()
+    for turn, group in enumerate(groups):
+        members = sorted((place[id(record)] for record in group), key=lambda i: _order(prepared[i]))
+        shared, kind = _group(members, turn, prepared)
+        roles |= shared
+        kinds.add(kind)
+    ordered = tuple(roles[i] for i in range(len(prepared)))
+    names = tuple(p.record.name for p, role in zip(prepared, ordered, strict=True) if np.any(role == UNTOUCHED))
+    return Split(ordered, names, kinds.pop() if len(kinds) == 1 else "mixed")
+
+
+def stretches(record: Record, wanted: NDArray[np.bool_]) -> list[Record]:
+    """The unbroken stretches of a record in which the mask (n,) is set, those long enough to be fitted."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]]).astype(np.int8)))
+    found = []
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - start >= FEWEST:
+            mask = np.zeros(wanted.size, dtype=np.bool_)
+            mask[start:end] = True
+            found.append(sliced(record, mask))
+    return found
+
+
+def _order(prepared: Prepared) -> tuple[float, float, str]:
+    frequency = np.inf if prepared.cycles is None else round(prepared.cycles.frequency, 3)
+    return frequency, float(np.max(np.abs(prepared.record.velocity))), prepared.record.name
+
+
+def _group(members: list[int], turn: int, prepared: Sequence[Prepared]) -> tuple[dict[int, Roles], HoldOut]:
+    """Roles in one condition; `turn` rotates them, so that over the conditions every kind of test is in every role."""
+    rotated = [members[(turn + i) % len(members)] for i in range(len(members))]
+    if len(rotated) == 1:
+        only = prepared[rotated[0]]
+        return {rotated[0]: _parted(only, alone=True)}, "segments" if only.cycles is None else "cycles"
+    if len(rotated) == 2:
+        first, second = rotated
+        return {first: _parted(prepared[first], alone=False), second: _whole(prepared[second], UNTOUCHED)}, "records"
+    role = [TRAINING] * len(rotated)
+    role[1::4] = [UNTOUCHED] * len(role[1::4])
+    chooses = slice(3, None, 4) if len(rotated) > 3 else slice(2, 3)
+    role[chooses] = [VALIDATION] * len(role[chooses])
+    return {i: _whole(prepared[i], r) for i, r in zip(rotated, role, strict=True)}, "records"
+
+
+def _whole(prepared: Prepared, role: int) -> Roles:
+    return np.full(prepared.record.time.size, role, dtype=np.int64)
+
+
+def _parted(prepared: Prepared, *, alone: bool) -> Roles:
+    time = prepared.record.time
+    if prepared.cycles is None:
+        pattern = np.array(ALONE if alone else BESIDE_UNTOUCHED)
+        return pattern[np.arange(time.size) * pattern.size // time.size]
+    return _by_cycle(prepared.cycles.count, alone=alone)[np.clip(prepared.cycles.number(time), 0, None)]
+
+
+def _by_cycle(count: int, *, alone: bool) -> Roles:
+    """Roles of `count` cycles: the last quarter is untouched, the one before chooses, the rest is fitted."""
+    roles = np.full(count, TRAINING, dtype=np.int64)
+    untouched = max(1, count // 4) if alone else 0
+    chooses = max(1, count // 4) if count - untouched >= 2 else 0
+    roles[count - untouched :] = UNTOUCHED
+    roles[count - untouched - chooses : count - untouched] = VALIDATION
+    return roles
