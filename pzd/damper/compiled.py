@@ -54,4 +54,4 @@ numba.config.CACHE_DIR = str(cache_folder())  # type: ignore[attr-defined]  # nu
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """The same function as machine code, cached across processes."""
-    return numba.njit(cache=True, error_model="numpy")(function)
+    return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
