@@ -20,12 +20,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TypeVar
 
-from pzd.artefacts import Artefact, Manifest
+from pzd.artefacts import Artefact, Diagnosed, Identified, Manifest, Report, Rides, Rig, Table
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError, FilesError
 from pzd.schema.jsonfile import read_json, write_json
 
-Made = TypeVar("Made", bound=Artefact)
+Made = TypeVar("Made", Rig, Identified, Diagnosed, Table, Rides, Report, Artefact)
 
 MANIFEST = "manifest.json"
 CONFIG = "config.yaml"

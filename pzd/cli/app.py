@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 import typer
@@ -27,7 +27,7 @@ app = typer.Typer(
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_COMMANDS = (*stages.COMMANDS, *look.COMMANDS, *start.COMMANDS)
+_COMMANDS: tuple[Callable[..., int], ...] = (*stages.COMMANDS, *look.COMMANDS, *start.COMMANDS)
 for _command in _COMMANDS:
     app.command()(_command)
 

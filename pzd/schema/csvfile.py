@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import Any, TypeVar, get_args
 
 import numpy as np
@@ -19,9 +22,13 @@ from pydantic import ValidationError
 from pzd.quantities import Control
 from pzd.schema.errors import DataError, at
 from pzd.schema.model import Frozen
+from pzd.schema.text import read_text
 
 Row = TypeVar("Row", bound=Frozen)
 Columns = dict[str, NDArray[np.float64]]
+
+_MOST_FAULTS = 20
+"""Faults that one file's message lists before it only counts them."""
 
 
 def write_rows(path: Path, model: type[Row], rows: Iterable[Row], control: Control) -> None:
@@ -40,11 +47,11 @@ def read_rows(path: Path, model: type[Row], control: Control) -> tuple[Row, ...]
     ------
     DataError : when the header or a cell is not what the model asks for, with every place
     """
-    lines = list(csv.reader(io.StringIO(_text(path))))
-    _check_header(path, lines, [control.renamed(name) for name in model.model_fields])
+    numbered = _records(path)
+    _check_header(path, numbered[0][1] if numbered else [], [control.renamed(name) for name in model.model_fields])
     rows: list[Row] = []
     faults: list[str] = []
-    for number, cells in enumerate(lines[1:], start=2):
+    for number, cells in numbered[1:]:
         if len(cells) != len(model.model_fields):
             faults.append(f"{at(path, number)}: {len(cells)} fields where the header has {len(model.model_fields)}")
             continue
@@ -53,8 +60,7 @@ def read_rows(path: Path, model: type[Row], control: Control) -> tuple[Row, ...]
             rows.append(model.model_validate({n: _plain(cell, field.annotation) for (n, field), cell in fields}))
         except ValidationError as error:
             faults += [_fault(path, number, detail, control) for detail in error.errors()]
-    if faults:
-        raise DataError(faults)
+    _refuse(path, faults)
     return tuple(rows)
 
 
@@ -62,11 +68,22 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64] | None],
     """Write arrays of one length as columns, each number so that it reads back exactly.
 
     None stands for a column that is absent: its cells are empty.
-    """
-    import pandas as pd
 
-    frame = pd.DataFrame({control.renamed(name): values for name, values in columns.items()})
-    frame.to_csv(path, index=False, lineterminator="\n")
+    Raises
+    ------
+    ValueError : when a number is not finite or the lengths differ, which no reader would take
+    """
+    length = max((values.size for values in columns.values() if values is not None), default=0)
+    wrong = [name for name, values in columns.items() if values is not None and not np.isfinite(values).all()]
+    if wrong:
+        raise ValueError(f"{path.name}: {', '.join(wrong)} must hold finite numbers")
+    cells = [
+        itertools.repeat("", length) if values is None else map(repr, np.asarray(values, dtype=np.float64).tolist())
+        for values in columns.values()
+    ]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        file.write(",".join(control.renamed(name) for name in columns) + "\n")
+        file.writelines(f"{','.join(row)}\n" for row in zip(*cells, strict=True))
 
 
 def read_columns(path: Path, header: Sequence[str], control: Control, optional: Sequence[str] = ()) -> Columns:
@@ -76,58 +93,111 @@ def read_columns(path: Path, header: Sequence[str], control: Control, optional: 
     ------
     DataError : when the header, a field count or a cell is wrong, with file and line
     """
-    lines = _text(path).splitlines()
-    given = lines[0].split(",") if lines else []
+    top, _, body = _text(path).partition("\n")
+    given = top.split(",")
     names = [name for name in header if name not in optional or control.renamed(name) in given]
-    _check_header(path, [given], [control.renamed(name) for name in names])
-    faults = [
-        f"{at(path, number)}: {line.count(',') + 1} fields where the header has {len(names)}"
-        for number, line in enumerate(lines[1:], start=2)
-        if line.count(",") != len(names) - 1
-    ]
-    if faults:
-        raise DataError(faults)
-    columns: Columns = {}
-    for name, cells in zip(names, zip(*(line.split(",") for line in lines[1:]), strict=True), strict=False):
-        if name in optional and not any(cells):
-            continue
-        columns[name] = _numbers(path, control.renamed(name), cells)
-    return columns
-
-
-def _numbers(path: Path, name: str, cells: Sequence[str]) -> NDArray[np.float64]:
+    _check_header(path, given, [control.renamed(name) for name in names])
+    if not body.strip():
+        raise DataError(f"{at(path, 1)}: no data rows stand below the header")
+    _check_counts(path, body, len(names))
+    empty = [i for i, cell in enumerate(body.partition("\n")[0].split(",")) if names[i] in optional and not cell]
+    filled = [i for i in range(len(names)) if i not in empty]
+    _check_empty(path, body, {i: control.renamed(names[i]) for i in empty})
     try:
-        values = np.array(cells, dtype=np.float64)
+        table = _parsed(body, filled)
     except ValueError:
-        values = np.array([_number(cell) for cell in cells])
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise DataError(
-            f"{at(path, int(row) + 2)}: {name}: a finite number is needed (got {cells[int(row)]!r})" for row in bad
+        table = None
+    if table is None or not np.isfinite(table).all():
+        _refuse(path, _bad_cells(path, body, {i: control.renamed(names[i]) for i in filled}))
+    return {names[i]: np.ascontiguousarray(table[:, n]) for n, i in enumerate(filled)} if table is not None else {}
+
+
+def _parsed(body: str, columns: Sequence[int]) -> NDArray[np.float64]:
+    return np.loadtxt(io.StringIO(body), delimiter=",", comments=None, usecols=columns, ndmin=2)
+
+
+def _check_counts(path: Path, body: str, wanted: int) -> None:
+    """Refuse lines with more or fewer fields than the header; quotes are no part of such a file."""
+    codes = np.frombuffer(body.removesuffix("\n").encode(), dtype=np.uint8)
+    ends = np.append(np.flatnonzero(codes == ord("\n")), codes.size)
+    before = np.searchsorted(np.flatnonzero(codes == ord(",")), ends)
+    fields = np.diff(before, prepend=0) + 1
+    uneven = np.flatnonzero(fields != wanted)
+    _refuse(path, [f"{at(path, int(i) + 2)}: {fields[i]} fields where the header has {wanted}" for i in uneven])
+
+
+def _check_empty(path: Path, body: str, columns: Mapping[int, str]) -> None:
+    """Refuse cells in columns that begin as wholly empty ones."""
+    if columns:
+        _refuse(
+            path,
+            [
+                f"{at(path, number)}: {name}: the column is empty above, so it must be here (got {cells[i]!r})"
+                for number, cells in _lines(body)
+                for i, name in columns.items()
+                if cells[i]
+            ],
         )
-    return values
 
 
-def _number(cell: str) -> float:
+def _bad_cells(path: Path, body: str, columns: Mapping[int, str]) -> list[str]:
+    return [
+        f"{at(path, number)}: {name}: a finite number is needed (got {cells[i]!r})"
+        for number, cells in _lines(body)
+        for i, name in columns.items()
+        if not _is_number(cells[i])
+    ]
+
+
+def _lines(body: str) -> Iterable[tuple[int, list[str]]]:
+    return enumerate((line.split(",") for line in body.removesuffix("\n").split("\n")), start=2)
+
+
+def _is_number(cell: str) -> bool:
     try:
-        return float(cell)
+        return math.isfinite(float(cell)) and "_" not in cell
     except ValueError:
-        return float("nan")
+        return False
 
 
 def _text(path: Path) -> str:
+    text = read_text(path, DataError, "run the stage again").replace("\r\n", "\n")
+    if "\0" in text:
+        raise DataError(f"{at(path, text.count(chr(10), 0, text.index(chr(0))) + 1)}: a zero byte; this is no text")
+    return text
+
+
+def _records(path: Path) -> list[tuple[int, list[str]]]:
+    """Every record of the file with the line that it begins in; a quoted cell may span several."""
+    found: list[tuple[int, list[str]]] = []
+    reader = csv.reader(io.StringIO(_text(path)), strict=True)
+    line = 1
     try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise DataError(f"{at(path)}: the file is missing; run the stage again") from None
-    except UnicodeDecodeError as error:
-        raise DataError(f"{at(path)}: not UTF-8 text ({error.reason})") from None
+        for cells in reader:
+            found.append((line, cells))
+            line = reader.line_num + 1
+    except csv.Error as error:
+        raise DataError(f"{at(path, line)}: not CSV: {error}") from None
+    return found
 
 
-def _check_header(path: Path, lines: Sequence[Sequence[str]], wanted: Sequence[str]) -> None:
-    given = list(lines[0]) if lines else []
-    if given != list(wanted):
-        raise DataError(f"{at(path, 1)}: the header must read {','.join(wanted)} (got {','.join(given)})")
+def _check_header(path: Path, given: Sequence[str], wanted: Sequence[str]) -> None:
+    if list(given) == list(wanted):
+        return
+    twice = sorted({name for name in given if given.count(name) > 1})
+    parts = {
+        "missing": [name for name in wanted if name not in given],
+        "unknown": [name for name in given if name not in wanted],
+        "twice": twice,
+    }
+    said = "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names) or "another order"
+    raise DataError(f"{at(path, 1)}: the header must read {','.join(wanted)}; {said} (got {','.join(given)})")
+
+
+def _refuse(path: Path, faults: Sequence[str]) -> None:
+    if faults:
+        more = len(faults) - _MOST_FAULTS
+        raise DataError([*faults[:_MOST_FAULTS], *([f"{at(path)}: and {more} more such faults"] if more > 0 else [])])
 
 
 def _cell(value: Any) -> str:
@@ -138,19 +208,16 @@ def _cell(value: Any) -> str:
 
 def _plain(cell: str, annotation: Any) -> str | float | None:
     """What a cell stands for: nothing, a number where the field takes one, else its text."""
-    if not cell:
-        return None
     kinds = {annotation, *get_args(annotation)}
-    if kinds.isdisjoint({int, float}) and not any(isinstance(kind, int) for kind in kinds):
+    if not cell:
+        return None if NoneType in kinds else cell
+    takes_numbers = not kinds.isdisjoint({int, float}) or any(isinstance(kind, int) for kind in kinds)
+    if not takes_numbers or not _is_number(cell):
         return cell
-    for number in (int, float):
-        try:
-            return number(cell)
-        except ValueError:
-            continue
-    return cell
+    return int(cell) if cell.lstrip("+-").isdecimal() else float(cell)
 
 
 def _fault(path: Path, number: int, detail: Any, control: Control) -> str:
     name = control.renamed(str(detail["loc"][0])) if detail["loc"] else "row"
-    return f"{at(path, number)}: {name}: {detail['msg']} (got {detail['input']!r})"
+    message = str(detail["msg"]).removeprefix("Value error, ").replace("Input should", "must")
+    return f"{at(path, number)}: {name}: {message} (got {detail['input']!r})"
