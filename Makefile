@@ -34,6 +34,10 @@ check: $(DEV)  ## Check style (ruff), format (ruff) and types (mypy --strict)
 ci: check  ## What a merge must pass besides `make test`: check, every config, the wheel installed elsewhere
 	$(BIN)/python -m pytest -m ci --durations 10
 
+.PHONY: bench
+bench: $(DEV)  ## Print how long a user waits, beside the limits
+	$(BIN)/python tests/studies/bench.py
+
 .PHONY: format
 format: $(DEV)  ## Format the code and mend what ruff can mend
 	$(BIN)/ruff format .

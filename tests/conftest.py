@@ -68,10 +68,9 @@ def pzd() -> Callable[..., subprocess.CompletedProcess[str]]:
     """Run the command as a user would: pzd("run", config, cwd=folder) gives code, stdout and stderr."""
 
     def run(*arguments: object, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
-        start = [sys.executable, "-c", "from pzd.cli import main; main()"]
         paths = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
         return subprocess.run(
-            [*start, *map(str, arguments)],
+            [sys.executable, "-m", "pzd", *map(str, arguments)],
             cwd=cwd,
             env={**os.environ, "PYTHONPATH": paths},
             capture_output=True,
