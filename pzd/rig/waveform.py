@@ -1,0 +1,84 @@
+"""What a block of the config must give to be a waveform of the stand, and how a test starts from rest."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from pzd.record import Array
+from pzd.schema.model import Frozen
+
+Course = Callable[[Array], tuple[Array, Array, Array]]
+"""Displacement [m], velocity [m/s] and acceleration [m/s2] at any times (n,) [s], exactly."""
+
+
+class Waveform(Frozen):
+    """The motion of the actuator in one test; each kind is one file in `waveforms/` with `kind` of its own."""
+
+    usual_cycles: ClassVar[int] = 10
+    """Cycles of a test that says nothing of its length."""
+
+    kind: str
+    """Which waveform."""
+    label: str | None = Field(default=None, pattern=r"^[A-Za-z0-9._-]+$")
+    """Name of the waveform in the names of records; by default made from kind and size."""
+
+    @property
+    def name(self) -> str:
+        """How records call this waveform."""
+        return self.label or self.own_name()
+
+    @abstractmethod
+    def own_name(self) -> str:
+        """The name made from kind and size."""
+
+    @abstractmethod
+    def cycle(self, folder: Path) -> float:
+        """After which the motion repeats, or ends where it does not repeat [s]."""
+
+    @property
+    def settling(self) -> float:
+        """How long the motion has to go on before the damper has forgotten its start [s]."""
+        return 1.0
+
+    @abstractmethod
+    def course(self, draw: np.random.Generator, folder: Path) -> Course:
+        """The motion as a continuous function of time, from before 0 on.
+
+        Parameters
+        ----------
+        draw : where random phases come from
+        folder : of the config, for motions that are read
+        """
+
+
+def started(course: Course, lead: float) -> Course:
+    """The same motion started from rest, smoothly, and untouched from the middle of the lead on.
+
+    Equation: x s(r), s = 10 r^3 - 15 r^4 + 6 r^5, r = 2 (t + lead) / lead between 0 and 1
+              Source: the lowest polynomial that is level with level slope at both ends
+
+    Parameters
+    ----------
+    course : a motion that goes on before 0
+    lead : length of the lead-in [s], which begins at rest at -lead
+    """
+
+    def motion(time: Array) -> tuple[Array, Array, Array]:
+        x, v, a = course(time)
+        rising = time < -0.5 * lead
+        rate = 2.0 / lead
+        r = np.maximum(rate * (time[rising] + lead), 0.0)
+        s = r**3 * (10.0 - 15.0 * r + 6.0 * r**2)
+        ds = rate * 30.0 * r**2 * (1.0 - r) ** 2
+        dds = rate**2 * 60.0 * r * (1.0 - r) * (1.0 - 2.0 * r)
+        x0, v0, a0 = x[rising], v[rising], a[rising]
+        x[rising], v[rising], a[rising] = s * x0, ds * x0 + s * v0, dds * x0 + 2.0 * ds * v0 + s * a0
+        return x, v, a
+
+    return motion
