@@ -3,12 +3,47 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 Place = Literal["drive", "material", "stroke", "flow", "parallel", "sensor"]
 """Where in the damper something can be missing, in physical order."""
+
+Need = Literal["voltage", "temperature"]
+"""What must move inside a test."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """How large things are on one rig, so that a parameter can be searched in numbers around one."""
+
+    force: float
+    """Largest force [N]."""
+    low_force: float
+    """Largest force of the softest condition [N]."""
+    speed: float
+    """Largest extension speed [m/s]."""
+    stroke: float
+    """Largest displacement [m]."""
+    acceleration: float
+    """Largest acceleration [m/s2]."""
+    damping: float
+    """Median C of the conditions [N s/m]."""
+    voltage: float
+    """Span of the control signal [V]."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """Where a fit begins to look for a parameter, and in which unit it steps."""
+
+    scale: Callable[[Scales], float]
+    """Size that the parameter is counted in."""
+    starts: tuple[float, ...]
+    """Starting values, in that size; every one is tried."""
+    logarithmic: bool = False
+    """Whether steps are ratios."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +61,8 @@ class Parameter:
     high: float
     """Largest admissible value."""
     meaning: str
+    search: Search
+    """How a fit looks for it."""
 
     def admits(self, value: float) -> bool:
         """Whether the value lies within the limits."""
@@ -45,6 +82,8 @@ class Effect:
     """Where the law comes from."""
     tests: tuple[tuple[Mapping[str, float], float], ...]
     """Reference numbers: the arguments of the module's `law`, and what it gives."""
+    needs: Need | None = None
+    """What must move in a test for the effect to be seen at all."""
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name.

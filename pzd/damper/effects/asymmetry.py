@@ -6,13 +6,15 @@ as hard, alpha 0.3-0.5; a symmetric prototype shows a few percent.
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="asymmetry",
     place="flow",
     law="T0 and C times (1 + alpha sign(F))",
-    parameters=(Parameter("alpha", "-", 0.0, -0.95, 0.95, "share by which rebound is harder"),),
+    parameters=(
+        Parameter("alpha", "-", 0.0, -0.95, 0.95, "share by which rebound is harder", Search(lambda _: 1.0, (0.0,))),
+    ),
     source="Dixon 2007, The Shock Absorber Handbook",
     tests=(({"direction": 1.0, "alpha": 0.1}, 1.1), ({"direction": -1.0, "alpha": 0.1}, 0.9)),
 )

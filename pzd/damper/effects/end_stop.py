@@ -7,15 +7,25 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="end_stop",
     place="parallel",
     law="k_e (|x| - x_e)^2 sign(x) beyond x_e",
     parameters=(
-        Parameter("k_e", "N/m2", 0.0, 0.0, 1.0e12, "progressive stiffness of the stop"),
-        Parameter("x_e", "m", 0.02, 0.0, 1.0, "displacement at which it begins"),
+        Parameter(
+            "k_e",
+            "N/m2",
+            0.0,
+            0.0,
+            1.0e12,
+            "progressive stiffness of the stop",
+            Search(lambda s: s.force / s.stroke**2, (0.5,)),
+        ),
+        Parameter(
+            "x_e", "m", 0.02, 0.0, 1.0, "displacement at which it begins", Search(lambda s: s.stroke, (0.35, 0.7, 0.9))
+        ),
     ),
     source="quadratic bump stop; Dixon 2007, The Shock Absorber Handbook",
     tests=(

@@ -6,13 +6,23 @@ a mass and a spring of the other sign are the same thing.
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="fluid_inertia",
     place="parallel",
     law="m a",
-    parameters=(Parameter("m", "kg", 0.0, -1.0e5, 1.0e5, "apparent mass of the oil column"),),
+    parameters=(
+        Parameter(
+            "m",
+            "kg",
+            0.0,
+            -1.0e5,
+            1.0e5,
+            "apparent mass of the oil column",
+            Search(lambda s: s.force / s.acceleration, (0.0,)),
+        ),
+    ),
     source="fluid inerter; Swift et al. 2013, Vehicle System Dynamics 51(11)",
     tests=(({"x": 0.01, "v": 1.0, "a": 4.0, "m": 5.0}, 20.0),),
 )

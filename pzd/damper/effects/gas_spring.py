@@ -5,13 +5,23 @@ Law: k_g x. Range: monotube dampers 1-5 kN/m; the sign is left free, for the mou
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="gas_spring",
     place="parallel",
     law="k_g x",
-    parameters=(Parameter("k_g", "N/m", 0.0, -1.0e7, 1.0e7, "stiffness beside the element"),),
+    parameters=(
+        Parameter(
+            "k_g",
+            "N/m",
+            0.0,
+            -1.0e7,
+            1.0e7,
+            "stiffness beside the element",
+            Search(lambda s: s.force / s.stroke, (0.0,)),
+        ),
+    ),
     source="Dixon 2007, The Shock Absorber Handbook",
     tests=(({"x": 0.01, "v": 1.0, "a": 1.0, "k_g": 2000.0}, 20.0),),
 )

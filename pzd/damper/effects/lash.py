@@ -6,13 +6,17 @@ Law: dead zone of whole width delta on the elastic deflection x - y. Range: worn
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="lash",
     place="stroke",
     law="F = k e, e = dead zone of x - y, whole width delta",
-    parameters=(Parameter("delta", "m", 0.0, 0.0, 0.05, "whole width of the free play"),),
+    parameters=(
+        Parameter(
+            "delta", "m", 0.0, 0.0, 0.05, "whole width of the free play", Search(lambda s: s.stroke, (0.003, 0.02))
+        ),
+    ),
     source="dead-zone nonlinearity; Slotine and Li 1991, Applied Nonlinear Control",
     tests=(
         ({"deflection": 0.0004, "delta": 0.001}, 0.0),

@@ -5,13 +5,23 @@ Law: + q w^2, w = |dy/dt|. Range: 1-50 % of the peak force of a hydraulic damper
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="orifice_quadratic",
     place="flow",
     law="+ q w^2",
-    parameters=(Parameter("q", "N s2/m2", 0.0, 0.0, 1.0e8, "force over the square of the flow speed"),),
+    parameters=(
+        Parameter(
+            "q",
+            "N s2/m2",
+            0.0,
+            0.0,
+            1.0e8,
+            "force over the square of the flow speed",
+            Search(lambda s: s.force / s.speed**2, (0.05,)),
+        ),
+    ),
     source="orifice equation dp = rho Q^2 / (2 Cd^2 A^2); Merritt 1967, Hydraulic Control Systems",
     tests=(({"w": 0.3, "q": 1500.0}, 135.0),),
 )

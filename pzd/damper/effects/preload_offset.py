@@ -5,13 +5,17 @@ Law: F_0. Range: gas-charged dampers 50-300 N.
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="preload_offset",
     place="parallel",
     law="F_0",
-    parameters=(Parameter("F_0", "N", 0.0, -1.0e6, 1.0e6, "constant force beside the element"),),
+    parameters=(
+        Parameter(
+            "F_0", "N", 0.0, -1.0e6, 1.0e6, "constant force beside the element", Search(lambda s: s.force, (0.0,))
+        ),
+    ),
     source="Dixon 2007, The Shock Absorber Handbook",
     tests=(({"x": 0.01, "v": 1.0, "a": 1.0, "F_0": 55.0}, 55.0),),
 )

@@ -8,15 +8,25 @@ from __future__ import annotations
 
 from math import inf
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="relief_valve",
     place="flow",
     law="beyond b = max(F_r, T0) the slope is C_r",
     parameters=(
-        Parameter("F_r", "N", inf, 0.0, 1.0e7, "force at which the valve opens"),
-        Parameter("C_r", "N s/m", 0.0, 1.0e-3, 1.0e8, "slope beyond it"),
+        Parameter(
+            "F_r",
+            "N",
+            inf,
+            0.0,
+            1.0e7,
+            "force at which the valve opens",
+            Search(lambda s: s.force, (0.3, 0.5, 0.8), logarithmic=True),
+        ),
+        Parameter(
+            "C_r", "N s/m", 0.0, 1.0e-3, 1.0e8, "slope beyond it", Search(lambda s: s.damping, (0.4,), logarithmic=True)
+        ),
     ),
     source="two-stage damper valve; Dixon 2007, The Shock Absorber Handbook",
     tests=(({"F_r": 900.0, "T0": 300.0}, 900.0), ({"F_r": 200.0, "T0": 300.0}, 300.0)),

@@ -7,13 +7,23 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="rounded_yield",
     place="flow",
     law="T0 becomes T0 tanh(w/w_s)",
-    parameters=(Parameter("w_s", "m/s", 0.0, 0.0, 2.0, "flow speed over which the yield builds up"),),
+    parameters=(
+        Parameter(
+            "w_s",
+            "m/s",
+            0.0,
+            0.0,
+            2.0,
+            "flow speed over which the yield builds up",
+            Search(lambda s: s.speed, (0.01, 0.06), logarithmic=True),
+        ),
+    ),
     source="Kwok et al. 2006, J. Sound Vib. 296, hyperbolic-tangent model of a magneto-rheological damper",
     tests=(({"w": 0.01, "T0": 400.0, "w_s": 0.01}, 304.63766238230594), ({"w": 0.0, "T0": 400.0, "w_s": 0.0}, 400.0)),
 )

@@ -5,13 +5,13 @@ Law: F recorded at t - tau; negative where the displacement is the late one. Ran
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="sensor_delay",
     place="sensor",
     law="F recorded at t - tau",
-    parameters=(Parameter("tau", "s", 0.0, -0.1, 0.1, "delay of the force channel"),),
+    parameters=(Parameter("tau", "s", 0.0, -0.1, 0.1, "delay of the force channel", Search(lambda _: 1.0e-3, (0.0,))),),
     source="pure dead time of a measuring chain",
     tests=(({"time": 1.0, "tau": 0.002}, 0.998),),
 )

@@ -6,7 +6,7 @@ multigrade oils and magneto-rheological fluids past yield.
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 REFERENCE_SPEED = 0.3
 """w_r, the flow speed at which thinning leaves the viscous force as it is [m/s]."""
@@ -15,7 +15,9 @@ EFFECT = Effect(
     name="shear_thinning",
     place="flow",
     law="C w becomes C w_r (w/w_r)^n, w_r = 0.3 m/s",
-    parameters=(Parameter("n", "-", 1.0, 0.1, 1.0, "flow index; 1 is a Newtonian fluid"),),
+    parameters=(
+        Parameter("n", "-", 1.0, 0.1, 1.0, "flow index; 1 is a Newtonian fluid", Search(lambda _: 1.0, (0.85,))),
+    ),
     source="Ostwald-de Waele power law; Bird, Stewart and Lightfoot 2002, Transport Phenomena",
     tests=(
         ({"w": 0.3, "C": 2000.0, "n": 0.7}, 600.0),

@@ -7,15 +7,25 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="stribeck_friction",
     place="parallel",
     law="F_s exp(-(v/v_s)^2) sign(v)",
     parameters=(
-        Parameter("F_s", "N", 0.0, 0.0, 1.0e6, "friction at rest above that at speed"),
-        Parameter("v_s", "m/s", 0.02, 1.0e-4, 2.0, "speed over which it falls"),
+        Parameter(
+            "F_s", "N", 0.0, 0.0, 1.0e6, "friction at rest above that at speed", Search(lambda s: s.force, (0.02,))
+        ),
+        Parameter(
+            "v_s",
+            "m/s",
+            0.02,
+            1.0e-4,
+            2.0,
+            "speed over which it falls",
+            Search(lambda s: s.speed, (0.03, 0.15, 0.5), logarithmic=True),
+        ),
     ),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30(7)",
     tests=(

@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="temperature_drift",
     place="material",
     law="T0 exp(-beta_T0 (T - T_ref)), C exp(-beta_C (T - T_ref))",
     parameters=(
-        Parameter("beta_T0", "1/K", 0.0, -0.2, 0.2, "relative fall of T0 a kelvin"),
-        Parameter("beta_C", "1/K", 0.0, -0.2, 0.2, "relative fall of C a kelvin"),
+        Parameter("beta_T0", "1/K", 0.0, -0.2, 0.2, "relative fall of T0 a kelvin", Search(lambda _: 0.01, (0.0,))),
+        Parameter("beta_C", "1/K", 0.0, -0.2, 0.2, "relative fall of C a kelvin", Search(lambda _: 0.01, (0.0,))),
     ),
     source="Reynolds' viscosity law, 1886; falls with heat in Makowski and Knap 2021, fig. 8 and 9",
     tests=(({"temperature": 43.0, "reference": 23.0, "beta": 0.01}, 0.8187307530779818),),
+    needs="temperature",
 )
 
 

@@ -9,18 +9,29 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import Effect, Parameter
+from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
     name="valve_lag",
     place="drive",
     law="tau dUe/dt + Ue = U",
-    parameters=(Parameter("tau", "s", 0.0, 0.0, 0.5, "time constant of the valve and its supply"),),
+    parameters=(
+        Parameter(
+            "tau",
+            "s",
+            0.0,
+            0.0,
+            0.5,
+            "time constant of the valve and its supply",
+            Search(lambda _: 1.0e-3, (2.0, 10.0, 40.0), logarithmic=True),
+        ),
+    ),
     source="first-order lag; response times in Makowski and Knap 2021, sec. 1",
     tests=(
         ({"felt": 0.0, "before": 100.0, "now": 100.0, "step": 0.01, "tau": 0.01}, 63.21205588285577),
         ({"felt": 7.0, "before": 0.0, "now": 100.0, "step": 0.01, "tau": 0.0}, 100.0),
     ),
+    needs="voltage",
 )
 
 
