@@ -11,6 +11,8 @@ from pzd.record import Array
 
 LEAST_FRICTION = 1e-4
 """Smallest friction of the search, as a share of the peak force: its logarithm needs one."""
+OUTSIDE = 10.0
+"""What the search sees for a parameter set that the bounds of the other method leave out."""
 LEAST_SPREAD = 1e-8
 """Spread of the criterion over the population at which the search ends in any case; the rest is polish."""
 
@@ -41,7 +43,8 @@ def search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingh
     low = low._replace(friction=LEAST_FRICTION * high.friction)
 
     def criterion(logarithms: Array) -> float:
-        return objective.criterion(Bingham(*(float(p) for p in np.exp(logarithms))))
+        parameters = Bingham(*(float(p) for p in np.exp(logarithms)))
+        return objective.criterion(parameters) if objective.slips(parameters) else OUTSIDE
 
     found = differential_evolution(
         criterion,

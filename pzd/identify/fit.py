@@ -8,29 +8,28 @@ import numpy as np
 
 from pzd.artefacts import ParameterRow
 from pzd.identify.config import IdentifyConfig
+from pzd.identify.evidence import evidence_of, scales_of
 from pzd.identify.evolutionary import fit_evolutionary
 from pzd.identify.intervals import uncertainty
 from pzd.identify.objective import Bingham, Fit, Objective
 from pzd.identify.separable import fit_separable
 from pzd.identify.trial import trial_of
-from pzd.identify.trust import Evidence, friction_scale, is_stationary, judge, lies_at_bound, visible_shares
+from pzd.identify.trust import Evidence, judge, stationarity, visible_shares
 from pzd.record import Array, Condition, Record
-
-NAMES = ("T0", "C", "k")
 
 
 def fit_condition(condition: Condition, config: IdentifyConfig, seed: int) -> ParameterRow:
     """The Bingham parameters of one condition, pooled over its records."""
     objective, fit = fit_records(condition.records, config, seed)
     widths = uncertainty(fit.slopes, fit.residuals, objective.lengths).half_widths()
-    low, high = objective.bounds
-    bounded = [lies_at_bound(p, a, b) for p, a, b in zip(fit.parameters, low, high, strict=True)]
-    evidence = evidence_of(fit.parameters, widths, fit.slopes, objective.measured, fit.residuals, bounded)
+    scales = scales_of(fit.parameters, objective.measured)
+    visible = visible_shares(fit.slopes, scales, objective.energy)
+    cosines = stationarity(fit.slopes, fit.residuals, objective.energy)
     return row_of(
         (condition.setting, condition.voltage, condition.temperature),
         fit.parameters,
         widths,
-        evidence,
+        evidence_of(objective, fit.parameters, fit.criterion, np.stack([scales, widths, visible, cosines])),
         (objective.measured, fit.residuals),
     )
 
@@ -41,32 +40,6 @@ def fit_records(records: Sequence[Record], config: IdentifyConfig, seed: int) ->
     if config.method == "evolutionary":
         return objective, fit_evolutionary(objective, config.evolutionary, seed)
     return objective, fit_separable(objective)
-
-
-def evidence_of(
-    parameters: Bingham, widths: Array, slopes: Array, measured: Array, residuals: Array, bounded: Sequence[bool]
-) -> list[Evidence]:
-    """What the data say of T0, C and k.
-
-    Parameters
-    ----------
-    parameters : the optimum
-    widths : (3,) half widths of the 95 % intervals
-    slopes : (N, 3) derivatives of the simulated force
-    measured : (N,) force [N]
-    residuals : (N,) measured less simulated force [N]
-    bounded : whether each parameter lies at a bound of the search
-    """
-    energy = float(measured @ measured)
-    scales = np.array([friction_scale(parameters.friction, measured), parameters.damping, parameters.stiffness])
-    visible = visible_shares(slopes, scales, energy)
-    stationary = is_stationary(slopes, residuals, energy)
-    if parameters.friction == 0.0:  # the optimum lies at the natural bound, where the slope need not vanish
-        stationary = (True, *stationary[1:])
-    return [
-        Evidence(*facts)
-        for facts in zip(NAMES, scales.tolist(), widths.tolist(), visible.tolist(), bounded, stationary, strict=True)
-    ]
 
 
 def row_of(

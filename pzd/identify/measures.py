@@ -10,7 +10,7 @@ import numpy as np
 from pzd.artefacts import MeasureRow
 from pzd.identify.trial import reversals, warm_up
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
-from pzd.rig.cycles import cycles
+from pzd.rig.cycles import Cycles, cycles
 
 SAME_SPEED = 0.05
 """Tests whose peak speeds differ by less, relative, are at the same speed."""
@@ -104,11 +104,12 @@ def loop_of(record: Record) -> Loop:
             None,
             max(0.5 * turns, 0.5),
         )
-    displacement = run.mean(record.time, record.displacement)
-    step = run.period / displacement.size
-    velocity = (np.roll(displacement, -1) - np.roll(displacement, 1)) / (2.0 * step)
-    force = run.mean(record.time, record.force)
-    return Loop(displacement, velocity, force, step, True, run.frequency, 1.0)
+    if run.count >= 4:  # the outer cycles may still hold the start and the stop
+        run = Cycles(run.period, run.start + run.period, run.count - 2)
+    displacement, velocity, force = (
+        run.mean(record.time, channel) for channel in (record.displacement, record.velocity, record.force)
+    )
+    return Loop(displacement, velocity, force, run.period / displacement.size, True, run.frequency, 1.0)
 
 
 def _row(record: Record, still: bool) -> MeasureRow:

@@ -10,87 +10,32 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import ParameterRow
-from pzd.damper.compose import respond
-from pzd.damper.model import BaseRow, Damper
-from pzd.damper.motion import Motion
 from pzd.identify.config import IdentifyConfig
-from pzd.identify.fit import NAMES, row_of
+from pzd.identify.evidence import evidence_of, scales_of
+from pzd.identify.fit import row_of
 from pzd.identify.intervals import uncertainty
-from pzd.identify.nodes import nodes_of, weights
-from pzd.identify.objective import Bingham, Objective, from_search, to_search
+from pzd.identify.nodes import nodes_of
+from pzd.identify.objective import Bingham, Objective, from_search, search_slopes, to_search
+from pzd.identify.piecewise import MovingObjective, voltage_of
 from pzd.identify.separable import TOLERANCE, fit_separable
 from pzd.identify.trial import Trial, trial_of
-from pzd.identify.trust import Evidence, friction_scale, is_stationary, lies_at_bound, visible_shares
+from pzd.identify.trust import stationarity, visible_shares
 from pzd.record import CONSTANT_SHARE, Array, Condition, Record, conditions, voltage_scale
 
 Known = tuple[Condition, ParameterRow]
 
 log = logging.getLogger(__name__)
 
-DIFFERENCE = 1e-5
-"""Step of the difference quotients, in the logarithm of C and k and the share of peak force of T0."""
-INTEGRATION = 1e-10
-"""Tolerance of the integration, well below the step of the difference quotients."""
 SETTLED = 0.05
 """For starting values the voltage has been near its node for this long [s]."""
 FEWEST = 200
 """Samples near a node that starting values need."""
-
-
-@dataclass(frozen=True, eq=False)
-class MovingObjective:
-    """Criterion (4) over moving records, the parameters of some nodes free and of the others held."""
-
-    records: tuple[Record, ...]
-    nodes: Array
-    held: dict[int, Bingham]
-    """Parameters of the nodes that stand, by their index."""
-    plain: Objective
-    """The same records with constant parameters: bounds, warm-up and starting values."""
-
-    @property
-    def free(self) -> list[int]:
-        """Indices of the nodes to be fitted."""
-        return [i for i in range(self.nodes.size) if i not in self.held]
-
-    def residuals(self, free: Sequence[Bingham]) -> Array:
-        """(N,) measured less simulated force at the counted samples [N]."""
-        values = dict(self.held) | dict(zip(self.free, free, strict=True))
-        damper = damper_of(self.nodes, [values[i] for i in range(self.nodes.size)])
-        parts = [
-            respond(damper, motion_of(r), float(r.force[0]), INTEGRATION)[t.counted]
-            for r, t in zip(self.records, self.plain.trials, strict=True)
-        ]
-        residuals: Array = self.plain.measured - np.concatenate(parts)
-        return residuals
-
-    def slopes(self, free: Sequence[Bingham], residuals: Array) -> Array:
-        """(N, 3 f) derivatives of the simulated force by T0, C, k of each free node, by difference quotients."""
-        force = self.plain.scales[0]
-        columns = []
-        for i, parameters in enumerate(free):
-            for j in range(3):
-                moved = to_search(parameters, force)
-                moved[j] += DIFFERENCE
-                other = [*free[:i], from_search(moved, force), *free[i + 1 :]]
-                step = other[i][j] - parameters[j]
-                columns.append((residuals - self.residuals(other)) / step)
-        return np.stack(columns, axis=-1)
-
-    def touched(self) -> Array:
-        """(N, m) share of each node in the parameters at the counted samples."""
-        return np.concatenate(
-            [
-                weights(self.nodes, voltage_of(r)[t.counted])
-                for r, t in zip(self.records, self.plain.trials, strict=True)
-            ]
-        )
 
 
 def fit_moving(
@@ -117,36 +62,6 @@ def fit_moving(
         known = _at_nearest_temperature(list(zip(constant, rows, strict=True)), band.temperature, config)
         found += _fit_band([by_name[r.name] for r in band.records], band.temperature, known, config)
     return found
-
-
-def damper_of(nodes: Array, values: Sequence[Bingham]) -> Damper:
-    """The plain damper with these parameters at these voltages."""
-    return Damper(
-        base=tuple(
-            BaseRow(voltage_V=float(u), T0_N=p.friction, C_Ns_per_m=p.damping, k_N_per_m=p.stiffness)
-            for u, p in zip(nodes, values, strict=True)
-        )
-    )
-
-
-def motion_of(record: Record) -> Motion:
-    """The record's motion, its speed from the cubic through the displacement."""
-    from scipy.interpolate import CubicSpline
-
-    speed = CubicSpline(record.time, record.displacement)(record.time, 1)
-    return Motion(record.time, record.displacement, speed, record.acceleration, voltage_of(record), None)
-
-
-def voltage_of(record: Record) -> Array:
-    """The record's voltage.
-
-    Raises
-    ------
-    ValueError : when it has none
-    """
-    if record.voltage is None:
-        raise ValueError(f"record {record.name} has no voltage")
-    return record.voltage
 
 
 def _at_nearest_temperature(known: list[Known], temperature: float | None, config: IdentifyConfig) -> list[Known]:
@@ -232,24 +147,25 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
     """The optimum over all free nodes together, by trust-region least squares."""
     from scipy.optimize import least_squares
 
-    force, norm = objective.plain.scales[0], np.sqrt(objective.plain.energy)
-    low, high = (np.tile(to_search(b, force), len(starts)) for b in objective.plain.bounds)
+    stroke, norm = objective.plain.scales[2], np.sqrt(objective.plain.energy)
+    low, high = (np.tile(b, len(starts)) for b in objective.plain.search_bounds)
 
     def parameters(x: Array) -> list[Bingham]:
-        return [from_search(part, force) for part in x.reshape(-1, 3)]
+        return [from_search(part, stroke) for part in x.reshape(-1, 3)]
 
     def residuals_at(x: Array) -> Array:
         return np.asarray(objective.residuals(parameters(x)) / norm)
 
     def slopes_at(x: Array) -> Array:
         free = parameters(x)
-        factors = np.concatenate([(force, p.damping, p.stiffness) for p in free])
-        return np.asarray(-objective.slopes(free, objective.residuals(free)) * factors / norm)
+        slopes = objective.slopes(free, objective.residuals(free))
+        inner = [slopes[:, 3 * i : 3 * i + 3] @ search_slopes(p, stroke) for i, p in enumerate(free)]
+        return np.asarray(-np.hstack(inner) / norm)
 
-    start = np.concatenate([to_search(s, force) for s in starts])
+    start = np.concatenate([to_search(s, stroke) for s in starts])
     found = least_squares(
         residuals_at,
-        np.clip(start, low + 1e-6, high - 1e-6),
+        np.clip(start, low + 1e-9, high - 1e-9),
         jac=slopes_at,
         bounds=(low, high),
         x_scale="jac",
@@ -268,27 +184,17 @@ def _rows(
     residuals = objective.residuals(free)
     slopes = objective.slopes(free, residuals)
     widths = uncertainty(slopes, residuals, objective.plain.lengths).half_widths().reshape(-1, 3)
-    measured, energy = objective.plain.measured, objective.plain.energy
-    scales = np.array([(friction_scale(p.friction, measured), p.damping, p.stiffness) for p in free])
-    visible = visible_shares(slopes, scales.ravel(), energy).reshape(-1, 3)
-    still = np.reshape(is_stationary(slopes, residuals, energy), (-1, 3))
-    low, high = objective.plain.bounds
+    plain = objective.plain
+    scales = np.stack([scales_of(p, plain.measured) for p in free])
+    visible = visible_shares(slopes, scales.ravel(), plain.energy).reshape(-1, 3)
+    cosines = stationarity(slopes, residuals, plain.energy).reshape(-1, 3)
     touched = objective.touched()[:, objective.free] > 0.0
     rows = []
     for i, parameters in enumerate(free):
-        here = touched[:, i]
-        share = np.sqrt(energy / max(float(measured[here] @ measured[here]), np.finfo(float).tiny))
-        evidence = [
-            Evidence(
-                NAMES[j],
-                float(scales[i, j]),
-                float(widths[i, j]),
-                float(visible[i, j] * share),
-                lies_at_bound(parameters[j], low[j], high[j]),
-                bool(still[i, j]) or parameters[j] == 0.0,
-            )
-            for j in range(3)
-        ]
-        fitted = (measured[here], residuals[here]) if np.any(here) else (measured, residuals)
-        rows.append(row_of(labels[i], parameters, widths[i], evidence, fitted))
+        here = touched[:, i] if np.any(touched[:, i]) else slice(None)
+        measured, left = plain.measured[here], residuals[here]
+        energy = float(measured @ measured)
+        facts = np.stack([scales[i], widths[i], visible[i] * np.sqrt(plain.energy / energy), cosines[i]])
+        evidence = evidence_of(plain, parameters, float(left @ left) / energy, facts)
+        rows.append(row_of(labels[i], parameters, widths[i], evidence, (measured, left)))
     return rows

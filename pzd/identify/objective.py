@@ -15,6 +15,11 @@ from pzd.damper.element import element_force, element_force_sensitivities
 from pzd.identify.trial import Trial
 from pzd.record import Array
 
+LARGEST_PRE_SLIP = 0.45
+"""Largest pre-slip deflection T0/k of the search, as a share of the range of displacement."""
+AT_BOUND = 1e-3
+"""A parameter within this share of a bound, in search coordinates, lies at it."""
+
 
 class Bingham(NamedTuple):
     """The three parameters of the element, or one number for each of them."""
@@ -88,10 +93,31 @@ class Objective:
             Bingham(force, 1e2 * force / speed, 1e4 * force / stroke),
         )
 
+    @cached_property
+    def search_bounds(self) -> tuple[Array, Array]:
+        """(3,) bounds of what least squares searches."""
+        low, high = self.bounds
+        return (
+            np.array([0.0, np.log(low.damping), np.log(low.stiffness)]),
+            np.array([LARGEST_PRE_SLIP, np.log(high.damping), np.log(high.stiffness)]),
+        )
+
+    def slips(self, parameters: Bingham) -> bool:
+        """Whether the element slips within every full stroke: else F(0) would act as a free offset for ever."""
+        return parameters.friction <= LARGEST_PRE_SLIP * parameters.stiffness * self.scales[2]
+
+    def at_bounds(self, parameters: Bingham) -> tuple[bool, ...]:
+        """Whether each parameter lies at a bound of the search; a friction of zero does not."""
+        low, high = self.search_bounds
+        x = to_search(parameters, self.scales[2])
+        beyond = x >= high - AT_BOUND * np.abs(high)
+        below = x <= low + AT_BOUND * np.abs(low)
+        return bool(beyond[0]), bool(beyond[1] or below[1]), bool(beyond[2] or below[2])
+
     def clipped(self, parameters: Bingham) -> Bingham:
         """The parameters, brought inside the bounds."""
-        low, high = self.bounds
-        return Bingham(*(float(np.clip(p, a, b)) for p, a, b in zip(parameters, low, high, strict=True)))
+        stroke = self.scales[2]
+        return from_search(np.clip(to_search(parameters, stroke), *self.search_bounds), stroke)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +132,19 @@ class Fit:
     """(N, 3) derivatives of the simulated force by T0, C and k."""
 
 
-def to_search(parameters: Bingham, force: float) -> Array:
-    """(3,) what least squares searches: T0 as a share of the peak force, the logarithms of C and k."""
-    return np.array([parameters.friction / force, np.log(parameters.damping), np.log(parameters.stiffness)])
+def to_search(parameters: Bingham, stroke: float) -> Array:
+    """(3,) what least squares searches: pre-slip T0/k as a share of the stroke, the logarithms of C and k."""
+    friction, damping, stiffness = parameters
+    return np.array([friction / (stiffness * stroke), np.log(damping), np.log(stiffness)])
 
 
-def from_search(x: Array, force: float) -> Bingham:
+def from_search(x: Array, stroke: float) -> Bingham:
     """The parameters from what least squares searches."""
-    return Bingham(float(x[0]) * force, float(np.exp(x[1])), float(np.exp(x[2])))
+    stiffness = float(np.exp(x[2]))
+    return Bingham(float(x[0]) * stiffness * stroke, float(np.exp(x[1])), stiffness)
+
+
+def search_slopes(parameters: Bingham, stroke: float) -> Array:
+    """(3, 3) derivatives of T0, C, k (rows) by what least squares searches (columns)."""
+    friction, damping, stiffness = parameters
+    return np.array([[stiffness * stroke, 0.0, friction], [0.0, damping, 0.0], [0.0, 0.0, stiffness]])

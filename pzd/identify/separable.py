@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.damper.element import element_force
-from pzd.identify.objective import Bingham, Fit, Objective, from_search, to_search
+from pzd.identify.objective import LARGEST_PRE_SLIP, Bingham, Fit, Objective, from_search, search_slopes, to_search
 from pzd.identify.starts import graphical_start
 from pzd.identify.trial import Trial
 from pzd.record import Array
@@ -48,7 +48,7 @@ def grid_starts(objective: Objective, count: int = DESCENTS) -> list[Bingham]:
     _, _, stroke = objective.scales
     pieces = [_piece(t, GRID_SAMPLES // len(objective.trials)) for t in objective.trials]
     slowest = max((t.displacement.size - 1) * t.step for t in objective.trials)
-    deltas = np.geomspace(1e-4 * stroke, 0.5 * stroke, GRID[0])
+    deltas = np.geomspace(1e-4, LARGEST_PRE_SLIP, GRID[0]) * stroke
     taus = np.geomspace(min(p[1] for p in pieces), 0.1 * slowest, GRID[1])
     found: list[tuple[float, Bingham]] = []
     for delta in deltas:
@@ -64,14 +64,14 @@ def descend(objective: Objective, start: Bingham) -> Fit:
     """The optimum reached from a starting point by trust-region least squares within the bounds."""
     from scipy.optimize import least_squares
 
-    force = objective.scales[0]
+    stroke = objective.scales[2]
     norm = np.sqrt(objective.energy)
-    low, high = (to_search(b, force) for b in objective.bounds)
+    low, high = objective.search_bounds
 
     def both(x: Array) -> tuple[Array, Array]:
-        parameters = from_search(x, force)
+        parameters = from_search(x, stroke)
         residuals, slopes = objective.residuals_and_slopes(parameters)
-        return residuals / norm, -slopes * np.array([force, parameters.damping, parameters.stiffness]) / norm
+        return residuals / norm, -slopes @ search_slopes(parameters, stroke) / norm
 
     memory: dict[bytes, tuple[Array, Array]] = {}
 
@@ -88,7 +88,7 @@ def descend(objective: Objective, start: Bingham) -> Fit:
     def slopes_at(x: Array) -> Array:
         return at(x)[1]
 
-    inside = np.clip(to_search(start, force), low + 1e-6, high - 1e-6)
+    inside = np.clip(to_search(start, stroke), low + 1e-9, high - 1e-9)
     found = least_squares(
         residuals_at,
         inside,
@@ -100,7 +100,7 @@ def descend(objective: Objective, start: Bingham) -> Fit:
         gtol=TOLERANCE,
         max_nfev=100,
     )
-    parameters = from_search(found.x, force)
+    parameters = from_search(found.x, stroke)
     residuals, slopes = objective.residuals_and_slopes(parameters)
     return Fit(parameters, float(residuals @ residuals) / objective.energy, residuals, slopes)
 

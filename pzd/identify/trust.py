@@ -20,10 +20,15 @@ WEAK_SHIFT = 0.2
 """A parameter is weak when the sensor error may shift it by this share."""
 FRICTION_FLOOR = 0.05
 """T0 is judged against itself or this share of the force's r.m.s., the larger: a friction of zero is a finding."""
-AT_BOUND = 1e-3
-"""A parameter within this share of a bound of the search lies at it."""
+SPRING_TO_NOISE = 10.0
+"""k is undetermined when the spring gives by less than this many times the displacement's noise at peak force:
+what the noise does to the force then decides on k."""
+MISFIT = 0.2
+"""All parameters are weak where the model leaves more than this share of the force's r.m.s."""
 STATIONARY = 1e-3
 """Largest cosine between the residuals and a parameter's slope at an optimum."""
+EXACT = 1e-14
+"""A criterion below this is rounding: the fit is exact."""
 
 
 @dataclass(frozen=True)
@@ -47,17 +52,15 @@ class Evidence:
     """Half width of its 95 % interval [its unit]."""
     visible: float
     """R.m.s. of the force that changes with it by one scale and that no other parameter makes up, over the r.m.s."""
-    at_bound: bool
-    """Whether the search ended at a bound."""
-    stationary: bool
-    """Whether the criterion is stationary in it."""
+    veto: str | None = None
+    """Why it is undetermined whatever the numbers say."""
+    doubt: str | None = None
+    """Why it is weak whatever the numbers say."""
 
     def undetermined(self) -> str | None:
         """Why the data do not determine it, None where they do."""
-        if self.at_bound:
-            return "at a bound of the search"
-        if not self.stationary:
-            return "the search did not converge"
+        if self.veto:
+            return self.veto
         if self.visible <= 0.0:
             return "the force does not depend on it, or another parameter makes it up"
         if self.shift > UNDETERMINED:
@@ -72,7 +75,7 @@ class Evidence:
             return f"95 % interval of +-{_percent(self.half_width / self.scale)}"
         if self.shift > WEAK_SHIFT:
             return f"a force error of {SENSOR_ERROR:.1%} may shift it by {_percent(self.shift)}"
-        return None
+        return self.doubt
 
     @property
     def shift(self) -> float:
@@ -113,17 +116,23 @@ def visible_shares(slopes: Array, scales: Array, energy: float) -> Array:
     return result
 
 
-def is_stationary(slopes: Array, residuals: Array, energy: float) -> tuple[bool, ...]:
-    """Whether the criterion is stationary in each parameter, whatever the solver says."""
+def stationarity(slopes: Array, residuals: Array, energy: float) -> Array:
+    """(p,) cosine between the residuals and each slope, 0 at an optimum, whatever the solver says."""
     size = np.linalg.norm(slopes, axis=0) * np.sqrt(residuals @ residuals)
-    exact = float(residuals @ residuals) <= 1e-14 * energy
-    cosines = np.abs(slopes.T @ residuals) / np.where(size > 0.0, size, 1.0)
-    return tuple(bool(exact or c <= STATIONARY) for c in cosines)
+    if float(residuals @ residuals) <= EXACT * energy:
+        return np.zeros(size.size)
+    cosines: Array = np.abs(slopes.T @ residuals) / np.where(size > 0.0, size, 1.0)
+    return cosines
 
 
-def lies_at_bound(value: float, low: float, high: float) -> bool:
-    """Whether the search ended at a bound; a lower bound of zero (friction) is not one."""
-    return bool(value >= high * (1.0 - AT_BOUND) or (low > 0.0 and value <= low * (1.0 + AT_BOUND)))
+def displacement_noise(displacement: Array) -> float:
+    """White noise of a sampled displacement, from its third differences [m].
+
+    Equation: sigma = q90(|third difference|) / (1.645 sqrt(20))      Source: variance of 1, -3, 3, -1 is 20
+    """
+    if displacement.size < 8:
+        return 0.0
+    return float(np.quantile(np.abs(np.diff(displacement, 3)), 0.9) / (1.645 * np.sqrt(20.0)))
 
 
 def judge(evidence: Sequence[Evidence]) -> Trust:
