@@ -45,7 +45,7 @@ def kinematics(time: Array, displacement: Array, run: Cycles | None) -> Kinemati
     if run is None:
         return _smoothed(time, displacement, np.inf)
     inside = run.inside(time)
-    cyclic = _average_cycle(time, displacement, run)
+    cyclic = _average_cycle(time, displacement - _drift(time, displacement, run), run)
     drift = _smoothed(time[inside], displacement[inside] - cyclic.displacement, 0.5 * run.frequency)
     parts = [cyclic.displacement + drift.displacement, cyclic.velocity + drift.velocity]
     parts.append(cyclic.acceleration + drift.acceleration)
@@ -76,6 +76,24 @@ def significant_harmonics(folded: Array) -> Array:
         kept[-1] = False
     result: Array = kept
     return result
+
+
+def _drift(time: Array, displacement: Array, run: Cycles) -> Array:
+    """The mean over one period around every sample (n,), which no harmonic of the cycle moves.
+
+    Half a cycle at either end of the run is continued as a straight line; outside it is held.
+    """
+    from scipy.integrate import cumulative_trapezoid
+
+    whole = cumulative_trapezoid(displacement, time, initial=0.0)
+    half = 0.5 * run.period
+    middle = np.linspace(run.start + half, min(run.end, float(time[-1])) - half, 4 * run.count)
+    mean = (np.interp(middle + half, time, whole) - np.interp(middle - half, time, whole)) / run.period
+    slope = np.polyfit(middle, mean, 1)[0] if run.count < 3 else np.gradient(mean, middle)
+    first, last = (slope, slope) if run.count < 3 else (slope[:4].mean(), slope[-4:].mean())
+    ends = (mean[0] - half * first, mean[-1] + half * last)
+    knots = np.concatenate(([middle[0] - half], middle, [middle[-1] + half]))
+    return np.interp(time, knots, np.concatenate((ends[:1], mean, ends[1:])))
 
 
 def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:

@@ -20,8 +20,10 @@ CANDIDATE = 0.3
 """Mismatch (share of the variance) below which a lag is worth a closer look."""
 REPEATS = 0.02
 """Largest mismatch of two adjacent cycles that repeat, as a share of the variance."""
-SAME = 4e-4
-"""Mismatch that always counts as repeating: 2 % in r.m.s."""
+SAME = 2e-5
+"""Mismatch that always counts as repeating: 0.4 % in r.m.s."""
+SCATTER = 4.0
+"""Otherwise up to this many times the median mismatch of the motion counts as repeating."""
 INCREMENTS_REPEAT = 0.05
 """Largest mismatch of the increments."""
 LEAST_SHARE = 0.25
@@ -61,9 +63,13 @@ def repeats(time: Array, displacement: Array) -> Repeats | None:
     step = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / MOST_SAMPLES)
     grid = np.arange(time[0], time[-1] + 0.5 * step, step)
     x = np.interp(grid, time, displacement)
-    for lag in _candidates(x):
-        section = _section(x, lag, LEAST_SHARE * float(time[last] - time[first]) / step)
+    least = LEAST_SHARE * float(time[last] - time[first]) / step
+    for candidate in _candidates(x):
+        lag, section = candidate, _section(x, candidate, least)
         if section is not None:
+            # Ramps pull the lag of the whole record aside: look again at the section alone.
+            lag = _nearby(x[section[0] : int(section[1])], candidate)
+            section = _section(x, lag, least) or section
             return Repeats(lag * step, float(grid[0]) + section[0] * step, float(grid[0]) + section[1] * step)
     return None
 
@@ -115,6 +121,13 @@ def _candidates(x: Array) -> list[float]:
     return lags
 
 
+def _nearby(x: Array, lag: float) -> float:
+    """The lag near the given one at which the mismatch is least."""
+    d = mismatch(x)
+    around = np.arange(max(int(lag) - 3, 1), min(int(lag) + 5, d.size))
+    return _vertex(d, int(around[np.argmin(d[around])])) if around.size else lag
+
+
 def _vertex(d: Array, lowest: int) -> float:
     """Lag of the lowest point of the parabola through three points."""
     if lowest == 0 or lowest == d.size - 1:
@@ -135,7 +148,7 @@ def _section(x: Array, lag: float, least: float) -> tuple[int, float] | None:
     error_u, scale_u = error_u[: error.size], scale_u[: error.size]
     size = float(np.median(scale[scale > 0.25 * scale.max()]))
     size_u = float(np.median(scale_u[scale_u > 0.25 * scale_u.max()]))
-    allowed = min(REPEATS, max(SAME, 4.0 * float(np.median(error[scale > 0.5 * size])) / size))
+    allowed = min(REPEATS, max(SAME, SCATTER * float(np.median(error[scale > 0.5 * size])) / size))
     good = (error <= allowed * size) & (error_u <= INCREMENTS_REPEAT * size_u) & (scale > 0.5 * size)
     first, length = _longest(good)
     end = first + length - 1 + 2.0 * lag
