@@ -1,0 +1,64 @@
+"""Force of a damper behind a frame that gives: the damper is extended less than the actuator moves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pzd.damper.compose import element_rows, felt_by_valve, parallel_force, recorded, respond, sampling_steps
+from pzd.damper.flow import ROW
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
+from pzd.damper.path import march
+from pzd.record import Array
+
+TOLERANCE = 1e-7
+"""Admissible error of one piece of the path, as a share of the force."""
+_ROUNDS = 12
+_SETTLED = 1e-10  # change of the parallel force in a round, as a share of the largest force
+_STIFFNESS = ROW.index("k")
+
+
+def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None) -> Array:
+    """Force that the channel records, the motion being that of the actuator.
+
+    The frame and the oil spring are springs in series, so the element is solved exactly with
+    1 / k' = 1 / k + 1 / k_frame; forces beside it are found by rounds, since they act at the
+    damper's own extension. The frame has no mass: its resonance is left out, and a fluid_inertia
+    takes the acceleration of the actuator.
+
+    Equation: F = k' (x - F_beside / k_frame - y)           Source: springs in series
+
+    Parameters
+    ----------
+    damper : the damper
+    motion : (n,) of the actuator, with voltage and temperature
+    frame_stiffness : k_frame [N/m]; None where the frame does not give
+
+    Returns
+    -------
+    (n,) force [N]
+
+    Raises
+    ------
+    ValueError : when the damper needs a voltage or temperature that the motion does not have
+    """
+    if frame_stiffness is None:
+        return respond(damper, motion, tolerance=TOLERANCE)
+    steps = sampling_steps(motion.time)
+    felt = felt_by_valve(damper, motion.voltage, steps)
+    rows = np.array(element_rows(damper, felt, motion.temperature))
+    rows[:, _STIFFNESS] /= 1.0 + rows[:, _STIFFNESS] / frame_stiffness
+    element = march(motion.displacement, motion.velocity, steps, rows, 0.0, TOLERANCE)
+    velocity = motion.velocity - np.gradient(element, motion.time) / frame_stiffness
+    beside = np.zeros(element.size)
+    for _ in range(_ROUNDS):
+        total = element + beside
+        own = replace(motion, displacement=motion.displacement - total / frame_stiffness, velocity=velocity)
+        last, beside = beside, parallel_force(damper, felt, own)
+        if np.max(np.abs(beside - last)) <= _SETTLED * np.max(np.abs(total)):
+            break
+        shifted = motion.displacement - beside / frame_stiffness
+        element = march(shifted, motion.velocity, steps, rows, 0.0, TOLERANCE)
+    return recorded(damper, motion.time, element + beside)
