@@ -110,7 +110,7 @@ def _edition_1997(ride: SettledRide, config: ReportConfig) -> Iterator[tuple[str
     yield "a_w", found.a_w, "m/s2", trust
     yield "weighted_peak", found.peak, "m/s2", trust
     yield "crest_factor", found.crest, "-", _condition(trust, found.crest, iso2631_1997.CREST_LIMIT)
-    yield "VDV", found.vdv, "m/s^1.75", f"{more}; over {ride.weighted.size / ride.rate:g} s"
+    yield "VDV", found.vdv, "m/s^1.75", f"{more}; over {ride.weighted.size / ride.rate:.4g} s"
     yield "MTVV", found.mtvv, "m/s2", more
     yield "MTVV_over_a_w", found.mtvv_ratio, "-", _condition(trust, found.mtvv_ratio, iso2631_1997.MTVV_LIMIT)
     yield "VDV_over_a_w_T", found.vdv_ratio, "-", _condition(trust, found.vdv_ratio, iso2631_1997.VDV_LIMIT)

@@ -94,7 +94,7 @@ def weighted(acceleration: Array, rate: float, weighting: Weighting = WK) -> Arr
     ramp = 0.5 + 0.5 * np.cos(np.linspace(0.0, np.pi, round(_RAMP_S * rate)))
     whole = np.concatenate([acceleration, acceleration[-1] * ramp])
     length = next_fast_len(whole.size + round(_MEMORY_S * rate), real=True)
-    frequency: Array = np.arange(length // 2 + 1) * (rate / length)
+    frequency = (np.arange(length // 2 + 1) * (rate / length)).astype(np.float64)
     spectrum = np.fft.rfft(whole, length)
     spectrum *= response(weighting, frequency)
     history: Array = np.fft.irfft(spectrum, length)[: acceleration.size]

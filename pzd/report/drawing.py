@@ -1,0 +1,115 @@
+"""How pictures look, and how they become text that is the same at every run."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from pzd.record import Array
+from pzd.report.blocks import Picture
+from pzd.report.story import Story
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Place = Literal["model", "missing", "damper", "passenger"]
+
+MEASURED = "#4d4d4d"
+PLAIN = "#d55e00"
+FINAL = "#0072b2"
+GRID = "#e3e6ea"
+INK = "#1f2933"
+BY_FIDELITY = {"ideal": "#56b4e9", "table": "#009e73", "dynamic": "#0072b2"}
+"""Colours of Okabe and Ito (2008), which people with any colour vision tell apart."""
+MAP = "cividis"
+_MOST_POINTS = 700
+_FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
+
+STYLE: Mapping[str, object] = {
+    "svg.hashsalt": "pzd",
+    "svg.fonttype": "none",
+    "font.family": "DejaVu Sans",
+    "font.size": 9.5,
+    "axes.edgecolor": "#9aa5b1",
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.major.size": 3.0,
+    "ytick.major.size": 3.0,
+    "text.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.linewidth": 1.5,
+    "lines.solid_capstyle": "round",
+    "path.simplify_threshold": 0.3,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """A drawn figure with its words."""
+
+    figure: Figure
+    title: str
+    alt: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One kind of picture: where on the page it stands, and what draws it (nothing where there is nothing)."""
+
+    name: str
+    place: Place
+    order: int
+    draw: Callable[[Story], Iterable[Panel]]
+
+
+def axes(width: float = 5.2, height: float = 3.4) -> tuple[Figure, Axes]:
+    """An empty figure of one axes, sized in inches to stay readable on a telephone."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.add_subplot()
+
+
+def pictures(plots: Iterable[Plot], story: Story) -> tuple[Picture, ...]:
+    """Draw and encode what the plots have to show."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
+        return tuple(_encoded(panel) for plot in plots for panel in plot.draw(story))
+
+
+def _encoded(panel: Panel) -> Picture:
+    buffer = io.StringIO()
+    panel.figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
+    text = buffer.getvalue().replace("'DejaVu Sans'", _FONTS)
+    data = base64.b64encode(text.encode()).decode()
+    return Picture(panel.title, f"data:image/svg+xml;base64,{data}", panel.alt, panel.caption)
+
+
+def thinned(*columns: Array) -> tuple[Array, ...]:
+    """Every so manyth sample of arrays of one length, so that a curve is no longer than the eye can follow."""
+    step = max(int(np.ceil(columns[0].size / _MOST_POINTS)), 1)
+    return tuple(column[::step] for column in columns)
+
+
+def shades(count: int) -> list[tuple[float, float, float, float]]:
+    """So many colours from dark blue to ochre, in order of lightness."""
+    import matplotlib as mpl
+
+    return [mpl.colormaps[MAP](place) for place in np.linspace(0.0, 0.85, count)] if count else []

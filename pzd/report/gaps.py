@@ -1,0 +1,90 @@
+"""The gap between measured and simulated force, record by record and by voltage and velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.record import Array, Record, is_constant, voltage_scale
+from pzd.report.story import Story
+
+_BINS = 14
+"""Classes of velocity in the map."""
+_FEWEST = 5
+"""A cell with fewer samples stays empty."""
+_ROWS = 12
+"""The map shows no more rows than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class GapMap:
+    """R.m.s. gap by row (voltage, or record where the voltage says nothing) and velocity."""
+
+    rows: tuple[str, ...]
+    edges: Array
+    """(n + 1,) edges of the velocity classes [m/s]"""
+    before: Array
+    """(rows, n) simple model, % of the peak force; NaN where there are too few samples"""
+    after: Array
+    """(rows, n) final damper"""
+
+
+def criterion(measured: Array, simulated: Array) -> float:
+    """How badly a simulated force misses the measured one.
+
+    Equation: W_s = sum (F - F_sim)^2 / sum F^2          Source: Makowski and Knap 2021, eq. (4)
+
+    Parameters
+    ----------
+    measured, simulated : (n,) [N]
+
+    Returns
+    -------
+    W_s, a pure number
+    """
+    return float(np.sum((measured - simulated) ** 2) / np.sum(measured**2))
+
+
+def by_record(story: Story) -> dict[str, tuple[float, float]]:
+    """W_s of every record of the setting before and after diagnose; the first cycle counts as well."""
+    return {
+        record.name: (
+            criterion(record.force, story.simulated[record.name][0]),
+            criterion(record.force, story.simulated[record.name][1]),
+        )
+        for record in story.records
+    }
+
+
+def gap_map(story: Story) -> GapMap:
+    """Where in voltage and velocity the gap lies, over all records of the setting."""
+    top = max(float(np.abs(record.velocity).max()) for record in story.records)
+    peak = max(float(np.abs(record.force).max()) for record in story.records)
+    edges = np.linspace(-top, top, _BINS + 1)
+    groups = _groups(story)
+    before, after = np.full((2, len(groups), _BINS), np.nan)
+    for i, records in enumerate(groups.values()):
+        cells = np.clip(np.digitize(np.concatenate([r.velocity for r in records]), edges) - 1, 0, _BINS - 1)
+        count = np.bincount(cells, minlength=_BINS)
+        for grid, which in ((before, 0), (after, 1)):
+            gap = np.concatenate([r.force - story.simulated[r.name][which] for r in records])
+            square = np.bincount(cells, weights=gap**2, minlength=_BINS)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                grid[i] = np.where(count >= _FEWEST, 100.0 / peak * np.sqrt(square / count), np.nan)
+    return GapMap(tuple(groups), edges, before, after)
+
+
+def _groups(story: Story) -> dict[str, list[Record]]:
+    """Records by voltage; by name where all share one; those whose voltage moves stand together."""
+    scale = voltage_scale(story.records)
+    moving = [r for r in story.records if not is_constant(r, scale)]
+    still = sorted((r for r in story.records if is_constant(r, scale)), key=lambda r: r.median_voltage() or 0.0)
+    found: dict[str, list[Record]] = {}
+    for record in still:
+        found.setdefault(story.voltage(record.median_voltage()), []).append(record)
+    if len(found) < 2:
+        found = {record.name: [record] for record in still[:_ROWS]}
+    if moving:
+        found[f"moving {story.control.name}"] = moving
+    return found

@@ -1,0 +1,40 @@
+"""Loops of force, measured and simulated, over whatever stands below them."""
+
+from __future__ import annotations
+
+from pzd.quantities import DISPLACEMENT, Quantity
+from pzd.record import Array, Record
+from pzd.report.drawing import FINAL, MEASURED, PLAIN, Panel, axes, thinned
+from pzd.report.story import Story
+
+
+def loops(story: Story, record: Record, abscissa: Array, quantity: Quantity, title: str) -> Panel:
+    """The last cycles of one record: measured force, the simple model, and the final damper.
+
+    Parameters
+    ----------
+    story : the run
+    record : the record
+    abscissa : (n,) what the force is drawn over, displacement in mm
+    quantity : what that is
+    title : what the picture shows
+
+    Returns
+    -------
+    the panel
+    """
+    before, after = story.simulated[record.name]
+    part = story.last_cycles(record)
+    x, measured, plain, final = thinned(abscissa[part], record.force[part], before[part], after[part])
+    figure, ax = axes()
+    ax.plot(x, measured / 1000.0, ".", color=MEASURED, markersize=2.4, label="measured")
+    ax.plot(x, plain / 1000.0, color=PLAIN, linestyle="--", label="simple model")
+    if story.extended:
+        ax.plot(x, final / 1000.0, color=FINAL, label="with what was missing")
+    unit = "mm" if quantity == DISPLACEMENT else quantity.unit
+    ax.set_xlabel(f"{quantity.name} [{unit}]")
+    ax.set_ylabel("force [kN]")
+    ax.legend(loc="best")
+    name = story.named(record)
+    curves = "measured force, the simple model" + (" and the extended one" if story.extended else "")
+    return Panel(figure, f"{title[0].upper()}{title[1:]}, {name}", f"{title}, {name}: {curves}.", "")

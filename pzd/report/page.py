@@ -1,0 +1,60 @@
+"""report.html: the blocks of the story in one file that asks nothing of the net and runs no script."""
+
+from __future__ import annotations
+
+from pzd.report.blocks import Card, Picture, Section
+from pzd.report.drawing import pictures
+from pzd.report.headline import cards
+from pzd.report.plots import library
+from pzd.report.sections import damper, made, missing, model, passenger, tested, trust
+from pzd.report.story import Story
+
+_PLACES = ("model", "missing", "damper", "passenger")
+
+
+def page(story: Story) -> str:
+    """The whole page as text.
+
+    Parameters
+    ----------
+    story : the run
+
+    Returns
+    -------
+    HTML, the same for the same story
+    """
+    drawn = _drawn(story)
+    sections = (
+        tested.tell(story),
+        model.tell(story, drawn),
+        missing.tell(story, drawn),
+        damper.tell(story, drawn),
+        passenger.tell(story, drawn),
+        trust.tell(story),
+        made.tell(story),
+    )
+    return render(_title(story), cards(story), sections)
+
+
+def _drawn(story: Story) -> dict[str, tuple[Picture, ...]]:
+    plots = library().values()
+    return {place: pictures([plot for plot in plots if plot.place == place], story) for place in _PLACES}
+
+
+def _title(story: Story) -> str:
+    return f"Damper and comfort report: {story.chosen}" if story.chosen else "Damper and comfort report"
+
+
+def render(title: str, headline: tuple[Card, ...], sections: tuple[Section, ...]) -> str:
+    """Fill the template; every text is escaped there."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("pzd.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template("report.html").render(title=title, cards=headline, sections=sections)

@@ -1,0 +1,53 @@
+"""The weighted r.m.s. of every ride on the overlapping scale of likely reactions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pzd.report.comfort import iso2631_1997
+from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes
+from pzd.report.story import REFERENCE, Story, policy_in_words
+from pzd.report.wording import number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SHADES = ("#f3f6f9", "#e6ecf2", "#d9e2ea", "#ccd7e2", "#bfccd9", "#b2c1d0")
+
+
+def draw(story: Story) -> Iterator[Panel]:
+    """One line a ride, over bands that overlap as they do in the standard."""
+    rows = [row for road in story.roads for row in story.cases(road)]
+    values = [story.value(row.case, "a_w") for row in rows]
+    known = [(row, value) for row, value in zip(rows, values, strict=True) if value is not None][::-1]
+    if not known:
+        return
+    figure, ax = axes(height=2.0 + 0.24 * len(known))
+    right = max(2.6, 1.15 * max(value for _, value in known))
+    _bands(ax, len(known), right)
+    for place, (row, value) in enumerate(known):
+        constant = row.policy == REFERENCE
+        colour = PLAIN if constant else BY_FIDELITY[row.fidelity]
+        ax.plot(value, place, "o" if constant else "s", color=colour, markersize=6.0, zorder=3)
+    ax.set_yticks(range(len(known)), [f"{row.road}: {policy_in_words(row)}" for row, _ in known])
+    ax.set_ylim(-0.6, len(known) + 2.6)
+    ax.set_xlim(0.0, right)
+    ax.set_xlabel("a_w [m/s²]")
+    ax.grid(visible=False, axis="y")
+    alt = "; ".join(f"{row.road} {policy_in_words(row)}: a_w {number(value)} m/s²" for row, value in known[::-1])
+    yield Panel(figure, "How the rides are likely to be felt", alt, "Bands overlap; the last two are not verified.")
+
+
+def _bands(ax: Axes, top: int, right: float) -> None:
+    for i, (band, shade) in enumerate(zip(iso2631_1997.REACTIONS, _SHADES, strict=True)):
+        height = top - 0.1 + 0.85 * (2 - i % 3)
+        end = float(np.minimum(band.high, right))
+        ax.barh(height, end - band.low, left=band.low, height=0.8, color=shade, edgecolor="#9aa5b1", linewidth=0.5)
+        ax.annotate(band.text.replace(" uncomfortable", ""), (band.low, height), (3, 0), textcoords="offset points",
+                    va="center", fontsize=7.5)  # fmt: skip
+
+
+PLOT = Plot("comfort_scale", "passenger", 1, draw)

@@ -1,0 +1,39 @@
+"""Where the gap lies in voltage and velocity, before and after diagnose."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pzd.record import Array
+from pzd.report.drawing import MAP, Panel, Plot, axes
+from pzd.report.gaps import GapMap, gap_map
+from pzd.report.story import Story
+
+
+def draw(story: Story) -> Iterator[Panel]:
+    """The map of the simple model, and beside it that of the final damper where there is another."""
+    if not story.records:
+        return
+    found = gap_map(story)
+    top = float(np.nanmax(found.before))
+    yield _panel(found, found.before, top, "simple model")
+    if story.extended:
+        yield _panel(found, found.after, top, "with what was missing")
+
+
+def _panel(found: GapMap, values: Array, top: float, which: str) -> Panel:
+    figure, ax = axes(height=1.5 + 0.3 * max(len(found.rows), 4))
+    mesh = ax.pcolormesh(found.edges, np.arange(len(found.rows) + 1), values, cmap=MAP, vmin=0.0, vmax=top)
+    ax.set_yticks(np.arange(len(found.rows)) + 0.5, found.rows)
+    ax.set_xlabel("velocity [m/s]")
+    ax.grid(visible=False)
+    figure.colorbar(mesh, ax=ax, label="gap [% of peak force]")
+    title = f"Where the gap lies: {which}"
+    largest = f"largest {np.nanmax(values):.2g} % of the peak force"
+    alt = f"Map of the r.m.s. gap by voltage and velocity, {which}; {largest}."
+    return Panel(figure, title, alt, "R.m.s. of measured minus simulated force, in % of the largest measured force.")
+
+
+PLOT = Plot("gap_map", "model", 2, draw)

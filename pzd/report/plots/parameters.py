@@ -1,0 +1,50 @@
+"""T0, C and k over the voltage with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pzd.artefacts import ParameterRow
+from pzd.quantities import DAMPING, FRICTION, STIFFNESS
+from pzd.report.drawing import Panel, Plot, axes, shades
+from pzd.report.story import Story
+from pzd.report.wording import amount, unit_of
+
+
+def draw(story: Story) -> Iterator[Panel]:
+    """One panel a parameter; nothing where there are fewer than two voltages."""
+    if len({row.voltage_V for row in story.parameters if row.voltage_V is not None}) < 2:
+        return
+    for quantity in (FRICTION, DAMPING, STIFFNESS):
+        figure, ax = axes(height=2.9)
+        temperatures = sorted({row.temperature_degC for row in story.parameters}, key=lambda t: t or 0.0)
+        for temperature, colour in zip(temperatures, shades(len(temperatures)), strict=True):
+            rows = [row for row in story.parameters if row.temperature_degC == temperature]
+            known = sorted(
+                (row.voltage_V, *_bounds(row, quantity.column))
+                for row in rows
+                if row.voltage_V is not None and getattr(row, quantity.column) is not None
+            )
+            if known:
+                x, y, below, above = zip(*known, strict=True)
+                label = amount(temperature, "degC") if temperature is not None else None
+                ax.errorbar(x, y, yerr=(below, above), fmt="o-", color=colour, capsize=3.0, markersize=4.0, label=label)
+        ax.set_xlabel(f"{story.control.name} [{story.control.unit}]")
+        ax.set_ylabel(f"{quantity.symbol} [{unit_of(quantity.unit)}]")
+        ax.margins(y=0.15)
+        if len(temperatures) > 1:
+            ax.legend()
+        name = quantity.meaning.removesuffix(" of the Bingham element")
+        title = f"{quantity.symbol}: {name}"
+        yield Panel(figure, title, f"{title}, over the {story.control.name}, with 95 % intervals.", "Whiskers: 95 %.")
+
+
+def _bounds(row: ParameterRow, column: str) -> tuple[float, float, float]:
+    value = float(getattr(row, column))
+    low, high = getattr(row, f"{column}_low95"), getattr(row, f"{column}_high95")
+    if low is None or high is None:
+        return value, 0.0, 0.0
+    return value, max(value - float(low), 0.0), max(float(high) - value, 0.0)
+
+
+PLOT = Plot("parameters", "damper", 1, draw)

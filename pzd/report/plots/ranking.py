@@ -1,0 +1,32 @@
+"""The candidates, by what each leaves of the gap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pzd.report.drawing import FINAL, GRID, MEASURED, PLAIN, Panel, Plot, axes
+from pzd.report.story import Story
+
+_MOST = 10
+
+
+def draw(story: Story) -> Iterator[Panel]:
+    """One bar a candidate, best on top."""
+    diagnosis = story.diagnosed.diagnosis
+    ranked = diagnosis.ranking[:_MOST][::-1]
+    if not ranked:
+        return
+    figure, ax = axes(height=1.3 + 0.26 * max(len(ranked), 3))
+    colours = [FINAL if r.effect in diagnosis.effects else "#b8c4d0" for r in ranked]
+    ax.barh([r.effect for r in ranked], [r.gap_after for r in ranked], color=colours, height=0.62)
+    ax.axvline(diagnosis.gap.before, color=PLAIN, linestyle="--", linewidth=1.2, label="simple model")
+    ax.axvline(diagnosis.gap.noise_floor, color=MEASURED, linestyle=":", linewidth=1.2, label="noise alone")
+    ax.set_xlabel("W_s that is left [-]")
+    ax.grid(visible=False, axis="y")
+    ax.grid(color=GRID, axis="x")
+    figure.legend(loc="outside upper center", ncols=2)
+    alt = f"What each candidate leaves of the gap; best: {ranked[-1].effect}, W_s {ranked[-1].gap_after:.3g}."
+    yield Panel(figure, "What each candidate leaves of the gap", alt, "Adopted effects stand out in dark blue.")
+
+
+PLOT = Plot("ranking", "missing", 1, draw)

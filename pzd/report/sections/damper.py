@@ -1,0 +1,125 @@
+"""What the damper is: its parameters, its force, how quickly it answers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pzd.artefacts import ParameterRow
+from pzd.damper.effects import library
+from pzd.quantities import DAMPING, FRICTION, STIFFNESS
+from pzd.report.blocks import Block, Notes, Paragraph, Picture, Section, Sheet
+from pzd.report.sections.pictures import gallery
+from pzd.report.story import Story, effect_in_words
+from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
+
+_QUANTITIES = (FRICTION, DAMPING, STIFFNESS)
+_FOLD = 12
+
+
+def tell(story: Story, pictures: dict[str, tuple[Picture, ...]]) -> Section:
+    """The fourth section."""
+    blocks: list[Block] = [Paragraph(_intro(story)), _parameters(story)]
+    blocks += gallery(pictures["damper"])
+    blocks += [_force(story)] if story.table.force else []
+    notes = story.table.notes
+    if notes.not_monotone:
+        blocks += [Paragraph(f"Force does not always rise with the {story.control.name}:"), Notes(notes.not_monotone, "care")]
+    if notes.lost:
+        blocks += [Paragraph("A table of force cannot carry:"), Notes(notes.lost)]
+    blocks += [_responses(story)] if story.rides.responses else []
+    blocks += [_measures(story)] if story.identified.measures else []
+    return Section("damper", "What the damper is", tuple(blocks))
+
+
+def _intro(story: Story) -> str:
+    effects = story.diagnosed.damper.effects
+    laws = [f"{effect_in_words(name)}, {library()[name].law}" for name in effects]
+    beside = f" Beside it stands: {listed(laws)}." if laws else ""
+    return (
+        "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. A value that the data "
+        f"do not determine is left out, and the status says so.{beside}"
+    )
+
+
+def _parameters(story: Story) -> Sheet:
+    units = [f"{q.symbol} [{unit_of(q.unit)}]" for q in _QUANTITIES]
+    header = (story.control.name, "temperature", *units, "W_s", "r.m.s. error", "status")
+    return Sheet("Identified parameters", header, tuple(_row(story, row) for row in story.parameters), False)
+
+
+def _row(story: Story, row: ParameterRow) -> tuple[str, ...]:
+    values = (
+        interval(*(getattr(row, f"{q.column}{end}") for end in ("", "_low95", "_high95"))) for q in _QUANTITIES
+    )
+    return (
+        story.voltage(row.voltage_V),
+        amount(row.temperature_degC, "degC"),
+        *values,
+        number(row.W_s),
+        amount(row.rmse_N, "N"),
+        row.status,
+    )
+
+
+def _force(story: Story) -> Sheet:
+    first = min((row.temperature_degC for row in story.table.force), key=lambda t: -np.inf if t is None else t)
+    rows = [row for row in story.table.force if row.temperature_degC == first and row.velocity_m_per_s > 0.0]
+    voltages = sorted({row.voltage_V for row in rows}, key=lambda v: v or 0.0)
+    speeds = sorted({row.velocity_m_per_s for row in rows})
+    at = {(row.velocity_m_per_s, row.voltage_V): row for row in rows}
+    chosen = _spread(speeds, story.table.notes.reached_m_per_s)
+    cells = tuple((amount(v, "m/s"), *(_cell(at.get((v, volt))) for volt in voltages)) for v in chosen)
+    degrees = f" at {amount(first, 'degC')}" if first is not None else ""
+    header = ("speed in rebound", *(f"force at {story.voltage(volt)}" for volt in voltages))
+    return Sheet(f"Force{degrees}; in brackets the model beyond what the rig reached", header, cells)
+
+
+def _cell(row: object) -> str:
+    force = getattr(row, "force_N", None)
+    if force is None:
+        return DASH
+    text = amount(force, "N")
+    return text if getattr(row, "inside", 0) else f"({text})"
+
+
+def _spread(speeds: list[float], reached: float) -> list[float]:
+    """Six speeds of the table, the one nearest to what the rig reached among them."""
+    if len(speeds) <= 6:
+        return speeds
+    wanted = [*np.linspace(speeds[0], speeds[-1], 5), reached]
+    return sorted({min(speeds, key=lambda v: abs(v - target)) for target in wanted})
+
+
+def _responses(story: Story) -> Sheet:
+    rows = tuple(
+        (
+            r.signal,
+            f"{story.voltage(r.from_voltage_V)} to {story.voltage(r.to_voltage_V)}",
+            amount(r.velocity_m_per_s, "m/s"),
+            *(f"{number(1000.0 * t)} ms" if t is not None else DASH for t in (r.to_63_percent_s, r.to_90_percent_s)),
+        )
+        for r in story.rides.responses
+    )
+    return Sheet("Answer to a step at constant speed", ("signal", "step", "speed", "to 63 %", "to 90 %"), rows, len(rows) > _FOLD)
+
+
+def _measures(story: Story) -> Sheet:
+    header = ("record", story.control.name, "temperature", "frequency", "amplitude", "peak force", "force at zero velocity",
+              "work per cycle", "equivalent c", "dynamic range")  # fmt: skip
+    rows = tuple(
+        (
+            m.record,
+            story.voltage(m.voltage_V),
+            amount(m.temperature_degC, "degC"),
+            amount(m.frequency_Hz, "Hz"),
+            f"{number(1000.0 * m.amplitude_m)} mm",
+            amount(m.peak_force_N, "N"),
+            amount(m.force_at_zero_velocity_N, "N"),
+            amount(m.work_per_cycle_J, "J"),
+            amount(m.equivalent_damping_Ns_per_m, "N s/m"),
+            number(m.dynamic_range),
+        )
+        for m in story.identified.measures
+        if m.setting == story.chosen
+    )
+    return Sheet("Every test as an equivalent viscous damper", header, rows, folded=True)

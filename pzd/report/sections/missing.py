@@ -1,0 +1,120 @@
+"""What is missing from the simple model, how sure that is, and what would settle it."""
+
+from __future__ import annotations
+
+from pzd.artefacts import Diagnosis, NextTest, Ranked, Value
+from pzd.damper.effects import library
+from pzd.report.blocks import Block, Notes, Paragraph, Picture, Section, Sheet
+from pzd.report.sections.pictures import gallery
+from pzd.report.story import Story, effect_in_words, effects_in_words
+from pzd.report.wording import DASH, amount, interval, listed, number, percent, sentence, unit_of
+
+_FOLD = 6
+
+
+def tell(story: Story, pictures: dict[str, tuple[Picture, ...]]) -> Section:
+    """The third section."""
+    diagnosis = story.diagnosed.diagnosis
+    blocks: list[Block] = [Paragraph(verdict(diagnosis)), Paragraph(sentence(diagnosis.reason))]
+    blocks = [block for block in blocks if not isinstance(block, Paragraph) or block.text]
+    blocks += [Paragraph(_gap(diagnosis)), *gallery(pictures["missing"])]
+    if diagnosis.parameters:
+        blocks.append(_parameters(story, diagnosis))
+    if diagnosis.ranking:
+        blocks.append(_ranking(diagnosis))
+    blocks.append(Notes((next_test(story, diagnosis.next_test),)))
+    return Section("missing", "What is missing, and how sure that is", tuple(blocks))
+
+
+def verdict(diagnosis: Diagnosis) -> str:
+    """The verdict in plain words, with the confidence where there is one."""
+    adopted = listed(effects_in_words(diagnosis.effects))
+    if diagnosis.verdict == "named":
+        text = f"Missing from the simple model: {adopted}"
+    elif diagnosis.verdict == "ambiguous":
+        rivals = listed(effects_in_words(diagnosis.rivals), "or")
+        text = f"These tests cannot tell apart what is missing. Best: {adopted or DASH}; equally possible: {rivals or DASH}"
+    elif diagnosis.verdict == "none":
+        text = "Nothing is missing: what the simple model leaves is within the noise and the scatter between tests"
+    else:
+        found = f"; {adopted} is part of it" if adopted else ""
+        text = f"Something is missing that the library of effects does not explain{found}"
+    sure = "" if diagnosis.confidence is None else f" (confidence {percent(diagnosis.confidence)})"
+    return f"{text}{sure}."
+
+
+def _gap(diagnosis: Diagnosis) -> str:
+    gap = diagnosis.gap
+    left = f"standard error {number(gap.standard_error, 2)}, noise alone {number(gap.noise_floor)}"
+    if gap.after == gap.before:
+        text = f"The model is handed on unchanged: W_s on held-out data is {number(gap.before)} ({left})."
+    else:
+        cut = percent(1.0 - gap.after / gap.before) if gap.before > 0.0 else DASH
+        text = f"On held-out data W_s goes from {number(gap.before)} to {number(gap.after)} ({left}): {cut} less."
+    weak = {
+        "records": "Whole records were held out.",
+        "cycles": "Only cycles of the same records were held out, which is a weak test.",
+        "segments": "Segments of the same records were held out, which is a weaker test than whole records.",
+        "mixed": "Some whole records and some parts of records were held out.",
+    }
+    return f"{text} {weak[gap.hold_out]}"
+
+
+def _parameters(story: Story, diagnosis: Diagnosis) -> Sheet:
+    rows = [
+        row
+        for effect, values in diagnosis.parameters.items()
+        for name, value in values.items()
+        for row in _value_rows(story, effect, name, value)
+    ]
+    return Sheet("What was added", ("effect", "parameter", "value (95 % interval)", "unit"), tuple(rows))
+
+
+def _value_rows(story: Story, effect: str, name: str, value: Value) -> list[tuple[str, ...]]:
+    unit = unit_of(value.unit)
+    if not isinstance(value.value, tuple):
+        low, high = (bound if not isinstance(bound, tuple) else None for bound in (value.low95, value.high95))
+        return [(effect, name, interval(value.value, low, high), unit)]
+    nodes = value.at_voltage_V or (None,) * len(value.value)
+    lows, highs = (bound if isinstance(bound, tuple) else (None,) * len(value.value) for bound in (value.low95, value.high95))
+    return [
+        (effect, f"{name} at {story.voltage(node)}", interval(each, low, high), unit)
+        for node, each, low, high in zip(nodes, value.value, lows, highs, strict=True)
+    ]
+
+
+def _ranking(diagnosis: Diagnosis) -> Sheet:
+    rows = tuple(
+        (r.effect, number(r.gap_after), f"{r.delta_bic:,.0f}".replace(",", "\u202f").replace("-", "\u2212"), _fitted(r), r.reason)
+        for r in diagnosis.ranking
+    )
+    header = ("effect", "W_s left", "delta BIC", "fitted", "what became of it")
+    return Sheet("Every candidate, best first", header, rows, folded=len(rows) > _FOLD)
+
+
+def _fitted(ranked: Ranked) -> str:
+    effects = library()
+    texts = []
+    for name, value in ranked.parameters.items():
+        known = effects.get(ranked.effect)
+        unit = next((p.unit for p in known.parameters if p.name == name), "") if known else ""
+        values = value if isinstance(value, tuple) else (value,)
+        shown = ", ".join(number(each) for each in values)
+        texts.append(f"{name} = {shown} {unit_of(unit)}".rstrip())
+    return "; ".join(texts) or DASH
+
+
+def next_test(story: Story, test: NextTest | None) -> str:
+    """The next rig test in plain words."""
+    if test is None:
+        return "Next test: none is called for."
+    parts = [test.waveform.replace("_", " ")]
+    parts += [amount(test.frequency_Hz, "Hz")] if test.frequency_Hz is not None else []
+    parts += [f"amplitude {number(1000.0 * test.amplitude_m)} mm"] if test.amplitude_m is not None else []
+    if test.voltage_V is not None:
+        volts = test.voltage_V if isinstance(test.voltage_V, tuple) else (test.voltage_V,)
+        parts.append(f"at {' and '.join(story.voltage(v) for v in volts)}")
+    names = [effect_in_words(name) if name in library() else name for name in test.separates]
+    aim = f": it separates {listed(names)}" if names else ""
+    far = f" by {number(test.distance_percent, 2)} % of the peak force" if test.distance_percent is not None else ""
+    return f"Next test: {', '.join(parts)}{aim}{far}."

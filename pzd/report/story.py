@@ -1,0 +1,166 @@
+"""All that the page tells of, in one place: every artefact, and what sections and pictures both need of them."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pzd.artefacts import ComfortRow, Diagnosed, Identified, ParameterRow, RecordEntry, Rides, Rig, SummaryRow, Table
+from pzd.quantities import Control
+from pzd.record import Array, Record
+from pzd.report.comfort.ride import SettledRide
+from pzd.report.config import ReportConfig
+from pzd.report.wording import amount
+from pzd.simulate.config import SimulateConfig
+
+PLAIN = "-plain"
+"""Ends the name of a ride on the damper before diagnose."""
+REFERENCE = "constant"
+"""The policy that the others are set beside."""
+_REALISTIC = ("dynamic", "table", "ideal")
+"""Fidelities, the one nearest to the road first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Story:
+    """The whole run, seen from its end."""
+
+    config: ReportConfig
+    simulate: SimulateConfig
+    rig: Rig
+    identified: Identified
+    diagnosed: Diagnosed
+    table: Table
+    rides: Rides
+    settled: tuple[SettledRide, ...]
+    comfort: tuple[ComfortRow, ...]
+    control: Control
+    setting: str | None
+
+    @cached_property
+    def chosen(self) -> str | None:
+        """The setting that diagnose and everything behind it used."""
+        settings = {row.setting for row in self.identified.rows}
+        return self.setting if self.setting is not None or len(settings) != 1 else next(iter(settings))
+
+    @cached_property
+    def records(self) -> tuple[Record, ...]:
+        """The records of the chosen setting."""
+        return tuple(record for record in self.rig.records if record.setting == self.chosen)
+
+    @cached_property
+    def entries(self) -> dict[str, RecordEntry]:
+        """What records.json says of each record."""
+        return {entry.name: entry for entry in self.rig.entries}
+
+    @cached_property
+    def parameters(self) -> tuple[ParameterRow, ...]:
+        """The identified rows of the chosen setting."""
+        return tuple(row for row in self.identified.rows if row.setting == self.chosen)
+
+    @cached_property
+    def simulated(self) -> dict[str, tuple[Array, Array]]:
+        """Force of the plain and of the final damper in every record of the setting [N]."""
+        from pzd.damper.compose import respond
+        from pzd.damper.motion import Motion
+
+        plain, damper = self.diagnosed.plain, self.diagnosed.damper
+        found: dict[str, tuple[Array, Array]] = {}
+        for record in self.records:
+            motion = Motion.of(record)
+            before = respond(plain, motion)
+            found[record.name] = (before, respond(damper, motion) if self.extended else before)
+        return found
+
+    @property
+    def extended(self) -> bool:
+        """Whether diagnose changed the damper."""
+        return self.diagnosed.damper != self.diagnosed.plain
+
+    @cached_property
+    def shown(self) -> tuple[Record, ...]:
+        """The records shown as force: the fastest of each voltage, spread over the voltages."""
+        by_voltage: dict[float, Record] = {}
+        for record in sorted(self.records, key=lambda r: float(np.abs(r.velocity).max())):
+            by_voltage[round(record.median_voltage() or 0.0, 6)] = record
+        chosen = [by_voltage[voltage] for voltage in sorted(by_voltage)]
+        if len(chosen) == 1:
+            chosen = sorted(self.records, key=lambda r: float(np.abs(r.velocity).max()))
+        count = min(self.config.records_shown, len(chosen))
+        places = {round(place) for place in np.linspace(0, len(chosen) - 1, count)}
+        return tuple(chosen[place] for place in sorted(places))
+
+    def last_cycles(self, record: Record) -> slice:
+        """The last two cycles of a periodic record, the last ten of any other; the start is left out."""
+        cycles = self.entries[record.name].cycles if record.name in self.entries else 0.0
+        periodic = any(m.record == record.name and m.frequency_Hz is not None for m in self.identified.measures)
+        wanted = 2.0 if periodic else 10.0
+        if cycles <= wanted:
+            return slice(0, None)
+        return slice(round(record.time.size * (1.0 - wanted / cycles)), None)
+
+    def voltage(self, value: float | None) -> str:
+        """A value of the control signal with its unit, in words where there is none."""
+        unit = self.control.unit
+        return f"no {self.control.name}" if value is None else amount(value, unit)
+
+    def named(self, record: Record) -> str:
+        """A record with its conditions."""
+        parts = [self.voltage(record.median_voltage())] if record.voltage is not None else []
+        if record.temperature is not None:
+            parts.append(amount(record.median_temperature(), "degC"))
+        return f"{record.name} ({', '.join(parts)})" if parts else record.name
+
+    @cached_property
+    def measures(self) -> dict[tuple[str, str], ComfortRow]:
+        """Comfort rows by case and measure."""
+        return {(row.case, row.measure): row for row in self.comfort}
+
+    def value(self, case: str, measure: str) -> float | None:
+        """A comfort value; None where the edition was not asked for."""
+        row = self.measures.get((case, measure))
+        return None if row is None else row.value
+
+    @cached_property
+    def roads(self) -> tuple[str, ...]:
+        """Names of the roads in the order of the rides."""
+        return tuple(dict.fromkeys(row.road for row in self.rides.summary))
+
+    def cases(self, road: str, *, plain: bool = False) -> tuple[SummaryRow, ...]:
+        """The rides over one road, on the final damper or on the one before diagnose."""
+        mine = [row for row in self.rides.summary if row.road == road]
+        return tuple(row for row in mine if row.case.endswith(PLAIN) == plain)
+
+    def reference(self, road: str) -> SummaryRow | None:
+        """The ride at constant damping over a road."""
+        return next((row for row in self.cases(road) if row.policy == REFERENCE), None)
+
+    def controlled(self, road: str) -> SummaryRow | None:
+        """The controlled ride that comes nearest to a real one."""
+        others = [row for row in self.cases(road) if row.policy != REFERENCE]
+        return min(others, key=lambda row: _REALISTIC.index(row.fidelity), default=None)
+
+    def without(self, row: SummaryRow) -> SummaryRow | None:
+        """The same ride on the damper before diagnose."""
+        return next((other for other in self.rides.summary if other.case == f"{row.case}{PLAIN}"), None)
+
+
+def effect_in_words(name: str) -> str:
+    """What an effect is, in the first sentence of its own documentation."""
+    text = importlib.import_module(f"pzd.damper.effects.{name}").__doc__ or name
+    first = text.split("\n")[0].rstrip(".")
+    return first[0].lower() + first[1:]
+
+
+def effects_in_words(names: Sequence[str]) -> list[str]:
+    """Each effect in words, with its name."""
+    return [f"{effect_in_words(name)} ({name})" for name in names]
+
+
+def policy_in_words(row: SummaryRow) -> str:
+    """What drove the dampers, and how exactly it was computed."""
+    return "constant c" if row.policy == REFERENCE else f"{row.policy}, {row.fidelity}"

@@ -1,0 +1,105 @@
+"""Numbers, units and times as people read them."""
+
+from __future__ import annotations
+
+import math
+
+from pzd.report.comfort.iso2631_1978 import LONGEST_MIN
+
+THIN = "\u202f"
+MINUS = "\u2212"
+DASH = "\u2013"
+TIMES = "\u00d7"
+
+_UNITS = {
+    "m/s2": "m/s²",
+    "m/s3": "m/s³",
+    "m/s^1.75": "m/s¹·⁷⁵",
+    "N s/m": "N s/m",
+    "N s2/m2": "N s²/m²",
+    "N/m2": "N/m²",
+    "degC": "°C",
+    "-": "",
+}
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def unit_of(unit: str) -> str:
+    """A unit as it is printed."""
+    return _UNITS.get(unit, unit)
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number to so many significant digits, with thin spaces between thousands; a dash for none."""
+    if value is None or not math.isfinite(value):
+        return DASH
+    if value == 0.0:
+        return "0"
+    magnitude = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if magnitude >= 6 or magnitude < -3:
+        mantissa = f"{value / 10.0**magnitude:.{digits - 1}f}".rstrip("0").rstrip(".")
+        return f"{mantissa} {TIMES} 10{str(magnitude).translate(_SUPERSCRIPT)}".replace("-", MINUS)
+    places = max(digits - 1 - magnitude, 0)
+    rounded = round(value, digits - 1 - magnitude)
+    return f"{rounded:,.{places}f}".replace(",", THIN).replace("-", MINUS)
+
+
+def amount(value: float | None, unit: str, digits: int = 3) -> str:
+    """A number with its unit; a dash alone where there is none."""
+    text, shown = number(value, digits), unit_of(unit)
+    return text if text == DASH or not shown else f"{text} {shown}"
+
+
+def interval(value: float | None, low: float | None, high: float | None) -> str:
+    """A number with its 95 % interval, as many digits as the interval leaves sense in."""
+    if value is None:
+        return DASH
+    if low is None or high is None:
+        return f"{number(value)} (no interval)"
+    digits = _digits(value, high - low)
+    return f"{number(value, digits)} ({_at(low, value, digits)} to {_at(high, value, digits)})"
+
+
+def _digits(value: float, width: float) -> int:
+    """Significant digits of a value down to the second digit of its interval's width, from 2 to 6."""
+    if value == 0.0 or width <= 0.0:
+        return 3
+    return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(width)) + 2, 2), 6)
+
+
+def _at(bound: float, value: float, digits: int) -> str:
+    """A bound of an interval, to the same decimal place as the value."""
+    if bound == 0.0 or value == 0.0:
+        return number(bound, digits)
+    shift = math.floor(math.log10(abs(bound))) - math.floor(math.log10(abs(value)))
+    return number(bound, max(digits + shift, 1))
+
+
+def percent(share: float | None, digits: int = 2) -> str:
+    """A share in percent."""
+    return DASH if share is None else f"{number(100.0 * share, digits)} %"
+
+
+def minutes(value: float | None) -> str:
+    """A time of exposure in words."""
+    if value is None:
+        return DASH
+    if value >= LONGEST_MIN:
+        return "more than 24 h"
+    if value < 60.0:
+        return f"{value:.0f} min"
+    hours, rest = divmod(round(value), 60)
+    return f"{hours} h {rest} min" if rest else f"{hours} h"
+
+
+def listed(words: list[str], last: str = "and") -> str:
+    """Words as an enumeration: `a, b and c`."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else ""
+
+
+def sentence(text: str) -> str:
+    """Text with a capital at its start and a full stop at its end."""
+    text = text.strip()
+    if not text:
+        return ""
+    return text[0].upper() + text[1:] + ("" if text[-1] in ".!?" else ".")
