@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import types
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
@@ -33,13 +33,20 @@ def _is_model(annotation: Any) -> bool:
 
 
 def _alternatives(annotation: Any, data: Any) -> list[Any]:
-    """The members of a union, without models whose discriminator the data contradict."""
+    """The members of a union, without models whose discriminator the data contradict, unless that is all of them."""
+    members = list(_members(annotation))
+    return [one for one in members if not (_is_model(one) and _contradicts(one, data))] or members
+
+
+def _members(annotation: Any) -> Iterator[Any]:
     origin = get_origin(annotation)
     if origin is Annotated:
-        return _alternatives(get_args(annotation)[0], data)
-    if origin in (Union, types.UnionType):
-        return [found for member in get_args(annotation) for found in _alternatives(member, data)]
-    return [] if _is_model(annotation) and _contradicts(annotation, data) else [annotation]
+        yield from _members(get_args(annotation)[0])
+    elif origin in (Union, types.UnionType):
+        for member in get_args(annotation):
+            yield from _members(member)
+    else:
+        yield annotation
 
 
 def _contradicts(model: type[BaseModel], data: Any) -> bool:

@@ -1,0 +1,190 @@
+"""CSV artefacts read back bit by bit, and what a person or a program got wrong is refused with file and line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from pzd.quantities import Control
+from pzd.schema.csvfile import read_columns, read_rows, write_columns, write_rows
+from pzd.schema.errors import DataError
+from pzd.schema.model import Frozen
+
+VOLTAGE = Control()
+CURRENT = Control("current", "A")
+HEADER = ("time_s", "force_N", "voltage_V")
+OPTIONAL = ("voltage_V",)
+
+
+class Row(Frozen):
+    name: str
+    voltage_V: float | None
+    force_N: float
+    inside: Literal[0, 1] = 1
+    published: float | str = ""
+
+
+def of_rows(path: Path, text: str | bytes, control: Control = VOLTAGE) -> list[str]:
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(DataError) as caught:
+        read_rows(path, Row, control)
+    return [message.replace(str(path), "a.csv") for message in caught.value.messages]
+
+
+def of_columns(path: Path, text: str | bytes, control: Control = VOLTAGE) -> list[str]:
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(DataError) as caught:
+        read_columns(path, HEADER, control, OPTIONAL)
+    return [message.replace(str(path), "a.csv") for message in caught.value.messages]
+
+
+@pytest.mark.parametrize("control", [VOLTAGE, CURRENT])
+def test_rows_read_back_with_every_bit(tmp_path: Path, control: Control) -> None:
+    path = tmp_path / "a.csv"
+    rows = (
+        Row(name='a, "b"\nc', voltage_V=None, force_N=-0.0, inside=0),
+        Row(name="ä", voltage_V=0.1 + 0.2, force_N=1e-300, published="9 h"),
+        Row(name="", voltage_V=1.0, force_N=5.0, published=2.5),
+    )
+    write_rows(path, Row, rows, control)
+    found = read_rows(path, Row, control)
+    assert found == rows
+    assert np.signbit(found[0].force_N)
+
+
+def test_no_rows_are_a_header_alone(tmp_path: Path) -> None:
+    write_rows(tmp_path / "a.csv", Row, (), VOLTAGE)
+    assert read_rows(tmp_path / "a.csv", Row, VOLTAGE) == ()
+
+
+def test_a_spreadsheet_may_save_rows_its_own_way(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(b'\xef\xbb\xbfname,voltage_V,force_N,inside,published\r\n"a","1",2.50,1,\r\n')
+    assert read_rows(path, Row, VOLTAGE) == (Row(name="a", voltage_V=1.0, force_N=2.5),)
+
+
+TOP = "name,voltage_V,force_N,inside,published\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "a.csv:1: the header must read name,voltage_V,force_N,inside,published; missing: name"),
+        ("name,voltage_V,force_kN,inside,published\n", "; missing: force_N; unknown: force_kN (got"),
+        ("name,name,voltage_V,force_N,inside,published\n", "; twice: name (got"),
+        ("voltage_V,name,force_N,inside,published\n", "; another order (got"),
+        (TOP + "a,1,2,1\n", "a.csv:2: 4 fields where the header has 5"),
+        (TOP + "a,1,2,1,,\n", "a.csv:2: 6 fields where the header has 5"),
+        (TOP + "a,1,2,1,\n\n", "a.csv:3: 0 fields where the header has 5"),
+        (TOP + "a,1,x,1,\n", "a.csv:2: force_N: must be a valid number (got 'x')"),
+        (TOP + "a,1,,1,\n", "a.csv:2: force_N: must be a valid number (got '')"),
+        (TOP + "a,1,nan,1,\n", "a.csv:2: force_N: "),
+        (TOP + "a,1,1_0,1,\n", "a.csv:2: force_N: "),
+        (TOP + "a,inf,1,1,\n", "a.csv:2: voltage_V: "),
+        (TOP + "a,1,2,3,\n", "a.csv:2: inside: must be 0 or 1 (got 3)"),
+        (TOP + '"a\nb",1,2,1,\nc,1,x,1,\n', "a.csv:4: force_N: "),
+        (TOP + '"a,1,2,1,\n', "a.csv:2: not CSV: "),
+        (TOP + '"a"b,1,2,1,\n', "a.csv:2: not CSV: "),
+        (TOP + "a,1,2,1,\0\n", "a.csv:2: a zero byte; this is no text"),
+        (TOP.encode() + b"caf\xe9,1,2,1,\n", "a.csv:2: not UTF-8 text"),
+    ],
+)
+def test_rows_at_fault_are_refused_in_one_line_with_their_place(
+    tmp_path: Path, text: str | bytes, message: str
+) -> None:
+    (found,) = of_rows(tmp_path / "a.csv", text)
+    assert message in found
+    assert found.startswith("a.csv:")
+
+
+def test_every_row_at_fault_is_listed_at_once(tmp_path: Path) -> None:
+    found = of_rows(tmp_path / "a.csv", TOP + "a,x,y,1,\nb,1,2,1,\nc,1,z,1,\n")
+    assert [message.split(": ")[0] for message in found] == ["a.csv:2", "a.csv:2", "a.csv:4"]
+
+
+def test_a_file_of_faults_is_not_a_message_without_end(tmp_path: Path) -> None:
+    found = of_rows(tmp_path / "a.csv", TOP + "a,x,1,1,\n" * 1000)
+    assert len(found) == 21
+    assert found[-1] == "a.csv: and 980 more such faults"
+
+
+def test_the_control_goes_by_its_own_name(tmp_path: Path) -> None:
+    (found,) = of_rows(tmp_path / "a.csv", TOP, CURRENT)
+    assert "missing: current_A; unknown: voltage_V" in found
+
+
+def test_columns_read_back_with_every_bit(tmp_path: Path, fresh_seeds: Callable[[int], list[int]]) -> None:
+    for seed in fresh_seeds(3):
+        draw = np.random.default_rng(seed)
+        columns = {name: draw.standard_normal(500) * 10.0 ** draw.integers(-300, 300, 500) for name in HEADER}
+        write_columns(tmp_path / "a.csv", columns, CURRENT)
+        found = read_columns(tmp_path / "a.csv", HEADER, CURRENT, OPTIONAL)
+        assert all(np.array_equal(found[name], columns[name]) for name in HEADER)
+        assert (tmp_path / "a.csv").read_text().startswith("time_s,force_N,current_A\n")
+
+
+def test_one_line_is_enough(tmp_path: Path) -> None:
+    write_columns(tmp_path / "a.csv", {name: np.array([1.0]) for name in HEADER}, VOLTAGE)
+    assert read_columns(tmp_path / "a.csv", HEADER, VOLTAGE)["force_N"].shape == (1,)
+
+
+def test_an_absent_channel_is_empty_cells_and_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    write_columns(path, {"time_s": np.arange(3.0), "force_N": np.ones(3), "voltage_V": None}, VOLTAGE)
+    assert path.read_text().splitlines()[1] == "0.0,1.0,"
+    assert set(read_columns(path, HEADER, VOLTAGE, OPTIONAL)) == {"time_s", "force_N"}
+    path.write_text("time_s,force_N\n0,1\n")
+    assert set(read_columns(path, HEADER, VOLTAGE, OPTIONAL)) == {"time_s", "force_N"}
+
+
+def test_windows_line_ends_and_a_mark_of_byte_order_are_no_fault(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"\xef\xbb\xbftime_s,force_N,voltage_V\r\n0,1,2\r\n1,2,3\r\n")
+    assert read_columns(path, HEADER, VOLTAGE)["voltage_V"].tolist() == [2.0, 3.0]
+
+
+HEAD = ",".join(HEADER) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "a.csv:1: the header must read time_s,force_N"),
+        (HEAD, "a.csv:1: no data rows stand below the header"),
+        ("time_s,force_kN,voltage_V\n0,1,2\n", "missing: force_N; unknown: force_kN"),
+        ("time_s,force_N,voltage_V,voltage_V\n0,1,2,3\n", "twice: voltage_V"),
+        (HEAD + "0,1,2\n1,2\n", "a.csv:3: 2 fields where the header has 3"),
+        (HEAD + "0,1,2\n\n1,2,3\n", "a.csv:3: 1 fields where the header has 3"),
+        (HEAD + "0,1,2\n1,x,2\n", "a.csv:3: force_N: a finite number is needed (got 'x')"),
+        (HEAD + "0,1,2\n1,,2\n", "a.csv:3: force_N: a finite number is needed (got '')"),
+        (HEAD + "0,1,2\n1,nan,2\n", "a.csv:3: force_N: a finite number is needed (got 'nan')"),
+        (HEAD + "0,1,2\n1,-inf,2\n", "a.csv:3: force_N: a finite number is needed (got '-inf')"),
+        (HEAD + "0,1,2\n1,1_0,2\n", "a.csv:3: force_N: a finite number is needed (got '1_0')"),
+        (HEAD + '0,1,2\n1,"1",2\n', "a.csv:3: force_N: a finite number is needed"),
+        (HEAD + "0,1,2\n1,2,\n", "a.csv:3: voltage_V: a finite number is needed (got '')"),
+        (HEAD + "0,1,\n1,2,3\n", "a.csv:3: voltage_V: the column is empty above"),
+        (HEAD + "0,1,2\n#,1,2\n", "a.csv:3: time_s: a finite number is needed (got '#')"),
+        (HEAD + "0,1,2\n1,\0,2\n", "a.csv:3: a zero byte; this is no text"),
+    ],
+)
+def test_columns_at_fault_are_refused_in_one_line_with_their_place(tmp_path: Path, text: str, message: str) -> None:
+    (found,) = of_columns(tmp_path / "a.csv", text)
+    assert message in found
+    assert found.startswith("a.csv:")
+
+
+def test_columns_that_no_reader_would_take_are_not_written(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="force_N"):
+        write_columns(tmp_path / "a.csv", {"time_s": np.zeros(2), "force_N": np.array([1.0, np.nan])}, VOLTAGE)
+    with pytest.raises(ValueError):
+        write_columns(tmp_path / "a.csv", {"time_s": np.zeros(2), "force_N": np.zeros(3)}, VOLTAGE)
+
+
+def test_a_long_record_is_read_in_a_moment(tmp_path: Path) -> None:
+    columns = {name: np.linspace(0.0, 1.0, 200_000) for name in HEADER}
+    write_columns(tmp_path / "a.csv", columns, VOLTAGE)
+    assert read_columns(tmp_path / "a.csv", HEADER, VOLTAGE)["time_s"].size == 200_000
