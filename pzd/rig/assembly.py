@@ -28,6 +28,7 @@ from pzd.rig.listing import Listed, listed, names
 from pzd.rig.measured import Measured
 from pzd.rig.preflight import findings
 from pzd.rig.reading import Test, read
+from pzd.rig.stand import Taken, record_of
 from pzd.schema.errors import ConfigError, DataError
 
 
@@ -98,10 +99,11 @@ def _measured(name: str, test: Test, freed: Freed, limits: Limits) -> Measured:
     return Measured(record, run, clean, limits, freed.said or None)
 
 
-def made(record: Record, limits: Limits) -> Measured:
+def made(taken: Taken, limits: Limits) -> Measured:
     """A record of the virtual stand, with its cycles and clean motion."""
-    run = cycles(record.time, record.displacement)
-    return Measured(record, run, kinematics(record.time, record.displacement, run), limits)
+    run = cycles(taken.time, taken.displacement)
+    clean = kinematics(taken.time, taken.displacement, run)
+    return Measured(record_of(taken, clean), run, clean, limits)
 
 
 def overview(tests: Sequence[Measured]) -> Rig:

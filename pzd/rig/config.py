@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from pzd.rig.virtual_config import VirtualEntry
 from pzd.schema.model import Frozen
-
-VirtualEntry = dict[str, Any]
 
 
 def _text(value: object) -> object:
@@ -164,4 +163,12 @@ class RigConfig(Frozen):
     def _one_source(self) -> Self:
         if (self.files is None) == (self.virtual is None):
             raise ValueError("say exactly one of files and virtual")
+        return self
+
+    @model_validator(mode="after")
+    def _distinct(self) -> Self:
+        names = [planned.name for entry in self.virtual or () for planned in entry.plan()]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"virtual: two records would be called {', '.join(twice)}; give each entry a setting")
         return self

@@ -37,23 +37,25 @@ def ingest(rig: RigConfig, control: Control, folder: Path) -> Rig:
     return overview(tests)
 
 
-def synthesise(rig: RigConfig, seed: int) -> Rig:
+def synthesise(rig: RigConfig, seed: int, control: Control, folder: Path) -> Rig:
     """Test the virtual dampers that the config names.
 
     Parameters
     ----------
     rig : the config's `rig` block, with `virtual`
     seed : seed of every draw
+    control : the control signal, whose unit stands in the names of the records
+    folder : the config's folder, for motions that are read from a file
 
     Raises
     ------
-    ConfigError : when the config has measured files instead
+    ConfigError : when the config has measured files instead, or two records would have one name
     """
     from pzd.rig.assembly import made, overview
-    from pzd.rig.stand import records
+    from pzd.rig.stand import take
 
     if rig.virtual is None:
         raise ConfigError("rig: this config has measured files and no virtual stand; use ingest (got rig.files)")
-    tested = [record for number, entry in enumerate(rig.virtual) for record in records(entry, [seed, number])]
-    log.info("tested %d records", len(tested))
-    return overview([made(record, rig.limits) for record in tested])
+    tests = [made(taken, rig.limits) for entry in rig.virtual for taken in take(entry, seed, folder, control)]
+    log.info("took %d records", len(tests))
+    return overview(tests)

@@ -21,7 +21,7 @@ from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.rig.cycles import cycles
 from pzd.rig.frame import force_in_frame
-from pzd.rig.kinematics import kinematics
+from pzd.rig.kinematics import Kinematics, kinematics
 from pzd.rig.programmes import Warming, voltage_over
 from pzd.rig.sensors import draw_for, sensed
 from pzd.rig.virtual_config import Planned, StandTest, VirtualEntry
@@ -69,7 +69,26 @@ def records(
     ConfigError : when the file of a motion is missing
     DataError : when the file of a motion cannot be read
     """
-    return tuple(_record(taken) for taken in take(entry, seed, folder, control))
+    found = []
+    for taken in take(entry, seed, folder, control):
+        clean = kinematics(taken.time, taken.displacement, cycles(taken.time, taken.displacement))
+        found.append(record_of(taken, clean))
+    return tuple(found)
+
+
+def record_of(taken: Taken, clean: Kinematics) -> Record:
+    """The record of a test, its velocity and acceleration derived from the recorded displacement."""
+    return Record(
+        taken.name,
+        taken.setting,
+        taken.time,
+        taken.displacement,
+        clean.velocity,
+        clean.acceleration,
+        taken.force,
+        taken.voltage,
+        taken.temperature,
+    )
 
 
 def take(
@@ -179,18 +198,3 @@ def _sensed_force(entry: VirtualEntry, time: Array, force: Array, sampled: slice
     shown = force[sampled] if late == 0.0 else np.interp(time[sampled] - late, time, force)
     peak = float(np.max(np.abs(shown)))
     return np.asarray(shown * (1.0 + entry.jitter.gain * gain) + entry.jitter.offset_of_peak * peak * offset)
-
-
-def _record(taken: Taken) -> Record:
-    clean = kinematics(taken.time, taken.displacement, cycles(taken.time, taken.displacement))
-    return Record(
-        taken.name,
-        taken.setting,
-        taken.time,
-        taken.displacement,
-        clean.velocity,
-        clean.acceleration,
-        taken.force,
-        taken.voltage,
-        taken.temperature,
-    )
