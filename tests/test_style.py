@@ -78,10 +78,17 @@ def test_nothing_is_left_unfinished() -> None:
     assert found == []
 
 
+def written_lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Lines of a function; its docstring does not make it long."""
+    first = node.body[0]
+    docstring = (first.end_lineno or first.lineno) - first.lineno + 1 if ast.get_docstring(node) else 0
+    return (node.end_lineno or node.lineno) - node.lineno + 1 - docstring
+
+
 def lengths() -> dict[str, int]:
-    """Lines of every function, all counted."""
+    """Lines of every function."""
     return {
-        f"{path.relative_to(PACKAGE)}:{node.lineno} {node.name}": (node.end_lineno or node.lineno) - node.lineno + 1
+        f"{path.relative_to(PACKAGE)}:{node.lineno} {node.name}": written_lines(node)
         for path in MODULES
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
