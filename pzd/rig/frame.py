@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from pzd.damper.compose import element_rows, felt_by_valve, parallel_force, recorded, respond, sampling_steps
+from pzd.damper.beside import beside_all
+from pzd.damper.compose import (
+    element_rows,
+    felt_by_valve,
+    parallel_rows,
+    recorded,
+    respond,
+    sampling_steps,
+    value_of,
+)
 from pzd.damper.flow import ROW
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
@@ -14,7 +21,7 @@ from pzd.damper.path import march
 from pzd.record import Array
 
 TOLERANCE = 1e-7
-"""Admissible error of one piece of the path, as a share of the force."""
+"""Admissible error of one piece of the path, as a share of the force; steps are so short that few pieces reach it."""
 _ROUNDS = 12
 _SETTLED = 1e-10  # change of the parallel force in a round, as a share of the largest force
 _STIFFNESS = ROW.index("k")
@@ -51,14 +58,23 @@ def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None
     rows = np.array(element_rows(damper, felt, motion.temperature))
     rows[:, _STIFFNESS] /= 1.0 + rows[:, _STIFFNESS] / frame_stiffness
     element = march(motion.displacement, motion.velocity, steps, rows, 0.0, TOLERANCE)
+    beside = parallel_rows(damper, felt)
+    force = element if beside is None else _with_beside(motion, steps, rows, beside, element, frame_stiffness)
+    return recorded(value_of(damper, "sensor_delay", "tau"), motion.time, force)
+
+
+def _with_beside(
+    motion: Motion, steps: Array, rows: Array, beside: Array, element: Array, frame_stiffness: float
+) -> Array:
+    """(n,) force of the element and of what stands beside it, in rounds from that of the element alone."""
     velocity = motion.velocity - np.gradient(element, motion.time) / frame_stiffness
-    beside = np.zeros(element.size)
+    more = np.zeros(element.size)
     for _ in range(_ROUNDS):
-        total = element + beside
-        own = replace(motion, displacement=motion.displacement - total / frame_stiffness, velocity=velocity)
-        last, beside = beside, parallel_force(damper, felt, own)
-        if np.max(np.abs(beside - last)) <= _SETTLED * np.max(np.abs(total)):
+        total = element + more
+        own = motion.displacement - total / frame_stiffness
+        last, more = more, beside_all(own, velocity, motion.acceleration, beside)
+        if np.max(np.abs(more - last)) <= _SETTLED * np.max(np.abs(total)):
             break
-        shifted = motion.displacement - beside / frame_stiffness
+        shifted = motion.displacement - more / frame_stiffness
         element = march(shifted, motion.velocity, steps, rows, 0.0, TOLERANCE)
-    return recorded(damper, motion.time, element + beside)
+    return np.asarray(element + more)
