@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,7 @@ _FLOW_COLUMNS = tuple(
     for parameter in effect.parameters
     if parameter.name == column and effect.place in ("stroke", "flow")
 )
+_NEUTRAL = {(e.name, p.name): p.neutral for e in library().values() for p in e.parameters}
 _EVEN = 1e-6  # of the median sampling interval
 
 
@@ -55,9 +57,40 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
     steps = sampling_steps(motion.time)
     felt = felt_by_valve(damper, motion.voltage, steps)
     rows = element_rows(damper, felt, motion.temperature)
+    beside = parallel_rows(damper, felt)
+    force = force_of_rows(rows, beside, motion, steps, initial_force, tolerance)
+    return recorded(value_of(damper, "sensor_delay", "tau"), motion.time, force)
+
+
+def force_of_rows(
+    rows: Array, beside: Array | None, motion: Motion, steps: Array, initial_force: float, tolerance: float
+) -> Array:
+    """(n,) force [N] of the element with its flow effects and of what stands beside it.
+
+    Parameters
+    ----------
+    rows : (n, 10) or (1, 10) parameter rows
+    beside : (n, m) or (1, m) rows of the parallel effects; None without any
+    motion : (n,) sampled motion
+    steps : (n - 1,) or (1,) sampling intervals [s]
+    initial_force : force of the oil spring at the first sample [N]
+    tolerance : admissible error of a piece, as a share of the force
+    """
     force = march(motion.displacement, motion.velocity, steps, rows, initial_force, tolerance)
-    force += parallel_force(damper, felt, motion)
-    return recorded(damper, motion.time, force)
+    if beside is not None:
+        force += beside_all(motion.displacement, motion.velocity, motion.acceleration, beside)
+    return force
+
+
+def standing_rows(
+    friction: float, damping: float, stiffness: float, effects: Mapping[str, Mapping[str, float]]
+) -> tuple[Array, Array | None]:
+    """The (1, 10) and (1, m) rows for `force_of_rows` where voltage and temperature stand still."""
+    flow = [effects.get(name, {}).get(parameter, _NEUTRAL[name, parameter]) for name, parameter in _FLOW_COLUMNS]
+    row = np.array([[friction, damping, stiffness, *flow]])
+    if not any(name in effects for name, _ in COLUMNS):
+        return row, None
+    return row, np.array([[effects.get(n, {}).get(parameter, _NEUTRAL[n, parameter]) for n, parameter in COLUMNS]])
 
 
 def sampling_steps(time: Array) -> Array:
@@ -83,17 +116,21 @@ def element_rows(damper: Damper, felt: Array | None, temperature: Array | float 
     return rows[:1] if np.all(rows == rows[0]) else rows
 
 
+def parallel_rows(damper: Damper, felt: Array | None) -> Array | None:
+    """(n, m) or (1, m) rows of the parallel effects; None without any."""
+    return _effect_columns(damper, COLUMNS, felt) if any(effect in damper.effects for effect, _ in COLUMNS) else None
+
+
 def parallel_force(damper: Damper, felt: Array | None, motion: Motion) -> Array:
     """(n,) force beside the element [N]."""
-    if not any(effect in damper.effects for effect, _ in COLUMNS):
+    rows = parallel_rows(damper, felt)
+    if rows is None:
         return np.zeros(motion.time.size)
-    rows = _effect_columns(damper, COLUMNS, felt)
     return np.asarray(beside_all(motion.displacement, motion.velocity, motion.acceleration, rows))
 
 
-def recorded(damper: Damper, time: Array, force: Array) -> Array:
-    """(n,) force as the delayed channel shows it [N], linear between samples, held before the first."""
-    tau = value_of(damper, "sensor_delay", "tau")
+def recorded(tau: float, time: Array, force: Array) -> Array:
+    """(n,) force as a channel delayed by tau [s] shows it [N], linear between samples, held before the first."""
     return force if tau == 0.0 else np.interp([moment(t, tau) for t in time], time, force)
 
 
@@ -170,7 +207,7 @@ def value_of(damper: Damper, effect: str, parameter: str) -> float:
     ------
     ValueError : when the damper gives it by voltage
     """
-    value = damper.effects.get(effect, {}).get(parameter, library()[effect].parameter(parameter).neutral)
+    value = damper.effects.get(effect, {}).get(parameter, _NEUTRAL[effect, parameter])
     if isinstance(value, tuple):
         raise ValueError(f"{effect}.{parameter} must be one number, not a list by voltage")  # noqa: TRY004  # a wrong value of a config
     return value
@@ -184,7 +221,7 @@ def _effect_columns(damper: Damper, columns: tuple[tuple[str, str], ...], felt: 
 
 def _column(damper: Damper, effect: str, parameter: str, felt: Array | None) -> Array:
     given = damper.effects.get(effect, {})
-    value = given.get(parameter, library()[effect].parameter(parameter).neutral)
+    value = given.get(parameter, _NEUTRAL[effect, parameter])
     if not isinstance(value, tuple):
         return np.array([value])
     if felt is None:

@@ -1,0 +1,257 @@
+"""A damper with some effects fitted to observations: T0, C, k of every base row together with the effects.
+
+Every residual is in units of noise with the tests' nuisances integrated out, so that half the sum of
+squares is minus the logarithm of the likelihood, and fits of different effects can be compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.damper.compose import force_of_rows, recorded, respond, standing_rows
+from pzd.damper.effect import Parameter, Scales
+from pzd.damper.effects import library
+from pzd.damper.model import BaseRow, Damper
+from pzd.diagnose.observation import Observation
+from pzd.record import Array
+
+SIMULATION_TOLERANCE = 1e-8
+"""Of the damper's path, as a share of the force."""
+DIFFERENCE = 1e-4
+"""Step of the searched variables for forward differences."""
+MOST_EVALUATIONS = 25
+BOUND = 1e4
+"""No scaled parameter is looked for beyond this."""
+
+Values = Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One effect parameter in the units of the search."""
+
+    effect: str
+    parameter: Parameter
+    scale: float
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Limits of the searched variable."""
+        low, high = (limit / self.scale for limit in (self.parameter.low, self.parameter.high))
+        if self.parameter.search.logarithmic:
+            return float(np.log(max(low, 1.0 / BOUND))), float(np.log(min(high, BOUND)))
+        return max(low, -BOUND), min(high, BOUND)
+
+    def value(self, searched: float) -> float:
+        """The parameter in its own unit."""
+        scaled = float(np.exp(searched)) if self.parameter.search.logarithmic else searched
+        return float(np.clip(scaled * self.scale, self.parameter.low, self.parameter.high))
+
+    def searched(self, value: float) -> float:
+        """The searched variable at a value of the parameter."""
+        scaled = value / self.scale
+        return float(np.log(max(scaled, 1.0 / BOUND))) if self.parameter.search.logarithmic else scaled
+
+    def slope(self, searched: float) -> float:
+        """Derivative of the parameter by the searched variable."""
+        return self.scale * (float(np.exp(searched)) if self.parameter.search.logarithmic else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """An optimum: the damper, and what it leaves."""
+
+    damper: Damper
+    effects: tuple[str, ...]
+    searched: Array
+    """(3 b + e,) the optimum in the units of the search."""
+    residuals: tuple[Array, ...]
+    """(w,) an observation, in units of noise."""
+    simulated: tuple[Array, ...]
+    """(n,) an observation, force at the compared samples [N]."""
+    covariance: Array
+    """(e, e) of the effect parameters in their own units, noise alone."""
+    unknowns: tuple[Unknown, ...]
+
+    @property
+    def misfit(self) -> float:
+        """Sum of squares in units of noise: minus twice the logarithm of the likelihood, but for a constant."""
+        return float(sum(r @ r for r in self.residuals))
+
+    @property
+    def size(self) -> int:
+        """Number of residuals."""
+        return sum(r.size for r in self.residuals)
+
+    def value_of(self, effect: str, parameter: str) -> float:
+        """A fitted parameter in its own unit."""
+        value = self.damper.effects[effect][parameter]
+        return value if isinstance(value, float) else value[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is fitted to what."""
+
+    observations: tuple[Observation, ...]
+    base: tuple[BaseRow, ...]
+    """Labels and starting values of the base rows."""
+    scales: Scales
+    reference: float | None = None
+    """T_ref for temperature drift [degC]."""
+
+    def unknowns(self, effects: Sequence[str]) -> tuple[Unknown, ...]:
+        """The parameters of some effects, in the order of the search."""
+        return tuple(
+            Unknown(name, parameter, parameter.search.scale(self.scales) or 1.0)
+            for name in effects
+            for parameter in library()[name].parameters
+        )
+
+    def start(self) -> Array:
+        """(3 b,) the base rows in the units of the search."""
+        return np.concatenate(
+            [(r.T0_N / self.scales.force, np.log(r.C_Ns_per_m), np.log(r.k_N_per_m)) for r in self.base]
+        )
+
+    def point(self, searched: Array, unknowns: Sequence[Unknown]) -> Point:
+        """What a point of the search stands for."""
+        split = 3 * len(self.base)
+        base = searched[:split].reshape(-1, 3)
+        values = np.column_stack([np.maximum(base[:, 0], 0.0) * self.scales.force, np.exp(base[:, 1:])])
+        effects: dict[str, dict[str, float]] = {}
+        for unknown, x in zip(unknowns, searched[split:], strict=True):
+            effects.setdefault(unknown.effect, {})[unknown.parameter.name] = unknown.value(float(x))
+        return Point(values, effects, self)
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Numbers for T0, C and k of every base row, and for the effects."""
+
+    base: Array
+    """(b, 3)"""
+    effects: Mapping[str, Mapping[str, float]]
+    problem: Problem
+
+    def damper(self) -> Damper:
+        """The same as a damper."""
+        rows = tuple(
+            BaseRow(
+                voltage_V=label.voltage_V,
+                temperature_degC=label.temperature_degC,
+                T0_N=float(friction),
+                C_Ns_per_m=float(damping),
+                k_N_per_m=float(stiffness),
+            )
+            for label, (friction, damping, stiffness) in zip(self.problem.base, self.base, strict=True)
+        )
+        return Damper(
+            base=rows,
+            effects={name: dict(values) for name, values in self.effects.items()},
+            reference_temperature_degC=self.problem.reference,
+        )
+
+
+def simulated(point: Point, observation: Observation) -> Array:
+    """(n,) force at the compared samples of an observation [N]."""
+    o, start = observation, float(observation.measured[0])
+    if o.place >= 0 and "temperature_drift" not in point.effects:
+        rows, beside = standing_rows(*point.base[o.place], point.effects)
+        force = force_of_rows(rows, beside, o.motion, o.steps, start, SIMULATION_TOLERANCE)
+        tau = point.effects.get("sensor_delay", {}).get("tau", 0.0)
+        return o.at_compared(recorded(tau, o.motion.time, force))
+    damper = point.damper()
+    if o.place >= 0:
+        damper = damper.model_copy(update={"base": damper.base[o.place : o.place + 1]})
+    return o.at_compared(respond(damper, o.motion, start, SIMULATION_TOLERANCE))
+
+
+def fit(problem: Problem, effects: Sequence[str], start: Array) -> Fitted:
+    """The optimum reached from a starting point, by trust-region least squares within the limits.
+
+    Parameters
+    ----------
+    problem : what is fitted to what
+    effects : names of the effects fitted together with the base rows
+    start : (3 b + e,) in the units of the search
+    """
+    from scipy.optimize import least_squares
+
+    unknowns = problem.unknowns(effects)
+    low, high = _bounds(problem, unknowns)
+    found = least_squares(
+        lambda x: np.concatenate(_residuals(problem, unknowns, x)[0]),
+        np.clip(start, low + 1e-9, high - 1e-9),
+        jac=lambda x: _slopes(problem, unknowns, x),
+        bounds=(low, high),
+        x_scale="jac",
+        ftol=1e-6,
+        xtol=1e-6,
+        gtol=1e-6,
+        max_nfev=MOST_EVALUATIONS,
+    )
+    residuals, forces = _residuals(problem, unknowns, found.x)
+    return Fitted(
+        problem.point(found.x, unknowns).damper(),
+        tuple(effects),
+        found.x,
+        tuple(residuals),
+        tuple(forces),
+        _covariance(found.jac, found.x, unknowns),
+        unknowns,
+    )
+
+
+def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
+    s = problem.scales
+    base_low = [0.0, np.log(1e-4 * s.force / s.speed), np.log(0.1 * s.force / s.stroke)]
+    base_high = [2.0, np.log(1e2 * s.force / s.speed), np.log(1e5 * s.force / s.stroke)]
+    limits = [u.bounds for u in unknowns]
+    count = len(problem.base)
+    return (
+        np.array(base_low * count + [low for low, _ in limits]),
+        np.array(base_high * count + [high for _, high in limits]),
+    )
+
+
+def _residuals(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> tuple[list[Array], list[Array]]:
+    point = problem.point(x, unknowns)
+    forces = [simulated(point, o) for o in problem.observations]
+    return [o.in_noise(o.measured - f) for o, f in zip(problem.observations, forces, strict=True)], forces
+
+
+def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Array:
+    """(w, p) derivatives of the residuals by forward differences; a test moves with its own base row alone."""
+    point, rows = problem.point(x, unknowns), len(problem.base)
+    shifted = [problem.point(_shifted(x, j), unknowns) for j in range(x.size)]
+    blocks = []
+    for o in problem.observations:
+        here = simulated(point, o)
+        own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(3 * rows)
+        columns = [*own, *range(3 * rows, x.size)]
+        change = o.in_noise(np.stack([here - simulated(shifted[j], o) for j in columns], axis=-1) / DIFFERENCE)
+        block = np.zeros((len(change), x.size))
+        block[:, columns] = change
+        blocks.append(block)
+    return np.concatenate(blocks)
+
+
+def _shifted(x: Array, j: int) -> Array:
+    moved = x.copy()
+    moved[j] += DIFFERENCE
+    return moved
+
+
+def _covariance(jacobian: Array, x: Array, unknowns: Sequence[Unknown]) -> Array:
+    """(e, e) covariance of the effect parameters in their own units."""
+    count = len(unknowns)
+    size = np.linalg.norm(jacobian, axis=0)
+    size[size == 0.0] = 1.0
+    scaled = jacobian / size
+    whole = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True) / np.outer(size, size)
+    slopes = np.array([u.slope(float(v)) for u, v in zip(unknowns, x[x.size - count :], strict=True)])
+    return np.asarray(whole[x.size - count :, x.size - count :] * np.outer(slopes, slopes))

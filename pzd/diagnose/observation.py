@@ -1,0 +1,221 @@
+"""One record as the evidence weighs it: what is simulated, what it is held against, and in which units of noise.
+
+A periodic record under constant conditions is its average cycle, harmonic by harmonic, each in
+units of its own noise; any other is its samples, whitened. What offset, gain and delay of the test
+may explain within their priors is taken out of both sides once and for all, so that a residual
+that is left counts as it should: |r|^2 is minus twice the logarithm of the likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.compose import sampling_steps
+from pzd.damper.motion import Motion
+from pzd.diagnose.autoregression import Autoregression
+from pzd.diagnose.config import NuisanceConfig
+from pzd.diagnose.inputs import Prepared
+from pzd.diagnose.noise import PureError, pure_error
+from pzd.diagnose.rich import rich_fit
+from pzd.identify.trial import fine_motion, trial_of, warm_up
+from pzd.record import Array, Record
+
+RESOLUTION = 3e-4
+"""No force is believed to be known better than this share of the record's peak (r.m.s.)."""
+MOST_HARMONICS = 80
+"""Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart."""
+CYCLE_POINTS = 256
+"""A cycle is simulated on at least this many points."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What one record, or a part of it, says."""
+
+    name: str
+    place: int
+    """Which base row it belongs to; -1 where the voltage moves."""
+    motion: Motion
+    """(m,) what is simulated."""
+    first: int
+    """Samples of the motion that come before the first one compared."""
+    stride: int
+    """Motion samples from one compared sample to the next."""
+    measured: Array
+    """(n,) force [N]."""
+    peak: float
+    """Largest measured force [N]."""
+    noise: PureError | Autoregression
+    weights: Array
+    """(H + 1,) of the harmonics of an average cycle; empty where samples are compared."""
+    frame: Array
+    """(w, q) orthonormal columns, in units of noise, along which nuisances move the force."""
+    shrink: Array
+    """(q,) factor on the residual along each of them."""
+
+    @cached_property
+    def steps(self) -> Array:
+        """Sampling intervals of the motion [s], one where they are even."""
+        return sampling_steps(self.motion.time)
+
+    def at_compared(self, simulated: Array) -> Array:
+        """(n,) or (n, p) of what was simulated at the samples that are compared."""
+        return simulated[self.first :: self.stride][: self.measured.size]
+
+    def in_noise(self, values: Array) -> Array:
+        """(w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
+        flat = self._scaled(values)
+        return flat - self.frame @ ((1.0 - self.shrink).reshape(-1, *([1] * (flat.ndim - 1))) * (self.frame.T @ flat))
+
+    def _scaled(self, values: Array) -> Array:
+        if isinstance(self.noise, Autoregression):
+            return self.noise.whitened(values)
+        weights = self.weights.reshape(-1, *([1] * (values.ndim - 1)))
+        harmonics = np.fft.rfft(values, axis=0)[: self.weights.size] / len(values) * weights
+        return np.concatenate([harmonics.real, harmonics.imag[1:]])
+
+
+def observations(
+    prepared: Sequence[Prepared],
+    kept: Sequence[NDArray[np.bool_]],
+    places: Sequence[int],
+    simulated: Sequence[Array],
+    nuisance: NuisanceConfig,
+) -> tuple[Observation, ...]:
+    """The observations of some samples of some records.
+
+    Parameters
+    ----------
+    prepared : the records
+    kept : (n,) which samples of each count
+    places : the base row of each
+    simulated : (n,) force of the plain damper for each, along which gain and delay act [N]
+    nuisance : priors of the tests' own offset, gain and delay
+    """
+    found = []
+    for p, mask, place, force in zip(prepared, kept, places, simulated, strict=True):
+        if np.any(mask):
+            build = _of_cycles if p.cycles is not None and place >= 0 else _of_samples
+            made = build(p, mask, place, force, nuisance)
+            found += [made] if made is not None else []
+    return tuple(found)
+
+
+def _of_cycles(
+    p: Prepared, mask: NDArray[np.bool_], place: int, force: Array, nuisance: NuisanceConfig
+) -> Observation | None:
+    run = p.cycles
+    if run is None:
+        return None
+    time, record = p.record.time, p.record
+    whole = run.fold(time, record.force)
+    numbers = run.number(time)
+    counted = [n for n in range(run.count) if np.all(mask[numbers == n])]
+    if not counted:
+        return None
+    error = pure_error(whole - run.fold(time, force))
+    cycle = whole[counted].mean(axis=0)
+    peak = float(np.max(np.abs(cycle)))
+    floor = (RESOLUTION * peak) ** 2 / error.single.size
+    weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
+    weights[0] /= np.sqrt(2.0)
+    bare = Observation(
+        record.name,
+        place,
+        *_cycle_motion(record, run.period, error.points, [run.mean(time, c) for c in _kinematics(record)]),
+        cycle,
+        peak,
+        error,
+        weights,
+        np.zeros((2 * weights.size - 1, 0)),
+        np.zeros(0),
+    )
+    return with_nuisances(bare, run.mean(time, force), nuisance, error.points / run.period)
+
+
+def _kinematics(record: Record) -> tuple[Array, Array, Array]:
+    return record.displacement, record.velocity, record.acceleration
+
+
+def _cycle_motion(record: Record, period: float, points: int, channels: Sequence[Array]) -> tuple[Motion, int, int]:
+    """Two cycles of the mean motion, the first to settle in, on a grid fine enough to simulate."""
+    factor = int(np.ceil(CYCLE_POINTS / points))
+    fine = [_refined(channel, factor) for channel in channels]
+    count = points * factor
+    time = period / count * np.arange(2 * count)
+    temperature = record.median_temperature()
+    voltage = record.median_voltage()
+    motion = Motion(
+        time,
+        *(np.tile(channel, 2) for channel in fine),
+        None if voltage is None else np.full(2 * count, voltage),
+        None if temperature is None else np.full(2 * count, temperature),
+    )
+    return motion, count, factor
+
+
+def _refined(cycle: Array, factor: int) -> Array:
+    """A periodic channel on `factor` times as many points, by its own harmonics."""
+    spectrum = np.fft.rfft(cycle)
+    return np.asarray(np.fft.irfft(spectrum, cycle.size * factor) * factor)
+
+
+def _of_samples(
+    p: Prepared, mask: NDArray[np.bool_], place: int, force: Array, nuisance: NuisanceConfig
+) -> Observation | None:
+    record = p.record
+    start = max(int(np.argmax(mask)), warm_up(record.displacement))
+    stop = int(mask.size - np.argmax(mask[::-1]))
+    if stop - start < 2 * CYCLE_POINTS:
+        return None
+    noise = rich_fit(record.force[start:stop] - force[start:stop], _part(record, start, stop), force[start:stop]).noise
+    peak = float(np.max(np.abs(record.force[start:stop])))
+    floor = (RESOLUTION * peak) ** 2
+    noise = Autoregression(noise.coefficients, max(noise.innovation, floor))
+    motion, factor = fine_motion(record), trial_of(record).factor
+    bare = Observation(
+        record.name,
+        place,
+        motion,
+        start * factor,
+        factor,
+        record.force[start:stop],
+        peak,
+        noise,
+        np.zeros(0),
+        np.zeros((stop - start - noise.coefficients.size, 0)),
+        np.zeros(0),
+    )
+    return with_nuisances(bare, force[start:stop], nuisance, record.rate)
+
+
+def _part(record: Record, start: int, stop: int) -> Record:
+    from pzd.diagnose.inputs import sliced
+
+    kept = np.zeros(record.time.size, dtype=np.bool_)
+    kept[start:stop] = True
+    return sliced(record, kept)
+
+
+def with_nuisances(bare: Observation, force: Array, nuisance: NuisanceConfig, rate: float) -> Observation:
+    """The observation with the test's own offset, gain and delay integrated over their priors.
+
+    Equation: r' = (I + V V')^(-1/2) r, V = [s_o peak, s_g F, -s_d dF/dt] in units of noise
+                                                    Source: Gaussian prior, marginal likelihood
+    """
+    from dataclasses import replace
+
+    columns = np.column_stack(
+        [
+            np.full(force.size, nuisance.offset * bare.peak),
+            nuisance.gain * force,
+            -nuisance.delay_s * np.gradient(force) * rate,
+        ]
+    )
+    left, size, _ = np.linalg.svd(bare.in_noise(columns), full_matrices=False)
+    return replace(bare, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
