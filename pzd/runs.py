@@ -49,6 +49,7 @@ def _hash_as_of(path: Path, _changed: int, _size: int, _inode: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+@cache
 def versions() -> dict[str, str]:
     """Versions of Python, of pzd and of the libraries that its numbers hang on."""
     found = {"python": platform.python_version()}

@@ -55,7 +55,7 @@ class Pipeline:
         return tuple(dict.fromkeys(mark for marks in self.marks.values() for mark in marks))
 
     def _bring(self, stage: Stage, *, force: bool) -> None:
-        inputs = dependencies(stage, self.config, self.run)
+        inputs = dependencies(stage, self.config, self.run, self._carried(stage, ()))
         kept = self.run.kept(stage.folder)
         reason = "forced" if force else stale(kept, inputs)
         if reason is None:

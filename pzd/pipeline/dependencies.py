@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from pzd.artefacts import RecordEntry, Rig
 from pzd.config import RunConfig, setting_in_use
 from pzd.pipeline.sources import code_hash
 from pzd.pipeline.stages import Stage
-from pzd.quantities import Control
 from pzd.rig.config import RigConfig
 from pzd.runs import Run, file_hash
 from pzd.schema.errors import FilesError
@@ -49,7 +48,7 @@ def is_artefact(annotation: Any) -> bool:
     return hasattr(annotation, "folder") and hasattr(annotation, "read")
 
 
-def dependencies(stage: Stage, config: RunConfig, run: Run) -> dict[str, str]:
+def dependencies(stage: Stage, config: RunConfig, run: Run, marks: Sequence[str]) -> dict[str, str]:
     """Everything that a stage depends on, by name, each as a hash.
 
     Parameters
@@ -57,6 +56,7 @@ def dependencies(stage: Stage, config: RunConfig, run: Run) -> dict[str, str]:
     stage : the stage
     config : the run's config
     run : the run's folder, in which the stages before this one are up to date
+    marks : why what it is made from is not to be trusted, which its manifest repeats
 
     Returns
     -------
@@ -72,11 +72,11 @@ def dependencies(stage: Stage, config: RunConfig, run: Run) -> dict[str, str]:
                 found |= _files_read(stage, block[1], run.config.parent)
         elif name == "setting":
             found[name] = _hash(setting_of(config, run))
-        elif annotation is Control:
-            found[name] = _hash(config.control.model_dump())
         elif name == "seed":
             found[name] = _hash(config.seed)
-    return found | {"code": code_hash(stage.function.__module__.split(".")[1])}
+    # Every stage's files name the control signal, so it counts whether the stage asks for it or not.
+    found |= {path: _hash(value) for path, value in _leaves("control", config.control.model_dump())}
+    return found | {"marks": _hash(list(marks)), "code": code_hash(stage.function.__module__.split(".")[1])}
 
 
 def key_of(inputs: Mapping[str, str]) -> str:
@@ -96,7 +96,8 @@ def changes(before: Mapping[str, str], now: Mapping[str, str]) -> str:
 
 
 def _told(name: str, change: str) -> str:
-    return f"the code {change}" if name == "code" else f"{name} {change}"
+    names = {"code": "the code", "marks": "what is not to be trusted"}
+    return f"{names.get(name, name)} {change}"
 
 
 def _hash(value: Any) -> str:

@@ -1,0 +1,194 @@
+"""Stages that take no time: signatures and artefacts as of the real ones, numbers that show what they depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pzd.artefacts import (
+    AXLE_COLUMNS,
+    AXLES,
+    RIDE_COLUMNS,
+    ComfortRow,
+    Diagnosed,
+    Diagnosis,
+    ForceRow,
+    Gap,
+    Identified,
+    InverseRow,
+    ParameterRow,
+    Record,
+    RecordEntry,
+    Region,
+    Report,
+    Ride,
+    Rides,
+    Rig,
+    SummaryRow,
+    Table,
+    TableNotes,
+    base_of,
+)
+from pzd.config import RunConfig
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.identify.config import IdentifyConfig
+from pzd.pipeline.stages import Stage
+from pzd.quantities import Control
+from pzd.report.config import ReportConfig
+from pzd.rig.config import RigConfig
+from pzd.rig.listing import listed
+from pzd.schema.errors import DataError
+from pzd.simulate.config import SimulateConfig
+from pzd.table.config import TableConfig
+
+NAMES = ["ingest", "identify", "diagnose", "table", "simulate", "report"]
+UNDETERMINED = 99
+"""A seed with which C is undetermined."""
+
+
+def ingest(rig: RigConfig, control: Control, folder: Path) -> Rig:
+    """A record a file: the first line of the file is its force."""
+    files = listed(rig.files or (), folder)
+    wrong = [one.path for one in files if one.path.read_text() == "nonsense"]
+    if wrong:
+        raise DataError(f"{path}:1: a number is needed (got nonsense)" for path in wrong)
+    records = tuple(_record(one.path, one.entry.setting) for one in files)
+    entries = [
+        RecordEntry(name=r.name, setting=r.setting, voltage_V=1.0, temperature_degC=22.0, rate_Hz=1.0, cycles=3.0)
+        for r in records
+    ]
+    return Rig(records, tuple(entries))
+
+
+def _record(path: Path, setting: str | None) -> Record:
+    level = np.full(3, float(path.read_text()))
+    time = np.arange(3.0)
+    return Record(path.stem, setting, time, level, level, level, level, np.ones(3), np.full(3, 22.0))
+
+
+def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
+    """A row a setting: T0 is the mean force, k the seed."""
+    rows = []
+    for setting in sorted({record.setting for record in rig.records}, key=str):
+        level = float(np.mean([record.force[0] for record in rig.records if record.setting == setting]))
+        damping = None if seed == UNDETERMINED else 2.0
+        rows.append(
+            ParameterRow(
+                setting=setting,
+                voltage_V=1.0,
+                temperature_degC=22.0,
+                W_s=0.01,
+                rmse_N=1.0,
+                T0_N=level,
+                T0_N_low95=level,
+                T0_N_high95=level,
+                C_Ns_per_m=damping,
+                C_Ns_per_m_low95=damping,
+                C_Ns_per_m_high95=damping,
+                k_N_per_m=float(seed),
+                k_N_per_m_low95=None,
+                k_N_per_m_high95=None,
+                status="ok" if damping else "undetermined: C, the records are too slow",
+            )
+        )
+    return Identified(tuple(rows), ())
+
+
+def diagnose(diagnose: DiagnoseConfig, rig: Rig, identified: Identified, setting: str | None) -> Diagnosed:
+    """Nothing missing; the significance shows as the noise floor."""
+    gap = Gap(
+        before=0.01,
+        after=0.01,
+        noise_floor=diagnose.significance,
+        standard_error=0.001,
+        held_out=("a",),
+        hold_out="records",
+    )
+    told = Diagnosis(
+        verdict="none",
+        reason=f"{len(rig.records)} records are explained",
+        effects=(),
+        confidence=None,
+        gap=gap,
+        parameters={},
+        ranking=(),
+        rivals=(),
+        where=(Region(region="abs(v) > 0.25 m/s", share_of_gap=0.7),),
+        next_test=None,
+    )
+    damper = base_of(identified.rows, setting)
+    return Diagnosed(told, damper, damper)
+
+
+def tabulate(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Control, setting: str | None) -> Table:
+    """One node; the largest speed is that of the config."""
+    force = diagnosed.damper.base[0].T0_N
+    row = ForceRow(temperature_degC=22.0, voltage_V=1.0, velocity_m_per_s=0.1, force_N=force, inside=1)
+    inverse = InverseRow(temperature_degC=22.0, velocity_m_per_s=0.1, force_N=force, voltage_V=1.0)
+    notes = TableNotes(outside=table.outside, reached_m_per_s=table.speed_max_m_per_s, lost=(), not_monotone=())
+    return Table((row,), (inverse,), notes)
+
+
+def simulate(simulate: SimulateConfig, diagnosed: Diagnosed, table: Table, seed: int) -> Rides:
+    """One ride whose peak is the table's force."""
+    names = (*RIDE_COLUMNS, *(name.format(axle) for axle in AXLES for name in AXLE_COLUMNS))
+    ride = Ride("sine-comfort-ideal", {name: np.zeros(2) for name in names})
+    summary = SummaryRow(
+        case=ride.case,
+        road="sine",
+        policy="comfort",
+        fidelity="ideal",
+        point="K",
+        peak_abs_aK_m_per_s2=float(table.force[0].force_N or 0.0),
+        rms_aK_m_per_s2=1.0,
+        rms_jerk_m_per_s3=1.0,
+        peak_deflection_m=0.1,
+        rms_wheel_load_N=1.0,
+        dissipated_J=1.0,
+        energy_error=1e-9,
+        outside_table=0.0,
+    )
+    return Rides((ride,), (summary,))
+
+
+def report(report: ReportConfig, rides: Rides, control: Control, setting: str | None) -> Report:
+    """One measure, and a page of a line."""
+    row = ComfortRow(
+        case="sine-comfort-ideal",
+        point="K",
+        edition="ISO 2631-1:1997",
+        measure="a_w",
+        value=rides.summary[0].peak_abs_aK_m_per_s2,
+        unit="m/s2",
+        status="verified",
+    )
+    return Report((row,), f"<p>{report.daily_exposure_h} h</p>\n")
+
+
+_FUNCTIONS: dict[str, Callable[..., Any]] = dict(
+    zip(NAMES, (ingest, identify, diagnose, tabulate, simulate, report), strict=True)
+)
+for _name, _function in _FUNCTIONS.items():
+    _function.__module__ = f"pzd.{'rig' if _name == 'ingest' else _name}.stage"
+
+
+def stages(config: RunConfig) -> tuple[Stage, ...]:
+    """The stand-ins in order."""
+    first = Stage("synthesise" if config.rig.virtual else "ingest", ingest)
+    return (first, *(Stage(name, _FUNCTIONS[name]) for name in NAMES[1:]))
+
+
+def project(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with two rig files, and a config that the stand-ins can run."""
+    monkeypatch.setattr("pzd.pipeline.command.stages", stages)
+    monkeypatch.setattr("os.fsync", lambda _: None)  # the disk's time is not what these tests are about
+    (folder / "data").mkdir(parents=True)
+    (folder / "data" / "a.csv").write_text("100")
+    (folder / "data" / "b.csv").write_text("300")
+    config = folder / "first.yaml"
+    config.write_text("rig:\n  files:\n    - path: data/*.csv\n")
+    return config

@@ -1,0 +1,265 @@
+"""A run folder holds the old result or the new one, never half, and one command at a time."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from pzd import runs
+from pzd.artefacts import Identified, ParameterRow
+from pzd.quantities import Control
+from pzd.runs import Run, file_hash
+from pzd.schema.errors import ConfigError, FilesError
+
+CONTROL = Control()
+HERE = Path(__file__).resolve().parent
+
+
+def identified(level: float) -> Identified:
+    row = ParameterRow(
+        setting=None,
+        voltage_V=level,
+        temperature_degC=None,
+        T0_N=level,
+        T0_N_low95=None,
+        T0_N_high95=None,
+        C_Ns_per_m=1.0,
+        C_Ns_per_m_low95=None,
+        C_Ns_per_m_high95=None,
+        k_N_per_m=1.0,
+        k_N_per_m_low95=None,
+        k_N_per_m_high95=None,
+        W_s=0.0,
+        rmse_N=0.0,
+        status="ok",
+    )
+    return Identified((row,), ())
+
+
+def write(run: Run, artefact: Identified) -> None:
+    with run.locked("pzd identify"):
+        run.write("identify", artefact, {"seed": "1"}, "key", (), 0.5)
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    monkeypatch.setattr("os.fsync", lambda _: None)  # the disk's time is not what these tests are about
+    config = tmp_path / "first.yaml"
+    config.write_text("rig: {}\n")
+    return Run.of(config, tmp_path / "runs", CONTROL)
+
+
+def level(run: Run) -> float | None:
+    return run.read(Identified).rows[0].T0_N
+
+
+def test_what_is_written_reads_back_with_its_manifest(run: Run) -> None:
+    write(run, identified(3.0))
+    kept = run.kept("2-identify")
+    assert level(run) == 3.0
+    assert kept.manifest is not None
+    assert kept.manifest.outputs == run.hashes("2-identify")
+    assert (kept.missing, kept.edited) == ((), ())
+    assert [path.name for path in run.folder.iterdir() if path.name != ".lock"] == ["2-identify"]
+
+
+def test_an_edited_and_a_missing_file_are_told_from_each_other(run: Run) -> None:
+    write(run, identified(3.0))
+    (run.folder / "2-identify" / "parameters.csv").write_text("edited")
+    (run.folder / "2-identify" / "measures.csv").unlink()
+    kept = run.kept("2-identify")
+    assert (kept.missing, kept.edited) == (("measures.csv",), ("parameters.csv",))
+
+
+def test_a_hash_follows_the_content_even_when_the_length_stays(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_text("1")
+    before = file_hash(path)
+    path.write_text("2")
+    assert file_hash(path) != before
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EACCES, errno.EIO, errno.EROFS])
+def test_a_disk_that_refuses_is_said_in_a_line_and_the_old_result_stands(
+    run: Run, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    write(run, identified(3.0))
+
+    def refuse(_: Identified, folder: Path, __: Control) -> None:
+        (folder / "parameters.csv").write_text("half")
+        raise OSError(code, os.strerror(code), str(folder / "parameters.csv"))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Identified, "write", refuse)
+        with pytest.raises(FilesError) as caught:
+            write(run, identified(4.0))
+    (message,) = caught.value.messages
+    assert message.endswith(os.strerror(code))
+    assert level(run) == 3.0
+    assert not list(run.folder.glob(".*.new"))
+
+
+def test_a_fault_of_ours_while_writing_leaves_the_old_result(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(run, identified(3.0))
+    with monkeypatch.context() as patch:
+        patch.setattr(Identified, "write", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            write(run, identified(4.0))
+    assert level(run) == 3.0
+
+
+def test_runs_below_a_file_are_a_fault_of_files(tmp_path: Path) -> None:
+    (tmp_path / "runs").write_text("a file")
+    with pytest.raises(FilesError, match="runs"), Run.of(tmp_path / "a.yaml", tmp_path / "runs", CONTROL).locked("x"):
+        pass
+
+
+WRITER = """
+import sys, time
+from pathlib import Path
+sys.path.insert(0, {here!r})
+from test_runs import CONTROL, identified
+from pzd.artefacts import Identified
+from pzd.runs import Run
+
+class Slow:
+    folder = Identified.folder
+    def write(self, folder, control):
+        identified(4.0).write(folder, control)
+        (folder / "parameters.csv").write_text("half")
+        print("writing", flush=True)
+        time.sleep(60)
+
+run = Run.of(Path({config!r}), Path({runs!r}), CONTROL)
+with run.locked("pzd identify"):
+    if {hold!r}:
+        print("writing", flush=True)
+        time.sleep(60)
+    run.write("identify", Slow(), {{}}, "key", (), 0.5)
+"""
+
+
+def other_process(run: Run, *, hold: bool) -> subprocess.Popen[str]:
+    text = WRITER.format(here=str(HERE), config=str(run.config), runs=str(run.folder.parent), hold=hold)
+    process = subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True, cwd=HERE.parent)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "writing\n"
+    return process
+
+
+def end(process: subprocess.Popen[str]) -> None:
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+
+
+def test_a_run_killed_in_the_middle_of_writing_leaves_the_old_result(run: Run) -> None:
+    write(run, identified(3.0))
+    process = other_process(run, hold=False)
+    end(process)
+    assert level(run) == 3.0
+    assert list(run.folder.glob(".*.new"))
+    write(run, identified(5.0))
+    assert level(run) == 5.0
+    assert not list(run.folder.glob(".*.new"))
+
+
+def test_a_first_run_killed_in_the_middle_of_writing_leaves_nothing(run: Run) -> None:
+    process = other_process(run, hold=False)
+    end(process)
+    assert not (run.folder / "2-identify").exists()
+    assert run.kept("2-identify").manifest is None
+
+
+@pytest.mark.parametrize("renames", [0, 1, 2])
+def test_a_run_killed_between_the_renames_leaves_the_old_result_or_the_new(
+    run: Run, monkeypatch: pytest.MonkeyPatch, renames: int
+) -> None:
+    write(run, identified(3.0))
+    done: list[Path] = []
+    rename = Path.rename
+
+    def until_killed(self: Path, target: Path) -> Path:
+        if len(done) == renames:
+            raise KeyboardInterrupt
+        done.append(target)
+        return rename(self, target)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "rename", until_killed)
+        patch.setattr(shutil, "rmtree", lambda *_, **__: None)  # a killed process tidies nothing up
+        with contextlib.suppress(KeyboardInterrupt):
+            write(run, identified(4.0))
+    with run.locked("pzd show"):
+        assert level(run) == (4.0 if renames == 2 else 3.0)
+    assert not [path.name for path in run.folder.iterdir() if path.suffix in (".new", ".old")]
+
+
+def test_a_held_run_is_refused_after_a_short_wait_and_names_who_holds_it(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runs, "PATIENCE", 0.2)
+    process = other_process(run, hold=True)
+    try:
+        begun = time.monotonic()
+        with pytest.raises(FilesError) as caught:
+            write(run, identified(3.0))
+        assert time.monotonic() - begun < 2.0
+        (message,) = caught.value.messages
+        assert f"pzd identify (process {process.pid} on " in message
+        assert message.startswith(f"{run.folder}: ")
+    finally:
+        end(process)
+    write(run, identified(3.0))
+    assert level(run) == 3.0
+
+
+def test_a_folder_of_another_config_of_the_same_stem_is_refused_and_both_are_named(run: Run, tmp_path: Path) -> None:
+    write(run, identified(3.0))
+    other = tmp_path / "elsewhere" / "first.yaml"
+    other.parent.mkdir()
+    other.write_text("rig: {}\n")
+    with pytest.raises(ConfigError) as caught:
+        Run.of(other, tmp_path / "runs", CONTROL)
+    (message,) = caught.value.messages
+    assert str(run.config) in message
+    assert str(other) in message
+    run.config.unlink()
+    Run.of(other, tmp_path / "runs", CONTROL)
+
+
+def test_a_config_named_by_another_path_is_the_same(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(run, identified(3.0))
+    monkeypatch.chdir(tmp_path)
+    Run.of(Path("first.yaml"), Path("runs"), CONTROL)
+    (tmp_path / "link.yaml").symlink_to(tmp_path / "first.yaml")
+    (tmp_path / "sub").mkdir()
+    Run.of(Path("sub/../first.yaml"), Path("runs"), CONTROL)
+
+
+def test_a_project_that_was_moved_keeps_its_runs(tmp_path: Path) -> None:
+    old = tmp_path / "old"
+    old.mkdir()
+    (old / "first.yaml").write_text("rig: {}\n")
+    write(Run.of(old / "first.yaml", old / "runs", CONTROL), identified(3.0))
+    shutil.copytree(old, tmp_path / "new")
+    moved = Run.of(tmp_path / "new" / "first.yaml", tmp_path / "new" / "runs", CONTROL)
+    assert level(moved) == 3.0
+
+
+def test_the_config_is_written_once_and_then_left_alone(run: Run) -> None:
+    with run.locked("pzd run"):
+        run.write_config("seed: 1\n")
+        written = (run.folder / "config.yaml").stat().st_mtime_ns
+        run.write_config("seed: 1\n")
+        assert (run.folder / "config.yaml").stat().st_mtime_ns == written
+        run.write_config("seed: 2\n")
+    assert (run.folder / "config.yaml").read_text() == "seed: 2\n"
