@@ -68,25 +68,27 @@ def descend(objective: Objective, start: Bingham) -> Fit:
     norm = np.sqrt(objective.energy)
     low, high = objective.search_bounds
 
-    def both(x: Array) -> tuple[Array, Array]:
+    def reduced(x: Array) -> Array:
+        """(4, 4) triangle whose last column and first three have the products of residuals and slopes."""
         parameters = from_search(x, stroke)
         residuals, slopes = objective.residuals_and_slopes(parameters)
-        return residuals / norm, -slopes @ search_slopes(parameters, stroke) / norm
+        together = np.column_stack([-slopes @ search_slopes(parameters, stroke), residuals]) / norm
+        return np.asarray(np.linalg.qr(together, mode="r"))
 
-    memory: dict[bytes, tuple[Array, Array]] = {}
+    memory: dict[bytes, Array] = {}
 
-    def at(x: Array) -> tuple[Array, Array]:
+    def at(x: Array) -> Array:
         key = x.tobytes()
         if key not in memory:
             memory.clear()
-            memory[key] = both(x)
+            memory[key] = reduced(x)
         return memory[key]
 
     def residuals_at(x: Array) -> Array:
-        return at(x)[0]
+        return at(x)[:, 3]
 
     def slopes_at(x: Array) -> Array:
-        return at(x)[1]
+        return at(x)[:, :3]
 
     inside = np.clip(to_search(start, stroke), low + 1e-9, high - 1e-9)
     found = least_squares(

@@ -11,8 +11,8 @@ from pzd.identify.objective import Bingham
 from pzd.identify.trial import Trial
 from pzd.record import Array
 
-FLANK = 0.5
-"""The slip flank is where the speed exceeds this share of its peak."""
+FLANK = 0.3
+"""The slip flank is read where the speed falls and still exceeds this share of its peak: there it surely slips."""
 PRE_SLIP = 0.5
 """The pre-slip branch is read where abs(F) stays below this share of the force at the foot of the flank."""
 
@@ -20,11 +20,12 @@ PRE_SLIP = 0.5
 def graphical_start(trials: Sequence[Trial]) -> Bingham:
     """Starting values of T0, C and k from the characteristic of force over speed.
 
-    Equation: abs(F) = T0 + C abs(v) on the slip flank; k = dF/dx before slip      Source: eq. (1)-(3)
+    Equation: abs(F) = T0 + C (abs(v) - tau d abs(v)/dt) on the slip flank; k = dF/dx before slip
+              Source: eq. (1)-(3), to first order in tau = C/k
 
     T0 is where the slip flank, extended, meets zero piston speed (the force measured there is
-    larger, the oil spring being still loaded); C is the flank's slope; k the slope of force over
-    displacement where the force passes through zero.
+    larger, the oil spring being still loaded, which the term in tau takes off); C is the flank's
+    slope; k the slope of force over displacement where the force passes through zero.
 
     Parameters
     ----------
@@ -34,23 +35,29 @@ def graphical_start(trials: Sequence[Trial]) -> Bingham:
     -------
     T0 [N], C [N s/m], k [N/m], all positive
     """
-    speed, force = _flank(trials)
-    peak = max(float(np.max(force, initial=0.0)), 1e-12)
-    slope, intercept = np.polyfit(speed, force, 1) if np.ptp(speed) > 0.0 else (0.0, peak)
-    damping = slope if slope > 0.0 else 0.1 * peak / max(float(np.max(speed)), 1e-12)
+    speed, slowing, force = _flank(trials)
+    peak = max(float(np.max(force, initial=0.0)), np.finfo(float).tiny)
+    fastest = max(float(np.max(speed, initial=0.0)), np.finfo(float).tiny)
+    terms = np.column_stack([np.ones(speed.size), speed / fastest, slowing / max(np.max(slowing, initial=0.0), 1e-12)])
+    intercept, slope, _ = np.linalg.lstsq(terms, force / peak, rcond=1e-3)[0] * peak
+    damping = max(slope, 0.05 * peak) / fastest
     friction = float(np.clip(intercept, 0.01 * peak, peak))
     return Bingham(friction, float(damping), _pre_slip_slope(trials, friction))
 
 
-def _flank(trials: Sequence[Trial]) -> tuple[Array, Array]:
-    """Speed and force along the direction of motion, where the element surely slips."""
-    speeds, forces = [], []
+def _flank(trials: Sequence[Trial]) -> tuple[Array, Array, Array]:
+    """Speed, its rate of fall, and force along the direction of motion, on the slip flank."""
+    parts = []
     for t in trials:
-        velocity = t.at_samples(np.gradient(t.displacement, t.step))[t.counted]
-        fast = np.abs(velocity) > FLANK * np.max(np.abs(velocity))
-        speeds.append(np.abs(velocity[fast]))
-        forces.append((t.force[t.counted] * np.sign(velocity))[fast])
-    return np.concatenate(speeds), np.concatenate(forces)
+        velocity = t.at_samples(np.gradient(t.displacement, t.step))
+        step = t.step * (t.displacement.size - 1) / (t.force.size - 1)
+        speed = np.abs(velocity)
+        slowing = -np.gradient(speed, step)
+        along = t.force * np.sign(velocity)
+        flank = t.counted & (speed > FLANK * np.max(speed)) & (slowing >= 0.0) & (along > 0.0)
+        parts.append(np.stack([speed[flank], slowing[flank], along[flank]]))
+    speed, slowing, along = np.concatenate(parts, axis=1)
+    return speed, slowing, along
 
 
 def _pre_slip_slope(trials: Sequence[Trial], friction: float) -> float:

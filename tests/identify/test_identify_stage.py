@@ -1,0 +1,83 @@
+"""The stage: one row a condition, one row of measures a record."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fresh_truths import TABLE_2, sine_test
+from pydantic import ValidationError
+
+from pzd.artefacts import Identified, Rig
+from pzd.identify.config import IdentifyConfig
+from pzd.identify.stage import identify
+from pzd.quantities import Control
+
+
+def rig() -> Rig:
+    records = []
+    for setting in ("wide", "narrow"):
+        for voltage, truth in TABLE_2.items():
+            for frequency in (1.0, 2.0):
+                name = f"{setting}-{voltage:.0f}-{frequency:.0f}"
+                record = sine_test(truth, frequency, 0.03, cycles=4, voltage=voltage, name=name)
+                warm = np.full(record.time.size, 22.0 + frequency / 2.0)
+                records.append(replace(record, setting=setting, temperature=warm))
+    return Rig(tuple(records), ())
+
+
+def test_records_of_one_condition_share_a_row_and_settings_do_not() -> None:
+    found = identify(IdentifyConfig(), rig(), seed=1)
+    assert [(r.setting, r.voltage_V) for r in found.rows] == [
+        ("narrow", 0.0),
+        ("narrow", 150.0),
+        ("wide", 0.0),
+        ("wide", 150.0),
+    ]
+    assert len(found.measures) == 8
+    assert found.untrusted == ()
+
+
+def test_a_narrower_group_splits_conditions() -> None:
+    config = IdentifyConfig.model_validate_json('{"group": {"temperature_degC": 0.1}}')
+    assert len(identify(config, rig(), seed=1).rows) == 8
+
+
+def test_without_voltage_and_temperature_there_is_one_condition() -> None:
+    record = sine_test(TABLE_2[0.0], 2.0, 0.03, cycles=4)
+    (row,) = identify(IdentifyConfig(), Rig((record,), ()), seed=1).rows
+    assert row.voltage_V is None
+    assert row.temperature_degC is None
+    assert row.status == "ok"
+
+
+def test_the_artefact_reads_back_as_it_was_written(tmp_path) -> None:
+    found = identify(IdentifyConfig(), rig(), seed=1)
+    found.write(tmp_path, Control())
+    read = Identified.read(tmp_path, Control())
+    assert read.rows == found.rows
+    assert read.measures == found.measures
+
+
+def test_progress_is_told_one_line_a_condition(caplog) -> None:
+    with caplog.at_level(logging.INFO, logger="pzd.identify"):
+        identify(IdentifyConfig(), rig(), seed=1)
+    assert [m.split(":")[0] for m in caplog.messages] == [f"{i} of 4 conditions" for i in range(1, 5)]
+
+
+def test_the_evolutionary_method_is_chosen_by_name() -> None:
+    single = Rig(rig().records[:1], ())
+    config = IdentifyConfig(method="evolutionary")
+    evolutionary, separable = (
+        identify(config, single, seed=1).rows[0],
+        identify(IdentifyConfig(), single, seed=1).rows[0],
+    )
+    assert evolutionary.W_s == pytest.approx(separable.W_s, rel=1e-6)
+
+
+def test_an_unknown_method_or_key_is_refused() -> None:
+    for wrong in ('{"method": "magic"}', '{"grid": 3}', '{"nodes": []}'):
+        with pytest.raises(ValidationError):
+            IdentifyConfig.model_validate_json(wrong)

@@ -1,0 +1,103 @@
+"""What the data do not determine gets no number, and the reason is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fresh_truths import TABLE_2, acceptance_test, sine_test, with_noise
+
+from pzd.artefacts import ParameterRow
+from pzd.identify.config import IdentifyConfig
+from pzd.identify.fit import fit_condition
+from pzd.identify.objective import Bingham
+from pzd.identify.trust import Evidence, displacement_noise, judge, visible_shares
+from pzd.record import Condition, Record
+
+
+def row_for(*records: Record) -> ParameterRow:
+    return fit_condition(Condition(None, None, None, records), IdentifyConfig(), seed=1)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_a_slow_small_test_cannot_tell_the_damping(noise) -> None:
+    record = sine_test(Bingham(400.0, 2500.0, 4e5), 0.2, 0.002, cycles=6)
+    row = row_for(with_noise(record, np.random.default_rng(1), noise, correlation=0.9))
+    assert row.C_Ns_per_m is None
+    assert row.C_Ns_per_m_low95 is None
+    assert row.status.startswith("undetermined: C (")
+    assert pytest.approx(400.0, rel=0.03) == row.T0_N
+
+
+def test_a_damper_that_never_slips_shows_neither_friction_nor_damping() -> None:
+    row = row_for(sine_test(Bingham(5000.0, 2500.0, 4e5), 2.0, 0.005))
+    assert row.T0_N is None
+    assert row.C_Ns_per_m is None
+    assert "undetermined: T0, C" in row.status
+
+
+def test_a_damper_without_friction_has_a_friction_of_nothing_and_not_an_unknown_one() -> None:
+    record = sine_test(Bingham(0.0, 2500.0, 4e5), 2.0, 0.02)
+    row = row_for(with_noise(record, np.random.default_rng(2)))
+    assert row.T0_N is not None
+    assert row.T0_N_high95 < 0.01 * np.abs(record.force).max()
+    assert row.C_Ns_per_m == pytest.approx(2500.0, rel=0.01)
+
+
+def test_a_rigid_oil_spring_is_undetermined_and_the_others_are_not() -> None:
+    row = row_for(with_noise(sine_test(Bingham(400.0, 2500.0, 4e9), 2.0, 0.02), np.random.default_rng(3)))
+    assert row.k_N_per_m is None
+    assert row.status.startswith("undetermined: k (")
+    assert pytest.approx(400.0, rel=0.05) == row.T0_N
+    assert row.C_Ns_per_m == pytest.approx(2500.0, rel=0.02)
+
+
+def test_displacement_noise_that_hides_the_oil_spring_is_named() -> None:
+    record = sine_test(Bingham(400.0, 2500.0, 3e7), 2.0, 0.02)
+    rng = np.random.default_rng(4)
+    noisy = replace(record, displacement=record.displacement + 1e-5 * rng.standard_normal(record.time.size))
+    row = row_for(noisy)
+    assert row.k_N_per_m is None
+    assert "the displacement's noise is" in row.status
+
+
+def test_displacement_noise_is_measured_and_the_motion_itself_is_not_taken_for_it() -> None:
+    record = sine_test(TABLE_2[0.0], 2.0, 0.03)
+    noise = 5e-6 * np.random.default_rng(5).standard_normal(record.time.size)
+    assert displacement_noise(record.displacement) < 1e-7
+    assert displacement_noise(record.displacement + noise) == pytest.approx(5e-6, rel=0.1)
+
+
+def test_a_model_that_misses_half_of_the_force_is_weak_throughout() -> None:
+    record = sine_test(TABLE_2[0.0], 2.0, 0.03)
+    spoiled = replace(record, force=record.force + 400.0 * np.sin(2.0 * np.pi * 11.0 * record.time))
+    row = row_for(spoiled)
+    assert row.status.startswith("weak: T0, C, k (")
+    assert "of the force's r.m.s." in row.status
+
+
+@pytest.mark.parametrize("seed", range(60, 66))
+def test_good_tests_are_ok(seed) -> None:
+    rng = np.random.default_rng(seed)
+    _, records = acceptance_test(rng)
+    assert row_for(*(with_noise(r, rng) for r in records)).status == "ok"
+
+
+def test_linearly_dependent_slopes_are_invisible() -> None:
+    base = np.random.default_rng(6).standard_normal((100, 2))
+    slopes = np.column_stack([base, base @ [1.0, 2.0]])
+    np.testing.assert_allclose(visible_shares(slopes, np.ones(3), 100.0), 0.0, atol=1e-7)
+    assert np.all(visible_shares(base, np.ones(2), 100.0) > 0.5)
+
+
+def test_undetermined_and_weak_stand_in_one_status() -> None:
+    trust = judge(
+        [
+            Evidence("T0", 100.0, 1.0, 0.3),
+            Evidence("C", 1000.0, 600.0, 0.3),
+            Evidence("k", 1e5, 2e4, 0.3),
+        ]
+    )
+    assert trust.determined == (True, False, True)
+    assert trust.status == "undetermined: C (95 % interval of +-60 %); weak: k (95 % interval of +-20 %)"
