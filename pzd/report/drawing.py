@@ -50,6 +50,7 @@ STYLE: Mapping[str, object] = {
     "xtick.major.size": 3.0,
     "ytick.major.size": 3.0,
     "text.color": INK,
+    "savefig.transparent": True,
     "legend.frameon": False,
     "legend.fontsize": 8.5,
     "lines.linewidth": 1.5,
@@ -78,26 +79,53 @@ class Plot:
     draw: Callable[[Story], Iterable[Panel]]
 
 
-def axes(width: float = 5.2, height: float = 3.4) -> tuple[Figure, Axes]:
-    """An empty figure of one axes, sized in inches to stay readable on a telephone."""
+_WIDTH_IN = 4.5
+_LETTER_IN = 0.078
+
+
+def axes(
+    height: float = 3.1, labels: Iterable[str] = ("-0.000",), *, key: int = 1, right: float = 0.12
+) -> tuple[Figure, Axes]:
+    """An empty figure of one axes, of a size in inches that stays readable on a telephone.
+
+    Parameters
+    ----------
+    height : of the whole figure [in]
+    labels : of the vertical axis; the longest decides where the axes begin
+    key : lines of a legend for which room is kept above
+    right : margin to the right [in]
+
+    Returns
+    -------
+    the figure and its axes
+    """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.add_subplot()
+    figure = Figure(figsize=(_WIDTH_IN, height))
+    left = 0.33 + _LETTER_IN * max(len(label) for label in labels)
+    below, above = 0.5, 0.1 + 0.21 * key
+    box = (left / _WIDTH_IN, below / height, 1.0 - (left + right) / _WIDTH_IN, 1.0 - (below + above) / height)
+    return figure, figure.add_axes(box)
 
 
-def pictures(plots: Iterable[Plot], story: Story) -> tuple[Picture, ...]:
-    """Draw and encode what the plots have to show."""
+def legend(figure: Figure, columns: int = 3) -> None:
+    """What the curves are, above them."""
+    figure.legend(loc="upper left", ncols=columns, bbox_to_anchor=(0.02, 1.01), columnspacing=1.3, handlelength=1.6)
+
+
+def pictures(plots: Iterable[Plot], story: Story) -> tuple[tuple[Picture, ...], ...]:
+    """Draw and encode what the plots have to show, plot by plot."""
     import matplotlib as mpl
 
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
-        return tuple(_encoded(panel) for plot in plots for panel in plot.draw(story))
+        return tuple(tuple(_encoded(panel) for panel in plot.draw(story)) for plot in plots)
 
 
 def _encoded(panel: Panel) -> Picture:
     buffer = io.StringIO()
-    panel.figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
-    text = buffer.getvalue().replace("'DejaVu Sans'", _FONTS)
+    panel.figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :].replace("'DejaVu Sans'", _FONTS)
     data = base64.b64encode(text.encode()).decode()
     return Picture(panel.title, f"data:image/svg+xml;base64,{data}", panel.alt, panel.caption)
 
@@ -112,4 +140,4 @@ def shades(count: int) -> list[tuple[float, float, float, float]]:
     """So many colours from dark blue to ochre, in order of lightness."""
     import matplotlib as mpl
 
-    return [mpl.colormaps[MAP](place) for place in np.linspace(0.0, 0.85, count)] if count else []
+    return [mpl.colormaps[MAP](place) for place in np.linspace(0.0, 0.75, count)] if count else []

@@ -46,21 +46,16 @@ def criterion(measured: Array, simulated: Array) -> float:
     return float(np.sum((measured - simulated) ** 2) / np.sum(measured**2))
 
 
-def by_record(story: Story) -> dict[str, tuple[float, float]]:
-    """W_s of every record of the setting before and after diagnose; the first cycle counts as well."""
-    return {
-        record.name: (
-            criterion(record.force, story.simulated[record.name][0]),
-            criterion(record.force, story.simulated[record.name][1]),
-        )
-        for record in story.records
-    }
+def of_record(story: Story, record: Record) -> tuple[float, float]:
+    """W_s of a record before and after diagnose, over all of its samples."""
+    before, after = (criterion(record.force, force) for force in story.simulated(record))
+    return before, after
 
 
 def gap_map(story: Story) -> GapMap:
-    """Where in voltage and velocity the gap lies, over all records of the setting."""
-    top = max(float(np.abs(record.velocity).max()) for record in story.records)
-    peak = max(float(np.abs(record.force).max()) for record in story.records)
+    """Where in voltage and velocity the gap lies, over the records of the setting."""
+    top = max(float(np.abs(record.velocity).max()) for record in story.sampled)
+    peak = max(float(np.abs(record.force).max()) for record in story.sampled)
     edges = np.linspace(-top, top, _BINS + 1)
     groups = _groups(story)
     before, after = np.full((2, len(groups), _BINS), np.nan)
@@ -68,7 +63,7 @@ def gap_map(story: Story) -> GapMap:
         cells = np.clip(np.digitize(np.concatenate([r.velocity for r in records]), edges) - 1, 0, _BINS - 1)
         count = np.bincount(cells, minlength=_BINS)
         for grid, which in ((before, 0), (after, 1)):
-            gap = np.concatenate([r.force - story.simulated[r.name][which] for r in records])
+            gap = np.concatenate([r.force - story.simulated(r)[which] for r in records])
             square = np.bincount(cells, weights=gap**2, minlength=_BINS)
             with np.errstate(invalid="ignore", divide="ignore"):
                 grid[i] = np.where(count >= _FEWEST, 100.0 / peak * np.sqrt(square / count), np.nan)
@@ -77,9 +72,9 @@ def gap_map(story: Story) -> GapMap:
 
 def _groups(story: Story) -> dict[str, list[Record]]:
     """Records by voltage; by name where all share one; those whose voltage moves stand together."""
-    scale = voltage_scale(story.records)
-    moving = [r for r in story.records if not is_constant(r, scale)]
-    still = sorted((r for r in story.records if is_constant(r, scale)), key=lambda r: r.median_voltage() or 0.0)
+    scale = voltage_scale(story.sampled)
+    moving = [r for r in story.sampled if not is_constant(r, scale)]
+    still = sorted((r for r in story.sampled if is_constant(r, scale)), key=lambda r: r.median_voltage() or 0.0)
     found: dict[str, list[Record]] = {}
     for record in still:
         found.setdefault(story.voltage(record.median_voltage()), []).append(record)

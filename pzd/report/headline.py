@@ -5,24 +5,17 @@ from __future__ import annotations
 from pzd.artefacts import ForceRow, SummaryRow
 from pzd.report.blocks import Card
 from pzd.report.comfort import iso2631_1978
-from pzd.report.comfort.iso2631_1978 import LONGEST_MIN
-from pzd.report.sections.missing import next_test, verdict
-from pzd.report.sections.passenger import COMFORT_TIME, change
-from pzd.report.story import Story, policy_in_words
-from pzd.report.wording import DASH, amount, listed, minutes, number, percent
+from pzd.report.sections.missing import rig_test, verdict
+from pzd.report.sections.passenger import change, times
+from pzd.report.story import Story, effect_in_words, policy_in_words
+from pzd.report.wording import DASH, amount, listed, number, percent, sentence
 
 
 def cards(story: Story) -> tuple[Card, ...]:
     """Damper, missing effect, confidence, next test, comfort: each a question with its answer."""
-    diagnosis = story.diagnosed.diagnosis
-    test = next_test(story, diagnosis.next_test).removeprefix("Next test: ")
-    return (
-        _damper(story),
-        Card("What is missing from the simple model?", _missing(story), _kept(verdict(diagnosis))),
-        _confidence(story),
-        Card("Which test next?", test[0].upper() + test[1:], ""),
-        _comfort(story),
-    )
+    question = "What is missing from the simple model?"
+    missing = Card(question, _missing(story), _meaning(story))
+    return _damper(story), missing, _confidence(story), _next(story), _comfort(story)
 
 
 def _damper(story: Story) -> Card:
@@ -35,9 +28,9 @@ def _damper(story: Story) -> Card:
     first = min((row.temperature_degC for row in rows), key=lambda t: float("-inf") if t is None else t)
     here = [row for row in rows if row.velocity_m_per_s == speed and row.temperature_degC == first]
     low, high = (end(here, key=lambda row: row.voltage_V or 0.0) for end in (min, max))
-    at = f"at {amount(speed, 'm/s')}" + (f" and {amount(first, 'degC')}" if first is not None else "")
-    if low == high:
-        return Card(question, f"{amount(low.force_N, 'N')} {at}", "")
+    at = f"In rebound at {amount(speed, 'm/s')}" + (f" and {amount(first, 'degC')}." if first is not None else ".")
+    if low.voltage_V == high.voltage_V:
+        return Card(question, f"It gives {amount(low.force_N, 'N')}", at)
     return Card(question, f"{_force(story, low)} to {_force(story, high)}", at)
 
 
@@ -47,52 +40,67 @@ def _force(story: Story, row: ForceRow) -> str:
 
 def _missing(story: Story) -> str:
     diagnosis = story.diagnosed.diagnosis
-    names = [name.replace("_", " ") for name in diagnosis.effects]
+    names = listed([_name(effect) for effect in diagnosis.effects])
     if diagnosis.verdict == "named":
-        return listed(names).capitalize()
+        return _capital(names)
     if diagnosis.verdict == "ambiguous":
-        rivals = [name.replace("_", " ") for name in diagnosis.rivals]
-        return listed([*names, *rivals], "or").capitalize() + ": not settled"
+        return _capital(listed([_name(e) for e in (*diagnosis.effects, *diagnosis.rivals)], "or")) + ": not settled"
     if diagnosis.verdict == "none":
-        return "Nothing that can be seen"
-    return f"Unexplained, with {listed(names)} as a part" if names else "Unexplained"
+        return "Nothing that these tests can see"
+    return f"Something unexplained, beside {names}" if names else "Something unexplained"
 
 
-def _kept(text: str) -> str:
-    return text.split(" (confidence")[0].rstrip(".") + "."
+def _meaning(story: Story) -> str:
+    diagnosis = story.diagnosed.diagnosis
+    if diagnosis.verdict == "named":
+        return sentence("; ".join(effect_in_words(effect) for effect in diagnosis.effects))
+    return verdict(diagnosis)
+
+
+def _name(effect: str) -> str:
+    return effect.replace("_", " ")
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _confidence(story: Story) -> Card:
     diagnosis = story.diagnosed.diagnosis
     gap = diagnosis.gap
-    answer = percent(diagnosis.confidence) if diagnosis.confidence is not None else "Not stated"
-    if gap.after == gap.before:
-        return Card("How sure is that?", answer, f"Gap on held-out data: W_s {number(gap.before)}, noise {number(gap.noise_floor)}.")
-    return Card("How sure is that?", answer, f"Gap on held-out data: W_s from {number(gap.before)} to {number(gap.after)}, noise {number(gap.noise_floor)}.")
+    moved = (
+        f"stays {number(gap.before)}"
+        if gap.after == gap.before
+        else f"goes from {number(gap.before)} to {number(gap.after)}"
+    )
+    detail = f"The gap W_s on held-out data {moved}; noise alone is {number(gap.noise_floor)}."
+    return Card(
+        "How sure is that?", percent(diagnosis.confidence) if diagnosis.confidence is not None else "Not stated", detail
+    )
+
+
+def _next(story: Story) -> Card:
+    test = story.diagnosed.diagnosis.next_test
+    if test is None:
+        return Card("Which test next?", "None is called for", "")
+    names = listed([_name(effect) for effect in test.separates])
+    return Card("Which test next?", _capital(rig_test(story, test)), sentence(f"it separates {names}") if names else "")
 
 
 def _comfort(story: Story) -> Card:
     pairs = [(road, story.reference(road), story.controlled(road)) for road in story.roads]
-    told = [(road, a, b) for road, a, b in pairs if a is not None and b is not None]
+    told = [(story.road(road), a, b) for road, a, b in pairs if a is not None and b is not None]
     if not told:
-        return Card("What does the passenger gain?", "Not compared", "No ride at constant damping stands beside another.")
-    if iso2631_1978.EDITION in story.config.editions:
-        answers = [f"{road}: {_times(story, a, b)}" for road, a, b in told]
-        note = f"Within reduced comfort, {policy_in_words(told[0][2])} against constant c; {iso2631_1978.EDITION}, {iso2631_1978.TRUST}."
-        return Card("How much longer can a passenger sit?", "; ".join(answers), note)
-    answers = [f"{road}: {_levels(story, a, b)}" for road, a, b in told]
-    return Card("What does the passenger gain?", "; ".join(answers), f"Weighted r.m.s. a_w, {policy_in_words(told[0][2])} against constant c.")
-
-
-def _times(story: Story, reference: SummaryRow, controlled: SummaryRow) -> str:
-    before, after = (story.value(row.case, COMFORT_TIME) for row in (reference, controlled))
-    if before is None or after is None:
-        return DASH
-    if before == after:
-        return f"{minutes(after)} either way"
-    if 0.0 < before < LONGEST_MIN and 0.0 < after < LONGEST_MIN:
-        return f"{minutes(after)} instead of {minutes(before)} ({number(after / before, 2)} times)"
-    return f"{minutes(after)} instead of {minutes(before)}"
+        return Card(
+            "What does the passenger gain?", "Not compared", "No ride at constant damping stands beside another."
+        )
+    levels = "; ".join(f"{road}: {_levels(story, a, b)}" for road, a, b in told)
+    beside = f"{_capital(policy_in_words(told[0][2]))}, beside constant c."
+    if iso2631_1978.EDITION not in story.config.editions:
+        return Card("What does the passenger gain?", levels, f"Acceleration a_w. {beside}")
+    longer = "; ".join(f"{road}: {times(story, a, b)}" for road, a, b in told)
+    source = f"Within reduced comfort, {iso2631_1978.EDITION} ({iso2631_1978.TRUST})."
+    return Card("How much longer can a passenger sit?", longer, f"{beside} {source} Acceleration a_w: {levels}.")
 
 
 def _levels(story: Story, reference: SummaryRow, controlled: SummaryRow) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pzd.quantities import DISPLACEMENT, Quantity
 from pzd.record import Array, Record
-from pzd.report.drawing import FINAL, MEASURED, PLAIN, Panel, axes, thinned
+from pzd.report.drawing import FINAL, MEASURED, PLAIN, Panel, axes, legend, thinned
 from pzd.report.story import Story
 
 
@@ -23,7 +23,7 @@ def loops(story: Story, record: Record, abscissa: Array, quantity: Quantity, tit
     -------
     the panel
     """
-    before, after = story.simulated[record.name]
+    before, after = story.simulated(record)
     part = story.last_cycles(record)
     x, measured, plain, final = thinned(abscissa[part], record.force[part], before[part], after[part])
     figure, ax = axes()
@@ -34,7 +34,9 @@ def loops(story: Story, record: Record, abscissa: Array, quantity: Quantity, tit
     unit = "mm" if quantity == DISPLACEMENT else quantity.unit
     ax.set_xlabel(f"{quantity.name} [{unit}]")
     ax.set_ylabel("force [kN]")
-    ax.legend(loc="best")
-    name = story.named(record)
+    legend(figure)
+    name = story.conditions(record)
     curves = "measured force, the simple model" + (" and the extended one" if story.extended else "")
-    return Panel(figure, f"{title[0].upper()}{title[1:]}, {name}", f"{title}, {name}: {curves}.", "")
+    return Panel(
+        figure, f"{title[0].upper()}{title[1:]}, {name}", f"{title}, {name}: {curves}.", f"Record {record.name}."
+    )

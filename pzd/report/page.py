@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from pzd.report.blocks import Card, Picture, Section
+from pzd.report.blocks import Card, Section
 from pzd.report.drawing import pictures
 from pzd.report.headline import cards
 from pzd.report.plots import library
 from pzd.report.sections import damper, made, missing, model, passenger, tested, trust
+from pzd.report.sections.pictures import Pictures
 from pzd.report.story import Story
 
 _PLACES = ("model", "missing", "damper", "passenger")
@@ -36,7 +37,7 @@ def page(story: Story) -> str:
     return render(_title(story), cards(story), sections)
 
 
-def _drawn(story: Story) -> dict[str, tuple[Picture, ...]]:
+def _drawn(story: Story) -> Pictures:
     plots = library().values()
     return {place: pictures([plot for plot in plots if plot.place == place], story) for place in _PLACES}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,11 +17,14 @@ from pzd.report.comfort.ride import SettledRide
 from pzd.report.config import ReportConfig
 from pzd.report.wording import amount
 from pzd.simulate.config import SimulateConfig
+from pzd.simulate.roads.sine import Sine
 
 PLAIN = "-plain"
 """Ends the name of a ride on the damper before diagnose."""
 REFERENCE = "constant"
 """The policy that the others are set beside."""
+_MOST_SAMPLES = 300_000
+"""A map of the gap is made from about so many samples."""
 _REALISTIC = ("dynamic", "table", "ideal")
 """Fidelities, the one nearest to the road first."""
 
@@ -63,18 +67,26 @@ class Story:
         return tuple(row for row in self.identified.rows if row.setting == self.chosen)
 
     @cached_property
-    def simulated(self) -> dict[str, tuple[Array, Array]]:
-        """Force of the plain and of the final damper in every record of the setting [N]."""
-        from pzd.damper.compose import respond
-        from pzd.damper.motion import Motion
+    def sampled(self) -> tuple[Record, ...]:
+        """Records for maps: all of the setting, or every so manyth where they are too many to simulate at leisure."""
+        total = sum(record.time.size for record in self.records)
+        return self.records[:: max(math.ceil(total / _MOST_SAMPLES), 1)]
 
-        plain, damper = self.diagnosed.plain, self.diagnosed.damper
-        found: dict[str, tuple[Array, Array]] = {}
-        for record in self.records:
+    def simulated(self, record: Record) -> tuple[Array, Array]:
+        """(n,) force of the plain and of the final damper in the motion of a record [N]."""
+        if record.name not in self._forces:
+            from pzd.damper.compose import respond
+            from pzd.damper.motion import Motion
+
             motion = Motion.of(record)
-            before = respond(plain, motion)
-            found[record.name] = (before, respond(damper, motion) if self.extended else before)
-        return found
+            before = respond(self.diagnosed.plain, motion)
+            after = respond(self.diagnosed.damper, motion) if self.extended else before
+            self._forces[record.name] = (before, after)
+        return self._forces[record.name]
+
+    @cached_property
+    def _forces(self) -> dict[str, tuple[Array, Array]]:
+        return {}
 
     @property
     def extended(self) -> bool:
@@ -98,22 +110,27 @@ class Story:
         """The last two cycles of a periodic record, the last ten of any other; the start is left out."""
         cycles = self.entries[record.name].cycles if record.name in self.entries else 0.0
         periodic = any(m.record == record.name and m.frequency_Hz is not None for m in self.identified.measures)
-        wanted = 2.0 if periodic else 10.0
-        if cycles <= wanted:
-            return slice(0, None)
-        return slice(round(record.time.size * (1.0 - wanted / cycles)), None)
+        share = min((2.0 if periodic else 10.0) / max(cycles, 1.0), 1.0 - 1.0 / max(cycles, 1.0))
+        return slice(round(record.time.size * (1.0 - share)) if share > 0.0 else 0, None)
 
     def voltage(self, value: float | None) -> str:
         """A value of the control signal with its unit, in words where there is none."""
         unit = self.control.unit
         return f"no {self.control.name}" if value is None else amount(value, unit)
 
-    def named(self, record: Record) -> str:
-        """A record with its conditions."""
+    def conditions(self, record: Record) -> str:
+        """The conditions of a record; its name where it has none."""
         parts = [self.voltage(record.median_voltage())] if record.voltage is not None else []
         if record.temperature is not None:
             parts.append(amount(record.median_temperature(), "degC"))
-        return f"{record.name} ({', '.join(parts)})" if parts else record.name
+        return ", ".join(parts) or record.name
+
+    def road(self, name: str) -> str:
+        """A road in words: a sine by its frequency and amplitude, any other by its name."""
+        for road in self.simulate.roads:
+            if road.name == name and isinstance(road, Sine) and road.label is None:
+                return f"{amount(road.frequency_Hz, 'Hz')} sine"
+        return name
 
     @cached_property
     def measures(self) -> dict[tuple[str, str], ComfortRow]:

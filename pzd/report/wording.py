@@ -10,6 +10,8 @@ THIN = "\u202f"
 MINUS = "\u2212"
 DASH = "\u2013"
 TIMES = "\u00d7"
+KEPT = "\u00a0"
+"""A space at which no line breaks."""
 
 _UNITS = {
     "m/s2": "m/s²",
@@ -30,24 +32,28 @@ def unit_of(unit: str) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number to so many significant digits, with thin spaces between thousands; a dash for none."""
+    """A number to at most so many significant digits, with thin spaces between thousands; a dash for none."""
     if value is None or not math.isfinite(value):
         return DASH
     if value == 0.0:
         return "0"
     magnitude = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
-    if magnitude >= 6 or magnitude < -3:
-        mantissa = f"{value / 10.0**magnitude:.{digits - 1}f}".rstrip("0").rstrip(".")
-        return f"{mantissa} {TIMES} 10{str(magnitude).translate(_SUPERSCRIPT)}".replace("-", MINUS)
-    places = max(digits - 1 - magnitude, 0)
-    rounded = round(value, digits - 1 - magnitude)
-    return f"{rounded:,.{places}f}".replace(",", THIN).replace("-", MINUS)
+    if magnitude >= 6 or magnitude < -4:
+        power = str(magnitude).translate(_SUPERSCRIPT)
+        return f"{_plain(value / 10.0**magnitude, digits - 1)}{KEPT}{TIMES}{KEPT}10{power}"
+    return _plain(round(value, digits - 1 - magnitude), max(digits - 1 - magnitude, 0))
+
+
+def _plain(value: float, places: int) -> str:
+    text = f"{value:,.{places}f}"
+    text = text.rstrip("0").rstrip(".") if "." in text else text
+    return text.replace(",", THIN).replace("-", MINUS)
 
 
 def amount(value: float | None, unit: str, digits: int = 3) -> str:
     """A number with its unit; a dash alone where there is none."""
     text, shown = number(value, digits), unit_of(unit)
-    return text if text == DASH or not shown else f"{text} {shown}"
+    return text if text == DASH or not shown else f"{text}{KEPT}{shown}"
 
 
 def interval(value: float | None, low: float | None, high: float | None) -> str:
@@ -77,7 +83,7 @@ def _at(bound: float, value: float, digits: int) -> str:
 
 def percent(share: float | None, digits: int = 2) -> str:
     """A share in percent."""
-    return DASH if share is None else f"{number(100.0 * share, digits)} %"
+    return DASH if share is None else f"{number(100.0 * share, digits)}{KEPT}%"
 
 
 def minutes(value: float | None) -> str:
@@ -87,9 +93,9 @@ def minutes(value: float | None) -> str:
     if value >= LONGEST_MIN:
         return "more than 24 h"
     if value < 60.0:
-        return f"{value:.0f} min"
+        return f"{value:.0f}{KEPT}min"
     hours, rest = divmod(round(value), 60)
-    return f"{hours} h {rest} min" if rest else f"{hours} h"
+    return f"{hours}{KEPT}h{KEPT}{rest}{KEPT}min" if rest else f"{hours}{KEPT}h"
 
 
 def listed(words: list[str], last: str = "and") -> str:

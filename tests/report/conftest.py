@@ -48,6 +48,7 @@ PLAIN = Damper(
 )
 FINAL = PLAIN.with_effect("orifice_quadratic", {"q": 1510.0})
 SETTLE_S, RATE_HZ, DURATION_S = 4.0, 500.0, 20.0
+VOLTS = Control()
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Run:
     diagnosed: Diagnosed
     table: Table
     rides: Rides
-    control: Control = Control()
+    control: Control = VOLTS
     setting: str | None = "gap 0.25 mm"
 
     def told(self, config: ReportConfig | None = None) -> Report:
@@ -98,9 +99,18 @@ def entry(of: Record, findings: tuple[Finding, ...] = ()) -> RecordEntry:
 
 
 def rig() -> Rig:
-    tests = [(f"r{i:02d}", *test) for i, test in enumerate(((2.0, 0.03, 0.0), (2.0, 0.03, 150.0), (1.0, 0.022, 0.0), (1.0, 0.022, 150.0)))]
+    tests = [
+        (f"r{i:02d}", *test)
+        for i, test in enumerate(((2.0, 0.03, 0.0), (2.0, 0.03, 150.0), (1.0, 0.022, 0.0), (1.0, 0.022, 150.0)))
+    ]
     records = tuple(record(*test) for test in tests)
-    spike = Finding(check="spike", where="0.412 s", size=312.0, unit="N", follows="one sample of the force stands out; W_s rises a little")
+    spike = Finding(
+        check="spike",
+        where="0.412 s",
+        size=312.0,
+        unit="N",
+        follows="one sample of the force stands out; W_s rises a little",
+    )
     return Rig(records, (entry(records[0], (spike,)), *(entry(r) for r in records[1:])))
 
 
@@ -160,8 +170,16 @@ def diagnosis() -> Diagnosis:
         ),
         parameters={"orifice_quadratic": {"q": Value(value=1510.0, low95=1490.0, high95=1530.0, unit="N s2/m2")}},
         ranking=(
-            Ranked(effect="orifice_quadratic", gap_after=0.0009, delta_bic=-5120.3, parameters={"q": 1510.0}, reason="adopted"),
-            Ranked(effect="shear_thinning", gap_after=0.004, delta_bic=-800.0, parameters={"n": 0.9}, reason="stand-in"),
+            Ranked(
+                effect="orifice_quadratic",
+                gap_after=0.0009,
+                delta_bic=-5120.3,
+                parameters={"q": 1510.0},
+                reason="adopted",
+            ),
+            Ranked(
+                effect="shear_thinning", gap_after=0.004, delta_bic=-800.0, parameters={"n": 0.9}, reason="stand-in"
+            ),
         ),
         rivals=(),
         where=(Region(region="abs(v) > 0.25 m/s, 150 V", share_of_gap=0.71),),
@@ -224,7 +242,12 @@ def rides() -> Rides:
             made.append(ride(f"{road}-comfort-{fidelity}", road, "comfort", fidelity, parts))
         made.append(ride(f"{road}-comfort-dynamic-plain", road, "comfort", "dynamic", {f: 1.5 * controlled}))
     step = Response(
-        signal="voltage", from_voltage_V=0.0, to_voltage_V=150.0, velocity_m_per_s=0.2, to_63_percent_s=0.0039, to_90_percent_s=0.009
+        signal="voltage",
+        from_voltage_V=0.0,
+        to_voltage_V=150.0,
+        velocity_m_per_s=0.2,
+        to_63_percent_s=0.0039,
+        to_90_percent_s=0.009,
     )
     return Rides(tuple(r for r, _ in made), tuple(s for _, s in made), (step,))
 

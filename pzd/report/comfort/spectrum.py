@@ -70,8 +70,6 @@ def third_octaves(acceleration: Array, rate: float, nominal: Array) -> Component
     frequency = np.fft.rfftfreq(acceleration.size, 1.0 / rate)
     number = np.round(_TRUE_CENTRE * np.log10(nominal))
     low, high = 10.0 ** ((number - 0.5) / _TRUE_CENTRE), 10.0 ** ((number + 0.5) / _TRUE_CENTRE)
-    bands = np.array(
-        [mean_square[(frequency >= a) & (frequency < b)].sum() for a, b in zip(low, high, strict=True)]
-    )
+    bands = np.array([mean_square[(frequency >= a) & (frequency < b)].sum() for a, b in zip(low, high, strict=True)])
     total = float(mean_square.sum())
     return Components(nominal, np.sqrt(bands), float(bands.sum()) / total if total > 0.0 else 1.0)

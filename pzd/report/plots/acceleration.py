@@ -8,7 +8,7 @@ import numpy as np
 
 from pzd.artefacts import SummaryRow
 from pzd.report.comfort.ride import SettledRide
-from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes, thinned
+from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes, legend, thinned
 from pzd.report.story import REFERENCE, Story, policy_in_words
 from pzd.report.wording import number
 
@@ -23,7 +23,7 @@ def draw(story: Story) -> Iterator[Panel]:
         reference, others = story.reference(road), _controlled(story, road)
         shown = ([reference] if reference else []) + others
         if shown:
-            yield _panel(road, shown, rides)
+            yield _panel(story, road, shown, rides)
 
 
 def _controlled(story: Story, road: str) -> list[SummaryRow]:
@@ -32,8 +32,8 @@ def _controlled(story: Story, road: str) -> list[SummaryRow]:
     return sorted(first, key=lambda row: list(BY_FIDELITY).index(row.fidelity))
 
 
-def _panel(road: str, shown: list[SummaryRow], rides: dict[str, SettledRide]) -> Panel:
-    figure, ax = axes()
+def _panel(story: Story, road: str, shown: list[SummaryRow], rides: dict[str, SettledRide]) -> Panel:
+    figure, ax = axes(key=2)
     window = _window(rides[shown[0].case])
     for row in shown:
         ride = rides[row.case]
@@ -46,9 +46,10 @@ def _panel(road: str, shown: list[SummaryRow], rides: dict[str, SettledRide]) ->
     ax.set_ylabel("|a_K| [m/s²]")
     ax.set_xlim(left=0.0)
     ax.set_ylim(bottom=0.0)
-    figure.legend(loc="outside upper center", ncols=2)
+    legend(figure, 2)
     peaks = "; ".join(f"{policy_in_words(row)} {number(row.peak_abs_aK_m_per_s2)} m/s²" for row in shown)
-    return Panel(figure, f"Acceleration at {shown[0].point}, {road}", f"Peaks of |a_K| on {road}: {peaks}.", "")
+    title = f"Acceleration at {shown[0].point}, {story.road(road)}"
+    return Panel(figure, title, f"Peaks of |a_K| on {road}: {peaks}.", "")
 
 
 def _window(ride: SettledRide) -> slice:

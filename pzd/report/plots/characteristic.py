@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pzd.report.drawing import Panel, Plot, axes, shades
+from pzd.report.drawing import Panel, Plot, axes, legend, shades
 from pzd.report.story import Story
 from pzd.report.wording import amount, number
 
@@ -18,7 +18,7 @@ def draw(story: Story) -> Iterator[Panel]:
         return
     rows = [row for row in story.table.force if row.temperature_degC == temperatures[0] and row.force_N is not None]
     voltages = sorted({row.voltage_V for row in rows}, key=lambda v: v or 0.0)
-    figure, ax = axes()
+    figure, ax = axes(key=(len(voltages) + 3) // 4)
     for voltage, colour in zip(voltages, shades(len(voltages)), strict=True):
         points = np.array([(r.velocity_m_per_s, r.force_N, r.inside) for r in rows if r.voltage_V == voltage])
         inside = np.where(points[:, 2] > 0, points[:, 1], np.nan) / 1000.0
@@ -26,7 +26,7 @@ def draw(story: Story) -> Iterator[Panel]:
         ax.plot(points[:, 0], inside, color=colour, label=story.voltage(voltage))
     ax.set_xlabel("velocity [m/s]")
     ax.set_ylabel("force [kN]")
-    ax.legend(loc="upper left")
+    legend(figure, 4)
     at = f" at {amount(temperatures[0], 'degC')}" if temperatures[0] is not None else ""
     reached = story.table.notes.reached_m_per_s
     alt = f"Force of the damper over velocity for {len(voltages)} values of the {story.control.name}{at}."
@@ -35,4 +35,4 @@ def draw(story: Story) -> Iterator[Panel]:
     )
 
 
-PLOT = Plot("characteristic", "damper", 0, draw)
+PLOT = Plot("characteristic", "damper", 1, draw)

@@ -25,14 +25,15 @@ def draw(story: Story) -> Iterator[Panel]:
     known = [(row, value) for row, value in zip(rows, values, strict=True) if value is not None][::-1]
     if not known:
         return
-    figure, ax = axes(height=2.0 + 0.24 * len(known))
+    names = [f"{story.road(row.road)}, {policy_in_words(row)}" for row, _ in known]
+    figure, ax = axes(1.5 + 0.22 * len(known), names, key=0)
     right = max(2.6, 1.15 * max(value for _, value in known))
     _bands(ax, len(known), right)
     for place, (row, value) in enumerate(known):
         constant = row.policy == REFERENCE
         colour = PLAIN if constant else BY_FIDELITY[row.fidelity]
         ax.plot(value, place, "o" if constant else "s", color=colour, markersize=6.0, zorder=3)
-    ax.set_yticks(range(len(known)), [f"{row.road}: {policy_in_words(row)}" for row, _ in known])
+    ax.set_yticks(range(len(known)), names)
     ax.set_ylim(-0.6, len(known) + 2.6)
     ax.set_xlim(0.0, right)
     ax.set_xlabel("a_w [m/s²]")
@@ -46,8 +47,8 @@ def _bands(ax: Axes, top: int, right: float) -> None:
         height = top - 0.1 + 0.85 * (2 - i % 3)
         end = float(np.minimum(band.high, right))
         ax.barh(height, end - band.low, left=band.low, height=0.8, color=shade, edgecolor="#9aa5b1", linewidth=0.5)
-        ax.annotate(band.text.replace(" uncomfortable", ""), (band.low, height), (3, 0), textcoords="offset points",
-                    va="center", fontsize=7.5)  # fmt: skip
+        name = band.text.replace(" uncomfortable", "")
+        ax.annotate(name, (band.low, height), (2, 0), textcoords="offset points", va="center", fontsize=7.0)
 
 
 PLOT = Plot("comfort_scale", "passenger", 1, draw)

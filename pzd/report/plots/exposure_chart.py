@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pzd.report.comfort import iso2631_1978
-from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes
+from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes, legend
 from pzd.report.story import REFERENCE, Story, policy_in_words
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def draw(story: Story) -> Iterator[Panel]:
 
 
 def _panel(story: Story, road: str, cases: list[str]) -> Panel:
-    figure, ax = axes(height=3.7)
+    figure, ax = axes(3.3)
     _boundaries(ax)
     for ride in (ride for ride in story.settled if ride.row.case in cases):
         parts, _ = ride.components()
@@ -42,8 +42,8 @@ def _panel(story: Story, road: str, cases: list[str]) -> Panel:
         ax.plot(parts.frequency[kept], parts.rms[kept], marker, color=colour, markersize=6.0, label=label, zorder=3)
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("acceleration, r.m.s. [m/s²]")
-    figure.legend(loc="outside upper center", ncols=2)
-    title = f"Exposure time within reduced comfort, {road}"
+    legend(figure)
+    title = f"Reduced comfort, {story.road(road)}"
     alt = f"Components of the rides over {road} on the chart of reduced comfort of ISO 2631:1978."
     return Panel(figure, title, alt, "Boundaries of ISO 2631:1978: unverified transcription of a withdrawn standard.")
 
@@ -53,7 +53,8 @@ def _boundaries(ax: Axes) -> None:
     for minutes, level in zip(table.minutes, table.level.T, strict=True):
         if float(minutes) in _LINES:
             ax.plot(table.frequency, factor * level, color="#9aa5b1", linewidth=1.0)
-            ax.annotate(_LINES[float(minutes)], (80.0, factor * level[-1]), (3, -3), textcoords="offset points", fontsize=8)
+            end = (float(table.frequency[-1]), factor * float(level[-1]))
+            ax.annotate(_LINES[float(minutes)], end, (3, -3), textcoords="offset points", fontsize=8)
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xlim(1.0, 130.0)

@@ -24,13 +24,17 @@ def draw(story: Story) -> Iterator[Panel]:
 
 
 def _panel(found: GapMap, values: Array, top: float, which: str) -> Panel:
-    figure, ax = axes(height=1.5 + 0.3 * max(len(found.rows), 4))
-    mesh = ax.pcolormesh(found.edges, np.arange(len(found.rows) + 1), values, cmap=MAP, vmin=0.0, vmax=top)
+    figure, ax = axes(1.5 + 0.3 * max(len(found.rows), 4), found.rows, key=0, right=0.75)
+    cells = np.arange(len(found.rows) + 1)
+    mesh = ax.pcolormesh(found.edges, cells, values, cmap=MAP, vmin=0.0, vmax=top, edgecolors="face", linewidth=0.9)
     ax.set_yticks(np.arange(len(found.rows)) + 0.5, found.rows)
     ax.set_xlabel("velocity [m/s]")
     ax.grid(visible=False)
-    figure.colorbar(mesh, ax=ax, label="gap [% of peak force]")
-    title = f"Where the gap lies: {which}"
+    box = ax.get_position()
+    figure.colorbar(
+        mesh, cax=figure.add_axes((box.x1 + 0.02, box.y0, 0.025, box.height)), label="gap [% of peak force]"
+    )
+    title = f"Gap, {which}"
     largest = f"largest {np.nanmax(values):.2g} % of the peak force"
     alt = f"Map of the r.m.s. gap by voltage and velocity, {which}; {largest}."
     return Panel(figure, title, alt, "R.m.s. of measured minus simulated force, in % of the largest measured force.")

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pzd.report.drawing import FINAL, PLAIN, Panel, Plot, axes
-from pzd.report.gaps import by_record
+from pzd.report.drawing import FINAL, PLAIN, Panel, Plot, axes, legend
+from pzd.report.gaps import of_record
 from pzd.report.story import Story
 
 _MOST = 16
@@ -18,18 +18,19 @@ def draw(story: Story) -> Iterator[Panel]:
     if not story.extended:
         return
     held_out = set(story.diagnosed.diagnosis.gap.held_out)
-    found = {name: gap for name, gap in by_record(story).items() if name in held_out}
-    if not found:
+    records = [record for record in story.records if record.name in held_out][:_MOST][::-1]
+    if not records:
         return
-    names = sorted(found)[:_MOST][::-1]
-    before, after = np.array([found[name] for name in names]).T
-    figure, ax = axes(height=1.3 + 0.26 * max(len(names), 3))
+    names = [record.name for record in records]
+    before, after = np.array([of_record(story, record) for record in records]).T
+    figure, ax = axes(1.0 + 0.26 * max(len(names), 3), names)
     ax.hlines(names, after, before, color="#b8c4d0", linewidth=2.0)
     ax.plot(before, names, "o", color=PLAIN, label="before")
     ax.plot(after, names, "s", color=FINAL, label="after")
     ax.set_xlim(0.0, 1.1 * float(max(before.max(), after.max())))
     ax.set_xlabel("W_s [-]")
-    figure.legend(loc="outside upper center", ncols=2)
+    ax.margins(y=0.25)
+    legend(figure)
     alt = f"W_s of {len(names)} held-out records; it falls in {int(np.sum(after < before))} of them."
     yield Panel(figure, "Held-out records one by one", alt, "")
 

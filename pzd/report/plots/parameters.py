@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from pzd.artefacts import ParameterRow
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS
-from pzd.report.drawing import Panel, Plot, axes, shades
+from pzd.report.drawing import Panel, Plot, axes, legend, shades
 from pzd.report.story import Story
 from pzd.report.wording import amount, unit_of
 
@@ -15,9 +15,10 @@ def draw(story: Story) -> Iterator[Panel]:
     """One panel a parameter; nothing where there are fewer than two voltages."""
     if len({row.voltage_V for row in story.parameters if row.voltage_V is not None}) < 2:
         return
+    temperatures = sorted({row.temperature_degC for row in story.parameters}, key=lambda t: t or 0.0)
+    voltages = [row.voltage_V for row in story.parameters if row.voltage_V is not None]
     for quantity in (FRICTION, DAMPING, STIFFNESS):
-        figure, ax = axes(height=2.9)
-        temperatures = sorted({row.temperature_degC for row in story.parameters}, key=lambda t: t or 0.0)
+        figure, ax = axes(2.6, key=int(len(temperatures) > 1))
         for temperature, colour in zip(temperatures, shades(len(temperatures)), strict=True):
             rows = [row for row in story.parameters if row.temperature_degC == temperature]
             known = sorted(
@@ -30,21 +31,24 @@ def draw(story: Story) -> Iterator[Panel]:
                 label = amount(temperature, "degC") if temperature is not None else None
                 ax.errorbar(x, y, yerr=(below, above), fmt="o-", color=colour, capsize=3.0, markersize=4.0, label=label)
         ax.set_xlabel(f"{story.control.name} [{story.control.unit}]")
-        ax.set_ylabel(f"{quantity.symbol} [{unit_of(quantity.unit)}]")
+        ax.set_ylabel(f"{quantity.symbol} [k{unit_of(quantity.unit)}]")
+        margin = 0.05 * (max(voltages) - min(voltages))
+        ax.set_xlim(min(voltages) - margin, max(voltages) + margin)
         ax.margins(y=0.15)
         if len(temperatures) > 1:
-            ax.legend()
+            legend(figure, 4)
         name = quantity.meaning.removesuffix(" of the Bingham element")
         title = f"{quantity.symbol}: {name}"
         yield Panel(figure, title, f"{title}, over the {story.control.name}, with 95 % intervals.", "Whiskers: 95 %.")
 
 
 def _bounds(row: ParameterRow, column: str) -> tuple[float, float, float]:
+    """Value and lengths of its whiskers, in thousands."""
     value = float(getattr(row, column))
     low, high = getattr(row, f"{column}_low95"), getattr(row, f"{column}_high95")
-    if low is None or high is None:
-        return value, 0.0, 0.0
-    return value, max(value - float(low), 0.0), max(float(high) - value, 0.0)
+    below = max(value - float(low), 0.0) if low is not None else 0.0
+    above = max(float(high) - value, 0.0) if high is not None else 0.0
+    return value / 1000.0, below / 1000.0, above / 1000.0
 
 
-PLOT = Plot("parameters", "damper", 1, draw)
+PLOT = Plot("parameters", "damper", 0, draw)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.report.drawing import FINAL, GRID, MEASURED, PLAIN, Panel, Plot, axes
+from pzd.report.drawing import FINAL, GRID, MEASURED, PLAIN, Panel, Plot, axes, legend
 from pzd.report.story import Story
 
 _MOST = 10
@@ -16,7 +16,7 @@ def draw(story: Story) -> Iterator[Panel]:
     ranked = diagnosis.ranking[:_MOST][::-1]
     if not ranked:
         return
-    figure, ax = axes(height=1.3 + 0.26 * max(len(ranked), 3))
+    figure, ax = axes(1.0 + 0.26 * max(len(ranked), 3), [r.effect for r in ranked])
     colours = [FINAL if r.effect in diagnosis.effects else "#b8c4d0" for r in ranked]
     ax.barh([r.effect for r in ranked], [r.gap_after for r in ranked], color=colours, height=0.62)
     ax.axvline(diagnosis.gap.before, color=PLAIN, linestyle="--", linewidth=1.2, label="simple model")
@@ -24,7 +24,7 @@ def draw(story: Story) -> Iterator[Panel]:
     ax.set_xlabel("W_s that is left [-]")
     ax.grid(visible=False, axis="y")
     ax.grid(color=GRID, axis="x")
-    figure.legend(loc="outside upper center", ncols=2)
+    legend(figure)
     alt = f"What each candidate leaves of the gap; best: {ranked[-1].effect}, W_s {ranked[-1].gap_after:.3g}."
     yield Panel(figure, "What each candidate leaves of the gap", alt, "Adopted effects stand out in dark blue.")
 

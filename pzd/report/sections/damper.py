@@ -7,8 +7,8 @@ import numpy as np
 from pzd.artefacts import ParameterRow
 from pzd.damper.effects import library
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS
-from pzd.report.blocks import Block, Notes, Paragraph, Picture, Section, Sheet
-from pzd.report.sections.pictures import gallery
+from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
+from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.story import Story, effect_in_words
 from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
 
@@ -16,14 +16,17 @@ _QUANTITIES = (FRICTION, DAMPING, STIFFNESS)
 _FOLD = 12
 
 
-def tell(story: Story, pictures: dict[str, tuple[Picture, ...]]) -> Section:
+def tell(story: Story, pictures: Pictures) -> Section:
     """The fourth section."""
     blocks: list[Block] = [Paragraph(_intro(story)), _parameters(story)]
-    blocks += gallery(pictures["damper"])
+    blocks += galleries(pictures["damper"])
     blocks += [_force(story)] if story.table.force else []
     notes = story.table.notes
     if notes.not_monotone:
-        blocks += [Paragraph(f"Force does not always rise with the {story.control.name}:"), Notes(notes.not_monotone, "care")]
+        blocks += [
+            Paragraph(f"Force does not always rise with the {story.control.name}:"),
+            Notes(notes.not_monotone, "care"),
+        ]
     if notes.lost:
         blocks += [Paragraph("A table of force cannot carry:"), Notes(notes.lost)]
     blocks += [_responses(story)] if story.rides.responses else []
@@ -36,8 +39,8 @@ def _intro(story: Story) -> str:
     laws = [f"{effect_in_words(name)}, {library()[name].law}" for name in effects]
     beside = f" Beside it stands: {listed(laws)}." if laws else ""
     return (
-        "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. A value that the data "
-        f"do not determine is left out, and the status says so.{beside}"
+        "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. A value that the "
+        f"data do not determine is left out, and the status says so.{beside}"
     )
 
 
@@ -48,9 +51,7 @@ def _parameters(story: Story) -> Sheet:
 
 
 def _row(story: Story, row: ParameterRow) -> tuple[str, ...]:
-    values = (
-        interval(*(getattr(row, f"{q.column}{end}") for end in ("", "_low95", "_high95"))) for q in _QUANTITIES
-    )
+    values = (interval(*(getattr(row, f"{q.column}{end}") for end in ("", "_low95", "_high95"))) for q in _QUANTITIES)
     return (
         story.voltage(row.voltage_V),
         amount(row.temperature_degC, "degC"),
@@ -100,12 +101,14 @@ def _responses(story: Story) -> Sheet:
         )
         for r in story.rides.responses
     )
-    return Sheet("Answer to a step at constant speed", ("signal", "step", "speed", "to 63 %", "to 90 %"), rows, len(rows) > _FOLD)
+    return Sheet(
+        "Answer to a step at constant speed", ("signal", "step", "speed", "to 63 %", "to 90 %"), rows, len(rows) > _FOLD
+    )
 
 
 def _measures(story: Story) -> Sheet:
-    header = ("record", story.control.name, "temperature", "frequency", "amplitude", "peak force", "force at zero velocity",
-              "work per cycle", "equivalent c", "dynamic range")  # fmt: skip
+    conditions = ("record", story.control.name, "temperature", "frequency", "amplitude")
+    found = ("peak force", "force at zero velocity", "work per cycle", "equivalent c", "dynamic range")
     rows = tuple(
         (
             m.record,
@@ -122,4 +125,4 @@ def _measures(story: Story) -> Sheet:
         for m in story.identified.measures
         if m.setting == story.chosen
     )
-    return Sheet("Every test as an equivalent viscous damper", header, rows, folded=True)
+    return Sheet("Every test as an equivalent viscous damper", conditions + found, rows, folded=True)

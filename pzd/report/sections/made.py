@@ -8,7 +8,7 @@ from pzd.report.story import Story
 
 _STAGES = (
     "rig: records in SI units, checked, never corrected unasked (1-rig)",
-    "identify: T0, C and k of every condition by the global optimum of criterion (4) of Makowski and Knap 2021 (2-identify)",
+    "identify: T0, C and k of every condition by the global optimum of the paper's criterion (4) (2-identify)",
     "diagnose: where the gap lies and which effect of the library closes it, judged on held-out data (3-diagnose)",
     "table: force over temperature, control signal and velocity, and its inverse (4-table)",
     "simulate: the half-car of the paper, equations (5) to (12), with an energy balance (5-simulate)",
@@ -17,24 +17,19 @@ _STAGES = (
 _SOURCES = {
     iso2631_1997.EDITION: "weighting Wk by its exact frequency response over the whole ride from rest, so that neither "
     "sampling nor the start bends it; measures and conditions verified against independent sources",
-    iso2631_1978.EDITION: "boundaries a_z interpolated log-log; a tone at its own frequency, a periodic ride harmonic by harmonic, "
-    f"any other by third-octave bands, the shortest time counting; {iso2631_1978.TRUST}",
+    iso2631_1978.EDITION: "boundaries a_z interpolated log-log; a tone at its own frequency, a periodic ride harmonic "
+    f"by harmonic, any other by third-octave bands, the shortest time counting; {iso2631_1978.TRUST}",
     directive.EDITION: "A(8) and the daily dose from the vertical direction alone; values verified",
 }
+_LINE = "One straight line of stages; each writes the files that the next one reads, in the folders beside this page's:"
+_SIGNS = (
+    "Extension (rebound) is positive for displacement, velocity and force; force times velocity above nought "
+    "dissipates. The same input and seed give the same bytes; versions and times stand in each manifest.json."
+)
 
 
 def tell(story: Story) -> Section:
     """The last section."""
     sources = tuple(f"{edition}: {_SOURCES[edition]}" for edition in story.config.editions)
-    return Section(
-        "made",
-        "How it was made",
-        (
-            Paragraph("One straight line of stages; each writes the files that the next one reads, in the folder beside this page:"),
-            Notes(_STAGES),
-            Paragraph("Standards:"),
-            Notes(sources),
-            Paragraph("Signs: extension (rebound) is positive for displacement, velocity and force; force times velocity "
-                      "above nought dissipates. Same input and seed give the same bytes; versions and times stand in manifest.json."),
-        ),
-    )  # fmt: skip
+    blocks = (Paragraph(_LINE), Notes(_STAGES), Paragraph("Standards:"), Notes(sources), Paragraph(_SIGNS))
+    return Section("made", "How it was made", blocks)

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from pzd.artefacts import Diagnosis, NextTest, Ranked, Value
 from pzd.damper.effects import library
-from pzd.report.blocks import Block, Notes, Paragraph, Picture, Section, Sheet
-from pzd.report.sections.pictures import gallery
+from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
+from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.story import Story, effect_in_words, effects_in_words
 from pzd.report.wording import DASH, amount, interval, listed, number, percent, sentence, unit_of
 
 _FOLD = 6
 
 
-def tell(story: Story, pictures: dict[str, tuple[Picture, ...]]) -> Section:
+def tell(story: Story, pictures: Pictures) -> Section:
     """The third section."""
     diagnosis = story.diagnosed.diagnosis
-    blocks: list[Block] = [Paragraph(verdict(diagnosis)), Paragraph(sentence(diagnosis.reason))]
-    blocks = [block for block in blocks if not isinstance(block, Paragraph) or block.text]
-    blocks += [Paragraph(_gap(diagnosis)), *gallery(pictures["missing"])]
+    sure = (
+        "" if diagnosis.confidence is None else f" The confidence in this verdict is {percent(diagnosis.confidence)}."
+    )
+    blocks: list[Block] = [Paragraph(f"{verdict(diagnosis)}{sure}")]
+    blocks += [Paragraph(text) for text in (sentence(diagnosis.reason), _gap(diagnosis)) if text]
+    blocks += [*galleries(pictures["missing"])]
     if diagnosis.parameters:
         blocks.append(_parameters(story, diagnosis))
     if diagnosis.ranking:
@@ -27,20 +30,19 @@ def tell(story: Story, pictures: dict[str, tuple[Picture, ...]]) -> Section:
 
 
 def verdict(diagnosis: Diagnosis) -> str:
-    """The verdict in plain words, with the confidence where there is one."""
+    """The verdict in plain words."""
     adopted = listed(effects_in_words(diagnosis.effects))
     if diagnosis.verdict == "named":
         text = f"Missing from the simple model: {adopted}"
     elif diagnosis.verdict == "ambiguous":
         rivals = listed(effects_in_words(diagnosis.rivals), "or")
-        text = f"These tests cannot tell apart what is missing. Best: {adopted or DASH}; equally possible: {rivals or DASH}"
+        text = f"These tests do not settle what is missing. Best: {adopted or DASH}; also possible: {rivals or DASH}"
     elif diagnosis.verdict == "none":
         text = "Nothing is missing: what the simple model leaves is within the noise and the scatter between tests"
     else:
         found = f"; {adopted} is part of it" if adopted else ""
         text = f"Something is missing that the library of effects does not explain{found}"
-    sure = "" if diagnosis.confidence is None else f" (confidence {percent(diagnosis.confidence)})"
-    return f"{text}{sure}."
+    return f"{text}."
 
 
 def _gap(diagnosis: Diagnosis) -> str:
@@ -76,7 +78,8 @@ def _value_rows(story: Story, effect: str, name: str, value: Value) -> list[tupl
         low, high = (bound if not isinstance(bound, tuple) else None for bound in (value.low95, value.high95))
         return [(effect, name, interval(value.value, low, high), unit)]
     nodes = value.at_voltage_V or (None,) * len(value.value)
-    lows, highs = (bound if isinstance(bound, tuple) else (None,) * len(value.value) for bound in (value.low95, value.high95))
+    unknown = (None,) * len(value.value)
+    lows, highs = (bound if isinstance(bound, tuple) else unknown for bound in (value.low95, value.high95))
     return [
         (effect, f"{name} at {story.voltage(node)}", interval(each, low, high), unit)
         for node, each, low, high in zip(nodes, value.value, lows, highs, strict=True)
@@ -85,8 +88,7 @@ def _value_rows(story: Story, effect: str, name: str, value: Value) -> list[tupl
 
 def _ranking(diagnosis: Diagnosis) -> Sheet:
     rows = tuple(
-        (r.effect, number(r.gap_after), f"{r.delta_bic:,.0f}".replace(",", "\u202f").replace("-", "\u2212"), _fitted(r), r.reason)
-        for r in diagnosis.ranking
+        (r.effect, number(r.gap_after), number(round(r.delta_bic), 6), _fitted(r), r.reason) for r in diagnosis.ranking
     )
     header = ("effect", "W_s left", "delta BIC", "fitted", "what became of it")
     return Sheet("Every candidate, best first", header, rows, folded=len(rows) > _FOLD)
@@ -105,16 +107,25 @@ def _fitted(ranked: Ranked) -> str:
 
 
 def next_test(story: Story, test: NextTest | None) -> str:
-    """The next rig test in plain words."""
+    """The next rig test in plain words, with what it would settle."""
     if test is None:
         return "Next test: none is called for."
+    names = [effect_in_words(name) if name in library() else name for name in test.separates]
+    aim = f". It separates: {'; '.join(names)}" if names else ""
+    far = (
+        f". They differ there by {number(test.distance_percent, 2)} % of the peak force"
+        if test.distance_percent
+        else ""
+    )
+    return f"Next test: {rig_test(story, test)}{aim}{far}."
+
+
+def rig_test(story: Story, test: NextTest) -> str:
+    """A rig test in a few words."""
     parts = [test.waveform.replace("_", " ")]
     parts += [amount(test.frequency_Hz, "Hz")] if test.frequency_Hz is not None else []
     parts += [f"amplitude {number(1000.0 * test.amplitude_m)} mm"] if test.amplitude_m is not None else []
     if test.voltage_V is not None:
         volts = test.voltage_V if isinstance(test.voltage_V, tuple) else (test.voltage_V,)
         parts.append(f"at {' and '.join(story.voltage(v) for v in volts)}")
-    names = [effect_in_words(name) if name in library() else name for name in test.separates]
-    aim = f": it separates {listed(names)}" if names else ""
-    far = f" by {number(test.distance_percent, 2)} % of the peak force" if test.distance_percent is not None else ""
-    return f"Next test: {', '.join(parts)}{aim}{far}."
+    return ", ".join(parts)

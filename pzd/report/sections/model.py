@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from pzd.report.blocks import Block, Paragraph, Picture, Section, Sheet
-from pzd.report.sections.pictures import gallery
+from pzd.report.blocks import Block, Paragraph, Section, Sheet
+from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.story import Story
 from pzd.report.wording import number, percent
 
 
-def tell(story: Story, pictures: dict[str, tuple[Picture, ...]]) -> Section:
+def tell(story: Story, pictures: Pictures) -> Section:
     """The second section."""
     gap = story.diagnosed.diagnosis.gap
     text = (
         "The simple model is the Bingham element of the paper: dry friction T0 and viscous damping C in series with "
-        f"the oil spring k. On data that no fit has seen it leaves W_s = {number(gap.before)} (share of the mean square of the force), "
-        f"where noise alone would leave {number(gap.noise_floor)}: an r.m.s. miss of {percent(gap.before**0.5)} of the force, "
-        f"{percent(max(gap.before - gap.noise_floor, 0.0) ** 0.5)} of it beyond the noise."
+        f"the oil spring k. On data that no fit has seen it leaves W_s = {number(gap.before)}, where noise alone would "
+        f"leave {number(gap.noise_floor)}. W_s is a share of the mean square of the force; in r.m.s. the model misses "
+        f"{percent(gap.before**0.5)} of the force, and noise alone would be {percent(gap.noise_floor**0.5)}."
     )
-    blocks: list[Block] = [Paragraph(text), *gallery(pictures["model"])]
+    blocks: list[Block] = [Paragraph(text), *galleries(pictures["model"])]
     where = story.diagnosed.diagnosis.where
     if where:
         rows = tuple((region.region, percent(region.share_of_gap)) for region in where)

@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pzd.artefacts import SummaryRow
-from pzd.report.blocks import Block, Notes, Paragraph, Picture, Section, Sheet
+from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
 from pzd.report.comfort import directive, iso2631_1978, iso2631_1997
-from pzd.report.sections.pictures import gallery
-from pzd.report.story import Story, policy_in_words
+from pzd.report.sections.pictures import Pictures, galleries
+from pzd.report.story import REFERENCE, Story, policy_in_words
 from pzd.report.wording import DASH, amount, minutes, number, percent
+from pzd.simulate.policies import policies
 
 COMFORT_TIME = "exposure_time_reduced_comfort"
 
 
-def tell(story: Story, pictures: dict[str, tuple[Picture, ...]]) -> Section:
+def tell(story: Story, pictures: Pictures) -> Section:
     """The fifth section."""
-    blocks: list[Block] = [Paragraph(_ride(story))]
+    blocks: list[Block] = [Paragraph(_ride(story)), *_meanings(story)]
     blocks += [Paragraph(text) for road in story.roads if (text := compared(story, road))]
-    blocks += gallery(pictures["passenger"])
+    blocks += galleries(pictures["passenger"])
     blocks += [_accelerations(story), *_exposures(story), _suspension(story), *_daily(story)]
     worth = _worth(story)
     if worth.rows:
@@ -26,19 +27,40 @@ def tell(story: Story, pictures: dict[str, tuple[Picture, ...]]) -> Section:
         blocks += [Paragraph(text), worth]
     beyond = tuple(_beyond(story))
     if beyond:
-        blocks += [Paragraph("The r.m.s. alone understates these rides; read MTVV and VDV beside it:"), Notes(beyond, "care")]
+        blocks += [
+            Paragraph("The r.m.s. alone understates these rides; read MTVV and VDV beside it:"),
+            Notes(beyond, "care"),
+        ]
     return Section("passenger", "What the passenger feels", tuple(blocks))
+
+
+_FIDELITIES = {
+    "ideal": "the demanded force is there at once",
+    "table": "the voltage comes from the table of force, and the force from the voltage",
+    "dynamic": "as table, with the lag of the valve and the damper's own dynamics",
+}
+
+
+def _meanings(story: Story) -> tuple[Notes, ...]:
+    """What the names of policies and fidelities stand for."""
+    rows = _all(story)
+    used = {row.policy for row in rows}
+    names = [f"{name}: {policy.meaning}" for name, policy in policies().items() if name in used]
+    exact = {row.fidelity for row in rows if row.policy != REFERENCE}
+    names += [f"{name}: {text}" for name, text in _FIDELITIES.items() if name in exact]
+    return (Notes(tuple(names)),) if names else ()
 
 
 def _ride(story: Story) -> str:
     config = story.simulate
     car = config.car.car()
+    springs = " and ".join(number(k / 1000.0) for k in car.stiffnesses)
     return (
-        f"A half-car ({car.name}: {number(car.mass, 4)} kg, springs {number(car.stiffnesses[0] / 1000.0)} and "
-        f"{number(car.stiffnesses[1] / 1000.0)} kN/m, wheelbase {number(car.wheelbase)} m) at {number(config.vehicle_speed_km_per_h)} km/h, "
-        f"judged at point K, {number(car.comfort_point)} m from the centre of gravity. Constant c is "
-        f"{amount(config.constant_damping_Ns_per_m, 'N s/m', 4)} at each axle. "
-        f"The first {number(config.settle_s)} s of each ride are left out."
+        f"A half-car ({car.name}: {amount(car.mass, 'kg', 4)}, springs {springs} kN/m, wheelbase "
+        f"{amount(car.wheelbase, 'm')}) at {amount(config.vehicle_speed_km_per_h, 'km/h')}, judged at point K, "
+        f"{amount(abs(car.comfort_point), 'm')} {'behind' if car.comfort_point > 0.0 else 'ahead of'} the centre of "
+        f"gravity. Constant c is {amount(config.constant_damping_Ns_per_m, 'N s/m', 4)} at each axle. The first "
+        f"{amount(config.settle_s, 's')} of each ride are left out."
     )
 
 
@@ -47,10 +69,13 @@ def compared(story: Story, road: str) -> str:
     reference, controlled = story.reference(road), story.controlled(road)
     if reference is None or controlled is None:
         return ""
-    text = f"{road}: the peak of the acceleration goes from {amount(reference.peak_abs_aK_m_per_s2, 'm/s2')} at constant c to {amount(controlled.peak_abs_aK_m_per_s2, 'm/s2')} ({policy_in_words(controlled)})"
+    peaks = [amount(row.peak_abs_aK_m_per_s2, "m/s2") for row in (reference, controlled)]
+    how = policy_in_words(controlled)
+    text = f"{story.road(road)}: peak acceleration {peaks[0]} at constant c, {peaks[1]} with {how}"
     before, after = story.value(reference.case, "a_w"), story.value(controlled.case, "a_w")
     if before and after is not None:
-        text += f", the weighted r.m.s. a_w from {amount(before, 'm/s2')} to {amount(after, 'm/s2')} ({change(before, after)})"
+        levels = f"{amount(before, 'm/s2')} and {amount(after, 'm/s2')}"
+        text += f"; weighted r.m.s. a_w {levels} ({change(before, after)})"
     return f"{text}{_longer(story, reference, controlled)}."
 
 
@@ -63,8 +88,18 @@ def change(before: float, after: float) -> str:
 def _longer(story: Story, reference: SummaryRow, controlled: SummaryRow) -> str:
     if iso2631_1978.EDITION not in story.config.editions:
         return ""
-    times = [minutes(story.value(row.case, COMFORT_TIME)) for row in (reference, controlled)]
-    return f"; time within reduced comfort {times[0]} and {times[1]}"
+    return f"; within reduced comfort {times(story, reference, controlled)}"
+
+
+def times(story: Story, reference: SummaryRow, controlled: SummaryRow) -> str:
+    """Time within reduced comfort of a controlled ride, beside that at constant damping."""
+    before, after = (story.value(row.case, COMFORT_TIME) for row in (reference, controlled))
+    if before is None or after is None:
+        return DASH
+    if before == after:
+        return f"{minutes(after)} either way"
+    factor = f" ({number(after / before, 2)} times)" if before > 0.0 and after < iso2631_1978.LONGEST_MIN else ""
+    return f"{minutes(after)} instead of {minutes(before)}{factor}"
 
 
 def _all(story: Story) -> list[SummaryRow]:
@@ -108,7 +143,11 @@ def _exposures(story: Story) -> Iterator[Sheet]:
         for row in _all(story)
     )
     names = (boundary.replace("_", " ") for boundary in iso2631_1978.FACTORS)
-    yield Sheet(f"Exposure times ({iso2631_1978.EDITION}, {iso2631_1978.TRUST})", ("road", "dampers", *names, "how (reduced comfort)"), rows)
+    yield Sheet(
+        f"Exposure times ({iso2631_1978.EDITION}, {iso2631_1978.TRUST})",
+        ("road", "dampers", *names, "how (reduced comfort)"),
+        rows,
+    )
 
 
 def _status(story: Story, case: str) -> str:
@@ -146,7 +185,9 @@ def _daily(story: Story) -> Iterator[Sheet]:
         )
         for row in _all(story)
     )
-    yield Sheet(f"{directive.EDITION}, {number(story.config.daily_exposure_h)} h a day, vertical direction only", header, rows)
+    yield Sheet(
+        f"{directive.EDITION}, {number(story.config.daily_exposure_h)} h a day, vertical direction only", header, rows
+    )
 
 
 def _worth(story: Story) -> Sheet:

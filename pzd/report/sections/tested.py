@@ -20,7 +20,10 @@ def tell(story: Story) -> Section:
     findings = _findings(story)
     if findings.rows:
         text = "Nothing was corrected unasked: each finding says where it is, how large it is and what follows."
-        blocks += [Paragraph(f"The preflight found {_count(len(findings.rows), 'thing')} to know about. {text}"), findings]
+        blocks += [
+            Paragraph(f"The preflight found {_count(len(findings.rows), 'thing')} to know about. {text}"),
+            findings,
+        ]
     else:
         blocks.append(Notes(("The preflight had no objection to any record.",), "good"))
     removed = tuple(f"{e.name}: {e.removed}" for e in story.rig.entries if e.removed)
@@ -54,13 +57,17 @@ def _summary(story: Story) -> str:
 
 def _conditions(story: Story) -> list[str]:
     found = []
-    volts = [v for r in story.records if r.voltage is not None for v in (float(r.voltage.min()), float(r.voltage.max()))]
+    volts = [
+        v for r in story.records if r.voltage is not None for v in (float(r.voltage.min()), float(r.voltage.max()))
+    ]
     if volts:
         span = number(min(volts)), number(max(volts))
         found.append(f"{story.control.name} {_span(*span)} {story.control.unit}")
     else:
         found.append(f"no {story.control.name} was recorded")
-    degrees = [float(t) for r in story.records if r.temperature is not None for t in (r.temperature.min(), r.temperature.max())]
+    degrees = [
+        float(t) for r in story.records if r.temperature is not None for t in (r.temperature.min(), r.temperature.max())
+    ]
     if degrees:
         found.append(f"temperature {_span(number(min(degrees)), number(max(degrees)))} °C")
     else:
@@ -73,7 +80,17 @@ def _span(low: str, high: str) -> str:
 
 
 def _records(story: Story) -> Sheet:
-    header = ("record", story.control.name, "temperature", "rate", "cycles", "stroke", "top speed", "top force", "findings")
+    header = (
+        "record",
+        story.control.name,
+        "temperature",
+        "rate",
+        "cycles",
+        "stroke",
+        "top speed",
+        "top force",
+        "findings",
+    )
     pairs = [(story.entries[r.name], r) for r in story.records if r.name in story.entries]
     rows = tuple(_row(story, entry, record) for entry, record in pairs)
     return Sheet("Records", header, rows, folded=len(rows) > _FOLD)
@@ -99,4 +116,6 @@ def _findings(story: Story) -> Sheet:
         for entry in story.rig.entries
         for finding in entry.findings
     )
-    return Sheet("Findings of the preflight", ("record", "check", "where", "size", "what follows"), rows, len(rows) > _FOLD)
+    return Sheet(
+        "Findings of the preflight", ("record", "check", "where", "size", "what follows"), rows, len(rows) > _FOLD
+    )

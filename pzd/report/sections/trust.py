@@ -20,7 +20,9 @@ def tell(story: Story) -> Section:
     if marks:
         blocks += [Paragraph("These results are not to be trusted as they stand:"), Notes(marks, "care")]
     else:
-        text = f"T0 and C are determined everywhere, and the energy of every ride balances to {ENERGY_LIMIT:g} or better."
+        text = (
+            f"T0 and C are determined everywhere, and the energy of every ride balances to {ENERGY_LIMIT:g} or better."
+        )
         blocks.append(Notes((text,), "good"))
     cares = tuple(_cares(story))
     if cares:
@@ -40,7 +42,11 @@ def _cares(story: Story) -> Iterator[str]:
     beyond = [row for row in story.rides.summary if row.outside_table > _MUCH]
     if beyond:
         worst = max(beyond, key=lambda row: row.outside_table)
-        does = {"clamp": "the force is held there", "error": "the table is empty there", "model": "the model goes on there"}
+        does = {
+            "clamp": "the force is held there",
+            "error": "the table is empty there",
+            "model": "the model goes on there",
+        }
         yield (
             f"{len(beyond)} rides leave what the rig reached ({number(story.table.notes.reached_m_per_s)} m/s), "
             f"{worst.case} for {percent(worst.outside_table)} of its time: {does[story.table.notes.outside]}, untested"
@@ -58,4 +64,6 @@ def _balance(story: Story) -> Sheet:
         (row.case, number(row.energy_error, 2), percent(row.outside_table) if row.outside_table else "0 %")
         for row in story.rides.summary
     )
-    return Sheet("Energy balance and table", ("ride", "energy error / dissipated", "time outside of the rig's range"), rows, True)
+    return Sheet(
+        "Energy balance and table", ("ride", "energy error / dissipated", "time outside of the rig's range"), rows, True
+    )
