@@ -15,6 +15,8 @@ from pzd.rig.cycles import Cycles
 
 STANDARD_ERRORS = 4.0
 """A harmonic is kept where its mean exceeds this many standard errors of its scatter over cycles."""
+NOT_CYCLIC = 3.0
+"""Departures from the average cycle are followed up to this many times its frequency."""
 _CORNERS = 60
 _BINS = 2000
 
@@ -39,14 +41,14 @@ def kinematics(time: Array, displacement: Array, run: Cycles | None) -> Kinemati
 
     Returns
     -------
-    inside the run from the average cycle (and what drifts slower than half the cycle's
-    frequency), outside from the smoothed displacement
+    inside the run from the average cycle and what departs from it slowly, outside from the
+    smoothed displacement
     """
     if run is None:
         return _smoothed(time, displacement, np.inf)
     inside = run.inside(time)
     cyclic = _average_cycle(time, displacement - _drift(time, displacement, run), run)
-    drift = _smoothed(time[inside], displacement[inside] - cyclic.displacement, 0.5 * run.frequency)
+    drift = _smoothed(time[inside], displacement[inside] - cyclic.displacement, NOT_CYCLIC * run.frequency)
     parts = [cyclic.displacement + drift.displacement, cyclic.velocity + drift.velocity]
     parts.append(cyclic.acceleration + drift.acceleration)
     if inside.all():
@@ -85,15 +87,16 @@ def _drift(time: Array, displacement: Array, run: Cycles) -> Array:
     """
     from scipy.integrate import cumulative_trapezoid
 
-    whole = cumulative_trapezoid(displacement, time, initial=0.0)
+    whole = cumulative_trapezoid(displacement, time, initial=0)
     half = 0.5 * run.period
     middle = np.linspace(run.start + half, min(run.end, float(time[-1])) - half, 4 * run.count)
     mean = (np.interp(middle + half, time, whole) - np.interp(middle - half, time, whole)) / run.period
-    slope = np.polyfit(middle, mean, 1)[0] if run.count < 3 else np.gradient(mean, middle)
-    first, last = (slope, slope) if run.count < 3 else (slope[:4].mean(), slope[-4:].mean())
-    ends = (mean[0] - half * first, mean[-1] + half * last)
+    edge = min(4, mean.size) - 1
+    first = mean[0] - half * (mean[edge] - mean[0]) / (middle[edge] - middle[0])
+    last = mean[-1] + half * (mean[-1] - mean[-1 - edge]) / (middle[-1] - middle[-1 - edge])
     knots = np.concatenate(([middle[0] - half], middle, [middle[-1] + half]))
-    return np.interp(time, knots, np.concatenate((ends[:1], mean, ends[1:])))
+    drift: Array = np.interp(time, knots, np.concatenate(([first], mean, [last])))
+    return drift
 
 
 def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:
