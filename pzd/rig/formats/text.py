@@ -87,7 +87,6 @@ class TextSheet:
             skip_blank_lines=False,
             skipinitialspace=True,
             quoting=csv.QUOTE_NONE,
-            float_precision="round_trip" if kind == "float64" else None,
             engine="c",
         )
 
