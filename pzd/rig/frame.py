@@ -32,8 +32,8 @@ def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None
 
     The frame and the oil spring are springs in series, so the element is solved exactly with
     1 / k' = 1 / k + 1 / k_frame; forces beside it are found by rounds, since they act at the
-    damper's own extension. The frame has no mass: its resonance is left out, and a fluid_inertia
-    takes the acceleration of the actuator.
+    damper's own extension. The frame has no mass: its resonance is left out, so a fluid_inertia
+    takes the acceleration of the actuator, and a friction the speed behind the element's force alone.
 
     Equation: F = k' (x - F_beside / k_frame - y)           Source: springs in series
 
