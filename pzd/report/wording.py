@@ -92,9 +92,9 @@ def minutes(value: float | None) -> str:
         return DASH
     if value >= LONGEST_MIN:
         return "more than 24 h"
-    if value < 60.0:
-        return f"{value:.0f}{KEPT}min"
     hours, rest = divmod(round(value), 60)
+    if not hours:
+        return f"{rest}{KEPT}min"
     return f"{hours}{KEPT}h{KEPT}{rest}{KEPT}min" if rest else f"{hours}{KEPT}h"
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pzd.artefacts import SummaryRow
 from pzd.report.comfort import iso2631_1997
 from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes
 from pzd.report.story import REFERENCE, Story, policy_in_words
@@ -15,18 +16,22 @@ from pzd.report.wording import number
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_HEIGHT = 2.8
 _SHADES = ("#f3f6f9", "#e6ecf2", "#d9e2ea", "#ccd7e2", "#bfccd9", "#b2c1d0")
 
 
 def draw(story: Story) -> Iterator[Panel]:
-    """One line a ride, over bands that overlap as they do in the standard."""
-    rows = [row for road in story.roads for row in story.cases(road)]
-    values = [story.value(row.case, "a_w") for row in rows]
-    known = [(row, value) for row, value in zip(rows, values, strict=True) if value is not None][::-1]
-    if not known:
-        return
-    names = [f"{story.road(row.road)}, {policy_in_words(row)}" for row, _ in known]
-    figure, ax = axes(1.5 + 0.22 * len(known), names, key=0)
+    """One panel a road, one line a ride, over bands that overlap as they do in the standard."""
+    for road in story.roads:
+        values = [(row, story.value(row.case, "a_w")) for row in story.cases(road)]
+        known = [(row, value) for row, value in values if value is not None]
+        if known:
+            yield _panel(story.road(road), known[::-1])
+
+
+def _panel(road: str, known: list[tuple[SummaryRow, float]]) -> Panel:
+    names = [policy_in_words(row) for row, _ in known]
+    figure, ax = axes(max(1.5 + 0.25 * len(known), _HEIGHT), names, key=0)
     right = max(2.6, 1.15 * max(value for _, value in known))
     _bands(ax, len(known), right)
     for place, (row, value) in enumerate(known):
@@ -38,8 +43,11 @@ def draw(story: Story) -> Iterator[Panel]:
     ax.set_xlim(0.0, right)
     ax.set_xlabel("a_w [m/s²]")
     ax.grid(visible=False, axis="y")
-    alt = "; ".join(f"{row.road} {policy_in_words(row)}: a_w {number(value)} m/s²" for row, value in known[::-1])
-    yield Panel(figure, "How the rides are likely to be felt", alt, "Bands overlap; the last two are not verified.")
+    alt = "; ".join(f"{policy_in_words(row)}: {number(value)} m/s²" for row, value in known[::-1])
+    title = f"How it is likely to be felt, {road}"
+    return Panel(
+        figure, title, f"Weighted r.m.s. a_w on {road}: {alt}.", "Bands overlap; the last two are not verified."
+    )
 
 
 def _bands(ax: Axes, top: int, right: float) -> None:

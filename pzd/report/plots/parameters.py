@@ -39,7 +39,9 @@ def draw(story: Story) -> Iterator[Panel]:
             legend(figure, 4)
         name = quantity.meaning.removesuffix(" of the Bingham element")
         title = f"{quantity.symbol}: {name}"
-        yield Panel(figure, title, f"{title}, over the {story.control.name}, with 95 % intervals.", "Whiskers: 95 %.")
+        yield Panel(
+            figure, title, f"{title}, over the {story.control.name}, with 95 % intervals.", "Whiskers: 95 % intervals."
+        )
 
 
 def _bounds(row: ParameterRow, column: str) -> tuple[float, float, float]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pzd.artefacts import SummaryRow
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
 from pzd.report.comfort import directive, iso2631_1978, iso2631_1997
-from pzd.report.sections.pictures import Pictures, galleries
+from pzd.report.sections.pictures import Pictures, by_turns
 from pzd.report.story import REFERENCE, Story, policy_in_words
 from pzd.report.wording import DASH, amount, minutes, number, percent
 from pzd.simulate.policies import policies
@@ -19,7 +19,7 @@ def tell(story: Story, pictures: Pictures) -> Section:
     """The fifth section."""
     blocks: list[Block] = [Paragraph(_ride(story)), *_meanings(story)]
     blocks += [Paragraph(text) for road in story.roads if (text := compared(story, road))]
-    blocks += galleries(pictures["passenger"])
+    blocks += by_turns(pictures["passenger"])
     blocks += [_accelerations(story), *_exposures(story), _suspension(story), *_daily(story)]
     worth = _worth(story)
     if worth.rows:

@@ -20,9 +20,8 @@ def tell(story: Story) -> Section:
     if marks:
         blocks += [Paragraph("These results are not to be trusted as they stand:"), Notes(marks, "care")]
     else:
-        text = (
-            f"T0 and C are determined everywhere, and the energy of every ride balances to {ENERGY_LIMIT:g} or better."
-        )
+        balance = f"the energy of every ride balances to {number(ENERGY_LIMIT)} or better"
+        text = f"T0 and C are determined everywhere, and {balance}."
         blocks.append(Notes((text,), "good"))
     cares = tuple(_cares(story))
     if cares:

@@ -1,0 +1,230 @@
+"""The page stands alone, tells the story in order, and copes with whatever is absent."""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pzd.artefacts import Identified, Rides, Rig, Table, TableNotes
+from pzd.damper.model import BaseRow, Damper
+from pzd.quantities import Control
+from pzd.report.config import ReportConfig
+from pzd.report.plots import library
+
+HERE = Path(__file__).parent
+ORDER = ["tested", "model", "missing", "damper", "passenger", "trust", "made"]
+FETCHES = {"src", "href", "srcset", "data", "action", "poster"}
+
+
+class Reader(HTMLParser):
+    """Tags with their attributes, the text, and whether every tag is closed."""
+
+    EMPTY = frozenset({"meta", "link", "img", "br"})
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.open: list[str] = []
+        self.said: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] != "style":
+            self.said.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.said).split()).replace("\u202f", " ")
+
+    def sections(self) -> list[str | None]:
+        return [attributes.get("id") for tag, attributes in self.tags if tag == "section"]
+
+    def pictures(self) -> list[dict[str, str | None]]:
+        return [attributes for tag, attributes in self.tags if tag == "img"]
+
+
+@pytest.fixture(scope="module")
+def page(run: Any) -> str:
+    return run.told().page
+
+
+@pytest.fixture(scope="module")
+def read(page: str) -> Reader:
+    return Reader(page)
+
+
+@pytest.fixture
+def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No pictures: for what the text alone must say."""
+    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, story: ())
+
+
+def test_the_story_is_told_in_its_order_and_every_tag_is_closed(read: Reader) -> None:
+    assert read.sections() == ORDER
+    assert read.open == []
+
+
+def test_nothing_is_fetched_and_nothing_is_run(read: Reader) -> None:
+    for tag, attributes in read.tags:
+        assert tag not in {"script", "iframe", "object", "embed"}
+        assert not any(name.startswith("on") for name in attributes)
+        for name in FETCHES & set(attributes):
+            assert re.match(r"data:|#", attributes[name] or "")
+
+
+def test_styles_and_pictures_fetch_nothing(page: str, read: Reader) -> None:
+    assert "@import" not in page
+    assert "url(" not in page
+    for picture in read.pictures():
+        svg = base64.b64decode((picture["src"] or "").partition(",")[2]).decode()
+        assert svg.startswith("<svg")
+        assert "<script" not in svg
+        assert re.findall(r'(?:xlink:)?href="(?!#|data:)[^"]*"', svg) == []
+        assert not re.search(r"url\((?!#)", svg)
+
+
+def test_every_picture_says_what_it_shows(read: Reader) -> None:
+    assert len(read.pictures()) >= len(library())
+    assert all(len(picture.get("alt") or "") > 20 for picture in read.pictures())
+
+
+def test_the_headline_answers_five_questions(read: Reader) -> None:
+    head = read.text.partition("1 What was tested")[0]
+    assert "1 540 N at 0 V to 2 480 N at 150 V" in head
+    assert "Orifice quadratic" in head
+    assert "97 %" in head
+    assert "Sine, 4 Hz, amplitude 10 mm, at 150 V" in head
+    assert "2.25 Hz sine: 30 min instead of 0 min; 4.5 Hz sine: 0 min either way" in head
+    assert "unverified transcription" in head
+
+
+def test_intervals_statuses_and_findings_stand_on_the_page(read: Reader) -> None:
+    assert "474 (465 to 485)" in read.text
+    assert "undetermined: k (the stroke hardly reaches slip)" in read.text
+    assert "one sample of the force stands out" in read.text
+    assert "abs(v) > 0.25 m/s, 150 V" in read.text
+
+
+def test_with_and_without_the_missing_effect_stand_side_by_side(read: Reader) -> None:
+    assert "With and without the missing effect" in read.text
+
+
+def test_the_same_input_gives_the_same_bytes_in_another_process() -> None:
+    code = (
+        f"import sys; sys.path.insert(0, {str(HERE)!r}); import hashlib, conftest as c\n"
+        "run = c.Run(c.rig(), c.identified(), c.Diagnosed(c.diagnosis(), c.FINAL, c.PLAIN), c.table(), c.rides())\n"
+        "print(hashlib.sha256(run.told().page.encode()).hexdigest())"
+    )
+    root = str(HERE.parent.parent)
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": root},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            {"verdict": "ambiguous", "effects": ("orifice_quadratic",), "rivals": ("shear_thinning",)},
+            "Orifice quadratic or shear thinning: not settled",
+        ),
+        ({"verdict": "none", "effects": (), "parameters": {}, "confidence": None}, "Nothing that these tests can see"),
+        ({"verdict": "unexplained", "effects": (), "parameters": {}, "confidence": None}, "Something unexplained"),
+        ({"verdict": "unexplained", "next_test": None, "where": (), "ranking": ()}, "beside orifice quadratic"),
+    ],
+)
+def test_every_verdict_is_told(words_only: None, run: Any, changes: dict[str, Any], said: str) -> None:
+    read = Reader(run.with_diagnosis(**changes).told().page)
+    assert said in read.text
+    assert read.sections() == ORDER
+    if "next_test" in changes:
+        assert "None is called for" in read.text
+
+
+def test_an_unchanged_damper_shows_no_second_curve(run: Any) -> None:
+    page = run.with_diagnosis(verdict="none", effects=(), parameters={}).told().page
+    assert "with what was missing" not in page
+
+
+def test_names_of_users_cannot_break_the_page(words_only: None, run: Any) -> None:
+    bad = "<script>alert(1)</script>&"
+    entries = tuple(entry.model_copy(update={"removed": bad}) for entry in run.rig.entries)
+    read = Reader(replace(run, rig=Rig(run.rig.records, entries)).told().page)
+    assert all(tag != "script" for tag, _ in read.tags)
+    assert bad in read.text
+
+
+def test_a_control_that_is_a_current_is_called_so(words_only: None, run: Any) -> None:
+    read = Reader(replace(run, control=Control("current", "A")).told().page)
+    assert "1 540 N at 0 A to 2 480 N at 150 A" in read.text
+    assert "150 V" not in read.text.replace("abs(v) > 0.25 m/s, 150 V", "")
+
+
+def test_a_rig_without_voltage_or_temperature_is_told(run: Any) -> None:
+    plain = Damper(base=(BaseRow(T0_N=474.0, C_Ns_per_m=2260.0, k_N_per_m=263000.0),))
+    records = tuple(replace(r, voltage=None, temperature=None) for r in run.rig.records[::2])
+    blank = {"voltage_V": None, "temperature_degC": None}
+    entries = tuple(entry.model_copy(update=blank) for entry in run.rig.entries[::2])
+    rows = (run.identified.rows[0].model_copy(update=blank),)
+    force = tuple(r.model_copy(update=blank) for r in run.table.force if r.voltage_V == 0.0)
+    bare = replace(
+        run.with_diagnosis(verdict="none", effects=(), parameters={}),
+        rig=Rig(records, entries),
+        identified=Identified(rows, ()),
+        table=Table(force, (), run.table.notes),
+    )
+    bare = replace(bare, diagnosed=replace(bare.diagnosed, damper=plain, plain=plain))
+    read = Reader(bare.told().page)
+    assert "no voltage was recorded" in read.text
+    assert "It gives 1 540 N" in read.text
+
+
+def test_an_empty_run_still_makes_a_page(run: Any) -> None:
+    notes = TableNotes(outside="clamp", reached_m_per_s=0.0, lost=(), not_monotone=())
+    empty = replace(
+        run.with_diagnosis(verdict="none", effects=(), parameters={}, ranking=(), where=(), next_test=None),
+        rig=Rig((), ()),
+        identified=Identified((), ()),
+        table=Table((), (), notes),
+        rides=Rides((), ()),
+    )
+    assert Reader(empty.told().page).sections() == ORDER
+
+
+def test_without_the_standard_of_1978_the_gain_is_told_in_acceleration(words_only: None, run: Any) -> None:
+    read = Reader(run.told(ReportConfig(editions=("ISO 2631-1:1997",))).page)
+    assert "What does the passenger gain?" in read.text
+    assert "2.25 Hz sine: 54 % less" in read.text
+    assert "unverified transcription" not in read.text
+
+
+def test_an_untrusted_ride_is_marked(words_only: None, run: Any) -> None:
+    summary = tuple(row.model_copy(update={"energy_error": 1e-3}) for row in run.rides.summary)
+    read = Reader(replace(run, rides=replace(run.rides, summary=summary)).told().page)
+    assert "not to be trusted as they stand" in read.text
+    assert "energy error 1.0e-03" in read.text
