@@ -126,7 +126,7 @@ def test_runs_below_a_file_are_a_fault_of_files(tmp_path: Path) -> None:
 WRITER = """
 import sys, time
 from pathlib import Path
-sys.path.insert(0, {here!r})
+sys.path[:0] = [{here!r}, {root!r}]
 from test_runs import CONTROL, identified
 from pzd.artefacts import Identified
 from pzd.runs import Run
@@ -149,7 +149,9 @@ with run.locked("pzd identify"):
 
 
 def other_process(run: Run, *, hold: bool) -> subprocess.Popen[str]:
-    text = WRITER.format(here=str(HERE), config=str(run.config), runs=str(run.folder.parent), hold=hold)
+    text = WRITER.format(
+        here=str(HERE), root=str(HERE.parent), config=str(run.config), runs=str(run.folder.parent), hold=hold
+    )
     process = subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True, cwd=HERE.parent)
     assert process.stdout is not None
     assert process.stdout.readline() == "writing\n"

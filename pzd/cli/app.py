@@ -64,15 +64,17 @@ def status(arguments: Sequence[str]) -> int:
     0 done, 1 our own fault, 2 config or usage, 3 data, 4 not to be trusted, 5 files, 130 interrupted
     """
     try:
-        return app(list(arguments), prog_name="pzd", standalone_mode=False) or DONE
+        code: int = app(list(arguments), prog_name="pzd", standalone_mode=False) or DONE
     except (KeyboardInterrupt, typer.Abort):
-        complain(["interrupted; finished stages stand, the one at work left what was there before"])
-        return INTERRUPTED
+        code = INTERRUPTED
     except BrokenPipeError:
         silence(sys.stdout)
         return DONE
     except Exception as error:  # noqa: BLE001  # every ending has its exit code
         return _failed(error)
+    if code == INTERRUPTED:  # typer may make an exit of its own of it
+        complain(["interrupted; finished stages stand, the one at work left what was there before"])
+    return code
 
 
 def _failed(error: Exception) -> int:
@@ -99,4 +101,4 @@ def _usage(error: Exception) -> str:
         near = difflib.get_close_matches(unknown[1], [one.__name__ for one in _COMMANDS], 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         message = f"no such command{hint} (got {unknown[1]})"
-    return f"{command}: {message}; see {command} --help"
+    return f"{command}: {message.rstrip('.')}; see {command} --help"

@@ -34,9 +34,11 @@ class Opened:
             raise ConfigError(self._placed(message) for message in error.messages) from error
 
     def _placed(self, message: str) -> str:
-        path = re.match(r"[\w.]+(?=: )", message)
-        parts = path.group().split(".") if path else [""]
-        return f"{self.document.place(parts)}: {message}" if parts[0] in RunConfig.model_fields else message
+        path, _, rest = message.partition(": ")
+        if not re.fullmatch(r"\w+(\.\w+)*", path) or path.split(".")[0] not in RunConfig.model_fields:
+            return message
+        place = self.document.place(path.split("."))
+        return f"{place}: {rest}" if place == f"--set {path}" else f"{place}: {message}"
 
 
 def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:

@@ -23,6 +23,7 @@ from pzd.quantities import Control
 from pzd.schema.errors import DataError, at
 from pzd.schema.model import Frozen
 from pzd.schema.text import read_text
+from pzd.schema.wording import worded
 
 Row = TypeVar("Row", bound=Frozen)
 Columns = dict[str, NDArray[np.float64]]
@@ -219,5 +220,4 @@ def _plain(cell: str, annotation: Any) -> str | float | None:
 
 def _fault(path: Path, number: int, detail: Any, control: Control) -> str:
     name = control.renamed(str(detail["loc"][0])) if detail["loc"] else "row"
-    message = str(detail["msg"]).removeprefix("Value error, ").replace("Input should", "must")
-    return f"{at(path, number)}: {name}: {message} (got {detail['input']!r})"
+    return f"{at(path, number)}: {name}: {worded(detail['type'], str(detail['msg']))} (got {detail['input']!r})"

@@ -14,6 +14,7 @@ from pzd.quantities import Control
 from pzd.schema.errors import UserError
 from pzd.schema.nearest import Path, keys_at, nearest
 from pzd.schema.nodes import Node
+from pzd.schema.wording import worded
 
 _LONGEST = 60
 """Characters of a wrong value that a message repeats."""
@@ -144,27 +145,13 @@ def _one_of(expected: str, given: Any) -> str:
     return f"must be one of {listed}" + (f"; did you mean {near}?" if near else "")
 
 
-_WORDS = {
-    "float_type": "must be a number",
-    "int_type": "must be a whole number",
-    "bool_type": "must be true or false",
-    "string_type": "must be text",
-    "tuple_type": "must be a list",
-    "list_type": "must be a list",
-    "dict_type": "must be a mapping",
-    "model_type": "must be a mapping",
-    "model_attributes_type": "must be a mapping",
-}
-
-
 def _worded(fault: _Fault) -> str:
     kind = fault.detail["type"]
     if kind == "literal_error":
         return _one_of(fault.detail["ctx"]["expected"], fault.node.value)
-    text = str(fault.detail["msg"]).removeprefix("Value error, ").replace("Input should", "must")
     if kind == "string_type" and isinstance(fault.node.value, int | float):
         return "must be text; put it in quotes"
-    return _WORDS.get(kind, text)
+    return worded(kind, str(fault.detail["msg"]))
 
 
 def _alternatives(texts: list[str]) -> str:

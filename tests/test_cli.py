@@ -1,0 +1,531 @@
+"""Every command with what users type, right and wrong: what it prints, where, and how it exits."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+from stand_ins import NAMES, UNDETERMINED, project
+
+from pzd import runs
+from pzd.artefacts import Diagnosis, Gap, NextTest, Ranked, Region, Value
+from pzd.cli.app import status
+from pzd.cli.story import story
+from pzd.config import load
+from pzd.damper.effects import library
+
+COMMANDS = [
+    *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report"),
+    *("check", "show", "compare", "init", "schema", "effects"),
+]
+HEAVY = ("numba", "pandas", "scipy", "matplotlib", "pint", "jinja2")
+
+
+class Terminal:
+    """A folder in which commands are typed; keeps what they printed."""
+
+    def __init__(self, config: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        self.config, self.capsys = config, capsys
+        self.out: list[str] = []
+        self.err: list[str] = []
+
+    def __call__(self, *arguments: str) -> int:
+        self.capsys.readouterr()
+        code = status(arguments)
+        printed = self.capsys.readouterr()
+        self.out, self.err = printed.out.splitlines(), printed.err.splitlines()
+        return code
+
+
+@pytest.fixture
+def typed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Terminal:
+    terminal = Terminal(project(tmp_path, monkeypatch), capsys)
+    monkeypatch.chdir(tmp_path)
+    return terminal
+
+
+# ---------------------------------------------------------------- running
+
+
+def test_run_tells_a_line_a_stage_and_where_the_report_lies(typed: Terminal) -> None:
+    assert typed("run", "first.yaml") == 0
+    assert typed.err == []
+    assert [line.split()[0] for line in typed.out if " runs: " in line] == NAMES
+    assert typed.out[-1] == "report: runs/first/6-report/report.html"
+    assert typed("run", "first.yaml") == 0
+    assert typed.out[:-1] == [f"{name:<10} fresh: nothing it depends on has changed" for name in NAMES]
+
+
+def test_every_stage_is_a_command_that_goes_so_far(typed: Terminal) -> None:
+    for name, folder in zip(
+        NAMES, ("1-rig", "2-identify", "3-diagnose", "4-table", "5-simulate", "6-report"), strict=True
+    ):
+        assert typed(name, "first.yaml") == 0
+        assert (Path("runs/first") / folder / "manifest.json").is_file()
+        assert [line.split()[0] for line in typed.out if " runs: " in line] == [name]
+
+
+def test_results_go_where_runs_says(typed: Terminal, tmp_path: Path) -> None:
+    assert typed("run", "first.yaml", "--runs", str(tmp_path / "far" / "away")) == 0
+    assert (tmp_path / "far" / "away" / "first" / "6-report" / "report.html").is_file()
+    assert not Path("runs").exists()
+
+
+def test_rig_files_are_looked_for_beside_the_config_wherever_one_stands(
+    typed: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert typed("ingest", "../first.yaml") == 0
+
+
+def test_the_written_config_holds_every_default_and_every_override(typed: Terminal) -> None:
+    typed("run", "first.yaml", "--set", "seed=5", "--set", "table.outside=clamp")
+    written = Path("runs/first/config.yaml")
+    data = yaml.safe_load(written.read_text())
+    assert (data["seed"], data["table"]["outside"], data["rig"]["files"][0]["path"]) == (5, "clamp", "data/*.csv")
+    assert set(data) == {
+        *("seed", "control", "setting", "rig", "identify", "diagnose", "table", "simulate", "report"),
+    } | set(data)
+    assert load(written) == load(typed.config, ["seed=5", "table.outside=clamp"])
+
+
+def test_quiet_prints_nothing_but_errors(typed: Terminal) -> None:
+    assert typed("run", "first.yaml", "-q") == 0
+    assert (typed.out, typed.err) == ([], [])
+    assert typed("run", "first.yaml", "-q", "--set", f"seed={UNDETERMINED}") == 4
+    assert typed.out == []
+    assert len(typed.err) == 1
+    assert typed("run", "absent.yaml", "-q") == 2
+    assert typed.err == ["absent.yaml: the file is missing; check the path"]
+
+
+def test_force_runs_again(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    assert typed("identify", "first.yaml", "--force") == 0
+    assert [line for line in typed.out if "runs: forced" in line] == ["identify   runs: forced"]
+
+
+def test_what_is_not_to_be_trusted_is_code_4_every_time(typed: Terminal) -> None:
+    for _ in range(2):
+        assert typed("run", "first.yaml", "--set", f"seed={UNDETERMINED}") == 4
+        assert typed.err == ["not to be trusted: rig, 1.0 V, 22.0 degC: undetermined: C, the records are too slow"]
+        assert Path("runs/first/6-report/report.html").is_file()
+    assert typed("ingest", "first.yaml", "--set", f"seed={UNDETERMINED}") == 0
+
+
+def test_diagnose_tells_the_story(typed: Terminal) -> None:
+    typed("diagnose", "first.yaml")
+    told = [line for line in typed.out if not re.match(r"[a-z]+ +(runs|done|fresh)", line)]
+    assert told[0] == "verdict: none, nothing is missing that the data can show"
+    assert told[1] == "reason: 2 records are explained"
+
+
+# ---------------------------------------------------------------- mistakes
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["rnu", "first.yaml"], 2, "pzd: no such command; did you mean run? (got rnu); see pzd --help"),
+        (["zzz"], 2, "pzd: no such command (got zzz); see pzd --help"),
+        (["--zzz"], 2, "pzd: No such option: --zzz"),
+        (["run"], 2, "pzd run: Missing argument"),
+        (["run", "first.yaml", "second.yaml"], 2, "pzd run: Got unexpected extra argument"),
+        (["run", "first.yaml", "--frce"], 2, "pzd run: No such option: --frce"),
+        (["run", "first.yaml", "--jobs", "many"], 2, "pzd run: Invalid value for '--jobs'"),
+        (["run", "first.yaml", "--jobs", "0"], 2, "pzd run: Invalid value for '--jobs'"),
+        (["run", "first.yaml", "--set"], 2, "pzd: Option '--set' requires an argument"),
+        (["run", "absent.yaml"], 2, "absent.yaml: the file is missing; check the path"),
+        (["run", "data"], 2, "data: this is a folder, a file is needed"),
+        (["run", "first.yaml", "--set", "sed=1"], 2, "--set sed: no such key; did you mean seed? (got sed)"),
+        (["run", "first.yaml", "--set", "seed"], 2, "--set seed: must read a.b=VALUE (got seed)"),
+        (["run", "first.yaml", "--set", "seed=[1]"], 2, "--set seed: VALUE must be one YAML scalar (got [1])"),
+        (["run", "first.yaml", "--set", "rig.files.7.path=X"], 2, "--set rig.files.7.path: a list of 1 stands here"),
+        (["run", "first.yaml", "--set", "rig.files.0.path=dta/*"], 2, "--set rig.files.0.path: no such file"),
+        (["synthesise", "first.yaml"], 2, "pzd synthesise: the config has rig.files, so the command is pzd ingest"),
+        (["run", "first.yaml", "--runs", "first.yaml"], 5, "first.yaml"),
+        (["show", "first.yaml"], 2, "runs/first: no results stand here yet; pzd run first.yaml makes them"),
+        (["show", "absent.yaml"], 2, "absent.yaml: the file is missing"),
+        (["check", "absent.yaml"], 2, "absent.yaml: the file is missing"),
+        (["compare", "runs/first"], 2, "runs/first: no run stands here, it has no config.yaml"),
+        (["compare"], 2, "pzd compare: Missing argument"),
+        (["init", "absent.csv"], 2, "absent.csv: no such file"),
+        (["init"], 2, "pzd init: Missing argument"),
+        (["schema", "first.yaml"], 2, "pzd schema: Got unexpected extra argument"),
+    ],
+)
+def test_a_mistake_is_one_plain_line_on_stderr(typed: Terminal, arguments: list[str], code: int, message: str) -> None:
+    assert typed(*arguments) == code
+    assert typed.out == []
+    assert len(typed.err) == 1
+    assert typed.err[0].startswith(message)
+    assert "Traceback" not in typed.err[0]
+
+
+def test_a_setting_that_no_record_has_is_refused_once_the_records_are_known(typed: Terminal) -> None:
+    assert typed("run", "first.yaml", "--set", "setting=gap") == 2
+    assert [line.split()[0] for line in typed.out] == ["ingest", "ingest"]
+    (message,) = typed.err
+    assert message.startswith("--set setting: no record of the rig has this setting; there is none that has a name")
+
+
+def test_every_mistake_of_a_config_is_said_at_once_with_its_place(typed: Terminal) -> None:
+    typed.config.write_text("sed: 1\nrig:\n  files:\n    - {path: 3}\ntable: {outside: modle}\n")
+    assert typed("run", "first.yaml") == 2
+    assert sorted(typed.err) == [
+        "first.yaml:1:1: sed: no such key; did you mean seed? (got sed)",
+        "first.yaml:4:14: rig.files.0.path: must be text; put it in quotes (got 3)",
+        "first.yaml:5:18: table.outside: must be one of clamp, error, model; did you mean model? (got modle)",
+    ]
+    assert not Path("runs").exists()
+
+
+def test_wrong_data_are_code_3_and_every_file_is_listed(typed: Terminal) -> None:
+    for name in ("a", "b"):
+        Path(f"data/{name}.csv").write_text("nonsense")
+    for command in ("run", "check"):
+        assert typed(command, "first.yaml") == 3
+        assert typed.err == [f"data/{name}.csv:1: a number is needed (got nonsense)" for name in ("a", "b")]
+
+
+def test_an_artefact_edited_wrongly_is_code_3_with_file_and_line(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    path = Path("runs/first/2-identify/parameters.csv")
+    path.write_text(path.read_text().replace("C_Ns_per_m,", "C_kNs_per_m,", 1))
+    assert typed("run", "first.yaml") == 3
+    assert typed.err[0].startswith(f"{path}:1: the header must read")
+    assert "missing: C_Ns_per_m; unknown: C_kNs_per_m" in typed.err[0]
+
+
+def test_a_second_config_of_the_same_stem_is_refused_and_both_are_named(typed: Terminal, tmp_path: Path) -> None:
+    typed("run", "first.yaml")
+    shutil.copytree("data", "other/data")
+    shutil.copy("first.yaml", "other/first.yaml")
+    for command in ("run", "check", "show"):
+        assert typed(command, "other/first.yaml") == 2
+        assert str(tmp_path / "first.yaml") in typed.err[0]
+        assert str(tmp_path / "other" / "first.yaml") in typed.err[0]
+
+
+def test_a_run_in_use_is_code_5_and_names_who_uses_it(typed: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runs, "PATIENCE", 0.1)
+    with runs.Run.of(typed.config, Path("runs"), load(typed.config).control.signal()).locked("pzd simulate"):
+        assert typed("run", "first.yaml") == 5
+    assert typed.err[0].startswith(f"runs/first: pzd simulate (process {os.getpid()} on ")
+
+
+def test_a_fault_of_ours_is_code_1_in_one_line_with_the_traceback_in_a_file(
+    typed: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pzd.pipeline.command.yaml_text", lambda *_: 1 / 0)
+    assert typed("run", "first.yaml") == 1
+    (line,) = typed.err
+    found = re.fullmatch(
+        r"pzd: this is a fault of pzd, not yours: ZeroDivisionError: division by zero"
+        r" \(traceback in (\S+); -v shows it\)",
+        line,
+    )
+    assert found
+    assert "Traceback (most recent call last)" in Path(found[1]).read_text()
+    Path(found[1]).unlink()
+    assert typed("run", "first.yaml", "-v") == 1
+    assert "Traceback (most recent call last):" in typed.err
+    Path(re.findall(r"traceback in (\S+);", typed.err[-1])[0]).unlink()
+
+
+def test_an_interrupt_is_code_130_and_leaves_what_was_there(typed: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    typed("run", "first.yaml")
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("pzd.artefacts.Table.write", interrupted)
+        assert typed("run", "first.yaml", "--force") == 130
+    assert typed.err == ["interrupted; finished stages stand, the one at work left what was there before"]
+    assert typed("run", "first.yaml") == 0
+    assert not any("table" in line and "runs:" in line for line in typed.out)
+
+
+def test_a_full_disk_is_code_5(typed: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(28, "No space left on device", "runs/first/2-identify")
+
+    monkeypatch.setattr("pzd.artefacts.Identified.write", refuse)
+    assert typed("run", "first.yaml") == 5
+    assert typed.err == ["runs/first/2-identify: No space left on device"]
+
+
+# ---------------------------------------------------------------- looking
+
+
+def files_below(folder: Path) -> set[Path]:
+    return set(folder.rglob("*"))
+
+
+def test_check_says_what_it_found_and_writes_nothing(typed: Terminal, tmp_path: Path) -> None:
+    before = files_below(tmp_path)
+    assert typed("check", "first.yaml") == 0
+    assert typed.out == [
+        "a: 3 cycles at 1 Hz",
+        "b: 3 cycles at 1 Hz",
+        "2 records, 0 findings; the config is in order, nothing was written",
+    ]
+    assert typed("check", "first.yaml", "--set", "setting=gap") == 2
+    assert files_below(tmp_path) == before
+
+
+def test_show_prints_the_numbers_of_the_run_and_writes_nothing(typed: Terminal, tmp_path: Path) -> None:
+    typed("run", "first.yaml")
+    before = files_below(tmp_path)
+    assert typed("show", "first.yaml") == 0
+    text = "\n".join(typed.out)
+    for part in ("200 (200 to 200)", "verdict: none", "sine-comfort-ideal", "a_w", "verified", "report.html"):
+        assert part in text
+    assert files_below(tmp_path) == before
+
+
+def test_show_prints_what_there_is_after_a_part_of_the_stages(typed: Terminal) -> None:
+    typed("identify", "first.yaml")
+    assert typed("show", "first.yaml") == 0
+    assert "report: not written yet" in typed.out
+    assert not any("verdict" in line for line in typed.out)
+
+
+def test_show_says_what_is_not_to_be_trusted(typed: Terminal) -> None:
+    typed("run", "first.yaml", "--set", f"seed={UNDETERMINED}")
+    assert typed("show", "first.yaml") == 0
+    assert [line for line in typed.out if line.startswith("not to be trusted: rig")]
+
+
+def test_compare_sets_runs_side_by_side(typed: Terminal) -> None:
+    shutil.copy("first.yaml", "second.yaml")
+    typed("run", "first.yaml")
+    typed("run", "second.yaml", "--set", "seed=7", "--set", "rig.files.0.path=data/a.csv")
+    assert typed("compare", "runs/first", "runs/second") == 0
+    rows = {re.split(r"  +", line)[0]: re.split(r"  +", line)[1:] for line in typed.out[1:]}
+    assert typed.out[0].split() == ["runs/first", "runs/second"]
+    assert rows["T0 [N], 1 V, 22 degC"] == ["200 (200 to 200)", "100 (100 to 100)"]
+    assert rows["k [N/m], 1 V, 22 degC"] == ["1", "7"]
+    assert rows["verdict"] == ["none", "none"]
+    assert rows["sine-comfort-ideal: peak |a_K| at K [m/s2]"] == ["200", "100"]
+
+
+def test_compare_puts_a_dash_where_a_run_has_no_such_number(typed: Terminal) -> None:
+    shutil.copy("first.yaml", "second.yaml")
+    typed("run", "first.yaml")
+    typed("identify", "second.yaml")
+    assert typed("compare", "runs/second", "runs/first") == 0
+    (verdict,) = [line for line in typed.out if line.startswith("verdict")]
+    assert verdict.split() == ["verdict", "-", "none"]
+
+
+def test_the_control_goes_by_its_own_name(typed: Terminal) -> None:
+    typed.config.write_text("control: {name: current, unit: A}\n" + typed.config.read_text())
+    assert typed("run", "first.yaml") == 0
+    assert Path("runs/first/2-identify/parameters.csv").read_text().startswith("setting,current_A,")
+    typed("show", "first.yaml")
+    assert any("current [A]" in line for line in typed.out)
+    assert typed("compare", "runs/first") == 0
+    assert any(line.startswith("T0 [N], 1 A, 22 degC") for line in typed.out)
+
+
+# ---------------------------------------------------------------- starting
+
+
+def test_schema_describes_every_block(typed: Terminal) -> None:
+    assert typed("schema") == 0
+    schema = json.loads("\n".join(typed.out))
+    assert {"seed", "control", "setting", "rig", "identify", "table"} <= set(schema["properties"])
+
+
+def test_effects_lists_every_parameter_of_every_effect(typed: Terminal) -> None:
+    assert typed("effects") == 0
+    listed = [tuple(line.split()[:3:2]) for line in typed.out[1:]]
+    assert listed == [(effect.name, p.name) for effect in library().values() for p in effect.parameters]
+
+
+def test_init_maps_headers_and_leaves_unknown_units_to_be_filled_in(typed: Terminal) -> None:
+    for name in ("one", "two"):
+        Path(f"data/{name}.csv").write_text("Time [s];Position;Load (kN);U\n0;1;2;3\n1;2;3;4\n")
+    assert typed("init", "data/one.csv", "data/two.csv") == 0
+    text = "\n".join(typed.out)
+    entries = yaml.safe_load(text)["rig"]["files"]
+    assert [entry["path"] for entry in entries] == ["data/one.csv", "data/two.csv"]
+    assert entries[0]["columns"] == {
+        "time": "Time [s]",
+        "displacement": "Position",
+        "force": "Load (kN)",
+        "voltage": "U",
+    }
+    assert entries[0]["units"] == {"displacement": None, "voltage": None}
+    assert "fill in: Position names no unit" in text
+
+
+def test_init_needs_nothing_more_for_canonical_columns(typed: Terminal, tmp_path: Path) -> None:
+    Path("rig").mkdir()
+    for name in ("one", "two"):
+        Path(f"rig/{name}.csv").write_text(
+            "time_s,displacement_m,force_N,voltage_V,temperature_C\n0,1,2,3,4\n1,2,3,4,5\n"
+        )
+    assert typed("init", "rig/one.csv", "rig/two.csv") == 0
+    (tmp_path / "made.yaml").write_text("\n".join(typed.out))
+    config = load(tmp_path / "made.yaml")
+    assert config.rig.files is not None
+    assert [entry.path for entry in config.rig.files] == ["rig/*.csv"]
+
+
+def test_init_says_which_quantity_it_did_not_find(typed: Terminal) -> None:
+    Path("odd.csv").write_text("a1,b1,force_N\n1,2,3\n")
+    assert typed("init", "odd.csv") == 0
+    assert any("displacement:" in line and "fill in: one of a1, b1, force_N" in line for line in typed.out)
+
+
+# ---------------------------------------------------------------- the story
+
+
+def diagnosis() -> Diagnosis:
+    gap = Gap(
+        before=0.0121,
+        after=0.0009,
+        noise_floor=0.0008,
+        standard_error=0.00004,
+        held_out=("r03", "r09"),
+        hold_out="records",
+    )
+    return Diagnosis(
+        verdict="named",
+        reason="only orifice_quadratic closes the gap",
+        effects=("orifice_quadratic",),
+        confidence=0.97,
+        gap=gap,
+        parameters={"orifice_quadratic": {"q": Value(value=1510.0, low95=1490.0, high95=1530.0, unit="N s2/m2")}},
+        ranking=(
+            Ranked(effect="orifice_quadratic", gap_after=0.0009, delta_bic=-5120.3, parameters={}, reason="adopted"),
+            Ranked(effect="lash", gap_after=0.012, delta_bic=3.0, parameters={}, reason="closes nothing"),
+        ),
+        rivals=("shear_thinning",),
+        where=(Region(region="abs(v) > 0.25 m/s, 150 V", share_of_gap=0.71),),
+        next_test=NextTest(
+            waveform="sine",
+            frequency_Hz=4.0,
+            amplitude_m=0.01,
+            voltage_V=150.0,
+            separates=("orifice_quadratic", "shear_thinning"),
+        ),
+    )
+
+
+def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
+    assert story(diagnosis()) == [
+        "verdict: named, one answer fits, and no other does",
+        "reason: only orifice_quadratic closes the gap",
+        "gap on what no fit has seen (2 records): W_s 0.0121 before, 0.0009 after, 93% less; noise alone gives 0.0008",
+        "where: abs(v) > 0.25 m/s, 150 V, 71% of the gap",
+        "adopted: orifice_quadratic, q = 1510 (1490 to 1530) N s2/m2",
+        "confidence: 97%",
+        "rivals: shear_thinning",
+        "not taken: lash, W_s 0.012, closes nothing",
+        "next test: sine 4 Hz 0.01 m at 150 to tell orifice_quadratic from shear_thinning",
+    ]
+
+
+def test_a_parameter_that_moves_with_the_voltage_is_told_at_each() -> None:
+    value = Value(value=(1.0, 2.0), low95=(0.9, 1.9), high95=(1.1, 2.1), unit="N", at_voltage_V=(0.0, 150.0))
+    told = story(diagnosis().model_copy(update={"parameters": {"orifice_quadratic": {"q": value}}}))
+    assert "adopted: orifice_quadratic, q = 1 at 0; 2 at 150 N" in told
+
+
+# ---------------------------------------------------------------- as a program
+
+
+Command = Callable[..., "subprocess.CompletedProcess[str]"]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent)}
+
+
+def test_help_takes_a_moment_and_lists_every_command(pzd: Command) -> None:
+    spent = []
+    for _ in range(5):
+        begun = time.perf_counter()
+        printed = pzd("--help")
+        spent.append(time.perf_counter() - begun)
+    assert min(spent) < 0.3
+    assert (printed.returncode, printed.stderr) == (0, "")
+    listed = re.findall(r"^  ([a-z]+)  +\S", printed.stdout.partition("Commands:")[2], re.MULTILINE)
+    assert listed == COMMANDS
+    assert not re.search("[╭│╰]|\x1b", printed.stdout)
+    assert pzd().stdout == printed.stdout
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(typed: Terminal, command: str) -> None:
+    assert typed(command, "--help") == 0
+    assert typed.out[0].startswith(f"Usage: pzd {command} ")
+
+
+def test_nothing_heavy_is_imported_to_find_that_all_is_fresh() -> None:
+    text = (
+        "import sys\nfrom pzd.pipeline.stages import stages\nfrom types import SimpleNamespace as S\n"
+        "import pzd.pipeline.command, pzd.rig.listing\nstages(S(rig=S(virtual=None)))\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules])"
+    )
+    printed = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, env=ENVIRONMENT)
+    assert printed.stdout == "[]\n", printed.stderr
+
+
+def test_a_closed_pipe_is_quiet() -> None:
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "w") as closed:
+        ended = subprocess.run(
+            [sys.executable, "-m", "pzd", "schema"],
+            stdout=closed,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            env=ENVIRONMENT,
+        )
+    assert ended.stderr == ""
+    assert ended.returncode == 0
+
+
+def opened_by_reader(pipe: Path) -> int:
+    """The pipe's end for writing, as soon as somebody reads at the other."""
+    deadline = time.monotonic() + 20.0
+    while True:
+        try:
+            return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+
+
+def test_ctrl_c_is_code_130_in_one_line(tmp_path: Path) -> None:
+    pipe = tmp_path / "slow.yaml"
+    os.mkfifo(pipe)  # reading it waits for somebody who writes
+    command = [sys.executable, "-m", "pzd", "run", "slow.yaml"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=tmp_path, env=ENVIRONMENT) as running:
+        end = opened_by_reader(pipe)
+        running.send_signal(signal.SIGINT)
+        _, err = running.communicate(timeout=20)
+        os.close(end)
+    assert running.returncode == 130
+    assert err.count("\n") == 1
+    assert err.startswith("interrupted; ")
+
+
+def test_a_terminal_of_another_encoding_is_no_fault() -> None:
+    environment = {**ENVIRONMENT, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
+    command = [sys.executable, "-m", "pzd", "schema"]
+    assert subprocess.run(command, capture_output=True, env=environment, check=False).returncode == 0
