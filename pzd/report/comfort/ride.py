@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 from pzd.artefacts import RIDE_COLUMNS, ComfortRow, Ride, SummaryRow
 from pzd.record import Array
@@ -39,6 +40,7 @@ class SettledRide:
     run_up: float
     """What was cut off [s]."""
 
+    @cached_property
     def components(self) -> tuple[Components, str]:
         """What the ride is made of, and how that was found."""
         nominal = iso2631_1978.chart().frequency
@@ -131,7 +133,7 @@ def _zone(a_w: float, name: str) -> str:
 
 
 def _edition_1978(ride: SettledRide) -> Iterator[tuple[str, float | None, str, str]]:
-    parts, how = ride.components()
+    parts, how = ride.components
     for boundary in iso2631_1978.FACTORS:
         found = iso2631_1978.shortest(parts, boundary)
         place = f"governed by {found.frequency:.4g} Hz" if found.frequency is not None else ""

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.record import Array
 
+_MOST_HARMONICS = 200
 _TRUE_CENTRE = 10.0
 """True centres are 10^(n/10) Hz, edges 10^((n +- 1/2)/10) Hz."""
 
@@ -25,29 +27,43 @@ class Components:
 
 
 def harmonics(acceleration: Array, rate: float, fundamental: float, highest: float) -> Components:
-    """Least-squares harmonics of a ride over a periodic road.
+    """Least-squares harmonics of a ride over a periodic road, whole number of periods or not.
+
+    Equation: a(t_n) = sum_k c_k exp(j k p n), |k| <= K, p = 2 pi f / rate; the normal equations are Toeplitz
+    with the geometric sums g_m = (1 - exp(j m p N)) / (1 - exp(j m p)); r.m.s. of harmonic k = sqrt(2) |c_k|
 
     Parameters
     ----------
-    acceleration : (n,) settled ride, any number of periods from one up [m/s2]
+    acceleration : (n,) settled ride, one period or more [m/s2]
     rate : sampling rate [Hz]
     fundamental : frequency of the road [Hz]
-    highest : no harmonic above this, nor above the Nyquist frequency [Hz]
+    highest : no harmonic above this, nor above the Nyquist frequency, nor after the 200th [Hz]
 
     Returns
     -------
     one component a harmonic, from the fundamental up
     """
-    count = max(int(min(highest, 0.49 * rate) / fundamental + 1e-9), 1)
-    order = np.arange(1.0, count + 1.0)
-    phase = 2.0 * np.pi * fundamental / rate * np.outer(np.arange(acceleration.size), order)
-    design = np.hstack([np.ones((acceleration.size, 1)), np.cos(phase), np.sin(phase)])
-    weights = np.linalg.solve(design.T @ design, design.T @ acceleration)
-    amplitude = np.hypot(weights[1 : count + 1], weights[count + 1 :])
-    total = float(np.var(acceleration))
-    share = 1.0 - float(np.var(acceleration - design @ weights)) / total if total > 0.0 else 1.0
-    frequency: Array = fundamental * order
-    return Components(frequency, amplitude / np.sqrt(2.0), share)
+    count = min(max(int(min(highest, 0.49 * rate) / fundamental + 1e-9), 1), _MOST_HARMONICS)
+    step = 2.0 * np.pi * fundamental / rate
+    order = np.arange(0.0, count + 1.0)
+    upper = np.array([acceleration @ np.exp(-1j * step * k * np.arange(acceleration.size)) for k in order])
+    right = np.concatenate([upper[:0:-1].conj(), upper])
+    weights = np.linalg.solve(_gram(step, count, acceleration.size), right)
+    total = acceleration.size * float(np.var(acceleration))
+    left = float(acceleration @ acceleration) - float((right.conj() @ weights).real)
+    rms = (np.sqrt(2.0) * np.abs(weights[count + 1 :])).astype(np.float64)
+    return Components(fundamental * order[1:], rms, 1.0 - left / total if total > 0.0 else 1.0)
+
+
+def _gram(step: float, count: int, samples: int) -> NDArray[np.complex128]:
+    """(2 count + 1,) squared: sums of exp(j (k - i) step n) over the samples."""
+    index = np.arange(-count, count + 1)
+    apart = step * (index[None, :] - index[:, None])
+    with np.errstate(invalid="ignore"):
+        sums = (1.0 - np.exp(1j * apart * samples)) / (1.0 - np.exp(1j * apart))
+    np.fill_diagonal(sums, samples)
+    gram: NDArray[np.complex128] = sums
+    return gram
 
 
 def third_octaves(acceleration: Array, rate: float, nominal: Array) -> Components:

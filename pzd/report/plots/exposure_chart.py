@@ -33,7 +33,7 @@ def _panel(story: Story, road: str, cases: list[str]) -> Panel:
     figure, ax = axes(3.3)
     _boundaries(ax)
     for ride in (ride for ride in story.settled if ride.row.case in cases):
-        parts, _ = ride.components()
+        parts, _ = ride.components
         kept = parts.rms >= _SMALLEST * float(parts.rms.max())
         constant = ride.row.policy == REFERENCE
         colour = PLAIN if constant else BY_FIDELITY[ride.row.fidelity]
