@@ -11,7 +11,7 @@ _VERDICTS = {
     "named": "one answer fits, and no other does",
     "ambiguous": "several answers fit the data equally well",
     "none": "nothing is missing that the data can show",
-    "unexplained": "a gap remains that no effect of the library accounts for",
+    "unexplained": "a gap that repeats remains, and no name accounts for it",
 }
 _MOST = 3
 """How many places and candidates are told."""

@@ -14,7 +14,6 @@ from pzd.artefacts import RecordEntry, Rig
 from pzd.config import RunConfig, setting_in_use
 from pzd.pipeline.sources import code_hash
 from pzd.pipeline.stages import Stage
-from pzd.rig.config import RigConfig
 from pzd.runs import Run, file_hash
 from pzd.schema.errors import FilesError
 from pzd.schema.jsonfile import read_json_list
@@ -67,9 +66,10 @@ def dependencies(stage: Stage, config: RunConfig, run: Run, marks: Sequence[str]
         if is_artefact(annotation):
             found |= {f"{annotation.folder}/{file}": h for file, h in run.outputs(annotation.folder).items()}
         elif block := block_of(config, annotation):
-            found |= {path: _hash(value) for path, value in _leaves(block[0], block[1].model_dump(mode="json"))}
-            if isinstance(block[1], RigConfig):
-                found |= _files_read(stage, block[1], run.config.parent)
+            values = dict(_leaves(block[0], block[1].model_dump(mode="json")))
+            found |= {path: _hash(value) for path, value in values.items()}
+            if "folder" in stage.takes:
+                found |= _files_named(values, run.config.parent)
         elif name == "setting":
             found[name] = _hash(setting_of(config, run))
         elif name == "seed":
@@ -113,13 +113,12 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield from _leaves(f"{path}.{key}", below)
 
 
-def _files_read(stage: Stage, rig: RigConfig, folder: Path) -> dict[str, str]:
-    """Hashes of the files beside the config that the first stage reads."""
-    from pzd.rig.listing import listed
+def _files_named(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
+    """Hashes of the files beside the config that its values name; absent ones are the stage's to refuse."""
+    from pzd.rig.listing import matching
 
-    if "folder" not in stage.takes:
-        return {}
+    named = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
     try:
-        return {str(one.path): file_hash(one.path) for one in listed(rig.files or (), folder)}
+        return {str(file): file_hash(file) for value in named for file in matching(folder, value)}
     except OSError as error:
         raise FilesError(f"{error.filename}: {error.strerror}") from error

@@ -1,10 +1,12 @@
-"""Guesses, from the headers of rig files, the entry of a config that reads them."""
+"""Guesses, from the headers of rig files, the entries of a config that read them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from pzd.quantities import (
     ACCELERATION,
@@ -16,12 +18,13 @@ from pzd.quantities import (
     TIME,
     VELOCITY,
     VOLTAGE,
+    Control,
     Quantity,
 )
-from pzd.rig.channels import ALSO_READ, NEEDED
+from pzd.rig.channels import ALSO_READ, NEEDED, own
 from pzd.rig.config import FilesEntry
 from pzd.rig.formats import reader
-from pzd.rig.units import in_header
+from pzd.rig.units import UnitFault, in_header, to_canonical
 from pzd.schema.scalars import written
 
 _LOOKS_LIKE = {
@@ -30,11 +33,12 @@ _LOOKS_LIKE = {
     VELOCITY: r"^v$|vel|speed",
     ACCELERATION: r"^a$|acc",
     FORCE: r"^f$|force|load|kraft",
-    VOLTAGE: r"^u$|volt|spannung",
     TEMPERATURE: r"temp",
     PRESSURE: r"^p$|press",
 }
-"""What headers of each quantity look like, its own unit in brackets taken off."""
+"""What headers of each quantity look like, a unit in brackets taken off."""
+_CONTROLS = {Control(): r"^u$|volt|spannung", Control("current", "A"): r"^i$|current|strom"}
+"""What the header of the control signal looks like."""
 
 Header = tuple[str, ...]
 
@@ -58,11 +62,21 @@ def guessed(files: Sequence[Path]) -> list[str]:
     for path in files:
         sheet = reader(path, None, "rig.files")(path, FilesEntry(path=str(path)), [q.column for q in CHANNELS])
         by_header.setdefault(sheet.header, []).append(path)
-    lines = ["# Guessed from the headers: check every line. Paths are relative to this file.", "rig:", "  files:"]
+    control = _control([column for header in by_header for column in header])
+    lines = ["# Guessed from the headers: check every line. Paths are relative to this file."]
+    if control != Control():
+        lines.append(f"control: {{name: {control.name}, unit: {control.unit}}}")
+    lines += ["rig:", "  files:"]
     for header, paths in by_header.items():
         for pattern in _patterns(paths):
-            lines += [f"    - path: {written(pattern)}", *(f"      {line}" for line in _entry(header))]
+            lines += [f"    - path: {written(pattern)}", *(f"      {line}" for line in _entry(header, control))]
     return lines
+
+
+def _control(columns: Sequence[str]) -> Control:
+    """The control signal that the headers show; a voltage where they show none."""
+    shown = [c for c, pattern in _CONTROLS.items() if any(re.search(pattern, _bare(column)) for column in columns)]
+    return next(iter(shown), Control())
 
 
 def _patterns(paths: Sequence[Path]) -> list[str]:
@@ -75,29 +89,38 @@ def _patterns(paths: Sequence[Path]) -> list[str]:
     return [path.as_posix() for path in paths]
 
 
-def _entry(header: Header) -> Iterator[str]:
-    found = {quantity: _column(header, quantity) for quantity in CHANNELS}
-    named = {q: column for q, column in found.items() if column is not None and not _canonical(column, q)}
+def _entry(header: Header, control: Control) -> Iterator[str]:
+    found = {q: _column(header, q, control) for q in CHANNELS}
+    named = {own(q, control): c for q, c in found.items() if c is not None and not _canonical(c, q, control)}
     lost = [q for q in NEEDED if found[q] is None]
     if named or lost:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
         yield from (f"  {q.name}:   # fill in: one of {', '.join(header)}" for q in lost)
-    unitless = [(q, column) for q, column in named.items() if in_header(column, q) is None]
+    unitless = [(q, column) for q, column in named.items() if not _says_unit(column, q)]
     if unitless:
         yield "units:"
         yield from (f"  {q.name}:   # fill in: {column} names no unit, e.g. {q.unit}" for q, column in unitless)
 
 
-def _column(header: Header, quantity: Quantity) -> str | None:
-    canonical = [column for column in header if _canonical(column, quantity)]
-    alike = [column for column in header if re.search(_LOOKS_LIKE[quantity], _bare(column))]
-    taken = [column for column in alike if not any(_canonical(column, other) for other in CHANNELS)]
+def _column(header: Header, quantity: Quantity, control: Control) -> str | None:
+    pattern = _CONTROLS[control] if quantity is VOLTAGE else _LOOKS_LIKE[quantity]
+    canonical = [column for column in header if _canonical(column, quantity, control)]
+    alike = [column for column in header if re.search(pattern, _bare(column))]
+    taken = [column for column in alike if not any(_canonical(column, other, control) for other in CHANNELS)]
     return next(iter(canonical or taken), None)
 
 
-def _canonical(column: str, quantity: Quantity) -> bool:
-    return column in (quantity.column, ALSO_READ.get(quantity))
+def _canonical(column: str, quantity: Quantity, control: Control) -> bool:
+    return column in (own(quantity, control).column, ALSO_READ.get(quantity))
+
+
+def _says_unit(column: str, quantity: Quantity) -> bool:
+    unit = in_header(column, quantity)
+    try:
+        return unit is not None and to_canonical(np.zeros(1), unit, quantity) is not None
+    except UnitFault:
+        return False
 
 
 def _bare(column: str) -> str:

@@ -39,7 +39,7 @@ def listed(entries: Sequence[FilesEntry], folder: Path) -> tuple[Listed, ...]:
     faults: list[str] = []
     for number, entry in enumerate(entries):
         place = f"rig.files.{number}"
-        paths = _matching(folder, entry.path)
+        paths = matching(folder, entry.path)
         found += [Listed(path, entry, place) for path in paths]
         if not paths:
             hint = f"; {entry.source}" if entry.source else "; the path is relative to the config's folder"
@@ -49,7 +49,8 @@ def listed(entries: Sequence[FilesEntry], folder: Path) -> tuple[Listed, ...]:
     return tuple(sorted(found, key=lambda one: (one.path.as_posix(), one.place)))
 
 
-def _matching(folder: Path, pattern: str) -> list[Path]:
+def matching(folder: Path, pattern: str) -> list[Path]:
+    """Files that a path or glob pattern of the config names, seen from the config's folder."""
     literal = folder / pattern
     if literal.is_file():
         return [literal]
