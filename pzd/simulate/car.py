@@ -82,5 +82,4 @@ class HalfCar:
         -------
         (2,) or (2, n) second derivative of (z, phi) [m/s2], [rad/s2]
         """
-        a: Array = -np.linalg.solve(self.mass_matrix(), self.force_directions() @ forces)
-        return a
+        return np.asarray(-np.linalg.solve(self.mass_matrix(), self.force_directions() @ forces), dtype=np.float64)

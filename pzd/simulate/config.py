@@ -100,7 +100,9 @@ class SimulateConfig(Frozen):
     constant_damping_Ns_per_m: float = Field(default=4500.0, gt=0.0)
     """c of the policy `constant`, per axle."""
     passive_voltage_V: float = 0.0
-    """Voltage of the policy `passive`."""
+    """Voltage of the policy `passive`, and of every valve before the ride."""
+    response_speed_m_per_s: float = Field(default=0.2, gt=0.0)
+    """Speed at which the response of the damper's force to a step of voltage is computed."""
     bounds: Literal["coefficients", "table"] = "coefficients"
     """What bounds the forces Omega(V) that `ideal` may demand: [c_min V, c_max V], or the table between its
     lowest and highest voltage. `table` and `dynamic` are always bounded by the table."""
@@ -118,13 +120,13 @@ class SimulateConfig(Frozen):
     valve_response_s: float = Field(default=0.0039, ge=0.0)
     """Time constant of the valve in `dynamic` where the damper has no `valve_lag` of its own: 0.0039 s
     reaches 90 % in the 9 ms that the paper states."""
-    integration_step_s: float = Field(default=0.0005, gt=0.0)
-    """Largest step of integration; it is halved as often as `tolerance` asks."""
+    integration_step_s: float = Field(default=0.001, gt=0.0)
+    """Largest step of integration, cut as `tolerance` asks; peaks and r.m.s. are taken at its ends."""
     tolerance: float = Field(default=1e-9, gt=0.0)
     """Largest local error of a step, as a share of the motion."""
-    duration_s: float = Field(default=20.0, gt=0.0)
+    duration_s: float = Field(default=16.0, gt=0.0)
     """Length of each ride."""
-    settle_s: float = Field(default=4.0, ge=0.0)
+    settle_s: float = Field(default=8.0, ge=0.0)
     """Peaks and r.m.s. are taken after this time."""
     output_rate_Hz: float = Field(default=500.0, gt=0.0)
     """Rate of the written histories; peaks and r.m.s. are taken from every step."""

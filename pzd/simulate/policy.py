@@ -9,8 +9,8 @@ from typing import Literal
 from pzd.record import Array
 from pzd.simulate.car import HalfCar
 
-Aim = Literal["feedback", "minimise", "voltage"]
-"""A force proportional to the state; the smallest |a_K|; or no force but a voltage."""
+Aim = Literal["damping", "feedback", "minimise", "voltage"]
+"""Constant damping; a force proportional to the state; the smallest |a_K|; or no force but a voltage."""
 
 
 @dataclass(frozen=True)
@@ -24,4 +24,4 @@ class Policy:
     aim: Aim
     feedback: Callable[[HalfCar, float], Array] | None = None
     """(car, constant damping) -> (2, 8) gains on (deflection 1, 2, its rate 1, 2, z, phi, dz, dphi):
-    the force that a policy with the aim `feedback` asks of each axle."""
+    the force that the aims `damping` and `feedback` ask of each axle."""

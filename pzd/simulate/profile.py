@@ -63,9 +63,9 @@ def through(heights: Array, spacing: float) -> Profile:
 
     Returns
     -------
-    the profile; its height before the first and behind the last knot is held
+    the profile above its first height; before the first and behind the last knot the height is held
     """
     from scipy.interpolate import CubicSpline
 
-    spline = CubicSpline(spacing * np.arange(len(heights)), heights, bc_type="clamped")
+    spline = CubicSpline(spacing * np.arange(len(heights)), heights - heights[0], bc_type="clamped")
     return Profile(spacing=spacing, coefficients=np.ascontiguousarray(spline.c[::-1].T))

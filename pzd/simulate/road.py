@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass
 from pathlib import Path
+
+from pydantic import Field
 
 from pzd.schema.model import Frozen
 from pzd.simulate.profile import Profile
 
 
+@dataclass(frozen=True)
+class Way:
+    """What a road may ask of the ride."""
+
+    vehicle_speed: float
+    """[m/s]."""
+    distance: float
+    """Length of the ride [m]."""
+    seed: int
+    """Of the run, for roads that are drawn."""
+    folder: Path
+    """Of the config, for roads that are read."""
+
+
 class Road(Frozen):
-    """A road under the wheels; each kind is one file in `roads/` with `kind` of its own."""
+    """A road under the wheels; each kind is one file in `roads/` with a `kind` of its own."""
 
     kind: str
     """Which road."""
-    label: str | None = None
+    label: str | None = Field(default=None, pattern=r"^[A-Za-z0-9._-]+$")
     """Name of the road in the names of cases; by default made from kind and size."""
 
     @property
@@ -27,17 +44,5 @@ class Road(Frozen):
         """The name made from kind and size."""
 
     @abstractmethod
-    def profile(self, vehicle_speed: float, distance: float, seed: int, folder: Path) -> Profile:
-        """The road as the car meets it.
-
-        Parameters
-        ----------
-        vehicle_speed : [m/s]
-        distance : length of the ride [m]
-        seed : of the run, for roads that are drawn
-        folder : of the config, for roads that are read
-
-        Returns
-        -------
-        height over distance
-        """
+    def profile(self, way: Way) -> Profile:
+        """The road as the car meets it: height over distance."""

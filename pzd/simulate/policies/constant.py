@@ -9,7 +9,7 @@ from pzd.simulate.car import HalfCar
 from pzd.simulate.policy import Policy
 
 
-def feedback(car: HalfCar, damping: float) -> Array:
+def feedback(car: HalfCar, damping: float) -> Array:  # the signature of every feedback
     """T_i = c V_i at both axles.
 
     Source: Makowski and Knap 2021, section 5 (c = const.)
@@ -19,4 +19,4 @@ def feedback(car: HalfCar, damping: float) -> Array:
     return gains
 
 
-POLICY = Policy("constant", "constant damping coefficient at both axles", "feedback", feedback)
+POLICY = Policy("constant", "constant damping coefficient at both axles", "damping", feedback)

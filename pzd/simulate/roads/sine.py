@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
+from typing_extensions import override
 
 from pzd.simulate.profile import Profile
-from pzd.simulate.road import Road
+from pzd.simulate.road import Road, Way
 
 
 class Sine(Road):
@@ -22,13 +22,13 @@ class Sine(Road):
     amplitude_m: float = Field(default=0.02, gt=0.0)
     """Amplitude of the road's height."""
 
+    @override
     def own_name(self) -> str:
-        """`sine-2.25Hz`."""
         return f"sine-{self.frequency_Hz:g}Hz"
 
-    def profile(self, vehicle_speed: float, distance: float, seed: int, folder: Path) -> Profile:
-        """The harmonic whose wavelength gives the frequency at this speed."""
-        return Profile(amplitude=self.amplitude_m, wavenumber=2.0 * math.pi * self.frequency_Hz / vehicle_speed)
+    @override
+    def profile(self, way: Way) -> Profile:
+        return Profile(amplitude=self.amplitude_m, wavenumber=2.0 * math.pi * self.frequency_Hz / way.vehicle_speed)
 
 
 ROAD = Sine

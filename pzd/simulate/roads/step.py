@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
+from typing_extensions import override
 
 from pzd.simulate.profile import Profile, through
-from pzd.simulate.road import Road
+from pzd.simulate.road import Road, Way
 
 _KNOTS = 200
 """Knots over the length of the ramp."""
@@ -27,12 +27,12 @@ class Step(Road):
     start_m: float = Field(default=10.0, ge=0.0)
     """Where it begins."""
 
+    @override
     def own_name(self) -> str:
-        """`step-0.05m`."""
         return f"step-{self.height_m:g}m"
 
-    def profile(self, vehicle_speed: float, distance: float, seed: int, folder: Path) -> Profile:
-        """The ramp with level road before and behind."""
+    @override
+    def profile(self, way: Way) -> Profile:
         spacing = self.length_m / _KNOTS
         place = spacing * np.arange(round(self.start_m / spacing) + _KNOTS + 2)
         r = np.clip((place - self.start_m) / self.length_m, 0.0, 1.0)

@@ -1,0 +1,108 @@
+"""The damper of a ride as arrays: its table, and its nodes with the lag of the valve."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pzd.artefacts import ForceRow, Table
+from pzd.damper.beside import beside
+from pzd.damper.compose import nodes_of, steady_force
+from pzd.damper.flow import C, K
+from pzd.damper.model import Damper
+from pzd.record import Array
+from pzd.schema.errors import DataError
+from pzd.simulate.car import HalfCar
+from pzd.simulate.oil import Oil
+from pzd.simulate.scene import Grid
+from pzd.table.lookup import Lookup
+
+LEAST_RELAXATION = 1e-5
+"""An oil spring that relaxes faster than this [s] is rigid for a car, and is taken as this fast."""
+
+
+def lowest_temperature(table: Table) -> float | None:
+    """The lowest temperature of the table [degC]; None where it has none."""
+    known = [row.temperature_degC for row in table.force if row.temperature_degC is not None]
+    return min(known, default=None)
+
+
+def grid_of(table: Table, temperature: float | None) -> Grid:
+    """The table at one temperature [degC], as the compiled loop reads it."""
+    lookup = Lookup.of(table, temperature)
+    return Grid(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.reach)
+
+
+def table_of(damper: Damper, table: Table) -> Table:
+    """The table that another damper would have at the same nodes: what the plain one promises.
+
+    Parameters
+    ----------
+    damper : the other damper
+    table : whose nodes, reach and rule for what lies outside are kept
+
+    Returns
+    -------
+    the table without its inverse
+    """
+    held = {(row.temperature_degC, row.voltage_V): 0.0 for row in table.force}
+    for row in table.force:
+        key = (row.temperature_degC, row.voltage_V)
+        if row.inside == 1 or table.notes.outside != "clamp":
+            held[key] = max(held[key], abs(row.velocity_m_per_s))
+    return Table(
+        tuple(_of(damper, row, held[row.temperature_degC, row.voltage_V]) for row in table.force), (), table.notes
+    )
+
+
+def _of(damper: Damper, row: ForceRow, fastest: float) -> ForceRow:
+    if row.force_N is None:
+        return row
+    velocity = np.copysign(min(abs(row.velocity_m_per_s), fastest), row.velocity_m_per_s)
+    force = float(steady_force(damper, row.voltage_V, row.temperature_degC, velocity))
+    return row.model_copy(update={"force_N": force})
+
+
+def oil_of(damper: Damper, temperature: float | None, valve: float) -> Oil:
+    """The damper at one temperature, as the compiled loop reads it.
+
+    Parameters
+    ----------
+    damper : with its effects
+    temperature : [degC]
+    valve : time constant of the valve where the damper has no `valve_lag` of its own [s]
+    """
+    nodes = nodes_of(damper, temperature)
+    rows = np.array(nodes.rows)
+    rows[:, K] = np.minimum(rows[:, K], rows[:, C] / LEAST_RELAXATION)
+    lag = nodes.tau if "valve_lag" in damper.effects else valve
+    parallel = np.ascontiguousarray(nodes.beside)
+    alone = not any(_stands_beside(row) for row in parallel)
+    return Oil(nodes.voltages, rows, parallel, float(lag), float(nodes.r), alone, np.zeros(parallel.shape[1]))
+
+
+def rubs(oil: Oil) -> bool:
+    """Whether friction beside the element jumps where the speed crosses nought."""
+    tiny = np.finfo(np.float64).tiny
+    return any(beside(0.0, tiny, 0.0, row) != beside(0.0, 0.0, 0.0, row) for row in oil.beside)
+
+
+def _stands_beside(row: Array) -> bool:
+    rest = beside(0.0, 0.0, 0.0, row)
+    tries = [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.0, -1e-6, 0.0), (0.0, 0.0, 1.0)]
+    return any(beside(x, v, a, row) != rest for x, v, a in tries)
+
+
+def check_inertance(oil: Oil, car: HalfCar) -> None:
+    """Refuse a damper whose apparent mass would outweigh the car's.
+
+    Raises
+    ------
+    DataError : when it would
+    """
+    apart = min(float(beside(0.0, 0.0, 1.0, row) - beside(0.0, 0.0, 0.0, row)) for row in oil.beside)
+    per_axle = apart * max(n * r * r for n, r in zip(car.dampers, car.motion_ratios, strict=True))
+    mobility = np.max(
+        np.linalg.eigvalsh(car.force_directions().T @ np.linalg.solve(car.mass_matrix(), car.force_directions()))
+    )
+    if 1.0 + per_axle * mobility <= 0.0:
+        raise DataError(f"3-diagnose/damper.yaml: effects.fluid_inertia: {apart:g} kg outweighs the car's body")

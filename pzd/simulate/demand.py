@@ -1,0 +1,75 @@
+"""The force that the policy asks of each axle, within the box Omega(V)."""
+
+from __future__ import annotations
+
+import math
+
+from pzd.damper.compiled import compiled
+from pzd.record import Array
+from pzd.simulate.admissible import coefficient_bounds, table_bounds
+from pzd.simulate.minimise import least_acceleration_forces
+from pzd.simulate.scene import (
+    BY_COEFFICIENTS,
+    BY_TABLE,
+    DEFLECTION,
+    FORCE,
+    HEAVE,
+    HEAVE_RATE,
+    HIGH,
+    LOW,
+    MINIMISE,
+    PITCH,
+    PITCH_RATE,
+    RATE,
+    Grid,
+    Law,
+    Vehicle,
+)
+
+
+@compiled
+def one_sided(velocity: float, side: float) -> float:
+    """The velocity held on the side of nought that an axle is on (+1, -1); the sign bit of 0 carries the side."""
+    return math.copysign(max(side * velocity, 0.0), side)
+
+
+@compiled
+def bounds_of(law: Law, car: Vehicle, grid: Grid, axle: int, velocity: float) -> tuple[float, float]:
+    """Lowest and highest force of an axle [N] at a suspension speed [m/s]."""
+    if law.bounds == BY_COEFFICIENTS:
+        return coefficient_bounds(velocity, law.c_min, law.c_max)
+    if law.bounds == BY_TABLE:
+        return table_bounds(velocity, car.ratio[axle], car.dampers[axle], grid.speeds, grid.rebound, grid.compression)
+    return -math.inf, math.inf
+
+
+@compiled
+def feedback_force(gains: Array, y: Array, desk: Array) -> float:
+    """Force of one axle that is proportional to what a policy senses: gains (8,) on `SENSED` [N]."""
+    force = gains[4] * y[HEAVE] + gains[5] * y[PITCH] + gains[6] * y[HEAVE_RATE] + gains[7] * y[PITCH_RATE]
+    for i in range(2):
+        force += gains[i] * desk[DEFLECTION, i] + gains[2 + i] * desk[RATE, i]
+    return float(force)
+
+
+@compiled
+def spring_acceleration(car: Vehicle, deflection: Array) -> float:
+    """Acceleration at K by the springs alone [m/s2].
+
+    Equation: a_0 = D^T S, S_i = k_i U_i      Source: Makowski and Knap 2021, eq. (9)
+    """
+    a0 = 0.0
+    for i in range(2):
+        a0 += car.comfort[i] * car.stiffness[i] * deflection[i]
+    return a0
+
+
+@compiled
+def demand(law: Law, car: Vehicle, y: Array, desk: Array, branch: int) -> None:
+    """Fill the desk's forces with what the policy asks of both axles within the desk's bounds [N]."""
+    if law.aim == MINIMISE:
+        a0 = spring_acceleration(car, desk[DEFLECTION])
+        least_acceleration_forces(a0, car.comfort, desk[LOW], desk[HIGH], law.tie, branch, desk[FORCE])
+        return
+    for i in range(2):
+        desk[FORCE, i] = min(max(feedback_force(law.gains[i], y, desk), desk[LOW, i]), desk[HIGH, i])

@@ -1,0 +1,162 @@
+"""The car with constant damping on a sine: linear, so everything about it is exact.
+
+The state is x = (z, phi, dz, dphi, sin wt, cos wt): the road is part of it, evaluated exactly at any
+step. One matrix exponential carries it over a step, another gives the energies of a step as
+quadratic forms of its start.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.record import Array
+from pzd.simulate.car import HalfCar
+from pzd.simulate.energy import balance_error
+from pzd.simulate.outcome import Outcome
+from pzd.simulate.scene import DISSIPATED, ROAD_WORK, STATES
+
+Complex = NDArray[np.complex128]
+
+
+def harmonic_response(
+    car: HalfCar, damping: float, frequency: float, amplitude: float, vehicle_speed: float
+) -> tuple[Complex, complex]:
+    """Steady vibration of body and point K with constant damping on a sine.
+
+    Equation: (K - w^2 M + i w C) X = H (k + i w c) xi, xi_2 = xi_1 exp(-i w (a1 + a2) / V)
+                                                                      Source: eq. (6) with T_i = c V_i
+
+    Parameters
+    ----------
+    car : the half-car
+    damping : c of each axle [N s/m]
+    frequency : that the car feels [Hz]
+    amplitude : of the road [m]
+    vehicle_speed : [m/s]
+
+    Returns
+    -------
+    (2,) complex amplitudes of z [m] and phi [rad], and that of a_K [m/s2]; the road under axle 1 is
+    the imaginary part of A exp(i w t)
+    """
+    w = 2.0 * np.pi * frequency
+    H = car.force_directions()
+    road = amplitude * np.exp(-1j * w * np.array([0.0, car.wheelbase / vehicle_speed]))
+    impedance = np.diag(np.array(car.stiffnesses) + 1j * w * damping)
+    body = np.linalg.solve(H @ impedance @ H.T - w * w * car.mass_matrix(), H @ impedance @ road)
+    return body.astype(np.complex128), complex(-w * w * (body[0] + car.comfort_point * body[1]))
+
+
+def ride_exactly(
+    car: HalfCar,
+    damping: float,
+    frequency: float,
+    amplitude: float,
+    vehicle_speed: float,
+    step: float,
+    steps: int,
+    per_output: int,
+    settle: int,
+    reach: float,
+) -> Outcome:
+    """Ride a sine from rest with constant damping, exactly.
+
+    Parameters
+    ----------
+    car : the half-car
+    damping : c of each axle [N s/m]
+    frequency, amplitude : of the sine [Hz], [m]
+    vehicle_speed : [m/s]
+    step, steps : length [s] and number of the steps at which the exact solution is taken
+    per_output : steps between two rows of the history
+    settle : steps before peaks and r.m.s. are taken
+    reach : largest damper speed of the rig [m/s]
+
+    Returns
+    -------
+    the ride
+    """
+    w = 2.0 * np.pi * frequency
+    u, v, rise = _suspension_rows(car, w, amplitude, vehicle_speed)
+    load = np.array(car.stiffnesses)[:, None] * u + damping * v
+    A = _system(car, w, load)
+    x = _states(A, step, steps)
+    deflection, rate, forces = x @ u.T, x @ v.T, x @ load.T
+    comfort = forces @ car.force_to_comfort()
+    energy = np.zeros(STATES)
+    energy[DISSIPATED] = _integral(A, damping * v.T @ v, step, x)
+    energy[ROAD_WORK] = _integral(A, -0.5 * (load.T @ rise + rise.T @ load), step, x)
+    stored = _stored(car, u)
+    change = float(x[-1] @ stored @ x[-1] - x[0] @ stored @ x[0])
+    too_fast = np.abs(rate) * np.array(car.motion_ratios) > reach * (1.0 + 1e-9)
+    springs = deflection * np.array(car.stiffnesses)
+    voltage = np.full(steps + 1, np.nan)
+    columns = [np.arange(steps + 1) * step, x[:, 0], x[:, 1], comfort]
+    for i in range(2):
+        damper = damping * rate[:, i]
+        columns += [deflection[:, i], rate[:, i], springs[:, i], damper, damper, voltage]
+    return Outcome(
+        history=np.stack(columns, axis=1)[::per_output],
+        comfort=comfort,
+        step=step,
+        peak_deflection=float(np.max(np.abs(deflection[settle:]))),
+        wheel_load=float(np.sqrt(np.max(np.mean(forces[settle:] ** 2, axis=0)))),
+        outside=float(np.mean(np.any(too_fast, axis=1))),
+        dissipated=float(energy[DISSIPATED]),
+        energy_error=balance_error(change, energy),
+    )
+
+
+def _suspension_rows(car: HalfCar, w: float, amplitude: float, speed: float) -> tuple[Array, Array, Array]:
+    """Rows (2, 6) that give deflection, its rate and the road's speed from the state x."""
+    H = car.force_directions()
+    late = w * np.array([0.0, car.wheelbase / speed])
+    sine, cosine = amplitude * np.cos(late), -amplitude * np.sin(late)
+    height = np.stack([sine, cosine], axis=1)
+    moving = w * np.stack([-cosine, sine], axis=1)
+    none = np.zeros((2, 2))
+    return np.hstack([H.T, none, -height]), np.hstack([none, H.T, -moving]), np.hstack([none, none, moving])
+
+
+def _system(car: HalfCar, w: float, load: Array) -> Array:
+    A = np.zeros((6, 6))
+    A[0, 2] = A[1, 3] = 1.0
+    A[2:4] = car.acceleration(load)
+    A[4, 5], A[5, 4] = w, -w
+    return A
+
+
+def _states(A: Array, step: float, steps: int) -> Array:
+    """(steps + 1, 6) states from rest, doubled block by block."""
+    from scipy.linalg import expm
+
+    x = np.zeros((1, 6))
+    x[0, 5] = 1.0
+    power = expm(A * step)
+    while len(x) <= steps:
+        x = np.vstack([x, x @ power.T])
+        power = power @ power
+    return x[: steps + 1]
+
+
+def _integral(A: Array, Q: Array, step: float, x: Array) -> float:
+    """Integral of x^T Q x over all steps, exactly.
+
+    Source: Van Loan 1978, IEEE Trans. Automatic Control 23(3)
+    """
+    from scipy.linalg import expm
+
+    n = len(A)
+    block = np.zeros((2 * n, 2 * n))
+    block[:n, :n], block[:n, n:], block[n:, n:] = -A.T, Q, A
+    whole = expm(block * step)
+    gramian = whole[n:, n:].T @ whole[:n, n:]
+    return float(np.einsum("ni,ij,nj->", x[:-1], gramian, x[:-1], optimize=True))
+
+
+def _stored(car: HalfCar, u: Array) -> Array:
+    E: Array = 0.5 * u.T @ np.diag(car.stiffnesses) @ u
+    E[2, 2] += 0.5 * car.mass
+    E[3, 3] += 0.5 * car.pitch_inertia
+    return E

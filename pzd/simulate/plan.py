@@ -1,0 +1,84 @@
+"""Which rides a config asks for, and which of them the rig allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pzd.schema.errors import ConfigError
+from pzd.simulate.config import Fidelity, SimulateConfig
+from pzd.simulate.policies import policies
+from pzd.simulate.policy import Policy
+from pzd.simulate.road import Road
+
+PLAIN = "-plain"
+"""Appended to the case that rides on the damper before diagnose."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One ride to be computed."""
+
+    road: Road
+    policy: Policy
+    fidelity: Fidelity
+    plain: bool
+    """On the damper before diagnose."""
+
+    @property
+    def name(self) -> str:
+        """road-policy-fidelity, with `-plain` appended."""
+        return f"{self.road.name}-{self.policy.name}-{self.fidelity}" + (PLAIN if self.plain else "")
+
+
+def cases(config: SimulateConfig, with_voltage: bool, changed: bool) -> tuple[Case, ...]:
+    """The rides, in the order of roads, policies and fidelities.
+
+    Without a control signal nothing can be asked of the dampers: then constant damping is ridden as
+    `ideal` and the dampers as they are (`passive`) by table and dynamically.
+
+    Parameters
+    ----------
+    config : the block
+    with_voltage : whether the rig has a control signal
+    changed : whether diagnose changed the damper, so that each ride on it has a `-plain` one beside it
+
+    Raises
+    ------
+    ConfigError : when a policy is named that needs the voltage of a rig without one
+    """
+    known = policies()
+    default = ("constant", "comfort") if with_voltage else ("constant", "passive")
+    chosen = [known[name] for name in config.policies or default]
+    if not with_voltage:
+        _refuse_without_voltage(config, chosen)
+    found = []
+    for road in config.roads:
+        for policy in chosen:
+            for fidelity in config.fidelities:
+                if not _possible(policy, fidelity, with_voltage):
+                    continue
+                found.append(Case(road, policy, fidelity, plain=False))
+                if changed and (fidelity != "ideal" or (config.bounds == "table" and policy.aim != "damping")):
+                    found.append(Case(road, policy, fidelity, plain=True))
+    if not found:
+        raise ConfigError("simulate.fidelities: none of them can ride any of the policies; add table or dynamic")
+    return tuple(found)
+
+
+def _possible(policy: Policy, fidelity: Fidelity, with_voltage: bool) -> bool:
+    if policy.aim == "voltage":
+        return fidelity != "ideal"
+    return with_voltage or fidelity == "ideal"
+
+
+def _refuse_without_voltage(config: SimulateConfig, chosen: list[Policy]) -> None:
+    wrong = [
+        f"simulate.policies: {policy.name} sets the voltage of the dampers, and the rig records none; "
+        "map a control signal, or ride constant and passive"
+        for policy in chosen
+        if policy.aim in ("feedback", "minimise")
+    ]
+    if wrong:
+        raise ConfigError(wrong)
+    if config.bounds == "table":
+        raise ConfigError("simulate.bounds: the rig records no voltage, so the table bounds nothing (got table)")
