@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -152,7 +153,6 @@ def test_diagnose_tells_the_story(typed: Terminal) -> None:
         (["run", "first.yaml", "--set", "seed"], 2, "--set seed: must read a.b=VALUE (got seed)"),
         (["run", "first.yaml", "--set", "seed=[1]"], 2, "--set seed: VALUE must be one YAML scalar (got [1])"),
         (["run", "first.yaml", "--set", "rig.files.7.path=X"], 2, "--set rig.files.7.path: a list of 1 stands here"),
-        (["run", "first.yaml", "--set", "rig.files.0.path=dta/*"], 2, "--set rig.files.0.path: no such file"),
         (["synthesise", "first.yaml"], 2, "pzd synthesise: the config has rig.files, so the command is pzd ingest"),
         (["run", "first.yaml", "--runs", "first.yaml"], 5, "first.yaml"),
         (["show", "first.yaml"], 2, "runs/first: no results stand here yet; pzd run first.yaml makes them"),
@@ -171,6 +171,12 @@ def test_a_mistake_is_one_plain_line_on_stderr(typed: Terminal, arguments: list[
     assert len(typed.err) == 1
     assert typed.err[0].startswith(message)
     assert "Traceback" not in typed.err[0]
+
+
+def test_a_path_that_matches_no_file_is_a_wrong_config(typed: Terminal) -> None:
+    assert typed("run", "first.yaml", "--set", "rig.files.0.path=dta/*") == 2
+    (message,) = typed.err
+    assert message.startswith("--set rig.files.0.path: no such file")
 
 
 def test_a_setting_that_no_record_has_is_refused_once_the_records_are_known(typed: Terminal) -> None:
@@ -456,11 +462,12 @@ ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.p
 
 def test_help_takes_a_moment_and_lists_every_command(pzd: Command) -> None:
     spent = []
-    for _ in range(5):
-        begun = time.perf_counter()
+    for _ in range(3):
+        begun = resource.getrusage(resource.RUSAGE_CHILDREN)
         printed = pzd("--help")
-        spent.append(time.perf_counter() - begun)
-    assert min(spent) < 0.3
+        ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent.append(ended.ru_utime - begun.ru_utime + ended.ru_stime - begun.ru_stime)
+    assert min(spent) < 0.3  # of the processor, so that a busy machine is no fault
     assert (printed.returncode, printed.stderr) == (0, "")
     listed = re.findall(r"^  ([a-z]+)  +\S", printed.stdout.partition("Commands:")[2], re.MULTILINE)
     assert listed == COMMANDS

@@ -24,7 +24,7 @@ from pzd.quantities import (
 from pzd.rig.channels import ALSO_READ, NEEDED, own
 from pzd.rig.config import FilesEntry
 from pzd.rig.formats import reader
-from pzd.rig.units import UnitFault, in_header, to_canonical
+from pzd.rig.units import UnitError, in_header, to_canonical
 from pzd.schema.scalars import written
 
 _LOOKS_LIKE = {
@@ -119,7 +119,7 @@ def _says_unit(column: str, quantity: Quantity) -> bool:
     unit = in_header(column, quantity)
     try:
         return unit is not None and to_canonical(np.zeros(1), unit, quantity) is not None
-    except UnitFault:
+    except UnitError:
         return False
 
 
