@@ -79,6 +79,18 @@ def test_force_is_periodic_from_the_first_sample(waveform: Any, seed: int) -> No
     np.testing.assert_allclose(test.true_force[period:], test.true_force[:-period], atol=1e-4)
 
 
+def test_a_test_starts_from_rest_before_its_recording_begins() -> None:
+    seen: list[Motion] = []
+
+    def law(damper: object, motion: Motion, frame: float | None) -> np.ndarray:
+        seen.append(motion)
+        return motion.velocity.copy()
+
+    list(take(stand(), 1, law=law))
+    assert seen[0].time[0] == pytest.approx(-1.0)
+    assert (seen[0].displacement[0], seen[0].velocity[0], seen[0].acceleration[0]) == (0.0, 0.0, 0.0)
+
+
 def test_a_record_spans_its_cycles_and_begins_at_time_zero() -> None:
     (test,) = taken(stand(tests=[{"waveform": SINE, "cycles": 3}]))
     assert test.time[0] == 0.0
