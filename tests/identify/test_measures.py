@@ -40,6 +40,7 @@ def test_force_at_zero_speed_is_the_mean_of_both_branches() -> None:
     phase = 2.0 * np.pi * (np.arange(1000) + 0.37) / 1000.0
     displacement, velocity = np.sin(phase), np.cos(phase)
     assert force_at_rest(velocity, 200.0 * displacement + 30.0, closed=True) == pytest.approx(200.0, rel=1e-4)
+    assert force_at_rest(velocity, 1000.0 * velocity, closed=True) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_dynamic_range_compares_tests_at_the_same_speed_only() -> None:

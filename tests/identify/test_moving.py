@@ -66,6 +66,12 @@ def test_a_single_constant_voltage_is_held_and_the_levels_dwelled_on_are_fitted(
     np.testing.assert_allclose(values(fitted), TABLE_2[150.0], rtol=1e-3)
 
 
+def test_rows_rise_with_the_voltage_whichever_was_fitted_first() -> None:
+    constant = sine_test(TABLE_2[150.0], 2.0, 0.03, cycles=4, voltage=150.0, name="c")
+    rows = rows_for(constant, moving_test(steps, seconds=4.0))
+    assert [row.voltage_V for row in rows] == pytest.approx([0.0, 150.0], abs=0.1)
+
+
 def test_a_node_whose_constant_record_tells_too_little_is_fitted_to_both() -> None:
     slow = sine_test(TABLE_2[0.0], 0.05, 0.002, cycles=3, voltage=0.0, name="slow")
     assert rows_for(slow)[0].C_Ns_per_m is None

@@ -43,9 +43,11 @@ def test_a_wrong_force_at_the_first_sample_is_forgotten(phase) -> None:
     truth = TABLE_2[0.0]
     record = sine_test(truth, 2.0, 0.03, phase=phase)
     wrong = record.force.copy()
-    wrong[0] *= 0.8
-    fit = fit_separable(Objective((trial_of(replace(record, force=wrong)),)))
-    np.testing.assert_allclose(fit.parameters, truth, rtol=2e-4)
+    wrong[0] -= 500.0
+    trial = trial_of(replace(record, force=wrong))
+    everything = replace(trial, counted=np.ones_like(trial.counted))
+    assert Objective((everything,)).criterion(truth) > 100.0 * Objective((trial,)).criterion(truth)
+    np.testing.assert_allclose(fit_separable(Objective((trial,))).parameters, truth, rtol=2e-4)
 
 
 def test_fine_displacement_removes_the_bias_of_reading_a_sine_as_a_polygon() -> None:

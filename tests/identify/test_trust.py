@@ -9,9 +9,12 @@ import pytest
 from fresh_truths import TABLE_2, acceptance_test, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
-from pzd.identify.config import IdentifyConfig
+from pzd.identify.config import EvolutionaryConfig, IdentifyConfig
+from pzd.identify.evolutionary import fit_evolutionary
 from pzd.identify.fit import fit_condition
-from pzd.identify.objective import Bingham
+from pzd.identify.objective import Bingham, Objective
+from pzd.identify.separable import fit_separable
+from pzd.identify.trial import trial_of
 from pzd.identify.trust import Evidence, displacement_noise, judge, visible_shares
 from pzd.record import Condition, Record
 
@@ -35,6 +38,14 @@ def test_a_damper_that_never_slips_shows_neither_friction_nor_damping() -> None:
     assert row.T0_N is None
     assert row.C_Ns_per_m is None
     assert "undetermined: T0, C" in row.status
+
+
+def test_a_tare_of_the_load_cell_is_not_explained_by_an_element_that_never_slips() -> None:
+    record = sine_test(Bingham(50.0, 1000.0, 4e5), 2.0, 0.01)
+    tared = Objective((trial_of(replace(record, force=record.force + 600.0)),))
+    for fit in (fit_separable(tared), fit_evolutionary(tared, EvolutionaryConfig(), seed=1)):
+        assert fit.parameters.friction < 0.5 * fit.parameters.stiffness * np.ptp(record.displacement)
+    assert row_for(replace(record, force=record.force + 600.0)).status != "ok"
 
 
 def test_a_damper_without_friction_has_a_friction_of_nothing_and_not_an_unknown_one() -> None:
