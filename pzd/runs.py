@@ -12,7 +12,7 @@ import os
 import platform
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
@@ -29,6 +29,7 @@ Made = TypeVar("Made", Rig, Identified, Diagnosed, Table, Rides, Report, Artefac
 
 MANIFEST = "manifest.json"
 CONFIG = "config.yaml"
+_LOCK = ".lock"
 PATIENCE = 2.0
 """How long to wait for another command on the same run [s]."""
 _NAMES = Control()
@@ -161,7 +162,7 @@ class Run:
         holder = self.folder / ".holder"
         with _as_files_error(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
-            lock = FileLock(self.folder / ".lock")
+            lock = FileLock(self.folder / _LOCK)
             try:
                 lock.acquire(timeout=PATIENCE)
             except Timeout:
@@ -179,7 +180,16 @@ class Run:
             yield
         finally:
             holder.unlink(missing_ok=True)
+            self._leave_nothing_for_nothing()
             lock.release()
+
+    def _leave_nothing_for_nothing(self) -> None:
+        """Take the folder away again where a first run came to no result."""
+        if [path.name for path in self.folder.iterdir()] == [_LOCK]:
+            (self.folder / _LOCK).unlink()
+            self.folder.rmdir()
+            with suppress(OSError):
+                self.folder.parent.rmdir()
 
     def _settle(self) -> None:
         for leftover in self.folder.glob(".*.new"):

@@ -129,6 +129,13 @@ def test_a_file_touched_or_a_comment_added_reruns_nothing(bench: Bench) -> None:
     assert bench() == []
 
 
+def test_the_same_config_by_another_path_reruns_nothing(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench()
+    monkeypatch.chdir(bench.config.parent)
+    bench.config, bench.runs = Path("first.yaml"), Path("runs")
+    assert bench() == []
+
+
 def test_edited_code_reruns_what_may_use_it(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     bench()
     monkeypatch.setattr(

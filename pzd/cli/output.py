@@ -24,10 +24,11 @@ class Output:
     def __init__(self, *, quiet: bool, verbose: bool) -> None:
         self.quiet = quiet
         logger = logging.getLogger("pzd")
-        logger.handlers = [_Handler(self, verbose=verbose and not quiet)]
+        handler = _Handler(self, verbose=verbose and not quiet)
+        logger.handlers = [handler]
         logger.setLevel(logging.DEBUG if verbose else logging.INFO)
         logging.captureWarnings(capture=True)
-        logging.getLogger("py.warnings").handlers = [logging.NullHandler()]
+        logging.getLogger("py.warnings").handlers = [handler if verbose else logging.NullHandler()]
 
     def say(self, *lines: str) -> None:
         """Print lines to stdout, unless the user wants it quiet or nobody listens any more."""

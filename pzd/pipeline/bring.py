@@ -13,6 +13,7 @@ from pzd.pipeline.dependencies import block_of, changes, dependencies, is_artefa
 from pzd.pipeline.stages import Stage
 from pzd.quantities import Control
 from pzd.runs import Kept, Run
+from pzd.schema.yamlfile import yaml_text
 
 Say = Callable[[str], None]
 
@@ -50,9 +51,15 @@ class Pipeline:
         wanted = self.stages[: [stage.name for stage in self.stages].index(target) + 1]
         for number, stage in enumerate(wanted):
             self._bring(stage, force=stage.name in forced)
-            if number == 0 and any("setting" in later.takes for later in wanted):
-                setting_of(self.config, self.run)
+            if number == 0:
+                self._after_first(wanted)
         return tuple(dict.fromkeys(mark for marks in self.marks.values() for mark in marks))
+
+    def _after_first(self, wanted: Sequence[Stage]) -> None:
+        """Now that the records are sound, write the config, and see that it is clear which setting is meant."""
+        self.run.write_config(yaml_text(self.config, self.run.control))
+        if any("setting" in stage.takes for stage in wanted):
+            setting_of(self.config, self.run)
 
     def _bring(self, stage: Stage, *, force: bool) -> None:
         inputs = dependencies(stage, self.config, self.run, self._carried(stage, ()))

@@ -14,7 +14,7 @@ from pzd.pipeline.bring import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
 from pzd.runs import Run
 from pzd.schema.errors import ConfigError
-from pzd.schema.yamlfile import Document, read_yaml, yaml_text
+from pzd.schema.yamlfile import Document, read_yaml
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,6 @@ def bring(given: Opened, target: str, *, force: bool, jobs: int, say: Say) -> tu
     _right_source(line, last)
     forced = [stage.name for stage in line if target in ("run", stage.name)] if force else []
     with given.placed(), given.run.locked(f"pzd {target}"):
-        given.run.write_config(yaml_text(given.config, given.run.control))
         return Pipeline(given.config, given.run, line, say, jobs).bring_up_to_date(last, forced)
 
 

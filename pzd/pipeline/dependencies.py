@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -119,6 +120,7 @@ def _files_named(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
 
     named = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
     try:
-        return {str(file): file_hash(file) for value in named for file in matching(folder, value)}
+        files = [file for value in named for file in matching(folder, value)]
+        return {Path(os.path.relpath(file, folder)).as_posix(): file_hash(file) for file in files}
     except OSError as error:
         raise FilesError(f"{error.filename}: {error.strerror}") from error

@@ -43,7 +43,14 @@ def validated(annotation: Any, root: Node, control: Control, error: type[UserErr
         return TypeAdapter(annotation).validate_json(json.dumps(data))
     except ValidationError as found:
         faults = _merged([_fault(detail, root) for detail in found.errors(include_url=False)])
-        raise error(_message(group, annotation, root, data, control) for group in faults) from None
+        messages = [_message(group, annotation, root, data, control) for group in faults]
+        raise error(sorted(messages, key=_position)) from None
+
+
+def _position(message: str) -> list[int]:
+    """Line and column of a message, to sort by; none for what the command line set."""
+    place = re.match(r".*?:(\d+):(\d+): ", message)
+    return [int(number) for number in place.groups()] if place else []
 
 
 @dataclass(frozen=True)

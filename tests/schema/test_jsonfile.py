@@ -61,8 +61,8 @@ def test_faults_carry_line_and_column_of_the_value(tmp_path: Path) -> None:
         "r.json:2:12: tests.0.name: must be text; put it in quotes (got 5)",
         "r.json:2:35: tests.0.at_voltage_V.1: must be a number (got x)",
         'r.json:3:2: tests.1.name: is missing (got ["nmae", "size"])',
-        "r.json:3:24: tests.1.size: must be a number or a list (got Infinity)",
         "r.json:3:3: tests.1.nmae: no such key; did you mean name? (got nmae)",
+        "r.json:3:24: tests.1.size: must be a number or a list (got Infinity)",
     ]
 
 

@@ -188,12 +188,12 @@ def test_every_fault_is_said_at_once_with_the_nearest_key(tmp_path: Path) -> Non
     text = "nmae: b\noutside: clmap\ninner:\n  - {voltage: 3, setting: 1}\n  - voltage_V: [1, x]\n"
     text += "limits: {a: true}\nzzz: 1\n"
     assert faults(tmp_path, text) == [
+        "c.yaml:1:1: nmae: no such key; did you mean name? (got nmae)",
         "c.yaml:2:10: outside: must be one of clamp, error, model; did you mean clamp? (got clmap)",
-        "c.yaml:4:27: inner.0.setting: must be text; put it in quotes (got 1)",
         "c.yaml:4:6: inner.0.voltage: no such key; did you mean voltage_V? (got voltage)",
+        "c.yaml:4:27: inner.0.setting: must be text; put it in quotes (got 1)",
         "c.yaml:5:20: inner.1.voltage_V.1: must be a number (got x)",
         "c.yaml:6:13: limits.a: must be a number (got true)",
-        "c.yaml:1:1: nmae: no such key; did you mean name? (got nmae)",
         "c.yaml:7:1: zzz: no such key; there is name, outside, inner, limits (got zzz)",
     ]
 

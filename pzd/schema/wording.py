@@ -1,0 +1,25 @@
+"""What pydantic says of a value, in the words of a person who wrote it."""
+
+from __future__ import annotations
+
+import re
+
+_WORDS = {
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "bool_type": "must be true or false",
+    "string_type": "must be text",
+    "tuple_type": "must be a list",
+    "list_type": "must be a list",
+    "dict_type": "must be a mapping",
+    "model_type": "must be a mapping",
+    "model_attributes_type": "must be a mapping",
+}
+
+
+def worded(kind: str, message: str) -> str:
+    """What a value must be, by pydantic's kind of error and its message."""
+    plain = re.sub(r"^(Input|String|Tuple|List|Dictionary|Value) should", "must", message.removeprefix("Value error, "))
+    return _WORDS.get(kind, plain.replace(" after validation", ""))
