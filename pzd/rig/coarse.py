@@ -15,12 +15,12 @@ from pzd.record import Array
 from pzd.rig.cycles import Cycles
 from pzd.rig.measured import Measured
 
-MOST_SAMPLES = 1500
-RATE = 500.0
+MOST_SAMPLES = 800
+RATE = 250.0
 """A record without cycles is read at about this rate [Hz]."""
 _GRID = (12, 10)
 _ZOOM = (7, 7)
-_ZOOMS = 3
+_ZOOMS = 2
 
 
 @dataclass(frozen=True, eq=False)

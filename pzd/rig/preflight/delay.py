@@ -13,6 +13,8 @@ LEAST_DELAY = 1e-3
 """Smallest delay that is said [s]; what is less is within the nuisances of a diagnosis."""
 EXPLAINS = 0.25
 """The delay has to leave less than this share of the squares that the element without it leaves."""
+VISIBLE = 2e-3
+"""Share of the squares that the element must leave: what is less is noise, or how coarse it is."""
 LONGEST = 0.03
 """Largest delay looked for [s], or a twentieth of the cycle where that is less."""
 TRIES = 31
@@ -27,8 +29,8 @@ def check(test: Measured) -> list[Finding]:
     delays = np.linspace(-longest, longest, TRIES)
     undelayed, best = fitted(part, part.force_later(np.zeros(1))), fitted(part, part.force_later(delays))
     delay = float(delays[best.force])
-    at_the_end = best.force in (0, TRIES - 1)
-    if at_the_end or abs(delay) < max(LEAST_DELAY, 0.5 * part.step) or best.left > EXPLAINS * undelayed.left:
+    found = abs(delay) >= max(LEAST_DELAY, 0.5 * part.step) and best.force not in (0, TRIES - 1)
+    if not found or undelayed.left < VISIBLE or best.left > EXPLAINS * undelayed.left:
         return []
     return [
         Finding(

@@ -11,7 +11,7 @@ LEAST_STROKE = 2e-4
 """A smaller stroke [m] is more likely a wrong unit than a test."""
 FORCES = (2.0, 5e5)
 """Peak forces [N] outside this range are more likely a wrong unit."""
-SPEEDS = (1e-4, 5.0)
+SPEEDS = (5e-4, 5.0)
 """Peak speeds [m/s] outside this range are more likely a wrong unit of time."""
 
 

@@ -1,0 +1,228 @@
+"""The preflight says what is wrong with a record, where and how much, and is silent about a clean one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from pzd.artefacts import Finding
+from pzd.damper.element import element_force
+from pzd.record import Record
+from pzd.rig.config import Limits
+from pzd.rig.cycles import cycles
+from pzd.rig.kinematics import kinematics
+from pzd.rig.measured import Measured
+from pzd.rig.preflight import checks, findings
+
+Array = NDArray[np.float64]
+
+KINDS = ("sine", "triangle", "random")
+FINE = 16
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng()
+
+
+def motion(kind: str, time: Array, rng: np.random.Generator) -> Array:
+    """A displacement of 4 to 15 mm amplitude, 0.6 to 3 Hz; the triangle up to 60 Hz, random motion 0.3 to 12 Hz."""
+    frequency, amplitude = rng.uniform(0.6, 3.0), rng.uniform(0.004, 0.015)
+    phase = 2.0 * np.pi * (frequency * time + rng.random())
+    if kind == "sine":
+        return amplitude * np.sin(phase)
+    if kind == "triangle":
+        odd = np.arange(1, int(60.0 / frequency), 2)
+        parts = [(-1.0) ** ((k - 1) // 2) / k**2 * np.sin(k * phase) for k in odd]
+        return amplitude * 8.0 / np.pi**2 * np.sum(parts, axis=0)
+    count = 2 * time.size
+    hertz = np.fft.rfftfreq(count, time[1] - time[0])
+    spectrum = rng.standard_normal(hertz.size) * np.exp(2j * np.pi * rng.random(hertz.size)) / np.maximum(hertz, 0.3)
+    x = np.fft.irfft(np.where((hertz > 0.3) & (hertz < 12.0), spectrum, 0.0), count)[: time.size]
+    return amplitude * x / np.abs(x).max()
+
+
+def record(
+    kind: str,
+    rng: np.random.Generator,
+    noise: float = 0.03,
+    rate: float = 1000.0,
+    delay: float = 0.0,
+    seconds: float = 8.0,
+) -> Record:
+    """A Bingham element within the paper's range, force noise correlated at 0.9, displacement noise of 5 um."""
+    time = np.arange(int(seconds * rate * FINE)) / (rate * FINE)
+    x = motion(kind, time, rng)
+    element = rng.uniform(100.0, 700.0), rng.uniform(1500.0, 5000.0), rng.uniform(1.5e5, 5e5)
+    force = element_force(x, float(time[1]), *element)
+    force = np.interp(time - delay, time, force)[::FINE]
+    time, x = time[::FINE], x[::FINE] + 5e-6 * rng.standard_normal(time[::FINE].size)
+    coloured = lfilter([np.sqrt(1.0 - 0.81)], [1.0, -0.9], rng.standard_normal(force.size))
+    force = force + noise * np.sqrt(np.mean(force**2)) * coloured
+    return Record(kind, None, time, x, x, x, force)
+
+
+def found(one: Record, limits: Limits = Limits()) -> tuple[Finding, ...]:  # noqa: B008 # frozen
+    """Findings of a record whose velocity is derived."""
+    run = cycles(one.time, one.displacement)
+    clean = kinematics(one.time, one.displacement, run)
+    whole = replace(one, velocity=clean.velocity, acceleration=clean.acceleration)
+    return findings(Measured(whole, run, clean, limits))
+
+
+def only(one: Record, check: str) -> Finding:
+    """The one finding of a check."""
+    (finding,) = [finding for finding in found(one) if finding.check == check]
+    return finding
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_clean_records_are_not_accused(kind: str, rng: np.random.Generator) -> None:
+    said = [finding for _ in range(12) for finding in found(record(kind, rng))]
+    assert len(said) <= 1, said
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_noise_free_records_are_not_accused(kind: str, rng: np.random.Generator) -> None:
+    for _ in range(3):
+        assert found(record(kind, rng, noise=0.0)) == ()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_offset_is_measured(kind: str, rng: np.random.Generator) -> None:
+    one = record(kind, rng)
+    offset = 0.1 * float(np.ptp(one.force))
+    assert only(replace(one, force=one.force + offset), "offset").size == pytest.approx(offset, rel=0.15)
+
+
+def test_a_late_force_is_measured(rng: np.random.Generator) -> None:
+    # Random motion alone: at one speed a delay is the same as a softer spring.
+    sizes = [
+        [finding.size for finding in found(record("random", rng, noise=0.01, delay=0.008)) if finding.check == "delay"]
+        for _ in range(6)
+    ]
+    assert sum(len(size) for size in sizes) >= 4
+    assert np.median(np.concatenate(sizes)) == pytest.approx(0.008, abs=0.0015)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("channel", ["force", "displacement"])
+def test_spikes_are_counted_and_placed(kind: str, channel: str, rng: np.random.Generator) -> None:
+    one = record(kind, rng)
+    values = getattr(one, channel).copy()
+    rows = np.sort(rng.choice(np.arange(100, 7000, 50), 3, replace=False))
+    values[rows] += np.array([1.0, -1.2, 1.5]) * 0.3 * np.ptp(values)
+    finding = only(replace(one, **{channel: values}), "spikes")
+    assert f"{channel}, 3 samples" in finding.where
+    assert f"{one.time[rows[2]]:.6g} s" in finding.where
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_force_cut_off_at_its_range_is_seen(kind: str, rng: np.random.Generator) -> None:
+    one = record(kind, rng, noise=0.003)
+    for sign in (1.0, -1.0):
+        top = 0.7 * float(np.percentile(np.abs(one.force), 99.0))
+        clipped = np.minimum(sign * one.force, top) * sign
+        finding = only(replace(one, force=clipped), "saturation")
+        assert finding.size == pytest.approx(np.mean(sign * one.force >= top), rel=0.3)
+
+
+def test_a_digitised_peak_is_no_saturation(rng: np.random.Generator) -> None:
+    for kind in KINDS:
+        one = record(kind, rng, noise=0.0)
+        digits = np.ptp(one.force) / 4096
+        coarse = replace(one, force=np.round(one.force / digits) * digits, displacement=np.round(one.displacement, 5))
+        assert [finding.check for finding in found(coarse)] == []
+
+
+def test_hum_of_the_mains_is_measured(rng: np.random.Generator) -> None:
+    for kind in KINDS:
+        for mains in (50.0, 60.0):
+            one = record(kind, rng)
+            hum = 0.05 * np.abs(one.force).max()
+            shown = one.force + hum * np.sin(2.0 * np.pi * (mains + 0.03) * one.time)
+            assert only(replace(one, force=shown), "hum").size == pytest.approx(hum, rel=0.2)
+
+
+def test_lost_samples_are_counted(rng: np.random.Generator) -> None:
+    for kind in KINDS:
+        one = record(kind, rng)
+        kept = np.delete(np.arange(one.time.size), [*range(3000, 3010), 5000])
+        channels = {name: getattr(one, name)[kept] for name in ("time", "displacement", "force")}
+        finding = only(replace(one, **channels), "dropped samples")
+        assert finding.size == 11.0
+        assert "2 gaps, the first after 2.999 s" in finding.where
+
+
+def test_an_unsteady_clock_is_measured(rng: np.random.Generator) -> None:
+    one = record("sine", rng)
+    shaken = one.time + 1e-4 * rng.uniform(-1.0, 1.0, one.time.size)
+    assert only(replace(one, time=shaken), "sampling").size == pytest.approx(1e-4 * np.sqrt(2.0 / 3.0) * 1e3, rel=0.1)
+
+
+def test_few_samples_and_few_cycles_are_said(rng: np.random.Generator) -> None:
+    slow = record("sine", rng, rate=25.0, seconds=30.0)
+    assert only(slow, "sampling").unit == "samples a cycle"
+    one = record("sine", rng)
+    period = cycles(one.time, one.displacement).period  # type: ignore[union-attr] # a sine has cycles
+    rows = slice(0, int(2.2 * period * 1000.0))
+    short = replace(one, time=one.time[rows], displacement=one.displacement[rows], force=one.force[rows])
+    assert only(short, "cycles").size == pytest.approx(2.2, abs=0.5)
+
+
+def test_a_velocity_at_odds_with_the_displacement_is_said(rng: np.random.Generator) -> None:
+    for kind in KINDS:
+        one = record(kind, rng)
+        run = cycles(one.time, one.displacement)
+        clean = kinematics(one.time, one.displacement, run)
+        for factor in (1e3, -1.0, 1.1):
+            whole = replace(one, velocity=factor * clean.velocity)
+            (finding,) = checks()["recorded_velocity"].check(Measured(whole, run, clean, Limits()))
+            assert finding.size == pytest.approx(factor, rel=0.01)
+        late = replace(one, velocity=np.roll(clean.velocity, int(0.05 * 1000 / 2.0)))
+        assert checks()["recorded_velocity"].check(Measured(late, run, clean, Limits()))
+        noisy = replace(one, velocity=clean.velocity + 0.02 * clean.velocity.std() * rng.standard_normal(one.time.size))
+        assert not checks()["recorded_velocity"].check(Measured(noisy, run, clean, Limits()))
+
+
+def test_units_off_by_a_thousand_are_suspected(rng: np.random.Generator) -> None:
+    one = record("sine", rng)
+    small = [finding.where for finding in found(replace(one, displacement=1e-3 * one.displacement))]
+    assert "stroke of the whole record" in small
+    assert only(replace(one, force=1e-3 * one.force), "scale").unit == "N"
+    assert only(replace(one, time=1e3 * one.time), "scale").unit == "m/s"
+
+
+def test_limits_of_the_stand_and_rest_are_said(rng: np.random.Generator) -> None:
+    one = record("sine", rng)
+    limits = Limits(stroke_m=1e-3, speed_m_per_s=1e-3, force_N=10.0, frequency_Hz=0.1)
+    assert len([finding for finding in found(one, limits) if finding.check == "reach"]) == 4
+    rest = np.arange(1, 3001) * 1e-3
+    still = replace(
+        one,
+        time=np.concatenate((one.time, one.time[-1] + rest)),
+        displacement=np.concatenate((one.displacement, np.full(3000, one.displacement[-1]))),
+        force=np.concatenate((one.force, np.full(3000, one.force[-1]))),
+    )
+    assert only(still, "rest").size == pytest.approx(3.0 / 11.0, abs=0.05)
+
+
+def test_a_cycle_that_feeds_energy_in_is_named(rng: np.random.Generator) -> None:
+    one = record("sine", rng)
+    run = cycles(one.time, one.displacement)
+    assert run is not None
+    flipped = np.where(run.number(one.time) == 2, -one.force, one.force)
+    finding = only(replace(one, force=flipped), "sign")
+    assert finding.size < 0.0
+    assert finding.where.startswith(f"1 of {run.count} cycles")
+
+
+def test_every_finding_says_what_follows(rng: np.random.Generator) -> None:
+    assert len(checks()) >= 12
+    for name, module in checks().items():
+        assert module.__doc__, name
+        assert module.check.__doc__, name
