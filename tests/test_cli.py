@@ -18,12 +18,12 @@ import pytest
 import yaml
 from stand_ins import NAMES, UNDETERMINED, project
 
-from pzd import runs
 from pzd.artefacts import Diagnosis, Gap, NextTest, Ranked, Region, Value
 from pzd.cli.app import status
 from pzd.cli.story import story
 from pzd.config import load
 from pzd.damper.effects import library
+from pzd.runs import Run
 
 COMMANDS = [
     *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report"),
@@ -226,8 +226,8 @@ def test_a_second_config_of_the_same_stem_is_refused_and_both_are_named(typed: T
 
 
 def test_a_run_in_use_is_code_5_and_names_who_uses_it(typed: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runs, "PATIENCE", 0.1)
-    with runs.Run.of(typed.config, Path("runs"), load(typed.config).control.signal()).locked("pzd simulate"):
+    monkeypatch.setattr("pzd.runs.folder.PATIENCE", 0.1)
+    with Run.of(typed.config, Path("runs"), load(typed.config).control.signal()).locked("pzd simulate"):
         assert typed("run", "first.yaml") == 5
     assert typed.err[0].startswith(f"runs/first: pzd simulate (process {os.getpid()} on ")
 

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import pytest
 
-from pzd import runs
 from pzd.artefacts import Identified, ParameterRow
 from pzd.quantities import Control
 from pzd.runs import Run, file_hash
@@ -208,7 +207,7 @@ def test_a_run_killed_between_the_renames_leaves_the_old_result_or_the_new(
 def test_a_held_run_is_refused_after_a_short_wait_and_names_who_holds_it(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runs, "PATIENCE", 0.2)
+    monkeypatch.setattr("pzd.runs.folder.PATIENCE", 0.2)
     process = other_process(run, hold=True)
     try:
         begun = time.monotonic()

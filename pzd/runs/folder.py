@@ -7,7 +7,6 @@ the next time the run is opened.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
 import shutil
@@ -15,13 +14,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TypeVar
 
 from pzd.artefacts import Artefact, Diagnosed, Identified, Manifest, Report, Rides, Rig, Table
 from pzd.quantities import Control
+from pzd.runs.disk import as_files_error, file_hash, sync, sync_folder, versions
 from pzd.schema.errors import ConfigError, DataError, FilesError
 from pzd.schema.jsonfile import read_json, write_json
 
@@ -34,32 +32,6 @@ PATIENCE = 2.0
 """How long to wait for another command on the same run [s]."""
 _NAMES = Control()
 """Manifests name files and keys as they are, whatever the control is called."""
-_LIBRARIES = ("pzd", "numpy", "scipy", "numba", "pandas", "pydantic")
-
-
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file's content."""
-    status = path.stat()
-    return _hash_as_of(path, status.st_mtime_ns, status.st_size, status.st_ino)
-
-
-@cache
-def _hash_as_of(path: Path, _changed: int, _size: int, _inode: int) -> str:
-    """The hash of a file, computed once as long as the file system says that it is the same."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-@cache
-def versions() -> dict[str, str]:
-    """Versions of Python, of pzd and of the libraries that its numbers hang on."""
-    found = {"python": platform.python_version()}
-    for name in _LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
 
 
 @dataclass(frozen=True)
@@ -116,7 +88,7 @@ class Run:
         """Hash of every file of a stage, by its path in the stage's folder."""
         folder = self.folder / stage
         files = (path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != MANIFEST)
-        with _as_files_error(folder):
+        with as_files_error(folder):
             return {path.relative_to(folder).as_posix(): file_hash(path) for path in files}
 
     def outputs(self, stage: str) -> dict[str, str]:
@@ -144,7 +116,7 @@ class Run:
         ------
         DataError : when a file of it is missing or at fault, with every place
         """
-        with _as_files_error(self.folder / kind.folder):
+        with as_files_error(self.folder / kind.folder):
             return kind.read(self.folder / kind.folder, self.control)
 
     # ------------------------------------------------------------ writing
@@ -160,7 +132,7 @@ class Run:
         from filelock import FileLock, Timeout
 
         holder = self.folder / ".holder"
-        with _as_files_error(self.folder):
+        with as_files_error(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
             lock = FileLock(self.folder / _LOCK)
             try:
@@ -171,7 +143,7 @@ class Run:
                     f"{self.folder}: {who} is writing here; wait for it, or give --runs another folder"
                 ) from None
         try:
-            with _as_files_error(self.folder):
+            with as_files_error(self.folder):
                 started = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
                 holder.write_text(
                     f"{command} (process {os.getpid()} on {platform.node()}, since {started})", encoding="utf-8"
@@ -204,12 +176,12 @@ class Run:
     def write_config(self, text: str) -> None:
         """Write the config with every default, unless it stands there already."""
         path = self.folder / CONFIG
-        with _as_files_error(path):
+        with as_files_error(path):
             if path.exists() and path.read_bytes() == text.encode():
                 return
             fresh = self.folder / f".{CONFIG}.new"
             fresh.write_text(text, encoding="utf-8", newline="\n")
-            _sync(fresh)
+            sync(fresh)
             fresh.replace(path)
 
     def write(
@@ -233,7 +205,7 @@ class Run:
         target = self.folder / artefact.folder
         fresh = self.folder / f".{artefact.folder}.new"
         try:
-            with _as_files_error(target):
+            with as_files_error(target):
                 fresh.mkdir()
                 artefact.write(fresh, self.control)
                 manifest = Manifest(
@@ -249,7 +221,7 @@ class Run:
                 )
                 write_json(fresh / MANIFEST, manifest, _NAMES)
                 self._carry_over(target, fresh, manifest)
-                _sync_folder(fresh)
+                sync_folder(fresh)
                 self._swap(target, fresh)
         finally:
             shutil.rmtree(fresh, ignore_errors=True)
@@ -272,31 +244,5 @@ class Run:
         if target.exists():
             target.rename(old)
         fresh.rename(target)
-        _sync(self.folder)
+        sync(self.folder)
         shutil.rmtree(old, ignore_errors=True)
-
-
-@contextmanager
-def _as_files_error(place: Path) -> Iterator[None]:
-    """Say what the disk refuses as one line."""
-    try:
-        yield
-    except OSError as error:
-        raise FilesError(f"{error.filename or place}: {error.strerror or error}") from error
-
-
-def _sync_folder(folder: Path) -> None:
-    for path in folder.rglob("*"):
-        _sync(path)
-    _sync(folder)
-
-
-def _sync(path: Path) -> None:
-    """Have the disk hold a file, or a folder's list of files where the system can sync one."""
-    if path.is_dir() and os.name == "nt":
-        return
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
