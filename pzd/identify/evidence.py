@@ -9,6 +9,8 @@ from pzd.identify.trust import MISFIT, SPRING_TO_NOISE, STATIONARY, Evidence, di
 from pzd.record import Array
 
 NAMES = ("T0", "C", "k")
+TARE = 0.3
+"""A mean force above this share of the r.m.s. is worth a hint."""
 NO_FRICTION = 1e-6
 """A friction below this share of the peak force is none."""
 
@@ -31,7 +33,7 @@ def evidence_of(objective: Objective, parameters: Bingham, criterion: float, fac
     scales, widths, visible, cosines = facts.tolist()
     unsettled = _unsettled(objective, parameters, cosines)
     vetoes = [
-        "at a bound of the search" if bounded else "the search did not converge" if moving else None
+        f"at a bound of the search{_tare(objective)}" if bounded else "the search did not converge" if moving else None
         for bounded, moving in zip(objective.at_bounds(parameters), unsettled, strict=True)
     ]
     vetoes[2] = vetoes[2] or _blurred(objective, parameters)
@@ -49,6 +51,14 @@ def _unsettled(objective: Objective, parameters: Bingham, cosines: list[float]) 
     if parameters.friction <= NO_FRICTION * objective.scales[0]:
         unsettled[0] = False
     return unsettled
+
+
+def _tare(objective: Objective) -> str:
+    """A hint where the force has a mean that the element cannot have."""
+    mean = float(np.mean(objective.measured))
+    if mean**2 <= TARE**2 * objective.energy / objective.measured.size:
+        return ""
+    return f"; the force has a mean of {mean:.0f} N, a tare of the load cell?"
 
 
 def _blurred(objective: Objective, parameters: Bingham) -> str | None:

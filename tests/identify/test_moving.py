@@ -88,7 +88,7 @@ def test_the_config_may_choose_the_nodes() -> None:
 
 
 def test_a_node_that_no_record_reaches_is_undetermined() -> None:
-    rows = rows_for(moving_test(steps, seconds=3.0), nodes=(0.0, 150.0, 400.0))
+    rows = rows_for(moving_test(steps, seconds=2.0), nodes=(0.0, 150.0, 400.0))
     assert rows[-1].status.startswith("undetermined: T0, C, k")
     assert rows[-1].T0_N is None
 
