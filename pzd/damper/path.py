@@ -25,7 +25,7 @@ DEFLECTION, SPEED, DISSIPATED, VALVE_WORK = range(4)
 """The state: e [m], the last flow speed w [m/s], and the energies so far [J]."""
 STATES = 4
 
-_MOST_PIECES = 10000
+_MOST_PIECES = 2000
 _MOST_BRACKETS = 60
 _FALSE_POSITIONS = 12  # then bisection, which cannot creep
 _ON_EDGE = 1e-13  # of the force

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
+from pzd.damper.effects import library
 from pzd.schema.model import Frozen
 
 
@@ -19,11 +20,34 @@ class NuisanceConfig(Frozen):
 
 
 class DiagnoseConfig(Frozen):
-    """When simulation and measurement count as disagreeing."""
+    """When simulation and measurement count as disagreeing, and when an effect is believed."""
 
     significance: float = Field(default=1e-4, gt=0.0, lt=1.0)
     """A gap is believed when noise alone would show it less often than this."""
     visible: float = Field(default=0.0025, ge=0.0)
-    """A gap smaller than this share of the peak force (r.m.s.) counts as nothing missing."""
+    """A gap smaller than this share of the peak force (r.m.s.) counts as nothing missing; an effect that moves the
+    force by less is not adopted."""
+    negligible: float = Field(default=0.001, ge=0.0)
+    """Below this share of the peak force no further effect is looked for."""
+    unexplained_share: float = Field(default=0.3, gt=0.0, le=1.0)
+    """What may remain of the gap (r.m.s.) under the verdicts `named` and `ambiguous`."""
+    adopt_bic: float = Field(default=-20.0, le=0.0)
+    """An effect pays when it changes the Bayesian information criterion by at most this."""
+    rival_bic: float = Field(default=10.0, ge=0.0)
+    """Effects whose criterion lies within this of the best are its rivals."""
+    most_effects: int = Field(default=3, ge=1, le=5)
+    """Most effects adopted one after another."""
+    force: tuple[str, ...] = ()
+    """Effects that are adopted whatever the data say; see `pzd effects`."""
+    forbid: tuple[str, ...] = ()
+    """Effects that are never adopted."""
     nuisance: NuisanceConfig = NuisanceConfig()
     """What may differ from test to test without being an effect."""
+
+    @field_validator("force", "forbid")
+    @classmethod
+    def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        unknown = [name for name in names if name not in library()]
+        if unknown:
+            raise ValueError(f"no effect is called {', '.join(unknown)}; there is {', '.join(library())}")
+        return names

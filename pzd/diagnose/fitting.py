@@ -23,8 +23,10 @@ SIMULATION_TOLERANCE = 1e-8
 DIFFERENCE = 1e-4
 """Step of the searched variables for forward differences."""
 MOST_EVALUATIONS = 25
-BOUND = 1e4
-"""No scaled parameter is looked for beyond this."""
+BOUND = 1e3
+"""No scaled parameter is looked for beyond this, nor one with ratio steps below its inverse."""
+WIDEST = 3.0
+"""C and k stay within e^3 = 20 times their starting values."""
 
 Values = Mapping[str, Mapping[str, float]]
 
@@ -72,6 +74,8 @@ class Fitted:
     """(w,) an observation, in units of noise."""
     simulated: tuple[Array, ...]
     """(n,) an observation, force at the compared samples [N]."""
+    slopes: Array
+    """(w, 3 b + e) derivatives of all residuals by the searched variables."""
     covariance: Array
     """(e, e) of the effect parameters in their own units, noise alone."""
     unknowns: tuple[Unknown, ...]
@@ -201,20 +205,21 @@ def fit(problem: Problem, effects: Sequence[str], start: Array) -> Fitted:
         found.x,
         tuple(residuals),
         tuple(forces),
+        np.asarray(found.jac),
         _covariance(found.jac, found.x, unknowns),
         unknowns,
     )
 
 
 def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
-    s = problem.scales
-    base_low = [0.0, np.log(1e-4 * s.force / s.speed), np.log(0.1 * s.force / s.stroke)]
-    base_high = [2.0, np.log(1e2 * s.force / s.speed), np.log(1e5 * s.force / s.stroke)]
+    """Base rows within a ratio of where they start: far from there lie only stiff or dead dampers."""
+    start = problem.start().reshape(-1, 3)
+    low, high = start + [-np.inf, -WIDEST, -WIDEST], start + [np.inf, WIDEST, WIDEST]
+    low[:, 0], high[:, 0] = 0.0, 2.0
     limits = [u.bounds for u in unknowns]
-    count = len(problem.base)
     return (
-        np.array(base_low * count + [low for low, _ in limits]),
-        np.array(base_high * count + [high for _, high in limits]),
+        np.array([*low.ravel(), *(lower for lower, _ in limits)]),
+        np.array([*high.ravel(), *(upper for _, upper in limits)]),
     )
 
 

@@ -1,0 +1,146 @@
+"""Every effect of the library tried on the observations, one at a time, beside those already adopted."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.damper.effect import Effect
+from pzd.damper.effects import library
+from pzd.diagnose.fitting import DIFFERENCE, Fitted, Problem, Unknown, fit, simulated
+from pzd.record import Array
+
+MOVES = 0.02
+"""A channel moves in a test if its range there exceeds this share of the rig's scale."""
+WARMS = 2.0
+"""A test warms up if its temperature moves by more [K]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One effect fitted together with the base rows and the effects adopted so far."""
+
+    effect: str
+    fitted: Fitted
+    delta_bic: float
+    """Change of the Bayesian criterion against the model without it; negative where it pays."""
+    explained: float
+    """R.m.s. by which it moves the simulated force, as a share of each record's peak."""
+
+
+def seen_in(problem: Problem, effect: Effect) -> bool:
+    """Whether something moves in some test that the effect needs to be seen at all."""
+    if effect.needs == "voltage":
+        return any(
+            o.motion.voltage is not None and float(np.ptp(o.motion.voltage)) > MOVES * (problem.scales.voltage or np.inf)
+            for o in problem.observations
+        )
+    if effect.needs == "temperature":
+        return any(
+            o.motion.temperature is not None and float(np.ptp(o.motion.temperature)) > WARMS
+            for o in problem.observations
+        )
+    return True
+
+
+def candidates(
+    problem: Problem,
+    before: Fitted,
+    forbidden: Sequence[str] = (),
+    jobs: int = 1,
+    told: Callable[[str], None] = lambda _: None,
+) -> tuple[Candidate, ...]:
+    """Every effect that the tests could show, fitted beside those of `before`, best first.
+
+    Parameters
+    ----------
+    problem : what is fitted to what
+    before : the optimum with the effects adopted so far
+    forbidden : effects that are not tried
+    jobs : how many are fitted at the same time
+    told : called with the name of each effect when it has been tried
+    """
+    tried = [
+        effect
+        for effect in library().values()
+        if effect.name not in (*before.effects, *forbidden) and seen_in(problem, effect)
+    ]
+
+    def one(effect: Effect) -> Candidate:
+        found = _candidate(problem, before, effect)
+        told(effect.name)
+        return found
+
+    with ThreadPoolExecutor(max(jobs, 1)) as pool:
+        found = list(pool.map(one, tried))
+    return tuple(sorted(found, key=lambda c: c.delta_bic))
+
+
+def _candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
+    start = promising_start(problem, before, effect)
+    fitted = fit(problem, (*before.effects, effect.name), np.concatenate([before.searched, start]))
+    return Candidate(effect.name, fitted, delta_bic(before, fitted), moved_by(problem, before, fitted))
+
+
+def delta_bic(before: Fitted, after: Fitted) -> float:
+    """Change of the Bayesian information criterion.
+
+    Equation: BIC = |r|^2 + p ln n                                  Source: Schwarz 1978
+    """
+    more = after.searched.size - before.searched.size
+    return after.misfit - before.misfit + more * float(np.log(after.size))
+
+
+def moved_by(problem: Problem, before: Fitted, after: Fitted) -> float:
+    """R.m.s. difference of two simulated forces, each record in units of its peak."""
+    squares = [
+        np.mean((a - b) ** 2) / o.peak**2
+        for o, a, b in zip(problem.observations, after.simulated, before.simulated, strict=True)
+    ]
+    return float(np.sqrt(np.mean(squares)))
+
+
+def promising_start(problem: Problem, before: Fitted, effect: Effect) -> Array:
+    """The starting values from which one linearised step promises the smallest misfit.
+
+    Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
+                                                                Source: Gauss-Newton step
+    """
+    unknowns = problem.unknowns((effect.name,))
+    grid = list(itertools.product(*(u.parameter.search.starts for u in unknowns)))
+    starts = [np.array([_searched(u, value) for u, value in zip(unknowns, values, strict=True)]) for values in grid]
+    if len(starts) == 1:
+        return starts[0]
+    frame, _ = np.linalg.qr(before.slopes)
+    promised = [_promised(problem, before, effect, start, frame) for start in starts]
+    return starts[int(np.argmin(promised))]
+
+
+def _searched(unknown: Unknown, start: float) -> float:
+    return float(np.log(start)) if unknown.parameter.search.logarithmic else start
+
+
+def _promised(problem: Problem, before: Fitted, effect: Effect, start: Array, frame: Array) -> float:
+    effects = (*before.effects, effect.name)
+    unknowns = problem.unknowns(effects)
+    here = np.concatenate([before.searched, start])
+    points = [problem.point(here, unknowns)]
+    for j in range(before.searched.size, here.size):
+        shifted = here.copy()
+        shifted[j] += DIFFERENCE
+        points.append(problem.point(shifted, unknowns))
+    residuals, slopes = [], []
+    for o in problem.observations:
+        forces = [simulated(point, o) for point in points]
+        residuals.append(o.in_noise(o.measured - forces[0]))
+        slopes.append(o.in_noise(np.stack([forces[0] - f for f in forces[1:]], axis=-1) / DIFFERENCE))
+    r, columns = np.concatenate(residuals), np.concatenate(slopes)
+    r, columns = r - frame @ (frame.T @ r), columns - frame @ (frame.T @ columns)
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns / np.where(size > 0.0, size, 1.0)
+    left = r - columns @ np.linalg.lstsq(columns, r, rcond=1e-6)[0]
+    return float(left @ left)

@@ -1,0 +1,105 @@
+"""The observations that naming works with: all samples seen, and their two halves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.effect import Scales
+from pzd.damper.model import Damper
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.fitting import Fitted, Problem, simulated
+from pzd.diagnose.gap import probability_of_noise, visible_gap
+from pzd.diagnose.inputs import Prepared
+from pzd.diagnose.joint import nearest_row
+from pzd.diagnose.judge import Judged, judge
+from pzd.diagnose.observation import Observation, observations
+from pzd.diagnose.predict import predicted_force
+from pzd.diagnose.split import TRAINING, UNTOUCHED, VALIDATION, Split
+from pzd.record import Array, is_constant, voltage_scale
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What the tests of one setting say, ready for fitting."""
+
+    prepared: tuple[Prepared, ...]
+    seen: tuple[Mask, ...]
+    """(n,) the samples that naming may look at."""
+    whole: Problem
+    """All samples seen."""
+    halves: tuple[Problem, Problem]
+    """Those for training, and those that choose."""
+
+    def judged(self, damper: Damper, config: DiagnoseConfig) -> list[Judged]:
+        """Every record seen against a damper."""
+        pairs = zip(self.prepared, self.seen, strict=True)
+        return [judge(damper, p, mask, config.nuisance) for p, mask in pairs if mask.any()]
+
+    def something_missing(self, fitted: Fitted, config: DiagnoseConfig) -> bool:
+        """Whether the fit misses the tests by more than noise and by more than nothing."""
+        judged = self.judged(fitted.damper, config)
+        return probability_of_noise(judged) < config.significance and visible_gap(judged) >= config.negligible
+
+    def misfit(self, half: int, fitted: Fitted) -> float:
+        """Misfit of a fit on one half of the tests, in units of noise."""
+        problem = self.halves[half]
+        point = problem.point(fitted.searched, fitted.unknowns)
+        residuals = (o.in_noise(o.measured - simulated(point, o)) for o in problem.observations)
+        return float(sum(r @ r for r in residuals))
+
+
+def evidence_of(prepared: Sequence[Prepared], parts: Split, damper: Damper, config: DiagnoseConfig) -> Evidence:
+    """The evidence of the records of one setting.
+
+    Parameters
+    ----------
+    prepared : the records, displacement cleaned
+    parts : which samples are fitted, which choose, which are untouched
+    damper : plain, fitted to the samples seen
+    config : priors of the nuisances
+    """
+    scale = voltage_scale([p.record for p in prepared])
+    places = [nearest_row(damper.base, p) if is_constant(p.record, scale) else -1 for p in prepared]
+    forces = [predicted_force(damper, p) for p in prepared]
+    seen = tuple(roles != UNTOUCHED for roles in parts.roles)
+
+    def observed(kept: Sequence[Mask]) -> tuple[Observation, ...]:
+        return observations(prepared, kept, places, forces, config.nuisance)
+
+    whole = observed(seen)
+    scales = _scales(whole, prepared, damper, scale)
+    reference = damper.reference_temperature_degC
+    if reference is None:
+        known = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
+        reference = float(np.median(known)) if known else None
+    problems = [
+        Problem(part, damper.base, scales, reference)
+        for part in (whole, *(observed([r == role for r in parts.roles]) for role in (TRAINING, VALIDATION)))
+    ]
+    return Evidence(tuple(prepared), seen, problems[0], (problems[1], problems[2]))
+
+
+def _scales(observed: Sequence[Observation], prepared: Sequence[Prepared], damper: Damper, voltage: float) -> Scales:
+    def largest(channel: str) -> float:
+        return max(float(np.max(np.abs(_of(p, channel)))) for p in prepared)
+
+    peaks = [o.peak for o in observed]
+    return Scales(
+        max(peaks),
+        min(peaks),
+        largest("velocity"),
+        largest("displacement"),
+        largest("acceleration"),
+        float(np.median([row.C_Ns_per_m for row in damper.base])),
+        voltage,
+    )
+
+
+def _of(prepared: Prepared, channel: str) -> Array:
+    return np.asarray(getattr(prepared.record, channel))

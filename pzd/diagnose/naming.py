@@ -1,0 +1,144 @@
+"""From candidates to adopted effects: forward, one after another, as long as the data support the next by themselves."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.diagnose.candidates import Candidate, candidates
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.evidence import Evidence
+from pzd.diagnose.fitting import Fitted, fit
+from pzd.record import Array
+
+log = logging.getLogger(__name__)
+
+AGREES = 0.001
+"""Halves of the tests disagree about a parameter when chance would let them so seldom."""
+ALIKE = 0.1
+"""Values within this ratio of one another agree, whatever their intervals."""
+TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3}
+"""A common offset [share of the lowest peak] or delay [s] that counts as nothing missing."""
+LEVEL = 1.96
+"""Standard errors in a 95 % interval."""
+
+
+@dataclass(frozen=True, eq=False)
+class Named:
+    """What was adopted, and what was tried."""
+
+    plain: Fitted
+    """No effect, on the samples seen."""
+    fitted: Fitted
+    """With all that was adopted, on the samples seen."""
+    rounds: tuple[tuple[Candidate, ...], ...]
+    """The candidates of each round, best first."""
+    reasons: dict[str, str]
+    """Why an effect was adopted or not."""
+    rivals: tuple[str, ...]
+    """Effects that explain the last step as well."""
+
+    @property
+    def adopted(self) -> tuple[str, ...]:
+        """The effects adopted, best first."""
+        return self.fitted.effects
+
+
+def name_effects(evidence: Evidence, config: DiagnoseConfig, jobs: int = 1) -> Named:
+    """Adopt effects one after another while the next one pays, is supported by itself, and something is missing.
+
+    Parameters
+    ----------
+    evidence : the observations, whole and in halves
+    config : thresholds, forced and forbidden effects
+    jobs : candidates fitted at the same time
+    """
+    whole = evidence.whole
+    plain = current = fit(whole, (), whole.start())
+    rounds: list[tuple[Candidate, ...]] = []
+    reasons: dict[str, str] = {}
+    rivals: tuple[str, ...] = ()
+    while len(current.effects) < config.most_effects and evidence.something_missing(current, config):
+        tried = candidates(whole, current, config.forbid, jobs)
+        rounds.append(tried)
+        chosen = _first_supported(evidence, config, current, tried, reasons)
+        if chosen is None:
+            break
+        reasons[chosen.effect] = "adopted"
+        rivals = tuple(c.effect for c in tried if c is not chosen and c.delta_bic - chosen.delta_bic < config.rival_bic)
+        log.info("diagnose: %s adopted, delta BIC %.0f", chosen.effect, chosen.delta_bic)
+        current = chosen.fitted
+    return Named(plain, current, tuple(rounds), reasons, rivals)
+
+
+def _first_supported(
+    evidence: Evidence, config: DiagnoseConfig, before: Fitted, tried: Sequence[Candidate], reasons: dict[str, str]
+) -> Candidate | None:
+    """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""
+    for candidate in tried:
+        reason = _unsupported(evidence, config, before, candidate)
+        if reason is None:
+            return candidate
+        reasons[candidate.effect] = reason
+        if candidate.delta_bic > config.adopt_bic:
+            break
+    return None
+
+
+def _unsupported(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> str | None:
+    """Why a candidate is not adopted, None where it is."""
+    if candidate.delta_bic > config.adopt_bic:
+        return "does not pay"
+    if candidate.explained < config.visible:
+        return f"moves the force by less than {100 * config.visible:g} % of peak"
+    if trivial(candidate.fitted, candidate.effect, evidence.whole.scales.low_force):
+        return "so small that it counts as an offset or a delay of the tests"
+    return _stand_in(evidence, before, candidate)
+
+
+def trivial(fitted: Fitted, effect: str, force: float) -> bool:
+    """Whether the 95 % interval of a common offset or delay reaches below what counts as an effect."""
+    index = [u.effect for u in fitted.unknowns].index(effect)
+    unknown = fitted.unknowns[index]
+    limit = TRIVIAL.get((effect, unknown.parameter.name))
+    if limit is None:
+        return False
+    size = abs(fitted.value_of(effect, unknown.parameter.name)) - LEVEL * standard_errors(fitted)[index]
+    return bool(size < limit * (force if unknown.parameter.unit == "N" else 1.0))
+
+
+def standard_errors(fitted: Fitted) -> Array:
+    """(e,) of the effect parameters, widened by what the fit leaves above the noise."""
+    freedom = max(fitted.size - fitted.searched.size, 1)
+    return np.sqrt(np.diag(fitted.covariance) * max(1.0, fitted.misfit / freedom))
+
+
+def _stand_in(evidence: Evidence, before: Fitted, candidate: Candidate) -> str | None:
+    """Whether an effect fails on tests that it was not fitted to, or takes other values on either half."""
+    effects, halves = candidate.fitted.effects, evidence.halves
+    fits = [fit(half, effects, candidate.fitted.searched) for half in halves]
+    if any(not half.observations for half in halves):
+        return None
+    plain = fit(halves[0], before.effects, before.searched)
+    if evidence.misfit(1, fits[0]) >= evidence.misfit(1, plain):
+        return "stand-in: does not shrink the gap on tests it was not fitted to"
+    if not _agree(fits[0], fits[1], candidate.effect):
+        return "stand-in: takes other values on either half of the tests"
+    return None
+
+
+def _agree(first: Fitted, second: Fitted, effect: str) -> bool:
+    from scipy.stats import norm
+
+    limit = float(norm.isf(AGREES / 2.0))
+    errors = np.hypot(standard_errors(first), standard_errors(second))
+    for i, unknown in enumerate(first.unknowns):
+        if unknown.effect != effect:
+            continue
+        a, b = (f.value_of(effect, unknown.parameter.name) for f in (first, second))
+        if abs(a - b) > limit * errors[i] and abs(a - b) > ALIKE * max(abs(a), abs(b)):
+            return False
+    return True
