@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pzd.damper.compiled import compiled
+from pzd.damper.compiled import compiled, laid_in
 from pzd.damper.rows import row_at
 from pzd.record import Array
 from pzd.simulate.demand import one_sided
@@ -118,7 +118,7 @@ def _act(time: float, y: Array, scene: Scene, control: Array, desk: Array) -> No
     accelerate(scene.car, control, desk)
 
 
-@compiled
+@laid_in
 def _try_sides(time: float, y: Array, scene: Scene, control: Array, desk: Array) -> None:
     """Fill how each sticking axle would be pushed away from V = 0, were it to slip to the one or the other side."""
     for i in range(2):
@@ -130,7 +130,7 @@ def _try_sides(time: float, y: Array, scene: Scene, control: Array, desk: Array)
             control[SIDE, i] = 0.0
 
 
-@compiled
+@laid_in
 def _book_damper(scene: Scene, desk: Array, axle: int, dy: Array) -> None:
     """Book the powers of the dampers of one axle, and the motion of its oil."""
     n, speed = scene.car.dampers[axle], scene.car.ratio[axle] * desk[RATE, axle]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pzd.damper.compiled import compiled
+from pzd.damper.compiled import compiled, laid_in
 from pzd.damper.dormand_prince import STAGES
 from pzd.damper.rows import row_at
 from pzd.record import Array
@@ -84,7 +84,7 @@ def set_control(time: float, y: Array, scene: Scene, control: Array, desk: Array
             choose_side(i, time, y, scene, control, desk, room)
 
 
-@compiled
+@laid_in
 def _voltage_for(scene: Scene, axle: int, force: float, velocity: float, otherwise: float) -> float:
     """The voltage that gives a force of the axle within its bounds; a rounding beyond them is let pass."""
     grid, car = scene.grid, scene.car
@@ -114,7 +114,7 @@ def _set_voltage(time: float, y: Array, scene: Scene, control: Array, axle: int,
             y[VALVE_WORK] += scene.car.dampers[axle] * change
 
 
-@compiled
+@laid_in
 def beyond_reach(scene: Scene, control: Array, desk: Array) -> bool:
     """Whether a damper moves faster than the rig did at its voltage; `ideal` has none, so at the best one."""
     grid, car = scene.grid, scene.car
@@ -130,7 +130,7 @@ def beyond_reach(scene: Scene, control: Array, desk: Array) -> bool:
     return False
 
 
-@compiled
+@laid_in
 def _note(time: float, y: Array, scene: Scene, control: Array, desk: Array, row: Array) -> None:
     """Fill one row of the history."""
     row[0], row[1], row[2], row[3] = time, y[0], y[1], desk[COMFORT, 0]
@@ -141,6 +141,15 @@ def _note(time: float, y: Array, scene: Scene, control: Array, desk: Array, row:
         row[7 + 6 * i] = desk[FORCE, i]
         row[8 + 6 * i] = desk[FORCE, i] if scene.law.fidelity == IDEAL else control[ASKED, i]
         row[9 + 6 * i] = control[SET, i]
+
+
+@laid_in
+def _tally(desk: Array, tally: Array) -> None:
+    """Take one step into peaks and sums."""
+    tally[SAMPLES] += 1.0
+    for i in range(2):
+        tally[PEAK_DEFLECTION] = max(tally[PEAK_DEFLECTION], abs(desk[DEFLECTION, i]))
+        tally[LOAD_1 + i] += (desk[SPRINGS, i] + desk[FORCE, i]) ** 2
 
 
 @compiled
@@ -176,12 +185,10 @@ def ride(
     stages, end = np.zeros((STAGES + 1, STATES)), np.zeros(STATES)
     room = stages[STAGES]
     motion(0.0, y, scene, control, desk, room)
-    if scene.law.jumps:
-        for i in range(2):
-            rate = desk[RATE, i]
-            control[SIDE, i] = 1.0 if rate > 0.0 else -1.0
-            if rate == 0.0:
-                choose_side(i, 0.0, y, scene, control, desk, room)
+    for i in range(2):
+        control[SIDE, i] = 1.0 if desk[RATE, i] >= 0.0 else -1.0
+        if scene.law.jumps and desk[RATE, i] == 0.0:
+            choose_side(i, 0.0, y, scene, control, desk, room)
     dt = h
     for n in range(steps + 1):
         time = n * h
@@ -195,10 +202,7 @@ def ride(
         if beyond_reach(scene, control, desk):
             tally[OUTSIDE] += 1.0
         if n >= settle:
-            tally[SAMPLES] += 1.0
-            for i in range(2):
-                tally[PEAK_DEFLECTION] = max(tally[PEAK_DEFLECTION], abs(desk[DEFLECTION, i]))
-                tally[LOAD_1 + i] += (desk[SPRINGS, i] + desk[FORCE, i]) ** 2
+            _tally(desk, tally)
         if n % per_output == 0:
             _note(time, y, scene, control, desk, history[n // per_output])
         if n < steps:

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from pzd.damper.beside import beside
-from pzd.damper.compiled import compiled
+from pzd.damper.compiled import compiled, laid_in
 from pzd.damper.drive import with_play
 from pzd.damper.flow import DELTA, K, Row, flow_speed, spring_extension
 from pzd.damper.regimes import spring_force
@@ -32,7 +32,7 @@ class Oil(NamedTuple):
     """A row of parallel effects to work in."""
 
 
-@compiled
+@laid_in
 def place(nodes: Array, value: float) -> tuple[int, float]:
     """Interval of rising nodes that holds a value, and the share of it that lies below; held beyond the ends."""
     if nodes.size == 1 or value <= nodes[0]:
@@ -43,7 +43,7 @@ def place(nodes: Array, value: float) -> tuple[int, float]:
     return i, (value - nodes[i]) / (nodes[i + 1] - nodes[i])
 
 
-@compiled
+@laid_in
 def beside_at(oil: Oil, voltage: float, row: Array) -> None:
     """Fill `row` with the parameters of the parallel effects at a voltage felt: linear between, held beyond."""
     i, share = place(oil.voltages, voltage)
@@ -51,7 +51,7 @@ def beside_at(oil: Oil, voltage: float, row: Array) -> None:
         row[j] = oil.beside[i, j] + share * (oil.beside[min(i + 1, oil.voltages.size - 1), j] - oil.beside[i, j])
 
 
-@compiled
+@laid_in
 def row_slope(voltages: Array, rows: Array, voltage: float, column: int) -> float:
     """Derivative of one parameter by the voltage felt."""
     if voltages.size == 1 or voltage <= voltages[0] or voltage >= voltages[-1]:
@@ -60,7 +60,7 @@ def row_slope(voltages: Array, rows: Array, voltage: float, column: int) -> floa
     return float((rows[i + 1, column] - rows[i, column]) / (voltages[i + 1] - voltages[i]))
 
 
-@compiled
+@laid_in
 def lagging(oil: Oil, voltage: float, before: float, elapsed: float) -> float:
     """Voltage behind the lag of the valve [V], a time [s] after it was set while the lag stood at `before` [V].
 
@@ -89,7 +89,7 @@ def felt(oil: Oil, voltage: float, before: float, felt_before: float, elapsed: f
     return shown, (voltage - late) / oil.lag
 
 
-@compiled
+@laid_in
 def flowing(e: float, row: Row, guess: float) -> tuple[float, float]:
     """Force of the oil spring [N] at its elastic deflection [m], and the speed at which the oil flows [m/s].
 
@@ -121,14 +121,14 @@ def valve_power(oil: Oil, e: float, row: Row, voltage: float, rate: float) -> fl
     return power * rate
 
 
-@compiled
+@laid_in
 def rubbing_force(v: float, row: Array) -> float:
     """Friction beside the element [N] at a speed [m/s]; the sign bit of 0 picks the side."""
     moving = math.copysign(_TINY, v) if v == 0.0 else v
     return float(beside(0.0, moving, 0.0, row) - beside(0.0, 0.0, 0.0, row))
 
 
-@compiled
+@laid_in
 def elastic_force(x: float, row: Array) -> float:
     """Force beside the element [N] at an extension [m] from where the car stands: it gives its work back.
 
@@ -137,7 +137,7 @@ def elastic_force(x: float, row: Array) -> float:
     return float(beside(x, 0.0, 0.0, row) - beside(0.0, 0.0, 0.0, row))
 
 
-@compiled
+@laid_in
 def inertance(row: Array) -> float:
     """Force beside the element for each acceleration [kg]."""
     return float(beside(0.0, 0.0, 1.0, row) - beside(0.0, 0.0, 0.0, row))

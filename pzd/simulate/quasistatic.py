@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pzd.damper.compiled import compiled
+from pzd.damper.compiled import compiled, laid_in
 from pzd.record import Array
 from pzd.simulate.demand import bounds_of, demand, feedback_force, one_sided, spring_acceleration
 from pzd.simulate.scene import (
@@ -60,7 +60,7 @@ def quasistatic_forces(y: Array, scene: Scene, control: Array, desk: Array) -> N
     demand(law, scene.car, y, desk, int(control[TIE_END, 1]))
 
 
-@compiled
+@laid_in
 def _force_beside_sticking(y: Array, scene: Scene, control: Array, desk: Array) -> None:
     """Fill the force of the free axle where the other sticks: the policy knows that the stuck one answers."""
     law, car = scene.law, scene.car

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from pzd.damper.compiled import compiled
+from pzd.damper.compiled import compiled, laid_in
 from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
 from pzd.record import Array
 from pzd.simulate.equations import motion
@@ -35,7 +35,7 @@ _SHARP = 1e-13  # of the step: how closely the moment is found at which an axle 
 _MOST_CUTS = 50
 
 
-@compiled
+@laid_in
 def trial(
     time: float, dt: float, y: Array, scene: Scene, control: Array, desk: Array, stages: Array, end: Array
 ) -> float:
@@ -86,7 +86,7 @@ def choose_side(axle: int, time: float, y: Array, scene: Scene, control: Array, 
         control[SIDE, axle] = -1.0
 
 
-@compiled
+@laid_in
 def leaver(control: Array, desk: Array) -> int:
     """The first axle that has left its side of V = 0 or its stick, as the desk stands; -1 where none has."""
     for i in range(2):

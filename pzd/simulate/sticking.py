@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pzd.damper.compiled import compiled
+from pzd.damper.compiled import laid_in
 from pzd.record import Array
 from pzd.simulate.scene import ACCELERATION, FORCE, INERTANCE, LIFT, SIDE, SPRINGS, Vehicle
 
 
-@compiled
+@laid_in
 def holding_force(car: Vehicle, axle: int, load: float, lift: float, other: float) -> float:
     """Damper force that keeps the deflection of an axle still, dV_i/dt = 0.
 
@@ -28,13 +28,13 @@ def holding_force(car: Vehicle, axle: int, load: float, lift: float, other: floa
     return -(lift + car.mobility[2] * other) / car.mobility[axle] - load
 
 
-@compiled
+@laid_in
 def holding_share(car: Vehicle, axle: int) -> float:
     """How much the holding force of an axle changes with the other axle's force: dT_i/dT_j."""
     return -car.mobility[2] / car.mobility[axle]
 
 
-@compiled
+@laid_in
 def accelerate(car: Vehicle, control: Array, desk: Array) -> None:
     """Fill dV/dt of both axles, and complete the damper forces by what holds a sticking axle and by inertia.
 
@@ -68,7 +68,7 @@ def accelerate(car: Vehicle, control: Array, desk: Array) -> None:
         desk[FORCE, i] += desk[INERTANCE, i] * desk[ACCELERATION, i]
 
 
-@compiled
+@laid_in
 def _accelerate_one(car: Vehicle, free: int, desk: Array) -> None:
     """The same where one axle is free and the other sticks."""
     stuck, cross = 1 - free, car.mobility[2]
