@@ -63,7 +63,8 @@ def test_there_are_configs_to_run() -> None:
 def test_a_config_runs_from_end_to_end_and_once_only(config: Path, pzd: Command, tmp_path: Path) -> None:
     if absent(config):
         pytest.skip(f"configs/{config.name}: measured data absent, nothing matches {', '.join(absent(config))}")
-    assert pzd("check", config, "--runs", tmp_path).returncode == DONE
+    checked = pzd("check", config, "--runs", tmp_path)
+    assert checked.returncode == DONE, checked.stdout + checked.stderr
     assert written(tmp_path) == {}
 
     first = pzd("run", config, "--runs", tmp_path)
