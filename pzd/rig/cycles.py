@@ -15,6 +15,8 @@ from pzd.rig.period import Repeats, repeats
 
 Array = NDArray[np.float64]
 
+REFINED_POINTS = 100
+"""Samples in a cycle that the refinement of the period looks at, more being no better."""
 REFINEMENTS = 6
 """Rounds of the refinement of the period; each squares the error."""
 
@@ -89,9 +91,10 @@ def cycles(time: Array, displacement: Array) -> Cycles | None:
 def _refined(time: Array, displacement: Array, found: Repeats) -> Cycles:
     """Refine the period on few cycles first, so that a shift never exceeds a small part of the cycle."""
     run = _whole(time, found, found.period)
+    every = max(run.points(time) // REFINED_POINTS, 1)
     for round_number in range(REFINEMENTS):
         used = Cycles(run.period, run.start, min(run.count, 3 * 4**round_number))
-        run = _whole(time, found, run.period + _shift_per_cycle(time, displacement, used))
+        run = _whole(time, found, run.period + _shift_per_cycle(time[::every], displacement[::every], used))
     return run
 
 

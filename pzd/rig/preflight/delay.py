@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.record import is_constant, voltage_scale
-from pzd.rig.coarse import fitted, piece
+from pzd.rig.coarse import fitted, plain
 from pzd.rig.measured import Measured
 
 LEAST_DELAY = 1e-3
@@ -24,10 +24,10 @@ def check(test: Measured) -> list[Finding]:
     """A delay of the force against the displacement that a plain Bingham element asks for."""
     if not is_constant(test.record, voltage_scale([test.record])):
         return []
-    part = piece(test)
+    part, undelayed = plain(test)
     longest = min(LONGEST, test.run.period / 20.0) if test.run else LONGEST
     delays = np.linspace(-longest, longest, TRIES)
-    undelayed, best = fitted(part, part.force_later(np.zeros(1))), fitted(part, part.force_later(delays))
+    best = fitted(part, part.force_later(delays))
     delay = float(delays[best.force])
     found = abs(delay) >= max(LEAST_DELAY, 0.5 * part.step) and best.force not in (0, TRIES - 1)
     if not found or undelayed.left < VISIBLE or best.left > EXPLAINS * undelayed.left:

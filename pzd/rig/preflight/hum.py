@@ -24,8 +24,10 @@ def check(test: Measured) -> list[Finding]:
     found: list[Finding] = []
     for name, unit, values in (("force", "N", test.record.force), ("displacement", "m", test.record.displacement)):
         least = SHARE * 0.5 * float(np.ptp(values))
-        for mains in MAINS:
-            amplitude = _hum(test, values, mains) if test.record.rate >= LEAST_RATE * mains else 0.0
+        left = _left_by_cycles(test, values)
+        for mains in (m for m in MAINS if test.record.rate >= LEAST_RATE * m):
+            amplitude = _line(values, test.record.rate, mains, test.run.frequency if test.run else 0.0)
+            amplitude = amplitude or _line(left, test.record.rate, mains, 0.0)
             if amplitude > least:
                 found.append(
                     Finding(
@@ -39,21 +41,22 @@ def check(test: Measured) -> list[Finding]:
     return found
 
 
-def _hum(test: Measured, values: Array, mains: float) -> float:
-    """Amplitude of the mains, 0 where no line stands out: in the record, or in what its cycles leave."""
-    run = test.run
-    whole = _line(values, test.record.rate, mains, run.frequency if run else 0.0)
-    if whole > 0.0 or run is None or run.count < 3:
-        return whole
-    time = test.record.time
+def _left_by_cycles(test: Measured, values: Array) -> Array:
+    """What the average cycle leaves of a channel inside the run; nothing where there is no run to average."""
+    run, time = test.run, test.record.time
+    if run is None or run.count < 3:
+        return values[:0]
     inside = run.inside(time)
     average = run.mean(time, values)
-    repeated = np.interp(run.phase(time[inside]), np.arange(average.size + 1) / average.size, [*average, average[0]])
-    return _line(values[inside] - repeated, test.record.rate, mains, 0.0)
+    phases = np.arange(average.size + 1) / average.size
+    left: Array = values[inside] - np.interp(run.phase(time[inside]), phases, np.append(average, average[0]))
+    return left
 
 
 def _line(values: Array, rate: float, frequency: float, cycle: float) -> float:
     """Amplitude of a line that stands out of its neighbourhood, which holds harmonics of the motion; else 0."""
+    if values.size == 0:
+        return 0.0
     window = np.hanning(values.size)
     ramp = np.linspace(values[0], values[-1], values.size)
     spectrum = 2.0 * np.abs(np.fft.rfft((values - ramp) * window)) / window.sum()

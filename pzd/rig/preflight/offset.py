@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.coarse import fitted, piece, unit_force
+from pzd.rig.coarse import plain, unit_force
 from pzd.rig.measured import Measured
 
 SHARE = 0.04
@@ -17,9 +17,8 @@ def check(test: Measured) -> list[Finding]:
 
     Equation: F = F_0 + k f(T0/k, C/k) + c_1 x + c_2 a               Source: least squares on a coarse element
     """
-    part = piece(test)
+    part, element = plain(test)
     force = part.force_later(np.zeros(1))[0]
-    element = fitted(part, force[None, :])
     x = part.displacement - 0.5 * float(part.displacement.max() + part.displacement.min())
     bend = np.gradient(np.gradient(x))
     columns = (np.ones(x.size), unit_force(part, element.friction_extension, element.lag), x, bend)

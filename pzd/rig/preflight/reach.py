@@ -10,8 +10,10 @@ from pzd.rig.period import moving
 
 RESTS = 0.1
 """Share of a record at rest, before and after the motion, that is said."""
-FULL = 0.99
-"""Share of the cell's range from which it may have been cut off."""
+MARGIN = 0.05
+"""A limit is a round number: so much beyond it is none."""
+FULL = 0.94
+"""Share of the cell's range, margin included, from which it may have been cut off."""
 
 
 def check(test: Measured) -> list[Finding]:
@@ -32,7 +34,7 @@ def check(test: Measured) -> list[Finding]:
             follows="the stand may not have followed or measured this: check rig.limits, units and the range",
         )
         for what, value, limit, unit in reached
-        if limit is not None and value > limit
+        if limit is not None and value > (1.0 + MARGIN) * limit
     ]
     first, last = moving(record.displacement)
     rest = 1.0 - (last - first + 1) / record.time.size
