@@ -37,7 +37,7 @@ class Sheet:
     def numeric(self) -> tuple[bool, ...]:
         """Which columns hold numbers."""
         return tuple(
-            column > 0 and all(row[column][:1] in "(0123456789\u2212\u2013" for row in self.rows)
+            column > 0 and all(row[column][:1] in "(>0123456789\u2212\u2013" for row in self.rows)
             for column in range(len(self.header))
         )
 

@@ -74,10 +74,10 @@ def _groups(story: Story) -> dict[str, list[Record]]:
     """Records by voltage; by name where all share one; those whose voltage moves stand together."""
     scale = voltage_scale(story.sampled)
     moving = [r for r in story.sampled if not is_constant(r, scale)]
-    still = sorted((r for r in story.sampled if is_constant(r, scale)), key=lambda r: r.median_voltage() or 0.0)
+    still = sorted((r for r in story.sampled if is_constant(r, scale)), key=lambda r: story.level(r) or 0.0)
     found: dict[str, list[Record]] = {}
     for record in still:
-        found.setdefault(story.voltage(record.median_voltage()), []).append(record)
+        found.setdefault(story.voltage(story.level(record)), []).append(record)
     if len(found) < 2:
         found = {record.name: [record] for record in still[:_ROWS]}
     if moving:

@@ -82,25 +82,33 @@ def _confidence(story: Story) -> Card:
 def _next(story: Story) -> Card:
     test = story.diagnosed.diagnosis.next_test
     if test is None:
-        return Card("Which test next?", "None is called for", "")
+        return Card("Which test next?", "None is proposed", "")
     names = listed([_name(effect) for effect in test.separates])
     return Card("Which test next?", _capital(rig_test(story, test)), sentence(f"it separates {names}") if names else "")
 
 
 def _comfort(story: Story) -> Card:
     pairs = [(road, story.reference(road), story.controlled(road)) for road in story.roads]
-    told = [(story.road(road), a, b) for road, a, b in pairs if a is not None and b is not None]
+    told = [(story.road(road), a, rows) for road, a, rows in pairs if a is not None and rows]
+    gain = "What does the passenger gain?"
     if not told:
-        return Card(
-            "What does the passenger gain?", "Not compared", "No ride at constant damping stands beside another."
-        )
-    levels = "; ".join(f"{road}: {_levels(story, a, b)}" for road, a, b in told)
-    beside = f"{_capital(policy_in_words(told[0][2]))}, beside constant c."
+        return Card(gain, "Not compared", "No ride at constant damping stands beside another.")
+    _, reference, rows = told[0]
+    beside = f"{_capital(policy_in_words(rows[0]))}, beside {policy_in_words(reference)}."
+    levels = "; ".join(f"{road}: {_levels(story, a, b[0])}" for road, a, b in told)
     if iso2631_1978.EDITION not in story.config.editions:
-        return Card("What does the passenger gain?", levels, f"Acceleration a_w. {beside}")
-    longer = "; ".join(f"{road}: {times(story, a, b)}" for road, a, b in told)
+        return Card(gain, levels, f"Acceleration a_w. {beside}")
+    longer = "; ".join(f"{road}: {times(story, a, b[0])}" for road, a, b in told)
     source = f"Within reduced comfort, {iso2631_1978.EDITION} ({iso2631_1978.TRUST})."
-    return Card("How much longer can a passenger sit?", longer, f"{beside} {source} Acceleration a_w: {levels}.")
+    detail = f"{beside} {source} Acceleration a_w: {levels}.{_ideal(story, told)}"
+    return Card("How much longer can a passenger sit?", longer, detail)
+
+
+def _ideal(story: Story, told: list[tuple[str, SummaryRow, tuple[SummaryRow, ...]]]) -> str:
+    """What control would reach if every demanded force were there at once."""
+    found = [(road, a, row) for road, a, rows in told for row in rows[1:] if row.fidelity == "ideal"]
+    texts = "; ".join(f"{road}: {times(story, a, row)}" for road, a, row in found)
+    return f" With ideal dampers: {texts}." if texts else ""
 
 
 def _levels(story: Story, reference: SummaryRow, controlled: SummaryRow) -> str:

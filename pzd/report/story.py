@@ -23,6 +23,8 @@ PLAIN = "-plain"
 """Ends the name of a ride on the damper before diagnose."""
 REFERENCE = "constant"
 """The policy that the others are set beside."""
+_OF_A_SINE = 1.5
+"""A motion whose peak speed stays within so many times that of a sine is a simple swing."""
 _MOST_SAMPLES = 300_000
 """A map of the gap is made from about so many samples."""
 _REALISTIC = ("dynamic", "table", "ideal")
@@ -95,22 +97,33 @@ class Story:
 
     @cached_property
     def shown(self) -> tuple[Record, ...]:
-        """The records shown as force: the fastest of each voltage, spread over the voltages."""
-        by_voltage: dict[float, Record] = {}
-        for record in sorted(self.records, key=lambda r: float(np.abs(r.velocity).max())):
-            by_voltage[round(record.median_voltage() or 0.0, 6)] = record
-        chosen = [by_voltage[voltage] for voltage in sorted(by_voltage)]
+        """The records shown as force: of each voltage the fastest sine or triangle, spread over the voltages."""
+        ordered = sorted(self.records, key=lambda r: (self.swings(r), float(np.abs(r.velocity).max())))
+        by_voltage = {self.level(record): record for record in ordered}
+        chosen = sorted(by_voltage.values(), key=lambda r: self.level(r) or 0.0)
         if len(chosen) == 1:
-            chosen = sorted(self.records, key=lambda r: float(np.abs(r.velocity).max()))
+            chosen = ordered
         count = min(self.config.records_shown, len(chosen))
         places = {round(place) for place in np.linspace(0, len(chosen) - 1, count)}
         return tuple(chosen[place] for place in sorted(places))
 
+    def swings(self, record: Record) -> bool:
+        """Whether the record goes to and fro once a cycle, as a sine or triangle does and a repeated road does not."""
+        for m in self.identified.measures:
+            if m.record == record.name and m.frequency_Hz is not None:
+                return m.peak_velocity_m_per_s <= _OF_A_SINE * 2.0 * math.pi * m.frequency_Hz * m.amplitude_m
+        return False
+
+    def level(self, record: Record) -> float | None:
+        """The identified voltage nearest to that of a record; its own where none was identified."""
+        own = record.median_voltage()
+        known = [row.voltage_V for row in self.parameters if row.voltage_V is not None]
+        return own if own is None or not known else min(known, key=lambda voltage: abs(voltage - own))
+
     def last_cycles(self, record: Record) -> slice:
         """The last two cycles of a periodic record, the last ten of any other; the start is left out."""
         cycles = self.entries[record.name].cycles if record.name in self.entries else 0.0
-        periodic = any(m.record == record.name and m.frequency_Hz is not None for m in self.identified.measures)
-        share = min((2.0 if periodic else 10.0) / max(cycles, 1.0), 1.0 - 1.0 / max(cycles, 1.0))
+        share = min((2.0 if self.swings(record) else 10.0) / max(cycles, 1.0), 1.0 - 1.0 / max(cycles, 1.0))
         return slice(round(record.time.size * (1.0 - share)) if share > 0.0 else 0, None)
 
     def voltage(self, value: float | None) -> str:
@@ -120,7 +133,7 @@ class Story:
 
     def conditions(self, record: Record) -> str:
         """The conditions of a record; its name where it has none."""
-        parts = [self.voltage(record.median_voltage())] if record.voltage is not None else []
+        parts = [self.voltage(self.level(record))] if record.voltage is not None else []
         if record.temperature is not None:
             parts.append(amount(record.median_temperature(), "degC"))
         return ", ".join(parts) or record.name
@@ -153,13 +166,15 @@ class Story:
         return tuple(row for row in mine if row.case.endswith(PLAIN) == plain)
 
     def reference(self, road: str) -> SummaryRow | None:
-        """The ride at constant damping over a road."""
-        return next((row for row in self.cases(road) if row.policy == REFERENCE), None)
+        """The ride at constant damping over a road, on plain viscous dampers where there is one."""
+        constant = [row for row in self.cases(road) if row.policy == REFERENCE]
+        return max(constant, key=lambda row: _REALISTIC.index(row.fidelity), default=None)
 
-    def controlled(self, road: str) -> SummaryRow | None:
-        """The controlled ride that comes nearest to a real one."""
+    def controlled(self, road: str) -> tuple[SummaryRow, ...]:
+        """The rides of the first policy that controls, nearest to a real one first."""
         others = [row for row in self.cases(road) if row.policy != REFERENCE]
-        return min(others, key=lambda row: _REALISTIC.index(row.fidelity), default=None)
+        first = [row for row in others if row.policy == others[0].policy]
+        return tuple(sorted(first, key=lambda row: _REALISTIC.index(row.fidelity)))
 
     def without(self, row: SummaryRow) -> SummaryRow | None:
         """The same ride on the damper before diagnose."""
@@ -180,4 +195,6 @@ def effects_in_words(names: Sequence[str]) -> list[str]:
 
 def policy_in_words(row: SummaryRow) -> str:
     """What drove the dampers, and how exactly it was computed."""
-    return "constant c" if row.policy == REFERENCE else f"{row.policy}, {row.fidelity}"
+    if row.policy == REFERENCE:
+        return "constant c" if row.fidelity == _REALISTIC[-1] else f"constant c, {row.fidelity}"
+    return f"{row.policy}, {row.fidelity}"

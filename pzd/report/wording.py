@@ -91,7 +91,7 @@ def minutes(value: float | None) -> str:
     if value is None:
         return DASH
     if value >= LONGEST_MIN:
-        return "more than 24 h"
+        return f">{KEPT}24{KEPT}h"
     hours, rest = divmod(round(value), 60)
     if not hours:
         return f"{rest}{KEPT}min"

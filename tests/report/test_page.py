@@ -163,7 +163,7 @@ def test_every_verdict_is_told(words_only: None, run: Any, changes: dict[str, An
     assert said in read.text
     assert read.sections() == ORDER
     if "next_test" in changes:
-        assert "None is called for" in read.text
+        assert "None is proposed" in read.text
 
 
 def test_an_unchanged_damper_shows_no_second_curve(run: Any) -> None:

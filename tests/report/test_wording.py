@@ -56,7 +56,7 @@ def test_intervals(given: tuple[float | None, ...], text: str) -> None:
         (59.7, "1 h"),
         (197.0, "3 h 17 min"),
         (240.0, "4 h"),
-        (1440.0, "more than 24 h"),
+        (1440.0, "> 24 h"),
     ],
 )
 def test_times(value: float, text: str) -> None:

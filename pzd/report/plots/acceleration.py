@@ -20,16 +20,10 @@ def draw(story: Story) -> Iterator[Panel]:
     """The last three periods of a harmonic road; of any other the four seconds with the largest peak."""
     for road in story.roads:
         rides = {ride.row.case: ride for ride in story.settled}
-        reference, others = story.reference(road), _controlled(story, road)
+        reference, others = story.reference(road), [*story.controlled(road)[::-1]]
         shown = ([reference] if reference else []) + others
         if shown:
             yield _panel(story, road, shown, rides)
-
-
-def _controlled(story: Story, road: str) -> list[SummaryRow]:
-    rows = [row for row in story.cases(road) if row.policy != REFERENCE]
-    first = [row for row in rows if row.policy == rows[0].policy]
-    return sorted(first, key=lambda row: list(BY_FIDELITY).index(row.fidelity))
 
 
 def _panel(story: Story, road: str, shown: list[SummaryRow], rides: dict[str, SettledRide]) -> Panel:

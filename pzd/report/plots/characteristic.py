@@ -24,6 +24,7 @@ def draw(story: Story) -> Iterator[Panel]:
         inside = np.where(points[:, 2] > 0, points[:, 1], np.nan) / 1000.0
         ax.plot(points[:, 0], points[:, 1] / 1000.0, color=colour, linewidth=1.0, linestyle=":")
         ax.plot(points[:, 0], inside, color=colour, label=story.voltage(voltage))
+    ax.locator_params(axis="x", nbins=6)
     ax.set_xlabel("velocity [m/s]")
     ax.set_ylabel("force [kN]")
     legend(figure, 4)

@@ -24,7 +24,7 @@ def draw(story: Story) -> Iterator[Panel]:
     if iso2631_1978.EDITION not in story.config.editions:
         return
     for road in story.roads:
-        rows = [row for row in (story.reference(road), story.controlled(road)) if row is not None]
+        rows = [row for row in (story.reference(road), *story.controlled(road)[:1]) if row is not None]
         if rows:
             yield _panel(story, road, [row.case for row in rows])
 

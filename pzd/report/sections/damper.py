@@ -84,10 +84,10 @@ def _cell(row: object) -> str:
 
 
 def _spread(speeds: list[float], reached: float) -> list[float]:
-    """Six speeds of the table, the one nearest to what the rig reached among them."""
+    """A few speeds of the table, up to what the rig reached and beyond."""
     if len(speeds) <= 6:
         return speeds
-    wanted = [*np.linspace(speeds[0], speeds[-1], 5), reached]
+    wanted = [0.1 * reached, 0.25 * reached, 0.5 * reached, reached, 0.5 * (reached + speeds[-1]), speeds[-1]]
     return sorted({min(speeds, key=lambda v: abs(v - target)) for target in wanted})
 
 

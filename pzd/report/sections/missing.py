@@ -109,7 +109,7 @@ def _fitted(ranked: Ranked) -> str:
 def next_test(story: Story, test: NextTest | None) -> str:
     """The next rig test in plain words, with what it would settle."""
     if test is None:
-        return "Next test: none is called for."
+        return "Next test: none is proposed."
     names = [effect_in_words(name) if name in library() else name for name in test.separates]
     aim = f". It separates: {'; '.join(names)}" if names else ""
     far = (

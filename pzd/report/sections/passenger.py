@@ -18,7 +18,7 @@ COMFORT_TIME = "exposure_time_reduced_comfort"
 def tell(story: Story, pictures: Pictures) -> Section:
     """The fifth section."""
     blocks: list[Block] = [Paragraph(_ride(story)), *_meanings(story)]
-    blocks += [Paragraph(text) for road in story.roads if (text := compared(story, road))]
+    blocks += [block for road in story.roads for block in _compared(story, road)]
     blocks += by_turns(pictures["passenger"])
     blocks += [_accelerations(story), *_exposures(story), _suspension(story), *_daily(story)]
     worth = _worth(story)
@@ -64,31 +64,34 @@ def _ride(story: Story) -> str:
     )
 
 
-def compared(story: Story, road: str) -> str:
-    """One road in one sentence: controlled against constant damping."""
+def _compared(story: Story, road: str) -> tuple[Block, ...]:
+    """One road: constant damping in a sentence, and what each controlled ride makes of it."""
     reference, controlled = story.reference(road), story.controlled(road)
-    if reference is None or controlled is None:
-        return ""
-    peaks = [amount(row.peak_abs_aK_m_per_s2, "m/s2") for row in (reference, controlled)]
-    how = policy_in_words(controlled)
-    text = f"{story.road(road)}: peak acceleration {peaks[0]} at constant c, {peaks[1]} with {how}"
-    before, after = story.value(reference.case, "a_w"), story.value(controlled.case, "a_w")
-    if before and after is not None:
-        levels = f"{amount(before, 'm/s2')} and {amount(after, 'm/s2')}"
-        text += f"; weighted r.m.s. a_w {levels} ({change(before, after)})"
-    return f"{text}{_longer(story, reference, controlled)}."
+    if reference is None or not controlled:
+        return ()
+    text = f"{story.road(road)}, at {policy_in_words(reference)}: {_felt_as(story, reference)}. Under control:"
+    items = (f"{policy_in_words(row)}: {_felt_as(story, row)}{_gain(story, reference, row)}" for row in controlled)
+    return Paragraph(text), Notes(tuple(items))
+
+
+def _felt_as(story: Story, row: SummaryRow) -> str:
+    a_w = story.value(row.case, "a_w")
+    level = "" if a_w is None else f", a_w {amount(a_w, 'm/s2')}"
+    return f"peak acceleration {amount(row.peak_abs_aK_m_per_s2, 'm/s2')}{level}"
+
+
+def _gain(story: Story, reference: SummaryRow, row: SummaryRow) -> str:
+    before, after = story.value(reference.case, "a_w"), story.value(row.case, "a_w")
+    less = f" ({change(before, after)})" if before and after is not None else ""
+    if iso2631_1978.EDITION not in story.config.editions:
+        return less
+    return f"{less}; within reduced comfort {times(story, reference, row)}"
 
 
 def change(before: float, after: float) -> str:
     """A change in percent, in words."""
     share = after / before - 1.0
     return f"{percent(abs(share))} {'less' if share <= 0.0 else 'more'}"
-
-
-def _longer(story: Story, reference: SummaryRow, controlled: SummaryRow) -> str:
-    if iso2631_1978.EDITION not in story.config.editions:
-        return ""
-    return f"; within reduced comfort {times(story, reference, controlled)}"
 
 
 def times(story: Story, reference: SummaryRow, controlled: SummaryRow) -> str:
