@@ -26,7 +26,7 @@ class Autoregression:
     """Variance of w, in the square of the noise's unit."""
 
     def whitened(self, series: Array) -> Array:
-        """The series (n,) or (n, m) with the model's colour taken out, scaled to unit variance; the first p rows dropped.
+        """The series (n,) or (n, m) without its colour, scaled to unit variance; the first p rows dropped.
 
         Equation: w_i = (e_i - sum_j a_j e_(i-j)) / sigma_w      Source: Box and Jenkins 1970, ch. 3
         """

@@ -18,6 +18,8 @@ from pzd.record import Record, is_constant, voltage_scale
 from pzd.rig.cycles import Cycles, cycles
 
 Array = NDArray[np.float64]
+Motion = tuple[Array, Array, Array]
+"""Displacement, velocity and acceleration, each (n,)."""
 
 CLEAR = 4.0
 """A harmonic of the displacement is kept from this many standard errors on."""
@@ -25,9 +27,10 @@ FINER = 16
 """Points per sample on which the cleaned cycle is laid."""
 COVERS = 0.5
 """The repeating run must cover this share of the record, else the record counts as not repeating."""
-DERIVATIVES = ("displacement", "velocity", "acceleration")
 ABOVE_FLOOR = 4.0
 """The spectrum of a motion that does not repeat is cut where it comes within this factor of its floor."""
+MEDIAN = 0.4549
+"""Median of chi-square with one degree of freedom: a line of a sine transform has one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +63,7 @@ def _prepared(record: Record, constant: bool) -> Prepared:
     inside = run.inside(record.time)
     motion = _mean_motion(record, run)
     kept = sliced(record, inside)
-    cleaned = replace(kept, **motion(kept.time))
+    cleaned = _moved(kept, motion(kept.time))
     if not constant:
         return Prepared(cleaned, None, None)
     step = 1.0 / record.rate
@@ -70,27 +73,47 @@ def _prepared(record: Record, constant: bool) -> Prepared:
 
 def sliced(record: Record, kept: NDArray[np.bool_]) -> Record:
     """The record's samples where the mask (n,) is set."""
-    channels = ("time", "displacement", "velocity", "acceleration", "force", "voltage", "temperature", "pressure")
-    values = {name: getattr(record, name) for name in channels}
-    return replace(record, **{name: None if v is None else v[kept] for name, v in values.items()})
 
+    def cut(channel: Array | None) -> Array | None:
+        return None if channel is None else channel[kept]
 
-def _led_in(cleaned: Record, early: Array, motion: dict[str, Array]) -> Record:
-    def longer(channel: Array | None) -> Array | None:
-        return None if channel is None else np.concatenate([np.full(early.size, channel[0]), channel])
-
-    return replace(
-        cleaned,
-        time=np.concatenate([early, cleaned.time]),
-        force=np.concatenate([np.full(early.size, cleaned.force[0]), cleaned.force]),
-        voltage=longer(cleaned.voltage),
-        temperature=longer(cleaned.temperature),
-        pressure=None,
-        **{name: np.concatenate([values, getattr(cleaned, name)]) for name, values in motion.items()},
+    return Record(
+        record.name,
+        record.setting,
+        record.time[kept],
+        record.displacement[kept],
+        record.velocity[kept],
+        record.acceleration[kept],
+        record.force[kept],
+        cut(record.voltage),
+        cut(record.temperature),
+        cut(record.pressure),
     )
 
 
-def _mean_motion(record: Record, run: Cycles) -> Callable[[Array], dict[str, Array]]:
+def _moved(record: Record, motion: Motion) -> Record:
+    """The record with another displacement and its derivatives."""
+    return replace(record, displacement=motion[0], velocity=motion[1], acceleration=motion[2])
+
+
+def _led_in(cleaned: Record, early: Array, motion: Motion) -> Record:
+    def longer(channel: Array | None) -> Array | None:
+        return None if channel is None else np.concatenate([np.full(early.size, channel[0]), channel])
+
+    return Record(
+        cleaned.name,
+        cleaned.setting,
+        np.concatenate([early, cleaned.time]),
+        np.concatenate([motion[0], cleaned.displacement]),
+        np.concatenate([motion[1], cleaned.velocity]),
+        np.concatenate([motion[2], cleaned.acceleration]),
+        np.concatenate([np.full(early.size, cleaned.force[0]), cleaned.force]),
+        longer(cleaned.voltage),
+        longer(cleaned.temperature),
+    )
+
+
+def _mean_motion(record: Record, run: Cycles) -> Callable[[Array], Motion]:
     """Displacement, velocity and acceleration of the average cycle at any time, by its clear harmonics."""
     from scipy.interpolate import CubicSpline
 
@@ -100,11 +123,14 @@ def _mean_motion(record: Record, run: Cycles) -> Callable[[Array], dict[str, Arr
     rate = 2j * np.pi * np.arange(error.mean.size) / run.period
     fine = FINER * error.points
     phase = np.arange(fine + 1) / fine
-    splines = {}
-    for order, name in enumerate(DERIVATIVES):
-        cycle = np.fft.irfft(np.where(clear, error.mean, 0.0) * rate**order, fine) * fine
-        splines[name] = CubicSpline(phase, np.append(cycle, cycle[0]), bc_type="periodic")
-    return lambda time: {name: np.asarray(spline(run.phase(time))) for name, spline in splines.items()}
+
+    def cycle(order: int) -> Callable[[Array], Array]:
+        values = np.fft.irfft(np.where(clear, error.mean, 0.0) * rate**order, fine) * fine
+        spline = CubicSpline(phase, np.append(values, values[0]), bc_type="periodic")
+        return lambda time: np.asarray(spline(run.phase(time)), dtype=np.float64)
+
+    x, v, a = cycle(0), cycle(1), cycle(2)
+    return lambda time: (x(time), v(time), a(time))
 
 
 def _smoothed(record: Record) -> Record:
@@ -113,20 +139,19 @@ def _smoothed(record: Record) -> Record:
     line = np.linspace(record.displacement[0], record.displacement[-1], n)
     odd = record.displacement - line
     spectrum = np.fft.rfft(np.concatenate([odd, -odd[:0:-1]]))
-    frequency = np.fft.rfftfreq(2 * n - 1, 1.0 / record.rate)
+    frequency = np.arange(spectrum.size) * record.rate / (2 * n - 1)
     spectrum[frequency > _corner(frequency, np.abs(spectrum) ** 2, record.rate)] = 0.0
     slope = float(line[-1] - line[0]) / ((n - 1) / record.rate)
-    trends = (line, slope, 0.0)
-    motion = {
-        name: np.fft.irfft(spectrum * (2j * np.pi * frequency) ** order, 2 * n - 1)[:n] + trends[order]
-        for order, name in enumerate(DERIVATIVES)
-    }
-    return replace(record, **motion)
+
+    def derivative(order: int) -> Array:
+        return np.fft.irfft(spectrum * (2j * np.pi * frequency) ** order, 2 * n - 1)[:n]
+
+    return _moved(record, (derivative(0) + line, derivative(1) + slope, derivative(2)))
 
 
 def _corner(frequency: Array, power: Array, rate: float) -> float:
     """Frequency beyond which nothing rises above the floor, read on an average over neighbouring lines [Hz]."""
-    floor = float(np.median(power[frequency > 0.3 * rate]))
+    floor = float(np.median(power[frequency > 0.3 * rate])) / MEDIAN
     width = max(power.size // 200, 3)
     level = np.convolve(power, np.full(width, 1.0 / width), "same")
     above = np.flatnonzero(level > ABOVE_FLOOR * floor)

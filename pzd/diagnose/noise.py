@@ -83,7 +83,9 @@ def pure_error(folded: Array) -> PureError:
     low, high = _window(last)
     total = np.concatenate([[0.0], np.cumsum(own)])
     local = (total[high + 1] - total[low]) / (high + 1 - low)
-    freedom = _with_shape(_freedom(count) * (high + 1 - low), shape * points, noise, differences.size)
+    freedom = _with_shape(
+        np.asarray(_freedom(count) * (high + 1 - low), dtype=np.float64), shape * points, noise, differences.size
+    )
     return PureError(
         count,
         points,
@@ -96,8 +98,10 @@ def pure_error(folded: Array) -> PureError:
 
 
 def _window(last: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First and last harmonic, from 1 on, whose scatter describes the noise at each harmonic: within
-    half an octave, and at least `LOCAL` of them where there are so many."""
+    """First and last harmonic, from 1 on, whose scatter describes the noise at each harmonic.
+
+    Those within a third of its number, and at least `LOCAL` of them where there are so many.
+    """
     h = np.arange(last + 1)
     reach = np.maximum(h // 3, LOCAL // 2)
     low = np.clip(h - reach, 1, max(last - LOCAL + 1, 1))

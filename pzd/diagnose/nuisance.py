@@ -9,14 +9,14 @@ from pzd.diagnose.config import NuisanceConfig
 
 Array = NDArray[np.float64]
 
-AT_MOST = 2.0
-"""A nuisance explains at most this many of its standard deviations: 1 % of peak, 1 ms, 4 %; more is a gap."""
+AT_MOST = np.array([2.0, 3.0, 2.0])
+"""Offset, gain and delay explain at most so many standard deviations: 1 % of peak, 6 %, 1 ms; more is a gap."""
 
 
 def nuisance(residual: Array, predicted: Array, rate: float, variance: float, config: NuisanceConfig) -> Array:
     """The part of a residual that offset, gain and delay of the test explain within their priors.
 
-    Equation: min_b |r - A b|^2 / s^2 + |b|^2, |b_i| <= 2, A = [sd_o peak, sd_g F, -sd_d dF/dt]
+    Equation: min_b |r - A b|^2 / s^2 + |b|^2, |b_i| <= 2, 3, 2, A = [sd_o peak, sd_g F, -sd_d dF/dt]
                                                                     Source: Gaussian prior, truncated
 
     Parameters
@@ -31,16 +31,21 @@ def nuisance(residual: Array, predicted: Array, rate: float, variance: float, co
     -------
     (n,) force [N]
     """
+    columns = columns_of(predicted, rate, config)
+    weight = max(variance, 1e-12 * float(np.max(np.abs(predicted))) ** 2)
+    normal = columns.T @ columns / weight + np.eye(columns.shape[1])
+    estimate = np.linalg.solve(normal, columns.T @ residual / weight)
+    explained: Array = columns @ np.clip(estimate, -AT_MOST, AT_MOST)
+    return explained
+
+
+def columns_of(predicted: Array, rate: float, config: NuisanceConfig) -> Array:
+    """(n, 3) force [N] that one standard deviation of offset, gain and delay makes of a predicted force (n,)."""
     peak = float(np.max(np.abs(predicted)))
-    columns = np.column_stack(
+    return np.column_stack(
         [
-            np.full(residual.size, config.offset * peak),
+            np.full(predicted.size, config.offset * peak),
             config.gain * predicted,
             -config.delay_s * np.gradient(predicted) * rate,
         ]
     )
-    weight = max(variance, 1e-12 * peak**2)
-    normal = columns.T @ columns / weight + np.eye(3)
-    estimate = np.linalg.solve(normal, columns.T @ residual / weight)
-    explained: Array = columns @ np.clip(estimate, -AT_MOST, AT_MOST)
-    return explained

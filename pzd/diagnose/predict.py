@@ -19,6 +19,9 @@ from pzd.record import Record
 
 Array = NDArray[np.float64]
 
+ENDS = 0.02
+"""Share of a record at either end where its smoothed displacement rests on one side alone: not judged."""
+
 
 def predicted_force(damper: Damper, prepared: Prepared) -> Array:
     """(n,) force that the damper gives under the record's cleaned motion [N]."""
@@ -32,7 +35,9 @@ def counted(prepared: Prepared) -> NDArray[np.bool_]:
     size = prepared.record.time.size
     if prepared.lead is not None:
         return np.ones(size, dtype=np.bool_)
-    return np.arange(size) >= warm_up(prepared.record.displacement)
+    ends = int(ENDS * size)
+    order = np.arange(size)
+    return (order >= max(warm_up(prepared.record.displacement), ends)) & (order < size - ends)
 
 
 def refitted(
@@ -51,10 +56,16 @@ def refitted(
     wanted : (n,) mask of each record
     identified : for the nodes of moving voltages
     setting : of the records
+
+    Returns
+    -------
+    the damper; the identified one where no stretch is long enough to be fitted
     """
     records: list[Record] = []
     for p, mask in zip(prepared, wanted, strict=True):
         records += stretches(p.record, mask)
+    if not records:
+        return base_of(identified.rows, setting)
     nodes = sorted({r.voltage_V for r in identified.rows if r.setting == setting and r.voltage_V is not None})
     fixed = config.model_copy(update={"method": "separable", "nodes": tuple(nodes) or None})
     return base_of(fit(fixed, Rig(tuple(records), ()), 1).rows, setting)

@@ -21,6 +21,10 @@ HATS = 8
 """Piecewise linear functions over each quantity."""
 ROUNDS = 3
 """Rounds of fitting the model and the colour of what it leaves."""
+SINGULAR = 1e-9
+"""Combinations of terms smaller than this share of the largest are the same term twice."""
+LAGS = (0.005, 0.02, 0.08)
+"""Time constants with which the force may follow a moving voltage [s]."""
 SAMPLES_PER_TERM = 20
 """Fewest samples for each term of the model; with fewer nothing is judged."""
 
@@ -31,6 +35,8 @@ class RichFit:
 
     explained: Array
     """(n,) [N]."""
+    spread: Array
+    """(n,) variance that noise alone gives to what is explained [N^2]."""
     noise: Autoregression
     """What is left."""
     probability: float
@@ -52,18 +58,22 @@ def rich_fit(residual: Array, record: Record, predicted: Array) -> RichFit:
 
     terms = _terms(record, predicted)
     if residual.size < SAMPLES_PER_TERM * terms.shape[1]:
-        return RichFit(np.zeros(residual.size), autoregression([residual - residual.mean()]), 1.0)
+        nothing = np.zeros(residual.size)
+        return RichFit(nothing, nothing, autoregression([residual - residual.mean()]), 1.0)
     explained = terms @ np.linalg.lstsq(terms, residual, rcond=None)[0]
     for _ in range(ROUNDS):
         noise = autoregression([residual - explained])
-        flat, columns = noise.whitened(residual), noise.whitened(terms)
-        coefficients = np.linalg.lstsq(columns, flat, rcond=None)[0]
-        explained = terms @ coefficients
-    left = float(np.sum((flat - columns @ coefficients) ** 2))
-    total, rank = float(flat @ flat), np.linalg.matrix_rank(columns)
+        flat = noise.whitened(residual)
+        left, sizes, right = np.linalg.svd(noise.whitened(terms), full_matrices=False)
+        rank = int(np.count_nonzero(sizes > SINGULAR * sizes[0]))
+        to_samples = terms @ (right[:rank].T / sizes[:rank])
+        taken = left[:, :rank].T @ flat
+        explained = to_samples @ taken
+    spread = np.sum(to_samples**2, axis=1) if noise.innovation > 0.0 else np.zeros(residual.size)
     free = flat.size - rank - noise.coefficients.size
-    ratio = (total - left) / rank / (left / free) if left > 0.0 else np.inf
-    return RichFit(explained, noise, float(f.sf(ratio, rank, free)))
+    over = float(flat @ flat - taken @ taken)
+    ratio = float(taken @ taken) / rank / (over / free) if over > 0.0 else np.inf
+    return RichFit(explained, spread, noise, float(f.sf(ratio, rank, free)))
 
 
 def _terms(record: Record, predicted: Array) -> Array:
@@ -77,10 +87,20 @@ def _terms(record: Record, predicted: Array) -> Array:
         np.column_stack([a, v * np.abs(v), a * np.sign(v), rate, np.abs(rate), _scaled(record.displacement) * v]),
         _hats(record.time)[:, ::3],
     ]
+    along = np.column_stack([np.sign(v), v])
     if record.voltage is not None and np.ptp(record.voltage) > 0.0:
         columns.append(_hats(record.voltage)[:, ::2] * np.sign(v)[:, None])
-        columns.append(_scaled(np.gradient(record.voltage))[:, None] * np.column_stack([np.ones(v.size), np.sign(v)]))
+        columns += [_behind(record.voltage, tau * record.rate)[:, None] * along for tau in LAGS]
     return np.column_stack(columns)
+
+
+def _behind(voltage: Array, samples: float) -> Array:
+    """What a first-order lag of so many samples leaves between the voltage and itself."""
+    from scipy.signal import lfilter
+
+    share = 1.0 - np.exp(-1.0 / samples)
+    lagged, _ = lfilter([share], [1.0, share - 1.0], voltage, zi=[voltage[0] * (1.0 - share)])
+    return _scaled(voltage - lagged)
 
 
 def _scaled(values: Array) -> Array:

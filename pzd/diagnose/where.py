@@ -1,0 +1,196 @@
+"""Where the gap lies: its share by voltage, temperature, speed, position, direction, frequency and time in the run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.artefacts import Region
+from pzd.diagnose.judge import Judged
+from pzd.diagnose.noise import repeatable_power
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.str_]
+
+DENSER = 1.25
+"""A region is told when it holds so many times more of the gap than of the samples."""
+TOLD = 0.15
+"""A region is told when it holds at least this share of the gap."""
+THIRD = 0.5
+"""A third of the run is told from this share on: single cycles are noisy."""
+MOST = 10
+"""Regions told."""
+
+
+@dataclass(frozen=True, eq=False)
+class GapMap:
+    """Every judged sample (or point of an average cycle) of all records, with its part of the gap."""
+
+    density: Array
+    """(n,) square of the residual less what noise gives; sums to the gap [N^2]."""
+    weight: Array
+    """(n,) samples that each point stands for."""
+    labels: dict[str, Labels]
+    """Axis -> (n,) the region in words that each point belongs to."""
+
+
+def regions(judged: Sequence[Judged], unit: str) -> tuple[Region, ...]:
+    """The regions in which the gap is denser than elsewhere, most telling first.
+
+    Parameters
+    ----------
+    judged : records against the damper
+    unit : of the control signal
+
+    Returns
+    -------
+    regions in words with their share of the gap; empty where there is no gap above the noise
+    """
+    gap = gap_map(judged, unit)
+    total = float(gap.density.sum())
+    if total <= 0.0:
+        return ()
+    found: list[tuple[float, Region]] = []
+    for labels in gap.labels.values():
+        found += _denser(labels, gap.density, gap.weight)
+    found += _frequencies(judged)
+    found += _thirds(judged)
+    found.sort(key=lambda item: -item[0])
+    return tuple(region for _, region in found[:MOST]) or (Region(region="everywhere alike", share_of_gap=1.0),)
+
+
+def gap_map(judged: Sequence[Judged], unit: str) -> GapMap:
+    """The gap sample by sample, noise's share taken off."""
+    points = [_points(j) for j in judged]
+    speed = max(float(np.max(np.abs(p["velocity"]))) for p in points)
+    stroke = max(float(np.ptp(p["displacement"])) for p in points)
+    labels: dict[str, list[Labels]] = {}
+    for j, p in zip(judged, points, strict=True):
+        for axis, words in _labels(j, p, speed, stroke, unit).items():
+            labels.setdefault(axis, []).append(words)
+    return GapMap(
+        np.concatenate([p["density"] for p in points]),
+        np.concatenate([p["weight"] for p in points]),
+        {axis: np.concatenate(words) for axis, words in labels.items() if len(words) == len(judged)},
+    )
+
+
+def _points(j: Judged) -> dict[str, Array]:
+    """Kinematics, density of the gap and weight: along the average cycle, or at every sample."""
+    record, run = j.prepared.record, j.prepared.cycles
+    if j.folded is None or run is None:
+        keep = j.wanted
+        names = ("velocity", "displacement", "acceleration")
+        motion = {name: getattr(record, name)[keep] for name in names}
+        density = (j.cleared**2 - j.variance if j.explained is None else j.explained)[keep]
+        voltage = record.voltage[keep] if record.voltage is not None else np.full(density.size, np.nan)
+        return {**motion, "density": density, "weight": np.ones(density.size), "voltage": voltage}
+    count = j.folded.shape[0]
+    mean = j.folded.mean(axis=0)
+    motion = {
+        "velocity": run.mean(record.time, record.velocity),
+        "displacement": run.mean(record.time, record.displacement),
+        "acceleration": run.mean(record.time, record.acceleration),
+    }
+    voltage = np.full(mean.size, record.median_voltage() if record.voltage is not None else np.nan)
+    density = count * (mean**2 - j.variance / count)
+    return {**motion, "density": density, "weight": np.full(mean.size, float(count)), "voltage": voltage}
+
+
+def _labels(j: Judged, p: dict[str, Array], speed: float, stroke: float, unit: str) -> dict[str, Labels]:
+    v, x, a = p["velocity"], p["displacement"], p["acceleration"]
+    fast = _bands(np.abs(v), _round(np.array([0.1, 0.33, 0.67]) * speed), "abs(v)", "m/s")
+    found = {
+        "velocity": fast,
+        "position": _bands(x, _round(np.array([-0.25, 0.25]) * stroke), "x", "m"),
+        "direction": np.where(v >= 0.0, "rebound (v > 0)", "compression (v < 0)"),
+        "phase": np.where(v * a >= 0.0, "speeding up", "slowing down"),
+    }
+    if np.all(np.isfinite(p["voltage"])):
+        words = _voltages(p["voltage"], unit)
+        found["voltage"] = words
+        found["velocity and voltage"] = np.char.add(np.char.add(fast, ", "), words)
+    temperature = j.prepared.record.median_temperature()
+    if temperature is not None:
+        found["temperature"] = np.full(v.size, f"{temperature:.0f} degC")
+    return found
+
+
+def _voltages(voltage: Array, unit: str) -> Labels:
+    """Voltages to three figures; a moving one in fifths of its range."""
+    span = float(np.ptp(voltage))
+    if span <= 0.02 * float(np.max(np.abs(voltage))):
+        return np.full(voltage.size, f"{float(np.median(voltage)):.3g} {unit}")
+    return _bands(voltage, _round(voltage.min() + span * np.array([0.2, 0.4, 0.6, 0.8])), "moving control", unit)
+
+
+def _bands(values: Array, edges: Array, name: str, unit: str) -> Labels:
+    words = [f"{name} < {edges[0]:.2g} {unit}"]
+    words += [f"{low:.2g} < {name} < {high:.2g} {unit}" for low, high in pairwise(edges)]
+    words.append(f"{name} > {edges[-1]:.2g} {unit}")
+    return np.array(words)[np.searchsorted(edges, values)]
+
+
+def _round(edges: Array) -> Array:
+    """Edges to two figures, so that the words say what was done."""
+    return np.array([float(f"{edge:.2g}") for edge in edges])
+
+
+def _denser(labels: Labels, density: Array, weight: Array) -> list[tuple[float, Region]]:
+    """The regions of one axis that hold more of the gap than of the samples, with by how much."""
+    names, index = np.unique(labels, return_inverse=True)
+    if names.size < 2:
+        return []
+    shares = np.bincount(index, density) / density.sum()
+    samples = np.bincount(index, weight) / weight.sum()
+    return _told(zip(names, shares, samples, strict=True))
+
+
+def _told(shares: Iterable[tuple[str, float, float]]) -> list[tuple[float, Region]]:
+    return [
+        (share - samples, Region(region=str(name), share_of_gap=float(min(share, 1.0))))
+        for name, share, samples in shares
+        if share >= TOLD and share >= DENSER * samples
+    ]
+
+
+def _frequencies(judged: Sequence[Judged]) -> list[tuple[float, Region]]:
+    """The octaves of frequency that hold most of the repeatable gap; an offset is one of its own."""
+    power: dict[str, float] = {}
+    for j in judged:
+        if j.error is None or j.prepared.cycles is None:
+            continue
+        words = [_octave(h * j.prepared.cycles.frequency) for h in range(j.error.mean.size)]
+        samples = float(np.count_nonzero(j.wanted))
+        for word, part in zip(words, repeatable_power(j.error), strict=True):
+            power[word] = power.get(word, 0.0) + samples * float(part)
+    total = sum(power.values())
+    if total <= 0.0 or len(power) < 2:
+        return []
+    return _told((word, part / total, 1.0 / len(power)) for word, part in power.items())
+
+
+def _octave(frequency: float) -> str:
+    if frequency <= 0.0:
+        return "constant offset of the force"
+    octave = int(np.floor(np.log2(frequency) + 1e-9))
+    return f"{2.0**octave:g} to {2.0 ** (octave + 1):g} Hz in the force"
+
+
+def _thirds(judged: Sequence[Judged]) -> list[tuple[float, Region]]:
+    """The third of the run in which the gap is larger."""
+    names = ("first third of the run", "middle third of the run", "last third of the run")
+    shares, samples = np.zeros(3), np.zeros(3)
+    for j in judged:
+        kept = np.flatnonzero(j.wanted)
+        for third, part in enumerate(np.array_split(kept, 3)):
+            shares[third] += float(np.sum(j.cleared[part] ** 2)) - part.size * j.variance
+            samples[third] += part.size
+    if shares.sum() <= 0.0:
+        return []
+    told = _told(zip(names, shares / shares.sum(), samples / samples.sum(), strict=True))
+    return [item for item in told if item[1].share_of_gap >= THIRD]

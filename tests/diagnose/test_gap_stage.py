@@ -1,0 +1,186 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from campaign import TABLE_2, coloured, damper_of, sine, sines, waveform
+
+from pzd.artefacts import Diagnosed, Rig, base_of
+from pzd.damper.compose import respond
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
+from pzd.diagnose.config import DiagnoseConfig, NuisanceConfig
+from pzd.diagnose.inputs import prepare
+from pzd.diagnose.judge import judge
+from pzd.diagnose.nuisance import nuisance
+from pzd.diagnose.split import TRAINING, UNTOUCHED, VALIDATION, split
+from pzd.diagnose.stage import diagnose
+from pzd.identify.config import IdentifyConfig
+from pzd.identify.stage import identify
+from pzd.quantities import Control
+from pzd.record import Array, Record
+
+TWO = (0.0, 150.0)
+
+
+def diagnosed(records: tuple[Record, ...]) -> Diagnosed:
+    rig = Rig(records, ())
+    identified = identify(IdentifyConfig(), rig, 1)
+    return diagnose(DiagnoseConfig(), IdentifyConfig(), rig, identified, Control(), None)
+
+
+def road(damper: Damper, rng: np.random.Generator, voltage: float, displacement_noise: float = 0.0) -> Record:
+    """Random motion that never repeats, 10 s at 500 Hz."""
+    fine = np.arange(-1.0, 10.0, 1.0 / 4000.0)
+    lines = np.arange(0.3, 12.0, 0.0937)
+    parts = [waveform(fine + rng.uniform(0, 10), float(f), 0.003 / float(f)) for f in lines]
+    x, v, a = (np.sum([p[i] for p in parts], axis=0) for i in range(3))
+    force = respond(damper, Motion(fine, x, v, a, np.full(fine.size, voltage)))
+    keep = slice(4000, None, 8)
+    peak = float(np.max(np.abs(force)))
+    measured = force[keep] + coloured(rng, fine[keep].size, 0.01 * peak, 0.9)
+    seen: Array = x[keep] + displacement_noise * rng.standard_normal(measured.size)
+    U = np.full(measured.size, voltage)
+    return Record(f"road{voltage:g}", None, fine[keep], seen, v[keep], a[keep], measured, U)
+
+
+def test_a_damper_that_misses_nothing_is_handed_on_with_the_verdict_none() -> None:
+    rng = np.random.default_rng()
+    records = sines(damper_of(TWO), rng, TWO, jitter=0.02)
+    found = diagnosed(records)
+    assert found.diagnosis.verdict == "none"
+    assert found.diagnosis.confidence is None
+    assert found.diagnosis.where == ()
+    gap = found.diagnosis.gap
+    assert gap.before == gap.after
+    assert gap.before == pytest.approx(gap.noise_floor, rel=0.4)
+    assert found.damper == found.plain == base_of(identify(IdentifyConfig(), Rig(records, ()), 1).rows, None)
+
+
+def test_displacement_noise_of_a_tenth_of_a_millimetre_is_no_missing_effect() -> None:
+    rng = np.random.default_rng()
+    records = sines(damper_of(TWO), rng, TWO, jitter=0.01, displacement_noise=1e-4)
+    assert diagnosed(records).diagnosis.verdict == "none"
+
+
+@pytest.mark.parametrize(
+    ("effects", "place"),
+    [
+        ({"preload_offset": {"F_0": 120.0}}, "constant offset of the force"),
+        ({"gas_spring": {"k_g": 8e3}}, "x "),
+        ({"orifice_quadratic": {"q": 4000.0}}, "abs(v) > 0.25 m/s"),
+    ],
+)
+def test_a_missing_effect_is_unexplained_and_told_where_it_acts(
+    effects: dict[str, dict[str, float]], place: str
+) -> None:
+    found = diagnosed(sines(damper_of(TWO, **effects), np.random.default_rng(), TWO))
+    assert found.diagnosis.verdict == "unexplained"
+    assert any(place in region.region for region in found.diagnosis.where)
+    assert all(0.0 < region.share_of_gap <= 1.0 for region in found.diagnosis.where)
+    gap = found.diagnosis.gap
+    assert gap.before > gap.noise_floor
+    assert gap.hold_out == "records"
+
+
+def test_a_misfit_at_one_voltage_is_told_there() -> None:
+    rng = np.random.default_rng()
+    records = tuple(
+        sine(damper_of(asymmetry={"alpha": 0.15 if U == 100.0 else 0.0}), U, f, 0.03, rng)
+        for U in TABLE_2
+        for f in (0.5, 2.0)
+    )
+    best = [region for region in diagnosed(records).diagnosis.where if region.region == "100 V"]
+    assert best
+    assert best[0].share_of_gap > 0.9
+
+
+def test_one_sine_a_voltage_holds_out_cycles_and_says_that_this_is_weak() -> None:
+    rng = np.random.default_rng()
+    found = diagnosed(sines(damper_of(), rng, tests=((2.0, 0.03),))).diagnosis
+    assert found.verdict == "none"
+    assert found.gap.hold_out == "cycles"
+    assert len(found.gap.held_out) == 4
+    assert "weak" in found.reason
+
+
+@pytest.mark.parametrize("displacement_noise", [0.0, 5e-5])
+def test_roads_without_a_missing_effect_are_within_the_noise(displacement_noise: float) -> None:
+    rng = np.random.default_rng()
+    found = diagnosed(tuple(road(damper_of(TWO), rng, U, displacement_noise) for U in TWO)).diagnosis
+    assert found.verdict == "none"
+    assert found.gap.hold_out == "segments"
+
+
+def test_roads_show_what_misses_although_nothing_repeats() -> None:
+    rng = np.random.default_rng()
+    damper = damper_of(TWO, gas_spring={"k_g": 2e4})
+    assert diagnosed(tuple(road(damper, rng, U) for U in TWO)).diagnosis.verdict == "unexplained"
+
+
+def test_the_same_rig_gives_the_same_diagnosis_and_reads_back(tmp_path: Any) -> None:
+    records = sines(damper_of(TWO), np.random.default_rng(), TWO, tests=((2.0, 0.03),))
+    first, second = diagnosed(records), diagnosed(records)
+    assert first.diagnosis == second.diagnosis
+    first.write(tmp_path, Control())
+    assert Diagnosed.read(tmp_path, Control()).diagnosis == first.diagnosis
+
+
+def test_every_role_has_every_kind_of_test_over_the_conditions() -> None:
+    rng = np.random.default_rng()
+    prepared = prepare(sines(damper_of(), rng, cycles=4))
+    parts = split(prepared, None, 2.0)
+    whole = [int(roles[0]) for roles in parts.roles]
+    assert all(np.all(roles == role) for roles, role in zip(parts.roles, whole, strict=True))
+    assert [whole.count(role) for role in (TRAINING, VALIDATION, UNTOUCHED)] == [8, 4, 4]
+    kinds = [
+        (round(p.cycles.frequency, 2), round(float(np.ptp(p.record.displacement)), 3)) for p in prepared if p.cycles
+    ]
+    for role in (TRAINING, VALIDATION, UNTOUCHED):
+        assert len({kind for kind, given in zip(kinds, whole, strict=True) if given == role}) == 4
+    for U in range(4):
+        fitted = [kinds[i][0] for i in range(4 * U, 4 * U + 4) if whole[i] == TRAINING]
+        assert len(set(fitted)) == 2
+
+
+def test_two_records_of_a_condition_hold_one_out_whole() -> None:
+    prepared = prepare(sines(damper_of(TWO), np.random.default_rng(), TWO, tests=((0.5, 0.03), (2.0, 0.03))))
+    parts = split(prepared, None, 2.0)
+    assert parts.hold_out == "records"
+    assert sorted(np.unique(roles).tolist() for roles in parts.roles) == [[0, 1], [0, 1], [2], [2]]
+
+
+def test_small_offset_gain_and_delay_are_nuisances_and_large_ones_a_gap() -> None:
+    rng = np.random.default_rng()
+    damper = damper_of([0.0])
+    for offset, gain, share in ((0.005, 1.03, 0.05), (0.05, 1.0, 0.5)):
+        record = sine(damper, 0.0, 2.0, 0.03, rng, noise=1e-4, offset=offset, gain=gain)
+        (prepared,) = prepare([record])
+        everything = np.ones(prepared.record.time.size, dtype=np.bool_)
+        judged = judge(damper, prepared, everything, NuisanceConfig())
+        left = float(np.sqrt(np.mean(judged.cleared**2)) / np.sqrt(np.mean(judged.residual**2)))
+        assert left < share if offset < 0.01 else left > share
+
+
+def test_a_nuisance_explains_a_pure_delay() -> None:
+    t = np.arange(2000) / 1000.0
+    force = 1000.0 * np.sin(4 * np.pi * t)
+    late = 1000.0 * np.sin(4 * np.pi * (t - 4e-4)) - force
+    explained = nuisance(late, force, 1000.0, 1e-2, NuisanceConfig())
+    assert np.max(np.abs(explained - late)) < 0.03 * np.max(np.abs(late))
+
+
+def test_cleaned_displacement_keeps_the_corners_of_a_triangle() -> None:
+    rng = np.random.default_rng()
+    t = np.arange(20000) / 1000.0
+    harmonics = np.arange(1, 40, 2)
+    triangle = 0.02 * sum(np.cos(2 * np.pi * h * t) / h**2 for h in harmonics)
+    zero = np.zeros(t.size)
+    noisy = triangle + 1e-4 * rng.standard_normal(t.size)
+    (prepared,) = prepare([Record("t", None, t, noisy, zero, zero, zero)])
+    true = replace(prepared.record, displacement=np.interp(prepared.record.time, t, triangle))
+    error = prepared.record.displacement - true.displacement
+    assert prepared.cycles is not None
+    assert np.sqrt(np.mean(error**2)) < 3e-5
