@@ -9,7 +9,7 @@ from pzd.report.story import Story
 
 
 def loops(story: Story, record: Record, abscissa: Array, quantity: Quantity, title: str) -> Panel:
-    """The last cycles of one record: measured force, the simple model, and the final damper.
+    """Cycles from the middle of one record: measured force, the simple model, and the final damper.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def loops(story: Story, record: Record, abscissa: Array, quantity: Quantity, tit
     the panel
     """
     before, after = story.simulated(record)
-    part = story.last_cycles(record)
+    part = story.middle(record)
     x, measured, plain, final = thinned(abscissa[part], record.force[part], before[part], after[part])
     figure, ax = axes()
     ax.plot(x, measured / 1000.0, ".", color=MEASURED, markersize=2.4, label="measured")

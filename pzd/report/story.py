@@ -120,11 +120,13 @@ class Story:
         known = [row.voltage_V for row in self.parameters if row.voltage_V is not None]
         return own if own is None or not known else min(known, key=lambda voltage: abs(voltage - own))
 
-    def last_cycles(self, record: Record) -> slice:
-        """The last two cycles of a periodic record, the last ten of any other; the start is left out."""
+    def middle(self, record: Record) -> slice:
+        """Two cycles of a simple swing, ten of any other record, from its middle: it may start and end at rest."""
         cycles = self.entries[record.name].cycles if record.name in self.entries else 0.0
-        share = min((2.0 if self.swings(record) else 10.0) / max(cycles, 1.0), 1.0 - 1.0 / max(cycles, 1.0))
-        return slice(round(record.time.size * (1.0 - share)) if share > 0.0 else 0, None)
+        wanted = 2.0 if self.swings(record) else 10.0
+        share = min(wanted / max(cycles, 1.0), 1.0)
+        start = round(record.time.size * 0.5 * (1.0 - share))
+        return slice(start, record.time.size - start)
 
     def voltage(self, value: float | None) -> str:
         """A value of the control signal with its unit, in words where there is none."""

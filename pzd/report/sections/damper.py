@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.artefacts import ParameterRow
 from pzd.damper.effects import library
-from pzd.quantities import DAMPING, FRICTION, STIFFNESS
+from pzd.quantities import DAMPING, FRICTION, STIFFNESS, VOLTAGE
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
 from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.story import Story, effect_in_words
@@ -94,7 +94,7 @@ def _spread(speeds: list[float], reached: float) -> list[float]:
 def _responses(story: Story) -> Sheet:
     rows = tuple(
         (
-            r.signal,
+            story.control.name if r.signal == VOLTAGE.name else r.signal,
             f"{story.voltage(r.from_voltage_V)} to {story.voltage(r.to_voltage_V)}",
             amount(r.velocity_m_per_s, "m/s"),
             *(f"{number(1000.0 * t)} ms" if t is not None else DASH for t in (r.to_63_percent_s, r.to_90_percent_s)),
