@@ -36,7 +36,8 @@ def seen_in(problem: Problem, effect: Effect) -> bool:
     """Whether something moves in some test that the effect needs to be seen at all."""
     if effect.needs == "voltage":
         return any(
-            o.motion.voltage is not None and float(np.ptp(o.motion.voltage)) > MOVES * (problem.scales.voltage or np.inf)
+            o.motion.voltage is not None
+            and float(np.ptp(o.motion.voltage)) > MOVES * (problem.scales.voltage or np.inf)
             for o in problem.observations
         )
     if effect.needs == "temperature":
@@ -71,7 +72,7 @@ def candidates(
     ]
 
     def one(effect: Effect) -> Candidate:
-        found = _candidate(problem, before, effect)
+        found = candidate(problem, before, effect)
         told(effect.name)
         return found
 
@@ -80,7 +81,8 @@ def candidates(
     return tuple(sorted(found, key=lambda c: c.delta_bic))
 
 
-def _candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
+def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
+    """One effect fitted beside those of `before`, from its most promising starting values."""
     start = promising_start(problem, before, effect)
     fitted = fit(problem, (*before.effects, effect.name), np.concatenate([before.searched, start]))
     return Candidate(effect.name, fitted, delta_bic(before, fitted), moved_by(problem, before, fitted))

@@ -46,6 +46,15 @@ class Evidence:
         judged = self.judged(fitted.damper, config)
         return probability_of_noise(judged) < config.significance and visible_gap(judged) >= config.negligible
 
+    def criterion(self, fitted: Fitted) -> float:
+        """W_s over the compared samples of all that is seen.
+
+        Equation: sum (F - F_sim)^2 / sum F^2                       Source: Makowski and Knap 2021, eq. (4)
+        """
+        pairs = list(zip(self.whole.observations, fitted.simulated, strict=True))
+        missed = sum(float(np.sum((o.measured - force) ** 2)) for o, force in pairs)
+        return missed / sum(float(np.sum(o.measured**2)) for o, _ in pairs)
+
     def misfit(self, half: int, fitted: Fitted) -> float:
         """Misfit of a fit on one half of the tests, in units of noise."""
         problem = self.halves[half]

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.diagnose.candidates import Candidate, candidates
+from pzd.damper.effects import library
+from pzd.damper.model import Damper
+from pzd.diagnose.candidates import Candidate, candidate, candidates
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence
 from pzd.diagnose.fitting import Fitted, fit
@@ -42,6 +44,15 @@ class Named:
     """Effects that explain the last step as well."""
 
     @property
+    def rivalling(self) -> tuple[tuple[str, Damper], ...]:
+        """The effect adopted last and its rivals, with the dampers fitted with them; empty without rivals."""
+        if not self.rivals:
+            return ()
+        last = self.rounds[len(self.adopted) - 1]
+        wanted = (self.adopted[-1], *self.rivals)
+        return tuple((name, c.fitted.damper) for name in wanted for c in last if c.effect == name)
+
+    @property
     def adopted(self) -> tuple[str, ...]:
         """The effects adopted, best first."""
         return self.fitted.effects
@@ -60,6 +71,9 @@ def name_effects(evidence: Evidence, config: DiagnoseConfig, jobs: int = 1) -> N
     plain = current = fit(whole, (), whole.start())
     rounds: list[tuple[Candidate, ...]] = []
     reasons: dict[str, str] = {}
+    for name in config.force:
+        current = candidate(whole, current, library()[name]).fitted
+        reasons[name] = "adopted because the config asks for it"
     rivals: tuple[str, ...] = ()
     while len(current.effects) < config.most_effects and evidence.something_missing(current, config):
         tried = candidates(whole, current, config.forbid, jobs)

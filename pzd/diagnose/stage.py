@@ -1,20 +1,14 @@
-"""The diagnose stage: where simulation and measurement disagree above the noise, and by how much."""
+"""The diagnose stage: where simulation and measurement disagree, what is missing, and how far adding it shrinks the gap."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pzd.artefacts import Diagnosed, Diagnosis, Gap, Identified, Region, Rig, base_of
-from pzd.damper.model import Damper
+from pzd.artefacts import Diagnosed, Diagnosis, Identified, Rig, base_of
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
-
-Mask = NDArray[np.bool_]
+from pzd.rig.config import RigConfig
 
 log = logging.getLogger(__name__)
 
@@ -22,82 +16,66 @@ log = logging.getLogger(__name__)
 def diagnose(
     diagnose: DiagnoseConfig,
     identify: IdentifyConfig,
+    stand: RigConfig,
     rig: Rig,
     identified: Identified,
     control: Control,
     setting: str | None,
+    jobs: int,
 ) -> Diagnosed:
-    """Whether the identified damper misses the measurement above the noise, where, and how far on held-out data.
+    """What the identified damper misses, named where the data allow it, and the damper with it added.
 
     Parameters
     ----------
     diagnose : the config's block
-    identify : that of identify, for refitting the base to the training samples alone
+    identify : that of identify, for refitting the base to the samples seen
+    stand : that of the rig, for what the stand can do
     rig : the records
     identified : the Bingham parameters
     control : the control signal, for the words
     setting : of the rig's settings, the one in use
+    jobs : candidates fitted at the same time
 
     Returns
     -------
-    the verdict `none` or `unexplained`, and the identified damper unchanged
+    the verdict, and the damper with what was adopted; unchanged where nothing was
     """
-    from pzd.diagnose.gap import gap_of, probability_of_noise, visible_gap
+    from pzd.diagnose.evidence import evidence_of
+    from pzd.diagnose.heldout import held_out_gap
     from pzd.diagnose.inputs import prepare
     from pzd.diagnose.joint import with_nuisances
-    from pzd.diagnose.judge import judge
+    from pzd.diagnose.naming import name_effects
+    from pzd.diagnose.next_test import next_test, reach_of
     from pzd.diagnose.predict import refitted
-    from pzd.diagnose.split import TRAINING, UNTOUCHED, split
+    from pzd.diagnose.split import UNTOUCHED, split
+    from pzd.diagnose.verdict import decide, parameters_of, ranking_of
     from pzd.diagnose.where import regions
 
     prepared = prepare([record for record in rig.records if record.setting == setting])
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     seen = [roles != UNTOUCHED for roles in parts.roles]
-
-    def fitted(wanted: Sequence[Mask]) -> Damper:
-        plain = refitted(identify, prepared, wanted, identified, setting)
-        return with_nuisances(plain, prepared, wanted, diagnose.nuisance)
-
-    base = fitted(seen)
-    judged = [judge(base, p, mask, diagnose.nuisance) for p, mask in zip(prepared, seen, strict=True) if mask.any()]
-    probability, size = probability_of_noise(judged), visible_gap(judged)
-    log.info("diagnose: gap %.2f %% of peak above the noise, probability by noise alone %.1e", 100 * size, probability)
-
-    trained = fitted([roles == TRAINING for roles in parts.roles])
-    unseen = [(p, roles == UNTOUCHED) for p, roles in zip(prepared, parts.roles, strict=True)]
-    figures = gap_of([judge(trained, p, mask, diagnose.nuisance) for p, mask in unseen if mask.any()], parts)
-    missed = probability < diagnose.significance and size >= diagnose.visible
-    where = regions(judged, control.unit) if missed else ()
-    damper = base_of(identified.rows, setting)
-    return Diagnosed(_diagnosis(diagnose, missed, probability, size, figures, where), damper, damper)
-
-
-def _diagnosis(
-    config: DiagnoseConfig, missed: bool, probability: float, size: float, gap: Gap, where: Sequence[Region]
-) -> Diagnosis:
-    return Diagnosis(
-        verdict="unexplained" if missed else "none",
-        reason=_reason(config, probability, size, gap),
-        effects=(),
-        confidence=None,
-        gap=gap,
-        parameters={},
-        ranking=(),
-        rivals=(),
-        where=tuple(where),
-        next_test=None,
+    plain = refitted(identify, prepared, seen, identified, setting)
+    plain = with_nuisances(plain, prepared, seen, diagnose.nuisance)
+    evidence = evidence_of(prepared, parts, plain, diagnose)
+    named = name_effects(evidence, diagnose, jobs)
+    before = evidence.judged(named.plain.damper, diagnose)
+    after = evidence.judged(named.fitted.damper, diagnose) if named.adopted else before
+    decision = decide(named, before, after, diagnose)
+    log.info("diagnose: %s, %s", decision.verdict, decision.reason)
+    identified_damper = base_of(identified.rows, setting)
+    voltages = [row.voltage_V for row in identified_damper.base if row.voltage_V is not None]
+    told = Diagnosis(
+        verdict=decision.verdict,
+        reason=decision.reason,
+        effects=named.adopted,
+        confidence=decision.confidence,
+        gap=held_out_gap(evidence, named, parts, diagnose),
+        parameters=parameters_of(named),
+        ranking=ranking_of(named, evidence),
+        rivals=named.rivals,
+        where=() if decision.verdict == "none" else regions(before, control.unit),
+        next_test=next_test(
+            named.rivalling, reach_of(stand.limits, evidence.whole.scales, voltages), evidence.whole.reference
+        ),
     )
-
-
-def _reason(config: DiagnoseConfig, probability: float, size: float, gap: Gap) -> str:
-    told = f"a gap of {100 * size:.2g} % of peak force (r.m.s. above the noise)"
-    if probability >= config.significance:
-        words = f"{told} that noise alone shows with probability {probability:.2g}: within the noise"
-    elif size < config.visible:
-        words = f"{told}, repeatable but smaller than {100 * config.visible:g} % of peak: counts as nothing missing"
-    else:
-        words = f"{told} that repeats (probability by noise alone {max(probability, 1e-300):.1g})"
-    weak = gap.hold_out in {"cycles", "segments", "mixed"}
-    return words + (
-        f"; held out were {gap.hold_out} of tests that were also fitted, which is weak evidence" if weak else ""
-    )
+    return Diagnosed(told, named.fitted.damper if named.adopted else identified_damper, identified_damper)

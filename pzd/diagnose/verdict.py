@@ -1,0 +1,134 @@
+"""The verdict: named, ambiguous, none or unexplained, its reason, and how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pzd.artefacts import Ranked, Value
+from pzd.diagnose.candidates import Candidate
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.evidence import Evidence
+from pzd.diagnose.gap import probability_of_noise, visible_gap
+from pzd.diagnose.judge import Judged
+from pzd.diagnose.naming import LEVEL, Named, standard_errors
+
+Verdict = Literal["named", "ambiguous", "none", "unexplained"]
+
+OUTSIDE = 0.03
+"""Share of cases in which what is missing is not in the library and yet one of its effects fits within the noise."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What is said, why, and how sure it is."""
+
+    verdict: Verdict
+    reason: str
+    confidence: float | None
+
+
+def decide(named: Named, before: Sequence[Judged], after: Sequence[Judged], config: DiagnoseConfig) -> Decision:
+    """The verdict on what was adopted, from what is left of the gap.
+
+    Parameters
+    ----------
+    named : what was adopted
+    before, after : every record seen against the plain damper and against the adopted one
+    config : thresholds
+    """
+    sizes = visible_gap(before), visible_gap(after)
+    chances = probability_of_noise(before), probability_of_noise(after)
+    if not named.adopted:
+        return _nothing_adopted(sizes[0], chances[0], config)
+    told = f"{' and '.join(named.adopted)}: the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
+    if chances[1] < config.significance and _remains(sizes, config):
+        words = f"{told}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
+        return Decision("unexplained", words, None)
+    if named.rivals:
+        words = f"{told}; {', '.join(named.rivals)} would do as well on these tests"
+        return Decision("ambiguous", words, confidence_of(named))
+    return Decision("named", f"{told}; what is left is within the noise or negligible", confidence_of(named))
+
+
+def _remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
+    """Whether too much of the gap is left, as r.m.s. with the noise floor taken off."""
+    return sizes[1] > config.unexplained_share * sizes[0] and sizes[1] >= config.negligible
+
+
+def _nothing_adopted(size: float, chance: float, config: DiagnoseConfig) -> Decision:
+    told = f"a gap of {_percent(size)} of peak force (r.m.s. above the noise)"
+    if chance >= config.significance:
+        return Decision("none", f"{told} that noise alone shows with probability {chance:.2g}: within the noise", None)
+    if size < config.visible:
+        limit = _percent(config.visible)
+        return Decision("none", f"{told}, repeatable but smaller than {limit} of peak: counts as nothing missing", None)
+    words = f"{told} that repeats (probability by noise alone {max(chance, 1e-300):.1g}); no effect of the library fits"
+    return Decision("unexplained", words, None)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
+
+
+def confidence_of(named: Named) -> float:
+    """Posterior weight of the effects adopted among all that were tried, by their Bayesian criteria.
+
+    Equation: w_i = exp(-BIC_i / 2) / sum_j exp(-BIC_j / 2), times what the library leaves out
+                                                    Source: Kass and Raftery 1995, J. Am. Stat. Assoc. 90, eq. (9)
+    """
+    weight = 1.0 - OUTSIDE
+    for tried in named.rounds[: len(named.adopted)]:
+        adopted = [c for c in tried if c.effect in named.adopted]
+        if adopted:
+            best = min(c.delta_bic for c in adopted)
+            weight /= sum(float(np.exp(-0.5 * max(c.delta_bic - best, -700.0))) for c in _distinct(tried, best))
+    return round(weight, 3)
+
+
+def _distinct(tried: Sequence[Candidate], best: float) -> list[Candidate]:
+    """Candidates that were not found to be stand-ins: those no better than the one adopted."""
+    return [c for c in tried if c.delta_bic >= best]
+
+
+def ranking_of(named: Named, evidence: Evidence) -> tuple[Ranked, ...]:
+    """Every candidate in the round that decided on it, best first; what was adopted leads.
+
+    `gap_after` is criterion (4) on the samples seen, the tests' nuisances left in.
+    """
+    rows: dict[str, Ranked] = {}
+    for i, tried in enumerate(named.rounds):
+        for c in tried:
+            if c.effect in named.adopted and c.effect != _adopted_in(named, i):
+                continue
+            reason = named.reasons.get(c.effect, "does not pay" if c.delta_bic > 0.0 else "explains less")
+            rows[c.effect] = Ranked(
+                effect=c.effect,
+                gap_after=evidence.criterion(c.fitted),
+                delta_bic=round(c.delta_bic, 3),
+                parameters=dict(c.fitted.damper.effects[c.effect]),
+                reason="rival" if c.effect in named.rivals else reason,
+            )
+    return tuple(sorted(rows.values(), key=lambda r: (r.effect not in named.adopted, r.delta_bic)))
+
+
+def _adopted_in(named: Named, round_number: int) -> str | None:
+    return named.adopted[round_number] if round_number < len(named.adopted) else None
+
+
+def parameters_of(named: Named) -> dict[str, dict[str, Value]]:
+    """The parameters of what was adopted, with 95 % intervals."""
+    errors = standard_errors(named.fitted)
+    found: dict[str, dict[str, Value]] = {}
+    for unknown, error in zip(named.fitted.unknowns, errors, strict=True):
+        value = named.fitted.value_of(unknown.effect, unknown.parameter.name)
+        found.setdefault(unknown.effect, {})[unknown.parameter.name] = Value(
+            value=value,
+            low95=value - LEVEL * float(error),
+            high95=value + LEVEL * float(error),
+            unit=unknown.parameter.unit,
+        )
+    return found
