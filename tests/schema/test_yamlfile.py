@@ -210,6 +210,10 @@ def test_every_fault_is_said_at_once_with_the_nearest_key(tmp_path: Path) -> Non
         ("{kind: sine, frequency_Hz: -1}", "c.yaml:1:43: inner.0.wave.frequency_Hz: must be greater than 0 (got -1)"),
         ("{kind: sine, frequency_Hz: .inf}", "c.yaml:1:43: inner.0.wave.frequency_Hz: must be a finite number"),
         ("{kind: sweep, from: 1, from_Hz: 2}", "c.yaml:1:30: inner.0.wave.from: no such key; did you mean from_Hz?"),
+        (
+            "{kind: sine, frequency_Hz: 1, from_Hz: 2}",
+            "c.yaml:1:46: inner.0.wave.from_Hz: no such key; there is kind, frequency_Hz (got from_Hz)",
+        ),
         ("3", "c.yaml:1:16: inner.0.wave: must be a mapping"),
     ],
 )
