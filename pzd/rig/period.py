@@ -1,8 +1,8 @@
 """The search for the period of a test, from how well the displacement repeats itself.
 
 No shape is assumed. The mismatch between the record and itself one lag later, drift taken
-off, is near zero at the period; the increments over an eighth of the period have to repeat
-as well, since slow random motion resembles itself by chance and its increments do not.
+off, is near zero at the period. The speed has to repeat as well: quick motion on a slow wave
+is small in the displacement and large in the speed.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pzd.rig.smoothing import low_pass
 
 Array = NDArray[np.float64]
 
@@ -24,14 +26,16 @@ SAME = 2e-5
 """Mismatch that always counts as repeating: 0.4 % in r.m.s."""
 SCATTER = 4.0
 """Otherwise up to this many times the median mismatch of the motion counts as repeating."""
-INCREMENTS_REPEAT = 0.05
-"""Largest mismatch of the increments."""
+SPEED_REPEATS = 0.05
+"""The same of the speed, which carries more noise."""
 LEAST_SHARE = 0.25
 """The run of repeating cycles has to cover this share of the motion."""
 MOVED = 0.05
 """The motion begins where the displacement has left its first value by this share of its range."""
 MOST_CANDIDATES = 40
 """Lags looked at closely, the shortest first."""
+HIGHEST_CORNER = 20.0
+"""Corner of the smoothing [rad/sample] that leaves a record without noise as it is."""
 LEAST_POINTS = 4
 """Fewest samples in a cycle."""
 
@@ -64,12 +68,13 @@ def repeats(time: Array, displacement: Array) -> Repeats | None:
     grid = np.arange(time[0], time[-1] + 0.5 * step, step)
     x = np.interp(grid, time, displacement)
     least = LEAST_SHARE * float(time[last] - time[first]) / step
+    smooth = low_pass(x, HIGHEST_CORNER)
     for candidate in _candidates(x):
-        lag, section = candidate, _section(x, candidate, least)
+        lag, section = candidate, _section(x, smooth, candidate, least)
         if section is not None:
             # Ramps pull the lag of the whole record aside: look again at the section alone.
             lag = _nearby(x[section[0] : int(section[1])], candidate)
-            section = _section(x, lag, least) or section
+            section = _section(x, smooth, lag, least) or section
             return Repeats(lag * step, float(grid[0]) + section[0] * step, float(grid[0]) + section[1] * step)
     return None
 
@@ -137,19 +142,17 @@ def _vertex(d: Array, lowest: int) -> float:
     return lowest + float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend > 0.0 else float(lowest)
 
 
-def _section(x: Array, lag: float, least: float) -> tuple[int, float] | None:
+def _section(x: Array, smooth: Array, lag: float, least: float) -> tuple[int, float] | None:
     """First sample and end [samples] of the longest section that repeats at this lag, None if below `least`."""
     window = max(int(0.98 * lag) - 1, 3)
-    short = max(int(lag / 8.0), 1)
     error, scale = _local(x, lag, window)
-    error_u, scale_u = _local(x[short:] - x[:-short], lag, max(window - short, 2))
-    if error.size == 0 or error_u.size < error.size:
+    error_v, scale_v = _local(np.gradient(smooth), lag, window)
+    if error.size == 0:
         return None
-    error_u, scale_u = error_u[: error.size], scale_u[: error.size]
     size = float(np.median(scale[scale > 0.25 * scale.max()]))
-    size_u = float(np.median(scale_u[scale_u > 0.25 * scale_u.max()]))
+    size_v = float(np.median(scale_v[scale_v > 0.25 * scale_v.max()]))
     allowed = min(REPEATS, max(SAME, SCATTER * float(np.median(error[scale > 0.5 * size])) / size))
-    good = (error <= allowed * size) & (error_u <= INCREMENTS_REPEAT * size_u) & (scale > 0.5 * size)
+    good = (error <= allowed * size) & (error_v <= SPEED_REPEATS * size_v) & (scale > 0.5 * size)
     first, length = _longest(good)
     end = first + length - 1 + 2.0 * lag
     if length == 0 or end - first < least:

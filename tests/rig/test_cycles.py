@@ -75,6 +75,15 @@ def test_motion_that_does_not_repeat_has_no_cycles(rng: np.random.Generator) -> 
         assert cycles(TIME, np.sin(2 * np.pi * (0.5 * TIME + rng.uniform(0.1, 1.0) * TIME**2))) is None
 
 
+def test_quick_motion_on_a_slow_wave_is_no_cycle(rng: np.random.Generator) -> None:
+    slow = 0.02 * np.sin(2 * np.pi * 0.3 * TIME)
+    assert cycles(TIME, slow) is not None
+    for _ in range(5):
+        quick = np.gradient(smooth_random(rng, 20_000))[:10_000]
+        # a tenth of the displacement, most of the speed
+        assert cycles(TIME, slow + 0.002 * quick / np.abs(quick).max()) is None
+
+
 def test_less_than_two_cycles_are_none() -> None:
     assert cycles(TIME[:950], np.sin(2 * np.pi * 2.0 * TIME[:950])) is None
     run = cycles(TIME[:1000], np.sin(2 * np.pi * 2.0 * TIME[:1000]))

@@ -310,7 +310,11 @@ def test_a_spike_and_a_tare_are_findings_and_no_refusal(tmp_path: Path) -> None:
     spiked = X.copy()
     spiked[123] += 0.1
     write(tmp_path / "a.csv", lines(CANONICAL | {"displacement_m": spiked}))
-    write(tmp_path / "b.csv", lines(CANONICAL | {"force_N": FORCE - 5000.0}))
+    # Half a cycle more out than back: the tare does negative work over the whole record, the damper does not.
+    half = {name: values[:475] for name, values in (CANONICAL | {"force_N": FORCE - 5000.0}).items()}
+    half["displacement_m"] = half["displacement_m"] + 0.05 * half["time_s"]
+    assert np.trapezoid(half["force_N"], half["displacement_m"]) < 0.0
+    write(tmp_path / "b.csv", lines(half))
     rig = run(tmp_path)
     assert "spikes" in {finding.check for finding in rig.entries[0].findings}
     assert "offset" in {finding.check for finding in rig.entries[1].findings}
