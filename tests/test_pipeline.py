@@ -111,6 +111,15 @@ def test_a_rig_file_that_changes_reruns_everything(bench: Bench) -> None:
     assert "1-rig/a.csv has changed" in bench.said("identify")
 
 
+def test_many_files_that_change_are_counted_and_not_listed(bench: Bench) -> None:
+    bench()
+    for name in ("a", "b"):
+        (bench.config.parent / "data" / f"{name}.csv").write_text("101")
+    bench()
+    assert bench.said("ingest") == "ingest     runs: 2 files of data have changed"
+    assert bench.said("identify") == "identify   runs: 2 files of 1-rig have changed"
+
+
 def test_a_rig_file_more_or_less_is_seen(bench: Bench) -> None:
     bench()
     (bench.config.parent / "data" / "c.csv").write_text("200")

@@ -19,6 +19,8 @@ from pzd.runs import Run, file_hash
 from pzd.schema.errors import FilesError
 from pzd.schema.jsonfile import read_json_list
 
+_WORDS = {"code": "the code", "marks": "what is not to be trusted"}
+"""How a line calls what has a short name."""
 _NAMED = 3
 """How many changes a line names before it only counts them."""
 
@@ -87,18 +89,14 @@ def key_of(inputs: Mapping[str, str]) -> str:
 
 def changes(before: Mapping[str, str], now: Mapping[str, str]) -> str:
     """In words, what a stage depends on that is not as it was."""
-    told = [
-        _told(name, "is new" if name not in before else "is gone" if name not in now else "has changed")
-        for name in dict.fromkeys((*before, *now))
-        if before.get(name) != now.get(name)
-    ]
+    by_place: dict[str, list[str]] = {}
+    for name in dict.fromkeys((*before, *now)):
+        if before.get(name) != now.get(name):
+            change = "is new" if name not in before else "is gone" if name not in now else "has changed"
+            by_place.setdefault(name.rpartition("/")[0] or name, []).append(f"{_WORDS.get(name, name)} {change}")
+    told = [one[0] if len(one) == 1 else f"{len(one)} files of {place} have changed" for place, one in by_place.items()]
     more = len(told) - _NAMED
     return ", ".join(told[:_NAMED]) + (f" and {more} more" if more > 0 else "")
-
-
-def _told(name: str, change: str) -> str:
-    names = {"code": "the code", "marks": "what is not to be trusted"}
-    return f"{names.get(name, name)} {change}"
 
 
 def _hash(value: Any) -> str:
