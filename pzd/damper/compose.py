@@ -55,8 +55,8 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
     ValueError : when the damper needs a voltage or temperature that the motion does not have
     """
     steps = sampling_steps(motion.time)
-    felt = felt_by_valve(damper, motion.voltage, steps)
-    rows = element_rows(damper, felt, motion.temperature)
+    felt = felt_by_valve(damper, standing(motion.voltage), steps)
+    rows = element_rows(damper, felt, standing(motion.temperature))
     beside = parallel_rows(damper, felt)
     force = force_of_rows(rows, beside, motion, steps, initial_force, tolerance)
     return recorded(value_of(damper, "sensor_delay", "tau"), motion.time, force)
@@ -91,6 +91,11 @@ def standing_rows(
     if not any(name in effects for name, _ in COLUMNS):
         return row, None
     return row, np.array([[effects.get(n, {}).get(parameter, _NEUTRAL[n, parameter]) for n, parameter in COLUMNS]])
+
+
+def standing(channel: Array | None) -> Array | None:
+    """(1,) value of a channel that stands still; the channel itself (n,) where it moves, None where it is absent."""
+    return channel if channel is None or np.any(channel != channel[0]) else channel[:1]
 
 
 def sampling_steps(time: Array) -> Array:

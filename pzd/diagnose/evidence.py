@@ -9,17 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.effect import Scales
-from pzd.damper.model import Damper
+from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fitting import Fitted, Problem, simulated
 from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.inputs import Prepared
-from pzd.diagnose.joint import nearest_row
 from pzd.diagnose.judge import Judged, judge
 from pzd.diagnose.observation import Observation, observations
 from pzd.diagnose.predict import predicted_force
 from pzd.diagnose.split import TRAINING, UNTOUCHED, VALIDATION, Split
-from pzd.record import Array, is_constant, voltage_scale
+from pzd.record import Array, voltage_scale
 
 Mask = NDArray[np.bool_]
 
@@ -70,11 +69,11 @@ def evidence_of(prepared: Sequence[Prepared], parts: Split, damper: Damper, conf
     ----------
     prepared : the records, displacement cleaned
     parts : which samples are fitted, which choose, which are untouched
-    damper : plain, fitted to the samples seen
+    damper : plain, where the fits start and along which gain and delay of a test act
     config : priors of the nuisances
     """
     scale = voltage_scale([p.record for p in prepared])
-    places = [nearest_row(damper.base, p) if is_constant(p.record, scale) else -1 for p in prepared]
+    places = [_nearest_row(damper.base, p) if p.constant else -1 for p in prepared]
     forces = [predicted_force(damper, p) for p in prepared]
     seen = tuple(roles != UNTOUCHED for roles in parts.roles)
 
@@ -112,3 +111,10 @@ def _scales(observed: Sequence[Observation], prepared: Sequence[Prepared], dampe
 
 def _of(prepared: Prepared, channel: str) -> Array:
     return np.asarray(getattr(prepared.record, channel))
+
+
+def _nearest_row(rows: Sequence[BaseRow], prepared: Prepared) -> int:
+    """Index of the base row at the temperature and voltage nearest to those of a record."""
+    voltage, temperature = prepared.record.median_voltage() or 0.0, prepared.record.median_temperature() or 0.0
+    away = [(abs((row.temperature_degC or 0.0) - temperature), abs((row.voltage_V or 0.0) - voltage)) for row in rows]
+    return min(range(len(rows)), key=lambda i: (round(away[i][0], 6), away[i][1]))

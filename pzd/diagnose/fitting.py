@@ -164,7 +164,8 @@ def simulated(point: Point, observation: Observation) -> Array:
     """(n,) force at the compared samples of an observation [N]."""
     o, start = observation, float(observation.measured[0])
     if o.place >= 0 and "temperature_drift" not in point.effects:
-        rows, beside = standing_rows(*point.base[o.place], point.effects)
+        friction, damping, stiffness = point.base[o.place]
+        rows, beside = standing_rows(friction, damping, stiffness, point.effects)
         force = force_of_rows(rows, beside, o.motion, o.steps, start, SIMULATION_TOLERANCE)
         tau = point.effects.get("sensor_delay", {}).get("tau", 0.0)
         return o.at_compared(recorded(tau, o.motion.time, force))
@@ -187,10 +188,17 @@ def fit(problem: Problem, effects: Sequence[str], start: Array) -> Fitted:
 
     unknowns = problem.unknowns(effects)
     low, high = _bounds(problem, unknowns)
+
+    def residuals_at(x: Array) -> Array:
+        return np.concatenate(_residuals(problem, unknowns, x)[0])
+
+    def slopes_at(x: Array) -> Array:
+        return _slopes(problem, unknowns, x)
+
     found = least_squares(
-        lambda x: np.concatenate(_residuals(problem, unknowns, x)[0]),
+        residuals_at,
         np.clip(start, low + 1e-9, high - 1e-9),
-        jac=lambda x: _slopes(problem, unknowns, x),
+        jac=slopes_at,
         bounds=(low, high),
         x_scale="jac",
         ftol=1e-6,
@@ -199,14 +207,15 @@ def fit(problem: Problem, effects: Sequence[str], start: Array) -> Fitted:
         max_nfev=MOST_EVALUATIONS,
     )
     residuals, forces = _residuals(problem, unknowns, found.x)
+    slopes = np.asarray(found.jac, dtype=np.float64)
     return Fitted(
         problem.point(found.x, unknowns).damper(),
         tuple(effects),
         found.x,
         tuple(residuals),
         tuple(forces),
-        np.asarray(found.jac),
-        _covariance(found.jac, found.x, unknowns),
+        slopes,
+        _covariance(slopes, found.x, unknowns),
         unknowns,
     )
 
@@ -214,7 +223,7 @@ def fit(problem: Problem, effects: Sequence[str], start: Array) -> Fitted:
 def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
     """Base rows within a ratio of where they start: far from there lie only stiff or dead dampers."""
     start = problem.start().reshape(-1, 3)
-    low, high = start + [-np.inf, -WIDEST, -WIDEST], start + [np.inf, WIDEST, WIDEST]
+    low, high = start - WIDEST, start + WIDEST
     low[:, 0], high[:, 0] = 0.0, 2.0
     limits = [u.bounds for u in unknowns]
     return (

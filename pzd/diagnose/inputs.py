@@ -43,6 +43,8 @@ class Prepared:
     """The run of cycles, where motion and voltage both repeat."""
     lead: Record | None
     """The same motion for one cycle more in front, for the simulation to settle."""
+    constant: bool
+    """Whether the voltage stands still."""
 
     @property
     def lead_samples(self) -> int:
@@ -59,16 +61,16 @@ def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
 def _prepared(record: Record, constant: bool) -> Prepared:
     run = cycles(record.time, record.displacement)
     if run is None or run.count * run.period < COVERS * (record.time[-1] - record.time[0]):
-        return Prepared(_smoothed(record), None, None)
+        return Prepared(_smoothed(record), None, None, constant)
     inside = run.inside(record.time)
     motion = _mean_motion(record, run)
     kept = sliced(record, inside)
     cleaned = _moved(kept, motion(kept.time))
     if not constant:
-        return Prepared(cleaned, None, None)
+        return Prepared(cleaned, None, None, constant)
     step = 1.0 / record.rate
     early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
-    return Prepared(cleaned, run, _led_in(cleaned, early, motion(early)))
+    return Prepared(cleaned, run, _led_in(cleaned, early, motion(early)), constant)
 
 
 def sliced(record: Record, kept: NDArray[np.bool_]) -> Record:

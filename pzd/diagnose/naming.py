@@ -1,4 +1,4 @@
-"""From candidates to adopted effects: forward, one after another, as long as the data support the next by themselves."""
+"""From candidates to adopted effects: one after another, as long as the data support the next by themselves."""
 
 from __future__ import annotations
 
@@ -92,12 +92,12 @@ def _first_supported(
     evidence: Evidence, config: DiagnoseConfig, before: Fitted, tried: Sequence[Candidate], reasons: dict[str, str]
 ) -> Candidate | None:
     """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""
-    for candidate in tried:
-        reason = _unsupported(evidence, config, before, candidate)
+    for each in tried:
+        reason = _unsupported(evidence, config, before, each)
         if reason is None:
-            return candidate
-        reasons[candidate.effect] = reason
-        if candidate.delta_bic > config.adopt_bic:
+            return each
+        reasons[each.effect] = reason
+        if each.delta_bic > config.adopt_bic:
             break
     return None
 

@@ -125,7 +125,8 @@ def _motion(
         signal = np.where((STEPS_HZ * phase) % 2.0 < 1.0, voltage[0], voltage[1])
     elif voltage is not None:
         signal = np.full(time.size, voltage)
-    return Motion(time, *channels, signal, None if temperature is None else np.full(time.size, temperature))
+    warmth = None if temperature is None else np.full(time.size, temperature)
+    return Motion(time, channels[0], channels[1], channels[2], signal, warmth)
 
 
 def _sine(phase: Array) -> Array:

@@ -9,7 +9,7 @@ that is left counts as it should: |r|^2 is minus twice the logarithm of the like
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,10 +19,11 @@ from pzd.damper.compose import sampling_steps
 from pzd.damper.motion import Motion
 from pzd.diagnose.autoregression import Autoregression
 from pzd.diagnose.config import NuisanceConfig
-from pzd.diagnose.inputs import Prepared
+from pzd.diagnose.inputs import Prepared, sliced
 from pzd.diagnose.noise import PureError, pure_error
+from pzd.diagnose.predict import motion_of
 from pzd.diagnose.rich import rich_fit
-from pzd.identify.trial import fine_motion, trial_of, warm_up
+from pzd.identify.trial import warm_up
 from pzd.record import Array, Record
 
 RESOLUTION = 3e-4
@@ -145,14 +146,17 @@ def _kinematics(record: Record) -> tuple[Array, Array, Array]:
 def _cycle_motion(record: Record, period: float, points: int, channels: Sequence[Array]) -> tuple[Motion, int, int]:
     """Two cycles of the mean motion, the first to settle in, on a grid fine enough to simulate."""
     factor = int(np.ceil(CYCLE_POINTS / points))
-    fine = [_refined(channel, factor) for channel in channels]
+    fine: list[Array] = [_refined(channel, factor) for channel in channels]
     count = points * factor
     time = period / count * np.arange(2 * count)
     temperature = record.median_temperature()
     voltage = record.median_voltage()
+    displacement, velocity, acceleration = (np.concatenate([channel, channel]) for channel in fine)
     motion = Motion(
         time,
-        *(np.tile(channel, 2) for channel in fine),
+        displacement,
+        velocity,
+        acceleration,
         None if voltage is None else np.full(2 * count, voltage),
         None if temperature is None else np.full(2 * count, temperature),
     )
@@ -162,7 +166,7 @@ def _cycle_motion(record: Record, period: float, points: int, channels: Sequence
 def _refined(cycle: Array, factor: int) -> Array:
     """A periodic channel on `factor` times as many points, by its own harmonics."""
     spectrum = np.fft.rfft(cycle)
-    return np.asarray(np.fft.irfft(spectrum, cycle.size * factor) * factor)
+    return np.asarray(np.fft.irfft(spectrum, cycle.size * factor) * factor, dtype=np.float64)
 
 
 def _of_samples(
@@ -177,7 +181,7 @@ def _of_samples(
     peak = float(np.max(np.abs(record.force[start:stop])))
     floor = (RESOLUTION * peak) ** 2
     noise = Autoregression(noise.coefficients, max(noise.innovation, floor))
-    motion, factor = fine_motion(record), trial_of(record).factor
+    motion, factor = motion_of(record, constant=p.constant)
     bare = Observation(
         record.name,
         place,
@@ -195,8 +199,6 @@ def _of_samples(
 
 
 def _part(record: Record, start: int, stop: int) -> Record:
-    from pzd.diagnose.inputs import sliced
-
     kept = np.zeros(record.time.size, dtype=np.bool_)
     kept[start:stop] = True
     return sliced(record, kept)
@@ -208,8 +210,6 @@ def with_nuisances(bare: Observation, force: Array, nuisance: NuisanceConfig, ra
     Equation: r' = (I + V V')^(-1/2) r, V = [s_o peak, s_g F, -s_d dF/dt] in units of noise
                                                     Source: Gaussian prior, marginal likelihood
     """
-    from dataclasses import replace
-
     columns = np.column_stack(
         [
             np.full(force.size, nuisance.offset * bare.peak),

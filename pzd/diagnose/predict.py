@@ -1,23 +1,25 @@
-"""What a damper predicts for a record, and the plain damper refitted to some of the samples."""
+"""What a damper predicts for a record."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.artefacts import Identified, Rig, base_of
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
 from pzd.diagnose.inputs import Prepared
-from pzd.diagnose.split import stretches
-from pzd.identify.config import IdentifyConfig
-from pzd.identify.stage import identify as fit
-from pzd.identify.trial import fine_motion, trial_of, warm_up
-from pzd.record import Record
+from pzd.identify.trial import fine_motion, reversals, trial_of, warm_up
+from pzd.record import SAME_TEMPERATURE, Record
 
 Array = NDArray[np.float64]
+
+FEWEST_IN_HALF_CYCLE = 50
+"""Samples of the fastest half cycle from which a parabola between them is exact enough: 1e-5 of the force."""
+PREDICTION_TOLERANCE = 1e-7
+"""Of the damper's path, as a share of the force."""
 
 ENDS = 0.02
 """Share of a record at either end where its smoothed displacement rests on one side alone: not judged."""
@@ -26,8 +28,38 @@ ENDS = 0.02
 def predicted_force(damper: Damper, prepared: Prepared) -> Array:
     """(n,) force that the damper gives under the record's cleaned motion [N]."""
     record = prepared.lead or prepared.record
-    force = respond(damper, fine_motion(record), float(record.force[0]))
-    return trial_of(record).at_samples(force)[prepared.lead_samples :]
+    motion, stride = motion_of(record, constant=prepared.constant)
+    force = respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)
+    return force[::stride][prepared.lead_samples :]
+
+
+def motion_of(record: Record, *, constant: bool) -> tuple[Motion, int]:
+    """The record's motion, on a finer grid where its samples are too far apart for a parabola between them.
+
+    Parameters
+    ----------
+    record : displacement cleaned
+    constant : whether the voltage counts as standing still, at its median; so does a temperature within 2 K
+
+    Returns
+    -------
+    the motion, and how many of its samples make one of the record
+    """
+    half_cycle = min(np.diff(reversals(record.displacement)), default=record.displacement.size)
+    stride = 1
+    if half_cycle < FEWEST_IN_HALF_CYCLE:
+        stride, motion = trial_of(record).factor, fine_motion(record)
+    else:
+        motion = Motion.of(record)
+    if constant:
+        motion = replace(motion, voltage=_held(motion.voltage))
+    if motion.temperature is not None and np.ptp(motion.temperature) <= SAME_TEMPERATURE:
+        motion = replace(motion, temperature=_held(motion.temperature))
+    return motion, stride
+
+
+def _held(channel: Array | None) -> Array | None:
+    return None if channel is None else np.full(channel.size, np.median(channel))
 
 
 def counted(prepared: Prepared) -> NDArray[np.bool_]:
@@ -38,34 +70,3 @@ def counted(prepared: Prepared) -> NDArray[np.bool_]:
     ends = int(ENDS * size)
     order = np.arange(size)
     return (order >= max(warm_up(prepared.record.displacement), ends)) & (order < size - ends)
-
-
-def refitted(
-    config: IdentifyConfig,
-    prepared: Sequence[Prepared],
-    wanted: Sequence[NDArray[np.bool_]],
-    identified: Identified,
-    setting: str | None,
-) -> Damper:
-    """The plain damper fitted to the wanted samples alone, on the conditions and nodes that identify found.
-
-    Parameters
-    ----------
-    config : of identify; the search is `separable` whatever it says, since both find the same optimum
-    prepared : the records of the setting
-    wanted : (n,) mask of each record
-    identified : for the nodes of moving voltages
-    setting : of the records
-
-    Returns
-    -------
-    the damper; the identified one where no stretch is long enough to be fitted
-    """
-    records: list[Record] = []
-    for p, mask in zip(prepared, wanted, strict=True):
-        records += stretches(p.record, mask)
-    if not records:
-        return base_of(identified.rows, setting)
-    nodes = sorted({r.voltage_V for r in identified.rows if r.setting == setting and r.voltage_V is not None})
-    fixed = config.model_copy(update={"method": "separable", "nodes": tuple(nodes) or None})
-    return base_of(fit(fixed, Rig(tuple(records), ()), 1).rows, setting)

@@ -1,4 +1,4 @@
-"""The diagnose stage: where simulation and measurement disagree, what is missing, and how far adding it shrinks the gap."""
+"""The diagnose stage: where simulation and measurement disagree, and what is missing."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def diagnose(
     Parameters
     ----------
     diagnose : the config's block
-    identify : that of identify, for refitting the base to the samples seen
+    identify : that of identify, for what counts as one condition
     stand : that of the rig, for what the stand can do
     rig : the records
     identified : the Bingham parameters
@@ -43,27 +43,22 @@ def diagnose(
     from pzd.diagnose.evidence import evidence_of
     from pzd.diagnose.heldout import held_out_gap
     from pzd.diagnose.inputs import prepare
-    from pzd.diagnose.joint import with_nuisances
     from pzd.diagnose.naming import name_effects
     from pzd.diagnose.next_test import next_test, reach_of
-    from pzd.diagnose.predict import refitted
-    from pzd.diagnose.split import UNTOUCHED, split
+    from pzd.diagnose.split import split
     from pzd.diagnose.verdict import decide, parameters_of, ranking_of
     from pzd.diagnose.where import regions
 
     prepared = prepare([record for record in rig.records if record.setting == setting])
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
-    seen = [roles != UNTOUCHED for roles in parts.roles]
-    plain = refitted(identify, prepared, seen, identified, setting)
-    plain = with_nuisances(plain, prepared, seen, diagnose.nuisance)
+    plain = base_of(identified.rows, setting)
     evidence = evidence_of(prepared, parts, plain, diagnose)
     named = name_effects(evidence, diagnose, jobs)
     before = evidence.judged(named.plain.damper, diagnose)
     after = evidence.judged(named.fitted.damper, diagnose) if named.adopted else before
     decision = decide(named, before, after, diagnose)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
-    identified_damper = base_of(identified.rows, setting)
-    voltages = [row.voltage_V for row in identified_damper.base if row.voltage_V is not None]
+    voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
     told = Diagnosis(
         verdict=decision.verdict,
         reason=decision.reason,
@@ -78,4 +73,4 @@ def diagnose(
             named.rivalling, reach_of(stand.limits, evidence.whole.scales, voltages), evidence.whole.reference
         ),
     )
-    return Diagnosed(told, named.fitted.damper if named.adopted else identified_damper, identified_damper)
+    return Diagnosed(told, named.fitted.damper if named.adopted else plain, plain)
