@@ -42,8 +42,18 @@ from pzd.simulate.scene import (
     VALVE,
     VALVE_WORK,
     Scene,
+    Vehicle,
 )
 from pzd.simulate.sticking import accelerate
+
+
+@laid_in
+def body_acceleration(car: Vehicle, load0: float, load1: float) -> tuple[float, float]:
+    """Acceleration of z [m/s2] and phi [rad/s2] under the forces S + T of the axles [N].
+
+    Equation: M d2X/dt2 + H (S + T) = 0              Source: Makowski and Knap 2021, eq. (6)
+    """
+    return -(load0 + load1) / car.mass, -(car.arms[0] * load0 + car.arms[1] * load1) / car.inertia
 
 
 @compiled
@@ -74,9 +84,7 @@ def dynamic_forces(time: float, y: Array, scene: Scene, control: Array, desk: Ar
 
 @compiled
 def motion(time: float, y: Array, scene: Scene, control: Array, desk: Array, dy: Array) -> None:
-    """Fill `dy` with the derivative of the state.
-
-    Equation: M d2X/dt2 + H (S + T) = 0, S_i = k_i U_i       Source: Makowski and Knap 2021, eq. (6)
+    """Fill `dy` with the derivative of the state: eq. (6) of Makowski and Knap 2021, S_i = k_i U_i.
 
     Parameters
     ----------
@@ -93,8 +101,7 @@ def motion(time: float, y: Array, scene: Scene, control: Array, desk: Array, dy:
         _try_sides(time, y, scene, control, desk)
     _act(time, y, scene, control, desk)
     load0, load1 = desk[SPRINGS, 0] + desk[FORCE, 0], desk[SPRINGS, 1] + desk[FORCE, 1]
-    desk[BODY, 0] = -(load0 + load1) / car.mass
-    desk[BODY, 1] = -(car.arms[0] * load0 + car.arms[1] * load1) / car.inertia
+    desk[BODY, 0], desk[BODY, 1] = body_acceleration(car, load0, load1)
     desk[COMFORT, 0] = car.comfort[0] * load0 + car.comfort[1] * load1
     dy[HEAVE], dy[PITCH] = y[HEAVE_RATE], y[PITCH_RATE]
     dy[HEAVE_RATE], dy[PITCH_RATE] = desk[BODY, 0], desk[BODY, 1]

@@ -1,0 +1,231 @@
+"""The cars that section 5 of the paper may have ridden: it leaves a1, a2, J_y and x_K out.
+
+A plausible car has a wheelbase of 2.2 to 3.6 m, its centre of gravity 30 to 70 % behind axle 1,
+J_y / (m a1 a2) of 0.7 to 1.3 and K between the axles. The two peaks with constant c of Figure 19 leave a
+surface of such cars, over which the two controlled peaks vary widely. Nor does equation (12) say
+which of many minimisers is taken, so each of the three tie-breaks has its own closest car.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from importlib.resources import as_file, files
+from typing import Literal
+
+import numpy as np
+
+from pzd.paper.steady_ride import STEP, settled_peak
+from pzd.quantities import Control
+from pzd.record import Array
+from pzd.schema.csvfile import read_rows
+from pzd.schema.model import Frozen
+from pzd.simulate.car import HalfCar
+from pzd.simulate.linear import harmonic_response
+from pzd.simulate.minimise import TieBreak
+
+FREQUENCIES = (2.25, 4.5)
+"""Of Figure 19a and 19b [Hz]."""
+CONSTANT_PEAKS = (2.2, 3.6)
+CONTROLLED_PEAKS = (0.75, 1.05)
+"""Largest |a_K| that Figure 19 prints [m/s2]; published.csv, F19."""
+MASS, STIFFNESS, DAMPING, BOUNDS = 1200.0, 47500.0, 4500.0, (750.0, 45000.0)
+AMPLITUDE, SPEED = 0.02, 25.0
+"""Inputs of section 5 in SI; published.csv, IN. 90 km/h is 25 m/s."""
+WHEELBASES, SHARES, INERTIAS = (2.2, 3.6), (0.3, 0.7), (0.7, 1.3)
+"""What is plausible: a1 + a2 [m], a1 / (a1 + a2), J_y / (m a1 a2)."""
+TOLERANCE = 0.05
+"""How closely a car must meet the two peaks with constant c."""
+_IMPLAUSIBLE = 10.0
+"""What a car outside of these ranges costs the refinement."""
+_ROUNDING = 1e-3
+"""How far rounding may carry a car of the grid beyond what is plausible, as a share."""
+
+Two = tuple[float, float]
+Found = Literal["survey", "refined"]
+
+
+class CarRow(Frozen):
+    """One car and one tie-break; a and b are 2.25 and 4.5 Hz, low and high the spread when a parameter moves by 1 %."""
+
+    a1_m: float
+    a2_m: float
+    pitch_inertia_kgm2: float
+    x_K_m: float
+    tie_break: TieBreak
+    found: Found
+    """Whether it stands on the grid of the survey or was refined from there."""
+    constant_a_m_per_s2: float
+    constant_b_m_per_s2: float
+    controlled_a_m_per_s2: float
+    controlled_a_low_m_per_s2: float
+    controlled_a_high_m_per_s2: float
+    controlled_b_m_per_s2: float
+    controlled_b_low_m_per_s2: float
+    controlled_b_high_m_per_s2: float
+
+    @property
+    def car(self) -> HalfCar:
+        """The car with the paper's mass and springs."""
+        return half_car(self.a1_m, self.a2_m, self.pitch_inertia_kgm2, self.x_K_m)
+
+    @property
+    def constant(self) -> Two:
+        """Peaks with constant c [m/s2]."""
+        return self.constant_a_m_per_s2, self.constant_b_m_per_s2
+
+    @property
+    def controlled(self) -> Two:
+        """Controlled peaks [m/s2]."""
+        return self.controlled_a_m_per_s2, self.controlled_b_m_per_s2
+
+    @property
+    def miss(self) -> float:
+        """How far the worst of all four peaks is from the paper's, as a share of it."""
+        return miss(self.constant, self.controlled)
+
+
+def half_car(a1: float, a2: float, inertia: float, comfort_point: float) -> HalfCar:
+    """The paper's body on its springs, with what the paper leaves out: a1, a2 [m], J_y [kg m2], x_K [m]."""
+    return HalfCar("plausible", MASS, inertia, (a1, a2), (STIFFNESS, STIFFNESS), comfort_point)
+
+
+def plausible(car: HalfCar) -> bool:
+    """Whether proportions are those of a car and K lies between its axles."""
+    a1, a2 = car.distances
+    shares = (a1 / car.wheelbase, car.pitch_inertia / (car.mass * a1 * a2), car.wheelbase)
+    ranges = (SHARES, INERTIAS, WHEELBASES)
+    inside = all(
+        low * (1.0 - _ROUNDING) <= value <= high * (1.0 + _ROUNDING)
+        for value, (low, high) in zip(shares, ranges, strict=True)
+    )
+    return inside and -a1 <= car.comfort_point <= a2
+
+
+def constant_peaks(car: HalfCar, damping: float = DAMPING) -> Two:
+    """Largest |a_K| with constant damping at 2.25 and 4.5 Hz, exactly [m/s2]."""
+    a, b = (abs(harmonic_response(car, damping, f, AMPLITUDE, SPEED)[1]) for f in FREQUENCIES)
+    return a, b
+
+
+def controlled_peaks(car: HalfCar, tie_break: TieBreak, step: float = STEP) -> Two:
+    """Largest |a_K| under the paper's control at 2.25 and 4.5 Hz, forces ideal within `BOUNDS` [m/s2]."""
+    a, b = (settled_peak(car, tie_break, f, AMPLITUDE, SPEED, BOUNDS, step) for f in FREQUENCIES)
+    return a, b
+
+
+def miss(constant: Two, controlled: Two) -> float:
+    """How far the worst of the four peaks of Figure 19 is missed, as a share of the paper's."""
+    wanted = (*CONSTANT_PEAKS, *CONTROLLED_PEAKS)
+    return max(abs(found / target - 1.0) for found, target in zip((*constant, *controlled), wanted, strict=True))
+
+
+def meets_constant(peaks: Two, tolerance: float = TOLERANCE) -> bool:
+    """Whether both peaks with constant c are the paper's within a share."""
+    return all(abs(found / target - 1.0) <= tolerance for found, target in zip(peaks, CONSTANT_PEAKS, strict=True))
+
+
+def candidates() -> Iterator[HalfCar]:
+    """The plausible cars of a grid that meet both peaks with constant c within `TOLERANCE`.
+
+    a_K is affine in x_K, so two places of K give it at all of them.
+    """
+    for wheelbase in np.arange(2.2, 3.61, 0.1):
+        for share in np.arange(0.3, 0.71, 0.05):
+            for ratio in np.arange(0.7, 1.31, 0.1):
+                a1 = float(round(share * wheelbase, 3))
+                a2 = float(round(wheelbase - a1, 3))
+                car = half_car(a1, a2, float(round(ratio * MASS * a1 * a2, 1)), 0.0)
+                yield from _meeting(car, np.round(np.linspace(-a1, a2, 51), 3))
+
+
+def _meeting(car: HalfCar, places: Array) -> Iterator[HalfCar]:
+    at_centre, at_metre = (
+        [harmonic_response(replace(car, comfort_point=x), DAMPING, f, AMPLITUDE, SPEED)[1] for f in FREQUENCIES]
+        for x in (0.0, 1.0)
+    )
+    peaks = [np.abs(zero + places * (one - zero)) for zero, one in zip(at_centre, at_metre, strict=True)]
+    for x, a, b in zip(places, *peaks, strict=True):
+        found = replace(car, comfort_point=float(x))
+        if meets_constant((float(a), float(b))) and plausible(found):
+            yield found
+
+
+def neighbours(car: HalfCar, share: float = 0.01) -> Iterator[HalfCar]:
+    """The car with each of a1, a2, J_y and x_K moved by a share, down and up."""
+    a1, a2 = car.distances
+    for factor in (1.0 - share, 1.0 + share):
+        yield replace(car, distances=(a1 * factor, a2))
+        yield replace(car, distances=(a1, a2 * factor))
+        yield replace(car, pitch_inertia=car.pitch_inertia * factor)
+        yield replace(car, comfort_point=car.comfort_point * factor)
+
+
+def judged(car: HalfCar, tie_break: TieBreak, found: Found = "survey") -> CarRow:
+    """The peaks of one car under one tie-break, and their spread when each parameter moves by 1 %."""
+    constant, controlled = constant_peaks(car), controlled_peaks(car, tie_break)
+    spread = np.array([controlled, *(controlled_peaks(other, tie_break) for other in neighbours(car))])
+    low, high = spread.min(axis=0), spread.max(axis=0)
+    return CarRow(
+        a1_m=car.distances[0],
+        a2_m=car.distances[1],
+        pitch_inertia_kgm2=car.pitch_inertia,
+        x_K_m=car.comfort_point,
+        tie_break=tie_break,
+        found=found,
+        constant_a_m_per_s2=_rounded(constant[0]),
+        constant_b_m_per_s2=_rounded(constant[1]),
+        controlled_a_m_per_s2=_rounded(controlled[0]),
+        controlled_a_low_m_per_s2=_rounded(low[0]),
+        controlled_a_high_m_per_s2=_rounded(high[0]),
+        controlled_b_m_per_s2=_rounded(controlled[1]),
+        controlled_b_low_m_per_s2=_rounded(low[1]),
+        controlled_b_high_m_per_s2=_rounded(high[1]),
+    )
+
+
+def _rounded(peak: float) -> float:
+    return float(round(peak, 4))
+
+
+def refined(start: HalfCar, tie_break: TieBreak) -> HalfCar:
+    """The plausible car near another whose four peaks are closest to the paper's: seconds.
+
+    Source: Nelder and Mead 1965, on the largest of the four misses
+
+    Parameters
+    ----------
+    start : a plausible car
+    tie_break : which of many minimisers
+
+    Returns
+    -------
+    the car, to the millimetre and the kg m2
+    """
+    from scipy.optimize import minimize
+
+    scale = np.array([1.0, 1.0, 1000.0, 1.0])
+
+    def car_at(x: Array) -> HalfCar:
+        a1, a2, inertia, place = (float(value) for value in x * scale)
+        return half_car(round(a1, 3), round(a2, 3), round(inertia, 0), round(place, 3))
+
+    def cost(x: Array) -> float:
+        car = car_at(x)
+        return miss(constant_peaks(car), controlled_peaks(car, tie_break)) if plausible(car) else _IMPLAUSIBLE
+
+    first = np.array([*start.distances, start.pitch_inertia, start.comfort_point]) / scale
+    simplex = first * (1.0 + 0.03 * np.vstack([np.zeros(4), np.eye(4)]))
+    options = {"initial_simplex": simplex, "maxfev": 160, "xatol": 1e-4, "fatol": 1e-4}
+    return car_at(minimize(cost, first, method="Nelder-Mead", options=options).x)
+
+
+def stored() -> tuple[CarRow, ...]:
+    """The survey as it was computed last; `tests/studies/car_search.py` computes it anew."""
+    with as_file(files("pzd.paper").joinpath("cars.csv")) as path:
+        return read_rows(path, CarRow, Control())
+
+
+def closest(rows: Iterable[CarRow], tie_break: TieBreak | None = None) -> CarRow:
+    """The row whose worst peak is closest to the paper's, of one tie-break or of all."""
+    return min((row for row in rows if tie_break in (None, row.tie_break)), key=lambda row: row.miss)
