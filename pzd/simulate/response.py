@@ -55,7 +55,8 @@ def responses(config: SimulateConfig, damper: Damper, temperature: float | None)
 
 
 def _step(damper: Damper, before: float, after: float, speed: float, temperature: float | None) -> list[Response]:
-    time = np.arange(-_BEFORE, _AFTER, _STEP)
+    count = np.arange(-round(_BEFORE / _STEP), round(_AFTER / _STEP), dtype=np.float64)
+    time: Array = _STEP * (count + 0.5)  # the ramp of one step is at 0
     voltage = np.where(time < 0.0, before, after)
     still = np.zeros_like(time)
     warmth = None if temperature is None else np.full_like(time, temperature)

@@ -1,0 +1,68 @@
+"""Rides with as little as a test needs to say."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from simulate_dampers import damper_after_table_2, table_of
+
+from pzd.artefacts import Table
+from pzd.damper.model import Damper
+from pzd.simulate.config import SimulateConfig
+from pzd.simulate.dampers import grid_of, oil_of
+from pzd.simulate.outcome import Outcome
+from pzd.simulate.plan import Case
+from pzd.simulate.policies import policies
+from pzd.simulate.riding import ride_case
+from pzd.simulate.road import Way
+
+
+@pytest.fixture(scope="session")
+def damper() -> Damper:
+    return damper_after_table_2()
+
+
+@pytest.fixture(scope="session")
+def table(damper: Damper) -> Table:
+    return table_of(damper)
+
+
+Rider = Callable[..., Outcome]
+
+
+@pytest.fixture(scope="session")
+def ride(damper: Damper, table: Table) -> Rider:
+    """Ride one case; `generic` takes constant damping through the generic integrator."""
+
+    def go(
+        policy: str = "comfort",
+        fidelity: str = "ideal",
+        road: int = 0,
+        on: Damper = damper,
+        with_table: Table = table,
+        generic: bool = False,
+        **given: object,
+    ) -> Outcome:
+        config = SimulateConfig.model_validate_json(json.dumps(given))
+        case = Case(config.roads[road], policies()[policy], fidelity, plain=False)
+        speed = config.vehicle_speed_km_per_h / 3.6
+        profile = case.road.profile(Way(speed, speed * config.duration_s, 1, Path()))
+        if generic:
+            profile = replace(profile, coefficients=np.zeros((1, 4)))  # a level spline beside the sine
+        grid, oil = grid_of(with_table, None), oil_of(on, 22.0, config.valve_response_s)
+        return ride_case(config, case, profile, grid, oil, with_table.notes.outside == "error")
+
+    return go
+
+
+@pytest.fixture(scope="session")
+def published(shared: Path) -> dict[str, float]:
+    """Published numbers by id."""
+    with (shared / "paper" / "published.csv").open(encoding="utf-8", newline="") as file:
+        return {row["id"]: float(row["value"]) for row in csv.DictReader(file) if row["kind"] != "claim"}

@@ -1,0 +1,93 @@
+"""Equation (12): the minimiser over the box, and which of its many points a tie-break takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from pzd.record import Array
+from pzd.simulate.minimise import TIE_BREAKS, least_acceleration
+
+
+def draws(seed: int, n: int) -> Iterator[tuple[float, Array, Array, Array]]:
+    """Boxes as suspensions give them (both forces of one sign per axle) and boxes of any kind."""
+    random = np.random.default_rng(seed)
+    for i in range(n):
+        D = random.normal(size=2) / 600.0
+        v = random.normal(size=2) * 0.3
+        ends = np.stack([750.0 * v, 45000.0 * v]) if i % 2 else random.normal(size=(2, 2)) * 3000.0
+        yield random.normal() * 3.0, D, ends.min(axis=0), ends.max(axis=0)
+
+
+@pytest.mark.parametrize("tie_break", TIE_BREAKS)
+def test_no_force_in_the_box_makes_less_acceleration(fresh_seeds, tie_break) -> None:
+    for a0, D, low, high in draws(fresh_seeds(1)[0], 600):
+        forces = least_acceleration(a0, D, low, high, tie_break)
+        assert np.all(forces >= low - 1e-9)
+        assert np.all(forces <= high + 1e-9)
+        grid = np.meshgrid(*[np.linspace(a, b, 61) for a, b in zip(low, high, strict=True)], indexing="ij")
+        brute = np.min(np.abs(a0 + D[0] * grid[0] + D[1] * grid[1]))
+        assert abs(a0 + D @ forces) <= brute + 1e-12
+
+
+def test_tie_breaks_differ_in_the_forces_and_not_in_the_acceleration(fresh_seeds) -> None:
+    apart = 0
+    for a0, D, low, high in draws(fresh_seeds(1)[0], 600):
+        found = {name: least_acceleration(a0, D, low, high, name) for name in TIE_BREAKS}
+        accelerations = [abs(a0 + D @ forces) for forces in found.values()]
+        assert np.ptp(accelerations) < 1e-12
+        norms = {name: np.linalg.norm(forces) for name, forces in found.items()}
+        assert norms["smallest"] <= norms["equal_share"] + 1e-9
+        assert norms["equal_share"] <= norms["largest"] + 1e-9
+        apart += norms["largest"] > norms["smallest"] + 1.0
+    assert apart > 20
+
+
+def test_smallest_and_largest_are_so_among_all_that_reach_the_minimum(fresh_seeds) -> None:
+    for a0, D, low, high in draws(fresh_seeds(1)[0], 300):
+        smallest, largest = (least_acceleration(a0, D, low, high, name) for name in ("smallest", "largest"))
+        if abs(a0 + D @ smallest) > 1e-12:
+            continue
+        first = np.linspace(low[0], high[0], 2001)
+        second = (-a0 - D[0] * first) / D[1]
+        within = (second >= low[1]) & (second <= high[1])
+        norms = np.hypot(first, second)[within]
+        if norms.size:
+            assert np.linalg.norm(smallest) <= norms.min() + 1e-6
+            assert np.linalg.norm(largest) >= norms.max() - 1e-6
+
+
+def test_equal_share_is_the_same_share_of_both_ranges(fresh_seeds) -> None:
+    for a0, D, low, high in draws(fresh_seeds(1)[0], 300):
+        forces = least_acceleration(a0, D, low, high, "equal_share")
+        start, end = np.where(D >= 0.0, low, high), np.where(D >= 0.0, high, low)
+        shares = (forces - start) / (end - start)
+        assert shares[0] == pytest.approx(shares[1], abs=1e-9)
+
+
+@pytest.mark.parametrize("tie_break", ["smallest", "equal_share"])
+def test_the_law_is_continuous_in_speed_and_spring_force(fresh_seeds, tie_break) -> None:
+    random = np.random.default_rng(fresh_seeds(1)[0])
+    for _ in range(300):
+        D = random.normal(size=2) / 600.0
+
+        def law(v: Array, a0: float, D: Array = D) -> Array:
+            ends = np.stack([750.0 * v, 45000.0 * v])
+            return least_acceleration(a0, D, ends.min(axis=0), ends.max(axis=0), tie_break)
+
+        v, a0 = random.normal(size=2) * 0.2, random.normal()
+        step = 1e-7 * random.normal(size=3)
+        jump = law(v + step[:2], a0 + step[2]) - law(v, a0)
+        assert np.max(np.abs(jump)) < 1.0
+
+
+def test_a_damper_without_leverage_on_the_point_is_left_to_the_tie_break() -> None:
+    low, high = np.array([-100.0, 50.0]), np.array([400.0, 300.0])
+    for name in TIE_BREAKS:
+        forces = least_acceleration(-0.1, np.array([0.0, 1e-3]), low, high, name)
+        assert forces[1] == pytest.approx(100.0)
+        assert low[0] <= forces[0] <= high[0]
+    assert least_acceleration(-0.1, np.array([0.0, 1e-3]), low, high, "smallest")[0] == 0.0
+    assert least_acceleration(-0.1, np.array([0.0, 1e-3]), low, high, "largest")[0] == 400.0

@@ -1,0 +1,117 @@
+"""Roads: what the car meets, its derivatives, names, and files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from pzd.rig.roads import classes
+from pzd.schema.errors import DataError, FilesError
+from pzd.simulate.config import SimulateConfig
+from pzd.simulate.kinematics import road_at
+from pzd.simulate.profile import through
+from pzd.simulate.road import Way
+from pzd.simulate.roads import roads
+from pzd.simulate.scene import ground
+
+WAY = Way(25.0, 400.0, 1, Path())
+SAMPLES = {
+    "sine": {"frequency_Hz": 2.25},
+    "bump": {},
+    "step": {},
+    "iso8608": {},
+}
+
+
+def read(*blocks: dict[str, object]) -> SimulateConfig:
+    return SimulateConfig.model_validate_json(json.dumps({"roads": blocks}))
+
+
+def test_every_file_in_the_folder_is_a_road() -> None:
+    assert set(roads()) == {*SAMPLES, "file"}
+
+
+@pytest.mark.parametrize("kind", SAMPLES)
+def test_slope_and_curvature_are_the_derivatives_of_the_height(kind, fresh_seeds) -> None:
+    profile = read({"kind": kind, **SAMPLES[kind]}).roads[0].profile(WAY)
+    numbers = ground(profile, 2.9)
+    h = 1e-5
+    for s in np.random.default_rng(fresh_seeds(1)[0]).uniform(0.5, 30.0, 50):
+        (low, *_), (height, slope, curvature), (high, *_) = (road_at(numbers, s + d) for d in (-h, 0.0, h))
+        scale = max(abs(slope), 1e-3)
+        assert slope == pytest.approx((high - low) / (2.0 * h), abs=1e-5 * scale + 1e-9)
+        assert curvature == pytest.approx((high - 2.0 * height + low) / h**2, abs=2e-3 * max(abs(curvature), 0.1))
+        assert height == pytest.approx(profile.height(np.array([s]))[0], abs=1e-12)
+
+
+def test_a_sine_has_the_frequency_that_the_car_feels() -> None:
+    profile = read({"kind": "sine", "frequency_Hz": 4.5, "amplitude_m": 0.01}).roads[0].profile(WAY)
+    time = np.linspace(0.0, 1.0, 1000)
+    assert profile.height(25.0 * time) == pytest.approx(0.01 * np.sin(2.0 * np.pi * 4.5 * time), abs=1e-12)
+
+
+def test_a_bump_and_a_step_reach_their_heights() -> None:
+    bump, step = (read({"kind": kind, "height_m": 0.03}).roads[0].profile(WAY) for kind in ("bump", "step"))
+    assert bump.height(np.array([0.0, 9.9, 11.0, 12.1, 50.0])) == pytest.approx([0.0, 0.0, 0.03, 0.0, 0.0], abs=1e-6)
+    assert step.height(np.array([0.0, 9.9, 10.5, 11.1, 50.0])) == pytest.approx([0.0, 0.0, 0.015, 0.03, 0.03], abs=1e-6)
+
+
+def test_a_road_of_a_class_has_its_spectrum_and_follows_the_seed(fresh_seeds) -> None:
+    road = read({"kind": "iso8608", "road_class": "B"}).roads[0]
+    place = np.arange(0.0, 4000.0, 0.05)
+    powers = []
+    for seed in fresh_seeds(4):
+        height = road.profile(Way(25.0, 4000.0, seed, Path())).height(place)[:-1]
+        spectrum = 2.0 * np.abs(np.fft.rfft(height)) ** 2 * 0.05 / len(height)
+        n = np.fft.rfftfreq(len(height), 0.05)
+        band = (n > 0.05) & (n < 2.0)
+        powers.append(np.mean(spectrum[band] * (n[band] / 0.1) ** 2))
+    assert np.mean(powers) == pytest.approx(classes()["B"], rel=0.1)
+    once, again, other = (road.profile(Way(25.0, 400.0, seed, Path())).coefficients for seed in (1, 1, 2))
+    assert np.array_equal(once, again)
+    assert not np.array_equal(once, other)
+
+
+def test_a_road_is_named_by_kind_and_size_and_no_name_stands_twice() -> None:
+    config = read({"kind": "sine", "frequency_Hz": 2.25}, {"kind": "iso8608"}, {"kind": "bump", "label": "kerb"})
+    assert [road.name for road in config.roads] == ["sine-2.25Hz", "iso8608-C", "kerb"]
+    with pytest.raises(ValidationError, match=r"sine-2\.25Hz; give each a label"):
+        read({"kind": "sine", "frequency_Hz": 2.25}, {"kind": "sine", "frequency_Hz": 2.25, "amplitude_m": 0.01})
+
+
+def test_a_road_from_a_file_goes_through_its_heights(tmp_path) -> None:
+    place = np.arange(0.0, 20.0, 0.05)
+    height = 0.01 * np.sin(place)
+    lines = [f"{s:.6f},{z:.9f}" for s, z in zip(place, height, strict=True)]
+    (tmp_path / "road.csv").write_text("\n".join(["distance_m,height_m", *lines]), encoding="utf-8")
+    profile = read({"kind": "file", "path": "road.csv"}).roads[0].profile(Way(25.0, 20.0, 1, tmp_path))
+    assert profile.height(place[:-1]) == pytest.approx(height[:-1], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("s,z\n0,0\n1,0", "1: the header must be"),
+        ("distance_m,height_m\n0,0\n1;0\n2,x", "3: two numbers"),
+        ("distance_m,height_m\n0,0\n0,1", "the distance must rise"),
+        ("distance_m,height_m\n0,0\n1,nan", "finite"),
+    ],
+)
+def test_a_road_file_that_cannot_be_believed_is_refused_with_its_line(tmp_path, text, message) -> None:
+    (tmp_path / "road.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, match=message):
+        read({"kind": "file", "path": "road.csv"}).roads[0].profile(Way(25.0, 20.0, 1, tmp_path))
+
+
+def test_a_road_file_that_is_not_there_is_said() -> None:
+    with pytest.raises(FilesError, match=r"absent\.csv"):
+        read({"kind": "file", "path": "absent.csv"}).roads[0].profile(WAY)
+
+
+def test_a_smooth_road_is_level_before_and_behind() -> None:
+    profile = through(np.array([1.0, 1.2, 1.1, 1.4]), 0.5)
+    assert profile.height(np.array([-3.0, 0.0, 1.5, 9.0])) == pytest.approx([0.0, 0.0, 0.4, 0.4])

@@ -1,0 +1,160 @@
+"""The stage: which rides, what they are called, what is refused, and what goes into the files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from simulate_dampers import diagnosed_of, table_of
+
+from pzd.artefacts import Rides, Table
+from pzd.damper.model import Damper
+from pzd.quantities import Control
+from pzd.schema.errors import ConfigError, DataError
+from pzd.simulate.config import SimulateConfig
+from pzd.simulate.stage import simulate
+
+SHORT = {"duration_s": 1.0, "settle_s": 0.2, "roads": [{"kind": "sine", "frequency_Hz": 2.25}]}
+
+
+def config(**given: object) -> SimulateConfig:
+    return SimulateConfig.model_validate_json(json.dumps({**SHORT, **given}))
+
+
+def ride(damper: Damper, table: Table | None = None, plain: Damper | None = None, **given: object) -> Rides:
+    return simulate(config(**given), diagnosed_of(damper, plain), table or table_of(damper), 1, Path())
+
+
+def unvoiced(damper: Damper) -> Damper:
+    row = damper.base[0].model_copy(update={"voltage_V": None})
+    return damper.model_copy(update={"base": (row,)})
+
+
+def test_a_case_is_road_policy_fidelity(damper) -> None:
+    rides = ride(damper)
+    assert [row.case for row in rides.summary] == [
+        f"sine-2.25Hz-{policy}-{fidelity}"
+        for policy in ("constant", "comfort")
+        for fidelity in ("ideal", "table", "dynamic")
+    ]
+    assert [r.case for r in rides.rides] == [row.case for row in rides.summary]
+    assert all(abs(row.energy_error) < 1e-6 for row in rides.summary)
+    assert rides.untrusted == ()
+
+
+def test_the_same_ride_on_the_damper_before_diagnose_stands_beside(damper) -> None:
+    changed = damper.with_effect("orifice_quadratic", {"q": 1500.0})
+    rides = {row.case: row for row in ride(changed, plain=damper, policies=["comfort"]).summary}
+    assert set(rides) == {
+        "sine-2.25Hz-comfort-ideal",
+        "sine-2.25Hz-comfort-table",
+        "sine-2.25Hz-comfort-table-plain",
+        "sine-2.25Hz-comfort-dynamic",
+        "sine-2.25Hz-comfort-dynamic-plain",
+    }
+    alone = {row.case: row for row in ride(damper, policies=["comfort"]).summary}
+    for fidelity in ("table", "dynamic"):
+        plain = rides[f"sine-2.25Hz-comfort-{fidelity}-plain"]
+        unchanged = alone[f"sine-2.25Hz-comfort-{fidelity}"]
+        assert plain.peak_abs_aK_m_per_s2 == pytest.approx(unchanged.peak_abs_aK_m_per_s2, rel=1e-6)
+        assert plain.dissipated_J != rides[f"sine-2.25Hz-comfort-{fidelity}"].dissipated_J
+
+
+def test_a_rig_without_voltage_rides_constant_damping_and_the_damper_as_it_is(damper) -> None:
+    rides = ride(unvoiced(damper))
+    assert [row.case for row in rides.summary] == [
+        "sine-2.25Hz-constant-ideal",
+        "sine-2.25Hz-passive-table",
+        "sine-2.25Hz-passive-dynamic",
+    ]
+    assert all("voltage_1_V" not in r.columns for r in rides.rides)
+    assert rides.responses == ()
+
+
+@pytest.mark.parametrize("policy", ["comfort", "skyhook", "wheel_load"])
+def test_a_policy_that_needs_the_voltage_is_refused_on_a_rig_without_one(damper, policy) -> None:
+    with pytest.raises(ConfigError, match=f"{policy} sets the voltage"):
+        ride(unvoiced(damper), policies=["constant", policy])
+
+
+def test_a_ride_beyond_a_table_that_ends_is_refused_with_the_speed(damper) -> None:
+    table = table_of(damper, outside="error", reached=0.1)
+    with pytest.raises(DataError, match="where the table ends"):
+        ride(damper, table, policies=["comfort"], fidelities=["table"])
+
+
+def test_a_ride_within_a_table_that_ends_goes_through(damper) -> None:
+    table = table_of(damper, outside="error", reached=1.0)
+    assert ride(damper, table, policies=["comfort"], fidelities=["table"]).summary[0].outside_table == 0.0
+
+
+def test_a_clamped_table_holds_the_force_and_the_share_beyond_is_said(damper) -> None:
+    rows = {}
+    for outside in ("clamp", "model"):
+        table = table_of(damper, outside=outside, reached=0.1)
+        rides = ride(damper, table, policies=["passive"], fidelities=["table"])
+        rows[outside] = rides.summary[0], rides.rides[0].columns["damper_force_1_N"]
+    assert rows["clamp"][0].outside_table > 0.3
+    assert np.max(np.abs(rows["clamp"][1])) == pytest.approx(301.0 + 272.0, rel=1e-6)
+    assert np.max(np.abs(rows["model"][1])) > 800.0
+
+
+def test_the_files_read_back_as_they_were_written(damper, tmp_path) -> None:
+    rides = ride(damper, policies=["comfort"], fidelities=["ideal", "table"])
+    rides.write(tmp_path, Control())
+    again = Rides.read(tmp_path, Control())
+    assert again.summary == rides.summary
+    assert again.responses == rides.responses
+    assert np.array_equal(again.rides[1].columns["a_K_m_per_s2"], rides.rides[1].columns["a_K_m_per_s2"])
+    header = (tmp_path / "sine-2.25Hz-comfort-ideal.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert header.startswith("time_s,z_m,phi_rad,a_K_m_per_s2,deflection_1_m,")
+
+
+def test_written_histories_are_thinned_and_peaks_are_not(damper) -> None:
+    thin = ride(damper, policies=["comfort"], fidelities=["ideal"], output_rate_Hz=20.0)
+    full = ride(damper, policies=["comfort"], fidelities=["ideal"], output_rate_Hz=1000.0)
+    assert len(thin.rides[0].columns["time_s"]) == 21
+    assert len(full.rides[0].columns["time_s"]) == 1001
+    assert thin.summary == full.summary
+
+
+def test_force_answers_a_step_of_voltage_later_than_the_valve(damper) -> None:
+    times = {(r.signal, r.to_voltage_V): r for r in ride(damper).responses}
+    voltage, force = times["voltage", 150.0], times["force", 150.0]
+    assert voltage.to_90_percent_s == pytest.approx(0.0039 * np.log(10.0))
+    assert voltage.to_90_percent_s == pytest.approx(0.009, rel=0.01)
+    assert force.to_90_percent_s > voltage.to_90_percent_s
+
+
+def test_with_an_instant_valve_the_force_takes_the_time_of_the_oil_spring(damper) -> None:
+    """One stiffness at every voltage: F sticks up to the new T0 at the rate k v, then goes on as exp(-t k / C)."""
+    rows = tuple(row.model_copy(update={"k_N_per_m": 199e3}) for row in damper.base)
+    even = damper.model_copy(update={"base": rows})
+    times = {(r.signal, r.to_voltage_V): r for r in ride(even, valve_response_s=0.0).responses}
+    assert times["voltage", 150.0].to_90_percent_s == 0.0
+    first, last = 301.0 + 0.2 * 2720.0, 1325.0 + 0.2 * 2560.0
+    stuck = (1325.0 - first) / (0.2 * 199e3)
+    slipping = 2560.0 / 199e3 * np.log((last - 1325.0) / (0.1 * (last - first)))
+    assert times["force", 150.0].to_90_percent_s == pytest.approx(stuck + slipping, rel=1e-3)
+    assert times["force", 0.0].to_90_percent_s == pytest.approx(2720.0 / 199e3 * np.log(10.0), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"policies": ["comfy"]}, "no policy is called comfy; there are comfort, constant"),
+        ({"car": {"model": "fiat"}}, "no car is called fiat; there are makowski2021"),
+        ({"car": {"motion_ratio": [1.0, 0.0]}}, "above nought"),
+        ({"control_period_s": 0.0015}, "whole number of integration_step_s"),
+        ({"c_max_Ns_per_m": 1.0}, "at least c_min"),
+        ({"settle_s": 1.0}, "shorter than duration_s"),
+        ({"fidelities": ["ideal", "ideal"]}, "named twice"),
+        ({"roads": [{"kind": "iso8608", "road_class": "Z"}]}, "there is no class Z"),
+    ],
+)
+def test_a_config_that_makes_no_sense_is_refused_with_what_would(given, message) -> None:
+    with pytest.raises(ValidationError, match=message):
+        config(**given)
