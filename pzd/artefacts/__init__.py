@@ -1,0 +1,51 @@
+"""What each stage hands on: read this package from the top and you know the pipeline.
+
+rig -> identified -> diagnosed -> table -> rides -> report, one file each. Every artefact writes
+itself into its stage's folder and reads itself back, checked, with file and line of whatever is
+wrong. `control` renames the columns of the control signal.
+"""
+
+from pzd.artefacts.diagnosed import Diagnosed, Diagnosis, Gap, NextTest, Ranked, Region, Value
+from pzd.artefacts.identified import UNDETERMINED, Identified, MeasureRow, ParameterRow, base_of
+from pzd.artefacts.manifest import Manifest
+from pzd.artefacts.report import ComfortRow, PublishedRow, Report
+from pzd.artefacts.rides import AXLE_COLUMNS, AXLES, ENERGY_LIMIT, RIDE_COLUMNS, Response, Ride, Rides, SummaryRow
+from pzd.artefacts.rig import Finding, RecordEntry, Rig
+from pzd.artefacts.table import ForceRow, InverseRow, Table, TableNotes
+
+Artefact = Rig | Identified | Diagnosed | Table | Rides | Report
+
+__all__ = [
+    "AXLES",
+    "AXLE_COLUMNS",
+    "ENERGY_LIMIT",
+    "RIDE_COLUMNS",
+    "UNDETERMINED",
+    "Artefact",
+    "ComfortRow",
+    "Diagnosed",
+    "Diagnosis",
+    "Finding",
+    "ForceRow",
+    "Gap",
+    "Identified",
+    "InverseRow",
+    "Manifest",
+    "MeasureRow",
+    "NextTest",
+    "ParameterRow",
+    "PublishedRow",
+    "Ranked",
+    "RecordEntry",
+    "Region",
+    "Report",
+    "Response",
+    "Ride",
+    "Rides",
+    "Rig",
+    "SummaryRow",
+    "Table",
+    "TableNotes",
+    "Value",
+    "base_of",
+]

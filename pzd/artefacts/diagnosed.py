@@ -1,0 +1,109 @@
+"""The verdict, its evidence, and the damper that everything behind uses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Literal, Self
+
+from pydantic import Field
+
+from pzd.damper.model import Damper
+from pzd.quantities import Control
+from pzd.schema.jsonfile import read_json, write_json
+from pzd.schema.model import Frozen
+from pzd.schema.yamlfile import read_yaml_model, write_yaml_model
+
+
+class Gap(Frozen):
+    """The gap between simulation and measurement on what no fit has seen."""
+
+    criterion: Literal["W_s"] = "W_s"
+    before: float
+    after: float
+    noise_floor: float
+    standard_error: float
+    held_out: tuple[str, ...]
+    hold_out: Literal["records", "cycles", "segments", "mixed"]
+
+
+class Value(Frozen):
+    """A parameter of an adopted effect with its 95 % interval; lists beside at_voltage_V."""
+
+    value: float | tuple[float, ...]
+    low95: float | tuple[float, ...] | None
+    high95: float | tuple[float, ...] | None
+    unit: str
+    at_voltage_V: tuple[float, ...] | None = None
+
+
+class Ranked(Frozen):
+    """One candidate effect in the ranking."""
+
+    effect: str
+    gap_after: float
+    delta_bic: float
+    parameters: dict[str, float | tuple[float, ...]]
+    reason: str
+    at_voltage_V: tuple[float, ...] | None = None
+
+
+class Region(Frozen):
+    """Where the gap lies."""
+
+    region: str
+    share_of_gap: float
+
+
+class NextTest(Frozen):
+    """The rig test that would separate the rivals best."""
+
+    waveform: str
+    frequency_Hz: float | None
+    amplitude_m: float | None
+    voltage_V: float | tuple[float, ...] | None
+    separates: tuple[str, ...]
+    distance_percent: float | None = None
+    """Predicted r.m.s. between the rivals there, in % of peak, after refitting the wrong one."""
+
+
+class Diagnosis(Frozen):
+    """What is missing from the model, how sure that is, and what would settle it."""
+
+    verdict: Literal["named", "ambiguous", "none", "unexplained"]
+    reason: str
+    effects: tuple[str, ...]
+    confidence: float | None = Field(ge=0.0, le=1.0)
+    gap: Gap
+    parameters: dict[str, dict[str, Value]]
+    ranking: tuple[Ranked, ...]
+    rivals: tuple[str, ...]
+    where: tuple[Region, ...]
+    next_test: NextTest | None
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """The verdict, and the damper that everything behind uses."""
+
+    folder: ClassVar[str] = "3-diagnose"
+
+    diagnosis: Diagnosis
+    damper: Damper
+    plain: Damper
+    """The damper before diagnose."""
+
+    def write(self, folder: Path, control: Control) -> None:
+        """Write diagnosis.json, damper.yaml and plain.yaml."""
+        write_json(folder / "diagnosis.json", self.diagnosis, control)
+        write_yaml_model(folder / "damper.yaml", self.damper, control)
+        write_yaml_model(folder / "plain.yaml", self.plain, control)
+
+    @classmethod
+    def read(cls, folder: Path, control: Control) -> Self:
+        """Read and check them again."""
+        return cls(
+            read_json(folder / "diagnosis.json", Diagnosis, control),
+            read_yaml_model(folder / "damper.yaml", Damper, control),
+            read_yaml_model(folder / "plain.yaml", Damper, control),
+        )

@@ -1,0 +1,129 @@
+"""The Bingham parameters of every condition, and the measures of every test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Self
+
+from pydantic import Field
+
+from pzd.damper.model import BaseRow, Damper
+from pzd.quantities import Control
+from pzd.schema.csvfile import read_rows, write_rows
+from pzd.schema.model import Frozen
+
+
+class ParameterRow(Frozen):
+    """The Bingham parameters of one condition or voltage node; None where undetermined."""
+
+    setting: str | None
+    voltage_V: float | None
+    temperature_degC: float | None
+    T0_N: float | None = Field(ge=0.0)
+    T0_N_low95: float | None
+    T0_N_high95: float | None
+    C_Ns_per_m: float | None = Field(gt=0.0)
+    C_Ns_per_m_low95: float | None
+    C_Ns_per_m_high95: float | None
+    k_N_per_m: float | None = Field(gt=0.0)
+    k_N_per_m_low95: float | None
+    k_N_per_m_high95: float | None
+    W_s: float = Field(ge=0.0)
+    """Criterion (4) over the samples that the row was fitted to."""
+    rmse_N: float = Field(ge=0.0)
+    status: str = Field(pattern=r"^(ok|(weak|undetermined): [T0Ck, ]+.*)$")
+    """`ok`, or `weak: T0 ...` / `undetermined: C, k ...` with the reason."""
+
+
+class MeasureRow(Frozen):
+    """What ties one test to an equivalent viscous damper."""
+
+    record: str
+    setting: str | None
+    voltage_V: float | None
+    temperature_degC: float | None
+    frequency_Hz: float | None
+    amplitude_m: float
+    peak_velocity_m_per_s: float
+    peak_force_N: float
+    """Maximum of the cycle-averaged force."""
+    force_at_zero_velocity_N: float
+    """Mean absolute force of both branches at v = 0."""
+    work_per_cycle_J: float
+    equivalent_damping_Ns_per_m: float
+    """Work per cycle over the integral of v^2 over the cycle."""
+    dynamic_range: float | None
+    """Peak force over that of the lowest voltage at the same speed; None without such a test."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """The Bingham parameters of every condition of every setting, and the measures of every test."""
+
+    folder: ClassVar[str] = "2-identify"
+
+    rows: tuple[ParameterRow, ...]
+    measures: tuple[MeasureRow, ...]
+
+    def write(self, folder: Path, control: Control) -> None:
+        """Write parameters.csv and measures.csv."""
+        write_rows(folder / "parameters.csv", ParameterRow, self.rows, control)
+        write_rows(folder / "measures.csv", MeasureRow, self.measures, control)
+
+    @classmethod
+    def read(cls, folder: Path, control: Control) -> Self:
+        """Read and check them again."""
+        return cls(
+            read_rows(folder / "parameters.csv", ParameterRow, control),
+            read_rows(folder / "measures.csv", MeasureRow, control),
+        )
+
+    @property
+    def untrusted(self) -> tuple[str, ...]:
+        """Why the result is not to be trusted (exit 4): the rows whose T0 or C is undetermined."""
+        return tuple(
+            f"{row.setting or 'rig'}, {row.voltage_V} V, {row.temperature_degC} degC: {row.status}"
+            for row in self.rows
+            if row.T0_N is None or row.C_Ns_per_m is None
+        )
+
+
+def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:
+    """The plain damper of one setting, from its identified parameters.
+
+    A value that the data do not determine is taken from the nearest condition that has it
+    (by voltage, then temperature); where no condition has it, from `UNDETERMINED`.
+
+    Raises
+    ------
+    ValueError : when the setting has no row
+    """
+    mine = [row for row in rows if row.setting == setting]
+    if not mine:
+        raise ValueError(f"no identified parameters for setting {setting!r}")
+    return Damper(base=tuple(_filled(row, mine) for row in mine))
+
+
+UNDETERMINED = {"T0_N": 0.0, "C_Ns_per_m": 1.0, "k_N_per_m": 1e8}
+"""Stand-ins where no condition determines a parameter: no friction, hardly any damping, a rigid spring."""
+
+
+def _filled(row: ParameterRow, rows: list[ParameterRow]) -> BaseRow:
+    def distance(other: ParameterRow) -> tuple[float, float]:
+        return (
+            abs((other.voltage_V or 0.0) - (row.voltage_V or 0.0)),
+            abs((other.temperature_degC or 0.0) - (row.temperature_degC or 0.0)),
+        )
+
+    def value(name: str) -> float:
+        known = [(distance(other), float(getattr(other, name))) for other in rows if getattr(other, name) is not None]
+        return min(known)[1] if known else UNDETERMINED[name]
+
+    return BaseRow(
+        voltage_V=row.voltage_V,
+        temperature_degC=row.temperature_degC,
+        T0_N=value("T0_N"),
+        C_Ns_per_m=value("C_Ns_per_m"),
+        k_N_per_m=value("k_N_per_m"),
+    )

@@ -1,0 +1,94 @@
+"""The rig records in canonical columns, and what the preflight found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Self
+
+from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
+from pzd.record import Array, Record
+from pzd.schema.csvfile import read_columns, write_columns
+from pzd.schema.jsonfile import read_json_list, write_json
+from pzd.schema.model import Frozen
+
+
+class Finding(Frozen):
+    """One finding of the preflight: never corrected, always said."""
+
+    check: str
+    """Which check found it."""
+    where: str
+    """Place in the record, in words with units."""
+    size: float
+    """How much."""
+    unit: str
+    """Unit of the size; '-' for a share."""
+    follows: str
+    """What follows for the results."""
+
+
+class RecordEntry(Frozen):
+    """One record as records.json lists it."""
+
+    name: str
+    setting: str | None
+    voltage_V: float | None
+    """Median of the control signal."""
+    temperature_degC: float | None
+    """Median temperature."""
+    rate_Hz: float
+    """Sampling rate."""
+    cycles: float
+    """Number of cycles of the motion."""
+    findings: tuple[Finding, ...] = ()
+    removed: str | None = None
+    """What a known fixture took out of the force, in words."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """The rig records in canonical columns, and what the preflight found."""
+
+    folder: ClassVar[str] = "1-rig"
+
+    records: tuple[Record, ...]
+    entries: tuple[RecordEntry, ...]
+
+    def write(self, folder: Path, control: Control) -> None:
+        """Write records.json and one CSV a record."""
+        write_json(folder / "records.json", self.entries, control)
+        for record in self.records:
+            write_columns(folder / f"{record.name}.csv", _channels(record), control)
+
+    @classmethod
+    def read(cls, folder: Path, control: Control) -> Self:
+        """Read and check them again."""
+        entries = read_json_list(folder / "records.json", RecordEntry, control)
+        return cls(tuple(_read_record(folder, entry, control) for entry in entries), entries)
+
+
+def _channels(record: Record) -> Mapping[str, Array | None]:
+    columns: dict[str, Array | None] = {
+        TIME.column: record.time,
+        DISPLACEMENT.column: record.displacement,
+        VELOCITY.column: record.velocity,
+        ACCELERATION.column: record.acceleration,
+        FORCE.column: record.force,
+        VOLTAGE.column: record.voltage,
+        TEMPERATURE.column: record.temperature,
+    }
+    return columns if record.pressure is None else {**columns, PRESSURE.column: record.pressure}
+
+
+def _read_record(folder: Path, entry: RecordEntry, control: Control) -> Record:
+    optional = (VOLTAGE.column, TEMPERATURE.column, PRESSURE.column)
+    header = [q.column for q in (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)]
+    columns = read_columns(folder / f"{entry.name}.csv", header, control, optional)
+    return Record(
+        entry.name,
+        entry.setting,
+        *(columns[name] for name in header[:5]),
+        *(columns.get(name) for name in optional),
+    )
