@@ -14,6 +14,7 @@ import numpy as np
 from pzd.damper.element import element_force
 from pzd.record import Array
 from pzd.rig.cycles import Cycles
+from pzd.rig.kinematics import drift_of
 from pzd.rig.measured import Measured
 
 MOST_SAMPLES = 800
@@ -77,7 +78,8 @@ def _beginning(test: Measured) -> Piece:
 
 def _average_cycle(test: Measured, run: Cycles) -> Piece:
     record = test.record
-    x, cycle = run.mean(record.time, test.clean.displacement), run.mean(record.time, record.force)
+    steady = test.clean.displacement - drift_of(record.time, test.clean.displacement, run)
+    x, cycle = run.mean(record.time, steady), run.mean(record.time, record.force)
     every = -(-x.size // MOST_SAMPLES)
     spectrum, harmonics = np.fft.rfft(cycle), np.arange(cycle.size // 2 + 1)
 

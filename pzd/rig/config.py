@@ -13,8 +13,9 @@ from pzd.schema.model import Frozen
 
 def _text(value: object) -> object:
     if isinstance(value, int | float):
-        # pydantic turns a ValueError alone into a fault of the config.
-        raise ValueError(f"a value needs its unit: write {value} V, {value} degC, ...")  # noqa: TRY004
+        raise ValueError(  # noqa: TRY004  # pydantic turns a ValueError alone into a fault of the config
+            f"a value needs its unit: write {value} V, {value} degC, ..."
+        )
     return value
 
 

@@ -46,7 +46,7 @@ def kinematics(time: Array, displacement: Array, run: Cycles | None) -> Kinemati
     if run is None:
         return _smoothed(time, displacement, np.inf)
     inside = run.inside(time)
-    cyclic = _average_cycle(time, displacement - _drift(time, displacement, run), run)
+    cyclic = _average_cycle(time, displacement - drift_of(time, displacement, run), run)
     drift = _smoothed(time[inside], displacement[inside] - cyclic.displacement, NOT_CYCLIC * run.frequency)
     parts = [cyclic.displacement + drift.displacement, cyclic.velocity + drift.velocity]
     parts.append(cyclic.acceleration + drift.acceleration)
@@ -79,7 +79,7 @@ def significant_harmonics(folded: Array) -> Array:
     return result
 
 
-def _drift(time: Array, displacement: Array, run: Cycles) -> Array:
+def drift_of(time: Array, displacement: Array, run: Cycles) -> Array:
     """The mean over one period around every sample (n,), which no harmonic of the cycle moves.
 
     Half a cycle at either end of the run is continued as a straight line; outside it is held.

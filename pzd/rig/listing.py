@@ -55,8 +55,7 @@ def matching(folder: Path, pattern: str) -> list[Path]:
     if literal.is_file():
         return [literal]
     whole = str(Path(glob.escape(str(folder))) / pattern)
-    # Path.glob takes no absolute patterns.
-    found = [Path(path) for path in glob.glob(whole, recursive=True)]  # noqa: PTH207
+    found = [Path(path) for path in glob.glob(whole, recursive=True)]  # noqa: PTH207  # Path.glob takes no absolute patterns
     return [path for path in found if path.is_file()]
 
 

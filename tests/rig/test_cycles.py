@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.signal import sawtooth
@@ -12,8 +14,8 @@ TIME = np.arange(10_000) * 1e-3
 
 
 @pytest.fixture
-def rng() -> np.random.Generator:
-    return np.random.default_rng()
+def rng(fresh_seeds: Callable[[int], list[int]]) -> np.random.Generator:
+    return np.random.default_rng(fresh_seeds(1)[0])
 
 
 def smooth_random(rng: np.random.Generator, count: int, step: float = 1e-3) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,11 +23,12 @@ Array = NDArray[np.float64]
 
 KINDS = ("sine", "triangle", "random")
 FINE = 16
+NO_LIMITS = Limits()
 
 
 @pytest.fixture
-def rng() -> np.random.Generator:
-    return np.random.default_rng()
+def rng(fresh_seeds: Callable[[int], list[int]]) -> np.random.Generator:
+    return np.random.default_rng(fresh_seeds(1)[0])
 
 
 def motion(kind: str, time: Array, rng: np.random.Generator) -> Array:
@@ -66,7 +68,7 @@ def record(
     return Record(kind, None, time, x, x, x, force)
 
 
-def found(one: Record, limits: Limits = Limits()) -> tuple[Finding, ...]:  # noqa: B008 # frozen
+def found(one: Record, limits: Limits = NO_LIMITS) -> tuple[Finding, ...]:
     """Findings of a record whose velocity is derived."""
     run = cycles(one.time, one.displacement)
     clean = kinematics(one.time, one.displacement, run)
