@@ -6,7 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
+from pzd.damper.compose import respond
+from pzd.damper.motion import Motion
 from pzd.simulate.outcome import low_passed_jerk
 
 DEFLECTION, RATE, SPRING, DAMPER, DEMANDED, VOLTAGE = range(4, 10)
@@ -143,6 +146,22 @@ def test_two_dampers_at_half_the_ratio_are_half_of_one(ride) -> None:
     fast = np.abs(whole.history[:, RATE]) > 0.1
     damping = whole.history[fast, DAMPER] - np.sign(whole.history[fast, RATE]) * 301.0
     assert damping == pytest.approx(2720.0 * whole.history[fast, RATE], rel=1e-6)
+
+
+@pytest.mark.parametrize("effects", [{}, {"orifice_quadratic": {"q": 1500.0}, "lash": {"delta": 3e-4}}])
+def test_the_damper_in_the_car_gives_the_force_that_it_gives_on_a_rig(ride, damper, effects) -> None:
+    """Deflection and voltage of a ride, replayed on a stand: the same damper, integrated by other means."""
+    for name, values in effects.items():
+        damper = damper.with_effect(name, values)
+    history = ride("comfort", "dynamic", on=damper, **SHORT).history
+    fine = 40
+    time = np.arange(len(history[:-1]) * fine) * (1e-3 / fine)
+    path = CubicHermiteSpline(history[:, 0], history[:, DEFLECTION], history[:, RATE])
+    voltage = np.repeat(history[:-1, VOLTAGE], fine)
+    motion = Motion(time, path(time), path(time, 1), path(time, 2), voltage, np.full(time.size, 22.0))
+    force = respond(damper.with_effect("valve_lag", {"tau": 0.0039}), motion)[::fine]
+    expected = history[:-1, DAMPER]
+    assert np.sqrt(np.mean((force - expected) ** 2)) < 2e-3 * np.max(np.abs(expected))
 
 
 def test_dynamic_becomes_table_as_the_oil_spring_stiffens(ride, damper) -> None:
