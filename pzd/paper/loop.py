@@ -1,0 +1,59 @@
+"""The settled loop of a damper in a sinusoidal test, exact and free of noise: its peak and its force at rest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.damper.compose import respond
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
+from pzd.record import Array
+
+_SAMPLES = 2000  # in a cycle
+_CYCLES = 2  # the second is settled
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """One settled cycle; every array is (n,)."""
+
+    displacement: Array
+    velocity: Array
+    force: Array
+
+    @property
+    def peak(self) -> float:
+        """Largest |F| [N]."""
+        return float(np.max(np.abs(self.force)))
+
+    @property
+    def at_zero(self) -> float:
+        """Mean |F| of both branches at v = 0 [N]."""
+        quarter = self.force.size // 4
+        return float(0.5 * (abs(self.force[quarter]) + abs(self.force[3 * quarter])))
+
+
+def loop_of(
+    damper: Damper, frequency: float, amplitude: float, voltage: float | None, temperature: float | None
+) -> Loop:
+    """The settled loop of a damper under x = A sin(2 pi f t).
+
+    Parameters
+    ----------
+    damper : the damper
+    frequency : f [Hz]
+    amplitude : A [m]
+    voltage : constant [V]; None where the damper has none
+    temperature : constant [degC]; None where the damper has none
+    """
+    rate = 2.0 * math.pi * frequency
+    time = np.arange(_CYCLES * _SAMPLES + 1) / (_SAMPLES * frequency)
+    phase = rate * time
+    constant = [None if value is None else np.full(time.size, value) for value in (voltage, temperature)]
+    x, v, a = amplitude * np.sin(phase), amplitude * rate * np.cos(phase), -amplitude * rate**2 * np.sin(phase)
+    force = respond(damper, Motion(time, x, v, a, *constant))
+    last = slice((_CYCLES - 1) * _SAMPLES, -1)
+    return Loop(x[last], v[last], force[last])
