@@ -34,6 +34,10 @@ check: $(DEV)  ## Check style (ruff), format (ruff) and types (mypy --strict)
 ci: check  ## What a merge must pass besides `make test`: check, every config, the wheel installed elsewhere
 	$(BIN)/python -m pytest -m ci --durations 10
 
+.PHONY: figures
+figures: $(RUNTIME)  ## Draw the figures of the paper into runs/paper/figures
+	$(BIN)/pzd figures configs/paper.yaml
+
 .PHONY: bench
 bench: $(DEV)  ## Print how long a user waits, beside the limits
 	$(BIN)/python tests/studies/bench.py

@@ -167,6 +167,7 @@ def test_the_wheel_alone_runs_every_command(elsewhere: Path) -> None:
     for stage in ("check", "synthesise", "identify", "diagnose", "table", "simulate", "report"):
         pzd(stage, "first.yaml")
     pzd("run", "second.yaml", "--set", "seed=2")
+    assert "index.html" in pzd("figures", "first.yaml")
     assert pzd("show", "first.yaml")
     assert pzd("compare", "runs/first", "runs/second")
     assert "orifice_quadratic" in pzd("effects")
