@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from pzd.paper.published import published
 from pzd.paper.steady_ride import STEP, settled_peak
 from pzd.quantities import Control
 from pzd.record import Array
@@ -23,15 +24,18 @@ from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 from pzd.simulate.linear import harmonic_response
 from pzd.simulate.minimise import TieBreak
+from pzd.simulate.riding import KM_PER_H
 
+_PRINTED = published()
 FREQUENCIES = (2.25, 4.5)
 """Of Figure 19a and 19b [Hz]."""
-CONSTANT_PEAKS = (2.2, 3.6)
-CONTROLLED_PEAKS = (0.75, 1.05)
-"""Largest |a_K| that Figure 19 prints [m/s2]; published.csv, F19."""
-MASS, STIFFNESS, DAMPING, BOUNDS = 1200.0, 47500.0, 4500.0, (750.0, 45000.0)
-AMPLITUDE, SPEED = 0.02, 25.0
-"""Inputs of section 5 in SI; published.csv, IN. 90 km/h is 25 m/s."""
+CONSTANT_PEAKS = (_PRINTED["F19a-c"].number, _PRINTED["F19b-c"].number)
+CONTROLLED_PEAKS = (_PRINTED["F19a-ctrl"].number, _PRINTED["F19b-ctrl"].number)
+"""Largest |a_K| that Figure 19 prints [m/s2]."""
+MASS, STIFFNESS, DAMPING = (_PRINTED[name].number for name in ("IN-m", "IN-k1", "IN-c"))
+BOUNDS = (_PRINTED["IN-cmin"].number, _PRINTED["IN-cmax"].number)
+AMPLITUDE, SPEED = _PRINTED["IN-A"].number, _PRINTED["IN-V"].number * KM_PER_H
+"""Inputs of section 5 in SI."""
 WHEELBASES, SHARES, INERTIAS = (2.2, 3.6), (0.3, 0.7), (0.7, 1.3)
 """What is plausible: a1 + a2 [m], a1 / (a1 + a2), J_y / (m a1 a2)."""
 TOLERANCE = 0.05
@@ -216,8 +220,13 @@ def refined(start: HalfCar, tie_break: TieBreak) -> HalfCar:
 
     first = np.array([*start.distances, start.pitch_inertia, start.comfort_point]) / scale
     simplex = first * (1.0 + 0.03 * np.vstack([np.zeros(4), np.eye(4)]))
-    options = {"initial_simplex": simplex, "maxfev": 160, "xatol": 1e-4, "fatol": 1e-4}
-    return car_at(minimize(cost, first, method="Nelder-Mead", options=options).x)
+    found = minimize(
+        cost,
+        first,
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": 160, "xatol": 1e-4, "fatol": 1e-4},
+    )
+    return car_at(found.x)
 
 
 def stored() -> tuple[CarRow, ...]:

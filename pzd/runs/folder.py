@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import platform
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -221,6 +221,28 @@ class Run:
                 )
                 write_json(fresh / MANIFEST, manifest, _NAMES)
                 self._carry_over(target, fresh, manifest)
+                sync_folder(fresh)
+                self._swap(target, fresh)
+        finally:
+            shutil.rmtree(fresh, ignore_errors=True)
+
+    def write_beside(self, folder: str, write: Callable[[Path], None]) -> None:
+        """Write a folder that is no stage in place of what was there before, whole or not at all.
+
+        Parameters
+        ----------
+        folder : its name beside the stages
+        write : fills the empty folder that it is given
+
+        Raises
+        ------
+        FilesError : when the disk does not take it; what was there before still is
+        """
+        target, fresh = self.folder / folder, self.folder / f".{folder}.new"
+        try:
+            with as_files_error(target):
+                fresh.mkdir()
+                write(fresh)
                 sync_folder(fresh)
                 self._swap(target, fresh)
         finally:

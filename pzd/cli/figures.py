@@ -1,0 +1,34 @@
+"""The command that draws the figures of the paper from a run."""
+
+from __future__ import annotations
+
+from pzd.cli.exits import DONE, UNTRUSTED
+from pzd.cli.options import RUNS, Config, Jobs, Quiet, Runs, Set, Verbose
+from pzd.cli.output import Output, complain
+
+
+def figures(
+    config: Config,
+    runs: Runs = RUNS,
+    overrides: Set = None,
+    jobs: Jobs = 1,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> int:
+    """Draw the figures of the paper, and their index."""
+    from pzd.figures.draw import FOLDER, drawn
+    from pzd.figures.evidence import Evidence
+    from pzd.pipeline.command import bring, opened
+
+    output = Output(quiet=quiet, verbose=verbose)
+    given = opened(config, runs, overrides or ())
+    marks = bring(given, "simulate", force=False, jobs=jobs, say=output.say)
+    gallery = drawn(Evidence.of(given.run, given.config), output.say)
+    with given.run.locked("pzd figures"):
+        given.run.write_beside(FOLDER, gallery.write)
+    output.say(f"figures: {given.run.folder / FOLDER / 'index.html'}")
+    complain(f"not to be trusted: {mark}" for mark in marks)
+    return UNTRUSTED if marks else DONE
+
+
+COMMANDS = (figures,)
