@@ -11,9 +11,11 @@ import numpy as np
 
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library
-from pzd.diagnose.fitting import DIFFERENCE, Fitted, Problem, Unknown, fit, simulated
+from pzd.diagnose.fitting import DIFFERENCE, MOST_EVALUATIONS, Fitted, Problem, Unknown, fit, simulated
 from pzd.record import Array
 
+PATIENT = 100
+"""Evaluations after which even a settled optimum is left as it is."""
 MOVES = 0.02
 """A channel moves in a test if its range there exceeds this share of the rig's scale."""
 WARMS = 2.0
@@ -83,9 +85,24 @@ def candidates(
 
 def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     """One effect fitted beside those of `before`, from its most promising starting values."""
-    start = promising_start(problem, before, effect)
-    fitted = fit(problem, (*before.effects, effect.name), np.concatenate([before.searched, start]))
-    return Candidate(effect.name, fitted, delta_bic(before, fitted), moved_by(problem, before, fitted))
+    start = promising_starts(problem, before, effect)[0]
+    return _from(problem, before, effect.name, np.concatenate([before.searched, start]))
+
+
+def settled(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
+    """A candidate with its optimum searched to the end, from all its starting values."""
+    effect = library()[found.effect]
+    others = [np.concatenate([before.searched, s]) for s in promising_starts(problem, before, effect)[1:]]
+    fits = [fit(problem, found.fitted.effects, start) for start in others]
+    best = min([found.fitted, *fits], key=lambda f: f.misfit)
+    return _from(problem, before, found.effect, best.searched, PATIENT)
+
+
+def _from(
+    problem: Problem, before: Fitted, effect: str, start: Array, evaluations: int = MOST_EVALUATIONS
+) -> Candidate:
+    fitted = fit(problem, (*before.effects, effect), start, evaluations)
+    return Candidate(effect, fitted, delta_bic(before, fitted), moved_by(problem, before, fitted))
 
 
 def delta_bic(before: Fitted, after: Fitted) -> float:
@@ -106,20 +123,20 @@ def moved_by(problem: Problem, before: Fitted, after: Fitted) -> float:
     return float(np.sqrt(np.mean(squares)))
 
 
-def promising_start(problem: Problem, before: Fitted, effect: Effect) -> Array:
-    """The starting values from which one linearised step promises the smallest misfit.
+def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
+    """All starting values of an effect, first those from which one linearised step promises the smallest misfit.
 
     Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
                                                                 Source: Gauss-Newton step
     """
     unknowns = problem.unknowns((effect.name,))
-    grid = list(itertools.product(*(u.parameter.search.starts for u in unknowns)))
+    grid = itertools.product(*(u.parameter.search.starts for u in unknowns))
     starts = [np.array([_searched(u, value) for u, value in zip(unknowns, values, strict=True)]) for values in grid]
     if len(starts) == 1:
-        return starts[0]
+        return starts
     frame, _ = np.linalg.qr(before.slopes)
     promised = [_promised(problem, before, effect, start, frame) for start in starts]
-    return starts[int(np.argmin(promised))]
+    return [starts[i] for i in np.argsort(promised, kind="stable")]
 
 
 def _searched(unknown: Unknown, start: float) -> float:

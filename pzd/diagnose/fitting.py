@@ -22,7 +22,7 @@ SIMULATION_TOLERANCE = 1e-8
 """Of the damper's path, as a share of the force."""
 DIFFERENCE = 1e-4
 """Step of the searched variables for forward differences."""
-MOST_EVALUATIONS = 25
+MOST_EVALUATIONS = 20
 BOUND = 1e3
 """No scaled parameter is looked for beyond this, nor one with ratio steps below its inverse."""
 WIDEST = 3.0
@@ -175,7 +175,7 @@ def simulated(point: Point, observation: Observation) -> Array:
     return o.at_compared(respond(damper, o.motion, start, SIMULATION_TOLERANCE))
 
 
-def fit(problem: Problem, effects: Sequence[str], start: Array) -> Fitted:
+def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int = MOST_EVALUATIONS) -> Fitted:
     """The optimum reached from a starting point, by trust-region least squares within the limits.
 
     Parameters
@@ -183,6 +183,7 @@ def fit(problem: Problem, effects: Sequence[str], start: Array) -> Fitted:
     problem : what is fitted to what
     effects : names of the effects fitted together with the base rows
     start : (3 b + e,) in the units of the search
+    evaluations : of the model, at most
     """
     from scipy.optimize import least_squares
 
@@ -204,7 +205,7 @@ def fit(problem: Problem, effects: Sequence[str], start: Array) -> Fitted:
         ftol=1e-6,
         xtol=1e-6,
         gtol=1e-6,
-        max_nfev=MOST_EVALUATIONS,
+        max_nfev=evaluations,
     )
     residuals, forces = _residuals(problem, unknowns, found.x)
     slopes = np.asarray(found.jac, dtype=np.float64)

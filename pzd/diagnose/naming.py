@@ -10,7 +10,7 @@ import numpy as np
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
-from pzd.diagnose.candidates import Candidate, candidate, candidates
+from pzd.diagnose.candidates import Candidate, candidate, candidates, settled
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence
 from pzd.diagnose.fitting import Fitted, fit
@@ -81,11 +81,21 @@ def name_effects(evidence: Evidence, config: DiagnoseConfig, jobs: int = 1) -> N
         chosen = _first_supported(evidence, config, current, tried, reasons)
         if chosen is None:
             break
+        chosen = settled(whole, current, chosen)
+        rounds[-1] = tuple(chosen if c.effect == chosen.effect else c for c in tried)
         reasons[chosen.effect] = "adopted"
-        rivals = tuple(c.effect for c in tried if c is not chosen and c.delta_bic - chosen.delta_bic < config.rival_bic)
+        rivals = tuple(
+            c.effect for c in tried if c.effect != chosen.effect and c.delta_bic - chosen.delta_bic < config.rival_bic
+        )
         log.info("diagnose: %s adopted, delta BIC %.0f", chosen.effect, chosen.delta_bic)
         current = chosen.fitted
     return Named(plain, current, tuple(rounds), reasons, rivals)
+
+
+def _rivals(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseConfig) -> tuple[str, ...]:
+    """The other effects that explain a step as well as the one chosen, best first."""
+    others = [c for c in tried if c.effect != chosen.effect and c.delta_bic >= chosen.delta_bic]
+    return tuple(c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic)
 
 
 def _first_supported(

@@ -146,17 +146,17 @@ def _kinematics(record: Record) -> tuple[Array, Array, Array]:
 def _cycle_motion(record: Record, period: float, points: int, channels: Sequence[Array]) -> tuple[Motion, int, int]:
     """Two cycles of the mean motion, the first to settle in, on a grid fine enough to simulate."""
     factor = int(np.ceil(CYCLE_POINTS / points))
-    fine: list[Array] = [_refined(channel, factor) for channel in channels]
+    fine = np.stack([_refined(channel, factor) for channel in channels])
     count = points * factor
     time = period / count * np.arange(2 * count)
     temperature = record.median_temperature()
     voltage = record.median_voltage()
-    displacement, velocity, acceleration = (np.concatenate([channel, channel]) for channel in fine)
+    twice = np.concatenate([fine, fine], axis=1)
     motion = Motion(
         time,
-        displacement,
-        velocity,
-        acceleration,
+        twice[0],
+        twice[1],
+        twice[2],
         None if voltage is None else np.full(2 * count, voltage),
         None if temperature is None else np.full(2 * count, temperature),
     )

@@ -11,13 +11,13 @@ from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.inputs import Prepared
-from pzd.identify.trial import fine_motion, reversals, trial_of, warm_up
+from pzd.identify.trial import reversals, warm_up
 from pzd.record import SAME_TEMPERATURE, Record
 
 Array = NDArray[np.float64]
 
-FEWEST_IN_HALF_CYCLE = 50
-"""Samples of the fastest half cycle from which a parabola between them is exact enough: 1e-5 of the force."""
+FEWEST_IN_HALF_CYCLE = 25
+"""Samples of the fastest half cycle from which a parabola between them is exact enough: 1e-4 of the force."""
 PREDICTION_TOLERANCE = 1e-7
 """Of the damper's path, as a share of the force."""
 
@@ -46,16 +46,25 @@ def motion_of(record: Record, *, constant: bool) -> tuple[Motion, int]:
     the motion, and how many of its samples make one of the record
     """
     half_cycle = min(np.diff(reversals(record.displacement)), default=record.displacement.size)
-    stride = 1
-    if half_cycle < FEWEST_IN_HALF_CYCLE:
-        stride, motion = trial_of(record).factor, fine_motion(record)
-    else:
-        motion = Motion.of(record)
+    stride = max(int(np.ceil(FEWEST_IN_HALF_CYCLE / max(half_cycle, 1))), 1)
+    motion = Motion.of(record) if stride == 1 else _refined(record, stride)
     if constant:
         motion = replace(motion, voltage=_held(motion.voltage))
     if motion.temperature is not None and np.ptp(motion.temperature) <= SAME_TEMPERATURE:
         motion = replace(motion, temperature=_held(motion.temperature))
     return motion, stride
+
+
+def _refined(record: Record, stride: int) -> Motion:
+    """The record's motion on `stride` times as many samples, by cubic splines."""
+    from scipy.interpolate import CubicSpline
+
+    samples = np.arange(record.time.size)
+    fine = np.arange((record.time.size - 1) * stride + 1) / stride
+    smooth = (record.displacement, record.velocity, record.acceleration)
+    displacement, velocity, acceleration = (CubicSpline(samples, channel)(fine) for channel in smooth)
+    held = (None if c is None else np.interp(fine, samples, c) for c in (record.voltage, record.temperature))
+    return Motion(np.interp(fine, samples, record.time), displacement, velocity, acceleration, *held)
 
 
 def _held(channel: Array | None) -> Array | None:

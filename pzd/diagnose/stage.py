@@ -46,7 +46,7 @@ def diagnose(
     from pzd.diagnose.naming import name_effects
     from pzd.diagnose.next_test import next_test, reach_of
     from pzd.diagnose.split import split
-    from pzd.diagnose.verdict import decide, parameters_of, ranking_of
+    from pzd.diagnose.verdict import decide, parameters_of, ranking_of, weak
     from pzd.diagnose.where import regions
 
     prepared = prepare([record for record in rig.records if record.setting == setting])
@@ -61,7 +61,7 @@ def diagnose(
     voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
     told = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason,
+        reason=decision.reason + weak(parts.hold_out),
         effects=named.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(evidence, named, parts, diagnose),

@@ -31,6 +31,13 @@ class Decision:
     confidence: float | None
 
 
+def weak(hold_out: str) -> str:
+    """What to add where the held-out data come from tests that were also fitted."""
+    if hold_out == "records":
+        return ""
+    return f"; held out were {hold_out} of tests that were also fitted, which is weak evidence"
+
+
 def decide(named: Named, before: Sequence[Judged], after: Sequence[Judged], config: DiagnoseConfig) -> Decision:
     """The verdict on what was adopted, from what is left of the gap.
 

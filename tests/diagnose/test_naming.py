@@ -1,0 +1,119 @@
+"""Naming: on rigs whose truth is known, drawn afresh at every run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from campaign import coloured, damper_of, sine, sines
+
+from pzd.artefacts import Diagnosed, Rig
+from pzd.damper.compose import respond
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.stage import diagnose
+from pzd.identify.config import IdentifyConfig
+from pzd.identify.stage import identify
+from pzd.quantities import Control
+from pzd.record import Record
+from pzd.rig.config import FilesEntry, RigConfig
+
+TWO = (0.0, 150.0)
+STAND = RigConfig(files=(FilesEntry(path="*.csv"),))
+
+TRUTHS = {
+    "orifice_quadratic": {"q": 2500.0},
+    "shear_thinning": {"n": 0.8},
+    "relief_valve": {"F_r": 900.0, "C_r": 900.0},
+    "rounded_yield": {"w_s": 0.015},
+    "asymmetry": {"alpha": 0.08},
+    "lash": {"delta": 3e-4},
+    "gas_spring": {"k_g": 3000.0},
+    "preload_offset": {"F_0": 90.0},
+    "fluid_inertia": {"m": 12.0},
+    "stribeck_friction": {"F_s": 80.0, "v_s": 0.04},
+    "end_stop": {"k_e": 1.5e6, "x_e": 0.018},
+    "sensor_delay": {"tau": 0.004},
+}
+
+
+def diagnosed(records: tuple[Record, ...], **config: object) -> Diagnosed:
+    rig = Rig(records, ())
+    settings = DiagnoseConfig.model_validate(config)
+    return diagnose(settings, IdentifyConfig(), STAND, rig, identify(IdentifyConfig(), rig, 1), Control(), None, 2)
+
+
+@pytest.mark.parametrize("name", TRUTHS)
+def test_a_hidden_effect_is_named_with_its_parameters(name: str, fresh_seeds: Callable[[int], list[int]]) -> None:
+    (seed,) = fresh_seeds(1)
+    found = diagnosed(sines(damper_of(TWO, **{name: TRUTHS[name]}), np.random.default_rng(seed), TWO, jitter=0.01))
+    told = found.diagnosis
+    assert told.verdict == "named", told.reason
+    assert told.effects == (name,)
+    assert told.confidence is not None
+    assert told.confidence > 0.9
+    for parameter, truth in TRUTHS[name].items():
+        value = told.parameters[name][parameter]
+        assert value.value == pytest.approx(truth, rel=0.1)
+    assert told.gap.after - told.gap.noise_floor < 0.1 * (told.gap.before - told.gap.noise_floor)
+    assert name in found.damper.effects
+    assert not found.plain.effects
+
+
+def test_a_spring_and_a_mass_cannot_be_told_apart_on_one_frequency_and_the_next_test_has_another() -> None:
+    rng = np.random.default_rng()
+    tests = ((2.0, 0.015), (2.0, 0.03))
+    told = diagnosed(sines(damper_of(TWO, gas_spring={"k_g": 3000.0}), rng, TWO, tests=tests)).diagnosis
+    assert told.verdict == "ambiguous"
+    assert {*told.effects, *told.rivals} >= {"gas_spring", "fluid_inertia"}
+    assert told.next_test is not None
+    assert set(told.next_test.separates) == {*told.effects, *told.rivals}
+    assert told.next_test.frequency_Hz != pytest.approx(2.0)
+    assert told.next_test.distance_percent is not None
+    assert told.next_test.distance_percent > 0.5
+
+
+def test_something_that_is_not_in_the_library_is_unexplained() -> None:
+    def with_flutter(record: Record) -> Record:
+        """A force that depends on where the piston stands: damping that doubles towards one end."""
+        extra = 1500.0 * record.velocity * np.sin(300.0 * record.displacement) ** 2
+        return Record(
+            record.name, None, record.time, record.displacement, record.velocity, record.acceleration,
+            record.force + extra, record.voltage,
+        )  # fmt: skip
+
+    records = sines(damper_of(TWO), np.random.default_rng(), TWO)
+    told = diagnosed(tuple(with_flutter(r) for r in records)).diagnosis
+    assert told.verdict == "unexplained", told.reason
+
+
+def test_a_forbidden_effect_is_never_adopted_and_a_forced_one_always() -> None:
+    records = sines(damper_of(TWO, gas_spring={"k_g": 3000.0}), np.random.default_rng(), TWO)
+    assert "gas_spring" not in diagnosed(records, forbid=("gas_spring",)).damper.effects
+    assert "asymmetry" in diagnosed(records, force=("asymmetry",)).damper.effects
+
+
+def test_a_lag_of_the_valve_is_named_from_steps_of_the_voltage() -> None:
+    rng = np.random.default_rng()
+    damper = damper_of(TWO, valve_lag={"tau": 0.02})
+    steady = tuple(sine(damper, U, f, 0.02, rng) for U in TWO for f in (0.5, 2.0))
+    told = diagnosed((*steady, *(stepped(damper, rng, f) for f in (1.0, 2.3)))).diagnosis
+    assert "valve_lag" in told.effects, told.reason
+    assert told.parameters["valve_lag"]["tau"].value == pytest.approx(0.02, rel=0.1)
+
+
+def stepped(damper: Damper, rng: np.random.Generator, frequency: float) -> Record:
+    """A sine under a voltage that steps between 0 and 150 V."""
+    fine = np.arange(-1.0, 6.0, 1.0 / 16000.0)
+    omega = 2 * np.pi * frequency
+    x = 0.02 * np.sin(omega * fine)
+    v, a = 0.02 * omega * np.cos(omega * fine), -(omega**2) * x
+    voltage = np.where(np.floor(fine / 0.37) % 2 == 0, 0.0, 150.0)
+    force = respond(damper, Motion(fine, x, v, a, voltage), tolerance=1e-7)
+    keep = slice(16000, None, 16)
+    noise = coloured(rng, fine[keep].size, 0.01 * float(np.max(np.abs(force))), 0.5)
+    return Record(
+        f"steps{frequency:g}", None, fine[keep], x[keep], v[keep], a[keep], force[keep] + noise, voltage[keep]
+    )
