@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from pzd import artefacts
 from pzd.cli.app import app
 from pzd.config import RunConfig
 from pzd.damper.effects import library
+from pzd.schema.yamlfile import read_yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = Path(pzd.__file__).parent
@@ -79,9 +81,15 @@ def test_every_command_and_option_has_its_help() -> None:
     assert silent == []
 
 
+@cache
+def config_schema() -> dict[str, Any]:
+    """The JSON schema of a config."""
+    return RunConfig.model_json_schema()
+
+
 def config_keys() -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Block, key and schema of every key that a config may hold."""
-    schema = RunConfig.model_json_schema()
+    schema = config_schema()
     for block, body in {"": schema, **schema.get("$defs", {})}.items():
         for key, value in body.get("properties", {}).items():
             yield block, key, value
@@ -89,6 +97,57 @@ def config_keys() -> Iterator[tuple[str, str, dict[str, Any]]]:
 
 def test_every_config_key_is_in_the_readme(code: str) -> None:
     assert sorted({f"{block}.{key}" for block, key, _ in config_keys() if not names(key, code)}) == []
+
+
+def resolved(schema: dict[str, Any], data: Any) -> tuple[str, dict[str, Any]] | None:
+    """Name and body of the block that data of the README are an example of; None where they are no block."""
+    blocks = config_schema()["$defs"]
+    ways = [schema, *schema.get("anyOf", []), *schema.get("oneOf", []), *schema.get("allOf", [])]
+    if isinstance(schema.get("items"), dict):
+        return resolved(schema["items"], data)
+    for way in ways:
+        if "$ref" in way:
+            name = way["$ref"].removeprefix("#/$defs/")
+            kind = blocks[name]["properties"].get("kind", {}).get("const")
+            if isinstance(data, dict) and kind in (None, data.get("kind")):
+                return name, blocks[name]
+        elif way is not schema and (found := resolved(way, data)):
+            return found
+    return None
+
+
+def examples(name: str, body: dict[str, Any], data: dict[str, Any]) -> Iterator[tuple[str, str, Any]]:
+    """Block, key and value of everything that the README's config says, every item of a list by itself."""
+    for key, value in data.items():
+        yield name, key, value
+        for item in value if isinstance(value, list) else [value]:
+            found = resolved(body.get("properties", {}).get(key, {}), item)
+            if found:
+                yield from examples(*found, item)
+
+
+def holds_blocks(values: list[Any]) -> bool:
+    """Whether a key holds blocks, which are shown key by key, rather than a value."""
+    first = [value[0] if isinstance(value, list) and value else value for value in values]
+    return any(isinstance(value, dict) and value for value in first)
+
+
+def test_the_config_reference_shows_every_key_with_its_default(readme: str, tmp_path: Path) -> None:
+    texts = re.findall(r"<!-- config reference -->\n```yaml\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
+    shown: dict[tuple[str, str], list[Any]] = {}
+    for text in texts:
+        (tmp_path / "part.yaml").write_text(text, encoding="utf-8")
+        data = read_yaml(tmp_path / "part.yaml").data
+        for block, key, value in examples("", config_schema(), data):
+            shown.setdefault((block, key), []).append(value)
+    known = {(block, key): value for block, key, value in config_keys()}
+    assert set(known) - set(shown) == set()
+    assert set(shown) - set(known) == set()
+    assert [
+        f"{'.'.join(place)}: {shown[place]}, by default {schema['default']}"
+        for place, schema in known.items()
+        if "default" in schema and not holds_blocks(shown[place]) and schema["default"] not in shown[place]
+    ] == []
 
 
 def test_every_config_key_says_what_it_is() -> None:
