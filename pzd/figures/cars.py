@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.figures.canvas import COLOURS, INK, SOFT, key, panels
+from pzd.figures.canvas import COLOURS, INK, PLAIN, SOFT, key, panels
 from pzd.figures.evidence import Evidence
 from pzd.figures.figure import Drawing
 from pzd.paper.car_search import CONTROLLED_PEAKS, CarRow, closest, stored
@@ -22,10 +22,10 @@ def survey(evidence: Evidence) -> Drawing:
     for ax, tie_break, colour in zip(axes, TIE_BREAKS, COLOURS, strict=False):
         cars = [row for row in rows if row.tie_break == tie_break]
         best = closest(cars)
-        _spread(ax, cars, SOFT, 0.35, "plausible cars, spread for 1 %")
+        _spread(ax, cars, SOFT, 0.7, "plausible cars, spread for 1 %")
         ax.plot([c.controlled[0] for c in cars], [c.controlled[1] for c in cars], ".", color=colour, markersize=3.5)
-        _spread(ax, [best], INK, 1.0, "closest")
-        ax.plot(*CONTROLLED_PEAKS, "*", color="#d55e00", markersize=11, label="paper", zorder=4)
+        _spread(ax, [best], INK, 1.0, "closest", 1.6)
+        ax.plot(*CONTROLLED_PEAKS, "o", color=PLAIN, markersize=11, markerfacecolor="none", label="paper", zorder=4)
         ax.set_title(f"{ax.get_title(loc='left')} {tie_break}", loc="left", fontsize=9.5)
         ax.set_xlabel("controlled peak at 2.25 Hz [m/s²]")
         ax.set_ylabel("controlled peak at 4.5 Hz [m/s²]")
@@ -40,7 +40,7 @@ def survey(evidence: Evidence) -> Drawing:
     return Drawing("cars", figure, "Controlled peaks of all plausible cars under three tie-breaks.", caption)
 
 
-def _spread(ax: Axes, cars: list[CarRow], colour: str, alpha: float, label: str) -> None:
+def _spread(ax: Axes, cars: list[CarRow], colour: str, alpha: float, label: str, width: float = 0.6) -> None:
     x, y = [c.controlled[0] for c in cars], [c.controlled[1] for c in cars]
     across = [
         [c.controlled[0] - c.controlled_a_low_m_per_s2 for c in cars],
@@ -50,7 +50,18 @@ def _spread(ax: Axes, cars: list[CarRow], colour: str, alpha: float, label: str)
         [c.controlled[1] - c.controlled_b_low_m_per_s2 for c in cars],
         [c.controlled_b_high_m_per_s2 - c.controlled[1] for c in cars],
     ]
-    ax.errorbar(x, y, along, across, fmt="none", ecolor=colour, elinewidth=0.6, alpha=alpha, label=label)
+    ax.errorbar(
+        x,
+        y,
+        along,
+        across,
+        fmt="none",
+        ecolor=colour,
+        elinewidth=width,
+        alpha=alpha,
+        label=label,
+        zorder=3 if width > 1 else 1,
+    )
 
 
 def _told(row: CarRow) -> str:

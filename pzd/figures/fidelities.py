@@ -132,8 +132,9 @@ def _share(evidence: Evidence) -> str:
         constant = abs(harmonic_response(car, DAMPING, frequency, AMPLITUDE, SPEED)[1])
         controlled = evidence.ride(frequency, "comfort", "ideal").peak_abs_aK_m_per_s2
         share = (constant - soft[n]) / (constant - controlled)
+        judged = f"{share:.0%} of the gain" if share > 0.0 else "worse than the larger c"
         said.append(
             f"{constant:.2f} to {controlled:.2f} m/s² at {frequency:g} Hz, where c_min alone gives {soft[n]:.2f}"
-            f" ({share:.0%} of the gain)"
+            f" ({judged})"
         )
     return f"Control takes the peak from {' and from '.join(said)}."

@@ -43,12 +43,12 @@ class Pen:
         self._ax.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": INK, "shrinkA": 0, "shrinkB": 0})
 
     def turn(self, x: float, y: float, radius: float) -> None:
-        """An arrow that turns clockwise about a place."""
-        angle = np.linspace(np.pi * 0.75, np.pi * 0.1, 30)
+        """An arrow that turns counterclockwise about a place."""
+        angle = np.linspace(np.pi * 0.25, np.pi * 0.9, 30)
         self._ax.plot(x + radius * np.cos(angle), y + radius * np.sin(angle), color=INK, linewidth=1.1)
         self.arrow(
             (x + radius * float(np.cos(angle[-2])), y + radius * float(np.sin(angle[-2]))),
-            (x + radius * float(np.cos(angle[-1])) + 0.01, y + radius * float(np.sin(angle[-1])) - 0.06),
+            (x + radius * float(np.cos(angle[-1])) - 0.01, y + radius * float(np.sin(angle[-1])) - 0.06),
         )
 
     def measure(self, start: float, end: float, height: float, name: str) -> None:
