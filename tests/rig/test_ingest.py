@@ -137,6 +137,14 @@ def test_the_control_may_be_a_current_from_the_name_of_the_file(tmp_path: Path) 
     )
 
 
+def test_a_preamble_that_was_not_skipped_is_hinted_at(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", ["made by a logger", *lines(CANONICAL)])
+    assert "say skip" in refused(tmp_path)[-1]
+    text = lines(CANONICAL)
+    write(tmp_path / "a.csv", [*text[:9], *[f"{line},1" for line in text[9:20]], *text[20:]])
+    assert "say skip" not in refused(tmp_path)[-1]
+
+
 def test_several_tests_in_one_file_are_numbered(tmp_path: Path) -> None:
     pause = np.concatenate((TIME, TIME + 60.0))
     event = [""] * pause.size

@@ -214,7 +214,10 @@ def _uneven(
         f"{at(path, int(lines[r]))}: {fields[r]} fields where the header has {wanted} (separator {separator!r})"
         for r in rows[:MOST_FAULTS]
     ]
-    return shown + ([f"{at(path)}: and {rows.size - MOST_FAULTS} more such lines"] if rows.size > MOST_FAULTS else [])
+    if rows.size <= MOST_FAULTS:
+        return shown
+    hint = "; if the header stands further down, say skip: lines above it" if rows.size > lines.size // 2 else ""
+    return [*shown, f"{at(path)}: and {rows.size - MOST_FAULTS} more such lines{hint}"]
 
 
 def _ends_before_the_event(entry: FilesEntry, header: list[str], fields: NDArray[np.int64]) -> NDArray[np.bool_]:
