@@ -9,14 +9,26 @@ Where a piece of the path leaves its regime, the moment is found by bracketing a
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.compiled import compiled
 from pzd.damper.dormand_prince import STAGES
-from pzd.damper.flow import DELTA, T0, K, smooth_force, spring_extension
+from pzd.damper.flow import DELTA, T0, C, K, Row, smooth_force, spring_extension
 from pzd.damper.pieces import Step, piece, row_in
-from pzd.damper.regimes import SMOOTH, STICK, beyond, deflection_at, onto_edge, regime_of, speed_at, spring_force
+from pzd.damper.regimes import (
+    SMOOTH,
+    STICK,
+    beyond,
+    deflection_at,
+    onto_edge,
+    over_yield,
+    regime_of,
+    speed_at,
+    spring_force,
+)
 from pzd.damper.rows import interpolate, row_of
 
 Array = NDArray[np.float64]
@@ -29,6 +41,7 @@ _MOST_PIECES = 2000
 _MOST_BRACKETS = 60
 _FALSE_POSITIONS = 12  # then bisection, which cannot creep
 _ON_EDGE = 1e-13  # of the force
+_OFF_EDGE = 1e-6  # of a piece
 _SAME_FORCE = 1e-11  # of the force; a saved flow speed that gives it within this is kept
 
 
@@ -46,13 +59,14 @@ def advance(state: Array, step: Step, tolerance: float, stages: Array, booked: b
     """
     e, w, at, dt = state[DEFLECTION], state[SPEED], 0.0, step.h
     force = abs(spring_force(e, step.p0))
+    size = size_of(step)
     regime, side = regime_of(spring_force(e, step.p0), step.p0)
     if regime != SMOOTH or abs(smooth_force(w, step.p0, side) - force) > _SAME_FORCE * force:
         w = speed_at(force, step.p0, regime, side, w)
     for _ in range(_MOST_PIECES):
         dt = min(dt, step.h - at)
         end, speed, error = piece(e, w, at, dt, regime, side, step, stages)
-        allowed = tolerance * (abs(spring_force(e, step.p1)) + step.p1[T0])
+        allowed = tolerance * (abs(spring_force(e, step.p1)) + size)
         if error > allowed and dt > 1e-7 * step.h:
             dt *= max(0.2, 0.9 * (allowed / error) ** 0.2)
             continue
@@ -77,19 +91,38 @@ def advance(state: Array, step: Step, tolerance: float, stages: Array, booked: b
 
 
 @compiled
+def size_of(step: Step) -> float:
+    """How large the force of a step is at least [N], where it passes through zero too: T0 + C |u|."""
+    return step.p1[T0] + step.p1[C] * max(abs(step.u0), abs(step.u1))
+
+
+@compiled
+def _miss(e: float, p: Row, regime: int, side: float) -> float:
+    """How far the state lies past the edge that is looked for [N], negative before it."""
+    return over_yield(e, p, side) if regime == STICK else beyond(e, p, regime, side)[0]
+
+
+@compiled
 def _crossing(
     e: float, w: float, at: float, dt: float, over: float, regime: int, side: float, step: Step, stages: Array
 ) -> float:
     """Length of the piece that ends on the edge of its regime: Illinois' false position, then bisection."""
-    start, _ = beyond(e, row_in(step, at), regime, side)
-    low, high, below, above = 0.0, dt, min(start, 0.0), over
+    size = abs(spring_force(e, step.p0)) + size_of(step)
+    if regime == STICK:
+        end, _, _ = piece(e, w, at, dt, regime, side, step, stages)
+        side = math.copysign(1.0, end)
+    low, high, below, above = 0.0, dt, min(_miss(e, row_in(step, at), regime, side), 0.0), over
+    if regime == STICK and below > -_ON_EDGE * size:  # it starts on this edge: look for where it comes back
+        low = _OFF_EDGE * dt
+        end, _, _ = piece(e, w, at, low, regime, side, step, stages)
+        below = min(_miss(end, row_in(step, at + low), regime, side), 0.0)
     for i in range(_MOST_BRACKETS):
         middle = (low * above - high * below) / (above - below)
         if i > _FALSE_POSITIONS or not low < middle < high:
             middle = 0.5 * (low + high)
         end, _, _ = piece(e, w, at, middle, regime, side, step, stages)
-        miss, _ = beyond(end, row_in(step, at + middle), regime, side)
-        if abs(miss) <= _ON_EDGE * (abs(spring_force(end, step.p0)) + step.p0[T0]) or high - low <= 1e-15 * step.h:
+        miss = _miss(end, row_in(step, at + middle), regime, side)
+        if abs(miss) <= _ON_EDGE * size or high - low <= 1e-15 * step.h:
             return middle
         if miss > 0.0:
             high, above = middle, miss

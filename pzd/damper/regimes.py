@@ -37,17 +37,23 @@ def regime_of(force: float, p: Row) -> tuple[int, float]:
 
 
 @compiled
+def over_yield(e: float, p: Row, side: float) -> float:
+    """How far the force lies above breakaway on one side [N]; inside the lash it counts on below zero."""
+    return p[K] * (side * e - 0.5 * p[DELTA]) - breakaway(p, side)
+
+
+@compiled
 def beyond(e: float, p: Row, regime: int, side: float) -> tuple[float, int]:
     """How far the state lies outside its regime, as a force [N], and past which edge: -1 low, 1 high.
 
-    Negative inside; inside the lash the force counts on below zero, so that its edges are seen.
+    Negative inside; `side` is not looked at in STICK.
     """
     if regime == STICK:
-        return p[K] * (abs(e) - 0.5 * p[DELTA]) - breakaway(p, math.copysign(1.0, e)), 1
-    force = p[K] * (side * e - 0.5 * p[DELTA])
+        return over_yield(e, p, math.copysign(1.0, e)), 1
+    below = -over_yield(e, p, side)
+    above = breakaway(p, side) - below - relief(p, side)
     if regime == RELIEF:
-        return relief(p, side) - force, -1
-    below, above = breakaway(p, side) - force, force - relief(p, side)
+        return -above, -1
     return (below, -1) if below > above else (above, 1)
 
 

@@ -204,3 +204,14 @@ def test_a_voltage_that_is_needed_and_not_given_is_said() -> None:
     blind = Motion(motion.time, motion.displacement, motion.velocity, motion.acceleration)
     with pytest.raises(ValueError, match="depends on the voltage"):
         respond(PLAIN, blind)
+
+
+@pytest.mark.parametrize("friction", [0.0, 1e-9, 0.05, 3.0])
+def test_a_stick_that_begins_on_its_edge_finds_the_far_edge(friction: float, fresh_seeds) -> None:
+    rng = np.random.default_rng(fresh_seeds(1)[0])
+    weak = Damper(base=(BaseRow(T0_N=friction, C_Ns_per_m=2816.0, k_N_per_m=1.64e5),))
+    x = np.cumsum(rng.normal(0.0, 1e-4, 600))
+    flat = np.zeros_like(x)
+    ours = respond(weak, Motion(TIME, x, flat, flat))
+    exact = element_force(x, STEP, friction, 2816.0, 1.64e5)
+    np.testing.assert_allclose(ours, exact, rtol=0, atol=1e-8 * np.max(np.abs(exact)))
