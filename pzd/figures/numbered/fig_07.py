@@ -66,7 +66,7 @@ def draw(evidence: Evidence) -> Iterator[Drawing]:
     ax.plot(minutes, temperature, color=FINAL)
     for value, text in ((start, f"{start:g} °C, Figure 7a"), (end, f"{end:g} °C, Figure 7b")):
         ax.axhline(value, color=PLAIN, linewidth=1.0, linestyle="--")
-        ax.annotate(text, (minutes[-1], value), (0, -11), textcoords="offset points", ha="right", color=PLAIN)
+        ax.annotate(text, (0.0, value), (4, -11), textcoords="offset points", color=PLAIN)
     ax.axhline(AMBIENT, color=SOFT, linewidth=0.8)
     ax.annotate("ambient 22 °C", (minutes[-1], AMBIENT), (0, 3), textcoords="offset points", ha="right")
     ax.set_xlim(0.0, float(minutes[-1]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.figures.canvas import FINAL, MEASURED
+from pzd.figures.canvas import MEASURED, PLAIN
 from pzd.figures.evidence import Condition, Evidence, Sine
 from pzd.figures.figure import Drawing, PaperFigure
 from pzd.figures.planes import Curve, both_planes, fitted, over_last_cycle
@@ -20,7 +20,7 @@ def draw(evidence: Evidence) -> Iterator[Drawing]:
     cycle = test.cycle()
     curves = [
         Curve("measured", cycle, test, MEASURED),
-        Curve("model", over_last_cycle(test, force), colour=FINAL, style={"linestyle": "--"}),
+        Curve("model", over_last_cycle(test, force), colour=PLAIN, style={"linestyle": "--", "linewidth": 1.3}),
     ]
     caption = f"{AT}, {SINE}: W_s = {w_s:.2e}; peak measured {cycle.peak:.0f} N, model {curves[1].loop.peak:.0f} N."
     yield Drawing("planes", both_planes(curves), "Measured and modelled force on both planes at 100 V.", caption)

@@ -40,10 +40,11 @@ def draw(evidence: Evidence) -> Iterator[Drawing]:
     ax.annotate(r"$V_i$", (speed, 0.0), (0, -12), textcoords="offset points", ha="center")
     ax.annotate(r"$T_i$", (0.0, force), (-6, 0), textcoords="offset points", ha="right", va="center")
     ax.annotate(r"$\alpha_i$", (speed, force), (5, -9), textcoords="offset points")
-    for text, curve, offset in ((r"$\alpha_{min}$", low, -12), (r"$\alpha_{max}$", high, 6)):
-        ax.annotate(text, tuple(curve[-1]), (-8, offset), textcoords="offset points", ha="right")
+    for text, curve in ((r"$\alpha_{min}$", low), (r"$\alpha_{max}$", high)):
+        ax.annotate(text, tuple(curve[-1]), (4, -3), textcoords="offset points")
     ax.axhline(0.0, color=SOFT, linewidth=0.8)
     ax.axvline(0.0, color=SOFT, linewidth=0.8)
+    ax.set_xlim(right=1.18 * float(low[-1, 0]))
     ax.set_xlabel(VELOCITY)
     ax.set_ylabel(FORCE)
     key(figure, ax, 5)
