@@ -21,7 +21,6 @@ from pzd.artefacts import (
     Identified,
     InverseRow,
     ParameterRow,
-    Record,
     RecordEntry,
     Region,
     Report,
@@ -38,6 +37,7 @@ from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
 from pzd.pipeline.stages import Stage
 from pzd.quantities import Control
+from pzd.record import Record
 from pzd.report.config import ReportConfig
 from pzd.rig.config import RigConfig
 from pzd.rig.listing import listed
