@@ -1,9 +1,4 @@
-"""The valve of the paper's damper, calibrated on its published rig forces, and the damper of the virtual stand.
-
-The oil is pressed through a slot of width h, laminar with a turbulent share. The stack closes the
-slot by its stroke s(U), and the pressure pushes it open again by a compliance:
-
-    F = T0(T) + F_v,   F_v = c exp(-beta (T - 22)) v / h^3 + b v^2 / h^2,   h = h0 + e - s(U) + kappa F_v
+"""The valve of the paper's damper, calibrated on its published rig forces.
 
 What fixes what: c the peaks of 0 V at gap 0.25 mm (F5-0, F6-2), b the peak at half the speed (F6-1),
 the zero error e of the micrometer screw the peak of 0 V at gap 0.15 mm (F4-0), the stroke of 150 V and
@@ -17,25 +12,15 @@ value of the test of F5-0 and F6-2; it pulls within their range.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from pzd.damper.effects.shear_thinning import REFERENCE_SPEED
-from pzd.damper.model import BaseRow, Damper
-from pzd.paper.loop import Loop, loop_of
-from pzd.paper.published import AT_ZERO, LARGE_GAP, PEAK, SMALL_GAP, Published, published, rig_tests, span
+from pzd.paper.loop import loop_in
+from pzd.paper.published import AT_ZERO, PEAK, Published, rig_tests, span
+from pzd.paper.valve import COLD_DEGC, HOT_DEGC, Valve, peak_force, stand_damper
 from pzd.record import Array
 
-INITIAL_GAPS = {SMALL_GAP: 0.15e-3, LARGE_GAP: 0.25e-3}
-"""Width of the slot as the paper sets it [m]."""
-REFERENCE_DEGC, COLD_DEGC, HOT_DEGC = 22.0, 23.0, 43.0
-"""Temperatures of Figures 4 to 6, and of the two curves of Figures 8 and 9 [degC]."""
-STIFFNESS = 5.0e6
-"""Oil spring of the stand [N/m]. The published forces bound it from below only: `least_stiffness`."""
-FULL_STROKE = 85e-6
-"""Free stroke of the stack at 150 V by its maker (STROKE) [m]."""
 _TOLERANCE = 0.02
 _SHARE_OF_SPAN = 0.8  # where the paper prints several values for a test, the fit keeps this far inside of them
 _SCALES = {
@@ -50,88 +35,6 @@ _SCALES = {
     "viscosity_fall": 0.006,
 }
 """Where the fit starts, and the unit in which it steps."""
-
-
-@dataclass(frozen=True)
-class Valve:
-    """The parameters of the valve and of the seal."""
-
-    laminar: float
-    """c at 22 degC [N m2 s]."""
-    turbulent: float
-    """b [N s2]."""
-    compliance: float
-    """kappa: opening of the slot by the damper's force [m/N]."""
-    zero_error: float
-    """e: by how much the slot is wider than the micrometer screw says [m]."""
-    stroke_50: float
-    """Stroke of the stack at 50 V [m]."""
-    stroke_100: float
-    """At 100 V, in the test of Figure 5 [m]."""
-    stroke_100_small: float
-    """At 100 V, in the test of Figure 4 [m]."""
-    stroke_150: float
-    """At 150 V [m]."""
-    viscosity_fall: float
-    """beta: relative fall of c a kelvin [1/K]."""
-    friction: float
-    """T0 at 23 degC [N]."""
-    friction_fall: float
-    """Relative fall of T0 a kelvin [1/K]."""
-
-    def stroke(self, setting: str, voltage: float) -> float:
-        """Stroke of the unloaded stack [m]."""
-        at_100 = self.stroke_100_small if setting == SMALL_GAP else self.stroke_100
-        return {0.0: 0.0, 50.0: self.stroke_50, 100.0: at_100, 150.0: self.stroke_150}[voltage]
-
-    def friction_at(self, temperature: float) -> float:
-        """T0 [N] at a temperature [degC]."""
-        return self.friction * math.exp(-self.friction_fall * (temperature - COLD_DEGC))
-
-
-def flow_force(valve: Valve, setting: str, voltage: float, temperature: float, speed: float) -> float:
-    """Force that presses the oil through the slot.
-
-    Equation: F_v = c v / h^3 + b v^2 / h^2, h = h0 + e - s(U) + kappa F_v
-              Source: plane Poiseuille flow, c ~ viscosity, and a sharp edge; Merritt 1967, Hydraulic Control Systems
-
-    Parameters
-    ----------
-    valve : its parameters
-    setting : which gap
-    voltage : at the stack [V]
-    temperature : of the damper [degC]
-    speed : of the piston, >= 0 [m/s]
-
-    Returns
-    -------
-    F_v [N]
-    """
-    from scipy.optimize import brentq
-
-    viscous = valve.laminar * math.exp(-valve.viscosity_fall * (temperature - REFERENCE_DEGC)) * speed
-    inertial = valve.turbulent * speed * speed
-    shut = INITIAL_GAPS[setting] + valve.zero_error - valve.stroke(setting, voltage)
-
-    def excess(force: float) -> float:
-        gap = shut + valve.compliance * force
-        return force * gap**3 - viscous - inertial * gap
-
-    return float(brentq(excess, 0.0, 1e6, xtol=1e-9))
-
-
-def peak_speed(row: Published) -> float:
-    """Largest speed of a sinusoidal test [m/s]."""
-    if row.frequency_Hz is None or row.amplitude_m is None:
-        raise ValueError(f"{row.id} is no test of the damper")
-    return 2.0 * math.pi * row.frequency_Hz * row.amplitude_m
-
-
-def peak_force(valve: Valve, row: Published) -> float:
-    """Peak force [N] of the test of a published row, the oil spring rigid."""
-    temperature = row.temperature_C or REFERENCE_DEGC
-    flow = flow_force(valve, row.setting or "", row.voltage_V or 0.0, temperature, peak_speed(row))
-    return valve.friction_at(temperature) + flow
 
 
 def calibrate() -> Valve:
@@ -180,86 +83,5 @@ def _fit_friction(valve: Valve) -> Valve:
 
 
 def _friction_for(valve: Valve, row: Published) -> float:
-    loaded = test_loop(stand_damper(valve, row.setting or ""), row).at_zero - valve.friction_at(row.temperature_C or 0)
+    loaded = loop_in(stand_damper(valve, row.setting or ""), row).at_zero - valve.friction_at(row.temperature_C or 0)
     return row.number - loaded
-
-
-def test_loop(damper: Damper, row: Published) -> Loop:
-    """The settled loop of a damper in the test of a published row."""
-    if row.frequency_Hz is None or row.amplitude_m is None:
-        raise ValueError(f"{row.id} is no test of the damper")
-    return loop_of(damper, row.frequency_Hz, row.amplitude_m, row.voltage_V, row.temperature_C)
-
-
-def stand_damper(valve: Valve, setting: str, stiffness: float = STIFFNESS) -> Damper:
-    """The damper that the virtual stand tests: Bingham rows, and a flow curve that bends as the slot opens.
-
-    A slot that the pressure opens gives less than proportional forces. Of the effects, `shear_thinning` has
-    that shape: its C and n are those of the curve through the forces at the largest test speed and at half of it.
-
-    Parameters
-    ----------
-    valve : its parameters
-    setting : which gap
-    stiffness : of the oil spring [N/m]
-    """
-    speed = _largest_speed(setting)
-    indices = {u: _flow_index(valve, setting, u, speed) for u in _voltages(setting)}
-    rows = tuple(
-        BaseRow(
-            voltage_V=u,
-            temperature_degC=t,
-            T0_N=valve.friction_at(t),
-            C_Ns_per_m=_coefficient(flow_force(valve, setting, u, t, speed), speed, n),
-            k_N_per_m=stiffness,
-        )
-        for t in _temperatures(setting)
-        for u, n in indices.items()
-    )
-    thinning = {"n": tuple(indices.values()), "at_voltage_V": tuple(indices)}
-    return Damper(base=rows, effects={"shear_thinning": thinning})
-
-
-def _flow_index(valve: Valve, setting: str, voltage: float, speed: float) -> float:
-    full, half = (flow_force(valve, setting, voltage, REFERENCE_DEGC, share * speed) for share in (1.0, 0.5))
-    return min(math.log2(full / half), 1.0)
-
-
-def _coefficient(force: float, speed: float, index: float) -> float:
-    """C [N s/m] of the power law through one force [N] at one speed [m/s]."""
-    return force / (REFERENCE_SPEED * (speed / REFERENCE_SPEED) ** index)
-
-
-def _tests(setting: str) -> Iterator[Published]:
-    return (row for row in rig_tests() if row.setting == setting)
-
-
-def _voltages(setting: str) -> list[float]:
-    return sorted({row.voltage_V or 0.0 for row in _tests(setting)})
-
-
-def _temperatures(setting: str) -> list[float]:
-    """The hot row only where the paper tested hot."""
-    hot = any((row.temperature_C or 0.0) == HOT_DEGC for row in _tests(setting))
-    return [REFERENCE_DEGC, HOT_DEGC] if hot else [REFERENCE_DEGC]
-
-
-def _largest_speed(setting: str) -> float:
-    return max(peak_speed(row) for row in _tests(setting))
-
-
-def least_stiffness() -> Mapping[str, float]:
-    """The softest oil spring [N/m] with which the force at zero velocity can be as small as published, by id.
-
-    Without any friction the spring still carries C^2 A (2 pi f)^2 / k when the piston turns, C being the
-    slope that the published peak asks for.
-
-    Equation: k >= C^2 A (2 pi f)^2 / F(0), C = F_peak / (2 pi f A)      Source: eq. (1)-(3) at small C / k
-    """
-    found = {}
-    for at_zero, peak in (("F8z-23", "F8-23"), ("F8z-43", "F8-43")):
-        row = published()[at_zero]
-        speed = peak_speed(row)
-        slope = published()[peak].number / speed
-        found[at_zero] = slope**2 * speed**2 / ((row.amplitude_m or 1.0) * row.number)
-    return found

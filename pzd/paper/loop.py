@@ -10,6 +10,7 @@ import numpy as np
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
+from pzd.paper.published import Published
 from pzd.record import Array
 
 _SAMPLES = 2000  # in a cycle
@@ -57,3 +58,15 @@ def loop_of(
     force = respond(damper, Motion(time, x, v, a, *constant))
     last = slice((_CYCLES - 1) * _SAMPLES, -1)
     return Loop(x[last], v[last], force[last])
+
+
+def loop_in(damper: Damper, row: Published) -> Loop:
+    """The settled loop of a damper in the test of a published row.
+
+    Raises
+    ------
+    ValueError : when the row is no test of the damper
+    """
+    if row.frequency_Hz is None or row.amplitude_m is None:
+        raise ValueError(f"{row.id} is no test of the damper")
+    return loop_of(damper, row.frequency_Hz, row.amplitude_m, row.voltage_V, row.temperature_C)

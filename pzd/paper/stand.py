@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pzd.damper.model import BaseRow, Damper
-from pzd.paper.calibration import Valve, stand_damper
 from pzd.paper.published import LARGE_GAP, SMALL_GAP
+from pzd.paper.valve import Valve, stand_damper
 
 
 def rounded(damper: Damper) -> Damper:

@@ -33,10 +33,11 @@ def report(
 
     Returns
     -------
-    the comfort rows and the page
+    the comfort rows, the page, and the paper's numbers where the config asks for them
     """
     from pzd.report.comfort.ride import assess, settled
     from pzd.report.page import page
+    from pzd.report.published import published_rows
     from pzd.report.story import Story
     from pzd.simulate.roads.sine import Sine
 
@@ -62,4 +63,5 @@ def report(
         control=control,
         setting=setting,
     )
-    return Report(comfort=comfort, page=page(story))
+    published = published_rows(simulate, identified, rides, comfort) if report.published else None
+    return Report(comfort=comfort, page=page(story), published=published)
