@@ -117,15 +117,15 @@ def test_a_neighbour_differs_in_one_parameter_by_1_percent() -> None:
 
 @pytest.mark.parametrize("tie_break", TIE_BREAKS)
 def test_the_short_ride_gives_the_peaks_of_the_whole_simulation(config: RunConfig, tie_break) -> None:
+    import numpy as np
+
+    from pzd.damper.model import BaseRow, Damper
     from pzd.simulate.dampers import oil_of
     from pzd.simulate.plan import Case
     from pzd.simulate.policies import policies
     from pzd.simulate.riding import ride_case
     from pzd.simulate.road import Way
     from pzd.simulate.scene import Grid
-
-    import numpy as np
-    from pzd.damper.model import BaseRow, Damper
 
     simulate = config.simulate.model_copy(update={"tie_break": tie_break})
     oil = oil_of(Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=1e3, k_N_per_m=1e5),)), None, 0.0)

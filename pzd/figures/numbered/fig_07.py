@@ -20,6 +20,9 @@ AMBIENT = 22.0
 COLD, WARM = "F8-23", "F8-43"
 """The tests between whose temperatures the dissipated power is interpolated."""
 _STEP = 1.0
+"""Of the heating [s]."""
+_STALLED = 1e-5
+"""Below this rate the temperature counts as settled [K/s]."""
 
 
 def heating(power_cold: float, power_warm: float, start: float, end: float) -> tuple[list[float], list[float]]:
@@ -45,7 +48,7 @@ def heating(power_cold: float, power_warm: float, start: float, end: float) -> t
         now = temperatures[-1]
         power = power_cold + (power_warm - power_cold) * (now - 23.0) / 20.0
         rate = (power - EXCHANGE_W_PER_M2_K * AREA_M2 * (now - AMBIENT)) / (MASS_KG * HEAT_J_PER_KG_K)
-        if rate <= 0.0:
+        if rate <= _STALLED:
             raise LookupError(f"{power:.0f} W do not warm the damper beyond {now:.1f} °C")
         times.append(times[-1] + _STEP)
         temperatures.append(now + _STEP * rate)
