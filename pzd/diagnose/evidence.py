@@ -22,6 +22,9 @@ from pzd.record import Array, voltage_scale
 
 Mask = NDArray[np.bool_]
 
+PER_SAMPLE = 3.0
+"""Time constants C/k of an element that fit into one sample at most."""
+
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
@@ -86,8 +89,9 @@ def evidence_of(prepared: Sequence[Prepared], parts: Split, damper: Damper, conf
     if reference is None:
         known = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
         reference = float(np.median(known)) if known else None
+    fastest = PER_SAMPLE * max(p.record.rate for p in prepared)
     problems = [
-        Problem(part, damper.base, scales, reference)
+        Problem(part, damper.base, scales, fastest, reference)
         for part in (whole, *(observed([r == role for r in parts.roles]) for role in (TRAINING, VALIDATION)))
     ]
     return Evidence(tuple(prepared), seen, problems[0], (problems[1], problems[2]))

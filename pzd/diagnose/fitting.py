@@ -25,6 +25,8 @@ DIFFERENCE = 1e-4
 MOST_EVALUATIONS = 20
 BOUND = 1e3
 """No scaled parameter is looked for beyond this, nor one with ratio steps below its inverse."""
+STIFFER = 2.0
+"""By this factor the search may exceed the fastest element."""
 WIDEST = 3.0
 """C and k stay within e^3 = 20 times their starting values."""
 
@@ -104,6 +106,8 @@ class Problem:
     base: tuple[BaseRow, ...]
     """Labels and starting values of the base rows."""
     scales: Scales
+    fastest: float
+    """Largest k / C that is looked for [1/s]: an element that answers within a sample shows no spring."""
     reference: float | None = None
     """T_ref for temperature drift [degC]."""
 
@@ -117,8 +121,12 @@ class Problem:
 
     def start(self) -> Array:
         """(3 b,) the base rows in the units of the search."""
+        stiffest = [min(r.k_N_per_m, self.fastest * r.C_Ns_per_m) for r in self.base]
         return np.concatenate(
-            [(r.T0_N / self.scales.force, np.log(r.C_Ns_per_m), np.log(r.k_N_per_m)) for r in self.base]
+            [
+                (r.T0_N / self.scales.force, np.log(r.C_Ns_per_m), np.log(k))
+                for r, k in zip(self.base, stiffest, strict=True)
+            ]
         )
 
     def point(self, searched: Array, unknowns: Sequence[Unknown]) -> Point:
@@ -226,6 +234,7 @@ def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array
     start = problem.start().reshape(-1, 3)
     low, high = start - WIDEST, start + WIDEST
     low[:, 0], high[:, 0] = 0.0, 2.0
+    high[:, 2] = np.minimum(high[:, 2], start[:, 1] + np.log(STIFFER * problem.fastest))
     limits = [u.bounds for u in unknowns]
     return (
         np.array([*low.ravel(), *(lower for lower, _ in limits)]),

@@ -26,7 +26,8 @@ CLEAR = 4.0
 FINER = 16
 """Points per sample on which the cleaned cycle is laid."""
 COVERS = 0.5
-"""The repeating run must cover this share of the record, else the record counts as not repeating."""
+"""The repeating run must hold this share of the way that the piston travels, else the record counts as not
+repeating; rest before and after does not count."""
 ABOVE_FLOOR = 4.0
 """The spectrum of a motion that does not repeat is cut where it comes within this factor of its floor."""
 MEDIAN = 0.4549
@@ -60,9 +61,12 @@ def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
 
 def _prepared(record: Record, constant: bool) -> Prepared:
     run = cycles(record.time, record.displacement)
-    if run is None or run.count * run.period < COVERS * (record.time[-1] - record.time[0]):
+    if run is None:
         return Prepared(_smoothed(record), None, None, constant)
     inside = run.inside(record.time)
+    travel = np.abs(np.gradient(record.displacement))
+    if travel[inside].sum() < COVERS * travel.sum():
+        return Prepared(_smoothed(record), None, None, constant)
     motion = _mean_motion(record, run)
     kept = sliced(record, inside)
     cleaned = _moved(kept, motion(kept.time))

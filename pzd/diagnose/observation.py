@@ -146,9 +146,9 @@ def _kinematics(record: Record) -> tuple[Array, Array, Array]:
 def _cycle_motion(record: Record, period: float, points: int, channels: Sequence[Array]) -> tuple[Motion, int, int]:
     """Two cycles of the mean motion, the first to settle in, on a grid fine enough to simulate."""
     factor = int(np.ceil(CYCLE_POINTS / points))
-    fine = np.stack([_refined(channel, factor) for channel in channels])
+    fine: Array = np.stack([_refined(channel, factor) for channel in channels])
     count = points * factor
-    time = period / count * np.arange(2 * count)
+    time: Array = np.arange(2 * count, dtype=np.float64) * (period / count)
     temperature = record.median_temperature()
     voltage = record.median_voltage()
     twice = np.concatenate([fine, fine], axis=1)
