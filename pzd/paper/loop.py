@@ -13,7 +13,8 @@ from pzd.damper.motion import Motion
 from pzd.paper.published import Published
 from pzd.record import Array
 
-_SAMPLES = 2000  # in a cycle
+_SAMPLES = 2000
+"""In a cycle, unless asked for otherwise; a multiple of 4."""
 _CYCLES = 2  # the second is settled
 
 
@@ -38,7 +39,12 @@ class Loop:
 
 
 def loop_of(
-    damper: Damper, frequency: float, amplitude: float, voltage: float | None, temperature: float | None
+    damper: Damper,
+    frequency: float,
+    amplitude: float,
+    voltage: float | None,
+    temperature: float | None,
+    samples: int = _SAMPLES,
 ) -> Loop:
     """The settled loop of a damper under x = A sin(2 pi f t).
 
@@ -49,14 +55,15 @@ def loop_of(
     amplitude : A [m]
     voltage : constant [V]; None where the damper has none
     temperature : constant [degC]; None where the damper has none
+    samples : in a cycle, a multiple of 4
     """
     rate = 2.0 * math.pi * frequency
-    time = np.arange(_CYCLES * _SAMPLES + 1) / (_SAMPLES * frequency)
+    time = np.arange(_CYCLES * samples + 1) / (samples * frequency)
     phase = rate * time
     constant = [None if value is None else np.full(time.size, value) for value in (voltage, temperature)]
     x, v, a = amplitude * np.sin(phase), amplitude * rate * np.cos(phase), -amplitude * rate**2 * np.sin(phase)
     force = respond(damper, Motion(time, x, v, a, *constant))
-    last = slice((_CYCLES - 1) * _SAMPLES, -1)
+    last = slice((_CYCLES - 1) * samples, -1)
     return Loop(x[last], v[last], force[last])
 
 
