@@ -94,17 +94,17 @@ def flow_force(valve: Valve, setting: str, voltage: float, temperature: float, s
 
 
 VALVE = Valve(
-    laminar=4.819e-8,
-    turbulent=4.854e-5,
-    compliance=7.253e-9,
-    zero_error=-18.14e-6,
-    stroke_50=10.35e-6,
-    stroke_100=36.92e-6,
-    stroke_100_small=43.83e-6,
-    stroke_150=60.35e-6,
-    viscosity_fall=0.0064,
-    friction=151.84,
-    friction_fall=0.04471,
+    laminar=4.81916e-08,
+    turbulent=4.85361e-05,
+    compliance=7.25276e-09,
+    zero_error=-1.81378e-05,
+    stroke_50=1.03458e-05,
+    stroke_100=3.69217e-05,
+    stroke_100_small=4.38318e-05,
+    stroke_150=6.03509e-05,
+    viscosity_fall=0.00640039,
+    friction=151.836,
+    friction_fall=0.0447096,
 )
 """What `calibrate` finds; the dampers of configs/paper.yaml are written from it."""
 
