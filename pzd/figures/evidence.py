@@ -125,11 +125,11 @@ class Evidence:
         ------
         LookupError : when the rig has none
         """
-        records = {record.name: record for record in self.rig.records}
-        for measure in self.identified.measures:
-            if _is(measure, condition) and _swings(measure, sine):
-                return Test(records[measure.record], measure)
-        raise LookupError(f"the rig has no test at {condition}, {sine}")
+        found = [one for one in self.identified.measures if _is(one, condition) and _swings(one, sine)]
+        if not found:
+            raise LookupError(f"the rig has no test at {condition}, {sine}")
+        measure = min(found, key=lambda one: _too_warm(one, condition))
+        return Test(next(record for record in self.rig.records if record.name == measure.record), measure)
 
     def test_of(self, row: Published) -> Test:
         """The test that a published number tells of.
@@ -148,10 +148,10 @@ class Evidence:
         ------
         LookupError : when there are none
         """
-        for row in self.identified.rows:
-            if _is(row, condition):
-                return row
-        raise LookupError(f"the rig has no tests at {condition}")
+        found = [row for row in self.identified.rows if _is(row, condition)]
+        if not found:
+            raise LookupError(f"the rig has no tests at {condition}")
+        return min(found, key=lambda row: _too_warm(row, condition))
 
     def ride(self, frequency: float, policy: str, fidelity: str) -> SummaryRow:
         """The line of a ride over a sine.
@@ -167,11 +167,16 @@ class Evidence:
         raise LookupError(f"the run has no ride {wanted}")
 
 
+def _too_warm(row: MeasureRow | ParameterRow, condition: Condition) -> float:
+    """How far a row is from the temperature asked for [K]."""
+    return 0.0 if row.temperature_degC is None else abs(row.temperature_degC - condition.temperature)
+
+
 def _is(row: MeasureRow | ParameterRow, condition: Condition) -> bool:
     return (
         row.setting == condition.setting
         and abs((row.voltage_V or 0.0) - condition.voltage) <= _SAME_VOLTAGE
-        and (row.temperature_degC is None or abs(row.temperature_degC - condition.temperature) <= _SAME_TEMPERATURE)
+        and _too_warm(row, condition) <= _SAME_TEMPERATURE
     )
 
 
