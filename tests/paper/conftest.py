@@ -1,0 +1,54 @@
+"""The chain of configs/paper.yaml without its diagnosis: the plain Bingham damper rides."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pzd.artefacts import Diagnosed, Diagnosis, Identified, PublishedRow, Rides, Rig, base_of
+from pzd.config import RunConfig, load
+from pzd.identify.stage import identify
+from pzd.quantities import Control
+from pzd.report.comfort.ride import assess, settled
+from pzd.report.published import published_rows
+from pzd.rig.stage import synthesise
+from pzd.simulate.stage import simulate
+from pzd.table.stage import tabulate
+
+
+@pytest.fixture(scope="package")
+def config(root: Path) -> RunConfig:
+    return load(root / "configs" / "paper.yaml")
+
+
+@pytest.fixture(scope="package")
+def rig(config: RunConfig, root: Path) -> Rig:
+    return synthesise(config.rig, config.seed, Control(), root / "configs")
+
+
+@pytest.fixture(scope="package")
+def identified(config: RunConfig, rig: Rig) -> Identified:
+    return identify(config.identify, rig, config.seed)
+
+
+@pytest.fixture(scope="package")
+def rides(config: RunConfig, rig: Rig, identified: Identified) -> Rides:
+    damper = base_of(identified.rows, config.setting)
+    diagnosed = Diagnosed(Diagnosis.model_construct(), damper, damper)
+    table = tabulate(config.table, rig, diagnosed, Control(), config.setting)
+    return simulate(config.simulate, diagnosed, table, config.seed, Path())
+
+
+@pytest.fixture(scope="package")
+def beside(config: RunConfig, identified: Identified, rides: Rides) -> dict[str, PublishedRow]:
+    rows = {row.case: row for row in rides.summary}
+    tones = {road.name: road.frequency_Hz for road in config.simulate.roads}
+    comfort = tuple(
+        row
+        for ride in rides.rides
+        for row in assess(
+            settled(ride, rows[ride.case], config.simulate.settle_s, tones[rows[ride.case].road]), config.report
+        )
+    )
+    return {row.id: row for row in published_rows(config.simulate, identified, rides, comfort)}
