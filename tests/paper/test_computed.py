@@ -14,19 +14,19 @@ AT_REST = [row for row in rig_tests() if row.quantity == AT_ZERO]
 NOT_COMPUTED = {"POWER", "TEMP-start", "TEMP-end"}
 
 IDENTIFIED = {
-    (SMALL_GAP, 0, 22): (339, 14280, 5.7e6),
-    (SMALL_GAP, 100, 22): (1043, 24150, 6.3e6),
-    (SMALL_GAP, 150, 22): (1623, 27970, 6.4e6),
-    (LARGE_GAP, 0, 22): (174, 3662, 4.9e6),
-    (LARGE_GAP, 50, 22): (187, 4098, 5.5e6),
-    (LARGE_GAP, 100, 22): (243, 5411, 5.8e6),
-    (LARGE_GAP, 150, 22): (345, 6975, 6.1e6),
-    (LARGE_GAP, 0, 43): (76, 3293, 4.2e6),
-    (LARGE_GAP, 50, 43): (87, 3675, 5.5e6),
-    (LARGE_GAP, 100, 43): (138, 4871, 5.5e6),
-    (LARGE_GAP, 150, 43): (238, 6263, 6.3e6),
+    (SMALL_GAP, 0, 22): (305, 14490, 2.2e6),
+    (SMALL_GAP, 100, 22): (956, 24650, 2.2e6),
+    (SMALL_GAP, 150, 22): (1501, 28710, 2.2e6),
+    (LARGE_GAP, 0, 22): (160, 3708, 2.1e6),
+    (LARGE_GAP, 50, 22): (175, 4131, 2.2e6),
+    (LARGE_GAP, 100, 22): (233, 5435, 2.2e6),
+    (LARGE_GAP, 150, 22): (327, 7017, 2.3e6),
+    (LARGE_GAP, 0, 43): (66, 3323, 1.9e6),
+    (LARGE_GAP, 50, 43): (78, 3700, 2.2e6),
+    (LARGE_GAP, 100, 43): (131, 4888, 2.2e6),
+    (LARGE_GAP, 150, 43): (229, 6276, 2.2e6),
 }
-"""T0 [N], C [N s/m] and k [N/m] of the plain element on the stand; the bent flow curve makes T0 rise with the voltage."""
+"""T0 [N], C [N s/m] and k [N/m] of the plain element; the bent flow curve makes T0 rise with the voltage."""
 
 
 @pytest.mark.parametrize("row", PEAKS, ids=lambda row: row.id)
@@ -51,7 +51,7 @@ def test_parameters_identified_from_the_stand_stand_beside_the_tables_with_inter
     for row in rows:
         found, wanted = beside[row.id], IDENTIFIED[row.setting, row.voltage_V, row.temperature_C]
         expected = dict(zip(("T0", "C", "k"), wanted, strict=True))[row.quantity]
-        assert found.computed == pytest.approx(expected, rel={"T0": 0.05, "C": 0.02, "k": 0.2}[row.quantity]), row.id
+        assert found.computed == pytest.approx(expected, rel={"T0": 0.05, "C": 0.02, "k": 0.1}[row.quantity]), row.id
         assert "95 %" in found.note, row.id
 
 
@@ -90,14 +90,14 @@ def test_exposure_times_stand_beside_the_papers_with_their_standard(beside: dict
 
 
 def test_claims_are_recomputed(beside: dict[str, PublishedRow]) -> None:
-    assert beside["CL-43"].computed == pytest.approx(79.0, abs=4.0)
+    assert beside["CL-43"].computed == pytest.approx(79.7, abs=3.0)
     assert beside["CL-range"].computed == pytest.approx(235.0, rel=0.03)
-    assert beside["CL-dT0"].computed == pytest.approx(230.0, abs=40.0)
-    assert beside["CL-dT150"].computed == pytest.approx(335.0, abs=40.0)
+    assert beside["CL-dT0"].computed == pytest.approx(223.0, abs=30.0)
+    assert beside["CL-dT150"].computed == pytest.approx(350.0, abs=40.0)
 
 
 def test_the_stroke_is_what_the_calibration_leaves_of_it(beside: dict[str, PublishedRow]) -> None:
-    assert beside["STROKE"].computed == pytest.approx(60.4, abs=0.5)
+    assert beside["STROKE"].computed == pytest.approx(59.7, abs=0.5)
 
 
 def test_a_run_without_the_papers_tests_says_so(config: RunConfig) -> None:
