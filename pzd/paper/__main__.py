@@ -1,12 +1,12 @@
-"""`python -m pzd.paper calibration` and `python -m pzd.paper contradiction` print what they find."""
+"""`python -m pzd.paper claims`, `calibration` and `contradiction` print what they find."""
 
 from __future__ import annotations
 
 import sys
 
-from pzd.paper.telling import calibration, contradiction
+from pzd.paper.telling import calibration, contested, contradiction
 
-TOPICS = {"calibration": calibration, "contradiction": contradiction}
+TOPICS = {"claims": contested, "calibration": calibration, "contradiction": contradiction}
 
 
 def main(arguments: list[str]) -> int:

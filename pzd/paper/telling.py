@@ -8,6 +8,7 @@ from typing import Literal
 
 from pzd.damper.effects import library
 from pzd.paper.calibration import calibrate
+from pzd.paper.claims import claims
 from pzd.paper.contradiction import BASES, Attempt, Base, attempts, condition, excluded, misses
 from pzd.paper.loop import loop_in
 from pzd.paper.published import PEAK, rig_tests, span
@@ -104,3 +105,8 @@ def _calibration() -> Iterator[str]:
         several = f"  the paper prints {low:g} to {high:g} N for this test" if low < high else ""
         yield f"  {row.id:8}{row.number:>9.0f} N{force:>8.0f} N{100 * (force / row.number - 1):>+7.1f}%{several}"
     yield f"\n{written(valve)}"
+
+
+def contested() -> str:
+    """What the paper says, and what its own numbers give."""
+    return "\n".join(f"{claim.says}\n    {claim.gives}" for claim in claims())
