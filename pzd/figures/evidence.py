@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.artefacts import Diagnosed, Identified, MeasureRow, ParameterRow, Rides, Rig, SummaryRow, Table
+from pzd.artefacts import Identified, MeasureRow, ParameterRow, Rig, SummaryRow, base_of
 from pzd.config import RunConfig, setting_in_use
+from pzd.paper.fidelity import Outing, rides_on
 from pzd.paper.published import Published
 from pzd.quantities import Control
 from pzd.record import Array, Record
@@ -90,13 +91,12 @@ class Test:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """A run, as far as its rides."""
+    """A run, as far as its parameters, and what its plain dampers do in the car."""
 
     rig: Rig
     identified: Identified
-    diagnosed: Diagnosed
-    table: Table
-    rides: Rides
+    outing: Outing
+    """The plain damper's table in the chosen setting, and the ideal rides."""
     simulate: SimulateConfig
     tabulate: TableConfig
     control: Control
@@ -104,19 +104,12 @@ class Evidence:
 
     @classmethod
     def of(cls, run: Run, config: RunConfig) -> Evidence:
-        """What stands in a run that is up to date as far as its rides."""
-        rig = run.read(Rig)
-        return cls(
-            rig,
-            run.read(Identified),
-            run.read(Diagnosed),
-            run.read(Table),
-            run.read(Rides),
-            config.simulate,
-            config.table,
-            run.control,
-            setting_in_use(config.setting, [entry.setting for entry in rig.entries]),
-        )
+        """What a run that is up to date as far as its parameters leads to by the paper's own, plain model."""
+        rig, identified = run.read(Rig), run.read(Identified)
+        setting = setting_in_use(config.setting, [entry.setting for entry in rig.entries])
+        ideal = config.simulate.model_copy(update={"policies": None, "fidelities": ("ideal",)})
+        outing = rides_on(base_of(identified.rows, setting), setting, rig, ideal, config.table, run.control)
+        return cls(rig, identified, outing, config.simulate, config.table, run.control, setting)
 
     def test(self, condition: Condition, sine: Sine) -> Test:
         """The test of a condition with a sine.
@@ -161,7 +154,7 @@ class Evidence:
         LookupError : when the run has none
         """
         wanted = f"sine-{frequency:g}Hz-{policy}-{fidelity}"
-        for row in self.rides.summary:
+        for row in self.outing.rides.summary:
             if row.case == wanted:
                 return row
         raise LookupError(f"the run has no ride {wanted}")

@@ -19,7 +19,7 @@ from pzd.paper.car_search import (
     SPEED,
     constant_peaks,
 )
-from pzd.paper.fidelity import Gap, rides_on
+from pzd.paper.fidelity import Outing, rides_on
 from pzd.paper.published import LARGE_GAP, SMALL_GAP, published
 from pzd.report.comfort.iso2631_1978 import TRUST, Boundary, Exposure, exposure, shortest
 from pzd.report.comfort.ride import settled
@@ -62,13 +62,15 @@ def fidelities(evidence: Evidence) -> Iterator[Drawing]:
     yield Drawing("fidelity", figure, "Peaks of |a_K| and exposure times, ideal, by table and dynamically.", caption)
 
 
-def _gap(evidence: Evidence, setting: str) -> Gap:
-    damper = evidence.diagnosed.damper if setting == evidence.setting else base_of(evidence.identified.rows, setting)
+def _gap(evidence: Evidence, setting: str) -> Outing:
+    """Control by the table and dynamically, and the damper without voltage, on one setting of the valve."""
+    damper = base_of(evidence.identified.rows, setting)
     records = tuple(record for record in evidence.rig.records if record.setting == setting)
     if not records:
         raise LookupError(f"the rig has no tests at {setting}")
     rig = replace(evidence.rig, records=records)
-    return rides_on(damper, setting, rig, evidence.diagnosed, evidence.simulate, evidence.tabulate, evidence.control)
+    real = evidence.simulate.model_copy(update={"policies": ("comfort", "passive"), "fidelities": ("table", "dynamic")})
+    return rides_on(damper, setting, rig, real, evidence.tabulate, evidence.control)
 
 
 def _of_the_paper() -> list[Bar]:
@@ -94,10 +96,10 @@ def _ideal(evidence: Evidence) -> list[Bar]:
         )
         bars.append(Bar(f"constant c = {damping:g} N s/m", PLAIN, peaks, times))
     rows = [evidence.ride(frequency, "comfort", "ideal") for frequency in FREQUENCIES]
-    return [*bars, _bar(evidence, "control, ideal", COLOURS[0], evidence.rides.rides, rows)]
+    return [*bars, _bar(evidence, "control, ideal", COLOURS[0], evidence.outing.rides.rides, rows)]
 
 
-def _real(evidence: Evidence, gap: Gap) -> Iterator[Bar]:
+def _real(evidence: Evidence, gap: Outing) -> Iterator[Bar]:
     colour = COLOURS[1] if gap.setting == LARGE_GAP else COLOURS[2]
     for policy, fidelity in (("passive", "dynamic"), ("comfort", "table"), ("comfort", "dynamic")):
         rows = [row for row in gap.rides.summary if (row.policy, row.fidelity) == (policy, fidelity)]

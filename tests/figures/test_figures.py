@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pzd.artefacts import Diagnosed, Diagnosis, Gap, base_of
+from pzd.artefacts import base_of
 from pzd.config import RunConfig
 from pzd.figures.draw import Gallery, _entry, drawn
 from pzd.figures.evidence import Condition, Evidence, Sine
@@ -23,6 +23,7 @@ from pzd.figures.models import tabulated
 from pzd.figures.numbered import library
 from pzd.figures.numbered.fig_07 import heating
 from pzd.figures.planes import element, loop
+from pzd.paper.fidelity import rides_on
 from pzd.paper.published import published
 
 SMALL, LARGE = "gap 0.15 mm", "gap 0.25 mm"
@@ -56,8 +57,6 @@ def evidence() -> Evidence:
     """A stand like the paper's, identified; nothing is missing from its damper."""
     from pzd.identify.stage import identify
     from pzd.rig.stage import synthesise
-    from pzd.simulate.stage import simulate
-    from pzd.table.stage import tabulate
 
     small = [row(u, 22, t0, c) for u, t0, c in ((0, 800, 10000), (100, 2000, 16000), (150, 3400, 14000))]
     large = [row(u, 22, t0, c) for u, t0, c in ((0, 170, 3700), (50, 350, 3700), (100, 800, 4000), (150, 1300, 4200))]
@@ -75,28 +74,9 @@ def evidence() -> Evidence:
     config = RunConfig.model_validate_json(json.dumps(whole))
     records = synthesise(config.rig, 1, config.control.signal(), Path())
     identified = identify(config.identify, records, 1)
-    damper = base_of(identified.rows, LARGE)
-    nothing = Diagnosed(_nothing_missing(), damper, damper)
-    table = tabulate(config.table, records, nothing, config.control.signal(), LARGE)
-    rides = simulate(config.simulate, nothing, table, 1, Path())
     control = config.control.signal()
-    return Evidence(records, identified, nothing, table, rides, config.simulate, config.table, control, LARGE)
-
-
-def _nothing_missing() -> Diagnosis:
-    gap = Gap(before=1e-4, after=1e-4, noise_floor=1e-4, standard_error=1e-5, held_out=("a",), hold_out="records")
-    return Diagnosis(
-        verdict="none",
-        reason="nothing is missing",
-        effects=(),
-        confidence=None,
-        gap=gap,
-        parameters={},
-        ranking=(),
-        rivals=(),
-        where=(),
-        next_test=None,
-    )
+    outing = rides_on(base_of(identified.rows, LARGE), LARGE, records, config.simulate, config.table, control)
+    return Evidence(records, identified, outing, config.simulate, config.table, control, LARGE)
 
 
 @pytest.fixture(scope="module")

@@ -18,10 +18,10 @@ _CHOSEN_SHARE = 0.6
 def draw(evidence: Evidence) -> Iterator[Drawing]:
     """Force over velocity for each voltage of the table, shaded between both limits, and one V_i that leads to T_i."""
     temperature = evidence.simulate.temperature_degC
-    known = [row.temperature_degC for row in evidence.table.force]
+    known = [row.temperature_degC for row in evidence.outing.table.force]
     if temperature not in known:
         temperature = min(known, key=lambda t: t or 0.0)
-    rows = [r for r in evidence.table.force if r.temperature_degC == temperature and r.force_N is not None]
+    rows = [r for r in evidence.outing.table.force if r.temperature_degC == temperature and r.force_N is not None]
     voltages = sorted({row.voltage_V or 0.0 for row in rows})
     curves = {
         u: np.array([(r.velocity_m_per_s, r.force_N) for r in rows if (r.voltage_V or 0.0) == u], dtype=np.float64)
@@ -59,6 +59,6 @@ FIGURE = PaperFigure(
     18,
     "Characteristics of the damper and the control range between its limits",
     "stand",
-    "The table of force over voltage and velocity computed from the damper that was identified and diagnosed.",
+    "The table of force over voltage and velocity computed from the plain Bingham damper that was identified.",
     draw,
 )

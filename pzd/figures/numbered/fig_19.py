@@ -29,7 +29,7 @@ def draw(evidence: Evidence) -> Iterator[Drawing]:
 
 def accelerations(evidence: Evidence) -> Drawing:
     """|a_K| over the last two seconds of the ideal rides at 2.25 and 4.5 Hz."""
-    rides = {ride.case: ride.columns for ride in evidence.rides.rides}
+    rides = {ride.case: ride.columns for ride in evidence.outing.rides.rides}
     figure, axes = panels()
     said = []
     for ax, frequency, printed in zip(
