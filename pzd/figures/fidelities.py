@@ -54,7 +54,9 @@ def fidelities(evidence: Evidence) -> Iterator[Drawing]:
         ax.set_xlim(0.0, 1.45 * max(bar.peaks[n] for bar in bars))
         ax.set_xlabel(f"peak |a_K| at {frequency:g} Hz [m/s²];  exposure time in comfort")
     floor = ", ".join(f"{gap.setting} at least {gap.least_damping:.0f} N s/m" for gap in gaps)
+    said = "; ".join(f"{bar.name} {' and '.join(f'{peak:.2f}' for peak in bar.peaks)}" for bar in bars)
     caption = (
+        f"Peaks at 2.25 and 4.5 Hz [m/s²]: {said}. "
         f"The damper's force over speed is nowhere below: {floor}; c_min = {BOUNDS[0]:g} N s/m is out of reach at any "
         f"voltage. {_share(evidence)} Exposure times: reduced comfort of ISO 2631:1978, {TRUST}, "
         "each harmonic by itself; beside the bars of the paper stand its own."
