@@ -31,6 +31,8 @@ class Pipeline:
     """Processes that a stage may use, where it can use several."""
     marks: dict[str, tuple[str, ...]] = field(default_factory=dict)
     """Why the results so far are not to be trusted, by folder."""
+    _compiles: bool = False
+    """Whether the ride's kernels may still have to be compiled, which a second core can do meanwhile."""
 
     def bring_up_to_date(self, target: str, forced: Sequence[str] = ()) -> tuple[str, ...]:
         """Run every stage up to the target that is stale.
@@ -49,6 +51,7 @@ class Pipeline:
         UserError : what the user can mend; the stage at fault leaves what was there before
         """
         wanted = self.stages[: [stage.name for stage in self.stages].index(target) + 1]
+        self._compiles = any(stage.function.__module__ == "pzd.simulate.stage" for stage in wanted)
         for number, stage in enumerate(wanted):
             self._bring(stage, force=stage.name in forced)
             if number == 0:
@@ -75,6 +78,11 @@ class Pipeline:
         self._run(stage, inputs)
 
     def _run(self, stage: Stage, inputs: dict[str, str]) -> None:
+        if self._compiles:
+            from pzd.simulate.warm import in_background
+
+            in_background()
+            self._compiles = False
         begun = time.monotonic()
         artefact = self.made(stage)
         marks = self._carried(stage, getattr(artefact, "untrusted", ()))

@@ -1,0 +1,60 @@
+"""Compiles the kernels of the ride ahead, in a process of its own: `python -m pzd.simulate.warm`.
+
+On a new machine this takes as long as all the stages before; a second core does it meanwhile.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from pzd.artefacts import Diagnosed, Diagnosis, ForceRow, Gap, Table, TableNotes
+from pzd.damper.model import BaseRow, Damper
+from pzd.simulate.config import SimulateConfig
+
+_MARK = "ride-compiled"
+
+
+def in_background() -> None:
+    """Start compiling, unless it was done before; nobody waits for it, and nothing depends on it."""
+    from pzd.damper.compiled import cache_folder
+
+    if not (cache_folder() / _MARK).exists():
+        quiet = subprocess.DEVNULL
+        command = [sys.executable, "-m", __name__]
+        subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)  # noqa: S603  # our own module
+
+
+def _smallest_ride() -> None:
+    """Ride half a second on a damper of two voltages, by every fidelity."""
+    from pzd.simulate.stage import simulate
+
+    rows = tuple(BaseRow(voltage_V=u, T0_N=300.0 + u, C_Ns_per_m=2700.0, k_N_per_m=2e5) for u in (0.0, 100.0))
+    damper = Damper(base=rows)
+    forces = tuple(
+        ForceRow(temperature_degC=None, voltage_V=r.voltage_V, velocity_m_per_s=v, force_N=_steady(r, v), inside=1)
+        for r in rows
+        for v in (-1.0, -0.0, 0.0, 1.0)
+    )
+    table = Table(forces, (), TableNotes(outside="model", reached_m_per_s=1.0, lost=(), not_monotone=()))
+    gap = Gap(before=0.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=(), hold_out="records")
+    nothing = Diagnosis(
+        verdict="none", reason="", effects=(), confidence=None, gap=gap, parameters={}, ranking=(), rivals=(),
+        where=(), next_test=None,
+    )  # fmt: skip
+    config = SimulateConfig(duration_s=0.5, settle_s=0.1)
+    simulate(config, Diagnosed(nothing, damper, damper), table, 1, Path())
+
+
+def _steady(row: BaseRow, velocity: float) -> float:
+    from math import copysign
+
+    return copysign(row.T0_N + row.C_Ns_per_m * abs(velocity), velocity)
+
+
+if __name__ == "__main__":
+    from pzd.damper.compiled import cache_folder
+
+    _smallest_ride()
+    (cache_folder() / _MARK).touch()
