@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pzd.damper.compose import value_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.paper.published import LARGE_GAP, SMALL_GAP
 from pzd.paper.valve import Valve, stand_damper
@@ -14,9 +15,7 @@ def rounded(damper: Damper) -> Damper:
     rows = tuple(
         row.model_copy(update={"T0_N": round(row.T0_N, 1), "C_Ns_per_m": round(row.C_Ns_per_m)}) for row in damper.base
     )
-    thinning = damper.effects["shear_thinning"]
-    indices = [round(n, 3) for n in _listed(thinning["n"])]
-    return Damper(base=rows, effects={"shear_thinning": {**thinning, "n": tuple(indices)}})
+    return Damper(base=rows).with_effect("shear_thinning", {"n": round(_index(damper), 3)})
 
 
 def written(valve: Valve) -> str:
@@ -30,10 +29,8 @@ def _entry(setting: str, valve: Valve) -> Iterator[str]:
     yield "      damper:"
     yield "        base:"
     yield from (_row(row) for row in damper.base)
-    thinning = damper.effects["shear_thinning"]
-    n, at = (", ".join(f"{value:g}" for value in _listed(thinning[key])) for key in ("n", "at_voltage_V"))
     yield "        effects:"
-    yield f"          shear_thinning: {{n: [{n}], at_voltage_V: [{at}]}}"
+    yield f"          shear_thinning: {{n: {_index(damper):g}}}"
 
 
 def _row(row: BaseRow) -> str:
@@ -41,5 +38,5 @@ def _row(row: BaseRow) -> str:
     return f"          - {{{fields}}}"
 
 
-def _listed(value: float | tuple[float, ...]) -> tuple[float, ...]:
-    return value if isinstance(value, tuple) else (value,)
+def _index(damper: Damper) -> float:
+    return value_of(damper, "shear_thinning", "n")

@@ -14,17 +14,17 @@ AT_REST = [row for row in rig_tests() if row.quantity == AT_ZERO]
 NOT_COMPUTED = {"POWER", "TEMP-start", "TEMP-end"}
 
 IDENTIFIED = {
-    (SMALL_GAP, 0, 22): (305, 14490, 2.2e6),
-    (SMALL_GAP, 100, 22): (956, 24650, 2.2e6),
-    (SMALL_GAP, 150, 22): (1501, 28710, 2.2e6),
-    (LARGE_GAP, 0, 22): (160, 3708, 2.1e6),
-    (LARGE_GAP, 50, 22): (175, 4131, 2.2e6),
-    (LARGE_GAP, 100, 22): (233, 5435, 2.2e6),
-    (LARGE_GAP, 150, 22): (327, 7017, 2.3e6),
-    (LARGE_GAP, 0, 43): (66, 3323, 1.9e6),
-    (LARGE_GAP, 50, 43): (78, 3700, 2.2e6),
-    (LARGE_GAP, 100, 43): (131, 4888, 2.2e6),
-    (LARGE_GAP, 150, 43): (229, 6276, 2.2e6),
+    (SMALL_GAP, 0, 22): (305, 14480, 2.2e6),
+    (SMALL_GAP, 100, 22): (482, 27790, 2.1e6),
+    (SMALL_GAP, 150, 22): (582, 34860, 2.1e6),
+    (LARGE_GAP, 0, 22): (159, 3711, 2.0e6),
+    (LARGE_GAP, 50, 22): (163, 4159, 2.1e6),
+    (LARGE_GAP, 100, 22): (176, 5565, 2.1e6),
+    (LARGE_GAP, 150, 22): (190, 7290, 2.1e6),
+    (LARGE_GAP, 0, 43): (66, 3323, 1.8e6),
+    (LARGE_GAP, 50, 43): (69, 3721, 2.0e6),
+    (LARGE_GAP, 100, 43): (80, 5002, 2.0e6),
+    (LARGE_GAP, 150, 43): (95, 6581, 2.0e6),
 }
 """T0 [N], C [N s/m] and k [N/m] of the plain element; the bent flow curve makes T0 rise with the voltage."""
 
