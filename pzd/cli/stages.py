@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from pzd.cli.exits import DONE, UNTRUSTED
-from pzd.cli.options import RUNS, Config, Force, Jobs, Quiet, Runs, Set, Verbose
+from pzd.cli.options import CORES, RUNS, Config, Force, Jobs, Quiet, Runs, Set, Verbose
 from pzd.cli.output import Output, complain
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def _command(name: str, summary: str) -> Callable[..., int]:
         runs: Runs = RUNS,
         overrides: Set = None,
         force: Force = False,
-        jobs: Jobs = 1,
+        jobs: Jobs = CORES,
         quiet: Quiet = False,
         verbose: Verbose = False,
     ) -> int:
