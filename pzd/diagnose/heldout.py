@@ -6,7 +6,7 @@ from pzd.artefacts import Gap
 from pzd.damper.model import Damper
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence
-from pzd.diagnose.fitting import fit
+from pzd.diagnose.fitting import MOST_EVALUATIONS, fit
 from pzd.diagnose.gap import gap_of
 from pzd.diagnose.judge import Judged, judge
 from pzd.diagnose.naming import Named
@@ -24,7 +24,7 @@ def held_out_gap(evidence: Evidence, named: Named, parts: Split, config: Diagnos
     config : priors of the nuisances
     """
     training = evidence.halves[0]
-    plain = fit(training, (), training.start()).damper
+    plain = fit(training, (), training.start(), 1 if named.misled else MOST_EVALUATIONS).damper
     before = gap_of(_untouched(evidence, parts, plain, config), parts)
     if not named.adopted:
         return before

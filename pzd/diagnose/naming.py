@@ -24,6 +24,8 @@ ALIKE = 0.1
 """Values within this ratio of one another agree, whatever their intervals."""
 TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3}
 """A common offset [share of the lowest peak] or delay [s] that counts as nothing missing."""
+MISLED = 8.0
+"""A plain fit whose criterion (4) is so many times that of identify's is led by the harmonics with the least noise."""
 LEVEL = 1.96
 """Standard errors in a 95 % interval."""
 
@@ -42,6 +44,8 @@ class Named:
     """Why an effect was adopted or not."""
     rivals: tuple[str, ...]
     """Effects that explain the last step as well."""
+    misled: bool = False
+    """Whether weights by noise led the fits away from the measurement and nothing closed the gap: nothing is adopted."""
 
     @property
     def rivalling(self) -> tuple[tuple[str, Damper], ...]:
@@ -89,6 +93,10 @@ def name_effects(evidence: Evidence, config: DiagnoseConfig, jobs: int = 1) -> N
         )
         log.info("diagnose: %s adopted, delta BIC %.0f", chosen.effect, chosen.delta_bic)
         current = chosen.fitted
+    at_start = fit(whole, (), whole.start(), evaluations=1)
+    misled = evidence.criterion(plain) > MISLED * evidence.criterion(at_start)
+    if misled and evidence.something_missing(current, config):
+        return Named(at_start, at_start, (), {}, (), misled=True)
     return Named(plain, current, tuple(rounds), reasons, rivals)
 
 

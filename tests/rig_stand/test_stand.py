@@ -335,4 +335,4 @@ def test_the_quickstart_is_a_stand_with_something_hidden(root: Path) -> None:
 
     (entry,) = load(root / "configs" / "quickstart.yaml").rig.virtual or ()
     assert "orifice_quadratic" in entry.damper.effects
-    assert len(entry.plan()) == 24
+    assert len(entry.plan()) == 20
