@@ -45,7 +45,7 @@ class Named:
     rivals: tuple[str, ...]
     """Effects that explain the last step as well."""
     misled: bool = False
-    """Whether weights by noise led the fits away from the measurement and nothing closed the gap: nothing is adopted."""
+    """Whether weights by noise led the fits away from the measurement, and nothing closed the gap: nothing adopted."""
 
     @property
     def rivalling(self) -> tuple[tuple[str, Damper], ...]:
