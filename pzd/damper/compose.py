@@ -126,14 +126,6 @@ def parallel_rows(damper: Damper, felt: Array | None) -> Array | None:
     return _effect_columns(damper, COLUMNS, felt) if any(effect in damper.effects for effect, _ in COLUMNS) else None
 
 
-def parallel_force(damper: Damper, felt: Array | None, motion: Motion) -> Array:
-    """(n,) force beside the element [N]."""
-    rows = parallel_rows(damper, felt)
-    if rows is None:
-        return np.zeros(motion.time.size)
-    return np.asarray(beside_all(motion.displacement, motion.velocity, motion.acceleration, rows))
-
-
 def recorded(tau: float, time: Array, force: Array) -> Array:
     """(n,) force as a channel delayed by tau [s] shows it [N], linear between samples, held before the first."""
     return force if tau == 0.0 else np.interp([moment(t, tau) for t in time], time, force)

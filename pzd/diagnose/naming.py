@@ -52,9 +52,13 @@ class Named:
         """The effect adopted last and its rivals, with the dampers fitted with them; empty without rivals."""
         if not self.rivals:
             return ()
-        last = self.rounds[len(self.adopted) - 1]
+        last = self.deciding(self.adopted[-1])
         wanted = (self.adopted[-1], *self.rivals)
         return tuple((name, c.fitted.damper) for name in wanted for c in last if c.effect == name)
+
+    def deciding(self, effect: str) -> tuple[Candidate, ...]:
+        """The round that decided on an effect: the last in which it was tried; empty for a forced one."""
+        return next((r for r in reversed(self.rounds) if any(c.effect == effect for c in r)), ())
 
     @property
     def adopted(self) -> tuple[str, ...]:
@@ -88,9 +92,7 @@ def name_effects(evidence: Evidence, config: DiagnoseConfig, jobs: int = 1) -> N
         chosen = settled(whole, current, chosen)
         rounds[-1] = tuple(chosen if c.effect == chosen.effect else c for c in tried)
         reasons[chosen.effect] = "adopted"
-        rivals = tuple(
-            c.effect for c in tried if c.effect != chosen.effect and c.delta_bic - chosen.delta_bic < config.rival_bic
-        )
+        rivals = _rivals(chosen, rounds[-1], config)
         log.info("diagnose: %s adopted, delta BIC %.0f", chosen.effect, chosen.delta_bic)
         current = chosen.fitted
     at_start = fit(whole, (), whole.start(), evaluations=1)

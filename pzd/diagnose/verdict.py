@@ -112,9 +112,9 @@ def ranking_of(named: Named, evidence: Evidence) -> tuple[Ranked, ...]:
     `gap_after` is criterion (4) on the samples seen, the tests' nuisances left in.
     """
     rows: dict[str, Ranked] = {}
-    for i, tried in enumerate(named.rounds):
+    for tried in named.rounds:
         for c in tried:
-            if c.effect in named.adopted and c.effect != _adopted_in(named, i):
+            if tried is not named.deciding(c.effect):
                 continue
             reason = named.reasons.get(c.effect, "does not pay" if c.delta_bic > 0.0 else "explains less")
             rows[c.effect] = Ranked(
@@ -125,10 +125,6 @@ def ranking_of(named: Named, evidence: Evidence) -> tuple[Ranked, ...]:
                 reason="rival" if c.effect in named.rivals else reason,
             )
     return tuple(sorted(rows.values(), key=lambda r: (r.effect not in named.adopted, r.delta_bic)))
-
-
-def _adopted_in(named: Named, round_number: int) -> str | None:
-    return named.adopted[round_number] if round_number < len(named.adopted) else None
 
 
 def parameters_of(named: Named) -> dict[str, dict[str, Value]]:
