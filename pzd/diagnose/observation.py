@@ -28,6 +28,9 @@ from pzd.record import Array, Record
 
 RESOLUTION = 3e-4
 """No force is believed to be known better than this share of the record's peak (r.m.s.)."""
+BETWEEN_SAMPLES = 0.5
+"""Of what the force does from one sample to the next but a straight line would not, this share (r.m.s.) is not known:
+a jump falls anywhere between two samples."""
 MOST_HARMONICS = 80
 """Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart."""
 CYCLE_POINTS = 256
@@ -122,7 +125,7 @@ def _of_cycles(
     error = pure_error(whole - run.fold(time, force))
     cycle = whole[counted].mean(axis=0)
     peak = float(np.max(np.abs(cycle)))
-    floor = (RESOLUTION * peak) ** 2 / error.single.size
+    floor = ((RESOLUTION * peak) ** 2 + _sampling_error(cycle, error, len(counted))) / error.single.size
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
     bare = Observation(
@@ -137,6 +140,17 @@ def _of_cycles(
         np.zeros(0),
     )
     return with_nuisances(bare, run.mean(time, force), nuisance, error.points / run.period)
+
+
+def _sampling_error(cycle: Array, error: PureError, averaged: int) -> float:
+    """Mean square of what instants between two samples hide of jumps and kinks in the average cycle [N^2].
+
+    Equation: s^2 mean_k (F_k+1 - 2 F_k + F_k-1)^2, the noise's share taken off        Source: Parseval
+    """
+    order = np.arange(error.single.size)
+    power = np.abs(np.fft.rfft(cycle)[: order.size] / cycle.size) ** 2 - error.single / averaged
+    rough = 2.0 * float(np.sum(power * (2.0 - 2.0 * np.cos(2.0 * np.pi * order / cycle.size)) ** 2))
+    return BETWEEN_SAMPLES**2 * max(rough, 0.0)
 
 
 def _kinematics(record: Record) -> tuple[Array, Array, Array]:
