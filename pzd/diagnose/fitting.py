@@ -129,6 +129,10 @@ class Problem:
             ]
         )
 
+    def start_with(self, fitted: Fitted) -> Array:
+        """(3 b + e,) the base rows, and the effects of an earlier fit."""
+        return np.concatenate([self.start(), fitted.searched[3 * len(self.base) :]])
+
     def point(self, searched: Array, unknowns: Sequence[Unknown]) -> Point:
         """What a point of the search stands for."""
         split = 3 * len(self.base)

@@ -6,30 +6,30 @@ from pzd.artefacts import Gap
 from pzd.damper.model import Damper
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence
-from pzd.diagnose.fitting import MOST_EVALUATIONS, fit
+from pzd.diagnose.fitting import fit
 from pzd.diagnose.gap import gap_of
 from pzd.diagnose.judge import Judged, judge
 from pzd.diagnose.naming import Named
 from pzd.diagnose.split import UNTOUCHED, Split
 
 
-def held_out_gap(evidence: Evidence, named: Named, parts: Split, config: DiagnoseConfig) -> Gap:
+def held_out_gap(named: Named, parts: Split, config: DiagnoseConfig) -> Gap:
     """Criterion (4) on the untouched samples, nuisances at their prior mean, before and after alike.
 
     Parameters
     ----------
-    evidence : the halves; the first trains
-    named : what was adopted
+    named : what was adopted, and the evidence whose first half trains
     parts : the split
     config : priors of the nuisances
     """
-    training = evidence.halves[0]
-    plain = fit(training, (), training.start(), 1 if named.misled else MOST_EVALUATIONS).damper
-    before = gap_of(_untouched(evidence, parts, plain, config), parts)
+    training = named.first.halves[0]
+    plain = fit(training, (), training.start()).damper
+    before = gap_of(_untouched(named.first, parts, plain, config), parts)
     if not named.adopted:
         return before
-    adopted = fit(training, named.adopted, named.fitted.searched).damper
-    after = gap_of(_untouched(evidence, parts, adopted, config), parts)
+    training = named.last.halves[0]
+    adopted = fit(training, named.adopted, training.start_with(named.fitted)).damper
+    after = gap_of(_untouched(named.last, parts, adopted, config), parts)
     return after.model_copy(update={"before": before.before})
 
 

@@ -12,8 +12,10 @@ from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.diagnose.candidates import Candidate, candidate, candidates, settled
 from pzd.diagnose.config import DiagnoseConfig
-from pzd.diagnose.evidence import Evidence
+from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit
+from pzd.diagnose.inputs import Prepared
+from pzd.diagnose.split import Split
 from pzd.record import Array
 
 log = logging.getLogger(__name__)
@@ -24,8 +26,6 @@ ALIKE = 0.1
 """Values within this ratio of one another agree, whatever their intervals."""
 TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3}
 """A common offset [share of the lowest peak] or delay [s] that counts as nothing missing."""
-MISLED = 8.0
-"""A plain fit whose criterion (4) is so many times that of identify's is led by the harmonics with the least noise."""
 LEVEL = 1.96
 """Standard errors in a 95 % interval."""
 
@@ -44,8 +44,10 @@ class Named:
     """Why an effect was adopted or not."""
     rivals: tuple[str, ...]
     """Effects that explain the last step as well."""
-    misled: bool = False
-    """Whether weights by noise led the fits away from the measurement, and nothing closed the gap: nothing adopted."""
+    first: Evidence
+    """Weighed by what the plain damper leaves."""
+    last: Evidence
+    """Weighed by what the adopted damper leaves."""
 
     @property
     def rivalling(self) -> tuple[tuple[str, Damper], ...]:
@@ -66,40 +68,41 @@ class Named:
         return self.fitted.effects
 
 
-def name_effects(evidence: Evidence, config: DiagnoseConfig, jobs: int = 1) -> Named:
+def name_effects(
+    prepared: Sequence[Prepared], parts: Split, damper: Damper, config: DiagnoseConfig, jobs: int = 1
+) -> Named:
     """Adopt effects one after another while the next one pays, is supported by itself, and something is missing.
 
     Parameters
     ----------
-    evidence : the observations, whole and in halves
+    prepared : the records of one setting
+    parts : which samples are fitted, which choose, which are untouched
+    damper : plain, where the fits start
     config : thresholds, forced and forbidden effects
     jobs : candidates fitted at the same time
     """
-    whole = evidence.whole
-    plain = current = fit(whole, (), whole.start())
+    first = evidence = evidence_of(prepared, parts, damper, config)
+    plain = current = fit(first.whole, (), first.whole.start())
     rounds: list[tuple[Candidate, ...]] = []
     reasons: dict[str, str] = {}
     for name in config.force:
-        current = candidate(whole, current, library()[name]).fitted
+        current = candidate(first.whole, current, library()[name]).fitted
         reasons[name] = "adopted because the config asks for it"
     rivals: tuple[str, ...] = ()
     while len(current.effects) < config.most_effects and evidence.something_missing(current, config):
-        tried = candidates(whole, current, config.forbid, jobs)
+        tried = candidates(evidence.whole, current, config.forbid, jobs)
         rounds.append(tried)
         chosen = _first_supported(evidence, config, current, tried, reasons)
         if chosen is None:
             break
-        chosen = settled(whole, current, chosen)
+        chosen = settled(evidence.whole, current, chosen)
         rounds[-1] = tuple(chosen if c.effect == chosen.effect else c for c in tried)
         reasons[chosen.effect] = "adopted"
         rivals = _rivals(chosen, rounds[-1], config)
         log.info("diagnose: %s adopted, delta BIC %.0f", chosen.effect, chosen.delta_bic)
-        current = chosen.fitted
-    at_start = fit(whole, (), whole.start(), evaluations=1)
-    misled = evidence.criterion(plain) > MISLED * evidence.criterion(at_start)
-    if misled and evidence.something_missing(current, config):
-        return Named(at_start, at_start, (), {}, (), misled=True)
-    return Named(plain, current, tuple(rounds), reasons, rivals)
+        evidence = evidence_of(prepared, parts, chosen.fitted.damper, config)
+        current = fit(evidence.whole, chosen.fitted.effects, evidence.whole.start_with(chosen.fitted))
+    return Named(plain, current, tuple(rounds), reasons, rivals, first, evidence)
 
 
 def _rivals(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseConfig) -> tuple[str, ...]:

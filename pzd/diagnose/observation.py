@@ -28,9 +28,15 @@ from pzd.record import Array, Record
 
 RESOLUTION = 3e-4
 """No force is believed to be known better than this share of the record's peak (r.m.s.)."""
-BETWEEN_SAMPLES = 0.5
-"""Of what the force does from one sample to the next but a straight line would not, this share (r.m.s.) is not known:
-a jump falls anywhere between two samples."""
+DISCREPANCY = 0.1
+"""Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
+fitted: a model that still lacks something must not be bent to where the noise happens to be smallest."""
+SUDDEN = 6.0
+"""A sample at which the force bends by so many times its usual scatter lies beside a jump."""
+MOST_SUDDEN = 40
+"""Samples beside jumps that are allowed for in one record, the largest."""
+USUAL = 1.4826
+"""Standard deviation of Gaussian scatter over its median magnitude."""
 MOST_HARMONICS = 80
 """Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart."""
 CYCLE_POINTS = 256
@@ -125,7 +131,9 @@ def _of_cycles(
     error = pure_error(whole - run.fold(time, force))
     cycle = whole[counted].mean(axis=0)
     peak = float(np.max(np.abs(cycle)))
-    floor = ((RESOLUTION * peak) ** 2 + _sampling_error(cycle, error, len(counted))) / error.single.size
+    expected = run.mean(time, force)
+    left = DISCREPANCY * _left_by(cycle, expected, error.sample_variance / len(counted))
+    floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
     bare = Observation(
@@ -139,18 +147,15 @@ def _of_cycles(
         np.zeros((2 * weights.size - 1, 0)),
         np.zeros(0),
     )
-    return with_nuisances(bare, run.mean(time, force), nuisance, error.points / run.period)
+    return with_nuisances(bare, expected, nuisance, error.points / run.period)
 
 
-def _sampling_error(cycle: Array, error: PureError, averaged: int) -> float:
-    """Mean square of what instants between two samples hide of jumps and kinks in the average cycle [N^2].
-
-    Equation: s^2 mean_k (F_k+1 - 2 F_k + F_k-1)^2, the noise's share taken off        Source: Parseval
-    """
-    order = np.arange(error.single.size)
-    power = np.abs(np.fft.rfft(cycle)[: order.size] / cycle.size) ** 2 - error.single / averaged
-    rough = 2.0 * float(np.sum(power * (2.0 - 2.0 * np.cos(2.0 * np.pi * order / cycle.size)) ** 2))
-    return BETWEEN_SAMPLES**2 * max(rough, 0.0)
+def _left_by(measured: Array, force: Array, variance: float) -> float:
+    """R.m.s. of what a model leaves above the noise [N], offset, gain and delay of the test taken off."""
+    columns = np.column_stack([np.ones(force.size), force, np.gradient(force)])
+    residual = measured - force
+    residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
+    return float(np.sqrt(max(np.mean(residual**2) - variance, 0.0)))
 
 
 def _kinematics(record: Record) -> tuple[Array, Array, Array]:
@@ -193,8 +198,10 @@ def _of_samples(
         return None
     noise = rich_fit(record.force[start:stop] - force[start:stop], _part(record, start, stop), force[start:stop]).noise
     peak = float(np.max(np.abs(record.force[start:stop])))
-    floor = (RESOLUTION * peak) ** 2
-    noise = Autoregression(noise.coefficients, max(noise.innovation, floor))
+    left = DISCREPANCY * _left_by(record.force[start:stop], force[start:stop], noise.variance)
+    if left**2 > noise.variance:
+        noise = Autoregression(np.zeros(0), noise.variance + left**2)
+    noise = Autoregression(noise.coefficients, max(noise.innovation, (RESOLUTION * peak) ** 2))
     motion, factor = motion_of(record, constant=p.constant)
     bare = Observation(
         record.name,
@@ -219,9 +226,9 @@ def _part(record: Record, start: int, stop: int) -> Record:
 
 
 def with_nuisances(bare: Observation, force: Array, nuisance: NuisanceConfig, rate: float) -> Observation:
-    """The observation with the test's own offset, gain and delay integrated over their priors.
+    """The observation with the test's own offset, gain and delay, and the samples beside jumps, integrated out.
 
-    Equation: r' = (I + V V')^(-1/2) r, V = [s_o peak, s_g F, -s_d dF/dt] in units of noise
+    Equation: r' = (I + V V')^(-1/2) r, V = [s_o peak, s_g F, -s_d dF/dt, jumps] in units of noise
                                                     Source: Gaussian prior, marginal likelihood
     """
     columns = np.column_stack(
@@ -229,7 +236,22 @@ def with_nuisances(bare: Observation, force: Array, nuisance: NuisanceConfig, ra
             np.full(force.size, nuisance.offset * bare.peak),
             nuisance.gain * force,
             -nuisance.delay_s * np.gradient(force) * rate,
+            _jumps(bare.measured),
         ]
     )
     left, size, _ = np.linalg.svd(bare.in_noise(columns), full_matrices=False)
     return replace(bare, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
+
+
+def _jumps(force: Array) -> Array:
+    """(n, j) one column a sample beside a jump, as large as the force bends there [N].
+
+    A jump (dry friction at a reversal) falls anywhere between two samples: what is recorded beside it is chance.
+    """
+    bend = np.abs(np.convolve(force, (1.0, -2.0, 1.0), "same"))
+    bend[[0, -1]] = 0.0
+    sudden = np.flatnonzero(bend > SUDDEN * USUAL * np.median(bend))
+    beside = sudden[np.argsort(-bend[sudden], kind="stable")][:MOST_SUDDEN]
+    columns = np.zeros((force.size, beside.size))
+    columns[beside, np.arange(beside.size)] = bend[beside]
+    return columns

@@ -40,7 +40,6 @@ def diagnose(
     -------
     the verdict, and the damper with what was adopted; unchanged where nothing was
     """
-    from pzd.diagnose.evidence import evidence_of
     from pzd.diagnose.heldout import held_out_gap
     from pzd.diagnose.inputs import prepare
     from pzd.diagnose.naming import name_effects
@@ -52,8 +51,8 @@ def diagnose(
     prepared = prepare([record for record in rig.records if record.setting == setting])
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
-    evidence = evidence_of(prepared, parts, plain, diagnose)
-    named = name_effects(evidence, diagnose, jobs)
+    named = name_effects(prepared, parts, plain, diagnose, jobs)
+    evidence = named.first
     before = evidence.judged(named.plain.damper, diagnose)
     after = evidence.judged(named.fitted.damper, diagnose) if named.adopted else before
     decision = decide(named, before, after, diagnose)
@@ -64,7 +63,7 @@ def diagnose(
         reason=decision.reason + weak(parts.hold_out),
         effects=named.adopted,
         confidence=decision.confidence,
-        gap=held_out_gap(evidence, named, parts, diagnose),
+        gap=held_out_gap(named, parts, diagnose),
         parameters=parameters_of(named),
         ranking=ranking_of(named, evidence),
         rivals=named.rivals,

@@ -49,11 +49,6 @@ def decide(named: Named, before: Sequence[Judged], after: Sequence[Judged], conf
     """
     sizes = visible_gap(before), visible_gap(after)
     chances = probability_of_noise(before), probability_of_noise(after)
-    if named.misled:
-        words = (
-            f"a gap of {_percent(sizes[0])} of peak force stands so far above the noise that weights by noise mislead"
-        )
-        return Decision("unexplained", f"{words} the fits; what they would adopt are stand-ins", None)
     if not named.adopted:
         return _nothing_adopted(sizes[0], chances[0], config)
     told = f"{' and '.join(named.adopted)}: the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
