@@ -38,7 +38,6 @@ def _source() -> str:
     ]
     return "\n".join(
         [
-            "import numpy as np",
             "from pzd.damper.compiled import compiled",
             *(f"from pzd.damper.effects import {effect}" for effect in effects),
             *(f"_{effect} = compiled({effect}.law)" for effect in effects),
@@ -46,11 +45,9 @@ def _source() -> str:
             "def beside(x, v, a, p):",
             f"    return {' + '.join(terms)}",
             "@compiled",
-            "def beside_all(x, v, a, rows):",
-            "    force = np.empty(x.size)",
+            "def fill_beside(x, v, a, rows, force):",
             "    for i in range(x.size):",
             "        force[i] = beside(x[i], v[i], a[i], rows[min(i, rows.shape[0] - 1)])",
-            "    return force",
             "",
         ]
     )
@@ -77,5 +74,9 @@ _MODULE = _load()
 beside = _MODULE.beside
 """Compiled: force [N] beside the element at one x [m], v [m/s], a [m/s2] and one row of parameters."""
 
-beside_all = _MODULE.beside_all
-"""Compiled: the same for (n,) arrays and (n, m) or (1, m) rows."""
+
+def beside_all(x: Array, v: Array, a: Array, rows: Array) -> Array:
+    """(n,) force [N] beside the element at (n,) x [m], v [m/s], a [m/s2] and (n, m) or (1, m) rows."""
+    force = np.empty(x.size)
+    _MODULE.fill_beside(x, v, a, rows, force)
+    return force

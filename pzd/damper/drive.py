@@ -14,7 +14,6 @@ lagged = compiled(valve_lag.law)
 with_play = compiled(piezo_hysteresis.law)
 
 
-@compiled
 def felt_voltage(voltage: Array, steps: Array, tau: float, r: float) -> Array:
     """Voltage as the valve feels it, at rest with the first sample.
 
@@ -30,9 +29,14 @@ def felt_voltage(voltage: Array, steps: Array, tau: float, r: float) -> Array:
     (n,) voltage felt [V]
     """
     felt = np.empty_like(voltage)
+    _feel(voltage, steps, tau, r, felt)
+    return felt
+
+
+@compiled
+def _feel(voltage: Array, steps: Array, tau: float, r: float, felt: Array) -> None:
     late = voltage[0]
     felt[0] = late
     for i in range(1, voltage.size):
         late = lagged(late, voltage[i - 1], voltage[i], steps[min(i - 1, steps.size - 1)], tau)
         felt[i] = with_play(felt[i - 1], late, r)
-    return felt

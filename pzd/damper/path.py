@@ -163,7 +163,6 @@ def _book(
         state[VALVE_WORK] += (last[K] - first[K]) / 12.0 * (s0 * s0 + 4.0 * sm * sm + s1 * s1)
 
 
-@compiled
 def march(
     displacement: Array, velocity: Array, steps: Array, rows: Array, initial_force: float, tolerance: float
 ) -> Array:
@@ -182,8 +181,23 @@ def march(
     -------
     (n,) force [N]
     """
-    state, stages = np.zeros(STATES), np.empty(STAGES)
     force = np.empty(displacement.size)
+    _march(displacement, velocity, steps, rows, initial_force, tolerance, np.zeros(STATES), np.empty(STAGES), force)
+    return force
+
+
+@compiled
+def _march(
+    displacement: Array,
+    velocity: Array,
+    steps: Array,
+    rows: Array,
+    initial_force: float,
+    tolerance: float,
+    state: Array,
+    stages: Array,
+    force: Array,
+) -> None:
     p0 = row_of(rows[0])
     p1 = p0
     state[DEFLECTION] = deflection_at(initial_force, p0)
@@ -198,4 +212,3 @@ def march(
         half = 0.5 * (velocity[i] - velocity[i - 1]) if velocity.size > 1 else 0.0
         advance(state, Step(h, mean - half, mean + half, p0, p1, moving), tolerance, stages, False)
         force[i] = spring_force(state[DEFLECTION], p1)
-    return force

@@ -65,17 +65,25 @@ def settled_peak(
             round(DURATION / step),
             round(SETTLE / step),
             desk(),
+            np.zeros((6, _BODY)),
         )
     )
 
 
 @compiled
 def _peak(
-    car: Vehicle, road: Ground, bounds: tuple[float, float], tie: int, step: float, steps: int, settle: int, desk: Array
+    car: Vehicle,
+    road: Ground,
+    bounds: tuple[float, float],
+    tie: int,
+    step: float,
+    steps: int,
+    settle: int,
+    desk: Array,
+    room: Array,
 ) -> float:
-    """Largest |a_K| at the steps from `settle` on."""
-    x, trial = np.zeros(_BODY), np.zeros(_BODY)
-    rates = np.zeros((4, _BODY))
+    """Largest |a_K| at the steps from `settle` on; the room (6, 4) holds the state, one to try, and four rates."""
+    x, trial, rates = room[0], room[1], room[2:]
     peak = 0.0
     for n in range(steps + 1):
         time = n * step

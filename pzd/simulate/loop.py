@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from pzd.damper.compiled import compiled, laid_in
 from pzd.damper.dormand_prince import STAGES
 from pzd.damper.rows import row_at
@@ -32,7 +30,6 @@ from pzd.simulate.scene import (
     SIDE,
     SINCE,
     SPRINGS,
-    STATES,
     TIE_END,
     VALVE_WORK,
     VOLTAGE,
@@ -167,6 +164,8 @@ def ride(
     acceleration: Array,
     history: Array,
     tally: Array,
+    stages: Array,
+    end: Array,
 ) -> None:
     """Ride from time 0 through a number of steps.
 
@@ -181,8 +180,8 @@ def ride(
     acceleration : (steps + 1,) a_K at every step [m/s2], filled
     history : (steps // per_output + 1, COLUMNS) filled
     tally : (TALLIES,) filled; fewer steps are done where the table ends
+    stages, end : room to work in, see `advance`
     """
-    stages, end = np.zeros((STAGES + 1, STATES)), np.zeros(STATES)
     room = stages[STAGES]
     motion(0.0, y, scene, control, desk, room)
     for i in range(2):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pzd.damper.dormand_prince import STAGES
 from pzd.schema.errors import DataError
 from pzd.simulate.car import HalfCar
 from pzd.simulate.config import SimulateConfig
@@ -128,7 +129,8 @@ def ride_case(config: SimulateConfig, case: Case, profile: Profile, grid: Grid, 
             clock.settle,
             float(np.max(grid.reach)),
         )
-    scene = Scene(vehicle(car, speed), ground(profile, car.wheelbase), law_of(config, case, car, oil), grid, oil)
+    own = oil._replace(room=np.zeros_like(oil.room))  # rides at the same time work in rooms of their own
+    scene = Scene(vehicle(car, speed), ground(profile, car.wheelbase), law_of(config, case, car, oil), grid, own)
     return ride_scene(scene, clock, config.tolerance, case.name, ends)
 
 
@@ -153,6 +155,8 @@ def ride_scene(scene: Scene, clock: Clock, tolerance: float, name: str, ends: bo
         comfort,
         history,
         tally,
+        np.zeros((STAGES + 1, STATES)),
+        np.zeros(STATES),
     )
     if tally[STEPS_DONE] < clock.steps or not np.all(np.isfinite(y)):
         raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(room[1])))))

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import logging
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pzd.artefacts import AXLE_COLUMNS, Diagnosed, Rides, Table
 from pzd.simulate.config import SimulateConfig
+
+if TYPE_CHECKING:
+    from pzd.simulate.outcome import Outcome
+    from pzd.simulate.plan import Case
 
 log = logging.getLogger(__name__)
 
 _DEMANDED, _VOLTAGE = AXLE_COLUMNS[-2:]
 
 
-def simulate(simulate: SimulateConfig, diagnosed: Diagnosed, table: Table, seed: int, folder: Path) -> Rides:
+def simulate(
+    simulate: SimulateConfig, diagnosed: Diagnosed, table: Table, seed: int, folder: Path, jobs: int = 1
+) -> Rides:
     """Every ride that the config asks for, its summary, and the response of the damper to a step of voltage.
 
     Parameters
@@ -23,6 +31,7 @@ def simulate(simulate: SimulateConfig, diagnosed: Diagnosed, table: Table, seed:
     table : force over voltage and velocity, by which the controller finds its voltage
     seed : of the run, for roads that are drawn
     folder : of the config, for roads that are read
+    jobs : rides at the same time
 
     Raises
     ------
@@ -50,13 +59,16 @@ def simulate(simulate: SimulateConfig, diagnosed: Diagnosed, table: Table, seed:
         grids[plain] = grid_of(table_of(damper, table) if plain else table, temperature)
         oils[plain] = oil_of(damper, temperature, simulate.valve_response_s)
         check_inertance(oils[plain], simulate.car.car())
-    rides, summary = [], []
-    for case in planned:
+
+    def ridden(case: Case) -> Outcome:
         log.info("simulate: %s", case.name)
-        profile = profiles[case.road.name]
-        outcome = ride_case(
-            simulate, case, profile, grids[case.plain], oils[case.plain], table.notes.outside == "error"
-        )
+        ends = table.notes.outside == "error"
+        return ride_case(simulate, case, profiles[case.road.name], grids[case.plain], oils[case.plain], ends)
+
+    rides, summary = [], []
+    with ThreadPoolExecutor(max(jobs, 1)) as pool:
+        outcomes = list(pool.map(ridden, planned))
+    for case, outcome in zip(planned, outcomes, strict=True):
         without: tuple[str, ...] = (_VOLTAGE,) if case.fidelity == "ideal" or not with_voltage else ()
         without += (_DEMANDED,) if case.policy.aim == "voltage" else ()
         rides.append(ride_of(case.name, outcome, without))
