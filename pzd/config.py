@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import Field, TypeAdapter, ValidationError, field_validator
 
+from pzd.blind.config import BlindConfig
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import CHANNELS, VOLTAGE, Control
@@ -62,6 +63,8 @@ class RunConfig(Frozen):
     """The half-car and its rides."""
     report: ReportConfig = ReportConfig()
     """The comfort report."""
+    blind: BlindConfig | None = None
+    """What `pzd blind` hides in virtual rigs, to see how far the naming can be trusted."""
 
 
 def load(path: Path, overrides: Sequence[str] = ()) -> RunConfig:

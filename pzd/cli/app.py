@@ -10,7 +10,7 @@ from typing import NoReturn
 
 import typer
 
-from pzd.cli import figures, look, stages, start
+from pzd.cli import blind, figures, look, stages, start
 from pzd.cli.exits import DONE, INTERRUPTED, OWN_FAULT
 from pzd.cli.output import complain, own_fault, silence
 from pzd.schema.errors import ConfigError, FilesError, UserError
@@ -27,7 +27,13 @@ app = typer.Typer(
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_COMMANDS: tuple[Callable[..., int], ...] = (*stages.COMMANDS, *look.COMMANDS, *figures.COMMANDS, *start.COMMANDS)
+_COMMANDS: tuple[Callable[..., int], ...] = (
+    *stages.COMMANDS,
+    *look.COMMANDS,
+    *figures.COMMANDS,
+    *blind.COMMANDS,
+    *start.COMMANDS,
+)
 for _command in _COMMANDS:
     app.command()(_command)
 

@@ -1,0 +1,134 @@
+"""Runs the cases: one pool of processes draws them, another diagnoses them, and the truth is opened last.
+
+At most `jobs` processes work at a time, so that the seconds of a diagnosis are its own.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import shutil
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from pzd.blind.case import Places, Scored
+from pzd.blind.hide import Setup, hide
+from pzd.blind.mark import mark
+from pzd.blind.plan import Planned, plan
+from pzd.blind.seek import Methods, seek
+from pzd.schema.errors import DataError
+from pzd.schema.jsonfile import read_json
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """What is hidden, how it is sought, and where the files go."""
+
+    setup: Setup
+    methods: Methods
+    places: Places
+    made_from: str
+    """Hash of everything that a case hangs on but its number: cases with another one are done again."""
+
+    def run(self, jobs: int, *, afresh: bool = False) -> tuple[Scored, ...]:
+        """Every case's score; those that stand there finished are not done again.
+
+        Parameters
+        ----------
+        jobs : processes that work at a time
+        afresh : do the finished ones again as well
+        """
+        cases = plan(self.setup.blind)
+        done = {} if afresh else self.finished(cases)
+        waiting = [case for case in cases if case.id not in done]
+        if waiting:
+            self._prepare(waiting)
+            done |= self._worked(waiting, len(cases), jobs)
+        return tuple(done[case.id] for case in cases)
+
+    def finished(self, cases: Iterable[Planned]) -> dict[str, Scored]:
+        """The scores that stand there and were made from the same config and code."""
+        found = {}
+        for case in cases:
+            with suppress(DataError):
+                score = read_json(self.places.scored(case.id), Scored, self.setup.control)
+                if score.made_from == self.made_from:
+                    found[case.id] = score
+        return found
+
+    def _prepare(self, waiting: Iterable[Planned]) -> None:
+        """Take away what an earlier run left of the cases."""
+        for case in waiting:
+            shutil.rmtree(self.places.case(case.id), ignore_errors=True)
+            for path in (self.places.truth(case.id), self.places.clean(case.id), self.places.scored(case.id)):
+                path.unlink(missing_ok=True)
+
+    def _worked(self, waiting: list[Planned], whole: int, jobs: int) -> dict[str, Scored]:
+        fresh = multiprocessing.get_context("spawn")
+        begun = time.monotonic()
+        found: dict[str, Scored] = {}
+
+        def kept(case: Planned) -> None:
+            found[case.id] = mark(
+                self.places, case.id, self.made_from, self.setup.control, keep_files=self.setup.blind.keep_files
+            )
+            left = (time.monotonic() - begun) / len(found) * (len(waiting) - len(found))
+            log.info("%d of %d cases, %s left", whole - len(waiting) + len(found), whole, _duration(left))
+
+        drawing = ProcessPoolExecutor(min(jobs, len(waiting)), fresh)
+        seeking = ProcessPoolExecutor(min(jobs, len(waiting)), fresh)
+        try:
+            _in_turn(
+                waiting,
+                lambda case: drawing.submit(hide, self.setup, case, self.places),
+                lambda case: seeking.submit(seek, self.methods, self.places.case(case.id)),
+                kept,
+                jobs,
+            )
+        finally:
+            drawing.shutdown(cancel_futures=True)
+            seeking.shutdown(cancel_futures=True)
+        return found
+
+
+def _in_turn(
+    cases: list[Planned],
+    draw: Callable[[Planned], Future[None]],
+    diagnose: Callable[[Planned], Future[None]],
+    kept: Callable[[Planned], None],
+    jobs: int,
+) -> None:
+    """Draw and diagnose every case, at most `jobs` at work; what is drawn is diagnosed first."""
+    waiting, drawn = list(reversed(cases)), list[Planned]()
+    drawing: dict[Future[None], Planned] = {}
+    seeking: dict[Future[None], Planned] = {}
+    while waiting or drawn or drawing or seeking:
+        while len(drawing) + len(seeking) < jobs and (drawn or waiting):
+            if drawn:
+                case = drawn.pop()
+                seeking[diagnose(case)] = case
+            else:
+                case = waiting.pop()
+                drawing[draw(case)] = case
+        finished, _ = wait([*drawing, *seeking], return_when=FIRST_COMPLETED)
+        for future in finished:
+            future.result()
+            if future in drawing:
+                drawn.append(drawing.pop(future))
+            else:
+                kept(seeking.pop(future))
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds / 60.0:.0f} min" if seconds > 90.0 else f"{seconds:.0f} s"
+
+
+def folder_of(root: Path, seed: int) -> Places:
+    """Where a benchmark of a seed lies below the benchmark's folder."""
+    return Places(root / f"seed-{seed}")

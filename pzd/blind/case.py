@@ -1,0 +1,113 @@
+"""What is kept of a case: the truth, what the diagnosis cost, and the score."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pzd.blind.plan import Kind
+from pzd.damper.model import Damper
+from pzd.schema.model import Frozen
+
+
+class Truth(Frozen):
+    """What was hidden, and how well it can be seen."""
+
+    id: str
+    seed: int
+    """Seed of the benchmark; with the number of the case it fixes every draw."""
+    kind: Kind
+    campaign: str
+    effects: tuple[str, ...]
+    """Effects of the library that were hidden."""
+    form: str | None
+    """Form outside the library that was hidden."""
+    form_values: dict[str, float]
+    damper: Damper
+    sizes: dict[str, float]
+    """The most by which each changes the force, as a share of the record's peak."""
+    force_noise: float
+    noise_rho: float
+    displacement_noise_m: float
+    warming: bool
+    one_frequency: bool
+    lowest_peak_N: float
+    """Largest force of the softest record."""
+    visible_gap: float
+    """R.m.s. left by the best Bingham refit, as a share of the record's peak."""
+    gap_given_other: dict[str, float]
+    """Of a pair: what is left when the other effect is known and T0, C and k are refitted."""
+
+
+class Cost(Frozen):
+    """What ingest, identify and diagnose took."""
+
+    seconds: float
+    diagnose_seconds: float
+    peak_memory_MB: float
+    """Largest memory of the process so far."""
+    failure: str | None = None
+    """What went wrong where no diagnosis came."""
+
+
+class Scored(Frozen):
+    """One finished case."""
+
+    id: str
+    made_from: str
+    """What config and code it was made with."""
+    kind: Kind
+    campaign: str
+    one_frequency: bool
+    hidden: str
+    """Names of all that was hidden, joined by `+`; `none`."""
+    truth: tuple[str, ...]
+    """Effects that were there to be named: what counts as nothing is left out."""
+    force_noise: float
+    noise_rho: float
+    displacement_noise_m: float
+    visible_gap: float
+    gap_given_other: dict[str, float]
+    verdict: str | None
+    """None where the diagnosis failed."""
+    effects: tuple[str, ...]
+    rivals: tuple[str, ...]
+    confidence: float | None
+    inside: dict[str, bool]
+    """Of each parameter of a rightly named effect: whether it lies in its 95 % interval."""
+    gap_cut: float | None
+    """1 - W_s after / W_s before against the noise-free force of the held-out records; None where nothing was
+    adopted."""
+    next_test: bool
+    """Whether a next test was proposed."""
+    seconds: float
+    diagnose_seconds: float
+    peak_memory_MB: float
+    failure: str | None
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the files of a benchmark lie below its folder; the truth lies apart from what the diagnosis is given."""
+
+    folder: Path
+
+    def case(self, name: str) -> Path:
+        """All that the diagnosis of a case sees and writes."""
+        return self.folder / "cases" / name
+
+    def rig(self, name: str) -> Path:
+        """The rig files of a case."""
+        return self.case(name) / "rig"
+
+    def truth(self, name: str) -> Path:
+        """The truth of a case."""
+        return self.folder / "truth" / f"{name}.json"
+
+    def clean(self, name: str) -> Path:
+        """Its noise-free records."""
+        return self.folder / "truth" / f"{name}.npz"
+
+    def scored(self, name: str) -> Path:
+        """Its score."""
+        return self.folder / "scored" / f"{name}.json"

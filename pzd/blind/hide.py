@@ -1,0 +1,288 @@
+"""Draws a case: a damper near that of the config, something hidden in it, and what the stand records of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from pzd.blind.case import Places, Truth
+from pzd.blind.config import BlindConfig, Campaign
+from pzd.blind.outside import FORMS, Reached
+from pzd.blind.plan import Planned
+from pzd.blind.strengths import RULES, Values, of_size
+from pzd.blind.visible import Clean, visible_gap
+from pzd.damper.compose import respond
+from pzd.damper.effect import Scales
+from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
+from pzd.diagnose.config import NuisanceConfig
+from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control
+from pzd.record import Array
+from pzd.rig.frame import force_in_frame
+from pzd.rig.stand import Taken, take
+from pzd.rig.virtual_config import DisplacementNoise, ForceNoise, Jitter, Noise, VirtualEntry
+from pzd.schema.csvfile import write_columns
+from pzd.schema.jsonfile import write_json
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What every case starts from."""
+
+    blind: BlindConfig
+    stand: VirtualEntry
+    nuisance: NuisanceConfig
+    """What differs from test to test."""
+    control: Control
+
+    def campaign(self, name: str) -> Campaign:
+        """The campaign of that name."""
+        return next(campaign for campaign in self.blind.campaigns if campaign.name == name)
+
+
+def hide(setup: Setup, planned: Planned, places: Places) -> None:
+    """Draw a case; write its rig files where the diagnosis looks, and its truth where it does not.
+
+    Parameters
+    ----------
+    setup : what every case starts from
+    planned : the case
+    places : where its files go
+    """
+    truth, records = drawn(setup, planned)
+    rig = places.rig(planned.id)
+    rig.mkdir(parents=True, exist_ok=True)
+    for number, record in enumerate(records, start=1):
+        write_columns(rig / f"r{number:02d}.csv", _channels(record), setup.control)
+    places.truth(planned.id).parent.mkdir(parents=True, exist_ok=True)
+    write_json(places.truth(planned.id), truth, setup.control)
+    write_clean(places, planned.id, [Clean(record.truth, record.true_force) for record in records])
+
+
+def drawn(setup: Setup, planned: Planned) -> tuple[Truth, list[Taken]]:
+    """The truth of a case, and what the data logger has of it.
+
+    Parameters
+    ----------
+    setup : what every case starts from
+    planned : the case
+    """
+    blind, campaign = setup.blind, setup.campaign(planned.campaign)
+    draw = np.random.default_rng(np.random.SeedSequence(blind.seed, spawn_key=(planned.index,)))
+    stand_seed = int(draw.integers(1 << 31))
+    share, rho = float(draw.choice(blind.force_noise)), float(draw.choice(blind.noise_rho))
+    unsteady = float(np.exp(draw.uniform(*np.log(blind.displacement_noise_m))))
+    warms = bool(draw.random() < blind.warming_share) or "temperature_drift" in planned.hidden
+    wanted = {name: float(np.exp(draw.uniform(*np.log(blind.sizes)))) for name in planned.hidden}
+    stand = _stand(setup, campaign, _near(setup.stand.damper, blind.base_spread, draw), warms=warms)
+    plain = _clean(stand.model_copy(update={"oversampling": 1}), stand_seed, setup.control)
+    if planned.kind == "outside":
+        hidden = _Outside.drawn(planned.hidden[0], wanted[planned.hidden[0]], plain, draw)
+        damper, law = stand.damper, hidden.law
+    else:
+        hidden, law = None, force_in_frame
+        damper = _with_effects(stand.damper, wanted, plain, draw)
+    recorded = stand.model_copy(update={"damper": damper, **_noise(setup, share, rho, unsteady)})
+    records = list(take(recorded, stand_seed, control=setup.control, law=law))
+    clean = [Clean(record.truth, record.true_force) for record in records]
+    return Truth(
+        id=planned.id,
+        seed=blind.seed,
+        kind=planned.kind,
+        campaign=campaign.name,
+        effects=tuple(damper.effects),
+        form=hidden.name if hidden else None,
+        form_values=dict(hidden.values) if hidden else {},
+        damper=damper,
+        sizes=sizes(plain, stand.damper, damper) if hidden is None else wanted,
+        force_noise=share,
+        noise_rho=rho,
+        displacement_noise_m=unsteady,
+        warming=warms,
+        one_frequency=campaign.one_frequency,
+        lowest_peak_N=min(one.peak for one in clean),
+        visible_gap=visible_gap(clean, stand.damper),
+        gap_given_other=_given_other(clean, damper),
+    ), records
+
+
+def _near(damper: Damper, spread: float, draw: np.random.Generator) -> Damper:
+    """The damper with T0, C and k of every row scaled, half by factors of the case and half by the row's own."""
+    common = draw.uniform(-0.5, 0.5, 3)
+    rows = []
+    for row in damper.base:
+        friction, damping, stiffness = 1.0 + spread * (common + draw.uniform(-0.5, 0.5, 3))
+        rows.append(
+            BaseRow(
+                voltage_V=row.voltage_V,
+                temperature_degC=row.temperature_degC,
+                T0_N=row.T0_N * float(friction),
+                C_Ns_per_m=row.C_Ns_per_m * float(damping),
+                k_N_per_m=row.k_N_per_m * float(stiffness),
+            )
+        )
+    return Damper(base=tuple(rows))
+
+
+def _stand(setup: Setup, campaign: Campaign, damper: Damper, *, warms: bool) -> VirtualEntry:
+    """The stand with this campaign, without noise and jitter."""
+    changes = {"damper": damper, "tests": campaign.tests, "noise": Noise(), "jitter": Jitter(), "setting": None}
+    warming = {"temperatures_degC": (setup.blind.warming,)} if warms else {}
+    return setup.stand.model_copy(update={**changes, **warming})
+
+
+def _noise(setup: Setup, share: float, rho: float, unsteady: float) -> dict[str, Noise | Jitter]:
+    """What the sensors add in this case; voltage and temperature as the config's stand has them."""
+    own, nuisance = setup.stand.noise, setup.nuisance
+    noise = Noise(
+        displacement=DisplacementNoise(sd_m=unsteady),
+        force=ForceNoise(share_of_peak=share, rho=rho),
+        voltage=own.voltage,
+        temperature=own.temperature,
+    )
+    return {
+        "noise": noise,
+        "jitter": Jitter(gain=nuisance.gain, offset_of_peak=nuisance.offset, delay_s=nuisance.delay_s),
+    }
+
+
+def _clean(stand: VirtualEntry, seed: int, control: Control) -> list[Clean]:
+    return [Clean(record.truth, record.true_force) for record in take(stand, seed, control=control)]
+
+
+def _with_effects(
+    plain: Damper, wanted: Mapping[str, float], records: Sequence[Clean], draw: np.random.Generator
+) -> Damper:
+    """The damper with every effect at its size, each alone."""
+    scales = _scales(records, plain)
+    start = _start_temperature(records)
+    base = plain.model_copy(update={"reference_temperature_degC": start if "temperature_drift" in wanted else None})
+    effects: dict[str, Values] = {}
+    for name, size in wanted.items():
+        strength = RULES[name](draw, scales)
+        effects[name] = of_size(strength, partial(_size, records, base, name), size)
+    return Damper(base=plain.base, effects=dict(effects), reference_temperature_degC=base.reference_temperature_degC)
+
+
+def _start_temperature(records: Sequence[Clean]) -> float | None:
+    temperature = records[0].motion.temperature
+    return None if temperature is None else float(temperature[0])
+
+
+def _size(records: Sequence[Clean], plain: Damper, name: str, values: Values) -> float:
+    """The most by which an effect changes the force, as a share of the record's peak."""
+    damper = plain.with_effect(name, values)
+    return max(_change(record, plain, damper) for record in records)
+
+
+def sizes(records: Sequence[Clean], plain: Damper, damper: Damper) -> dict[str, float]:
+    """The most by which each effect of a damper, alone, changes the force, as a share of the record's peak.
+
+    Parameters
+    ----------
+    records : motions, and the force of the plain damper
+    plain : without the effects
+    damper : with them
+    """
+    base = plain.model_copy(update={"reference_temperature_degC": damper.reference_temperature_degC})
+    return {
+        name: _size(records, base, name, {key: float(value) for key, value in values.items()})  # type: ignore[arg-type]  # one number each, as drawn
+        for name, values in damper.effects.items()
+    }
+
+
+def _change(record: Clean, plain: Damper, damper: Damper) -> float:
+    start = float(record.force[0])
+    with_it, without = (respond(one, record.motion, start, 1e-6) for one in (damper, plain))
+    return float(np.max(np.abs(with_it - without))) / record.peak
+
+
+def _scales(records: Sequence[Clean], damper: Damper) -> Scales:
+    motions = [record.motion for record in records]
+    voltages = np.concatenate([[0.0] if m.voltage is None else m.voltage[[0, -1]] for m in motions])
+    moving = [float(np.ptp(m.voltage)) for m in motions if m.voltage is not None]
+    return Scales(
+        force=max(record.peak for record in records),
+        low_force=min(record.peak for record in records),
+        speed=max(float(np.max(np.abs(m.velocity))) for m in motions),
+        stroke=max(float(np.max(np.abs(m.displacement))) for m in motions),
+        acceleration=max(float(np.max(np.abs(m.acceleration))) for m in motions),
+        damping=float(np.median([row.C_Ns_per_m for row in damper.base])),
+        voltage=max([float(np.ptp(voltages)), *moving]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Outside:
+    """A form outside the library at its size."""
+
+    name: str
+    values: Mapping[str, float]
+    reached: Reached
+
+    @classmethod
+    def drawn(cls, name: str, size: float, records: Sequence[Clean], draw: np.random.Generator) -> _Outside:
+        """The form with parameters drawn, the most that it adds to a record being `size` of its peak."""
+        form = FORMS[name]
+        scale = Reached(
+            stroke=max(float(np.max(np.abs(record.motion.displacement))) for record in records),
+            speed=max(float(np.max(np.abs(record.motion.velocity))) for record in records),
+        )
+        values = {key: float(draw.uniform(*limits)) for key, limits in form.ranges.items()}
+        largest = max(float(np.max(np.abs(form.shape(r.motion, scale, values)))) / r.peak for r in records)
+        return cls(name, {**values, "force_N": size / largest}, scale)
+
+    def law(self, damper: Damper, motion: Motion, frame_stiffness: float | None) -> Array:
+        """(n,) force of the damper and of the form beside it [N]."""
+        shape = FORMS[self.name].shape(motion, self.reached, self.values)
+        return force_in_frame(damper, motion, frame_stiffness) + self.values["force_N"] * shape
+
+
+def _given_other(records: Sequence[Clean], damper: Damper) -> dict[str, float]:
+    """Of a pair: what is left without each when the other one stays as it is and T0, C and k are refitted."""
+    if len(damper.effects) < 2:
+        return {}
+    rest = {
+        name: {key: dict(values) for key, values in damper.effects.items() if key != name} for name in damper.effects
+    }
+    return {
+        name: visible_gap(records, damper.model_copy(update={"effects": effects})) for name, effects in rest.items()
+    }
+
+
+def _channels(record: Taken) -> dict[str, Array | None]:
+    """The columns of a rig file: what a data logger has."""
+    columns = {TIME.column: record.time, DISPLACEMENT.column: record.displacement, FORCE.column: record.force}
+    more = {VOLTAGE.column: record.voltage, TEMPERATURE.column: record.temperature}
+    return {**columns, **{name: channel for name, channel in more.items() if channel is not None}}
+
+
+_CHANNELS = ("time", "displacement", "velocity", "acceleration", "voltage", "temperature")
+
+
+def write_clean(places: Places, name: str, records: Sequence[Clean]) -> None:
+    """Keep the noise-free records of a case beside its truth."""
+    arrays = {
+        f"{number:02d}.{key}": channel
+        for number, record in enumerate(records, start=1)
+        for key, channel in [("force", record.force), *((key, getattr(record.motion, key)) for key in _CHANNELS)]
+        if channel is not None
+    }
+    np.savez(places.clean(name), allow_pickle=False, **arrays)
+
+
+def read_clean(places: Places, name: str) -> dict[str, Clean]:
+    """The noise-free records of a case, by the names that the rig files gave them."""
+    with np.load(places.clean(name)) as file:
+        arrays = dict(file)
+    numbers = sorted({key.split(".")[0] for key in arrays})
+    return {
+        f"r{number}": Clean(
+            Motion(*(arrays.get(f"{number}.{key}") for key in _CHANNELS)),  # type: ignore[arg-type]  # the first four always stand there
+            arrays[f"{number}.force"],
+        )
+        for number in numbers
+    }

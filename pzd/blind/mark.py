@@ -1,0 +1,137 @@
+"""Scores a case: opens the truth beside the diagnosis."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping
+
+import numpy as np
+
+from pzd.artefacts import Diagnosed, Diagnosis
+from pzd.blind.case import Cost, Places, Scored, Truth
+from pzd.blind.hide import read_clean
+from pzd.blind.seek import COST
+from pzd.blind.visible import Clean
+from pzd.damper.compose import respond
+from pzd.damper.model import Damper
+from pzd.identify.trial import warm_up
+from pzd.quantities import Control
+from pzd.schema.jsonfile import read_json, write_json
+
+SMALL_OFFSET = 0.01
+"""A preload_offset below this share of the softest record's peak counts as nothing missing."""
+SMALL_DELAY = 1e-3
+"""So does a sensor_delay shorter than this [s]."""
+
+
+def mark(places: Places, name: str, made_from: str, control: Control, *, keep_files: bool) -> Scored:
+    """Score a diagnosed case and keep the score for good.
+
+    Parameters
+    ----------
+    places : where its files are
+    name : id of the case
+    made_from : what config and code it was made with
+    control : the control signal
+    keep_files : whether rig files, diagnosis and noise-free records stay
+    """
+    truth = read_json(places.truth(name), Truth, control)
+    cost = read_json(places.case(name) / COST, Cost, control)
+    found = None if cost.failure else Diagnosed.read(places.case(name), control)
+    result = scored(truth, cost, found, {} if found is None else read_clean(places, name), made_from)
+    _kept(places, result, control)
+    if not keep_files:
+        shutil.rmtree(places.rig(name))
+        places.clean(name).unlink()
+    return result
+
+
+def _kept(places: Places, result: Scored, control: Control) -> None:
+    """Write the score whole or not at all."""
+    target = places.scored(result.id)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    fresh = target.with_suffix(".new")
+    write_json(fresh, result, control)
+    os.replace(fresh, target)
+
+
+def scored(truth: Truth, cost: Cost, found: Diagnosed | None, clean: Mapping[str, Clean], made_from: str) -> Scored:
+    """The score of a case.
+
+    Parameters
+    ----------
+    truth : what was hidden
+    cost : what the diagnosis took, and how it failed
+    found : the diagnosis; None where it failed
+    clean : the noise-free records by name
+    made_from : what config and code the case was made with
+    """
+    told = found.diagnosis if found else None
+    there = counted(truth)
+    return Scored(
+        id=truth.id,
+        made_from=made_from,
+        kind=truth.kind,
+        campaign=truth.campaign,
+        one_frequency=truth.one_frequency,
+        hidden=truth.form or "+".join(truth.effects) or "none",
+        truth=there,
+        force_noise=truth.force_noise,
+        noise_rho=truth.noise_rho,
+        displacement_noise_m=truth.displacement_noise_m,
+        visible_gap=truth.visible_gap,
+        gap_given_other=truth.gap_given_other,
+        verdict=told.verdict if told else None,
+        effects=told.effects if told else (),
+        rivals=told.rivals if told else (),
+        confidence=told.confidence if told else None,
+        inside=_inside(told, truth) if told and set(told.effects) == set(there) else {},
+        gap_cut=gap_cut(found, clean) if found and found.diagnosis.effects else None,
+        next_test=bool(told and told.next_test),
+        seconds=cost.seconds,
+        diagnose_seconds=cost.diagnose_seconds,
+        peak_memory_MB=cost.peak_memory_MB,
+        failure=cost.failure,
+    )
+
+
+def counted(truth: Truth) -> tuple[str, ...]:
+    """The hidden effects that are large enough to be anything at all."""
+    small = {
+        "preload_offset": lambda v: abs(v["F_0"]) < SMALL_OFFSET * truth.lowest_peak_N,
+        "sensor_delay": lambda v: abs(v["tau"]) < SMALL_DELAY,
+    }
+    return tuple(name for name, values in truth.damper.effects.items() if not small.get(name, lambda _: False)(values))
+
+
+def _inside(told: Diagnosis, truth: Truth) -> dict[str, bool]:
+    """Of each parameter with one value and an interval: whether the true value lies in it."""
+    found = {}
+    for effect, parameters in told.parameters.items():
+        for name, value in parameters.items():
+            low, high, true = value.low95, value.high95, truth.damper.effects[effect][name]
+            if isinstance(low, float) and isinstance(high, float) and isinstance(true, float):
+                found[f"{effect}.{name}"] = low <= true <= high
+    return found
+
+
+def gap_cut(found: Diagnosed, clean: Mapping[str, Clean]) -> float:
+    """How much of the gap to the noise-free force the found effects take away on the held-out records.
+
+    Equation: 1 - W_s after / W_s before                    Source: Makowski and Knap 2021, eq. (4)
+
+    Parameters
+    ----------
+    found : the diagnosis with the damper before and after
+    clean : the noise-free records by name
+    """
+    held_out = [clean[name] for name in found.diagnosis.gap.held_out]
+    before, after = (sum(_squares(damper, record) for record in held_out) for damper in (found.plain, found.damper))
+    return 1.0 - after / before
+
+
+def _squares(damper: Damper, record: Clean) -> float:
+    first = warm_up(record.motion.displacement)
+    residual = (record.force - respond(damper, record.motion, float(record.force[0]), 1e-7))[first:]
+    return float(np.sum(residual**2))

@@ -1,0 +1,86 @@
+"""Which case hides what in which campaign: fairly mixed from the first case on, whatever the number of cases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal, TypeVar
+
+from pzd.blind.config import BlindConfig, Campaign
+from pzd.blind.outside import FORMS
+from pzd.damper.effects import library
+
+Kind = Literal["single", "pair", "none", "outside"]
+KINDS: tuple[Kind, ...] = ("single", "none", "outside", "pair")
+
+Key = TypeVar("Key", bound=str)
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One case before anything is drawn."""
+
+    index: int
+    kind: Kind
+    campaign: str
+    hidden: tuple[str, ...]
+    """Names of the effects, or of the form outside the library."""
+
+    @property
+    def id(self) -> str:
+        """What its files are called; it tells nothing of the truth."""
+        return f"{self.index:05d}"
+
+
+def plan(config: BlindConfig) -> tuple[Planned, ...]:
+    """Every case, in the order in which they are done.
+
+    Parameters
+    ----------
+    config : the shares, the campaigns and the number
+    """
+    shares: dict[Kind, float] = {kind: getattr(config.kinds, kind) for kind in KINDS}
+    kinds = _mixed(shares)
+    campaigns = {kind: _mixed({c.name: c.share for c in config.campaigns}) for kind in KINDS}
+    what = {(kind, c.name): _in_turn(hideable(c, kind)) for kind in KINDS for c in config.campaigns}
+    found = []
+    for index in range(config.cases):
+        kind = next(kinds)
+        campaign = next(campaigns[kind])
+        found.append(Planned(index, kind, campaign, next(what[kind, campaign])))
+    return tuple(found)
+
+
+def hideable(campaign: Campaign, kind: Kind) -> list[tuple[str, ...]]:
+    """What a campaign can hide; effects of the drive only where the voltage moves.
+
+    Pairs come in such an order that every effect has been in one before any is in many.
+    """
+    if kind == "none":
+        return [()]
+    if kind == "outside":
+        return [(name,) for name in FORMS]
+    effects = [name for name, e in library().items() if e.needs != "voltage" or campaign.moves_voltage]
+    if kind == "single":
+        return [(name,) for name in effects]
+    place = {name: i for i, name in enumerate(effects)}
+    return sorted(combinations(effects, 2), key=lambda pair: (place[pair[1]] - place[pair[0]]) * 7 % len(effects))
+
+
+def _mixed(shares: Mapping[Key, float]) -> Iterator[Key]:
+    """Names for ever, at each turn the one that is furthest behind its share."""
+    whole = sum(shares.values())
+    given = dict.fromkeys(shares, 0)
+    for turn in range(1, 1 << 62):
+        behind = {name: share / whole * turn - given[name] for name, share in shares.items() if share > 0.0}
+        name = max(behind, key=lambda one: behind[one])
+        given[name] += 1
+        yield name
+
+
+def _in_turn(choices: list[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
+    turn = 0
+    while True:
+        yield choices[turn % len(choices)]
+        turn += 1

@@ -1,0 +1,76 @@
+"""The command that hides effects in virtual rigs and scores what the diagnosis names."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING
+
+from pzd.cli.exits import DONE
+from pzd.cli.options import CORES, RUNS, Config, Force, Jobs, Quiet, Runs, Set, Verbose
+from pzd.cli.output import Output
+
+if TYPE_CHECKING:
+    from pzd.blind.hide import Setup
+    from pzd.config import RunConfig
+
+FOLDER = "blind"
+"""Where the benchmark lies beside the stages of the run."""
+
+
+def blind(
+    config: Config,
+    runs: Runs = RUNS,
+    overrides: Set = None,
+    force: Force = False,
+    jobs: Jobs = CORES,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> int:
+    """Hide effects in virtual rigs, diagnose them, and score what is named."""
+    from pzd.blind.benchmark import Benchmark, folder_of
+    from pzd.blind.seek import Methods
+    from pzd.blind.summary import write
+    from pzd.pipeline.command import opened
+
+    output = Output(quiet=quiet, verbose=verbose)
+    given = opened(config, runs, overrides or ())
+    setup, whole = _setup(given.config), given.config
+    places = folder_of(given.run.folder / FOLDER, setup.blind.seed)
+    methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
+    with given.run.locked("pzd blind"):
+        benchmark = Benchmark(setup, methods, places, _made_from(whole))
+        cases = benchmark.run(jobs, afresh=force)
+        lines = write(cases, places.folder, setup.control, tuning=setup.blind.tuning)
+    output.say(*lines, f"tables and picture: {places.folder}")
+    return DONE
+
+
+def _setup(config: RunConfig) -> Setup:
+    """What every case starts from.
+
+    Raises
+    ------
+    ConfigError : when the config has no `blind` block, or not one virtual stand
+    """
+    from pzd.blind.hide import Setup
+    from pzd.schema.errors import ConfigError
+
+    if config.blind is None:
+        raise ConfigError("blind: the config has no such block; configs/blind.yaml is an example")
+    if config.rig.virtual is None or len(config.rig.virtual) != 1:
+        raise ConfigError("rig.virtual: pzd blind needs one virtual stand, whose damper the cases start from")
+    return Setup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
+
+
+def _made_from(config: RunConfig) -> str:
+    """Hash of the config's blocks and of the code that a case hangs on."""
+    from pzd.pipeline.sources import code_hash
+
+    of_the_run = {"blind": {"cases", "keep_files", "tuned_on", "tuning"}}
+    blocks = config.model_dump_json(
+        include={"seed", "control", "rig", "identify", "diagnose", "blind"}, exclude=of_the_run
+    )
+    return hashlib.sha256(f"{blocks}{code_hash('blind')}".encode()).hexdigest()[:16]
+
+
+COMMANDS = (blind,)
