@@ -25,7 +25,7 @@ class Truth(Frozen):
     form_values: dict[str, float]
     damper: Damper
     sizes: dict[str, float]
-    """The most by which each changes the force, as a share of the record's peak."""
+    """How much each changes the force, as `blind.sizes` counts it."""
     force_noise: float
     noise_rho: float
     displacement_noise_m: float

@@ -47,8 +47,11 @@ class Campaign(Frozen):
 
 
 class BlindConfig(Frozen):
-    """A benchmark of the diagnosis; the stand and the damper are those of `rig.virtual`, the jitter of force
-    channels from test to test that of `diagnose.nuisance`."""
+    """A benchmark of the diagnosis.
+
+    The stand and the damper are those of `rig.virtual`, the jitter of the force from test to test that of
+    `diagnose.nuisance`.
+    """
 
     seed: int = Field(ge=0)
     """Seed of every draw."""
@@ -63,7 +66,8 @@ class BlindConfig(Frozen):
     campaigns: tuple[Campaign, ...] = Field(min_length=1)
     """What the stand runs; every case runs one campaign."""
     sizes: tuple[float, float] = (0.02, 0.2)
-    """Smallest and largest effect: the most by which it changes the force, as a share of the record's peak."""
+    """Smallest and largest effect, as a share of the peak of the record that it changes most: the amplitude of the sine
+    that has the r.m.s. of the change."""
     base_spread: float = Field(default=0.1, ge=0.0, lt=1.0)
     """T0, C and k of every row lie within this share of those in `rig.virtual`."""
     force_noise: tuple[float, ...] = Field(default=(0.005, 0.01, 0.02, 0.03), min_length=1)

@@ -164,7 +164,11 @@ def _with_effects(
     for name, size in wanted.items():
         strength = RULES[name](draw, scales)
         effects[name] = of_size(strength, partial(_size, records, base, name), size)
-    return Damper(base=plain.base, effects=dict(effects), reference_temperature_degC=base.reference_temperature_degC)
+    return Damper(base=plain.base, effects=_plain(effects), reference_temperature_degC=base.reference_temperature_degC)
+
+
+def _plain(effects: Mapping[str, Values]) -> dict[str, dict[str, float | tuple[float, ...]]]:
+    return {name: dict(values) for name, values in effects.items()}
 
 
 def _start_temperature(records: Sequence[Clean]) -> float | None:
@@ -173,19 +177,23 @@ def _start_temperature(records: Sequence[Clean]) -> float | None:
 
 
 def _size(records: Sequence[Clean], plain: Damper, name: str, values: Values) -> float:
-    """The most by which an effect changes the force, as a share of the record's peak."""
+    """How much an effect changes the force of the record that it changes most, as a share of its peak."""
     damper = plain.with_effect(name, values)
     return max(_change(record, plain, damper) for record in records)
 
 
 def sizes(records: Sequence[Clean], plain: Damper, damper: Damper) -> dict[str, float]:
-    """The most by which each effect of a damper, alone, changes the force, as a share of the record's peak.
+    """How much each effect of a damper, alone, changes the force of the record that it changes most.
 
     Parameters
     ----------
     records : motions, and the force of the plain damper
     plain : without the effects
     damper : with them
+
+    Returns
+    -------
+    by the effect's name: amplitude of a sine of the same r.m.s., as a share of the record's peak
     """
     base = plain.model_copy(update={"reference_temperature_degC": damper.reference_temperature_degC})
     return {
@@ -197,7 +205,12 @@ def sizes(records: Sequence[Clean], plain: Damper, damper: Damper) -> dict[str, 
 def _change(record: Clean, plain: Damper, damper: Damper) -> float:
     start = float(record.force[0])
     with_it, without = (respond(one, record.motion, start, 1e-6) for one in (damper, plain))
-    return float(np.max(np.abs(with_it - without))) / record.peak
+    return amplitude(with_it - without) / record.peak
+
+
+def amplitude(force: Array) -> float:
+    """Amplitude of the sine that has the r.m.s. of a force [N]: a short spike does not count as a large effect."""
+    return float(np.sqrt(2.0 * np.mean(force**2)))
 
 
 def _scales(records: Sequence[Clean], damper: Damper) -> Scales:
@@ -225,14 +238,14 @@ class _Outside:
 
     @classmethod
     def drawn(cls, name: str, size: float, records: Sequence[Clean], draw: np.random.Generator) -> _Outside:
-        """The form with parameters drawn, the most that it adds to a record being `size` of its peak."""
+        """The form with parameters drawn, adding `size` of its peak to the record that it changes most."""
         form = FORMS[name]
         scale = Reached(
             stroke=max(float(np.max(np.abs(record.motion.displacement))) for record in records),
             speed=max(float(np.max(np.abs(record.motion.velocity))) for record in records),
         )
         values = {key: float(draw.uniform(*limits)) for key, limits in form.ranges.items()}
-        largest = max(float(np.max(np.abs(form.shape(r.motion, scale, values)))) / r.peak for r in records)
+        largest = max(amplitude(form.shape(r.motion, scale, values)) / r.peak for r in records)
         return cls(name, {**values, "force_N": size / largest}, scale)
 
     def law(self, damper: Damper, motion: Motion, frame_stiffness: float | None) -> Array:

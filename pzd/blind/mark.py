@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Mapping
 
@@ -53,7 +52,7 @@ def _kept(places: Places, result: Scored, control: Control) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     fresh = target.with_suffix(".new")
     write_json(fresh, result, control)
-    os.replace(fresh, target)
+    fresh.replace(target)
 
 
 def scored(truth: Truth, cost: Cost, found: Diagnosed | None, clean: Mapping[str, Clean], made_from: str) -> Scored:
@@ -98,11 +97,17 @@ def scored(truth: Truth, cost: Cost, found: Diagnosed | None, clean: Mapping[str
 
 def counted(truth: Truth) -> tuple[str, ...]:
     """The hidden effects that are large enough to be anything at all."""
+    least = {("preload_offset", "F_0"): SMALL_OFFSET * truth.lowest_peak_N, ("sensor_delay", "tau"): SMALL_DELAY}
     small = {
-        "preload_offset": lambda v: abs(v["F_0"]) < SMALL_OFFSET * truth.lowest_peak_N,
-        "sensor_delay": lambda v: abs(v["tau"]) < SMALL_DELAY,
+        effect
+        for (effect, parameter), limit in least.items()
+        if effect in truth.damper.effects and abs(_one(truth.damper.effects[effect][parameter])) < limit
     }
-    return tuple(name for name, values in truth.damper.effects.items() if not small.get(name, lambda _: False)(values))
+    return tuple(name for name in truth.damper.effects if name not in small)
+
+
+def _one(value: float | tuple[float, ...]) -> float:
+    return value if isinstance(value, float) else value[0]
 
 
 def _inside(told: Diagnosis, truth: Truth) -> dict[str, bool]:

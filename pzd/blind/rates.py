@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -136,7 +136,7 @@ def rate_rows(cases: Iterable[Scored]) -> list[RateRow]:
     campaigns = sorted({case.campaign for case in every})
     rows = []
     for campaign, kind, low, (start, end) in product(
-        campaigns, ("single", "pair", "none", "outside"), (True, False), zip(GAPS, GAPS[1:], strict=False)
+        campaigns, ("single", "pair", "none", "outside"), (True, False), pairwise(GAPS)
     ):
         found = [
             c
@@ -212,7 +212,7 @@ def calibration_rows(cases: Iterable[Scored]) -> list[CalibrationRow]:
     """Bins of the confidence; a hit is that exactly what was adopted was there."""
     stated = [(case.confidence, case) for case in cases if case.confidence is not None]
     rows = []
-    for low, high in zip(CONFIDENCES, CONFIDENCES[1:], strict=False):
+    for low, high in pairwise(CONFIDENCES):
         inside = [(c, case) for c, case in stated if low < c <= high or (low == 0.0 and c == 0.0)]
         if inside:
             rate = Rate.of((case for _, case in inside), lambda case: set(case.effects) == set(case.truth))

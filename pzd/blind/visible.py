@@ -53,10 +53,10 @@ def visible_gap(records: Sequence[Clean], damper: Damper) -> float:
 
     def residuals(x: Array) -> Array:
         rows = _rows(damper, x)
-        return np.concatenate([part.residuals(rows) for part in parts]) / size
+        return np.asarray(np.concatenate([part.residuals(rows) for part in parts]) / size)
 
     def slopes(x: Array) -> Array:
-        return np.concatenate([part.slopes(damper, x) for part in parts]) / size
+        return np.asarray(np.concatenate([part.slopes(damper, x) for part in parts]) / size)
 
     low = np.tile([0.0, -3.0, -3.0], len(damper.base))
     high = np.tile([np.inf, 3.0, 3.0], len(damper.base))
