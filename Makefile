@@ -38,6 +38,10 @@ ci: check  ## What a merge must pass besides `make test`: check, every config, t
 figures: $(RUNTIME)  ## Draw the figures of the paper into runs/paper/figures
 	$(BIN)/pzd figures configs/paper.yaml
 
+.PHONY: blind
+blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the naming can be trusted; about an hour
+	$(BIN)/pzd blind configs/blind.yaml
+
 .PHONY: bench
 bench: $(DEV)  ## Print how long a user waits, beside the limits
 	$(BIN)/python tests/studies/bench.py
