@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from pzd.blind.case import Places, Truth
+from pzd.blind.clean import Clean, write_clean
 from pzd.blind.config import BlindConfig, Campaign
-from pzd.blind.outside import FORMS, Reached
 from pzd.blind.plan import Planned
-from pzd.blind.strengths import RULES, Values, of_size
-from pzd.blind.visible import Clean, visible_gap
-from pzd.damper.compose import respond
-from pzd.damper.effect import Scales
+from pzd.blind.sizes import Outside, sizes, with_effects
+from pzd.blind.visible import visible_gap
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.motion import Motion
 from pzd.diagnose.config import NuisanceConfig
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control
 from pzd.record import Array
@@ -59,7 +55,7 @@ def hide(setup: Setup, planned: Planned, places: Places) -> None:
         write_columns(rig / f"r{number:02d}.csv", _channels(record), setup.control)
     places.truth(planned.id).parent.mkdir(parents=True, exist_ok=True)
     write_json(places.truth(planned.id), truth, setup.control)
-    write_clean(places, planned.id, [Clean(record.truth, record.true_force) for record in records])
+    write_clean(places.clean(planned.id), [Clean(record.truth, record.true_force) for record in records])
 
 
 def drawn(setup: Setup, planned: Planned) -> tuple[Truth, list[Taken]]:
@@ -80,11 +76,11 @@ def drawn(setup: Setup, planned: Planned) -> tuple[Truth, list[Taken]]:
     stand = _stand(setup, campaign, _near(setup.stand.damper, blind.base_spread, draw), warms=warms)
     plain = _clean(stand.model_copy(update={"oversampling": 1}), stand_seed, setup.control)
     if planned.kind == "outside":
-        hidden = _Outside.drawn(planned.hidden[0], wanted[planned.hidden[0]], plain, draw)
+        hidden = Outside.drawn(planned.hidden[0], wanted[planned.hidden[0]], plain, draw)
         damper, law = stand.damper, hidden.law
     else:
         hidden, law = None, force_in_frame
-        damper = _with_effects(stand.damper, wanted, plain, draw)
+        damper = with_effects(stand.damper, wanted, plain, draw)
     recorded = stand.model_copy(update={"damper": damper, **_noise(setup, share, rho, unsteady)})
     records = list(take(recorded, stand_seed, control=setup.control, law=law))
     clean = [Clean(record.truth, record.true_force) for record in records]
@@ -153,107 +149,6 @@ def _clean(stand: VirtualEntry, seed: int, control: Control) -> list[Clean]:
     return [Clean(record.truth, record.true_force) for record in take(stand, seed, control=control)]
 
 
-def _with_effects(
-    plain: Damper, wanted: Mapping[str, float], records: Sequence[Clean], draw: np.random.Generator
-) -> Damper:
-    """The damper with every effect at its size, each alone."""
-    scales = _scales(records, plain)
-    start = _start_temperature(records)
-    base = plain.model_copy(update={"reference_temperature_degC": start if "temperature_drift" in wanted else None})
-    effects: dict[str, Values] = {}
-    for name, size in wanted.items():
-        strength = RULES[name](draw, scales)
-        effects[name] = of_size(strength, partial(_size, records, base, name), size)
-    return Damper(base=plain.base, effects=_plain(effects), reference_temperature_degC=base.reference_temperature_degC)
-
-
-def _plain(effects: Mapping[str, Values]) -> dict[str, dict[str, float | tuple[float, ...]]]:
-    return {name: dict(values) for name, values in effects.items()}
-
-
-def _start_temperature(records: Sequence[Clean]) -> float | None:
-    temperature = records[0].motion.temperature
-    return None if temperature is None else float(temperature[0])
-
-
-def _size(records: Sequence[Clean], plain: Damper, name: str, values: Values) -> float:
-    """How much an effect changes the force of the record that it changes most, as a share of its peak."""
-    damper = plain.with_effect(name, values)
-    return max(_change(record, plain, damper) for record in records)
-
-
-def sizes(records: Sequence[Clean], plain: Damper, damper: Damper) -> dict[str, float]:
-    """How much each effect of a damper, alone, changes the force of the record that it changes most.
-
-    Parameters
-    ----------
-    records : motions, and the force of the plain damper
-    plain : without the effects
-    damper : with them
-
-    Returns
-    -------
-    by the effect's name: amplitude of a sine of the same r.m.s., as a share of the record's peak
-    """
-    base = plain.model_copy(update={"reference_temperature_degC": damper.reference_temperature_degC})
-    return {
-        name: _size(records, base, name, {key: float(value) for key, value in values.items()})  # type: ignore[arg-type]  # one number each, as drawn
-        for name, values in damper.effects.items()
-    }
-
-
-def _change(record: Clean, plain: Damper, damper: Damper) -> float:
-    start = float(record.force[0])
-    with_it, without = (respond(one, record.motion, start, 1e-6) for one in (damper, plain))
-    return amplitude(with_it - without) / record.peak
-
-
-def amplitude(force: Array) -> float:
-    """Amplitude of the sine that has the r.m.s. of a force [N]: a short spike does not count as a large effect."""
-    return float(np.sqrt(2.0 * np.mean(force**2)))
-
-
-def _scales(records: Sequence[Clean], damper: Damper) -> Scales:
-    motions = [record.motion for record in records]
-    voltages = np.concatenate([[0.0] if m.voltage is None else m.voltage[[0, -1]] for m in motions])
-    moving = [float(np.ptp(m.voltage)) for m in motions if m.voltage is not None]
-    return Scales(
-        force=max(record.peak for record in records),
-        low_force=min(record.peak for record in records),
-        speed=max(float(np.max(np.abs(m.velocity))) for m in motions),
-        stroke=max(float(np.max(np.abs(m.displacement))) for m in motions),
-        acceleration=max(float(np.max(np.abs(m.acceleration))) for m in motions),
-        damping=float(np.median([row.C_Ns_per_m for row in damper.base])),
-        voltage=max([float(np.ptp(voltages)), *moving]),
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Outside:
-    """A form outside the library at its size."""
-
-    name: str
-    values: Mapping[str, float]
-    reached: Reached
-
-    @classmethod
-    def drawn(cls, name: str, size: float, records: Sequence[Clean], draw: np.random.Generator) -> _Outside:
-        """The form with parameters drawn, adding `size` of its peak to the record that it changes most."""
-        form = FORMS[name]
-        scale = Reached(
-            stroke=max(float(np.max(np.abs(record.motion.displacement))) for record in records),
-            speed=max(float(np.max(np.abs(record.motion.velocity))) for record in records),
-        )
-        values = {key: float(draw.uniform(*limits)) for key, limits in form.ranges.items()}
-        largest = max(amplitude(form.shape(r.motion, scale, values)) / r.peak for r in records)
-        return cls(name, {**values, "force_N": size / largest}, scale)
-
-    def law(self, damper: Damper, motion: Motion, frame_stiffness: float | None) -> Array:
-        """(n,) force of the damper and of the form beside it [N]."""
-        shape = FORMS[self.name].shape(motion, self.reached, self.values)
-        return force_in_frame(damper, motion, frame_stiffness) + self.values["force_N"] * shape
-
-
 def _given_other(records: Sequence[Clean], damper: Damper) -> dict[str, float]:
     """Of a pair: what is left without each when the other one stays as it is and T0, C and k are refitted."""
     if len(damper.effects) < 2:
@@ -271,31 +166,3 @@ def _channels(record: Taken) -> dict[str, Array | None]:
     columns = {TIME.column: record.time, DISPLACEMENT.column: record.displacement, FORCE.column: record.force}
     more = {VOLTAGE.column: record.voltage, TEMPERATURE.column: record.temperature}
     return {**columns, **{name: channel for name, channel in more.items() if channel is not None}}
-
-
-_CHANNELS = ("time", "displacement", "velocity", "acceleration", "voltage", "temperature")
-
-
-def write_clean(places: Places, name: str, records: Sequence[Clean]) -> None:
-    """Keep the noise-free records of a case beside its truth."""
-    arrays = {
-        f"{number:02d}.{key}": channel
-        for number, record in enumerate(records, start=1)
-        for key, channel in [("force", record.force), *((key, getattr(record.motion, key)) for key in _CHANNELS)]
-        if channel is not None
-    }
-    np.savez(places.clean(name), allow_pickle=False, **arrays)
-
-
-def read_clean(places: Places, name: str) -> dict[str, Clean]:
-    """The noise-free records of a case, by the names that the rig files gave them."""
-    with np.load(places.clean(name)) as file:
-        arrays = dict(file)
-    numbers = sorted({key.split(".")[0] for key in arrays})
-    return {
-        f"r{number}": Clean(
-            Motion(*(arrays.get(f"{number}.{key}") for key in _CHANNELS)),  # type: ignore[arg-type]  # the first four always stand there
-            arrays[f"{number}.force"],
-        )
-        for number in numbers
-    }

@@ -9,9 +9,8 @@ import numpy as np
 
 from pzd.artefacts import Diagnosed, Diagnosis
 from pzd.blind.case import Cost, Places, Scored, Truth
-from pzd.blind.hide import read_clean
+from pzd.blind.clean import Clean, read_clean
 from pzd.blind.seek import COST
-from pzd.blind.visible import Clean
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.identify.trial import warm_up
@@ -38,7 +37,7 @@ def mark(places: Places, name: str, made_from: str, control: Control, *, keep_fi
     truth = read_json(places.truth(name), Truth, control)
     cost = read_json(places.case(name) / COST, Cost, control)
     found = None if cost.failure else Diagnosed.read(places.case(name), control)
-    result = scored(truth, cost, found, {} if found is None else read_clean(places, name), made_from)
+    result = scored(truth, cost, found, {} if found is None else read_clean(places.clean(name)), made_from)
     _kept(places, result, control)
     if not keep_files:
         shutil.rmtree(places.rig(name))

@@ -3,32 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from pzd.blind.clean import Clean
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.motion import Motion
 from pzd.identify.trial import warm_up
 from pzd.record import Array
 
 _STEP = 1e-4
 _EVALUATIONS = 30
-
-
-@dataclass(frozen=True, eq=False)
-class Clean:
-    """One record without noise, gain, offset or delay."""
-
-    motion: Motion
-    force: Array
-    """(n,) [N]"""
-
-    @property
-    def peak(self) -> float:
-        """Largest force [N]."""
-        return float(np.max(np.abs(self.force)))
 
 
 def visible_gap(records: Sequence[Clean], damper: Damper) -> float:
