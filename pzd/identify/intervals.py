@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.record import Array
+from pzd.rig.recursion import all_pole
 
 LARGEST_ORDER = 30
 """Largest order of the autoregression; the one used is chosen by BIC."""
@@ -41,9 +42,9 @@ class Uncertainty:
 
     def half_widths(self, level: float = 0.95) -> Array:
         """(p,) half widths of the two-sided intervals."""
-        from scipy.stats import t
+        from scipy.special import stdtrit
 
-        quantile = float(t.ppf(0.5 + 0.5 * level, max(self.degrees_of_freedom, 1.0)))
+        quantile = float(stdtrit(max(self.degrees_of_freedom, 1.0), 0.5 + 0.5 * level))
         return quantile * np.sqrt(np.diag(self.covariance))
 
 
@@ -62,8 +63,6 @@ def uncertainty(slopes: Array, residuals: Array, lengths: Sequence[int]) -> Unce
     -------
     covariance with the small-sample factor N / (N - p), and degrees of freedom
     """
-    from scipy.signal import lfilter
-
     size = np.linalg.norm(slopes, axis=0)
     unseen = size == 0.0
     size[unseen] = 1.0
@@ -74,7 +73,7 @@ def uncertainty(slopes: Array, residuals: Array, lengths: Sequence[int]) -> Unce
     for length in lengths:
         part = slice(start, start + length)
         noise = autoregression(residuals[part])
-        filtered = lfilter([1.0], noise.coefficients, scaled[part][::-1], axis=0)
+        filtered = all_pole(noise.coefficients, scaled[part][::-1])
         meat += noise.variance * filtered.T @ filtered
         independent += length * _independent_share(noise)
         start += length

@@ -31,6 +31,8 @@ class Pipeline:
     """Processes that a stage may use, where it can use several."""
     marks: dict[str, tuple[str, ...]] = field(default_factory=dict)
     """Why the results so far are not to be trusted, by folder."""
+    _in_hand: dict[str, tuple[dict[str, str], Artefact]] = field(default_factory=dict)
+    """Artefacts that were read back, by folder, with the hashes of the files that they were read from."""
     _compiles: bool = False
     """Whether the ride's kernels may still have to be compiled, which a second core can do meanwhile."""
 
@@ -98,7 +100,7 @@ class Pipeline:
     def _argument(self, name: str, annotation: Any) -> Any:
         """What a parameter of a stage is given; artefacts are read back from their files, never passed on."""
         if is_artefact(annotation):
-            return self.run.read(annotation)
+            return self._read_back(annotation)
         if block := block_of(self.config, annotation):
             return block[1]
         if annotation is Control:
@@ -107,10 +109,19 @@ class Pipeline:
             return setting_of(self.config, self.run)
         return {"seed": self.config.seed, "folder": self.run.config.parent, "jobs": self.jobs}[name]
 
+    def _read_back(self, kind: type[Artefact]) -> Artefact:
+        """An artefact as its files have it: read and checked once, and again where they have changed since."""
+        now = self.run.outputs(kind.folder)
+        files, artefact = self._in_hand.get(kind.folder, ({}, None))
+        if artefact is None or files != now:
+            artefact = self.run.read(kind)
+            self._in_hand[kind.folder] = (now, artefact)
+        return artefact
+
     def _marks_as_it_stands(self, stage: Stage, kept: Kept) -> tuple[str, ...]:
         """The marks of the manifest, or of the artefact itself where it was edited, which checks it too."""
         if kept.edited:
-            return self._carried(stage, getattr(self.run.read(stage.makes), "untrusted", ()))
+            return self._carried(stage, getattr(self._read_back(stage.makes), "untrusted", ()))
         return kept.manifest.marks if kept.manifest else ()
 
     def _carried(self, stage: Stage, own: Sequence[str]) -> tuple[str, ...]:

@@ -1,9 +1,10 @@
-"""A first-order recursion without a loop: coloured noise and the warming of a lump are both one."""
+"""Linear recursions: coloured noise and the warming of a lump are of first order, filters of any."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from pzd.damper.compiled import compiled
 from pzd.record import Array
 
 _FORGOTTEN = 1e-18
@@ -30,3 +31,30 @@ def recursion(memory: float, inputs: Array) -> Array:
         values[shift:] += share * values[:-shift]
         shift, share = 2 * shift, share * share
     return values
+
+
+def all_pole(coefficients: Array, inputs: Array) -> Array:
+    """What a memory of any order makes of its inputs, column by column.
+
+    Equation: y_i = u_i - a_1 y_(i-1) - a_2 y_(i-2) - ..., at rest before the first
+
+    Parameters
+    ----------
+    coefficients : (order + 1,) 1, a_1, a_2, ...
+    inputs : (n, m) u
+
+    Returns
+    -------
+    (n, m) y
+    """
+    values = np.array(inputs, dtype=np.float64, order="C")
+    _recur(coefficients, values)
+    return values
+
+
+@compiled
+def _recur(coefficients: Array, values: Array) -> None:
+    for i in range(values.shape[0]):
+        for j in range(1, min(coefficients.size, i + 1)):
+            for n in range(values.shape[1]):
+                values[i, n] -= coefficients[j] * values[i - j, n]

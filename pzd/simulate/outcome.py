@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from pzd.artefacts import AXLE_COLUMNS, AXLES, RIDE_COLUMNS, Ride, SummaryRow
 from pzd.record import Array
+from pzd.rig.recursion import all_pole
 
 JERK_CORNER = 80.0
 """Corner of the low-pass behind which the jerk is taken [Hz]: the raw jerk of a law that switches has no r.m.s."""
-_JERK_ORDER = 4
+_POLES = (math.pi / 8, 3 * math.pi / 8)
+"""Angles of the pairs of poles of the fourth order off the negative real axis (Butterworth 1930)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +51,25 @@ def low_passed_jerk(acceleration: Array, step: float) -> Array:
     -------
     (n,) jerk [m/s3]
     """
-    from scipy.signal import butter, sosfilt, sosfilt_zi
-
     if 0.5 / step <= JERK_CORNER:
         return np.asarray(np.gradient(acceleration, step))
-    filter_ = butter(_JERK_ORDER, JERK_CORNER, fs=1.0 / step, output="sos")
-    smooth, _ = sosfilt(filter_, acceleration, zi=sosfilt_zi(filter_) * acceleration[0])
-    return np.asarray(np.gradient(smooth, step))
+    warped = math.tan(math.pi * JERK_CORNER * step)
+    smooth = acceleration - acceleration[0]
+    for angle in _POLES:
+        smooth = _low_passed(smooth, warped, 2.0 * math.cos(angle))
+    return np.asarray(np.gradient(smooth + acceleration[0], step))
+
+
+def _low_passed(values: Array, warped: float, damping: float) -> Array:
+    """(n,) values behind one pair of poles, at rest before the first.
+
+    Equation: H = W^2 / (s^2 + d W s + W^2), s = (1 - 1/z) / (1 + 1/z)      Source: bilinear transform, prewarped
+    """
+    square = warped * warped
+    scale = 1.0 + damping * warped + square
+    fed = np.convolve(values, np.array([1.0, 2.0, 1.0]) * square / scale)[: values.size]
+    past = np.array([1.0, 2.0 * (square - 1.0) / scale, (1.0 - damping * warped + square) / scale])
+    return all_pole(past, fed[:, np.newaxis])[:, 0]
 
 
 def rms(values: Array) -> float:

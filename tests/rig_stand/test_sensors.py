@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.rig.recursion import recursion
+from pzd.rig.recursion import all_pole, recursion
 from pzd.rig.sensors import coloured, draw_for, sensed
 from pzd.rig.virtual_config import ChannelNoise, DisplacementNoise, ForceNoise, TemperatureNoise, VoltageNoise
 
@@ -35,6 +35,17 @@ def test_recursion_equals_its_loop(seed: int) -> None:
             y = memory * y + u
             expected.append(y)
         np.testing.assert_allclose(recursion(memory, inputs), expected, atol=1e-11)
+
+
+def test_a_memory_of_any_order_equals_the_filter_of_its_poles(seed: int) -> None:
+    from scipy.signal import lfilter
+
+    draw = np.random.default_rng(seed)
+    inputs = draw.normal(size=(500, 3))
+    for order in (0, 1, 7):
+        coefficients = np.real(np.poly(draw.uniform(-0.95, 0.95, order)))
+        expected = lfilter([1.0], np.atleast_1d(coefficients), inputs, axis=0)
+        np.testing.assert_allclose(all_pole(np.atleast_1d(coefficients), inputs), expected, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(
