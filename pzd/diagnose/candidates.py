@@ -16,6 +16,8 @@ from pzd.record import Array
 
 PATIENT = 100
 """Evaluations after which even a settled optimum is left as it is."""
+STUCK = 1.0
+"""A model that holds another one is worse than it by more [in squares of noise] only where its search got stuck."""
 MOVES = 0.02
 """A channel moves in a test if its range there exceeds this share of the rig's scale."""
 WARMS = 2.0
@@ -84,9 +86,16 @@ def candidates(
 
 
 def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
-    """One effect fitted beside those of `before`, from its most promising starting values."""
-    start = promising_starts(problem, before, effect)[0]
-    return _from(problem, before, effect.name, np.concatenate([before.searched, start]))
+    """One effect fitted beside those of `before`, from its most promising starting values.
+
+    The others are tried only while what is reached is worse than without the effect: a search that got stuck.
+    """
+    reached: list[Candidate] = []
+    for start in promising_starts(problem, before, effect):
+        reached.append(_from(problem, before, effect.name, np.concatenate([before.searched, start])))
+        if reached[-1].fitted.misfit <= before.misfit + STUCK:
+            break
+    return min(reached, key=lambda c: c.fitted.misfit)
 
 
 def settled(problem: Problem, before: Fitted, found: Candidate) -> Candidate:

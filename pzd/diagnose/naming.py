@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,7 +81,11 @@ def name_effects(
     config : thresholds, forced and forbidden effects
     jobs : candidates fitted at the same time
     """
-    first = evidence = evidence_of(prepared, parts, damper, config)
+
+    def weighed(model: Damper) -> Evidence:
+        return evidence_of(prepared, parts, model, config)
+
+    first = evidence = weighed(damper)
     plain = current = fit(first.whole, (), first.whole.start())
     rounds: list[tuple[Candidate, ...]] = []
     reasons: dict[str, str] = {}
@@ -92,7 +96,7 @@ def name_effects(
     while len(current.effects) < config.most_effects and evidence.something_missing(current, config):
         tried = candidates(evidence.whole, current, config.forbid, jobs)
         rounds.append(tried)
-        chosen = _first_supported(evidence, config, current, tried, reasons)
+        chosen = _first_supported(evidence, weighed, config, current, tried, reasons)
         if chosen is None:
             break
         chosen = settled(evidence.whole, current, chosen)
@@ -100,7 +104,7 @@ def name_effects(
         reasons[chosen.effect] = "adopted"
         rivals = _rivals(chosen, rounds[-1], config)
         log.info("diagnose: %s adopted, delta BIC %.0f", chosen.effect, chosen.delta_bic)
-        evidence = evidence_of(prepared, parts, chosen.fitted.damper, config)
+        evidence = weighed(chosen.fitted.damper)
         current = fit(evidence.whole, chosen.fitted.effects, evidence.whole.start_with(chosen.fitted))
     return Named(plain, current, tuple(rounds), reasons, rivals, first, evidence)
 
@@ -112,11 +116,16 @@ def _rivals(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseConfi
 
 
 def _first_supported(
-    evidence: Evidence, config: DiagnoseConfig, before: Fitted, tried: Sequence[Candidate], reasons: dict[str, str]
+    evidence: Evidence,
+    weighed: Callable[[Damper], Evidence],
+    config: DiagnoseConfig,
+    before: Fitted,
+    tried: Sequence[Candidate],
+    reasons: dict[str, str],
 ) -> Candidate | None:
     """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""
     for each in tried:
-        reason = _unsupported(evidence, config, before, each)
+        reason = _unsupported(evidence, config, each) or _stand_in(weighed(each.fitted.damper), before, each)
         if reason is None:
             return each
         reasons[each.effect] = reason
@@ -125,15 +134,15 @@ def _first_supported(
     return None
 
 
-def _unsupported(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> str | None:
-    """Why a candidate is not adopted, None where it is."""
+def _unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate) -> str | None:
+    """Why a candidate is too little to be adopted, None where it is not."""
     if candidate.delta_bic > config.adopt_bic:
         return "does not pay"
     if candidate.explained < config.visible:
         return f"moves the force by less than {100 * config.visible:g} % of peak"
     if trivial(candidate.fitted, candidate.effect, evidence.whole.scales.low_force):
         return "so small that it counts as an offset or a delay of the tests"
-    return _stand_in(evidence, before, candidate)
+    return None
 
 
 def trivial(fitted: Fitted, effect: str, force: float) -> bool:
@@ -154,12 +163,19 @@ def standard_errors(fitted: Fitted) -> Array:
 
 
 def _stand_in(evidence: Evidence, before: Fitted, candidate: Candidate) -> str | None:
-    """Whether an effect fails on tests that it was not fitted to, or takes other values on either half."""
-    effects, halves = candidate.fitted.effects, evidence.halves
-    fits = [fit(half, effects, candidate.fitted.searched) for half in halves]
+    """Why an effect is a stand-in: it fails on tests that it was not fitted to, or takes other values on either half.
+
+    Parameters
+    ----------
+    evidence : weighed by what the candidate leaves, so that each test's own gain and delay act along its force
+    before : the optimum without the candidate
+    candidate : the optimum with it
+    """
+    halves = evidence.halves
     if any(not half.observations for half in halves):
         return None
-    plain = fit(halves[0], before.effects, before.searched)
+    fits = [fit(half, candidate.fitted.effects, half.start_with(candidate.fitted)) for half in halves]
+    plain = fit(halves[0], before.effects, halves[0].start_with(before))
     if evidence.misfit(1, fits[0]) >= evidence.misfit(1, plain):
         return "stand-in: does not shrink the gap on tests it was not fitted to"
     if not _agree(fits[0], fits[1], candidate.effect):

@@ -28,7 +28,7 @@ from pzd.record import Array, Record
 
 RESOLUTION = 3e-4
 """No force is believed to be known better than this share of the record's peak (r.m.s.)."""
-DISCREPANCY = 0.1
+DISCREPANCY = 0.3
 """Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
 fitted: a model that still lacks something must not be bent to where the noise happens to be smallest."""
 SUDDEN = 6.0
