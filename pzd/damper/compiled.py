@@ -38,9 +38,11 @@ def cache_folder() -> Path:
         digest.update(part.encode())
     for source in _sources():
         digest.update(source.read_bytes())
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    for root in (home, Path(tempfile.gettempdir())):
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111  # Path's may raise
+    for root in (Path(home), Path(tempfile.gettempdir())):
         folder = root / "pzd" / digest.hexdigest()[:16]
+        if not root.is_absolute():
+            continue  # nobody's home is known
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError:

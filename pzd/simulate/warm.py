@@ -7,23 +7,36 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
+from threading import Thread
 
 from pzd.artefacts import Diagnosed, Diagnosis, ForceRow, Gap, Table, TableNotes
 from pzd.damper.model import BaseRow, Damper
 from pzd.simulate.config import SimulateConfig
 
 _MARK = "ride-compiled"
+_LOCK = "ride-compiling.lock"
 
 
+@cache
 def in_background() -> None:
-    """Start compiling, unless it was done before; nobody waits for it, and nothing depends on it."""
+    """Start compiling, once at most and unless it was done before; nothing depends on it.
+
+    A thread waits for the process, so that it is reaped; a command that is done earlier does not wait, and
+    the process goes on by itself and leaves its kernels for the next.
+    """
     from pzd.damper.compiled import cache_folder
 
     if not (cache_folder() / _MARK).exists():
-        quiet = subprocess.DEVNULL
-        command = [sys.executable, "-m", __name__]
-        subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)  # noqa: S603  # our own module
+        Thread(target=_compile, daemon=True).start()
+
+
+def _compile() -> None:
+    quiet = subprocess.DEVNULL
+    command = [sys.executable, "-m", __name__]
+    subprocess.run(command, stdin=quiet, stdout=quiet, stderr=quiet, check=False)  # noqa: S603  # our own module
 
 
 def _smallest_ride() -> None:
@@ -53,8 +66,17 @@ def _steady(row: BaseRow, velocity: float) -> float:
     return copysign(row.T0_N + row.C_Ns_per_m * abs(velocity), velocity)
 
 
+def _once(folder: Path) -> None:
+    """Compile into the folder, unless it was done or another process is at it."""
+    from filelock import FileLock, Timeout
+
+    with suppress(Timeout), FileLock(folder / _LOCK, blocking=False):
+        if not (folder / _MARK).exists():
+            _smallest_ride()
+            (folder / _MARK).touch()
+
+
 if __name__ == "__main__":
     from pzd.damper.compiled import cache_folder
 
-    _smallest_ride()
-    (cache_folder() / _MARK).touch()
+    _once(cache_folder())
