@@ -20,7 +20,7 @@ _SAME_VOLTAGE = 0.02  # of the largest voltage; labels of one voltage at two tem
 
 def base_voltages(damper: Damper) -> Array:
     """(m,) voltages of the base rows [V], rising; one zero where the damper has no voltage."""
-    return np.array([voltage for voltage, _ in _by_voltage(damper.base)])
+    return np.array([voltage for voltage, _ in by_voltage(damper.base)])
 
 
 def material(damper: Damper, voltage: Array | float | None, temperature: Array | float | None) -> Array:
@@ -40,7 +40,7 @@ def material(damper: Damper, voltage: Array | float | None, temperature: Array |
     ------
     ValueError : when the damper depends on a voltage or temperature that is not given
     """
-    groups = _by_voltage(damper.base)
+    groups = by_voltage(damper.base)
     if voltage is None and len(groups) > 1:
         raise ValueError("the damper depends on the voltage, and none is given")
     at_nodes = np.stack([_over_temperature(rows, temperature) for _, rows in groups])
@@ -49,7 +49,8 @@ def material(damper: Damper, voltage: Array | float | None, temperature: Array |
     return values * _drift_factors(damper, temperature)
 
 
-def _by_voltage(rows: Sequence[BaseRow]) -> list[tuple[float, list[BaseRow]]]:
+def by_voltage(rows: Sequence[BaseRow]) -> list[tuple[float, list[BaseRow]]]:
+    """The rows of each voltage at whatever temperature, lowest voltage [V] first; 0 where there is none."""
     scale = max(abs(row.voltage_V or 0.0) for row in rows)
     groups: list[tuple[float, list[BaseRow]]] = []
     for row in sorted(rows, key=lambda r: (r.voltage_V or 0.0, r.temperature_degC or 0.0)):

@@ -90,9 +90,9 @@ def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
 
     The others are tried only while what is reached is worse than without the effect: a search that got stuck.
     """
-    reached: list[Candidate] = []
+    problem, reached = _for(problem, effect), []
     for start in promising_starts(problem, before, effect):
-        reached.append(_from(problem, before, effect.name, np.concatenate([before.searched, start])))
+        reached.append(_from(problem, before, effect.name, np.concatenate([_base(problem, before), start])))
         if reached[-1].fitted.misfit <= before.misfit + STUCK:
             break
     return min(reached, key=lambda c: c.fitted.misfit)
@@ -101,10 +101,22 @@ def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
 def settled(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
     """A candidate with its optimum searched to the end, from all its starting values."""
     effect = library()[found.effect]
-    others = [np.concatenate([before.searched, s]) for s in promising_starts(problem, before, effect)[1:]]
+    problem = _for(problem, effect)
+    others = [np.concatenate([_base(problem, before), s]) for s in promising_starts(problem, before, effect)[1:]]
     fits = [fit(problem, found.fitted.effects, start) for start in others]
     best = min([found.fitted, *fits], key=lambda f: f.misfit)
     return _from(problem, before, found.effect, best.searched, PATIENT)
+
+
+def _for(problem: Problem, effect: Effect) -> Problem:
+    """The problem that an effect is tried on: what changes the base with heat stands for its temperature axis."""
+    return problem.pooled() if effect.place == "material" else problem
+
+
+def _base(problem: Problem, before: Fitted) -> Array:
+    """(3 b + e,) where the search starts in the base rows and the effects of `before`."""
+    rows = before.searched.size - len(before.unknowns)
+    return before.searched if rows == 3 * len(problem.base) else problem.start_with(before)
 
 
 def _from(

@@ -57,11 +57,17 @@ class Evidence:
         missed = sum(float(np.sum((o.measured - force) ** 2)) for o, force in pairs)
         return missed / sum(float(np.sum(o.measured**2)) for o, _ in pairs)
 
-    def misfit(self, half: int, fitted: Fitted) -> float:
-        """Misfit of a fit on one half of the tests, in units of noise."""
-        problem = self.halves[half]
+    def misfit(self, fitted: Fitted, problem: Problem) -> float:
+        """Misfit of a fit on the tests that choose, in units of noise.
+
+        Parameters
+        ----------
+        fitted : to other tests
+        problem : the tests that choose, with the base rows that were fitted
+        """
         point = problem.point(fitted.searched, fitted.unknowns)
-        residuals = (o.in_noise(o.measured - simulated(point, o)) for o in problem.observations)
+        pairs = zip(self.halves[1].observations, problem.observations, strict=True)
+        residuals = (mine.in_noise(mine.measured - simulated(point, o)) for mine, o in pairs)
         return float(sum(r @ r for r in residuals))
 
 

@@ -7,13 +7,14 @@ squares is minus the logarithm of the likelihood, and fits of different effects 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pzd.damper.compose import force_of_rows, recorded, respond, standing_rows
 from pzd.damper.effect import Parameter, Scales
 from pzd.damper.effects import library
+from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.observation import Observation
 from pzd.record import Array
@@ -114,6 +115,15 @@ class Problem:
     reference: float | None = None
     """T_ref for temperature drift [degC]."""
 
+    def pooled(self) -> Problem:
+        """The same with one base row a voltage, whatever the temperature: an effect stands for its axis then."""
+        groups = [rows for _, rows in by_voltage(self.base)]
+        if len(groups) == len(self.base):
+            return self
+        place = {id(row): i for i, rows in enumerate(groups) for row in rows}
+        moved = tuple(o if o.place < 0 else replace(o, place=place[id(self.base[o.place])]) for o in self.observations)
+        return replace(self, observations=moved, base=tuple(_mean_row(rows) for rows in groups))
+
     def unknowns(self, effects: Sequence[str]) -> tuple[Unknown, ...]:
         """The parameters of some effects, in the order of the search."""
         return tuple(
@@ -147,6 +157,17 @@ class Problem:
         for unknown, x in zip(unknowns, searched[split:], strict=True):
             effects.setdefault(unknown.effect, {})[unknown.parameter.name] = unknown.value(float(x))
         return Point(values, effects, self)
+
+
+def _mean_row(rows: Sequence[BaseRow]) -> BaseRow:
+    """One row for several temperatures or none: means of T0, C and k."""
+    friction, damping, stiffness = np.mean([(r.T0_N, r.C_Ns_per_m, r.k_N_per_m) for r in rows], axis=0)
+    return BaseRow(
+        voltage_V=rows[0].voltage_V,
+        T0_N=float(friction),
+        C_Ns_per_m=float(damping),
+        k_N_per_m=float(stiffness),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -125,7 +125,7 @@ def _first_supported(
 ) -> Candidate | None:
     """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""
     for each in tried:
-        reason = _unsupported(evidence, config, each) or _stand_in(weighed(each.fitted.damper), before, each)
+        reason = _unsupported(evidence, config, each) or _stand_in(evidence, weighed(each.fitted.damper), before, each)
         if reason is None:
             return each
         reasons[each.effect] = reason
@@ -162,21 +162,22 @@ def standard_errors(fitted: Fitted) -> Array:
     return np.sqrt(np.diag(fitted.covariance) * max(1.0, fitted.misfit / freedom))
 
 
-def _stand_in(evidence: Evidence, before: Fitted, candidate: Candidate) -> str | None:
+def _stand_in(evidence: Evidence, weighed: Evidence, before: Fitted, candidate: Candidate) -> str | None:
     """Why an effect is a stand-in: it fails on tests that it was not fitted to, or takes other values on either half.
 
     Parameters
     ----------
-    evidence : weighed by what the candidate leaves, so that each test's own gain and delay act along its force
+    evidence : weighed by what is left without the candidate
+    weighed : by what it leaves, so that each test's own gain and delay act along its force
     before : the optimum without the candidate
     candidate : the optimum with it
     """
-    halves = evidence.halves
+    halves = weighed.halves
     if any(not half.observations for half in halves):
         return None
     fits = [fit(half, candidate.fitted.effects, half.start_with(candidate.fitted)) for half in halves]
-    plain = fit(halves[0], before.effects, halves[0].start_with(before))
-    if evidence.misfit(1, fits[0]) >= evidence.misfit(1, plain):
+    without = fit(evidence.halves[0], before.effects, before.searched)
+    if weighed.misfit(fits[0], halves[1]) >= weighed.misfit(without, evidence.halves[1]):
         return "stand-in: does not shrink the gap on tests it was not fitted to"
     if not _agree(fits[0], fits[1], candidate.effect):
         return "stand-in: takes other values on either half of the tests"
