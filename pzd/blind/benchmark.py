@@ -8,9 +8,10 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import shutil
+import signal
 import time
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,17 @@ from pzd.schema.jsonfile import read_json
 log = logging.getLogger(__name__)
 
 
+def processes(count: int) -> Executor:
+    """A pool of processes that share nothing with this one."""
+    return ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _ends_quietly)
+
+
+def _ends_quietly() -> None:
+    """Let a process end without a traceback when it is interrupted, and say nothing: the parent speaks for all."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    logging.getLogger("pzd").addHandler(logging.NullHandler())
+
+
 @dataclass(frozen=True)
 class Benchmark:
     """What is hidden, how it is sought, and where the files go."""
@@ -35,6 +47,8 @@ class Benchmark:
     places: Places
     made_from: str
     """Hash of everything that a case hangs on but its number: cases with another one are done again."""
+    pool: Callable[[int], Executor] = processes
+    """Makes a pool of so many workers."""
 
     def run(self, jobs: int, *, afresh: bool = False) -> tuple[Scored, ...]:
         """Every case's score; those that stand there finished are not done again.
@@ -70,7 +84,6 @@ class Benchmark:
                 path.unlink(missing_ok=True)
 
     def _worked(self, waiting: list[Planned], whole: int, jobs: int) -> dict[str, Scored]:
-        fresh = multiprocessing.get_context("spawn")
         begun = time.monotonic()
         found: dict[str, Scored] = {}
 
@@ -81,8 +94,7 @@ class Benchmark:
             left = (time.monotonic() - begun) / len(found) * (len(waiting) - len(found))
             log.info("%d of %d cases, %s left", whole - len(waiting) + len(found), whole, _duration(left))
 
-        drawing = ProcessPoolExecutor(min(jobs, len(waiting)), fresh)
-        seeking = ProcessPoolExecutor(min(jobs, len(waiting)), fresh)
+        drawing, seeking = (self.pool(min(jobs, len(waiting))) for _ in range(2))
         try:
             _in_turn(
                 waiting,

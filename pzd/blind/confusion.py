@@ -79,7 +79,7 @@ def draw(matrix: Confusion, path: Path) -> None:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from pzd.report.drawing import MAP, STYLE
+    from pzd.report.drawing import STYLE
 
     rows, columns = len(matrix.rows), len(matrix.columns)
     shares = matrix.counts / np.maximum(matrix.counts.sum(axis=1, keepdims=True), 1.0)
@@ -87,9 +87,9 @@ def draw(matrix: Confusion, path: Path) -> None:
     with mpl.rc_context(style):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
         figure = Figure(figsize=(2.6 + 0.33 * columns, 2.2 + 0.25 * rows), layout="constrained")
         ax = figure.subplots()
-        ax.imshow(np.sqrt(shares), cmap=MAP, vmin=0.0, vmax=1.0, aspect="auto")
+        ax.imshow(np.sqrt(shares), cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
         for row, column in np.argwhere(matrix.counts > 0):
-            ink = "black" if shares[row, column] > 0.3 else "white"
+            ink = "white" if shares[row, column] > 0.4 else "black"
             ax.text(column, row, f"{matrix.counts[row, column]:.0f}", ha="center", va="center", color=ink, fontsize=7.5)
         ax.set_xticks(range(columns), matrix.columns, rotation=90)
         ax.set_yticks(range(rows), matrix.rows)

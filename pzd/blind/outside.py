@@ -4,7 +4,8 @@ None of the fifteen effects has their shape: position enters the damping, or fri
 is no function rising with x, or the force changes from one cycle to the next without a temperature.
 (Shapes that an effect of the library nearly has, as x^3 is nearly an end stop that begins early, v^3 nearly
 a quadratic orifice, and a chamber that fills late on one side nearly a lash, are left out: to name that
-effect is no mistake.)
+effect is no mistake.) At 10 % of the peak, in two tests of two frequencies each, the effect that follows
+best leaves 77 to 100 % of the visible gap of each form.
 Each gives a force of about one; it is scaled afterwards to its size.
 """
 

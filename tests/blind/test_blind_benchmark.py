@@ -1,0 +1,181 @@
+"""The benchmark keeps the truth apart, goes on where it was, and gives the same whatever the number of processes."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pzd.blind import benchmark as module
+from pzd.blind.benchmark import Benchmark, processes
+from pzd.blind.case import Places, Scored
+from pzd.blind.hide import Setup, drawn, hide
+from pzd.blind.plan import plan
+from pzd.blind.seek import COST, seek
+from pzd.cli.app import status
+from pzd.config import RunConfig
+from pzd.damper.effects import library
+from pzd.schema.errors import ConfigError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+Small = Callable[..., RunConfig]
+SetupOf = Callable[[RunConfig], Setup]
+BenchmarkOf = Callable[[RunConfig, Path], Benchmark]
+
+SMALL = """
+rig:
+  virtual:
+    - {damper: {base: [{T0_N: 301, C_Ns_per_m: 2720, k_N_per_m: 199000}]}, tests: [{waveform: WAVE}]}
+blind:
+  seed: 77
+  tuned_on: [1, 2]
+  campaigns: [{name: one, tests: [{waveform: WAVE}]}]
+""".replace("WAVE", "{kind: sine, frequency_Hz: 1, amplitude_m: 0.02}")
+SECOND = SMALL.splitlines()[3].replace("{damper", "{setting: other, damper") + "\n"
+COSTS = {"seconds", "diagnose_seconds", "peak_memory_MB"}
+
+
+def content(case: Scored) -> dict[str, object]:
+    return case.model_dump(exclude=COSTS)
+
+
+def test_a_run_stops_and_goes_on_and_does_not_hang_on_the_number_of_processes(
+    small: Small, benchmark_of: BenchmarkOf, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    two = benchmark_of(small(), tmp_path / "two").run(jobs=2)
+    first = benchmark_of(small("blind.cases=1"), tmp_path / "one").run(jobs=1)
+    kept = (tmp_path / "one" / "scored" / "00000.json").stat().st_mtime_ns
+    both = benchmark_of(small(), tmp_path / "one").run(jobs=1)
+    assert (tmp_path / "one" / "scored" / "00000.json").stat().st_mtime_ns == kept
+    assert [content(case) for case in both] == [content(case) for case in two]
+    assert content(first[0]) == content(both[0])
+    assert [case.failure for case in both] == [None, None]
+
+    assert not list(tmp_path.rglob("*.csv"))
+    assert not list(tmp_path.rglob("*.npz"))
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("a finished case was begun again")
+
+    monkeypatch.setattr(module, "_in_turn", refuse)
+    assert benchmark_of(small(), tmp_path / "one").run(jobs=1) == both
+
+
+def test_cases_are_drawn_and_diagnosed_in_processes_of_their_own(
+    small: Small, benchmark_of: BenchmarkOf, tmp_path: Path
+) -> None:
+    begun: list[int] = []
+
+    def counted(count: int) -> Executor:
+        begun.append(count)
+        return processes(count)
+
+    benchmark = replace(benchmark_of(small("blind.cases=1"), tmp_path), pool=counted)
+    (case,) = benchmark.run(jobs=2)
+    assert begun == [1, 1]
+    assert case.failure is None
+    assert case.peak_memory_MB > 0.0
+
+
+def test_the_diagnosis_is_given_a_folder_without_the_truth(
+    small: Small, setup_of: SetupOf, benchmark_of: BenchmarkOf, tmp_path: Path
+) -> None:
+    config = small()
+    setup, places = setup_of(config), Places(tmp_path / "here")
+    (planned, _) = plan(setup.blind)
+    hide(setup, planned, places)
+    given = places.case(planned.id)
+    assert {path.relative_to(given).as_posix() for path in given.rglob("*.*")} == {
+        "rig/r01.csv",
+        "rig/r02.csv",
+        "rig/r03.csv",
+    }
+    header = (given / "rig" / "r01.csv").read_text(encoding="utf-8").partition("\n")[0]
+    assert set(header.split(",")) <= {"time_s", "displacement_m", "force_N", "voltage_V", "temperature_degC"}
+    hidden = json.loads(places.truth(planned.id).read_text(encoding="utf-8"))
+    assert hidden["effects"] == list(planned.hidden)
+
+    places.truth(planned.id).parent.rename(tmp_path / "elsewhere")
+    seek(benchmark_of(config, tmp_path).methods, given)
+    assert json.loads((given / COST).read_text(encoding="utf-8"))["failure"] is None
+    assert (given / "diagnosis.json").exists()
+
+
+def test_a_failed_diagnosis_is_a_case_with_its_message(
+    small: Small, setup_of: SetupOf, benchmark_of: BenchmarkOf, tmp_path: Path
+) -> None:
+    config, places = small(), Places(tmp_path)
+    (planned, _) = plan(setup_of(config).blind)
+    hide(setup_of(config), planned, places)
+    for path in places.rig(planned.id).iterdir():
+        path.write_text("time_s,force_N\n0,1\n", encoding="utf-8")
+    seek(benchmark_of(config, tmp_path).methods, places.case(planned.id))
+    cost = json.loads((places.case(planned.id) / COST).read_text(encoding="utf-8"))
+    assert "DataError" in cost["failure"] or "ConfigError" in cost["failure"]
+
+
+def test_what_is_drawn_hangs_on_seed_and_number_alone(small: Small, setup_of: SetupOf) -> None:
+    short, long = setup_of(small()), setup_of(small("blind.cases=5"))
+    for setup in (short, long):
+        assert plan(setup.blind)[:2] == plan(short.blind)
+    one, records = drawn(short, plan(short.blind)[0])
+    same, others = drawn(long, plan(long.blind)[0])
+    assert one == same
+    assert all(np.array_equal(a.force, b.force) for a, b in zip(records, others, strict=True))
+    fresh, _ = drawn(setup_of(small("blind.seed=78")), plan(short.blind)[0])
+    assert fresh.damper != one.damper
+
+
+def test_an_effect_has_the_size_that_was_drawn(
+    small: Small, setup_of: SetupOf, fresh_seeds: Callable[[int], list[int]]
+) -> None:
+    setup = setup_of(small(f"blind.seed={fresh_seeds(1)[0]}", "blind.kinds.none=0", "blind.cases=12"))
+    for planned in plan(setup.blind)[1:12:5]:
+        truth, _ = drawn(setup, planned)
+        assert truth.sizes[planned.hidden[0]] == pytest.approx(0.05, rel=0.02)
+
+
+def test_the_first_cases_are_fairly_mixed(small: Small) -> None:
+    shares = ("blind.kinds.single=0.45", "blind.kinds.pair=0.1", "blind.kinds.none=0.25", "blind.kinds.outside=0.2")
+    config = small(*shares, "blind.cases=400")
+    assert config.blind is not None
+    cases = plan(config.blind)
+    for count in (20, 60, 400):
+        found = Counter(case.kind for case in cases[:count])
+        assert found == {"single": 0.45 * count, "pair": 0.1 * count, "none": 0.25 * count, "outside": 0.2 * count}
+    singles = Counter(case.hidden for case in cases if case.kind == "single")
+    assert max(singles.values()) - min(singles.values()) <= 1
+    assert len(singles) == len([effect for effect in library().values() if effect.needs != "voltage"])
+
+
+def test_a_seed_that_was_tuned_on_gives_no_result(small: Small) -> None:
+    with pytest.raises(ConfigError, match="seed 2 is one that thresholds were tuned on"):
+        small("blind.seed=2")
+    assert small("blind.seed=2", "blind.tuning=true").blind is not None
+    with pytest.raises(ConfigError, match="seed 77 is none of tuned_on"):
+        small("blind.tuning=true")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (SMALL.split("blind:")[0], "the config has no such block"),
+        (SMALL.replace("  virtual:\n", "  virtual:\n" + SECOND), "pzd blind needs one virtual stand"),
+        (SMALL.replace("seed: 77", "seed: 1"), "seed 1 is one that thresholds were tuned on"),
+    ],
+)
+def test_a_config_that_cannot_be_used_is_refused(
+    text: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "wrong.yaml"
+    path.write_text(text, encoding="utf-8")
+    assert status(["blind", str(path), "--runs", str(tmp_path / "runs")]) == ConfigError.exit_code
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "runs").exists()
