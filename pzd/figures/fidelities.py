@@ -66,10 +66,10 @@ def fidelities(evidence: Evidence) -> Iterator[Drawing]:
 
 def _gap(evidence: Evidence, setting: str) -> Outing:
     """Control by the table and dynamically, and the damper without voltage, on one setting of the valve."""
-    damper = base_of(evidence.identified.rows, setting)
     records = tuple(record for record in evidence.rig.records if record.setting == setting)
     if not records:
         raise LookupError(f"the rig has no tests at {setting}")
+    damper = base_of(evidence.identified.rows, setting)
     rig = replace(evidence.rig, records=records)
     real = evidence.simulate.model_copy(update={"policies": ("comfort", "passive"), "fidelities": ("table", "dynamic")})
     return rides_on(damper, setting, rig, real, evidence.tabulate, evidence.control)

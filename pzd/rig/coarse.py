@@ -20,9 +20,9 @@ from pzd.rig.measured import Measured
 MOST_SAMPLES = 800
 RATE = 250.0
 """A record without cycles is read at about this rate [Hz]."""
-_GRID = (12, 10)
+_GRID = (24, 16)
 _ZOOM = (7, 7)
-_ZOOMS = 2
+_ZOOMS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +44,19 @@ class Coarse:
     """The element that leaves least of any of the forces that it was held against."""
 
     left: float
-    """Share of the squares that it leaves."""
+    """Share of the force's squares about its mean that is left."""
+    left_beside: float
+    """The same without the element: what offset, spring and inertia leave by themselves."""
     force: int
     """Which of the forces."""
     friction_extension: float
     """T0 / k [m]."""
     lag: float
     """C / k [s]."""
+
+    def explains(self) -> bool:
+        """Whether it takes more than half of what is left without it; else its parameters say nothing."""
+        return self.left < 0.5 * self.left_beside
 
 
 @lru_cache(maxsize=1)
@@ -101,7 +107,7 @@ def fitted(part: Piece, forces: Array) -> Coarse:
     """
     x = part.displacement
     free = _beside(x)
-    targets = _unit(forces, free)
+    targets, beside = _unit(forces, free), _share_beside(forces, free)
     half = 0.5 * float(np.ptp(x))
     longest = max(2.0 * part.step, min(0.1, 0.1 * part.step * x.size))
     spans = [(np.log(2e-3 * half), np.log(0.7 * half)), (np.log(0.2 * part.step), np.log(longest))]
@@ -110,14 +116,14 @@ def fitted(part: Piece, forces: Array) -> Coarse:
         frictions, lags = (np.linspace(*span, count) for span, count in zip(spans, counts, strict=True))
         pairs = [(float(np.exp(u)), float(np.exp(w))) for u in frictions for w in lags]
         elements = _unit(np.stack([unit_force(part, *pair) for pair in pairs]), free)
-        left = 1.0 - np.maximum(elements @ targets.T, 0.0) ** 2
+        left = beside * (1.0 - np.maximum(elements @ targets.T, 0.0) ** 2)
         best, force = (int(i) for i in np.unravel_index(int(np.argmin(left)), left.shape))
         spans = [
             (np.log(value) - (grid[1] - grid[0]), np.log(value) + (grid[1] - grid[0]))
             for value, grid in zip(pairs[best], (frictions, lags), strict=True)
         ]
         counts = _ZOOM
-    return Coarse(float(left[best, force]), force, *pairs[best])
+    return Coarse(float(left[best, force]), float(beside[force]), force, *pairs[best])
 
 
 def unit_force(part: Piece, friction_extension: float, lag: float) -> Array:
@@ -131,6 +137,14 @@ def _beside(x: Array) -> Array:
     """Orthonormal columns (n, 3) of what may stand beside the element: offset, spring, inertia."""
     bend = np.gradient(np.gradient(x))
     result: Array = np.linalg.qr(np.stack([np.ones(x.size), x, bend], axis=1))[0]
+    return result
+
+
+def _share_beside(forces: Array, free: Array) -> Array:
+    """Share (m,) of each force's squares about its mean that what stands beside the element leaves."""
+    rest = forces - (forces @ free) @ free.T
+    about_mean = forces - forces.mean(axis=1, keepdims=True)
+    result: Array = np.sum(rest**2, axis=1) / np.maximum(np.sum(about_mean**2, axis=1), 1e-300)
     return result
 
 

@@ -173,14 +173,23 @@ def test_the_real_damper_cannot_reach_c_min(gallery: Gallery) -> None:
 
 
 def test_a_run_without_the_papers_tests_says_what_it_lacks(evidence: Evidence) -> None:
-    only_large = replace(
-        evidence.identified, measures=tuple(m for m in evidence.identified.measures if m.setting == LARGE)
+    identified, rig = evidence.identified, evidence.rig
+    poorer = replace(
+        evidence,
+        identified=replace(
+            identified,
+            rows=tuple(row for row in identified.rows if row.setting == LARGE),
+            measures=tuple(measure for measure in identified.measures if measure.setting == LARGE),
+        ),
+        rig=replace(rig, records=tuple(record for record in rig.records if record.setting == LARGE)),
     )
-    poorer = replace(evidence, identified=only_large)
     fourth, none = _entry(library()[4], poorer)
     assert "no test at gap 0.15 mm" in (fourth.missing or "")
     assert none == {}
     assert _entry(library()[5], poorer)[0].missing is None
+    nineteenth = _entry(library()[19], poorer)[0]
+    assert nineteenth.missing == "the rig has no tests at gap 0.15 mm"
+    assert [picture.png for picture in nineteenth.pictures] == ["fig-19-acceleration.png", "fig-19-cars.png"]
 
 
 def test_the_papers_element_gives_the_peaks_that_its_tables_give() -> None:

@@ -14,7 +14,7 @@ LEAST_DELAY = 1e-3
 EXPLAINS = 0.25
 """The delay has to leave less than this share of the squares that the element without it leaves."""
 VISIBLE = 2e-3
-"""Share of the squares that the element must leave: what is less is noise, or how coarse it is."""
+"""Share of the force's squares that the element must leave: what is less is noise, or how coarse it is."""
 LONGEST = 0.03
 """Largest delay looked for [s], or a twentieth of the cycle where that is less."""
 TRIES = 31

@@ -10,6 +10,11 @@ from pzd.rig.measured import Measured
 
 SHARE = 0.04
 """Offset that is said, as a share of half the force's range."""
+SLIPS = 0.02
+"""Least share of the samples at which the element must slip, either way.
+
+Friction that sticks keeps any force within T0 from before the record, which is no offset.
+"""
 
 
 def check(test: Measured) -> list[Finding]:
@@ -19,9 +24,13 @@ def check(test: Measured) -> list[Finding]:
     """
     part, element = plain(test)
     force = part.force_later(np.zeros(1))[0]
+    unit = unit_force(part, element.friction_extension, element.lag)
+    slips = min(np.mean(sign * unit > element.friction_extension) for sign in (1.0, -1.0))
+    if slips < SLIPS or not element.explains():
+        return []
     x = part.displacement - 0.5 * float(part.displacement.max() + part.displacement.min())
     bend = np.gradient(np.gradient(x))
-    columns = (np.ones(x.size), unit_force(part, element.friction_extension, element.lag), x, bend)
+    columns = (np.ones(x.size), unit, x, bend)
     design = np.stack([column / (np.abs(column).max() or 1.0) for column in columns], axis=1)
     offset = float(np.linalg.lstsq(design, force, rcond=None)[0][0])
     low, high = np.percentile(test.record.force, (1, 99))
