@@ -11,6 +11,7 @@ from pzd.quantities import Control
 from pzd.record import Array
 from pzd.schema.csvfile import read_columns, read_rows, write_columns, write_rows
 from pzd.schema.model import Frozen
+from pzd.schema.processes import at_once
 
 RIDE_COLUMNS = ("time_s", "z_m", "phi_rad", "a_K_m_per_s2")
 AXLE_COLUMNS = (
@@ -76,11 +77,14 @@ class Rides:
     summary: tuple[SummaryRow, ...]
     responses: tuple[Response, ...] = field(default=())
 
-    def write(self, folder: Path, control: Control) -> None:
-        """Write one CSV a case, summary.csv and response.csv."""
-        for ride in self.rides:
+    def write(self, folder: Path, control: Control, jobs: int = 1) -> None:
+        """Write one CSV a case, so many at the same time, summary.csv and response.csv."""
+
+        def written(ride: Ride) -> None:
             columns = {name: ride.columns.get(name) for name in _RIDE_HEADER}
             write_columns(folder / f"{ride.case}.csv", columns, control)
+
+        at_once(written, self.rides, jobs)
         write_rows(folder / "summary.csv", SummaryRow, self.summary, control)
         write_rows(folder / "response.csv", Response, self.responses, control)
 

@@ -12,6 +12,7 @@ from pzd.record import Array, Record
 from pzd.schema.csvfile import read_columns, write_columns
 from pzd.schema.jsonfile import read_json_list, write_json
 from pzd.schema.model import Frozen
+from pzd.schema.processes import at_once
 
 
 class Finding(Frozen):
@@ -56,11 +57,14 @@ class Rig:
     records: tuple[Record, ...]
     entries: tuple[RecordEntry, ...]
 
-    def write(self, folder: Path, control: Control) -> None:
-        """Write records.json and one CSV a record."""
-        write_json(folder / "records.json", self.entries, control)
-        for record in self.records:
+    def write(self, folder: Path, control: Control, jobs: int = 1) -> None:
+        """Write records.json and one CSV a record, so many at the same time."""
+
+        def written(record: Record) -> None:
             write_columns(folder / f"{record.name}.csv", _channels(record), control)
+
+        write_json(folder / "records.json", self.entries, control)
+        at_once(written, self.records, jobs)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:

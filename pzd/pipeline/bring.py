@@ -89,7 +89,7 @@ class Pipeline:
         artefact = self.made(stage)
         marks = self._carried(stage, getattr(artefact, "untrusted", ()))
         seconds = time.monotonic() - begun
-        self.run.write(stage.name, artefact, inputs, key_of(inputs), marks, seconds)
+        self.run.write(stage.name, artefact, inputs, key_of(inputs), marks, seconds, self.jobs)
         self.marks[stage.folder] = marks
         self._say(stage, f"done in {seconds:.1f} s: {self.run.folder / stage.folder}")
 

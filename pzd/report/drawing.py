@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -13,6 +13,7 @@ import numpy as np
 from pzd.record import Array
 from pzd.report.blocks import Picture
 from pzd.report.story import Story
+from pzd.schema.processes import at_once
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -113,12 +114,17 @@ def legend(figure: Figure, columns: int = 3) -> None:
     figure.legend(loc="upper left", ncols=columns, bbox_to_anchor=(0.02, 1.01), columnspacing=1.3, handlelength=1.6)
 
 
-def pictures(plots: Iterable[Plot], story: Story) -> tuple[tuple[Picture, ...], ...]:
-    """Draw and encode what the plots have to show, plot by plot."""
+def pictures(plots: Sequence[Plot], story: Story, jobs: int = 1) -> list[tuple[Picture, ...]]:
+    """Draw and encode what the plots have to show, plot by plot, so many at the same time."""
     import matplotlib as mpl
+    import matplotlib.backends.backend_svg
+    import matplotlib.figure  # once, before the processes part
+
+    def drawn(plot: Plot) -> tuple[Picture, ...]:
+        return tuple(_encoded(panel) for panel in plot.draw(story))
 
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
-        return tuple(tuple(_encoded(panel) for panel in plot.draw(story)) for plot in plots)
+        return at_once(drawn, plots, jobs)
 
 
 def _encoded(panel: Panel) -> Picture:

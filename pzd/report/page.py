@@ -13,18 +13,19 @@ from pzd.report.story import Story
 _PLACES = ("model", "missing", "damper", "passenger")
 
 
-def page(story: Story) -> str:
+def page(story: Story, jobs: int = 1) -> str:
     """The whole page as text.
 
     Parameters
     ----------
     story : the run
+    jobs : pictures drawn at the same time
 
     Returns
     -------
     HTML, the same for the same story
     """
-    drawn = _drawn(story)
+    drawn = _drawn(story, jobs)
     sections = (
         tested.tell(story),
         model.tell(story, drawn),
@@ -37,9 +38,10 @@ def page(story: Story) -> str:
     return render(_title(story), cards(story), sections)
 
 
-def _drawn(story: Story) -> Pictures:
-    plots = library().values()
-    return {place: pictures([plot for plot in plots if plot.place == place], story) for place in _PLACES}
+def _drawn(story: Story, jobs: int) -> Pictures:
+    plots = list(library().values())
+    drawn = list(zip(plots, pictures(plots, story, jobs), strict=True))
+    return {place: tuple(of_plot for plot, of_plot in drawn if plot.place == place) for place in _PLACES}
 
 
 def _title(story: Story) -> str:

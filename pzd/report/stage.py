@@ -20,6 +20,7 @@ def report(
     rides: Rides,
     control: Control,
     setting: str | None,
+    jobs: int = 1,
 ) -> Report:
     """Rate every ride by the standards asked for, and tell the whole story on one page.
 
@@ -30,6 +31,7 @@ def report(
     rig, identified, diagnosed, table, rides : what the stages before made
     control : the control signal of the valve
     setting : of the rig's settings, the one in use
+    jobs : pictures drawn at the same time
 
     Returns
     -------
@@ -64,4 +66,4 @@ def report(
         setting=setting,
     )
     published = published_rows(simulate, identified, rides, comfort) if report.published else None
-    return Report(comfort=comfort, page=page(story), published=published)
+    return Report(comfort=comfort, page=page(story, jobs), published=published)

@@ -108,10 +108,11 @@ def made(taken: Taken, limits: Limits) -> Measured:
 
 def overview(tests: Sequence[Measured]) -> Rig:
     """The artefact: the records, and an entry with the findings of each."""
-    return Rig(tuple(test.record for test in tests), tuple(_entry(test) for test in tests))
+    return Rig(tuple(test.record for test in tests), tuple(entry_of(test) for test in tests))
 
 
-def _entry(test: Measured) -> RecordEntry:
+def entry_of(test: Measured) -> RecordEntry:
+    """What records.json says of a test, with what the preflight finds in it."""
     record = test.record
     return RecordEntry(
         name=record.name,

@@ -108,11 +108,27 @@ def take(
     control : the control signal, whose unit stands in the names
     law : gives the force; another law puts another damper into the stand
     """
+    return map(taker(entry, seed, folder, law), entry.plan(control))
+
+
+def taker(
+    entry: VirtualEntry, seed: int, folder: Path = Path(), law: Law = force_in_frame
+) -> Callable[[Planned], Taken]:
+    """What takes one planned record, in any order; it keeps the motion of the test that it took last.
+
+    Parameters
+    ----------
+    entry, seed, folder, law : as for `take`
+    """
     drive: _Drive | None = None
-    for planned in entry.plan(control):
+
+    def taken(planned: Planned) -> Taken:
+        nonlocal drive
         if drive is None or drive.test is not planned.test:
             drive = _drive(entry, planned.test, seed, folder)
-        yield _taken(entry, planned, drive, seed, law)
+        return _taken(entry, planned, drive, seed, law)
+
+    return taken
 
 
 @dataclass(frozen=True, eq=False)

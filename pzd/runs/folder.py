@@ -185,7 +185,14 @@ class Run:
             fresh.replace(path)
 
     def write(
-        self, stage: str, artefact: Artefact, inputs: dict[str, str], key: str, marks: tuple[str, ...], seconds: float
+        self,
+        stage: str,
+        artefact: Artefact,
+        inputs: dict[str, str],
+        key: str,
+        marks: tuple[str, ...],
+        seconds: float,
+        jobs: int = 1,
     ) -> None:
         """Write a stage's artefact and manifest in place of what was there before.
 
@@ -197,6 +204,7 @@ class Run:
         key : hash of them all
         marks : why the result is not to be trusted
         seconds : how long it took
+        jobs : files written at the same time, where there are many
 
         Raises
         ------
@@ -207,7 +215,10 @@ class Run:
         try:
             with as_files_error(target):
                 fresh.mkdir()
-                artefact.write(fresh, self.control)
+                if isinstance(artefact, Rig | Rides):
+                    artefact.write(fresh, self.control, jobs)
+                else:
+                    artefact.write(fresh, self.control)
                 manifest = Manifest(
                     stage=stage,
                     key=key,
