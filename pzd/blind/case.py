@@ -78,6 +78,9 @@ class Scored(Frozen):
     gap_cut: float | None
     """1 - W_s after / W_s before against the noise-free force of the held-out records; None where nothing was
     adopted."""
+    gap_cut_gains_out: float | None
+    """The same with the best gain of each record taken out, before and after alike: what tests whose gains jitter can
+    show of the shape."""
     next_test: bool
     """Whether a next test was proposed."""
     seconds: float

@@ -140,10 +140,12 @@ def _unexplained(case: Scored) -> bool:
 
 
 def _gap_cuts(cases: Sequence[Scored]) -> Iterator[Line]:
-    cuts = [c.gap_cut for c in cases if c.truth and right(c) and visible(c) and c.gap_cut is not None]
-    for figure, share, target in (("median", 50, ">= 90 %"), ("tenth percentile", 10, ">= 75 %")):
-        value = float(np.percentile(cuts, share)) if cuts else None
-        yield _number("rightly named, visible", f"gap cut, {figure}", value, len(cuts), target)
+    named = [c for c in cases if c.truth and right(c) and visible(c)]
+    cuts = [c.gap_cut for c in named if c.gap_cut is not None]
+    shapes = [c.gap_cut_gains_out for c in named if c.gap_cut_gains_out is not None]
+    for about, values, targets in (("", cuts, (">= 90 %", ">= 75 %")), (", gains left out", shapes, ("", ""))):
+        yield _percentile(f"gap cut{about}, median", values, 50, targets[0])
+        yield _percentile(f"gap cut{about}, tenth percentile", values, 10, targets[1])
     inside = [hit for c in cases if c.truth and visible(c) for hit in c.inside.values()]
     rate = Rate(sum(inside), len(inside))
     met: Met = "too few"
@@ -161,9 +163,18 @@ def _gap_cuts(cases: Sequence[Scored]) -> Iterator[Line]:
     )
 
 
-def _number(about: str, figure: str, value: float | None, count: int, target: str) -> Line:
-    met = _verdict(value, target)
-    return Line(about=about, figure=figure, value=value, low95=None, high95=None, count=count, target=target, met=met)
+def _percentile(figure: str, values: Sequence[float], share: float, target: str) -> Line:
+    value = float(np.percentile(values, share)) if values else None
+    return Line(
+        about="rightly named, visible",
+        figure=figure,
+        value=value,
+        low95=None,
+        high95=None,
+        count=len(values),
+        target=target,
+        met=_verdict(value, target),
+    )
 
 
 def _calibration(cases: Sequence[Scored]) -> Iterator[Line]:

@@ -92,6 +92,7 @@ def case() -> Callable[..., Scored]:
             "confidence": 0.97,
             "inside": {"asymmetry.alpha": True},
             "gap_cut": 0.95,
+            "gap_cut_gains_out": 0.97,
             "next_test": False,
             "seconds": 2.0,
             "diagnose_seconds": 1.0,

@@ -12,15 +12,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pzd.artefacts import Diagnosed, Diagnosis
+from pzd.artefacts.diagnosed import Gap
 from pzd.blind import benchmark as module
 from pzd.blind.benchmark import Benchmark, processes
 from pzd.blind.case import Places, Scored
+from pzd.blind.clean import Clean
 from pzd.blind.hide import Setup, drawn, hide
+from pzd.blind.mark import gap_cut
 from pzd.blind.plan import plan
 from pzd.blind.seek import COST, seek
 from pzd.cli.app import status
 from pzd.config import RunConfig
+from pzd.damper.compose import respond
 from pzd.damper.effects import library
+from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
 from pzd.schema.errors import ConfigError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -179,3 +186,25 @@ def test_a_config_that_cannot_be_used_is_refused(
     assert status(["blind", str(path), "--runs", str(tmp_path / "runs")]) == ConfigError.exit_code
     assert said in capsys.readouterr().err
     assert not (tmp_path / "runs").exists()
+
+
+def test_the_gap_cut_is_one_when_the_truth_is_found_and_nothing_when_nothing_changes() -> None:
+    row = BaseRow(T0_N=500.0, C_Ns_per_m=3000.0, k_N_per_m=3e5)
+    plain = Damper(base=(row,))
+    true = plain.with_effect("asymmetry", {"alpha": 0.1})
+    t = np.arange(0.0, 2.0, 1e-3)
+    w = 2.0 * np.pi
+    motion = Motion(t, 0.02 * np.sin(w * t), 0.02 * w * np.cos(w * t), -0.02 * w**2 * np.sin(w * t))
+    clean = {"r01": Clean(motion, respond(true, motion))}
+    stronger = Damper(base=(row.model_copy(update={"T0_N": 510.0, "C_Ns_per_m": 3060.0, "k_N_per_m": 3.06e5}),))
+
+    def cut(damper: Damper, *, gains_out: bool = False) -> float:
+        gap = Gap(before=1.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=("r01",), hold_out="records")
+        said = Diagnosis(verdict="named", reason="", effects=("asymmetry",), confidence=None, gap=gap, parameters={},
+                         ranking=(), rivals=(), where=(), next_test=None)  # fmt: skip
+        return gap_cut(Diagnosed(said, damper, plain), clean, gains_out=gains_out)
+
+    assert cut(true) == pytest.approx(1.0, abs=1e-9)
+    assert cut(plain) == pytest.approx(0.0, abs=1e-9)
+    assert cut(stronger.with_effect("asymmetry", {"alpha": 0.1})) < 0.99
+    assert cut(stronger.with_effect("asymmetry", {"alpha": 0.1}), gains_out=True) == pytest.approx(1.0, abs=1e-3)

@@ -55,7 +55,7 @@ def test_right_is_exactly_what_was_there(case: Make) -> None:
 
 
 def test_a_failed_diagnosis_is_wrong_wherever_it_happens(case: Make) -> None:
-    failed = {
+    failed: dict[str, object] = {
         "verdict": None,
         "effects": (),
         "confidence": None,
