@@ -63,11 +63,11 @@ class Run:
     control: Control = VOLTS
     setting: str | None = "gap 0.25 mm"
 
-    def told(self, config: ReportConfig | None = None) -> Report:
+    def told(self, config: ReportConfig | None = None, jobs: int = 1) -> Report:
         """The report of this run."""
         simulate = SimulateConfig()
         parts = (self.rig, self.identified, self.diagnosed, self.table, self.rides)
-        return report(config or ReportConfig(), simulate, *parts, self.control, self.setting)
+        return report(config or ReportConfig(), simulate, *parts, self.control, self.setting, jobs)
 
     def with_diagnosis(self, damper: Damper = PLAIN, **changes: object) -> Run:
         """The same run with another verdict."""

@@ -73,7 +73,7 @@ def read(page: str) -> Reader:
 @pytest.fixture
 def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """No pictures: for what the text alone must say."""
-    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, story: ())
+    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, story, jobs: [()] * len(plots))
 
 
 def test_the_story_is_told_in_its_order_and_every_tag_is_closed(read: Reader) -> None:
@@ -124,6 +124,10 @@ def test_intervals_statuses_and_findings_stand_on_the_page(read: Reader) -> None
 
 def test_with_and_without_the_missing_effect_stand_side_by_side(read: Reader) -> None:
     assert "With and without the missing effect" in read.text
+
+
+def test_pictures_drawn_at_the_same_time_are_the_same(page: str, run: Any) -> None:
+    assert run.told(jobs=3).page == page
 
 
 def test_the_same_input_gives_the_same_bytes_in_another_process() -> None:

@@ -26,7 +26,7 @@ ALL = ReportConfig(
 def rows_only() -> Iterator[None]:
     """No pictures: these tests are about the rows."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pzd.report.page.pictures", lambda plots, story: ())
+        patch.setattr("pzd.report.page.pictures", lambda plots, story, jobs: [()] * len(plots))
         yield
 
 

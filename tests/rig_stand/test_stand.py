@@ -13,8 +13,9 @@ from pzd.damper.compose import respond
 from pzd.damper.element import element_force
 from pzd.damper.motion import Motion
 from pzd.quantities import Control
-from pzd.rig.config import Fixture
+from pzd.rig.config import Fixture, RigConfig
 from pzd.rig.fixture import free
+from pzd.rig.stage import synthesise
 from pzd.rig.stand import Taken, records, take
 from pzd.rig.virtual_config import VirtualEntry
 
@@ -328,6 +329,17 @@ def test_names_say_setting_waveform_voltage_temperature_and_number() -> None:
 def test_an_impossible_stand_is_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         stand(**changes)
+
+
+def test_records_taken_at_the_same_time_are_the_same() -> None:
+    entry = stand(TABLE_2, tests=[{"waveform": SINE, "cycles": 3}, {"waveform": TRIANGLE, "cycles": 3}])
+    rig = RigConfig(virtual=(entry, entry.model_copy(update={"setting": "other"})))
+    alone, together = (synthesise(rig, 1, Control(), Path(), jobs) for jobs in (1, 3))
+    assert together.entries == alone.entries
+    for one, other in zip(together.records, alone.records, strict=True):
+        assert one.name == other.name
+        assert np.array_equal(one.force, other.force)
+        assert np.array_equal(one.velocity, other.velocity)
 
 
 def test_the_quickstart_is_a_stand_with_something_hidden(root: Path) -> None:
