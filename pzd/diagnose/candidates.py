@@ -5,19 +5,22 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library
-from pzd.diagnose.fitting import DIFFERENCE, MOST_EVALUATIONS, Fitted, Problem, Unknown, fit, simulated
+from pzd.diagnose.fitting import DIFFERENCE, MOST_EVALUATIONS, Fitted, fit
+from pzd.diagnose.problem import Problem, Unknown, simulated
 from pzd.record import Array
 
 PATIENT = 100
 """Evaluations after which even a settled optimum is left as it is."""
 STUCK = 1.0
 """A model that holds another one is worse than it by more [in squares of noise] only where its search got stuck."""
+VARIES = ("stroke", "flow", "parallel")
+"""Places of effects whose parameters may differ by voltage."""
 MOVES = 0.02
 """A channel moves in a test if its range there exceeds this share of the rig's scale."""
 WARMS = 2.0
@@ -34,6 +37,8 @@ class Candidate:
     """Change of the Bayesian criterion against the model without it; negative where it pays."""
     explained: float
     """R.m.s. by which it moves the simulated force, as a share of each record's peak."""
+    varies: bool = False
+    """Whether it is an effect adopted before, its parameters now by voltage."""
 
 
 def seen_in(problem: Problem, effect: Effect) -> bool:
@@ -98,8 +103,26 @@ def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     return min(reached, key=lambda c: c.fitted.misfit)
 
 
+def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:
+    """Every effect of `before` whose parameters may differ by voltage, fitted so."""
+    free = [
+        name
+        for name in before.effects
+        if library()[name].place in VARIES and name not in problem.varying and len(problem.voltages) > 1
+    ]
+    return [_varied(problem, before, name) for name in free]
+
+
+def _varied(problem: Problem, before: Fitted, effect: str, evaluations: int = MOST_EVALUATIONS) -> Candidate:
+    wider = replace(problem, varying=problem.varying | {effect})
+    fitted = fit(wider, before.effects, wider.start_with(before.damper), evaluations)
+    return Candidate(effect, fitted, delta_bic(before, fitted), moved_by(problem, before, fitted), varies=True)
+
+
 def settled(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
     """A candidate with its optimum searched to the end, from all its starting values."""
+    if found.varies:
+        return _varied(problem, before, found.effect, PATIENT)
     effect = library()[found.effect]
     problem = _for(problem, effect)
     others = [np.concatenate([_base(problem, before), s]) for s in promising_starts(problem, before, effect)[1:]]
@@ -116,7 +139,7 @@ def _for(problem: Problem, effect: Effect) -> Problem:
 def _base(problem: Problem, before: Fitted) -> Array:
     """(3 b + e,) where the search starts in the base rows and the effects of `before`."""
     rows = before.searched.size - len(before.unknowns)
-    return before.searched if rows == 3 * len(problem.base) else problem.start_with(before)
+    return before.searched if rows == 3 * len(problem.base) else problem.start_with(before.damper)
 
 
 def _from(

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from pzd.damper.effect import Scales
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.config import DiagnoseConfig
-from pzd.diagnose.fitting import Fitted, Problem, simulated
+from pzd.diagnose.fitting import Fitted
 from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.judge import Judged, judge
 from pzd.diagnose.observation import Observation, observations
 from pzd.diagnose.predict import predicted_force
+from pzd.diagnose.problem import Problem, simulated
 from pzd.diagnose.split import TRAINING, UNTOUCHED, VALIDATION, Split
 from pzd.record import Array, voltage_scale
 
@@ -96,8 +97,9 @@ def evidence_of(prepared: Sequence[Prepared], parts: Split, damper: Damper, conf
         known = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
         reference = float(np.median(known)) if known else None
     fastest = PER_SAMPLE * max(p.record.rate for p in prepared)
+    varying = frozenset(name for name, values in damper.effects.items() if "at_voltage_V" in values)
     problems = [
-        Problem(part, damper.base, scales, fastest, reference)
+        Problem(part, damper.base, scales, fastest, reference, varying)
         for part in (whole, *(observed([r == role for r in parts.roles]) for role in (TRAINING, VALIDATION)))
     ]
     return Evidence(tuple(prepared), seen, problems[0], (problems[1], problems[2]))

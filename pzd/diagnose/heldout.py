@@ -28,7 +28,7 @@ def held_out_gap(named: Named, parts: Split, config: DiagnoseConfig) -> Gap:
     if not named.adopted:
         return before
     training = named.last.halves[0]
-    adopted = fit(training, named.adopted, training.start_with(named.fitted)).damper
+    adopted = fit(training, named.adopted, training.start_with(named.fitted.damper)).damper
     after = gap_of(_untouched(named.last, parts, adopted, config), parts)
     return after.model_copy(update={"before": before.before})
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
-from pzd.diagnose.candidates import Candidate, candidate, candidates, settled
+from pzd.diagnose.candidates import Candidate, by_voltage, candidate, candidates, settled
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit
@@ -93,19 +93,22 @@ def name_effects(
         current = candidate(first.whole, current, library()[name]).fitted
         reasons[name] = "adopted because the config asks for it"
     rivals: tuple[str, ...] = ()
-    while len(current.effects) < config.most_effects and evidence.something_missing(current, config):
-        tried = candidates(evidence.whole, current, config.forbid, jobs)
-        rounds.append(tried)
-        chosen = _first_supported(evidence, weighed, config, current, tried, reasons)
+    while evidence.something_missing(current, config):
+        more = len(current.effects) < config.most_effects
+        tried = candidates(evidence.whole, current, config.forbid, jobs) if more else ()
+        steps = sorted((*tried, *by_voltage(evidence.whole, current)), key=lambda c: c.delta_bic)
+        chosen = _first_supported(evidence, weighed, config, current, steps, reasons)
         if chosen is None:
+            rounds += [tried] if tried else []
             break
         chosen = settled(evidence.whole, current, chosen)
-        rounds[-1] = tuple(chosen if c.effect == chosen.effect else c for c in tried)
-        reasons[chosen.effect] = "adopted"
-        rivals = _rivals(chosen, rounds[-1], config)
-        log.info("diagnose: %s adopted, delta BIC %.0f", chosen.effect, chosen.delta_bic)
+        reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
+        if not chosen.varies:
+            rounds.append(tuple(chosen if c.effect == chosen.effect else c for c in tried))
+            rivals = _rivals(chosen, tried, config)
+        log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, reasons[chosen.effect], chosen.delta_bic)
         evidence = weighed(chosen.fitted.damper)
-        current = fit(evidence.whole, chosen.fitted.effects, evidence.whole.start_with(chosen.fitted))
+        current = fit(evidence.whole, chosen.fitted.effects, evidence.whole.start_with(chosen.fitted.damper))
     return Named(plain, current, tuple(rounds), reasons, rivals, first, evidence)
 
 
@@ -128,7 +131,8 @@ def _first_supported(
         reason = _unsupported(evidence, config, each) or _stand_in(evidence, weighed(each.fitted.damper), before, each)
         if reason is None:
             return each
-        reasons[each.effect] = reason
+        if not each.varies:
+            reasons[each.effect] = reason
         if each.delta_bic > config.adopt_bic:
             break
     return None
@@ -147,13 +151,14 @@ def _unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidat
 
 def trivial(fitted: Fitted, effect: str, force: float) -> bool:
     """Whether the 95 % interval of a common offset or delay reaches below what counts as an effect."""
-    index = [u.effect for u in fitted.unknowns].index(effect)
-    unknown = fitted.unknowns[index]
-    limit = TRIVIAL.get((effect, unknown.parameter.name))
-    if limit is None:
-        return False
-    size = abs(fitted.value_of(effect, unknown.parameter.name)) - LEVEL * standard_errors(fitted)[index]
-    return bool(size < limit * (force if unknown.parameter.unit == "N" else 1.0))
+    errors = standard_errors(fitted)
+    sizes = []
+    for unknown, error in zip(fitted.unknowns, errors, strict=True):
+        limit = TRIVIAL.get((unknown.effect, unknown.parameter.name))
+        if unknown.effect == effect and limit is not None:
+            unit = limit * (force if unknown.parameter.unit == "N" else 1.0)
+            sizes.append((abs(unknown.of(fitted.damper)) - LEVEL * error) / unit)
+    return bool(sizes) and max(sizes) < 1.0
 
 
 def standard_errors(fitted: Fitted) -> Array:
@@ -175,7 +180,7 @@ def _stand_in(evidence: Evidence, weighed: Evidence, before: Fitted, candidate: 
     halves = weighed.halves
     if any(not half.observations for half in halves):
         return None
-    fits = [fit(half, candidate.fitted.effects, half.start_with(candidate.fitted)) for half in halves]
+    fits = [fit(half, candidate.fitted.effects, half.start_with(candidate.fitted.damper)) for half in halves]
     without = fit(evidence.halves[0], before.effects, before.searched)
     if weighed.misfit(fits[0], halves[1]) >= weighed.misfit(without, evidence.halves[1]):
         return "stand-in: does not shrink the gap on tests it was not fitted to"
@@ -192,7 +197,7 @@ def _agree(first: Fitted, second: Fitted, effect: str) -> bool:
     for i, unknown in enumerate(first.unknowns):
         if unknown.effect != effect:
             continue
-        a, b = (f.value_of(effect, unknown.parameter.name) for f in (first, second))
+        a, b = unknown.of(first.damper), unknown.of(second.damper)
         if abs(a - b) > limit * errors[i] and abs(a - b) > ALIKE * max(abs(a), abs(b)):
             return False
     return True

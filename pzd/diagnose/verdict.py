@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from pzd.artefacts import Ranked, Value
+from pzd.damper.effect import Parameter
+from pzd.damper.effects import library
+from pzd.damper.model import Damper
 from pzd.diagnose.candidates import Candidate
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence
@@ -116,7 +119,7 @@ def ranking_of(named: Named, evidence: Evidence) -> tuple[Ranked, ...]:
                 effect=c.effect,
                 gap_after=evidence.criterion(c.fitted),
                 delta_bic=round(c.delta_bic, 3),
-                parameters=dict(c.fitted.damper.effects[c.effect]),
+                **_as_fitted(named.fitted.damper if c.effect in named.adopted else c.fitted.damper, c.effect),
                 reason="rival" if c.effect in named.rivals else reason,
             )
     return tuple(sorted(rows.values(), key=lambda r: (r.effect not in named.adopted, r.delta_bic)))
@@ -124,14 +127,41 @@ def ranking_of(named: Named, evidence: Evidence) -> tuple[Ranked, ...]:
 
 def parameters_of(named: Named) -> dict[str, dict[str, Value]]:
     """The parameters of what was adopted, with 95 % intervals."""
-    errors = standard_errors(named.fitted)
+    damper, errors = named.fitted.damper, standard_errors(named.fitted)
     found: dict[str, dict[str, Value]] = {}
-    for unknown, error in zip(named.fitted.unknowns, errors, strict=True):
-        value = named.fitted.value_of(unknown.effect, unknown.parameter.name)
-        found.setdefault(unknown.effect, {})[unknown.parameter.name] = Value(
-            value=value,
-            low95=value - LEVEL * float(error),
-            high95=value + LEVEL * float(error),
-            unit=unknown.parameter.unit,
-        )
+    for name, values in damper.effects.items():
+        nodes = values.get("at_voltage_V")
+        for parameter in library()[name].parameters:
+            mine = [
+                (u.of(damper), float(error))
+                for u, error in zip(named.fitted.unknowns, errors, strict=True)
+                if (u.effect, u.parameter.name) == (name, parameter.name)
+            ]
+            found.setdefault(name, {})[parameter.name] = _value(mine, parameter, nodes)
     return found
+
+
+def _value(
+    found: Sequence[tuple[float, float]], parameter: Parameter, nodes: float | tuple[float, ...] | None
+) -> Value:
+    """A parameter with its 95 % interval inside its limits, one a voltage where it differs by voltage.
+
+    Parameters
+    ----------
+    found : value and standard error, one a voltage or a single one
+    parameter : its unit and limits
+    nodes : the voltages [V]; None for a single value
+    """
+    middle = tuple(value for value, _ in found)
+    low = tuple(max(value - LEVEL * error, parameter.low) for value, error in found)
+    high = tuple(min(value + LEVEL * error, parameter.high) for value, error in found)
+    if not isinstance(nodes, tuple):
+        return Value(value=middle[0], low95=low[0], high95=high[0], unit=parameter.unit)
+    return Value(value=middle, low95=low, high95=high, unit=parameter.unit, at_voltage_V=nodes)
+
+
+def _as_fitted(damper: Damper, effect: str) -> dict[str, Any]:
+    """Parameters of an effect as a ranking shows them: the voltages beside them, not among them."""
+    values = dict(damper.effects[effect])
+    nodes = values.pop("at_voltage_V", None)
+    return {"parameters": values, "at_voltage_V": nodes}
