@@ -89,13 +89,14 @@ class Rides:
         write_rows(folder / "response.csv", Response, self.responses, control)
 
     @classmethod
-    def read(cls, folder: Path, control: Control) -> Self:
-        """Read and check them again."""
+    def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
+        """Read and check them again, so many at the same time."""
+
+        def ride(row: SummaryRow) -> Ride:
+            return Ride(row.case, read_columns(folder / f"{row.case}.csv", _RIDE_HEADER, control, _RIDE_OPTIONAL))
+
         summary = read_rows(folder / "summary.csv", SummaryRow, control)
-        rides = tuple(
-            Ride(row.case, read_columns(folder / f"{row.case}.csv", _RIDE_HEADER, control, _RIDE_OPTIONAL))
-            for row in summary
-        )
+        rides = tuple(at_once(ride, summary, jobs))
         return cls(rides, summary, read_rows(folder / "response.csv", Response, control))
 
     @property

@@ -67,10 +67,10 @@ class Rig:
         at_once(written, self.records, jobs)
 
     @classmethod
-    def read(cls, folder: Path, control: Control) -> Self:
-        """Read and check them again."""
+    def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
+        """Read and check them again, so many at the same time."""
         entries = read_json_list(folder / "records.json", RecordEntry, control)
-        return cls(tuple(_read_record(folder, entry, control) for entry in entries), entries)
+        return cls(tuple(at_once(lambda entry: _read_record(folder, entry, control), entries, jobs)), entries)
 
 
 def _channels(record: Record) -> Mapping[str, Array | None]:

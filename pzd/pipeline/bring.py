@@ -114,7 +114,7 @@ class Pipeline:
         now = self.run.outputs(kind.folder)
         files, artefact = self._in_hand.get(kind.folder, ({}, None))
         if artefact is None or files != now:
-            artefact = self.run.read(kind)
+            artefact = self.run.read(kind, self.jobs)
             self._in_hand[kind.folder] = (now, artefact)
         return artefact
 

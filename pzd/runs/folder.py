@@ -109,14 +109,16 @@ class Run:
             tuple(name for name, digest in manifest.outputs.items() if now.get(name, digest) != digest),
         )
 
-    def read(self, kind: type[Made]) -> Made:
-        """Read an artefact of the run, checked.
+    def read(self, kind: type[Made], jobs: int = 1) -> Made:
+        """Read an artefact of the run, checked; with so many files at the same time, where there are many.
 
         Raises
         ------
         DataError : when a file of it is missing or at fault, with every place
         """
         with as_files_error(self.folder / kind.folder):
+            if issubclass(kind, Rig | Rides):
+                return kind.read(self.folder / kind.folder, self.control, jobs)
             return kind.read(self.folder / kind.folder, self.control)
 
     # ------------------------------------------------------------ writing
