@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from pzd.artefacts import RecordEntry, Rig
@@ -29,11 +30,13 @@ from pzd.rig.measured import Measured
 from pzd.rig.preflight import findings
 from pzd.rig.reading import Test, read
 from pzd.rig.stand import Taken, record_of
+from pzd.rig.virtual_config import Planned
 from pzd.schema.errors import ConfigError, DataError
+from pzd.schema.processes import at_once
 
 
-def measured(entries: Sequence[FilesEntry], limits: Limits, control: Control, folder: Path) -> list[Measured]:
-    """Every test of every file as a record.
+def measured(entries: Sequence[FilesEntry], limits: Limits, control: Control, folder: Path, jobs: int = 1) -> Rig:
+    """The artefact: every test of every file as a record, so many at the same time, and an entry with its findings.
 
     Raises
     ------
@@ -45,7 +48,7 @@ def measured(entries: Sequence[FilesEntry], limits: Limits, control: Control, fo
         check_keys(entry, f"rig.files.{number}", control)
     tests = _read_all(files, control)
     called = names([(test.path, test.number) for test, _ in tests])
-    return [_measured(name, test, freed, limits) for name, (test, freed) in zip(called, tests, strict=True)]
+    return overview([partial(_measured, name, *of, limits) for name, of in zip(called, tests, strict=True)], jobs)
 
 
 def _read_all(files: Sequence[Listed], control: Control) -> list[tuple[Test, Freed]]:
@@ -99,20 +102,32 @@ def _measured(name: str, test: Test, freed: Freed, limits: Limits) -> Measured:
     return Measured(record, run, clean, limits, freed.said or None)
 
 
-def made(taken: Taken, limits: Limits) -> Measured:
+def made(take: Callable[[Planned], Taken], planned: Planned, limits: Limits) -> Measured:
     """A record of the virtual stand, with its cycles and clean motion."""
+    taken = take(planned)
     run = cycles(taken.time, taken.displacement)
     clean = kinematics(taken.time, taken.displacement, run)
     return Measured(record_of(taken, clean), run, clean, limits)
 
 
-def overview(tests: Sequence[Measured]) -> Rig:
-    """The artefact: the records, and an entry with the findings of each."""
-    return Rig(tuple(test.record for test in tests), tuple(entry_of(test) for test in tests))
+def overview(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:
+    """The artefact: the records, and an entry with the findings of each.
+
+    Parameters
+    ----------
+    tests : what gives them
+    jobs : tests worked on at the same time
+    """
+
+    def listed(given: Callable[[], Measured]) -> tuple[Record, RecordEntry]:
+        test = given()
+        return test.record, _entry(test)
+
+    found = at_once(listed, tests, jobs)
+    return Rig(tuple(record for record, _ in found), tuple(entry for _, entry in found))
 
 
-def entry_of(test: Measured) -> RecordEntry:
-    """What records.json says of a test, with what the preflight finds in it."""
+def _entry(test: Measured) -> RecordEntry:
     record = test.record
     return RecordEntry(
         name=record.name,
