@@ -11,14 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.rig.edges import ROUNDS, averaged, force_span, motion_span
 from pzd.rig.period import Repeats, repeats
 
 Array = NDArray[np.float64]
 
-REFINED_POINTS = 100
-"""Samples in a cycle that the refinement of the period looks at, more being no better."""
+FITTED_POINTS = 1000
+"""Points of a cycle that the period is fitted to, at least, as far as there are samples."""
 REFINEMENTS = 6
 """Rounds of the refinement of the period; each squares the error."""
+TWO = 1.99
+"""Fewer cycles than these make no run."""
+MARGIN = 0.1
+"""Share of a cycle by which the run keeps off the end of the section, where there is so much to spare."""
 
 
 @dataclass(frozen=True)
@@ -88,21 +93,57 @@ def cycles(time: Array, displacement: Array) -> Cycles | None:
     return None if found is None else _refined(time, displacement, found)
 
 
+def settled(run: Cycles, time: Array, force: Array) -> Cycles:
+    """The cycles of a run whose force repeats as well: at a constant voltage, the transient at its ends left out.
+
+    Parameters
+    ----------
+    run : of the displacement
+    time : (n,) of the record [s]
+    force : (n,) [N]
+
+    Returns
+    -------
+    the same run where its force repeats throughout, or where fewer than two cycles would remain
+    """
+    span = force_span(time, force, run.period, (run.start, run.end))
+    if span == (run.start, run.end) or span[1] - span[0] < TWO * run.period:
+        return run
+    return _whole(time, Repeats(run.period, *span), run.period)
+
+
 def _refined(time: Array, displacement: Array, found: Repeats) -> Cycles:
-    """Refine the period on few cycles first, so that a shift never exceeds a small part of the cycle."""
+    """Find the edges of the run and its period in turn: either needs the other."""
+    coarse, x = averaged(time, displacement, found.period, FITTED_POINTS)
+    run = _fitted(time, coarse, x, found)
+    for _ in range(ROUNDS):
+        start, end = motion_span(time, displacement, run.period, (found.start, found.end))
+        if (start, end) == (found.start, found.end) or end - start < TWO * run.period:
+            break
+        found = Repeats(run.period, start, end)
+        run = _fitted(time, coarse, x, found)
+    return run
+
+
+def _fitted(time: Array, coarse: Array, displacement: Array, found: Repeats) -> Cycles:
+    """Fit the period to few cycles first, so that a shift never exceeds a small part of the cycle."""
     run = _whole(time, found, found.period)
-    every = max(run.points(time) // REFINED_POINTS, 1)
     for round_number in range(REFINEMENTS):
         used = Cycles(run.period, run.start, min(run.count, 3 * 4**round_number))
-        run = _whole(time, found, run.period + _shift_per_cycle(time[::every], displacement[::every], used))
+        run = _whole(time, found, run.period + _shift_per_cycle(coarse, displacement, used))
     return run
 
 
 def _whole(time: Array, found: Repeats, period: float) -> Cycles:
-    """Whole cycles up to the end of the repeating section, the first starting on a sample."""
+    """Whole cycles at the end of the repeating section, the first starting on a sample.
+
+    What is left over goes to the front, where a transient may linger; a little of it keeps the run from the end.
+    """
     step = float(np.median(np.diff(time)))
     end = min(found.end, float(time[-1]) + step)
     count = max(int((end - found.start + 0.5 * step) / period), 2)
+    left_over = max(end - found.start - count * period, 0.0)
+    end -= min(0.5 * left_over, MARGIN * period)
     first = int(np.searchsorted(time, end - count * period - 0.5 * step))
     return Cycles(period, float(time[first]), count)
 
@@ -112,13 +153,22 @@ def _shift_per_cycle(time: Array, displacement: Array, run: Cycles) -> float:
 
     Equation: shift_i = - sum((x_i - m) m') / sum(m'^2), m the average cycle      Source: first-order Taylor series
     """
+    order = np.arange(run.count, dtype=np.float64) - (run.count - 1) / 2.0
     folded = run.fold(time, displacement)
-    folded = folded - folded.mean(axis=1, keepdims=True)
-    average = folded.mean(axis=0)
-    slope = (np.roll(average, -1) - np.roll(average, 1)) * average.size / (2.0 * run.period)
+    folded = folded - _drift(folded, order)
+    average: Array = folded.mean(axis=0)
+    slope = np.asarray((np.roll(average, -1) - np.roll(average, 1)) * average.size / (2.0 * run.period))
     shifts = -(folded - average) @ slope / float(slope @ slope)
-    order = np.arange(run.count) - (run.count - 1) / 2.0
     return float(order @ shifts / (order @ order))
+
+
+def _drift(folded: Array, order: Array) -> Array:
+    """Slow drift (count, points), a parabola that the means of the cycles show and their shape has no part in."""
+    degree = min(order.size - 1, 2)
+    phase = (np.arange(folded.shape[1]) - 0.5 * (folded.shape[1] - 1)) / folded.shape[1]
+    course = np.polynomial.Polynomial.fit(order, folded.mean(axis=1), degree)
+    drift: Array = course(order[:, None] + phase)
+    return drift
 
 
 def _cubic(time: Array, values: Array, at: Array) -> Array:
