@@ -12,11 +12,13 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFIG = ROOT / "configs" / "quickstart.yaml"
+PAPER = ROOT / "configs" / "paper.yaml"
 
 
 def seconds(*arguments: object, folder: Path) -> float:
     """How long a command takes; it must exit 0."""
     command = [sys.executable, "-m", "pzd", *map(str, arguments)]
+    folder.mkdir(exist_ok=True)
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(folder / "cache")}
     start = time.perf_counter()
     subprocess.run(command, env=environment, cwd=folder, stdout=subprocess.DEVNULL, check=True)
@@ -29,6 +31,7 @@ def waits(folder: Path) -> Iterator[tuple[str, float, float]]:
     yield "pzd run, nothing compiled yet", seconds("run", CONFIG, folder=folder), 30.0
     yield "pzd run again, all fresh", seconds("run", CONFIG, folder=folder), 2.0
     yield "pzd run, all anew, kernels compiled", seconds("run", CONFIG, "--runs", "anew", folder=folder), 10.0
+    yield "make figures, from nothing", seconds("figures", PAPER, folder=folder / "elsewhere"), 120.0
 
 
 def main() -> int:
