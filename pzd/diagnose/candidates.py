@@ -12,19 +12,22 @@ import numpy as np
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library
 from pzd.diagnose.fitting import DIFFERENCE, MOST_EVALUATIONS, Fitted, fit
+from pzd.diagnose.predict import WARMS
 from pzd.diagnose.problem import Problem, Unknown, simulated
 from pzd.record import Array
 
 PATIENT = 100
 """Evaluations after which even a settled optimum is left as it is."""
+FIRST = 6
+"""Evaluations after which the candidates are compared for the first time; the better ones go on."""
+NEAR = 0.5
+"""A candidate that pays less than this share of what the best pays is not searched on."""
 STUCK = 1.0
 """A model that holds another one is worse than it by more [in squares of noise] only where its search got stuck."""
 VARIES = ("stroke", "flow", "parallel")
 """Places of effects whose parameters may differ by voltage."""
 MOVES = 0.02
 """A channel moves in a test if its range there exceeds this share of the rig's scale."""
-WARMS = 2.0
-"""A test warms up if its temperature moves by more [K]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +53,19 @@ def seen_in(problem: Problem, effect: Effect) -> bool:
             for o in problem.observations
         )
     if effect.needs == "temperature":
-        return any(
-            o.motion.temperature is not None and float(np.ptp(o.motion.temperature)) > WARMS
-            for o in problem.observations
-        )
+        return any(np.ptp(warmth) > WARMS for warmth in _warmth(problem).values())
     return True
+
+
+def _warmth(problem: Problem) -> dict[int, list[float]]:
+    """Temperatures at the beginning and end of every test [degC], by base row."""
+    found: dict[int, list[float]] = {}
+    for o in problem.observations:
+        if o.motion.temperature is not None:
+            tenth = max(o.motion.temperature.size // 10, 1)
+            ends = o.motion.temperature[:tenth], o.motion.temperature[-tenth:]
+            found.setdefault(o.place, []).extend(float(np.median(end)) for end in ends)
+    return found
 
 
 def candidates(
@@ -87,7 +98,14 @@ def candidates(
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         found = list(pool.map(one, tried))
+        best = min((c.delta_bic for c in found), default=0.0)
+        found = list(pool.map(lambda c: finished(problem, before, c) if c.delta_bic < NEAR * best else c, found))
     return tuple(sorted(found, key=lambda c: c.delta_bic))
+
+
+def finished(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
+    """A candidate whose search was broken off early, searched on from there."""
+    return _from(_for(problem, library()[found.effect]), before, found.effect, found.fitted.searched)
 
 
 def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
@@ -97,7 +115,7 @@ def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     """
     problem, reached = _for(problem, effect), []
     for start in promising_starts(problem, before, effect):
-        reached.append(_from(problem, before, effect.name, np.concatenate([_base(problem, before), start])))
+        reached.append(_from(problem, before, effect.name, np.concatenate([_base(problem, before), start]), FIRST))
         if reached[-1].fitted.misfit <= before.misfit + STUCK:
             break
     return min(reached, key=lambda c: c.fitted.misfit)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.effect import Scales
+from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fitting import Fitted
@@ -19,6 +20,7 @@ from pzd.diagnose.observation import Observation, observations
 from pzd.diagnose.predict import predicted_force
 from pzd.diagnose.problem import Problem, simulated
 from pzd.diagnose.split import TRAINING, UNTOUCHED, VALIDATION, Split
+from pzd.diagnose.unsure import force_error
 from pzd.record import Array, voltage_scale
 
 Mask = NDArray[np.bool_]
@@ -87,8 +89,10 @@ def evidence_of(prepared: Sequence[Prepared], parts: Split, damper: Damper, conf
     forces = [predicted_force(damper, p) for p in prepared]
     seen = tuple(roles != UNTOUCHED for roles in parts.roles)
 
+    unsure = [force_error(damper, p, force) for p, force in zip(prepared, forces, strict=True)]
+
     def observed(kept: Sequence[Mask]) -> tuple[Observation, ...]:
-        return observations(prepared, kept, places, forces, config.nuisance)
+        return observations(prepared, kept, places, forces, config.nuisance, unsure)
 
     whole = observed(seen)
     scales = _scales(whole, prepared, damper, scale)
@@ -126,7 +130,8 @@ def _of(prepared: Prepared, channel: str) -> Array:
 
 
 def _nearest_row(rows: Sequence[BaseRow], prepared: Prepared) -> int:
-    """Index of the base row at the temperature and voltage nearest to those of a record."""
+    """Index of the base row of a record: of the rows of the nearest voltage, that of the nearest temperature."""
     voltage, temperature = prepared.record.median_voltage() or 0.0, prepared.record.median_temperature() or 0.0
-    away = [(abs((row.temperature_degC or 0.0) - temperature), abs((row.voltage_V or 0.0) - voltage)) for row in rows]
-    return min(range(len(rows)), key=lambda i: (round(away[i][0], 6), away[i][1]))
+    _, nearest = min(by_voltage(rows), key=lambda group: abs(group[0] - voltage))
+    row = min(nearest, key=lambda r: abs((r.temperature_degC or 0.0) - temperature))
+    return next(i for i, each in enumerate(rows) if each is row)

@@ -18,6 +18,8 @@ from pzd.record import Array
 DIFFERENCE = 1e-4
 """Step of the searched variables for forward differences."""
 MOST_EVALUATIONS = 20
+PRECISION = 1e-5
+"""Relative change of the sum of squares at which a search ends."""
 STIFFER = 2.0
 """By this factor the search may exceed the fastest element."""
 USUAL = 1.5
@@ -87,9 +89,9 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
         jac=slopes_at,
         bounds=(low, high),
         x_scale="jac",
-        ftol=1e-6,
-        xtol=1e-6,
-        gtol=1e-6,
+        ftol=PRECISION,
+        xtol=PRECISION,
+        gtol=PRECISION,
         max_nfev=evaluations,
     )
     residuals, forces = _residuals(problem, unknowns, found.x)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pzd.diagnose.noise import pure_error
 from pzd.record import Record, is_constant, voltage_scale
-from pzd.rig.cycles import Cycles, cycles
+from pzd.rig.cycles import Cycles, cycles, settled
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array]
@@ -23,6 +23,8 @@ Motion = tuple[Array, Array, Array]
 
 CLEAR = 4.0
 """A harmonic of the displacement is kept from this many standard errors on."""
+DRAWS = 6
+"""Displacements sent through the damper to see what their noise makes of the force."""
 FINER = 16
 """Points per sample on which the cleaned cycle is laid."""
 COVERS = 0.5
@@ -46,6 +48,8 @@ class Prepared:
     """The same motion for one cycle more in front, for the simulation to settle."""
     constant: bool
     """Whether the voltage stands still."""
+    draws: tuple[Record, ...] = ()
+    """The lead with other displacements, as likely by what its noise and resolution leave in the average cycle."""
 
     @property
     def lead_samples(self) -> int:
@@ -67,14 +71,18 @@ def _prepared(record: Record, constant: bool) -> Prepared:
     travel = np.abs(np.gradient(record.displacement))
     if travel[inside].sum() < COVERS * travel.sum():
         return Prepared(_smoothed(record), None, None, constant)
-    motion = _mean_motion(record, run)
-    kept = sliced(record, inside)
+    average = Average.of(record, run)
+    motion = average.motion(average.clear_harmonics)
+    if constant:
+        run = settled(run, record.time, record.force)
+    kept = sliced(record, run.inside(record.time))
     cleaned = _moved(kept, motion(kept.time))
     if not constant:
         return Prepared(cleaned, None, None, constant)
     step = 1.0 / record.rate
     early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
-    return Prepared(cleaned, run, _led_in(cleaned, early, motion(early)), constant)
+    lead = _led_in(cleaned, early, motion(early))
+    return Prepared(cleaned, run, lead, constant, _drawn(lead, average))
 
 
 def sliced(record: Record, kept: NDArray[np.bool_]) -> Record:
@@ -119,24 +127,67 @@ def _led_in(cleaned: Record, early: Array, motion: Motion) -> Record:
     )
 
 
-def _mean_motion(record: Record, run: Cycles) -> Callable[[Array], Motion]:
-    """Displacement, velocity and acceleration of the average cycle at any time, by its clear harmonics."""
-    from scipy.interpolate import CubicSpline
+@dataclass(frozen=True, eq=False)
+class Average:
+    """The average cycle of a displacement, harmonic by harmonic."""
 
-    error = pure_error(run.fold(record.time, record.displacement))
-    clear = np.abs(error.mean) > CLEAR * np.sqrt(error.of_mean)
-    clear[0] = True
-    rate = 2j * np.pi * np.arange(error.mean.size) / run.period
-    fine = FINER * error.points
-    phase = np.arange(fine + 1) / fine
+    run: Cycles
+    points: int
+    harmonics: NDArray[np.complex128]
+    """(H + 1,) Fourier coefficients [m]."""
+    variance: Array
+    """(H + 1,) of them |.|^2, by noise and resolution [m^2]."""
 
-    def cycle(order: int) -> Callable[[Array], Array]:
-        values = np.fft.irfft(np.where(clear, error.mean, 0.0) * rate**order, fine) * fine
-        spline = CubicSpline(phase, np.append(values, values[0]), bc_type="periodic")
-        return lambda time: np.asarray(spline(run.phase(time)), dtype=np.float64)
+    @classmethod
+    def of(cls, record: Record, run: Cycles) -> Average:
+        """The average cycle of a record, and how well it is known."""
+        error = pure_error(run.fold(record.time, record.displacement))
+        finest = float(np.median(np.diff(np.unique(record.displacement))))
+        hidden = finest**2 / 12.0 if error.sample_variance < (0.5 * finest) ** 2 else 0.0
+        return cls(run, error.points, error.mean, error.of_mean + hidden / error.points)
 
-    x, v, a = cycle(0), cycle(1), cycle(2)
-    return lambda time: (x(time), v(time), a(time))
+    @property
+    def clear(self) -> NDArray[np.bool_]:
+        """(H + 1,) whether a harmonic stands clear of its own uncertainty."""
+        clear: NDArray[np.bool_] = np.abs(self.harmonics) > CLEAR * np.sqrt(self.variance)
+        clear[0] = True
+        return clear
+
+    @property
+    def clear_harmonics(self) -> NDArray[np.complex128]:
+        """(H + 1,) the coefficients that stand clear, the others zero [m]."""
+        return np.where(self.clear, self.harmonics, 0.0)
+
+    def error(self, draw: np.random.Generator) -> NDArray[np.complex128]:
+        """(H + 1,) one error of `clear_harmonics` as likely as any: noise in those kept, what is left out of others."""
+        left_out = np.maximum(np.abs(self.harmonics) ** 2 - self.variance, 0.0)
+        size = np.sqrt(0.5 * np.where(self.clear, self.variance, left_out))
+        found: NDArray[np.complex128] = size * (draw.standard_normal(size.size) + 1j * draw.standard_normal(size.size))
+        found[0] = 0.0
+        return found
+
+    def motion(self, harmonics: NDArray[np.complex128]) -> Callable[[Array], Motion]:
+        """Displacement, velocity and acceleration of some harmonics (H + 1,) at any time."""
+        from scipy.interpolate import CubicSpline
+
+        rate = 2j * np.pi * np.arange(harmonics.size) / self.run.period
+        fine = FINER * self.points
+        phase = np.arange(fine + 1) / fine
+
+        def cycle(order: int) -> Callable[[Array], Array]:
+            values = np.fft.irfft(harmonics * rate**order, fine) * fine
+            spline = CubicSpline(phase, np.append(values, values[0]), bc_type="periodic")
+            return lambda time: np.asarray(spline(self.run.phase(time)), dtype=np.float64)
+
+        x, v, a = cycle(0), cycle(1), cycle(2)
+        return lambda time: (x(time), v(time), a(time))
+
+
+def _drawn(lead: Record, average: Average) -> tuple[Record, ...]:
+    """The lead with other displacements that are as likely."""
+    draw = np.random.default_rng(DRAWS)
+    motions = [average.motion(average.clear_harmonics + average.error(draw)) for _ in range(DRAWS)]
+    return tuple(_moved(lead, motion(lead.time)) for motion in motions)
 
 
 def _smoothed(record: Record) -> Record:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from pzd.diagnose.noise import PureError, harmonics_of, pure_error, repeatable_p
 from pzd.diagnose.nuisance import nuisance
 from pzd.diagnose.predict import counted, predicted_force
 from pzd.diagnose.rich import rich_fit
+from pzd.diagnose.unsure import force_error
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -66,12 +67,14 @@ def judge(damper: Damper, prepared: Prepared, wanted: Mask, config: NuisanceConf
     slack[mask] = nuisance(residual[mask], predicted[mask], record.rate, rough, config)
     folded = _folded(prepared, residual - slack, mask)
     if folded is not None:
-        return _repeating(prepared, mask, residual, slack, folded)
+        return _repeating(prepared, mask, residual, slack, folded, force_error(damper, prepared, predicted))
     return _not_repeating(prepared, mask, residual, slack, predicted)
 
 
-def _repeating(prepared: Prepared, mask: Mask, residual: Array, slack: Array, folded: Array) -> Judged:
-    error = pure_error(folded)
+def _repeating(
+    prepared: Prepared, mask: Mask, residual: Array, slack: Array, folded: Array, unsure: Array | float
+) -> Judged:
+    error = replace(pure_error(folded), shared=unsure)
     trend = by_trend(folded)
     probability = {"harmonics": by_harmonics(error)}
     if trend is not None:

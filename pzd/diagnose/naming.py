@@ -10,11 +10,20 @@ import numpy as np
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
-from pzd.diagnose.candidates import Candidate, by_voltage, candidate, candidates, settled
+from pzd.diagnose.candidates import (
+    Candidate,
+    by_voltage,
+    candidate,
+    candidates,
+    delta_bic,
+    moved_by,
+    settled,
+)
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit
 from pzd.diagnose.inputs import Prepared
+from pzd.diagnose.problem import Problem
 from pzd.diagnose.split import Split
 from pzd.record import Array
 
@@ -24,10 +33,18 @@ AGREES = 0.001
 """Halves of the tests disagree about a parameter when chance would let them so seldom."""
 ALIKE = 0.1
 """Values within this ratio of one another agree, whatever their intervals."""
-TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3}
-"""A common offset [share of the lowest peak] or delay [s] that counts as nothing missing."""
+TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, ("valve_lag", "tau"): 1e-3}
+"""A common offset [share of the lowest peak], delay or lag [s] that counts as nothing missing."""
 LEVEL = 1.96
 """Standard errors in a 95 % interval."""
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """One step: the candidates, best first, and which of them was adopted."""
+
+    tried: tuple[Candidate, ...]
+    chosen: str | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +55,7 @@ class Named:
     """No effect, on the samples seen."""
     fitted: Fitted
     """With all that was adopted, on the samples seen."""
-    rounds: tuple[tuple[Candidate, ...], ...]
-    """The candidates of each round, best first."""
+    rounds: tuple[Round, ...]
     reasons: dict[str, str]
     """Why an effect was adopted or not."""
     rivals: tuple[str, ...]
@@ -60,7 +76,7 @@ class Named:
 
     def deciding(self, effect: str) -> tuple[Candidate, ...]:
         """The round that decided on an effect: the last in which it was tried; empty for a forced one."""
-        return next((r for r in reversed(self.rounds) if any(c.effect == effect for c in r)), ())
+        return next((r.tried for r in reversed(self.rounds) if any(c.effect == effect for c in r.tried)), ())
 
     @property
     def adopted(self) -> tuple[str, ...]:
@@ -87,29 +103,44 @@ def name_effects(
 
     first = evidence = weighed(damper)
     plain = current = fit(first.whole, (), first.whole.start())
-    rounds: list[tuple[Candidate, ...]] = []
+    rounds: list[Round] = []
     reasons: dict[str, str] = {}
     for name in config.force:
         current = candidate(first.whole, current, library()[name]).fitted
         reasons[name] = "adopted because the config asks for it"
     rivals: tuple[str, ...] = ()
-    while evidence.something_missing(current, config):
+    while len(rounds) < 2 * config.most_effects and evidence.something_missing(current, config):
         more = len(current.effects) < config.most_effects
         tried = candidates(evidence.whole, current, config.forbid, jobs) if more else ()
         steps = sorted((*tried, *by_voltage(evidence.whole, current)), key=lambda c: c.delta_bic)
         chosen = _first_supported(evidence, weighed, config, current, steps, reasons)
         if chosen is None:
-            rounds += [tried] if tried else []
+            rounds += [Round(tried, None)] if tried else []
             break
         chosen = settled(evidence.whole, current, chosen)
         reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
         if not chosen.varies:
-            rounds.append(tuple(chosen if c.effect == chosen.effect else c for c in tried))
+            rounds.append(Round(tuple(chosen if c.effect == chosen.effect else c for c in tried), chosen.effect))
             rivals = _rivals(chosen, tried, config)
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, reasons[chosen.effect], chosen.delta_bic)
         evidence = weighed(chosen.fitted.damper)
         current = fit(evidence.whole, chosen.fitted.effects, evidence.whole.start_with(chosen.fitted.damper))
+        for name in current.effects[len(config.force) : -1]:
+            without = _without(evidence.whole, current, name, config)
+            if without is not None:
+                current, reasons[name] = without, f"stand-in: not needed beside {chosen.effect}"
     return Named(plain, current, tuple(rounds), reasons, rivals, first, evidence)
+
+
+def _without(problem: Problem, current: Fitted, effect: str, config: DiagnoseConfig) -> Fitted | None:
+    """The fit without an effect that was adopted earlier, where it no longer pays or no longer moves the force."""
+    if library()[effect].place == "material":
+        return None
+    damper = current.damper
+    fewer = damper.model_copy(update={"effects": {n: v for n, v in damper.effects.items() if n != effect}})
+    without = fit(problem, tuple(fewer.effects), problem.start_with(fewer))
+    pays = delta_bic(without, current) <= config.adopt_bic and moved_by(problem, without, current) >= config.visible
+    return None if pays else without
 
 
 def _rivals(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseConfig) -> tuple[str, ...]:

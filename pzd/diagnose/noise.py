@@ -44,11 +44,13 @@ class PureError:
     """The noise of one sample."""
     sample_variance: float
     """Variance of one sample by noise [N^2]."""
+    shared: Array | float = 0.0
+    """(H + 1,) variance of the coefficient by what all cycles share, and more of them would not shrink [N^2]."""
 
     @property
     def of_mean(self) -> Array:
-        """(H + 1,) variance of the coefficient of the average cycle by noise [N^2]."""
-        return self.single / self.count
+        """(H + 1,) variance of the coefficient of the average cycle [N^2]."""
+        return self.single / self.count + self.shared
 
     @property
     def mean_variance(self) -> float:

@@ -96,6 +96,7 @@ def observations(
     places: Sequence[int],
     simulated: Sequence[Array],
     nuisance: NuisanceConfig,
+    unsure: Sequence[Array | float],
 ) -> tuple[Observation, ...]:
     """The observations of some samples of some records.
 
@@ -106,18 +107,23 @@ def observations(
     places : the base row of each
     simulated : (n,) force of the plain damper for each, along which gain and delay act [N]
     nuisance : priors of the tests' own offset, gain and delay
+    unsure : (H + 1,) variance of the harmonics of each simulated cycle by the noise of the displacement [N^2]
     """
     found = []
-    for p, mask, place, force in zip(prepared, kept, places, simulated, strict=True):
+    for p, mask, place, force, error in zip(prepared, kept, places, simulated, unsure, strict=True):
         if np.any(mask):
-            build = _of_cycles if p.cycles is not None and place >= 0 else _of_samples
-            made = build(p, mask, place, force, nuisance)
+            cycles = p.cycles is not None and place >= 0
+            made = (
+                _of_cycles(p, mask, place, force, nuisance, error)
+                if cycles
+                else _of_samples(p, mask, place, force, nuisance)
+            )
             found += [made] if made is not None else []
     return tuple(found)
 
 
 def _of_cycles(
-    p: Prepared, mask: NDArray[np.bool_], place: int, force: Array, nuisance: NuisanceConfig
+    p: Prepared, mask: NDArray[np.bool_], place: int, force: Array, nuisance: NuisanceConfig, unsure: Array | float
 ) -> Observation | None:
     run = p.cycles
     if run is None:
@@ -133,7 +139,7 @@ def _of_cycles(
     peak = float(np.max(np.abs(cycle)))
     expected = run.mean(time, force)
     left = DISCREPANCY * _left_by(cycle, expected, error.sample_variance / len(counted))
-    floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size
+    floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size + unsure
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
     bare = Observation(

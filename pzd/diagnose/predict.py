@@ -12,7 +12,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.inputs import Prepared
 from pzd.identify.trial import reversals, warm_up
-from pzd.record import SAME_TEMPERATURE, Record
+from pzd.record import Record
 
 Array = NDArray[np.float64]
 
@@ -21,6 +21,8 @@ FEWEST_IN_HALF_CYCLE = 25
 PREDICTION_TOLERANCE = 1e-7
 """Of the damper's path, as a share of the force."""
 
+WARMS = 0.5
+"""A temperature that moves by less [K] counts as standing still."""
 ENDS = 0.02
 """Share of a record at either end where its smoothed displacement rests on one side alone: not judged."""
 
@@ -39,7 +41,7 @@ def motion_of(record: Record, *, constant: bool) -> tuple[Motion, int]:
     Parameters
     ----------
     record : displacement cleaned
-    constant : whether the voltage counts as standing still, at its median; so does a temperature within 2 K
+    constant : whether the voltage counts as standing still, at its median; so does a temperature that hardly moves
 
     Returns
     -------
@@ -50,9 +52,15 @@ def motion_of(record: Record, *, constant: bool) -> tuple[Motion, int]:
     motion = Motion.of(record) if stride == 1 else _refined(record, stride)
     if constant:
         motion = replace(motion, voltage=_held(motion.voltage))
-    if motion.temperature is not None and np.ptp(motion.temperature) <= SAME_TEMPERATURE:
+    if motion.temperature is not None and warming(motion.temperature) <= WARMS:
         motion = replace(motion, temperature=_held(motion.temperature))
     return motion, stride
+
+
+def warming(temperature: Array) -> float:
+    """By how much a temperature (n,) rises or falls from beginning to end, its noise averaged out [K]."""
+    tenth = max(temperature.size // 10, 1)
+    return float(abs(np.median(temperature[-tenth:]) - np.median(temperature[:tenth])))
 
 
 def _refined(record: Record, stride: int) -> Motion:

@@ -12,7 +12,6 @@ from pzd.artefacts import Ranked, Value
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
-from pzd.diagnose.candidates import Candidate
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence
 from pzd.diagnose.gap import probability_of_noise, visible_gap
@@ -91,17 +90,12 @@ def confidence_of(named: Named) -> float:
                                                     Source: Kass and Raftery 1995, J. Am. Stat. Assoc. 90, eq. (9)
     """
     weight = 1.0 - OUTSIDE
-    for tried in named.rounds[: len(named.adopted)]:
-        adopted = [c for c in tried if c.effect in named.adopted]
-        if adopted:
-            best = min(c.delta_bic for c in adopted)
-            weight /= sum(float(np.exp(-0.5 * max(c.delta_bic - best, -700.0))) for c in _distinct(tried, best))
+    for step in named.rounds:
+        if step.chosen in named.adopted:
+            best = next(c.delta_bic for c in step.tried if c.effect == step.chosen)
+            others = [c.delta_bic - best for c in step.tried if c.delta_bic >= best]  # a better one was a stand-in
+            weight /= sum(float(np.exp(-0.5 * other)) for other in others)
     return round(weight, 3)
-
-
-def _distinct(tried: Sequence[Candidate], best: float) -> list[Candidate]:
-    """Candidates that were not found to be stand-ins: those no better than the one adopted."""
-    return [c for c in tried if c.delta_bic >= best]
 
 
 def ranking_of(named: Named, evidence: Evidence) -> tuple[Ranked, ...]:
@@ -110,9 +104,9 @@ def ranking_of(named: Named, evidence: Evidence) -> tuple[Ranked, ...]:
     `gap_after` is criterion (4) on the samples seen, the tests' nuisances left in.
     """
     rows: dict[str, Ranked] = {}
-    for tried in named.rounds:
-        for c in tried:
-            if tried is not named.deciding(c.effect):
+    for step in named.rounds:
+        for c in step.tried:
+            if step.tried is not named.deciding(c.effect):
                 continue
             reason = named.reasons.get(c.effect, "does not pay" if c.delta_bic > 0.0 else "explains less")
             rows[c.effect] = Ranked(
