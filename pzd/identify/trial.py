@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.motion import Motion
 from pzd.record import Array, Record
 
 FINE_RATE = 4000.0
@@ -65,25 +64,6 @@ def trial_of(record: Record) -> Trial:
         record.force,
         np.arange(record.time.size) >= warm_up(record.displacement),
         positions,
-    )
-
-
-def fine_motion(record: Record) -> Motion:
-    """The record's motion on the fine grid of `trial_of`; voltage and temperature linear between samples."""
-    time, _, positions = _fine_time(record)
-    regular = positions is None
-    stamps = np.linspace(record.time[0], record.time[-1], record.time.size) if regular else record.time
-
-    def linear(channel: Array | None) -> Array | None:
-        return None if channel is None else np.interp(time, stamps, channel)
-
-    return Motion(
-        time,
-        _spline(record.time, record.displacement, regular)(time),
-        _spline(record.time, record.velocity, regular)(time),
-        _spline(record.time, record.acceleration, regular)(time),
-        linear(record.voltage),
-        linear(record.temperature),
     )
 
 

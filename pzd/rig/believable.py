@@ -9,7 +9,7 @@ import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, TIME, VELOCITY
 from pzd.record import Array
-from pzd.rig.reading import Test
+from pzd.rig.reading import Test, standstills
 
 LONGEST_STROKE = 1.0
 """Largest stroke, end to end [m]; more is most often millimetres read as metres."""
@@ -34,17 +34,15 @@ def faults(test: Test) -> list[str]:
     time, x, force = test.channels[TIME], test.channels[DISPLACEMENT], test.channels[FORCE]
     if time.size < 2:
         return [f"{test.place(0)}: only one data row"]
-    backwards = np.flatnonzero(np.diff(time) <= 0.0)
-    if backwards.size:
-        row = int(backwards[0]) + 1
-        more = f", and {backwards.size - 1} more such rows" if backwards.size > 1 else ""
-        return [f"{test.place(row)}: time does not increase: {time[row]:.9g} s after {time[row - 1]:.9g} s{more}"]
+    backwards = standstills(time, test.place)
     still = [
         f"{test.place(0)}: {quantity.name} is constant over the whole test (got {values[0]:.6g} {quantity.unit})"
         for quantity, values in ((DISPLACEMENT, x), (FORCE, force))
         if np.ptp(values) <= 1e-12 * np.abs(values).max()
     ]
-    return still or _too_large(test) + _too_few(test, x)
+    if backwards or still:
+        return backwards + still
+    return _too_large(test) + _too_few(test, x)
 
 
 def _too_large(test: Test) -> list[str]:

@@ -25,6 +25,7 @@ from pzd.rig.channels import ALSO_READ, NEEDED, own
 from pzd.rig.config import FilesEntry
 from pzd.rig.formats import reader
 from pzd.rig.units import UnitError, in_header, to_canonical
+from pzd.schema.errors import DataError, at
 from pzd.schema.scalars import written
 
 _LOOKS_LIKE = {
@@ -39,6 +40,9 @@ _LOOKS_LIKE = {
 """What headers of each quantity look like, a unit in brackets taken off."""
 _CONTROLS = {Control(): r"^u$|volt|spannung", Control("current", "A"): r"^i$|current|strom"}
 """What the header of the control signal looks like."""
+
+_SHOWN = 6
+"""Headers that a refusal shows."""
 
 Header = tuple[str, ...]
 
@@ -56,12 +60,18 @@ def guessed(files: Sequence[Path]) -> list[str]:
 
     Raises
     ------
+    DataError : when a file is no table of a rig's channels, a line a file
     UserError : when a file cannot be read
     """
     by_header: dict[Header, list[Path]] = {}
+    faults: list[str] = []
     for path in files:
-        sheet = reader(path, None, "rig.files")(path, FilesEntry(path=str(path)), [q.column for q in CHANNELS])
-        by_header.setdefault(sheet.header, []).append(path)
+        try:
+            by_header.setdefault(_header(path), []).append(path)
+        except DataError as error:
+            faults.append(f"{error.messages[0]}; init reads tables with a line of headers on top")
+    if faults:
+        raise DataError(faults)
     control = _control([column for header in by_header for column in header])
     lines = ["# Guessed from the headers: check every line. Paths are relative to this file."]
     if control != Control():
@@ -71,6 +81,14 @@ def guessed(files: Sequence[Path]) -> list[str]:
         for pattern in _patterns(paths):
             lines += [f"    - path: {written(pattern)}", *(f"      {line}" for line in _entry(header, control))]
     return lines
+
+
+def _header(path: Path) -> Header:
+    sheet = reader(path, None, "rig.files")(path, FilesEntry(path=str(path)), [q.column for q in CHANNELS])
+    if not any(_column(sheet.header, quantity, _control(sheet.header)) for quantity in CHANNELS):
+        shown = ", ".join(sheet.header[:_SHOWN]) + (", ..." if len(sheet.header) > _SHOWN else "")
+        raise DataError(f"{at(path, sheet.header_line)}: no header names time, displacement or force (got {shown})")
+    return sheet.header
 
 
 def _control(columns: Sequence[str]) -> Control:

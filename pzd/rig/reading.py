@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,7 +55,7 @@ def read(file: Listed, control: Control) -> tuple[Test, ...]:
     entry, place = file.entry, file.place
     values, setting = said(entry, place, control, file.path)
     sheet = reader(file.path, entry.format, place)(file.path, entry, _wanted(entry, control))
-    channels = _channels(sheet, sources(sheet, entry, place, control), control, place)
+    channels = _channels(sheet, sources(sheet, entry, place, control), control, place, whole=entry.split is None)
     starts = [0] if entry.split is None else _starts(sheet, entry.split, channels[TIME], place)
     bounds = list(zip(starts, [*starts[1:], sheet.rows], strict=True))
     _one_value_a_test(values, len(bounds), place, file.path, control)
@@ -75,9 +76,15 @@ def _wanted(entry: FilesEntry, control: Control) -> set[str]:
     return {own(q, control).column for q in CHANNELS} | set(ALSO_READ.values()) | set(entry.columns.values())
 
 
-def _channels(sheet: Sheet, found: tuple[Source, ...], control: Control, place: str) -> dict[Quantity, Array]:
+def _channels(
+    sheet: Sheet, found: tuple[Source, ...], control: Control, place: str, *, whole: bool
+) -> dict[Quantity, Array]:
+    """Every channel in SI; `whole` says that the file is one test, in which the clock must go on."""
     dated = [s for s in found if s.quantity is TIME and "%" in s.unit]
-    numbers = sheet.numbers([s.column for s in found if s not in dated])
+    try:
+        numbers = sheet.numbers([s.column for s in found if s not in dated])
+    except DataError as error:
+        raise DataError([*error.messages, *(_stopped(sheet, found) if whole else [])]) from None
     channels: dict[Quantity, Array] = {s.quantity: _instants(sheet, s) for s in dated}
     faults: list[str] = []
     for source in found:
@@ -97,8 +104,36 @@ def _channels(sheet: Sheet, found: tuple[Source, ...], control: Control, place: 
         except UnitError as fault:
             raise ConfigError(f"{place}.units: {fault} (in {sheet.path})") from None
     if faults:
-        raise DataError(faults)
+        raise DataError(faults + (_stopped(sheet, found) if whole else []))
     return channels
+
+
+def _stopped(sheet: Sheet, found: tuple[Source, ...]) -> list[str]:
+    """Where the clock stands still in a file with other faults too; empty where it cannot be read."""
+    (clock,) = (source for source in found if source.quantity is TIME)
+    if "%" in clock.unit:
+        return []
+    try:
+        time = sheet.numbers([clock.column])[clock.column]
+    except DataError:
+        return []
+    return standstills(time, lambda row: at(sheet.path, sheet.line(row)))
+
+
+def standstills(time: Array, place: Callable[[int], str]) -> list[str]:
+    """Where the clock stands still or goes back, in a line; empty where it goes on. NaN is another's fault.
+
+    Parameters
+    ----------
+    time : (n,) [s]
+    place : gives file and line of a row
+    """
+    backwards = np.flatnonzero(np.diff(time) <= 0.0)
+    if not backwards.size:
+        return []
+    row = int(backwards[0]) + 1
+    more = f", and {backwards.size - 1} more such rows" if backwards.size > 1 else ""
+    return [f"{place(row)}: time does not increase: {time[row]:.9g} s after {time[row - 1]:.9g} s{more}"]
 
 
 def _instants(sheet: Sheet, source: Source) -> Array:

@@ -10,8 +10,6 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-import numpy as np
-
 from pzd.damper.compiled import compiled
 from pzd.record import Array
 
@@ -22,36 +20,24 @@ SMALLEST, EQUAL_SHARE, LARGEST = range(3)
 TIE_BREAKS: dict[TieBreak, int] = {"smallest": SMALLEST, "equal_share": EQUAL_SHARE, "largest": LARGEST}
 
 
-def least_acceleration(a0: float, D: Array, low: Array, high: Array, tie_break: TieBreak) -> Array:
-    """Damper forces within the box that make |a_0 + D^T T| smallest.
+@compiled
+def least_acceleration_forces(
+    a0: float, D: Pair, low: Array, high: Array, tie: int, branch: int, forces: Array
+) -> None:
+    """Fill `forces` (2,) with damper forces within the box that make |a_0 + D^T T| smallest.
 
     Equation: T_K in Arg min |a_0 + D^T T| over Omega(V)      Source: Makowski and Knap 2021, eq. (10)-(12)
 
     Parameters
     ----------
     a0 : acceleration at K by the springs alone [m/s2]
-    D : (2,) acceleration at K by each damper force [1/kg]
+    D : acceleration at K by each damper force [1/kg]
     low, high : (2,) the box Omega(V) [N]
-    tie_break : `smallest` Euclidean norm; `equal_share`: each damper goes the same share of its range
-        from where it pushes K down most to where it pushes K up most; `largest` Euclidean norm
-
-    Returns
-    -------
-    (2,) T [N]
+    tie : `SMALLEST` Euclidean norm; `EQUAL_SHARE`: each damper goes the same share of its range
+        from where it pushes K down most to where it pushes K up most; `LARGEST` Euclidean norm
+    branch : the end of the segment that `LARGEST` takes, see `farther_end`
+    forces : (2,) filled [N]
     """
-    forces = np.empty(2)
-    code = TIE_BREAKS[tie_break]
-    pair = (float(D[0]), float(D[1]))
-    branch = farther_end(a0, pair, low, high) if code == LARGEST else 0
-    least_acceleration_forces(a0, pair, low, high, code, branch, forces)
-    return forces
-
-
-@compiled
-def least_acceleration_forces(
-    a0: float, D: Pair, low: Array, high: Array, tie: int, branch: int, forces: Array
-) -> None:
-    """Fill `forces` (2,) with the minimiser; `branch` is the end of the segment that `LARGEST` takes."""
     share = _share(a0, D, low, high)
     if tie == EQUAL_SHARE or share <= 0.0 or share >= 1.0:
         for i in range(2):

@@ -11,7 +11,7 @@ from fresh_truths import TABLE_2, sine_test
 from pzd.damper.element import element_force
 from pzd.identify.objective import Objective
 from pzd.identify.separable import fit_separable
-from pzd.identify.trial import fine_motion, reversals, trial_of, upsampling_factor, warm_up
+from pzd.identify.trial import reversals, trial_of, upsampling_factor, warm_up
 
 
 def test_a_sine_turns_twice_a_cycle() -> None:
@@ -81,16 +81,6 @@ def test_an_irregular_clock_is_taken_as_it_is() -> None:
     trial = trial_of(thinned)
     assert trial.positions is not None
     np.testing.assert_allclose(fit_separable(Objective((trial,))).parameters, truth, rtol=1e-3)
-
-
-def test_fine_motion_lies_on_the_grid_of_the_trial() -> None:
-    record = sine_test(TABLE_2[0.0], 2.0, 0.03, voltage=5.0)
-    motion, trial = fine_motion(record), trial_of(record)
-    np.testing.assert_array_equal(motion.displacement, trial.displacement)
-    angle = 2.0 * np.pi * 2.0
-    np.testing.assert_allclose(motion.velocity, 0.03 * angle * np.cos(angle * motion.time), atol=1e-7)
-    assert motion.voltage is not None
-    np.testing.assert_allclose(motion.voltage, 5.0)
 
 
 def test_slopes_of_the_objective_agree_with_difference_quotients() -> None:

@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from pzd.record import Array
-from pzd.simulate.minimise import TIE_BREAKS, least_acceleration
+from pzd.simulate.minimise import LARGEST, TIE_BREAKS, TieBreak, farther_end, least_acceleration_forces
+
+
+def least_acceleration(a0: float, D: Array, low: Array, high: Array, tie_break: TieBreak) -> Array:
+    """The minimiser, `largest` at its farther end as at every act of the controller."""
+    forces, tie, pair = np.empty(2), TIE_BREAKS[tie_break], (float(D[0]), float(D[1]))
+    branch = farther_end(a0, pair, low, high) if tie == LARGEST else 0
+    least_acceleration_forces(a0, pair, low, high, tie, branch, forces)
+    return forces
 
 
 def draws(seed: int, n: int) -> Iterator[tuple[float, Array, Array, Array]]:

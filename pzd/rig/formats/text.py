@@ -60,10 +60,18 @@ class TextSheet:
             frame = self._parsed(columns, "float64")
             values = {column: frame[column].to_numpy() for column in columns}
         except (ValueError, OverflowError):
-            values = {column: self._cell_by_cell(column) for column in columns}
-        faults = [fault for column in columns for fault in self._infinite(column, values[column])]
-        if faults:
-            raise DataError(faults)
+            values = {}
+            faults: list[str] = []
+            for column in columns:
+                try:
+                    values[column] = self._cell_by_cell(column)
+                except DataError as error:
+                    faults += error.messages
+            if faults:
+                raise DataError(faults) from None
+        infinite = [fault for column in columns for fault in self._infinite(column, values[column])]
+        if infinite:
+            raise DataError(infinite)
         return values
 
     def texts(self, column: int) -> list[str]:
@@ -210,9 +218,9 @@ def _uneven(
     wanted: int,
     separator: str,
 ) -> list[str]:
+    said = "" if separator == "\x1f" else f" (separator {separator!r})"
     shown = [
-        f"{at(path, int(lines[r]))}: {fields[r]} fields where the header has {wanted} (separator {separator!r})"
-        for r in rows[:MOST_FAULTS]
+        f"{at(path, int(lines[r]))}: {fields[r]} fields where the header has {wanted}{said}" for r in rows[:MOST_FAULTS]
     ]
     if rows.size <= MOST_FAULTS:
         return shown

@@ -8,23 +8,22 @@ the road itself by `pzd.rig.roads`. Below f_body the body follows the road, abov
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from pzd.record import Array
 from pzd.rig.fourier import FourierSum
+from pzd.rig.lines import Lines
 from pzd.rig.roads import classes, profile
-from pzd.rig.waveform import Course, Waveform
+from pzd.rig.waveform import Course
 
 _FINE = 64  # points a turn of the highest line in the search for the peak
 
 
-class RoadMotion(Waveform):
+class RoadMotion(Lines):
     """A road under a simple suspension."""
-
-    usual_cycles: ClassVar[int] = 2
 
     kind: Literal["road"] = "road"
     """The deflection of a suspension on an ISO 8608 road."""
@@ -32,8 +31,6 @@ class RoadMotion(Waveform):
     """Class A (very good) to H (very poor) of ISO 8608."""
     vehicle_speed_km_per_h: float = Field(default=72.0, gt=0.0)
     """Speed of the vehicle."""
-    low_Hz: float = Field(default=0.5, gt=0.0)
-    """Lowest frequency."""
     high_Hz: float = Field(default=15.0, gt=0.0)
     """Highest frequency."""
     body_frequency_Hz: float | None = Field(default=1.4, gt=0.0)
@@ -42,8 +39,6 @@ class RoadMotion(Waveform):
     """Damping ratio of the body."""
     peak_m: float | None = Field(default=None, gt=0.0)
     """Scales the motion to this largest displacement, to suit the stroke of the stand; by default not scaled."""
-    period_s: float = Field(default=10.0, gt=0.0)
-    """After which the road repeats."""
 
     @field_validator("road_class")
     @classmethod
@@ -52,24 +47,9 @@ class RoadMotion(Waveform):
             raise ValueError(f"a road class is one of {', '.join(classes())} (got {name})")
         return name
 
-    @model_validator(mode="after")
-    def _has_lines(self) -> RoadMotion:
-        if int(self.high_Hz * self.period_s) < np.ceil(self.low_Hz * self.period_s):
-            raise ValueError("no multiple of 1 / period_s lies between low_Hz and high_Hz")
-        return self
-
     def own_name(self) -> str:
         """`road-C-72km_per_h`."""
         return f"road-{self.road_class}-{self.vehicle_speed_km_per_h:g}km_per_h"
-
-    def cycle(self, folder: Path) -> float:
-        """The period."""
-        return self.period_s
-
-    @property
-    def settling(self) -> float:
-        """Two turns at the lowest frequency, or a second."""
-        return max(2.0 / self.low_Hz, 1.0)
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
         """The deflection on a road drawn from its class."""
