@@ -20,6 +20,8 @@ FITTED_POINTS = 1000
 """Points of a cycle that the period is fitted to, at least, as far as there are samples."""
 REFINEMENTS = 6
 """Rounds of the refinement of the period; each squares the error."""
+CORNER = 3
+"""Points at either end of the cycle that the period is not fitted to."""
 TWO = 1.99
 """Fewer cycles than these make no run."""
 MARGIN = 0.1
@@ -158,6 +160,10 @@ def _shift_per_cycle(time: Array, displacement: Array, run: Cycles) -> float:
     folded = folded - _drift(folded, order)
     average: Array = folded.mean(axis=0)
     slope = np.asarray((np.roll(average, -1) - np.roll(average, 1)) * average.size / (2.0 * run.period))
+    # Where the run begins and ends it may touch the corner of a start out of rest, which no cubic follows.
+    touched = min(CORNER, average.size // 20)
+    slope[:touched] = slope[average.size - touched :] = 0.0
+    slope[touched : average.size - touched] -= slope.sum() / (average.size - 2 * touched)
     shifts = -(folded - average) @ slope / float(slope @ slope)
     return float(order @ shifts / (order @ order))
 

@@ -77,19 +77,17 @@ def _cut(time: Array, values: Array, period: float, span: Span, same: float) -> 
 
 
 def _course(time: Array, values: Array, period: float, span: Span) -> tuple[Array, int]:
-    """Averages of the values around points that divide the period evenly, and how many of these make a cycle."""
+    """Averages of the values over equal parts of the period, and how many of these make a cycle."""
     from scipy.interpolate import CubicSpline
 
     step = float(np.median(np.diff(time)))
     points = min(POINTS, max(int(period / step + 1e-6), 4))
     start, end = max(span[0], float(time[0])), min(span[1], float(time[-1]))
-    count = max(int((end - start) / period * points + 1e-6), 0) + 1
-    at = start + np.arange(count) * period / points
+    width = period / points
+    bounds = start + np.arange(max(int((end - start) / width + 1e-6), 0) + 1) * width
     near = (time >= start - 8 * step) & (time <= end + 8 * step)
     integral = CubicSpline(time[near], values[near]).antiderivative()
-    low = np.maximum(at - 0.5 * period / points, time[0])
-    high = np.minimum(at + 0.5 * period / points, time[-1])
-    return np.asarray((integral(high) - integral(low)) / (high - low)), points
+    return np.asarray(np.diff(integral(bounds)) / width), points
 
 
 def _departure(course: Array, points: int) -> Array:

@@ -8,6 +8,7 @@ is small in the displacement and large in the speed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +70,8 @@ def repeats(time: Array, displacement: Array) -> Repeats | None:
     x = np.interp(grid, time, displacement)
     least = LEAST_SHARE * float(time[last] - time[first]) / step
     smooth = low_pass(x, HIGHEST_CORNER)
-    for candidate in _candidates(x):
+    # With long ramps a motion to one side repeats in its speed only: its mean goes up and down with the ramps.
+    for candidate in chain.from_iterable(_candidates(course) for course in (x, np.gradient(smooth))):
         lag, section = candidate, _section(x, smooth, candidate, least)
         if section is not None:
             # Ramps pull the lag of the whole record aside: look again at the section alone.
