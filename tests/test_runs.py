@@ -213,7 +213,7 @@ def test_a_held_run_is_refused_after_a_short_wait_and_names_who_holds_it(
         begun = time.monotonic()
         with pytest.raises(FilesError) as caught:
             write(run, identified(3.0))
-        assert time.monotonic() - begun < 2.0
+        assert time.monotonic() - begun < 30.0  # and not the minute that the other holds it
         (message,) = caught.value.messages
         assert f"pzd identify (process {process.pid} on " in message
         assert message.startswith(f"{run.folder}: ")

@@ -20,6 +20,8 @@ from pzd.rig.measured import Measured
 MOST_SAMPLES = 800
 RATE = 250.0
 """A record without cycles is read at about this rate [Hz]."""
+VISIBLE = 2e-3
+"""Share of the force's squares that is looked into: what is less is noise, or how coarse the element is."""
 _GRID = (24, 16)
 _ZOOM = (7, 7)
 _ZOOMS = 4
@@ -55,8 +57,8 @@ class Coarse:
     """C / k [s]."""
 
     def explains(self) -> bool:
-        """Whether it takes more than half of what is left without it; else its parameters say nothing."""
-        return self.left < 0.5 * self.left_beside
+        """Whether something is left without it, and it takes more than half; else its parameters say nothing."""
+        return self.left_beside > VISIBLE and self.left < 0.5 * self.left_beside
 
 
 @lru_cache(maxsize=1)

@@ -6,15 +6,13 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.record import is_constant, voltage_scale
-from pzd.rig.coarse import fitted, plain
+from pzd.rig.coarse import VISIBLE, fitted, plain
 from pzd.rig.measured import Measured
 
 LEAST_DELAY = 1e-3
 """Smallest delay that is said [s]; what is less is within the nuisances of a diagnosis."""
 EXPLAINS = 0.25
 """The delay has to leave less than this share of the squares that the element without it leaves."""
-VISIBLE = 2e-3
-"""Share of the force's squares that the element must leave: what is less is noise, or how coarse it is."""
 LONGEST = 0.03
 """Largest delay looked for [s], or a twentieth of the cycle where that is less."""
 TRIES = 31
