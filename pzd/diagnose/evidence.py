@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,9 @@ from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.judge import Judged, judge
 from pzd.diagnose.observation import Observation, observations
-from pzd.diagnose.predict import predicted_force
-from pzd.diagnose.problem import Problem, simulated
+from pzd.diagnose.problem import Problem
 from pzd.diagnose.split import TRAINING, UNTOUCHED, VALIDATION, Split
-from pzd.diagnose.unsure import force_error
+from pzd.diagnose.unsure import expected
 from pzd.record import Array, voltage_scale
 
 Mask = NDArray[np.bool_]
@@ -60,18 +59,11 @@ class Evidence:
         missed = sum(float(np.sum((o.measured - force) ** 2)) for o, force in pairs)
         return missed / sum(float(np.sum(o.measured**2)) for o, _ in pairs)
 
-    def misfit(self, fitted: Fitted, problem: Problem) -> float:
-        """Misfit of a fit on the tests that choose, in units of noise.
-
-        Parameters
-        ----------
-        fitted : to other tests
-        problem : the tests that choose, with the base rows that were fitted
-        """
-        point = problem.point(fitted.searched, fitted.unknowns)
-        pairs = zip(self.halves[1].observations, problem.observations, strict=True)
-        residuals = (mine.in_noise(mine.measured - simulated(point, o)) for mine, o in pairs)
-        return float(sum(r @ r for r in residuals))
+    def choosing(self, weights: Evidence) -> Problem:
+        """The tests that choose, with the base rows of this evidence and the weights of another one."""
+        mine = self.halves[1]
+        pairs = zip(weights.halves[1].observations, mine.observations, strict=True)
+        return replace(mine, observations=tuple(replace(other, place=o.place) for other, o in pairs))
 
 
 def evidence_of(prepared: Sequence[Prepared], parts: Split, damper: Damper, config: DiagnoseConfig) -> Evidence:
@@ -86,13 +78,11 @@ def evidence_of(prepared: Sequence[Prepared], parts: Split, damper: Damper, conf
     """
     scale = voltage_scale([p.record for p in prepared])
     places = [_nearest_row(damper.base, p) if p.constant else -1 for p in prepared]
-    forces = [predicted_force(damper, p) for p in prepared]
+    given = [expected(damper, p, config.nuisance.delay_s) for p in prepared]
     seen = tuple(roles != UNTOUCHED for roles in parts.roles)
 
-    unsure = [force_error(damper, p, force) for p, force in zip(prepared, forces, strict=True)]
-
     def observed(kept: Sequence[Mask]) -> tuple[Observation, ...]:
-        return observations(prepared, kept, places, forces, config.nuisance, unsure)
+        return observations(prepared, kept, places, given, config.nuisance)
 
     whole = observed(seen)
     scales = _scales(whole, prepared, damper, scale)

@@ -68,44 +68,63 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
     start : (3 b + e,) in the units of the search
     evaluations : of the model, at most
     """
+    unknowns = problem.unknowns(effects)
+    found, slopes = _search(problem, unknowns, start, start.size, evaluations)
+    residuals, forces = _residuals(problem, unknowns, found)
+    prior = _prior(problem, len(unknowns))
+    return Fitted(
+        problem.point(found, unknowns).damper(),
+        tuple(effects),
+        found,
+        tuple(residuals),
+        tuple(forces),
+        slopes,
+        _covariance(np.concatenate([slopes, prior]), found, unknowns),
+        unknowns,
+    )
+
+
+def misfit_beside(problem: Problem, damper: Damper) -> float:
+    """Smallest misfit that T0, C and k alone reach while the effects stay as a damper has them."""
+    unknowns = problem.unknowns(tuple(damper.effects))
+    start = problem.start_with(damper)
+    found, _ = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS)
+    residuals, _ = _residuals(problem, unknowns, found)
+    return float(sum(r @ r for r in residuals))
+
+
+def _search(
+    problem: Problem, unknowns: Sequence[Unknown], start: Array, free: int, evaluations: int
+) -> tuple[Array, Array]:
+    """Where a search over the first `free` variables ends, (3 b + e,), and the slopes of the residuals there."""
     from scipy.optimize import least_squares
 
-    unknowns = problem.unknowns(effects)
     low, high = _bounds(problem, unknowns)
-
+    begin = np.clip(start, low + 1e-9, high - 1e-9)
     centre, prior = problem.start(), _prior(problem, len(unknowns))
 
+    def whole(x: Array) -> Array:
+        return np.concatenate([x, begin[free:]])
+
     def residuals_at(x: Array) -> Array:
-        return np.concatenate(
-            [*_residuals(problem, unknowns, x)[0], prior[:, : centre.size] @ (x[: centre.size] - centre)]
-        )
+        data = _residuals(problem, unknowns, whole(x))[0]
+        return np.concatenate([*data, prior[:, : centre.size] @ (x[: centre.size] - centre)])
 
     def slopes_at(x: Array) -> Array:
-        return np.concatenate([_slopes(problem, unknowns, x), prior])
+        return np.concatenate([_slopes(problem, unknowns, whole(x), free), prior[:, :free]])
 
     found = least_squares(
         residuals_at,
-        np.clip(start, low + 1e-9, high - 1e-9),
+        begin[:free],
         jac=slopes_at,
-        bounds=(low, high),
+        bounds=(low[:free], high[:free]),
         x_scale="jac",
         ftol=PRECISION,
         xtol=PRECISION,
         gtol=PRECISION,
         max_nfev=evaluations,
     )
-    residuals, forces = _residuals(problem, unknowns, found.x)
-    slopes = np.asarray(found.jac, dtype=np.float64)
-    return Fitted(
-        problem.point(found.x, unknowns).damper(),
-        tuple(effects),
-        found.x,
-        tuple(residuals),
-        tuple(forces),
-        slopes[: slopes.shape[0] - prior.shape[0]],
-        _covariance(slopes, found.x, unknowns),
-        unknowns,
-    )
+    return whole(found.x), np.asarray(found.jac, dtype=np.float64)[: -len(prior)]
 
 
 def _prior(problem: Problem, effects: int) -> Array:
@@ -134,10 +153,10 @@ def _residuals(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> tuple
     return [o.in_noise(o.measured - f) for o, f in zip(problem.observations, forces, strict=True)], forces
 
 
-def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Array:
-    """(w, p) derivatives of the residuals by forward differences; a test moves with its own voltage alone."""
+def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array, free: int) -> Array:
+    """(w, free) derivatives of the residuals by forward differences; a test moves with its own voltage alone."""
     point, rows = problem.point(x, unknowns), len(problem.base)
-    shifted = [problem.point(_shifted(x, j), unknowns) for j in range(x.size)]
+    shifted = [problem.point(_shifted(x, j), unknowns) for j in range(free)]
     blocks = []
     for o in problem.observations:
         here = simulated(point, o)
@@ -145,9 +164,9 @@ def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Array:
         moving = [
             j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]
         ]
-        columns = [*own, *(3 * rows + j for j in moving)]
+        columns = [*own, *(3 * rows + j for j in moving if 3 * rows + j < free)]
         change = o.in_noise(np.stack([here - simulated(shifted[j], o) for j in columns], axis=-1) / DIFFERENCE)
-        block = np.zeros((len(change), x.size))
+        block = np.zeros((len(change), free))
         block[:, columns] = change
         blocks.append(block)
     return np.concatenate(blocks)

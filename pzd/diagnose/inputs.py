@@ -160,7 +160,7 @@ class Average:
 
     def error(self, draw: np.random.Generator) -> NDArray[np.complex128]:
         """(H + 1,) one error of `clear_harmonics` as likely as any: noise in those kept, what is left out of others."""
-        left_out = np.maximum(np.abs(self.harmonics) ** 2 - self.variance, 0.0)
+        left_out = np.maximum(np.abs(self.harmonics) ** 2 - 2.0 * self.variance, 0.0)
         size = np.sqrt(0.5 * np.where(self.clear, self.variance, left_out))
         found: NDArray[np.complex128] = size * (draw.standard_normal(size.size) + 1j * draw.standard_normal(size.size))
         found[0] = 0.0

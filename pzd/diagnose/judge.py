@@ -13,9 +13,9 @@ from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
 from pzd.diagnose.noise import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.diagnose.nuisance import nuisance
-from pzd.diagnose.predict import counted, predicted_force
+from pzd.diagnose.predict import counted
 from pzd.diagnose.rich import rich_fit
-from pzd.diagnose.unsure import force_error
+from pzd.diagnose.unsure import expected
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -59,15 +59,15 @@ class Judged:
 def judge(damper: Damper, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> Judged:
     """The record against the damper, over the wanted samples past the warm-up."""
     record = prepared.record
-    predicted = predicted_force(damper, prepared)
-    residual = record.force - predicted
+    given = expected(damper, prepared, config.delay_s)
+    predicted, residual = given.force, record.force - given.force
     mask = wanted & counted(prepared)
     rough = _rough_variance(prepared, residual, mask)
     slack = np.zeros(residual.size)
-    slack[mask] = nuisance(residual[mask], predicted[mask], record.rate, rough, config)
+    slack[mask] = nuisance(residual[mask], predicted[mask], record.rate, rough, config, given.timing[mask])
     folded = _folded(prepared, residual - slack, mask)
     if folded is not None:
-        return _repeating(prepared, mask, residual, slack, folded, force_error(damper, prepared, predicted))
+        return _repeating(prepared, mask, residual, slack, folded, given.unsure)
     return _not_repeating(prepared, mask, residual, slack, predicted)
 
 

@@ -21,7 +21,7 @@ from pzd.diagnose.candidates import (
 )
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
-from pzd.diagnose.fitting import Fitted, fit
+from pzd.diagnose.fitting import Fitted, fit, misfit_beside
 from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.problem import Problem
 from pzd.diagnose.split import Split
@@ -213,7 +213,8 @@ def _stand_in(evidence: Evidence, weighed: Evidence, before: Fitted, candidate: 
         return None
     fits = [fit(half, candidate.fitted.effects, half.start_with(candidate.fitted.damper)) for half in halves]
     without = fit(evidence.halves[0], before.effects, before.searched)
-    if weighed.misfit(fits[0], halves[1]) >= weighed.misfit(without, evidence.halves[1]):
+    with_it, left = misfit_beside(halves[1], fits[0].damper), misfit_beside(evidence.choosing(weighed), without.damper)
+    if with_it >= left:
         return "stand-in: does not shrink the gap on tests it was not fitted to"
     if not _agree(fits[0], fits[1], candidate.effect):
         return "stand-in: takes other values on either half of the tests"

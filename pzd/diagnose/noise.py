@@ -138,10 +138,13 @@ def repeatable_power(error: PureError) -> Array:
 
     Equation: P_0 = c_0^2 - s_0^2,  P_h = 2 (|c_h|^2 - s_h^2)       Source: Parseval
 
+    What all cycles share by the noise of the displacement takes off at most what is there, at each harmonic.
+
     Returns
     -------
     (H + 1,) mean square [N^2], unbiased, so that noise alone gives values around zero
     """
     weights = np.where(np.arange(error.mean.size) == 0, 1.0, 2.0)
-    power: Array = weights * (np.abs(error.mean) ** 2 - error.of_mean)
+    repeats = np.abs(error.mean) ** 2 - error.single / error.count
+    power: Array = weights * (repeats - np.minimum(error.shared, np.maximum(repeats, 0.0)))
     return power

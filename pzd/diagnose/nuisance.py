@@ -9,14 +9,17 @@ from pzd.diagnose.config import NuisanceConfig
 
 Array = NDArray[np.float64]
 
-AT_MOST = np.array([2.0, 3.0, 2.0])
-"""Offset, gain and delay explain at most so many standard deviations: 1 % of peak, 6 %, 1 ms; more is a gap."""
+AT_MOST = np.array([2.0, 3.0, 2.0, 2.0])
+"""Offset, gain, delay and the instant of the voltage explain at most so many standard deviations: 1 % of peak, 6 %,
+1 ms, one sample; more is a gap."""
 
 
-def nuisance(residual: Array, predicted: Array, rate: float, variance: float, config: NuisanceConfig) -> Array:
+def nuisance(
+    residual: Array, predicted: Array, rate: float, variance: float, config: NuisanceConfig, timing: Array
+) -> Array:
     """The part of a residual that offset, gain and delay of the test explain within their priors.
 
-    Equation: min_b |r - A b|^2 / s^2 + |b|^2, |b_i| <= 2, 3, 2, A = [sd_o peak, sd_g F, -sd_d dF/dt]
+    Equation: min_b |r - A b|^2 / s^2 + |b|^2, |b_i| <= 2, 3, 2, 2, A = [sd_o peak, sd_g F, -sd_d dF/dt, sd_t dF/dt_U]
                                                                     Source: Gaussian prior, truncated
 
     Parameters
@@ -26,16 +29,17 @@ def nuisance(residual: Array, predicted: Array, rate: float, variance: float, co
     rate : sampling rate [Hz]
     variance : of the noise [N^2]
     config : standard deviations of the priors
+    timing : (n, 1) what one standard deviation of the voltage's instant makes of the force [N]; (n, 0) without
 
     Returns
     -------
     (n,) force [N]
     """
-    columns = columns_of(predicted, rate, config)
+    columns = np.hstack([columns_of(predicted, rate, config), timing])
     weight = max(variance, 1e-12 * float(np.max(np.abs(predicted))) ** 2)
     normal = columns.T @ columns / weight + np.eye(columns.shape[1])
     estimate = np.linalg.solve(normal, columns.T @ residual / weight)
-    explained: Array = columns @ np.clip(estimate, -AT_MOST, AT_MOST)
+    explained: Array = columns @ np.clip(estimate, -AT_MOST[: estimate.size], AT_MOST[: estimate.size])
     return explained
 
 

@@ -23,6 +23,7 @@ from pzd.diagnose.inputs import Prepared, sliced
 from pzd.diagnose.noise import PureError, pure_error
 from pzd.diagnose.predict import motion_of
 from pzd.diagnose.rich import rich_fit
+from pzd.diagnose.unsure import Expected
 from pzd.identify.trial import warm_up
 from pzd.record import Array, Record
 
@@ -94,9 +95,8 @@ def observations(
     prepared: Sequence[Prepared],
     kept: Sequence[NDArray[np.bool_]],
     places: Sequence[int],
-    simulated: Sequence[Array],
+    simulated: Sequence[Expected],
     nuisance: NuisanceConfig,
-    unsure: Sequence[Array | float],
 ) -> tuple[Observation, ...]:
     """The observations of some samples of some records.
 
@@ -105,30 +105,25 @@ def observations(
     prepared : the records
     kept : (n,) which samples of each count
     places : the base row of each
-    simulated : (n,) force of the plain damper for each, along which gain and delay act [N]
+    simulated : what the damper makes of each, along which gain and delay act
     nuisance : priors of the tests' own offset, gain and delay
-    unsure : (H + 1,) variance of the harmonics of each simulated cycle by the noise of the displacement [N^2]
     """
     found = []
-    for p, mask, place, force, error in zip(prepared, kept, places, simulated, unsure, strict=True):
+    for p, mask, place, given in zip(prepared, kept, places, simulated, strict=True):
         if np.any(mask):
-            cycles = p.cycles is not None and place >= 0
-            made = (
-                _of_cycles(p, mask, place, force, nuisance, error)
-                if cycles
-                else _of_samples(p, mask, place, force, nuisance)
-            )
+            build = _of_cycles if p.cycles is not None and place >= 0 else _of_samples
+            made = build(p, mask, place, given, nuisance)
             found += [made] if made is not None else []
     return tuple(found)
 
 
 def _of_cycles(
-    p: Prepared, mask: NDArray[np.bool_], place: int, force: Array, nuisance: NuisanceConfig, unsure: Array | float
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
 ) -> Observation | None:
     run = p.cycles
     if run is None:
         return None
-    time, record = p.record.time, p.record
+    time, record, force = p.record.time, p.record, given.force
     whole = run.fold(time, record.force)
     numbers = run.number(time)
     counted = [n for n in range(run.count) if np.all(mask[numbers == n])]
@@ -137,9 +132,9 @@ def _of_cycles(
     error = pure_error(whole - run.fold(time, force))
     cycle = whole[counted].mean(axis=0)
     peak = float(np.max(np.abs(cycle)))
-    expected = run.mean(time, force)
-    left = DISCREPANCY * _left_by(cycle, expected, error.sample_variance / len(counted))
-    floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size + unsure
+    average = run.mean(time, force)
+    left = DISCREPANCY * _left_by(cycle, average, error.sample_variance / len(counted))
+    floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size + given.unsure
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
     bare = Observation(
@@ -153,7 +148,7 @@ def _of_cycles(
         np.zeros((2 * weights.size - 1, 0)),
         np.zeros(0),
     )
-    return with_nuisances(bare, expected, nuisance, error.points / run.period)
+    return with_nuisances(bare, average, nuisance, error.points / run.period)
 
 
 def _left_by(measured: Array, force: Array, variance: float) -> float:
@@ -195,9 +190,9 @@ def _refined(cycle: Array, factor: int) -> Array:
 
 
 def _of_samples(
-    p: Prepared, mask: NDArray[np.bool_], place: int, force: Array, nuisance: NuisanceConfig
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
 ) -> Observation | None:
-    record = p.record
+    record, force = p.record, given.force
     start = max(int(np.argmax(mask)), warm_up(record.displacement))
     stop = int(mask.size - np.argmax(mask[::-1]))
     if stop - start < 2 * CYCLE_POINTS:
@@ -222,7 +217,7 @@ def _of_samples(
         np.zeros((stop - start - noise.coefficients.size, 0)),
         np.zeros(0),
     )
-    return with_nuisances(bare, force[start:stop], nuisance, record.rate)
+    return with_nuisances(bare, force[start:stop], nuisance, record.rate, given.timing[start:stop])
 
 
 def _part(record: Record, start: int, stop: int) -> Record:
@@ -231,10 +226,12 @@ def _part(record: Record, start: int, stop: int) -> Record:
     return sliced(record, kept)
 
 
-def with_nuisances(bare: Observation, force: Array, nuisance: NuisanceConfig, rate: float) -> Observation:
-    """The observation with the test's own offset, gain and delay, and the samples beside jumps, integrated out.
+def with_nuisances(
+    bare: Observation, force: Array, nuisance: NuisanceConfig, rate: float, timing: Array | None = None
+) -> Observation:
+    """The observation with the test's own offset, gain and delay, jumps and instants of the voltage integrated out.
 
-    Equation: r' = (I + V V')^(-1/2) r, V = [s_o peak, s_g F, -s_d dF/dt, jumps] in units of noise
+    Equation: r' = (I + V V')^(-1/2) r, V = [s_o peak, s_g F, -s_d dF/dt, jumps, s_t dF/dt_U] in units of noise
                                                     Source: Gaussian prior, marginal likelihood
     """
     columns = np.column_stack(
@@ -243,6 +240,7 @@ def with_nuisances(bare: Observation, force: Array, nuisance: NuisanceConfig, ra
             nuisance.gain * force,
             -nuisance.delay_s * np.gradient(force) * rate,
             _jumps(bare.measured),
+            *([] if timing is None else [timing]),
         ]
     )
     left, size, _ = np.linalg.svd(bare.in_noise(columns), full_matrices=False)

@@ -26,6 +26,8 @@ ALONE = (TRAINING, VALIDATION, TRAINING, UNTOUCHED, TRAINING, VALIDATION, TRAINI
 """Segments of a record that is alone in its condition and does not repeat."""
 BESIDE_UNTOUCHED = (TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION)
 """Segments of such a record when another of its condition is untouched."""
+MANY = 4
+"""Fewer records with a moving voltage are each parted: a step and a ramp do not stand for one another."""
 FEWEST = 50
 """A stretch of fewer samples is not fitted."""
 
@@ -53,7 +55,9 @@ def split(prepared: Sequence[Prepared], voltage_within: float | None, temperatur
     """
     place = {id(p.record): i for i, p in enumerate(prepared)}
     found, moving = conditions([p.record for p in prepared], voltage_within, temperature_within)
-    groups = [condition.records for condition in found] + ([moving] if moving else [])
+    groups = [condition.records for condition in found] + (
+        [moving] if len(moving) >= MANY else [(record,) for record in moving]
+    )
     roles: dict[int, Roles] = {}
     kinds: set[HoldOut] = set()
     for turn, group in enumerate(groups):

@@ -1,13 +1,14 @@
-"""How uncertain a predicted force is because the displacement is: errors in variables.
+"""What a damper makes of a record, and how uncertain that is because the channels are: errors in variables.
 
 What noise and resolution leave in the cleaned displacement of an average cycle repeats in every
 cycle of the prediction, and the oil spring makes force of it; the scatter of the force between
 cycles does not show it. So a few displacements that are as likely are sent through the damper.
+A voltage that moves is known at its samples alone: a step falls anywhere between two of them.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +18,44 @@ from pzd.diagnose.noise import harmonics_of
 from pzd.diagnose.predict import predicted_force
 from pzd.record import Array
 
+BETWEEN_SAMPLES = 0.5
+"""Standard deviation of the instant of the voltage [samples]."""
 NEIGHBOURS = 2
 """Harmonics on either side over which the scatter of so few draws is averaged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """The force that a damper gives in a record, and how uncertain it is."""
+
+    force: Array
+    """(n,) [N]."""
+    unsure: Array | float
+    """(H + 1,) variance |.|^2 of the harmonics of its average cycle by the displacement [N^2]; 0 where none repeats."""
+    timing: Array
+    """(n, 1) change of the force by one standard deviation of the voltage's instant [N]; (n, 0) where it stands."""
+
+
+def expected(damper: Damper, prepared: Prepared, delay: float) -> Expected:
+    """What a damper makes of a record.
+
+    Parameters
+    ----------
+    damper : that predicts
+    prepared : the record
+    delay : standard deviation of a test's own delay [s]
+    """
+    force = predicted_force(damper, prepared)
+    return Expected(force, force_error(damper, prepared, force), _timing(damper, prepared, force, delay))
+
+
+def _timing(damper: Damper, prepared: Prepared, force: Array, delay: float) -> Array:
+    record = prepared.record
+    if prepared.constant or record.voltage is None:
+        return np.zeros((force.size, 0))
+    late = replace(record, voltage=np.concatenate([record.voltage[:1], record.voltage[:-1]]))
+    change = predicted_force(damper, replace(prepared, record=late)) - force
+    return np.asarray(np.hypot(BETWEEN_SAMPLES, delay * record.rate) * change[:, None])
 
 
 def force_error(damper: Damper, prepared: Prepared, force: Array) -> Array | float:
