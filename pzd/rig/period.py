@@ -33,6 +33,8 @@ LEAST_SHARE = 0.25
 """The run of repeating cycles has to cover this share of the motion."""
 MOVED = 0.05
 """The motion begins where the displacement has left its first value by this share of its range."""
+RAMPS = 0.15
+"""Share of the motion at either end that is left out where the whole shows no period."""
 MOST_CANDIDATES = 40
 """Lags looked at closely, the shortest first."""
 HIGHEST_CORNER = 20.0
@@ -70,8 +72,10 @@ def repeats(time: Array, displacement: Array) -> Repeats | None:
     x = np.interp(grid, time, displacement)
     least = LEAST_SHARE * float(time[last] - time[first]) / step
     smooth = low_pass(x, HIGHEST_CORNER)
-    # With long ramps a motion to one side repeats in its speed only: its mean goes up and down with the ramps.
-    for candidate in chain.from_iterable(_candidates(course) for course in (x, np.gradient(smooth))):
+    # Few cycles drown between ramps as long, most of all to one side, whose mean goes up and down: look inside as well.
+    outer = int(RAMPS * (last - first) * float(np.median(np.diff(time))) / step)
+    inner = x[int((time[first] - time[0]) / step) + outer : int((time[last] - time[0]) / step) - outer]
+    for candidate in chain.from_iterable(_candidates(part) for part in (x, inner)):
         lag, section = candidate, _section(x, smooth, candidate, least)
         if section is not None:
             # Ramps pull the lag of the whole record aside: look again at the section alone.

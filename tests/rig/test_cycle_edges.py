@@ -42,8 +42,7 @@ class Test:
 
 def drawn(rng: np.random.Generator, shape: str) -> Test:
     rate, period = rng.choice([200.0, 512.0, 1000.0, 2000.0]), rng.uniform(0.25, 2.0)
-    # three cycles to one side between ramps as long drown in these: the search looks at the whole record first
-    count = int(rng.integers(4 if shape == "haversine" else 3, 13))
+    count = int(rng.integers(3, 13))
     rest = rng.uniform(0.2, 1.0) * period
     # a sine out of rest has no ramp, an envelope has
     ramp = 0.0 if shape == "sine from rest" else rng.uniform(0.5, 2.0) * period
