@@ -27,7 +27,7 @@ from pzd.runs import Run
 
 COMMANDS = [
     *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report"),
-    *("check", "show", "compare", "figures", "init", "schema", "effects"),
+    *("check", "show", "compare", "figures", "blind", "init", "schema", "effects"),
 ]
 HEAVY = ("numba", "pandas", "scipy", "matplotlib", "pint", "jinja2")
 

@@ -132,7 +132,7 @@ def test_the_wheel_holds_the_package_with_its_data_and_nothing_else(wheel: Path)
 
 @pytest.fixture(scope="module")
 def elsewhere(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the wheel installed from the hashed lock, one config, and nothing of the repository."""
+    """A folder with the wheel installed from the hashed lock, its configs, and nothing of the repository."""
     folder = tmp_path_factory.mktemp("elsewhere")
     subprocess.run([sys.executable, "-m", "venv", folder / "venv"], check=True)
     pip = [str(folder / "venv" / "bin" / "python"), "-m", "pip", "--disable-pip-version-check", "install", "-qq"]
@@ -140,6 +140,7 @@ def elsewhere(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     subprocess.run([*pip, "--no-deps", str(wheel)], check=True)
     shutil.copy(ROOT / "configs" / "quickstart.yaml", folder / "first.yaml")
     shutil.copy(ROOT / "configs" / "quickstart.yaml", folder / "second.yaml")
+    shutil.copy(ROOT / "configs" / "blind.yaml", folder / "blind.yaml")
     return folder
 
 
@@ -168,6 +169,7 @@ def test_the_wheel_alone_runs_every_command(elsewhere: Path) -> None:
         pzd(stage, "first.yaml")
     pzd("run", "second.yaml", "--set", "seed=2")
     assert "index.html" in pzd("figures", "first.yaml")
+    assert pzd("blind", "blind.yaml", "--set", "blind.cases=2")
     assert pzd("show", "first.yaml")
     assert pzd("compare", "runs/first", "runs/second")
     assert "orifice_quadratic" in pzd("effects")
