@@ -23,6 +23,8 @@ PREDICTION_TOLERANCE = 1e-7
 
 WARMS = 0.5
 """A temperature that moves by less [K] counts as standing still."""
+STEP = 0.1
+"""A voltage that moves by more from one sample to the next [share of its range in the record] has stepped."""
 ENDS = 0.02
 """Share of a record at either end where its smoothed displacement rests on one side alone: not judged."""
 
@@ -80,10 +82,21 @@ def _held(channel: Array | None) -> Array | None:
 
 
 def counted(prepared: Prepared) -> NDArray[np.bool_]:
-    """(n,) whether the prediction no longer depends on how the record began."""
+    """(n,) whether the prediction no longer depends on how the record began, nor on when between two samples a
+    voltage stepped."""
     size = prepared.record.time.size
     if prepared.lead is not None:
         return np.ones(size, dtype=np.bool_)
     ends = int(ENDS * size)
     order = np.arange(size)
-    return (order >= max(warm_up(prepared.record.displacement), ends)) & (order < size - ends)
+    begun = (order >= max(warm_up(prepared.record.displacement), ends)) & (order < size - ends)
+    return begun & ~_stepping(prepared.record.voltage, size)
+
+
+def _stepping(voltage: Array | None, size: int) -> NDArray[np.bool_]:
+    """(n,) whether the voltage steps right before or after a sample."""
+    beside = np.zeros(size, dtype=np.bool_)
+    if voltage is not None and np.ptp(voltage) > 0.0:
+        steps = np.flatnonzero(np.abs(np.diff(voltage)) > STEP * np.ptp(voltage))
+        beside[steps] = beside[steps + 1] = True
+    return beside
