@@ -39,11 +39,16 @@ class Evidence:
     """All samples seen."""
     halves: tuple[Problem, Problem]
     """Those for training, and those that choose."""
+    known: dict[str, list[Judged]]
+    """What was judged before, by damper: what the evidence weighs does not change it."""
 
     def judged(self, damper: Damper, config: DiagnoseConfig) -> list[Judged]:
         """Every record seen against a damper."""
-        pairs = zip(self.prepared, self.seen, strict=True)
-        return [judge(damper, p, mask, config.nuisance) for p, mask in pairs if mask.any()]
+        key = damper.model_dump_json()
+        if key not in self.known:
+            pairs = zip(self.prepared, self.seen, strict=True)
+            self.known[key] = [judge(damper, p, mask, config.nuisance) for p, mask in pairs if mask.any()]
+        return self.known[key]
 
     def something_missing(self, fitted: Fitted, config: DiagnoseConfig) -> bool:
         """Whether the fit misses the tests by more than noise and by more than nothing."""
@@ -66,7 +71,13 @@ class Evidence:
         return replace(mine, observations=tuple(replace(other, place=o.place) for other, o in pairs))
 
 
-def evidence_of(prepared: Sequence[Prepared], parts: Split, damper: Damper, config: DiagnoseConfig) -> Evidence:
+def evidence_of(
+    prepared: Sequence[Prepared],
+    parts: Split,
+    damper: Damper,
+    config: DiagnoseConfig,
+    known: dict[str, list[Judged]] | None = None,
+) -> Evidence:
     """The evidence of the records of one setting.
 
     Parameters
@@ -75,6 +86,7 @@ def evidence_of(prepared: Sequence[Prepared], parts: Split, damper: Damper, conf
     parts : which samples are fitted, which choose, which are untouched
     damper : plain, where the fits start and along which gain and delay of a test act
     config : priors of the nuisances
+    known : what was judged before of the same records, by damper; added to
     """
     scale = voltage_scale([p.record for p in prepared])
     places = [_nearest_row(damper.base, p) if p.constant else -1 for p in prepared]
@@ -88,15 +100,15 @@ def evidence_of(prepared: Sequence[Prepared], parts: Split, damper: Damper, conf
     scales = _scales(whole, prepared, damper, scale)
     reference = damper.reference_temperature_degC
     if reference is None:
-        known = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
-        reference = float(np.median(known)) if known else None
+        recorded = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
+        reference = float(np.median(recorded)) if recorded else None
     fastest = PER_SAMPLE * max(p.record.rate for p in prepared)
     varying = frozenset(name for name, values in damper.effects.items() if "at_voltage_V" in values)
     problems = [
         Problem(part, damper.base, scales, fastest, reference, varying)
         for part in (whole, *(observed([r == role for r in parts.roles]) for role in (TRAINING, VALIDATION)))
     ]
-    return Evidence(tuple(prepared), seen, problems[0], (problems[1], problems[2]))
+    return Evidence(tuple(prepared), seen, problems[0], (problems[1], problems[2]), {} if known is None else known)
 
 
 def _scales(observed: Sequence[Observation], prepared: Sequence[Prepared], damper: Damper, voltage: float) -> Scales:

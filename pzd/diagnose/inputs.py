@@ -49,7 +49,7 @@ class Prepared:
     constant: bool
     """Whether the voltage stands still."""
     draws: tuple[Record, ...] = ()
-    """The lead with other displacements, as likely by what its noise and resolution leave in the average cycle."""
+    """Two cycles of the lead; and the same with other displacements, as likely by what noise and resolution leave."""
 
     @property
     def lead_samples(self) -> int:
@@ -184,10 +184,11 @@ class Average:
 
 
 def _drawn(lead: Record, average: Average) -> tuple[Record, ...]:
-    """The lead with other displacements that are as likely."""
+    """Two cycles of the lead as they are, and with other displacements that are as likely."""
     draw = np.random.default_rng(DRAWS)
+    two = sliced(lead, np.arange(lead.time.size) < 2 * average.points)
     motions = [average.motion(average.clear_harmonics + average.error(draw)) for _ in range(DRAWS)]
-    return tuple(_moved(lead, motion(lead.time)) for motion in motions)
+    return (two, *(_moved(two, motion(two.time)) for motion in motions))
 
 
 def _smoothed(record: Record) -> Record:

@@ -23,6 +23,7 @@ from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit, misfit_beside
 from pzd.diagnose.inputs import Prepared
+from pzd.diagnose.judge import Judged
 from pzd.diagnose.problem import Problem
 from pzd.diagnose.split import Split
 from pzd.record import Array
@@ -97,9 +98,10 @@ def name_effects(
     config : thresholds, forced and forbidden effects
     jobs : candidates fitted at the same time
     """
+    known: dict[str, list[Judged]] = {}
 
     def weighed(model: Damper) -> Evidence:
-        return evidence_of(prepared, parts, model, config)
+        return evidence_of(prepared, parts, model, config, known)
 
     first = evidence = weighed(damper)
     plain = current = fit(first.whole, (), first.whole.start())

@@ -82,8 +82,7 @@ def _held(channel: Array | None) -> Array | None:
 
 
 def counted(prepared: Prepared) -> NDArray[np.bool_]:
-    """(n,) whether the prediction no longer depends on how the record began, nor on when between two samples a
-    voltage stepped."""
+    """(n,) whether the prediction depends neither on how the record began nor on when exactly a voltage stepped."""
     size = prepared.record.time.size
     if prepared.lead is not None:
         return np.ones(size, dtype=np.bool_)

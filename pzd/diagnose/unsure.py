@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.noise import harmonics_of
-from pzd.diagnose.predict import predicted_force
-from pzd.record import Array
+from pzd.diagnose.predict import PREDICTION_TOLERANCE, motion_of, predicted_force
+from pzd.record import Array, Record
 
 BETWEEN_SAMPLES = 0.5
 """Standard deviation of the instant of the voltage [samples]."""
@@ -46,7 +47,7 @@ def expected(damper: Damper, prepared: Prepared, delay: float) -> Expected:
     delay : standard deviation of a test's own delay [s]
     """
     force = predicted_force(damper, prepared)
-    return Expected(force, force_error(damper, prepared, force), _timing(damper, prepared, force, delay))
+    return Expected(force, force_error(damper, prepared), _timing(damper, prepared, force, delay))
 
 
 def _timing(damper: Damper, prepared: Prepared, force: Array, delay: float) -> Array:
@@ -58,7 +59,7 @@ def _timing(damper: Damper, prepared: Prepared, force: Array, delay: float) -> A
     return np.asarray(np.hypot(BETWEEN_SAMPLES, delay * record.rate) * change[:, None])
 
 
-def force_error(damper: Damper, prepared: Prepared, force: Array) -> Array | float:
+def force_error(damper: Damper, prepared: Prepared) -> Array | float:
     """Variance of the harmonics of a predicted average cycle, because its displacement is not known better.
 
     Equation: s_h^2 = mean_j |c_h(x + e_j) - c_h(x)|^2              Source: Monte Carlo, JCGM 101:2008
@@ -67,23 +68,23 @@ def force_error(damper: Damper, prepared: Prepared, force: Array) -> Array | flo
     ----------
     damper : that predicts
     prepared : the record
-    force : (n,) what it predicts [N]
 
     Returns
     -------
     (H + 1,) variance |.|^2 [N^2]; 0 where nothing repeats
     """
-    run = prepared.cycles
-    if run is None or not prepared.draws:
+    if not prepared.draws:
         return 0.0
-    time = prepared.record.time
-    changes = [
-        run.fold(time, predicted_force(damper, replace(prepared, lead=draw)) - force).mean(axis=0)
-        for draw in prepared.draws
-    ]
-    points = changes[0].size
-    power = np.mean(np.abs(np.fft.rfft(changes, axis=1) / points) ** 2, axis=0)[: harmonics_of(points) + 1]
+    points = prepared.draws[0].time.size // 2
+    known, *others = (_simulated(damper, draw)[points:] for draw in prepared.draws)
+    changes = np.fft.rfft(np.stack(others) - known, points, axis=1) / points
+    power = np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
     width = np.ones(2 * NEIGHBOURS + 1)
     smooth: Array = np.convolve(power, width, "same") / np.convolve(np.ones(power.size), width, "same")
     smooth[0] = power[0]
     return smooth
+
+
+def _simulated(damper: Damper, record: Record) -> Array:
+    motion, stride = motion_of(record, constant=True)
+    return respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)[::stride]
