@@ -22,6 +22,7 @@ from pzd.diagnose.candidates import (
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit, misfit_beside
+from pzd.diagnose.gap import visible_gap
 from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.judge import Judged
 from pzd.diagnose.problem import Problem
@@ -36,6 +37,8 @@ ALIKE = 0.1
 """Values within this ratio of one another agree, whatever their intervals."""
 TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, ("valve_lag", "tau"): 1e-3}
 """A common offset [share of the lowest peak], delay or lag [s] that counts as nothing missing."""
+LEAST_CUT = 0.2
+"""An effect closes at least this share of the gap (mean square): what is real is not one of many small corrections."""
 LEVEL = 1.96
 """Standard errors in a 95 % interval."""
 
@@ -161,7 +164,11 @@ def _first_supported(
 ) -> Candidate | None:
     """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""
     for each in tried:
-        reason = _unsupported(evidence, config, each) or _stand_in(evidence, weighed(each.fitted.damper), before, each)
+        reason = (
+            _unsupported(evidence, config, each)
+            or _leaves_gap(evidence, config, before, each)
+            or _stand_in(evidence, weighed(each.fitted.damper), before, each)
+        )
         if reason is None:
             return each
         if not each.varies:
@@ -180,6 +187,14 @@ def _unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidat
     if trivial(candidate.fitted, candidate.effect, evidence.whole.scales.low_force):
         return "so small that it counts as an offset or a delay of the tests"
     return None
+
+
+def _leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> str | None:
+    """Why a candidate is a stand-in by the gap that it leaves open, None where it closes its share."""
+    sizes = [visible_gap(evidence.judged(f.damper, config)) for f in (before, candidate.fitted)]
+    if sizes[1] ** 2 <= (1.0 - LEAST_CUT) * sizes[0] ** 2:
+        return None
+    return f"stand-in: closes less than {LEAST_CUT:.0%} of the gap"
 
 
 def trivial(fitted: Fitted, effect: str, force: float) -> bool:
