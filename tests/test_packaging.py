@@ -144,11 +144,15 @@ def elsewhere(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def nothing_of_the_repository() -> dict[str, str]:
+    """The environment without the path to the sources."""
+    return {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+
+
 def alone(folder: Path, *arguments: str) -> str:
     """What the installed command prints; it must exit 0."""
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     command = [str(folder / "venv" / "bin" / "pzd"), *arguments]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, cwd=folder, env=nothing_of_the_repository(), capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"pzd {' '.join(arguments)}\n{done.stdout}{done.stderr}"
     return done.stdout
 
@@ -157,7 +161,8 @@ def alone(folder: Path, *arguments: str) -> str:
 def test_the_wheel_alone_runs_every_command(elsewhere: Path) -> None:
     where = "import pzd; print(pzd.__file__)"
     python = elsewhere / "venv" / "bin" / "python"
-    assert str(elsewhere) in subprocess.check_output([python, "-c", where], cwd=elsewhere, text=True)
+    environment = nothing_of_the_repository()
+    assert str(elsewhere) in subprocess.check_output([python, "-c", where], cwd=elsewhere, env=environment, text=True)
 
     tried = set()
 
