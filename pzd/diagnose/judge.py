@@ -17,6 +17,9 @@ from pzd.diagnose.predict import counted
 from pzd.diagnose.rich import rich_fit
 from pzd.diagnose.unsure import expected
 
+BELIEVED = 1e-4
+"""A change from cycle to cycle counts in the gap where noise alone would show it less often than this."""
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -79,7 +82,9 @@ def _repeating(
     probability = {"harmonics": by_harmonics(error)}
     if trend is not None:
         probability["trend"] = np.array([trend])
-    power = float(repeatable_power(error).sum()) + _trend_power(folded, error)
+    power = float(repeatable_power(error).sum())
+    if trend is not None and trend < BELIEVED:
+        power += _trend_power(folded, error)
     return Judged(prepared, mask, residual, slack, error.sample_variance, power, probability, error, folded, None)
 
 

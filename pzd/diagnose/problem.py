@@ -19,6 +19,8 @@ from pzd.record import Array
 
 SIMULATION_TOLERANCE = 1e-8
 """Of the damper's path, as a share of the force."""
+SOFTEST = 0.02
+"""Least C that a search starts from [largest force over largest speed]: identify may leave it undetermined."""
 BOUND = 1e3
 """No scaled parameter is looked for beyond this, nor one with ratio steps below its inverse."""
 
@@ -107,13 +109,11 @@ class Problem:
 
     def start(self) -> Array:
         """(3 b,) the base rows in the units of the search."""
-        stiffest = [min(r.k_N_per_m, self.fastest * r.C_Ns_per_m) for r in self.base]
-        return np.concatenate(
-            [
-                (r.T0_N / self.scales.force, np.log(r.C_Ns_per_m), np.log(k))
-                for r, k in zip(self.base, stiffest, strict=True)
-            ]
-        )
+        softest = SOFTEST * self.scales.force / self.scales.speed
+        damping = [max(r.C_Ns_per_m, softest) for r in self.base]
+        stiffness = [min(r.k_N_per_m, self.fastest * C) for r, C in zip(self.base, damping, strict=True)]
+        rows = zip(self.base, damping, stiffness, strict=True)
+        return np.concatenate([(r.T0_N / self.scales.force, np.log(C), np.log(k)) for r, C, k in rows])
 
     def start_with(self, damper: Damper) -> Array:
         """(3 b + e,) the base rows, and the effects that a damper has."""

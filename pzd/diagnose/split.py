@@ -58,11 +58,13 @@ def split(prepared: Sequence[Prepared], voltage_within: float | None, temperatur
     groups = [condition.records for condition in found] + (
         [moving] if len(moving) >= MANY else [(record,) for record in moving]
     )
+    extreme = _extreme(prepared)
     roles: dict[int, Roles] = {}
     kinds: set[HoldOut] = set()
     for turn, group in enumerate(groups):
         members = sorted((place[id(record)] for record in group), key=lambda i: _order(prepared[i]))
-        shared, kind = _group(members, turn, prepared)
+        members = _rotated(members, turn, extreme)
+        shared, kind = _group(members, prepared)
         roles |= shared
         kinds.add(kind)
     ordered = tuple(roles[i] for i in range(len(prepared)))
@@ -87,9 +89,25 @@ def _order(prepared: Prepared) -> tuple[float, float, str]:
     return frequency, float(np.max(np.abs(prepared.record.velocity))), prepared.record.name
 
 
-def _group(members: list[int], turn: int, prepared: Sequence[Prepared]) -> tuple[dict[int, Roles], HoldOut]:
-    """Roles in one condition; `turn` rotates them, so that over the conditions every kind of test is in every role."""
-    rotated = [members[(turn + i) % len(members)] for i in range(len(members))]
+def _extreme(prepared: Sequence[Prepared]) -> set[int]:
+    """Places of the records with the rig's largest force, speed and stroke: what they show no other record may."""
+
+    def largest(channel: str) -> int:
+        peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in prepared]
+        return int(np.argmax(peaks))
+
+    return {largest("force"), largest("velocity"), largest("displacement")}
+
+
+def _rotated(members: list[int], turn: int, extreme: set[int]) -> list[int]:
+    """Members with an extreme first; `turn` rotates the others, so that every kind of test is in every role."""
+    first = [i for i in members if i in extreme]
+    others = [i for i in members if i not in extreme]
+    return first + [others[(turn + i) % len(others)] for i in range(len(others))]
+
+
+def _group(rotated: list[int], prepared: Sequence[Prepared]) -> tuple[dict[int, Roles], HoldOut]:
+    """Roles in one condition: the first of its members are fitted."""
     if len(rotated) == 1:
         only = prepared[rotated[0]]
         return {rotated[0]: _parted(only, alone=True)}, "segments" if only.cycles is None else "cycles"
@@ -100,7 +118,7 @@ def _group(members: list[int], turn: int, prepared: Sequence[Prepared]) -> tuple
     role[1::4] = [UNTOUCHED] * len(role[1::4])
     chooses = slice(3, None, 4) if len(rotated) > 3 else slice(2, 3)
     role[chooses] = [VALIDATION] * len(role[chooses])
-    return {i: _whole(prepared[i], r) for i, r in zip(rotated, role, strict=True)}, "records"
+    return {i: _whole(prepared[i], r) for i, r in zip(rotated, sorted(role), strict=True)}, "records"
 
 
 def _whole(prepared: Prepared, role: int) -> Roles:

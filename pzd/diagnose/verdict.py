@@ -20,6 +20,8 @@ from pzd.diagnose.naming import LEVEL, Named, standard_errors
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
+PLAIN = 2.0
+"""A remainder of so many times what is visible contradicts that these effects are all, whatever they closed."""
 OUTSIDE = 0.03
 """Share of cases in which what is missing is not in the library and yet one of its effects fits within the noise."""
 
@@ -64,8 +66,9 @@ def decide(named: Named, before: Sequence[Judged], after: Sequence[Judged], conf
 
 
 def _remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
-    """Whether too much of the gap is left, as r.m.s. with the noise floor taken off."""
-    return sizes[1] > config.unexplained_share * sizes[0] and sizes[1] >= config.negligible
+    """Whether too much of the gap is left, as r.m.s. with the noise floor taken off: as a share, or plain to see."""
+    share = sizes[1] > config.unexplained_share * sizes[0] and sizes[1] >= config.negligible
+    return share or sizes[1] >= PLAIN * config.visible
 
 
 def _nothing_adopted(size: float, chance: float, config: DiagnoseConfig) -> Decision:
