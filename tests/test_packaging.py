@@ -152,7 +152,9 @@ def nothing_of_the_repository() -> dict[str, str]:
 def alone(folder: Path, *arguments: str) -> str:
     """What the installed command prints; it must exit 0."""
     command = [str(folder / "venv" / "bin" / "pzd"), *arguments]
-    done = subprocess.run(command, cwd=folder, env=nothing_of_the_repository(), capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=folder, env=nothing_of_the_repository(), capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, f"pzd {' '.join(arguments)}\n{done.stdout}{done.stderr}"
     return done.stdout
 
