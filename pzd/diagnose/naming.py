@@ -167,7 +167,7 @@ def _first_supported(
         reason = (
             _unsupported(evidence, config, each)
             or _leaves_gap(evidence, config, before, each)
-            or _stand_in(evidence, weighed(each.fitted.damper), before, each)
+            or _stand_in(evidence, weighed(each.fitted.damper), config, before, each)
         )
         if reason is None:
             return each
@@ -215,13 +215,16 @@ def standard_errors(fitted: Fitted) -> Array:
     return np.sqrt(np.diag(fitted.covariance) * max(1.0, fitted.misfit / freedom))
 
 
-def _stand_in(evidence: Evidence, weighed: Evidence, before: Fitted, candidate: Candidate) -> str | None:
+def _stand_in(
+    evidence: Evidence, weighed: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate
+) -> str | None:
     """Why an effect is a stand-in: it fails on tests that it was not fitted to, or takes other values on either half.
 
     Parameters
     ----------
     evidence : weighed by what is left without the candidate
     weighed : by what it leaves, so that each test's own gain and delay act along its force
+    config : how much worse counts as worse
     before : the optimum without the candidate
     candidate : the optimum with it
     """
@@ -231,8 +234,8 @@ def _stand_in(evidence: Evidence, weighed: Evidence, before: Fitted, candidate: 
     fits = [fit(half, candidate.fitted.effects, half.start_with(candidate.fitted.damper)) for half in halves]
     without = fit(evidence.halves[0], before.effects, before.searched)
     with_it, left = misfit_beside(halves[1], fits[0].damper), misfit_beside(evidence.choosing(weighed), without.damper)
-    if with_it >= left:
-        return "stand-in: does not shrink the gap on tests it was not fitted to"
+    if with_it > left + config.rival_bic:
+        return "stand-in: widens the gap on tests it was not fitted to"
     if not _agree(fits[0], fits[1], candidate.effect):
         return "stand-in: takes other values on either half of the tests"
     return None

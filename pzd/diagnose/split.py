@@ -100,25 +100,34 @@ def _extreme(prepared: Sequence[Prepared]) -> set[int]:
 
 
 def _rotated(members: list[int], turn: int, extreme: set[int]) -> list[int]:
-    """Members with an extreme first; `turn` rotates the others, so that every kind of test is in every role."""
-    first = [i for i in members if i in extreme]
-    others = [i for i in members if i not in extreme]
-    return first + [others[(turn + i) % len(others)] for i in range(len(others))]
+    """Members rotated by `turn`, or by the least more that lets those with an extreme be fitted.
+
+    So over the conditions every kind of test is in every role.
+    """
+    count = len(members)
+    shifts = [[members[(turn + more + i) % count] for i in range(count)] for more in range(count)]
+    roles = _roles(count)
+    return max(shifts, key=lambda order: sum(i in extreme for i, r in zip(order, roles, strict=True) if r == TRAINING))
+
+
+def _roles(count: int) -> list[int]:
+    """Roles of so many records of one condition, in their order."""
+    role = [TRAINING] * count
+    role[1::4] = [UNTOUCHED] * len(role[1::4])
+    chooses = slice(3, None, 4) if count > 3 else slice(2, 3)
+    role[chooses] = [VALIDATION] * len(role[chooses])
+    return role
 
 
 def _group(rotated: list[int], prepared: Sequence[Prepared]) -> tuple[dict[int, Roles], HoldOut]:
-    """Roles in one condition: the first of its members are fitted."""
+    """Roles in one condition, by the order of its members."""
     if len(rotated) == 1:
         only = prepared[rotated[0]]
         return {rotated[0]: _parted(only, alone=True)}, "segments" if only.cycles is None else "cycles"
     if len(rotated) == 2:
         first, second = rotated
         return {first: _parted(prepared[first], alone=False), second: _whole(prepared[second], UNTOUCHED)}, "records"
-    role = [TRAINING] * len(rotated)
-    role[1::4] = [UNTOUCHED] * len(role[1::4])
-    chooses = slice(3, None, 4) if len(rotated) > 3 else slice(2, 3)
-    role[chooses] = [VALIDATION] * len(role[chooses])
-    return {i: _whole(prepared[i], r) for i, r in zip(rotated, sorted(role), strict=True)}, "records"
+    return {i: _whole(prepared[i], r) for i, r in zip(rotated, _roles(len(rotated)), strict=True)}, "records"
 
 
 def _whole(prepared: Prepared, role: int) -> Roles:
