@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.believable import work_done
+from pzd.rig.believable import reversals, work_done
 from pzd.rig.measured import Measured
 
 LEAST = 0.05
 """Work that is said, as a share of stroke times range of the force.
 
 A damper that sticks draws a line without area, and what little its noise encloses is fed in as
-often as taken out.
+often as taken out; over many cycles that adds up with the root of their number.
 """
 
 
@@ -20,7 +20,7 @@ def check(test: Measured) -> list[Finding]:
     """Cycles with negative work, and a record whose steady force outweighs its loops."""
     record = test.record
     least = LEAST * float(np.ptp(record.displacement) * np.subtract(*np.percentile(record.force, (99, 1))))
-    if work_done(record.displacement, record.force) < -least:
+    if work_done(record.displacement, record.force) < -least * np.sqrt(1.0 + 0.5 * reversals(record.displacement)):
         return [
             Finding(
                 check="sign",
