@@ -236,20 +236,24 @@ def _stand_in(
     with_it, left = misfit_beside(halves[1], fits[0].damper), misfit_beside(evidence.choosing(weighed), without.damper)
     if with_it > left + config.rival_bic:
         return "stand-in: widens the gap on tests it was not fitted to"
-    if not _agree(fits[0], fits[1], candidate.effect):
+    if not _agree(halves, (fits[0], fits[1]), candidate.effect):
         return "stand-in: takes other values on either half of the tests"
     return None
 
 
-def _agree(first: Fitted, second: Fitted, effect: str) -> bool:
-    from scipy.stats import norm
+def _agree(halves: tuple[Problem, Problem], fits: tuple[Fitted, Fitted], effect: str) -> bool:
+    """Whether one half of the tests does nearly as well with the values that the other half gives to an effect.
 
-    limit = float(norm.isf(AGREES / 2.0))
-    errors = np.hypot(standard_errors(first), standard_errors(second))
-    for i, unknown in enumerate(first.unknowns):
-        if unknown.effect != effect:
-            continue
-        a, b = unknown.of(first.damper), unknown.of(second.damper)
-        if abs(a - b) > limit * errors[i] and abs(a - b) > ALIKE * max(abs(a), abs(b)):
-            return False
-    return True
+    Equation: min_ij (|r_j(p_i)|^2 - |r_j(p_j)|^2) < 2 chi2_e        Source: likelihood ratio, either half for granted
+    """
+    from scipy.stats import chi2
+
+    values = [[u.of(f.damper) for u in f.unknowns if u.effect == effect] for f in fits]
+    if all(abs(a - b) <= ALIKE * max(abs(a), abs(b)) for a, b in zip(*values, strict=True)):
+        return True
+    limit = 2.0 * float(chi2.isf(AGREES, len(fits[0].unknowns)))
+    for half, own, other in ((halves[0], fits[0], fits[1]), (halves[1], fits[1], fits[0])):
+        spread = max(1.0, own.misfit / max(own.size - own.searched.size, 1))
+        if misfit_beside(half, other.damper) - own.misfit <= limit * spread:
+            return True
+    return False

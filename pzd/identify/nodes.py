@@ -37,6 +37,7 @@ def nodes_of(
     ConfigError : when two chosen nodes are closer than 2 % of the scale
     """
     apart = CONSTANT_SHARE * scale
+    constant = _merged(constant, apart)
     if chosen is not None and np.any(np.diff(np.sort(chosen)) <= apart):
         raise ConfigError(f"identify.nodes: two nodes are closer than {apart:g}; leave one out (got {list(chosen)})")
     if chosen is None and len(constant) > 1:
@@ -44,6 +45,15 @@ def nodes_of(
     voltage = np.concatenate([r.voltage for r in moving if r.voltage is not None])
     added = dwelled_levels(voltage, apart) if chosen is None else chosen
     return np.sort([*constant, *(v for v in added if all(abs(v - c) > apart for c in constant))])
+
+
+def _merged(voltages: Sequence[float], apart: float) -> list[float]:
+    """Voltages, those no further apart than that counting as the lowest of them: one voltage at two temperatures."""
+    kept: list[float] = []
+    for voltage in sorted(voltages):
+        if not kept or voltage - kept[-1] > apart:
+            kept.append(voltage)
+    return kept
 
 
 def dwelled_levels(voltage: Array, band: float) -> list[float]:
