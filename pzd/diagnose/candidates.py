@@ -164,7 +164,12 @@ def _from(
     problem: Problem, before: Fitted, effect: str, start: Array, evaluations: int = MOST_EVALUATIONS
 ) -> Candidate:
     fitted = fit(problem, (*before.effects, effect), start, evaluations)
-    return Candidate(effect, fitted, delta_bic(before, fitted), moved_by(problem, before, fitted))
+    pays = delta_bic(before, fitted)
+    if len(problem.base) < len(before.damper.base):
+        # Fewer base rows alone may pay already; that is not the effect's merit.
+        pooled = fit(problem, before.effects, problem.start_with(before.damper))
+        pays = max(pays, delta_bic(pooled, fitted))
+    return Candidate(effect, fitted, pays, moved_by(problem, before, fitted))
 
 
 def delta_bic(before: Fitted, after: Fitted) -> float:
