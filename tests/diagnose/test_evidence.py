@@ -1,0 +1,108 @@
+"""The evidence: what counts as noise of a test, so that a misfit is worth what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from campaign import damper_of, sine, sines
+
+from pzd.damper.model import BaseRow, Damper
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.evidence import Evidence, evidence_of
+from pzd.diagnose.fitting import fit, misfit_beside
+from pzd.diagnose.inputs import prepare
+from pzd.diagnose.observation import with_nuisances
+from pzd.diagnose.predict import counted
+from pzd.diagnose.split import TRAINING, split
+from pzd.diagnose.unsure import expected
+from pzd.record import Record
+
+TWO = (0.0, 150.0)
+
+
+def evidence(records: tuple[Record, ...], damper: Damper) -> Evidence:
+    prepared = prepare(records)
+    return evidence_of(prepared, split(prepared, None, 2.0), damper, DiagnoseConfig())
+
+
+@pytest.mark.parametrize(
+    "effects", [{}, {"stribeck_friction": {"F_s": 80.0, "v_s": 0.04}}, {"lash": {"delta": 3e-4}}], ids=str
+)
+def test_the_right_damper_leaves_no_more_than_noise(
+    effects: dict[str, dict[str, float]], fresh_seeds: Callable[[int], list[int]]
+) -> None:
+    # Also where dry friction jumps between two samples, which no simulation can know.
+    (seed,) = fresh_seeds(1)
+    truth = damper_of(TWO, **effects)
+    whole = evidence(sines(truth, np.random.default_rng(seed), TWO, jitter=0.01), truth).whole
+    found = fit(whole, tuple(effects), whole.start_with(truth))
+    freedom = found.size - found.searched.size
+    # About a thousand residuals: a standard deviation of 0.045, and noise is estimated from seven differences.
+    assert 0.5 < found.misfit / freedom < 1.3
+
+
+def test_what_a_wrong_damper_leaves_counts_in_the_weights() -> None:
+    records = sines(damper_of(TWO, gas_spring={"k_g": 3000.0}), np.random.default_rng(), TWO)
+    wrong, right = damper_of(TWO), damper_of(TWO, gas_spring={"k_g": 3000.0})
+    misfits = [misfit_beside(evidence(records, d).whole, wrong) for d in (wrong, right)]
+    assert misfits[0] < 0.3 * misfits[1]
+
+
+def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(
+    fresh_seeds: Callable[[int], list[int]],
+) -> None:
+    # A damper that never slips is a spring: s_F = k s_x at every harmonic that is kept.
+    (seed,) = fresh_seeds(1)
+    rng, k = np.random.default_rng(seed), 2e5
+    stuck = Damper(base=(BaseRow(voltage_V=0.0, T0_N=1e6, C_Ns_per_m=3000.0, k_N_per_m=k),))
+    record = sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=2e-5, cycles=8)
+    (prepared,) = prepare((record,))
+    run = prepared.cycles
+    assert run is not None
+    variance = expected(stuck, prepared, 0.0).unsure
+    assert isinstance(variance, np.ndarray)
+    single = 2e-5**2 / run.points(record.time) / run.count
+    # Six draws, averaged over five harmonics of which only the first is kept.
+    assert 0.0 < variance[1] < 10.0 * k**2 * single
+    quiet = prepare((replace(record, displacement=record.displacement + 0.0),))[0]
+    assert expected(stuck, quiet, 0.0).unsure == pytest.approx(variance)
+
+
+def test_the_instant_of_a_standing_voltage_does_not_matter() -> None:
+    (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, np.random.default_rng()),))
+    assert expected(damper_of(TWO), prepared, 5e-4).timing.shape == (prepared.record.time.size, 0)
+
+
+def test_a_sample_beside_a_jump_is_worth_nothing() -> None:
+    truth = damper_of(TWO, stribeck_friction={"F_s": 200.0, "v_s": 0.04})
+    (prepared,) = prepare((sine(truth, 0.0, 1.0, 0.02, np.random.default_rng(), noise=0.002),))
+    made = evidence((prepared.record, sine(truth, 150.0, 1.0, 0.02, np.random.default_rng())), truth)
+    bare = made.whole.observations[0]
+    config = DiagnoseConfig().nuisance
+    with_jumps = with_nuisances(bare, bare.measured, config, 1000.0)
+    bend = np.abs(np.convolve(bare.measured, (1.0, -2.0, 1.0), "same"))
+    bend[[0, -1]] = 0.0
+    spike = np.zeros(bare.measured.size)
+    spike[int(np.argmax(bend))] = 100.0
+    elsewhere = np.roll(spike, 100)
+    worth = [float(np.sum(with_jumps.in_noise(s) ** 2)) for s in (spike, elsewhere)]
+    assert worth[0] < 0.1 * worth[1]
+
+
+def test_samples_beside_a_step_of_the_voltage_are_not_judged() -> None:
+    (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, np.random.default_rng()),))
+    voltage = np.where(np.arange(prepared.record.time.size) < 3000, 0.0, 150.0)
+    stepped = replace(prepared, record=replace(prepared.record, voltage=voltage), lead=None, cycles=None)
+    assert not counted(stepped)[2999:3001].any()
+    assert counted(stepped)[[2998, 3001]].all()
+
+
+def test_the_hardest_tests_of_the_rig_are_fitted() -> None:
+    prepared = prepare(sines(damper_of(), np.random.default_rng(), cycles=4))
+    roles = split(prepared, None, 2.0).roles
+    for channel in ("force", "velocity", "displacement"):
+        peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in prepared]
+        assert roles[int(np.argmax(peaks))][0] == TRAINING
