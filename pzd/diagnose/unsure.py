@@ -79,9 +79,10 @@ def force_error(damper: Damper, prepared: Prepared) -> Array | float:
     known, *others = (_simulated(damper, draw)[points:] for draw in prepared.draws)
     changes = np.fft.rfft(np.stack(others) - known, points, axis=1) / points
     power = np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
+    power[0] = 0.0  # a stuck damper keeps whatever offset it began with
     width = np.ones(2 * NEIGHBOURS + 1)
     smooth: Array = np.convolve(power, width, "same") / np.convolve(np.ones(power.size), width, "same")
-    smooth[0] = power[0]
+    smooth[0] = 0.0
     return smooth
 
 
