@@ -19,7 +19,7 @@ from pzd.record import Array
 
 SIMULATION_TOLERANCE = 1e-8
 """Of the damper's path, as a share of the force."""
-SOFTEST = 0.02
+SOFTEST = 0.1
 """Least C that a search starts from [largest force over largest speed]: identify may leave it undetermined."""
 BOUND = 1e3
 """No scaled parameter is looked for beyond this, nor one with ratio steps below its inverse."""
