@@ -34,7 +34,7 @@ def by_harmonics(error: PureError) -> Array:
     -------
     (bands,) probabilities, uniform where nothing is missing
     """
-    from scipy.stats import f
+    from scipy.special import fdtrc
 
     ratio = np.abs(error.mean) ** 2 / np.where(error.of_mean > 0.0, error.of_mean, np.inf)
     octaves = bands(error.mean.size - 1)
@@ -43,7 +43,7 @@ def by_harmonics(error: PureError) -> Array:
     found = []
     for low, high in octaves:
         freedom = 1 if low == 0 else 2 * (high + 1 - low)
-        found.append(float(f.sf(ratio[low : high + 1].mean(), freedom, error.freedom[low : high + 1].max())))
+        found.append(float(fdtrc(freedom, error.freedom[low : high + 1].max(), ratio[low : high + 1].mean())))
     return np.array(found)
 
 
@@ -61,7 +61,7 @@ def by_trend(folded: Array) -> float | None:
     -------
     the probability, None with fewer than four cycles
     """
-    from scipy.stats import f
+    from scipy.special import fdtrc
 
     count, points = folded.shape
     if count < TREND_CYCLES:
@@ -73,7 +73,7 @@ def by_trend(folded: Array) -> float | None:
     slopes = order @ coefficients / (order @ order)
     scatter = error.single[1 : last + 1] / (order @ order)
     ratio = np.abs(slopes) ** 2 / np.where(scatter > 0.0, scatter, np.inf)
-    return float(f.sf(ratio.mean(), 2 * last, error.freedom[1 : last + 1].max()))
+    return float(fdtrc(2 * last, error.freedom[1 : last + 1].max(), ratio.mean()))
 
 
 def pooled(by_record: Sequence[Array]) -> float:
@@ -89,7 +89,7 @@ def pooled(by_record: Sequence[Array]) -> float:
     ----------
     by_record : one array of probabilities a test, of differing length
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
     if not by_record:
         return 1.0
@@ -99,5 +99,5 @@ def pooled(by_record: Sequence[Array]) -> float:
     sums = []
     for band in range(longest):
         logs = [np.log(max(float(p[band]), 1e-300)) for p in by_record if p.size > band]
-        sums.append(float(chi2.sf(-2.0 * sum(logs), 2 * len(logs))))
+        sums.append(float(chdtrc(2 * len(logs), -2.0 * sum(logs))))
     return min(1.0, 2.0 * min(single, longest * min(sums)))

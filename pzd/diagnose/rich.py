@@ -54,7 +54,7 @@ def rich_fit(residual: Array, record: Record, predicted: Array) -> RichFit:
     record : the motion, (n,)
     predicted : (n,) force [N]
     """
-    from scipy.stats import f
+    from scipy.special import fdtrc
 
     terms = _terms(record, predicted)
     if residual.size < SAMPLES_PER_TERM * terms.shape[1]:
@@ -73,7 +73,7 @@ def rich_fit(residual: Array, record: Record, predicted: Array) -> RichFit:
     free = flat.size - rank - noise.coefficients.size
     over = float(flat @ flat - taken @ taken)
     ratio = float(taken @ taken) / rank / (over / free) if over > 0.0 else np.inf
-    return RichFit(explained, spread, noise, float(f.sf(ratio, rank, free)))
+    return RichFit(explained, spread, noise, float(fdtrc(rank, free, ratio)))
 
 
 def _terms(record: Record, predicted: Array) -> Array:

@@ -101,12 +101,12 @@ def _agree(halves: tuple[Problem, Problem], fits: tuple[Fitted, Fitted], effects
 
     Equation: min_ij (|r_j(p_i)|^2 - |r_j(p_j)|^2) < 2 chi2_e        Source: likelihood ratio, either half for granted
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     values = [[u.of(f.damper) for u in f.unknowns if u.effect in effects] for f in fits]
     if all(abs(a - b) <= ALIKE * max(abs(a), abs(b)) for a, b in zip(*values, strict=True)):
         return True
-    limit = 2.0 * float(chi2.isf(AGREES, len(fits[0].unknowns)))
+    limit = 2.0 * float(chdtri(len(fits[0].unknowns), AGREES))
     for half, own, other in ((halves[0], fits[0], fits[1]), (halves[1], fits[1], fits[0])):
         spread = max(1.0, own.misfit / max(own.size - own.searched.size, 1))
         if misfit_beside(half, other.damper) - own.misfit <= limit * spread:
