@@ -22,10 +22,11 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """One step: the candidates, best first, and which of them was adopted."""
+    """One step: the candidates, best first, which of them was adopted, and which would have done as well."""
 
     tried: tuple[Candidate, ...]
     chosen: str | None
+    rivals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +40,6 @@ class Named:
     rounds: tuple[Round, ...]
     reasons: dict[str, str]
     """Why an effect was adopted or not."""
-    rivals: tuple[str, ...]
-    """Effects that explain the last step as well."""
     first: Evidence
     """Weighed by what the plain damper leaves."""
     last: Evidence
@@ -48,12 +47,23 @@ class Named:
 
     @property
     def rivalling(self) -> tuple[tuple[str, Damper], ...]:
-        """The effect adopted last and its rivals, with the dampers fitted with them; empty without rivals."""
-        if not self.rivals:
+        """An effect adopted and its rivals, with the dampers fitted with them; empty without rivals."""
+        if not self._contested:
             return ()
-        last = self.deciding(self.adopted[-1])
-        wanted = (self.adopted[-1], *self.rivals)
-        return tuple((name, c.fitted.damper) for name in wanted for c in last if c.effect == name)
+        step = self._contested[-1]
+        wanted = [name for name in (step.chosen, *step.rivals) if name == step.chosen or name in self.rivals]
+        return tuple((c.effect, c.fitted.damper) for name in wanted for c in step.tried if c.effect == name)
+
+    @property
+    def rivals(self) -> tuple[str, ...]:
+        """Effects that explain some step as well as the one adopted there, and were not adopted later."""
+        found = dict.fromkeys(name for step in self._contested for name in step.rivals)
+        return tuple(name for name in found if name not in self.adopted)
+
+    @property
+    def _contested(self) -> list[Round]:
+        """The steps that stand and in which another effect would have done as well."""
+        return [r for r in self.rounds if r.chosen in self.adopted and not set(r.rivals) <= set(self.adopted)]
 
     def deciding(self, effect: str) -> tuple[Candidate, ...]:
         """The round that decided on an effect: the last in which it was tried; empty for a forced one."""
@@ -90,7 +100,7 @@ def name_effects(
     while len(search.rounds) < 2 * config.most_effects and search.evidence.something_missing(search.current, config):
         if not search.step():
             break
-    return Named(plain, search.current, tuple(search.rounds), search.reasons, search.rivals, first, search.evidence)
+    return Named(plain, search.current, tuple(search.rounds), search.reasons, first, search.evidence)
 
 
 @dataclass(eq=False)
@@ -105,7 +115,6 @@ class _Search:
     current: Fitted
     rounds: list[Round] = field(default_factory=list)
     reasons: dict[str, str] = field(default_factory=dict)
-    rivals: tuple[str, ...] = ()
 
     def force(self) -> None:
         """Adopt what the config asks for."""
@@ -176,8 +185,8 @@ class _Search:
     def _adopt(self, chosen: Candidate, tried: tuple[Candidate, ...]) -> None:
         self.reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
         if not chosen.varies:
-            self.rounds.append(Round(tuple(chosen if c.effect == chosen.effect else c for c in tried), chosen.effect))
-            self.rivals = _rivals(chosen, tried, self.config)
+            finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
+            self.rounds.append(Round(finished, chosen.effect, _rivals(chosen, tried, self.config)))
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
         self.evidence = self.weighed(chosen.fitted.damper)
         whole = self.evidence.whole

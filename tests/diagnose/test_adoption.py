@@ -67,3 +67,16 @@ def test_a_drift_is_named_where_the_damper_warms_and_only_if_there_is_one(
     assert told.effects == (("temperature_drift",) if drifts else ()), told.reason
     for name, beta in betas.items() if drifts else ():
         assert told.parameters["temperature_drift"][name].value == pytest.approx(beta, rel=0.2)
+
+
+def test_what_cannot_be_told_apart_stays_ambiguous_when_another_effect_is_found(
+    fresh_seeds: Callable[[int], list[int]],
+) -> None:
+    (seed,) = fresh_seeds(1)
+    damper = damper_of(TWO, gas_spring={"k_g": 3000.0}, asymmetry={"alpha": 0.08})
+    records = sines(damper, np.random.default_rng(seed), TWO, tests=((2.0, 0.015), (2.0, 0.03)))
+    told = diagnosed(records).diagnosis
+    assert told.verdict == "ambiguous", told.reason
+    assert {*told.effects, *told.rivals} >= {"gas_spring", "fluid_inertia", "asymmetry"}
+    assert told.next_test is not None
+    assert set(told.next_test.separates) == {"gas_spring", "fluid_inertia"}
