@@ -51,8 +51,8 @@ def test_what_repeats_and_what_drifts_is_no_noise() -> None:
 def test_noise_alone_leaves_no_repeatable_power_on_average(colour: float) -> None:
     rng = np.random.default_rng()
     powers = [repeatable_power(pure_error(coloured(rng, 4000, 1.0, colour).reshape(8, 500))).sum() for _ in range(60)]
-    # Eight cycles hide a little of the colour: over 1500 draws the mean lies 0.3 standard errors (of 60) below zero. With
-    # that and a skewness of 0.3, five are passed in one of some 300,000 runs; four were in one of some thousands.
+    # Eight cycles hide a little of the colour: over 1500 draws the mean lies 0.3 standard errors (of 60) below zero.
+    # With that and a skewness of 0.3, five are passed in one of some 300,000 runs; four were in one of some thousands.
     assert abs(np.mean(powers)) < 5.0 * np.std(powers) / np.sqrt(60)
 
 
