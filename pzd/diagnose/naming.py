@@ -14,10 +14,14 @@ from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit
 from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.judge import Judged
+from pzd.diagnose.problem import Problem
 from pzd.diagnose.split import Split
 from pzd.diagnose.support import closes, leaves_gap, stand_in, unsupported
 
 log = logging.getLogger(__name__)
+
+CLOSE = 0.95
+"""Candidates that pay at least this share of what the chosen one pays are searched to the end like it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +134,7 @@ class _Search:
         if chosen is None:
             return self._pair(tried)
         chosen = settled(self.evidence.whole, self.current, chosen)
-        self._adopt(chosen, tried)
+        self._adopt(chosen, _ended(self.evidence.whole, self.current, chosen, tried))
         return True
 
     def _tried(self, evidence: Evidence, current: Fitted, room: int) -> tuple[Candidate, ...]:
@@ -180,7 +184,7 @@ class _Search:
         if not closes(self.evidence, self.config, self.current, both):
             return None
         failed = stand_in(self.evidence, self.weighed(both.fitted.damper), self.config, self.current, both)
-        return (both, seconds) if failed is None else None
+        return (both, _ended(evidence.whole, at, both, seconds)) if failed is None else None
 
     def _adopt(self, chosen: Candidate, tried: tuple[Candidate, ...]) -> None:
         self.reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
@@ -205,6 +209,12 @@ class _Search:
         pays = delta_bic(without, current) <= self.config.adopt_bic
         if not pays or moved_by(whole, without, current) < self.config.visible:
             self.current, self.reasons[effect] = without, f"stand-in: not needed beside {newest}"
+
+
+def _ended(problem: Problem, before: Fitted, chosen: Candidate, tried: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """The candidates of a step, those nearly as good as the one chosen searched to the end as it was."""
+    near = CLOSE * chosen.delta_bic
+    return tuple(settled(problem, before, c) if c.effect != chosen.effect and c.delta_bic < near else c for c in tried)
 
 
 def _rivals(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseConfig) -> tuple[str, ...]:
