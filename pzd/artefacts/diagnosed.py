@@ -93,6 +93,24 @@ class Diagnosed:
     plain: Damper
     """The damper before diagnose."""
 
+    @classmethod
+    def undiagnosed(cls, damper: Damper, plain: Damper | None = None) -> Self:
+        """A damper that nobody diagnosed, in the form in which the stages behind diagnose take it."""
+        gap = Gap(before=0.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=(), hold_out="records")
+        nothing = Diagnosis(
+            verdict="none",
+            reason="not diagnosed",
+            effects=(),
+            confidence=None,
+            gap=gap,
+            parameters={},
+            ranking=(),
+            rivals=(),
+            where=(),
+            next_test=None,
+        )
+        return cls(nothing, damper, plain or damper)
+
     def write(self, folder: Path, control: Control) -> None:
         """Write diagnosis.json, damper.yaml and plain.yaml."""
         write_json(folder / "diagnosis.json", self.diagnosis, control)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from pzd.artefacts import Diagnosed, Diagnosis, Gap, Rides, Rig, Table
+from pzd.artefacts import Diagnosed, Rides, Rig, Table
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.simulate.config import SimulateConfig
@@ -21,24 +21,6 @@ class Outing:
     rides: Rides
     least_damping: float
     """Smallest force over speed that any voltage gives at the speeds that the rig reached [N s/m]."""
-
-
-def undiagnosed(damper: Damper) -> Diagnosed:
-    """A damper as it was identified, in the form in which the stages behind diagnose take it."""
-    gap = Gap(before=0.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=(), hold_out="records")
-    nothing = Diagnosis(
-        verdict="none",
-        reason="not diagnosed: the paper's figures are about its own model",
-        effects=(),
-        confidence=None,
-        gap=gap,
-        parameters={},
-        ranking=(),
-        rivals=(),
-        where=(),
-        next_test=None,
-    )
-    return Diagnosed(nothing, damper, damper)
 
 
 def rides_on(
@@ -67,7 +49,7 @@ def rides_on(
     from pzd.simulate.stage import simulate as ride
     from pzd.table.stage import tabulate
 
-    alone = undiagnosed(damper)
+    alone = Diagnosed.undiagnosed(damper)
     made = tabulate(table, rig, alone, control, setting)
     rides = ride(simulate, alone, made, 1, Path())
     slopes = [

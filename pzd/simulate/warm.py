@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from threading import Thread
 
-from pzd.artefacts import Diagnosed, Diagnosis, ForceRow, Gap, Table, TableNotes
+from pzd.artefacts import Diagnosed, ForceRow, Table, TableNotes
 from pzd.damper.model import BaseRow, Damper
 from pzd.simulate.config import SimulateConfig
 
@@ -51,13 +51,8 @@ def _smallest_ride() -> None:
         for v in (-1.0, -0.0, 0.0, 1.0)
     )
     table = Table(forces, (), TableNotes(outside="model", reached_m_per_s=1.0, lost=(), not_monotone=()))
-    gap = Gap(before=0.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=(), hold_out="records")
-    nothing = Diagnosis(
-        verdict="none", reason="", effects=(), confidence=None, gap=gap, parameters={}, ranking=(), rivals=(),
-        where=(), next_test=None,
-    )  # fmt: skip
     config = SimulateConfig(duration_s=0.5, settle_s=0.1)
-    simulate(config, Diagnosed(nothing, damper, damper), table, 1, Path())
+    simulate(config, Diagnosed.undiagnosed(damper), table, 1, Path())
 
 
 def _steady(row: BaseRow, velocity: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pzd.artefacts import Diagnosed, Diagnosis, ForceRow, Gap, Table, TableNotes
+from pzd.artefacts import ForceRow, Table, TableNotes
 from pzd.damper.compose import steady_force
 from pzd.damper.model import BaseRow, Damper
 
@@ -44,20 +44,3 @@ def table_of(damper: Damper, outside: str = "model", reached: float = 0.4, top: 
             )
     notes = TableNotes(outside=outside, reached_m_per_s=reached, lost=(), not_monotone=())
     return Table(tuple(rows), (), notes)
-
-
-def diagnosed_of(damper: Damper, plain: Damper | None = None) -> Diagnosed:
-    gap = Gap(before=0.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=(), hold_out="cycles")
-    diagnosis = Diagnosis(
-        verdict="none",
-        reason="-",
-        effects=(),
-        confidence=None,
-        gap=gap,
-        parameters={},
-        ranking=(),
-        rivals=(),
-        where=(),
-        next_test=None,
-    )
-    return Diagnosed(diagnosis, damper, plain or damper)

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from simulate_dampers import diagnosed_of, table_of
+from simulate_dampers import table_of
 
-from pzd.artefacts import Rides, Table
+from pzd.artefacts import Diagnosed, Rides, Table
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError
@@ -29,7 +29,7 @@ def config(**given: object) -> SimulateConfig:
 
 
 def ride(damper: Damper, table: Table | None = None, plain: Damper | None = None, **given: object) -> Rides:
-    return simulate(config(**given), diagnosed_of(damper, plain), table or table_of(damper), 1, Path())
+    return simulate(config(**given), Diagnosed.undiagnosed(damper, plain), table or table_of(damper), 1, Path())
 
 
 def unvoiced(damper: Damper) -> Damper:
@@ -169,7 +169,7 @@ BY_VOLTAGE = {"at_voltage_V": (0.0, 150.0), "k_g": (1000.0, 40000.0)}
 
 def test_rides_at_the_same_time_are_the_same(damper) -> None:
     beside = damper.with_effect("gas_spring", BY_VOLTAGE)
-    given = (config(), diagnosed_of(beside, damper), table_of(beside), 1, Path())
+    given = (config(), Diagnosed.undiagnosed(beside, damper), table_of(beside), 1, Path())
     alone, together = simulate(*given), simulate(*given, jobs=6)
     assert together.summary == alone.summary
     for one, other in zip(together.rides, alone.rides, strict=True):

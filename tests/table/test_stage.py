@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pzd
-from pzd.artefacts import Diagnosed, Diagnosis, Gap, Rig, Table
+from pzd.artefacts import Diagnosed, Rig, Table
 from pzd.damper.model import BaseRow, Damper
 from pzd.quantities import Control
 from pzd.record import Record
@@ -46,26 +46,9 @@ def sine(voltage: float | None, temperature: float | None, amplitude: float = 0.
     return Record(f"r{voltage}-{temperature}", None, t, x, v, a, 1e3 * v, level(voltage), level(temperature))
 
 
-def diagnosed(damper: Damper) -> Diagnosed:
-    gap = Gap(before=0.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=(), hold_out="cycles")
-    none = Diagnosis(
-        verdict="none",
-        reason="-",
-        effects=(),
-        confidence=None,
-        gap=gap,
-        parameters={},
-        ranking=(),
-        rivals=(),
-        where=(),
-        next_test=None,
-    )
-    return Diagnosed(none, damper, damper)
-
-
 def table_of(damper: Damper, config: TableConfig | None = None, **motion: float) -> Table:
     records = tuple(sine(row.voltage_V, row.temperature_degC, **motion) for row in damper.base)
-    return tabulate(config or TableConfig(), Rig(records, ()), diagnosed(damper), Control(), None)
+    return tabulate(config or TableConfig(), Rig(records, ()), Diagnosed.undiagnosed(damper), Control(), None)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
@@ -145,7 +128,7 @@ def test_each_voltage_is_inside_as_far_as_it_was_driven() -> None:
     damper = damper_of([2])
     amplitudes = {0.0: 0.03, 50.0: 0.03, 100.0: 0.01, 150.0: 0.01}
     records = tuple(sine(U, 22.0, amplitude) for U, amplitude in amplitudes.items())
-    table = tabulate(TableConfig(), Rig(records, ()), diagnosed(damper), Control(), None)
+    table = tabulate(TableConfig(), Rig(records, ()), Diagnosed.undiagnosed(damper), Control(), None)
     lookup = Lookup.of(table)
     speed = 0.02 * 4 * np.pi
     np.testing.assert_array_equal(lookup.inside([0.0, 50.0, 100.0, 150.0], speed), [True, True, False, False])
