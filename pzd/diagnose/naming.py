@@ -128,7 +128,7 @@ class _Search:
 
     def step(self) -> bool:
         """Adopt one effect more, an adopted one by voltage, or two that are supported together; whether any was."""
-        tried = self._tried(self.evidence, self.current, room=1)
+        tried = self._tried(self.evidence, self.current)
         steps = sorted((*tried, *by_voltage(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
         chosen = self._first_supported(steps)
         if chosen is None:
@@ -137,8 +137,8 @@ class _Search:
         self._adopt(chosen, _ended(self.evidence.whole, self.current, chosen, tried))
         return True
 
-    def _tried(self, evidence: Evidence, current: Fitted, room: int) -> tuple[Candidate, ...]:
-        if len(current.effects) + room > self.config.most_effects:
+    def _tried(self, evidence: Evidence, current: Fitted) -> tuple[Candidate, ...]:
+        if len(current.effects) == self.config.most_effects:
             return ()
         return candidates(evidence.whole, current, self.config.forbid, self.jobs)
 
@@ -176,7 +176,7 @@ class _Search:
         """The effect that is supported together with another one, and what else was tried beside that."""
         evidence = self.weighed(lead.fitted.damper)
         at = fit(evidence.whole, lead.fitted.effects, evidence.whole.start_with(lead.fitted.damper))
-        seconds = self._tried(evidence, at, room=1)
+        seconds = self._tried(evidence, at)
         best = next((c for c in seconds if self._too_little(evidence, at, c) is None), None)
         if best is None:
             return None

@@ -39,16 +39,22 @@ def unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate
 
 def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> str | None:
     """Why a candidate is a stand-in by the gap that it leaves open, None where it closes its share."""
-    sizes = [visible_gap(evidence.judged(f.damper, config)) for f in (before, candidate.fitted)]
-    if sizes[1] ** 2 <= (1.0 - LEAST_CUT) * sizes[0] ** 2:
+    open_before, left = _gaps(evidence, config, before, candidate)
+    if left**2 <= (1.0 - LEAST_CUT) * open_before**2:
         return None
     return f"stand-in: closes less than {LEAST_CUT:.0%} of the gap"
 
 
 def closes(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> bool:
     """Whether a candidate leaves so little of the gap that nothing more is looked for under a name."""
-    sizes = [visible_gap(evidence.judged(f.damper, config)) for f in (before, candidate.fitted)]
-    return sizes[1] <= max(config.unexplained_share * sizes[0], config.negligible)
+    open_before, left = _gaps(evidence, config, before, candidate)
+    return left <= max(config.unexplained_share * open_before, config.negligible)
+
+
+def _gaps(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> tuple[float, float]:
+    """The gap without a candidate and with it, as shares of peak."""
+    without, with_it = (visible_gap(evidence.judged(f.damper, config)) for f in (before, candidate.fitted))
+    return without, with_it
 
 
 def trivial(fitted: Fitted, effect: str, force: float) -> bool:
