@@ -12,7 +12,7 @@ import numpy as np
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library
 from pzd.diagnose.fitting import DIFFERENCE, MOST_EVALUATIONS, Fitted, fit
-from pzd.diagnose.predict import WARMS
+from pzd.diagnose.predict import WARMS, ends
 from pzd.diagnose.problem import Problem, Unknown, simulated
 from pzd.record import Array
 
@@ -62,9 +62,7 @@ def _warmth(problem: Problem) -> dict[int, list[float]]:
     found: dict[int, list[float]] = {}
     for o in problem.observations:
         if o.motion.temperature is not None:
-            tenth = max(o.motion.temperature.size // 10, 1)
-            ends = o.motion.temperature[:tenth], o.motion.temperature[-tenth:]
-            found.setdefault(o.place, []).extend(float(np.median(end)) for end in ends)
+            found.setdefault(o.place, []).extend(ends(o.motion.temperature))
     return found
 
 

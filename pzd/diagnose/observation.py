@@ -21,7 +21,7 @@ from pzd.diagnose.autoregression import Autoregression
 from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.inputs import Prepared, sliced
 from pzd.diagnose.noise import PureError, pure_error
-from pzd.diagnose.predict import WARMS, motion_of, warming
+from pzd.diagnose.predict import motion_of, warms
 from pzd.diagnose.rich import rich_fit
 from pzd.diagnose.unsure import Expected
 from pzd.identify.trial import warm_up
@@ -111,16 +111,12 @@ def observations(
     found = []
     for p, mask, place, given in zip(prepared, kept, places, simulated, strict=True):
         if np.any(mask):
-            averaged = p.cycles is not None and place >= 0 and not _warms(p.record)
+            # Cycles differ where the damper warms, and their average would hide it.
+            averaged = p.cycles is not None and place >= 0 and not warms(p.record.temperature)
             build = _of_cycles if averaged else _of_samples
             made = build(p, mask, place, given, nuisance)
             found += [made] if made is not None else []
     return tuple(found)
-
-
-def _warms(record: Record) -> bool:
-    """Whether cycles differ because the damper warms: their average would hide it."""
-    return record.temperature is not None and warming(record.temperature) > WARMS
 
 
 def _of_cycles(

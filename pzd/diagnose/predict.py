@@ -54,15 +54,20 @@ def motion_of(record: Record, *, constant: bool) -> tuple[Motion, int]:
     motion = Motion.of(record) if stride == 1 else _refined(record, stride)
     if constant:
         motion = replace(motion, voltage=_held(motion.voltage))
-    if motion.temperature is not None and warming(motion.temperature) <= WARMS:
+    if motion.temperature is not None and not warms(motion.temperature):
         motion = replace(motion, temperature=_held(motion.temperature))
     return motion, stride
 
 
-def warming(temperature: Array) -> float:
-    """By how much a temperature (n,) rises or falls from beginning to end, its noise averaged out [K]."""
+def warms(temperature: Array | None) -> bool:
+    """Whether a temperature (n,) moves from beginning to end; False where none was recorded."""
+    return temperature is not None and float(np.ptp(ends(temperature))) > WARMS
+
+
+def ends(temperature: Array) -> tuple[float, float]:
+    """Temperature [degC] at the beginning and at the end of a test, the noise of (n,) samples averaged out."""
     tenth = max(temperature.size // 10, 1)
-    return float(abs(np.median(temperature[-tenth:]) - np.median(temperature[:tenth])))
+    return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
 
 
 def _refined(record: Record, stride: int) -> Motion:
