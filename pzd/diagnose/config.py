@@ -22,7 +22,7 @@ class NuisanceConfig(Frozen):
 class DiagnoseConfig(Frozen):
     """When simulation and measurement count as disagreeing, and when an effect is believed."""
 
-    significance: float = Field(default=1e-4, gt=0.0, lt=1.0)
+    significance: float = Field(default=1e-3, gt=0.0, lt=1.0)
     """A gap is believed when noise alone would show it less often than this."""
     visible: float = Field(default=0.0025, ge=0.0)
     """A gap smaller than this share of the peak force (r.m.s.) counts as nothing missing; an effect that moves the

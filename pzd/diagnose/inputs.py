@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pzd.diagnose.noise import pure_error
 from pzd.record import Record, is_constant, voltage_scale
-from pzd.rig.cycles import Cycles, cycles, settled
+from pzd.rig.cycles import Cycles, cycles, drift, settled
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array]
@@ -141,7 +141,9 @@ class Average:
     @classmethod
     def of(cls, record: Record, run: Cycles) -> Average:
         """The average cycle of a record, and how well it is known."""
-        error = pure_error(run.fold(record.time, record.displacement))
+        folded = run.fold(record.time, record.displacement)
+        creep = drift(folded)  # else a mean that walks would end every cycle with a step, which the oil spring feels
+        error = pure_error(folded - creep + creep.mean())
         finest = float(np.median(np.diff(np.unique(record.displacement))))
         hidden = finest**2 / 12.0 if error.sample_variance < (0.5 * finest) ** 2 else 0.0
         return cls(run, error.points, error.mean, error.of_mean + hidden / error.points)

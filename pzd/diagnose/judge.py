@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pzd.damper.model import Damper
 from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.inputs import Prepared
+from pzd.diagnose.jumps import jumps, jumps_in_cycles
 from pzd.diagnose.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
 from pzd.diagnose.noise import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.diagnose.nuisance import nuisance
@@ -34,7 +35,7 @@ class Judged:
     residual: Array
     """(n,) measured less predicted force [N]."""
     nuisances: Array
-    """(n,) the part of it that offset, gain and delay of the test explain [N]."""
+    """(n,) the part of it that offset, gain and delay of the test explain, and chance beside jumps [N]."""
     variance: float
     """Of one sample by noise [N^2]."""
     power: float
@@ -66,12 +67,22 @@ def judge(damper: Damper, prepared: Prepared, wanted: Mask, config: NuisanceConf
     predicted, residual = given.force, record.force - given.force
     mask = wanted & counted(prepared)
     rough = _rough_variance(prepared, residual, mask)
+    bends = _jumps(prepared)
     slack = np.zeros(residual.size)
-    slack[mask] = nuisance(residual[mask], predicted[mask], record.rate, rough, config, given.timing[mask])
+    slack[mask] = nuisance(
+        residual[mask], predicted[mask], record.rate, rough, config, given.timing[mask], bends[mask] == 0.0
+    )
+    slack[mask] += np.clip((residual - slack)[mask], -bends[mask], bends[mask])
     folded = _folded(prepared, residual - slack, mask)
     if folded is not None:
         return _repeating(prepared, mask, residual, slack, folded, given.unsure)
     return _not_repeating(prepared, mask, residual, slack, predicted)
+
+
+def _jumps(prepared: Prepared) -> Array:
+    """(n,) what chance makes of the samples beside a jump, at most [N]."""
+    record = prepared.record
+    return jumps_in_cycles(prepared.cycles, record.time, record.force) if prepared.cycles else jumps(record.force)
 
 
 def _repeating(

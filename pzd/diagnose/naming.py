@@ -99,11 +99,12 @@ def name_effects(
 
     first = weighed(damper)
     plain = fit(first.whole, (), first.whole.start())
-    search = _Search(config, weighed, jobs, first, plain)
+    search = _Search(config, weighed, jobs, damper, first, plain)
+    search.settle_temperature()
+    first, plain = search.evidence, search.current
     search.force()
-    while len(search.rounds) < 2 * config.most_effects and search.evidence.something_missing(search.current, config):
-        if not search.step():
-            break
+    while len(search.rounds) < 2 * config.most_effects and search.step():
+        pass
     return Named(plain, search.current, tuple(search.rounds), search.reasons, first, search.evidence)
 
 
@@ -114,6 +115,8 @@ class _Search:
     config: DiagnoseConfig
     weighed: Callable[[Damper], Evidence]
     jobs: int
+    identified: Damper
+    """Plain, with the base rows of identify."""
     evidence: Evidence
     """Weighed by what the current damper leaves."""
     current: Fitted
@@ -125,6 +128,26 @@ class _Search:
         for name in self.config.force:
             self.current = candidate(self.evidence.whole, self.current, library()[name]).fitted
             self.reasons[name] = "adopted because the config asks for it"
+
+    def settle_temperature(self) -> None:
+        """Keep T0, C, k by temperature where that pays, and more than an effect would; else one row a voltage.
+
+        Rows by temperature follow each test's own gain, and bend between the tests what is missing.
+        """
+        if len(self.identified.base) == len(self.evidence.whole.voltages) or self._drifts():
+            return
+        whole = self.weighed(self.identified.model_copy(update={"effects": self.current.damper.effects})).whole
+        few, effects, damper = whole.pooled(), self.current.effects, self.current.damper
+        rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, few))
+        pays = delta_bic(one, rows)
+        if pays <= self.config.adopt_bic and not effects:
+            drifts = tuple(name for name, effect in library().items() if effect.place == "material")
+            tried = candidates(few, one, (*self.config.forbid, *drifts), self.jobs)
+            pays -= min((c.delta_bic for c in tried), default=0.0)
+        self._weigh(rows if pays <= self.config.adopt_bic else one)
+
+    def _drifts(self) -> bool:
+        return any(library()[name].place == "material" for name in self.current.effects)
 
     def step(self) -> bool:
         """Adopt one effect more, an adopted one by voltage, or two that are supported together; whether any was."""
@@ -161,7 +184,8 @@ class _Search:
 
     def _pair(self, tried: tuple[Candidate, ...]) -> bool:
         """Adopt two effects at once: alone either takes on values that the other distorts."""
-        lead = next((c for c in tried if self._too_little(self.evidence, self.current, c) is None), None)
+        missing = self.evidence.something_missing(self.current, self.config)
+        lead = next((c for c in tried if missing and self._too_little(self.evidence, self.current, c) is None), None)
         found = None if lead is None else self._beside(lead)
         if lead is None or found is None:
             self.rounds += [Round(tried, None)] if tried else []
@@ -192,11 +216,16 @@ class _Search:
             finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
             self.rounds.append(Round(finished, chosen.effect, _rivals(chosen, tried, self.config)))
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
-        self.evidence = self.weighed(chosen.fitted.damper)
-        whole = self.evidence.whole
-        self.current = fit(whole, chosen.fitted.effects, whole.start_with(chosen.fitted.damper))
+        self._weigh(chosen.fitted)
+        self.settle_temperature()
         for name in self.current.effects[len(self.config.force) : -1]:
             self._drop_needless(name, chosen.effect)
+
+    def _weigh(self, found: Fitted) -> None:
+        """Go on from an optimum, the evidence weighed by what it leaves."""
+        self.evidence = self.weighed(found.damper)
+        whole = self.evidence.whole
+        self.current = fit(whole, found.effects, whole.start_with(found.damper))
 
     def _drop_needless(self, effect: str, newest: str) -> None:
         """Take back an effect adopted earlier that no longer pays or no longer moves the force."""

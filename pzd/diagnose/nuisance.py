@@ -9,17 +9,23 @@ from pzd.diagnose.config import NuisanceConfig
 
 Array = NDArray[np.float64]
 
-AT_MOST = np.array([2.0, 3.0, 2.0, 2.0])
-"""Offset, gain, delay and the instant of the voltage explain at most so many standard deviations: 1 % of peak, 6 %,
-1 ms, one sample; more is a gap."""
+AT_MOST = 3.5
+"""Offset, gain, delay and the instant of the voltage explain at most so many standard deviations of a test: chance
+goes further in one of two thousand; more is a gap. What all tests share shows in the fits, whatever this allows."""
 
 
 def nuisance(
-    residual: Array, predicted: Array, rate: float, variance: float, config: NuisanceConfig, timing: Array
+    residual: Array,
+    predicted: Array,
+    rate: float,
+    variance: float,
+    config: NuisanceConfig,
+    timing: Array,
+    calm: NDArray[np.bool_],
 ) -> Array:
     """The part of a residual that offset, gain and delay of the test explain within their priors.
 
-    Equation: min_b |r - A b|^2 / s^2 + |b|^2, |b_i| <= 2, 3, 2, 2, A = [sd_o peak, sd_g F, -sd_d dF/dt, sd_t dF/dt_U]
+    Equation: min_b |r - A b|^2 / s^2 + |b|^2, |b_i| <= 3.5, A = [sd_o peak, sd_g F, -sd_d dF/dt, sd_t dF/dt_U]
                                                                     Source: Gaussian prior, truncated
 
     Parameters
@@ -30,6 +36,7 @@ def nuisance(
     variance : of the noise [N^2]
     config : standard deviations of the priors
     timing : (n, 1) what one standard deviation of the voltage's instant makes of the force [N]; (n, 0) without
+    calm : (n,) the samples that count, those beside no jump
 
     Returns
     -------
@@ -37,9 +44,10 @@ def nuisance(
     """
     columns = np.hstack([columns_of(predicted, rate, config), timing])
     weight = max(variance, 1e-12 * float(np.max(np.abs(predicted))) ** 2)
-    normal = columns.T @ columns / weight + np.eye(columns.shape[1])
-    estimate = np.linalg.solve(normal, columns.T @ residual / weight)
-    explained: Array = columns @ np.clip(estimate, -AT_MOST[: estimate.size], AT_MOST[: estimate.size])
+    counted = columns[calm]
+    normal = counted.T @ counted / weight + np.eye(columns.shape[1])
+    estimate = np.linalg.solve(normal, counted.T @ residual[calm] / weight)
+    explained: Array = columns @ np.clip(estimate, -AT_MOST, AT_MOST)
     return explained
 
 

@@ -20,6 +20,7 @@ from pzd.damper.motion import Motion
 from pzd.diagnose.autoregression import Autoregression
 from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.inputs import Prepared, sliced
+from pzd.diagnose.jumps import jumps
 from pzd.diagnose.noise import PureError, pure_error
 from pzd.diagnose.predict import motion_of, warms
 from pzd.diagnose.rich import rich_fit
@@ -32,12 +33,6 @@ RESOLUTION = 3e-4
 DISCREPANCY = 0.3
 """Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
 fitted: a model that still lacks something must not be bent to where the noise happens to be smallest."""
-SUDDEN = 6.0
-"""A sample at which the force bends by so many times its usual scatter lies beside a jump."""
-MOST_SUDDEN = 40
-"""Samples beside jumps that are allowed for in one record, the largest."""
-USUAL = 1.4826
-"""Standard deviation of Gaussian scatter over its median magnitude."""
 MOST_HARMONICS = 80
 """Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart."""
 CYCLE_POINTS = 256
@@ -241,7 +236,7 @@ def with_nuisances(
             np.full(force.size, nuisance.offset * bare.peak),
             nuisance.gain * force,
             -nuisance.delay_s * np.gradient(force) * rate,
-            _jumps(bare.measured),
+            _beside(jumps(bare.measured)),
             *([] if timing is None else [timing]),
         ]
     )
@@ -249,15 +244,9 @@ def with_nuisances(
     return replace(bare, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
 
 
-def _jumps(force: Array) -> Array:
-    """(n, j) one column a sample beside a jump, as large as the force bends there [N].
-
-    A jump (dry friction at a reversal) falls anywhere between two samples: what is recorded beside it is chance.
-    """
-    bend = np.abs(np.convolve(force, (1.0, -2.0, 1.0), "same"))
-    bend[[0, -1]] = 0.0
-    sudden = np.flatnonzero(bend > SUDDEN * USUAL * np.median(bend))
-    beside = sudden[np.argsort(-bend[sudden], kind="stable")][:MOST_SUDDEN]
-    columns = np.zeros((force.size, beside.size))
-    columns[beside, np.arange(beside.size)] = bend[beside]
+def _beside(bends: Array) -> Array:
+    """(n, j) one column a sample beside a jump, as large as the force bends there [N]."""
+    beside = np.flatnonzero(bends)
+    columns = np.zeros((bends.size, beside.size))
+    columns[beside, np.arange(beside.size)] = bends[beside]
     return columns

@@ -38,7 +38,9 @@ def unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate
 
 
 def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> str | None:
-    """Why a candidate is a stand-in by the gap that it leaves open, None where it closes its share."""
+    """Why a candidate is a stand-in by the gap that it leaves open, None where it closes enough or noise hides it."""
+    if not evidence.something_missing(before, config):
+        return None
     open_before, left = _gaps(evidence, config, before, candidate)
     if left**2 <= (1.0 - LEAST_CUT) * open_before**2:
         return None

@@ -157,7 +157,7 @@ def _shift_per_cycle(time: Array, displacement: Array, run: Cycles) -> float:
     """
     order = np.arange(run.count, dtype=np.float64) - (run.count - 1) / 2.0
     folded = run.fold(time, displacement)
-    folded = folded - _drift(folded, order)
+    folded = folded - drift(folded)
     average: Array = folded.mean(axis=0)
     slope = np.asarray((np.roll(average, -1) - np.roll(average, 1)) * average.size / (2.0 * run.period))
     # Where the run begins and ends it may touch the corner of a start out of rest, which no cubic follows.
@@ -168,13 +168,19 @@ def _shift_per_cycle(time: Array, displacement: Array, run: Cycles) -> float:
     return float(order @ shifts / (order @ order))
 
 
-def _drift(folded: Array, order: Array) -> Array:
-    """Slow drift (count, points), a parabola that the means of the cycles show and their shape has no part in."""
+def drift(folded: Array) -> Array:
+    """Slow drift (count, points), a parabola that the means of the cycles show and their shape has no part in.
+
+    Parameters
+    ----------
+    folded : (count, points) one row a cycle
+    """
+    order = np.arange(len(folded)) - (len(folded) - 1) / 2.0
     degree = min(order.size - 1, 2)
     phase = (np.arange(folded.shape[1]) - 0.5 * (folded.shape[1] - 1)) / folded.shape[1]
     course = np.polynomial.Polynomial.fit(order, folded.mean(axis=1), degree)
-    drift: Array = course(order[:, None] + phase)
-    return drift
+    found: Array = course(order[:, None] + phase)
+    return found
 
 
 def _cubic(time: Array, values: Array, at: Array) -> Array:

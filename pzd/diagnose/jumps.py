@@ -1,0 +1,39 @@
+"""Where a recorded force jumps: what is recorded beside a jump is chance, for it falls anywhere between two samples."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pzd.record import Array
+from pzd.rig.cycles import Cycles
+
+SUDDEN = 6.0
+"""A sample at which the force bends by so many times its usual scatter lies beside a jump."""
+MOST_SUDDEN = 40
+"""Samples beside jumps that are allowed for in one record or average cycle, the largest."""
+USUAL = 1.4826
+"""Standard deviation of Gaussian scatter over its median magnitude."""
+
+
+def jumps(force: Array) -> Array:
+    """(n,) how far the force bends at the samples beside a jump (dry friction at a reversal) [N]; 0 at all others.
+
+    Equation: |F_(i-1) - 2 F_i + F_(i+1)| where it exceeds 6 of its robust standard deviations
+                                                                    Source: Hampel 1974, median deviation
+    """
+    bend = np.abs(np.convolve(force, (1.0, -2.0, 1.0), "same"))
+    bend[[0, -1]] = 0.0
+    sudden = np.flatnonzero(bend > SUDDEN * USUAL * np.median(bend))
+    largest = sudden[np.argsort(-bend[sudden], kind="stable")][:MOST_SUDDEN]
+    found = np.zeros(force.size)
+    found[largest] = bend[largest]
+    return found
+
+
+def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:
+    """(n,) the same for a record that repeats, as its average cycle shows them, free of most of the noise [N]."""
+    cycle = jumps(run.mean(time, force))
+    place = run.phase(time) * cycle.size
+    before = np.floor(place).astype(np.int64) % cycle.size
+    found: Array = np.maximum(cycle[before], cycle[(before + 1) % cycle.size])
+    return found
