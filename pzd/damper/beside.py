@@ -1,4 +1,4 @@
-"""The forces beside the element: the sum of all parallel effects in the library.
+"""The forces beside the element: the sum of all parallel effects in the library, and of the foils.
 
 The sum is written out as a module of its own in the kernel cache, so that a new parallel effect
 is one new file and still one compiled loop.
@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.compiled import cache_folder
-from pzd.damper.effects import library
+from pzd.damper.foils import foils, known
 
 Array = NDArray[np.float64]
 
 COLUMNS = tuple(
     (effect.name, parameter.name)
-    for effect in library().values()
+    for effect in known().values()
     if effect.place == "parallel"
     for parameter in effect.parameters
 )
@@ -39,7 +39,7 @@ def _source() -> str:
     return "\n".join(
         [
             "from pzd.damper.compiled import compiled",
-            *(f"from pzd.damper.effects import {effect}" for effect in effects),
+            *(f"from pzd.damper.{'foils' if effect in foils() else 'effects'} import {effect}" for effect in effects),
             *(f"_{effect} = compiled({effect}.law)" for effect in effects),
             "@compiled",
             "def beside(x, v, a, p):",

@@ -13,6 +13,7 @@ from pzd.damper.drive import felt_voltage
 from pzd.damper.effects import library
 from pzd.damper.effects.sensor_delay import law as moment
 from pzd.damper.flow import ROW, flow_force
+from pzd.damper.foils import known
 from pzd.damper.material import base_voltages, material
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
@@ -31,7 +32,7 @@ _FLOW_COLUMNS = tuple(
     for parameter in effect.parameters
     if parameter.name == column and effect.place in ("stroke", "flow")
 )
-_NEUTRAL = {(e.name, p.name): p.neutral for e in library().values() for p in e.parameters}
+_NEUTRAL = {(e.name, p.name): p.neutral for e in known().values() for p in e.parameters}
 _EVEN = 1e-6  # of the median sampling interval
 
 
@@ -128,7 +129,7 @@ def parallel_rows(damper: Damper, felt: Array | None) -> Array | None:
 
 def recorded(tau: float, time: Array, force: Array) -> Array:
     """(n,) force as a channel delayed by tau [s] shows it [N], linear between samples, held before the first."""
-    return force if tau == 0.0 else np.interp([moment(t, tau) for t in time], time, force)
+    return force if tau == 0.0 else np.asarray(np.interp(moment(time, tau), time, force))
 
 
 def steady_force(

@@ -92,7 +92,7 @@ def _drift_factors(damper: Damper, temperature: Array | float | None) -> Array:
     reference = damper.reference_temperature_degC or 0.0
     factors = np.ones((np.size(temperature), 3))
     for column, beta in enumerate(betas):
-        factors[:, column] = [drift(float(t), reference, beta) for t in np.atleast_1d(temperature)]
+        factors[:, column] = drift(temperature, reference, beta)
     return factors
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pydantic import Field, model_validator
 
 from pzd.damper.effects import library
+from pzd.damper.foils import known
 from pzd.schema.model import Frozen
 
 EffectValues = Mapping[str, float | tuple[float, ...]]
@@ -57,9 +58,9 @@ class Damper(Frozen):
 
 
 def _check_effect(name: str, values: EffectValues) -> None:
-    effects = library()
+    effects = known()
     if name not in effects:
-        near = difflib.get_close_matches(name, effects, 1)
+        near = difflib.get_close_matches(name, library(), 1)
         raise ValueError(f"no effect is called {name}" + (f"; is it {near[0]}?" if near else ""))
     wanted = {p.name for p in effects[name].parameters}
     given = set(values) - {"at_voltage_V"}

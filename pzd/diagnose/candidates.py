@@ -11,6 +11,7 @@ import numpy as np
 
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library
+from pzd.damper.foils import foils, known
 from pzd.diagnose.fitting import DIFFERENCE, MOST_EVALUATIONS, Fitted, fit
 from pzd.diagnose.predict import WARMS, ends
 from pzd.diagnose.problem import Problem, Unknown, simulated
@@ -103,7 +104,7 @@ def candidates(
 
 def finished(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
     """A candidate whose search was broken off early, searched on from there."""
-    return _from(_for(problem, library()[found.effect]), before, found.effect, found.fitted.searched)
+    return _from(_for(problem, known()[found.effect]), before, found.effect, found.fitted.searched)
 
 
 def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
@@ -117,6 +118,12 @@ def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
         if reached[-1].fitted.misfit <= before.misfit + STUCK:
             break
     return min(reached, key=lambda c: c.fitted.misfit)
+
+
+def best_foil(problem: Problem, before: Fitted) -> Candidate:
+    """The foil that explains most, fitted as a candidate is."""
+    tried = (settled(problem, before, candidate(problem, before, foil)) for foil in foils().values())
+    return min(tried, key=lambda c: c.delta_bic)
 
 
 def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:
@@ -139,7 +146,7 @@ def settled(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
     """A candidate with its optimum searched to the end, from all its starting values."""
     if found.varies:
         return _varied(problem, before, found.effect, PATIENT)
-    effect = library()[found.effect]
+    effect = known()[found.effect]
     problem = _for(problem, effect)
     others = [np.concatenate([_base(problem, before), s]) for s in promising_starts(problem, before, effect)[1:]]
     fits = [fit(problem, found.fitted.effects, start) for start in others]

@@ -8,7 +8,16 @@ from dataclasses import dataclass, field
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
-from pzd.diagnose.candidates import Candidate, by_voltage, candidate, candidates, delta_bic, moved_by, settled
+from pzd.diagnose.candidates import (
+    Candidate,
+    best_foil,
+    by_voltage,
+    candidate,
+    candidates,
+    delta_bic,
+    moved_by,
+    settled,
+)
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit
@@ -34,6 +43,24 @@ class Round:
 
 
 @dataclass(frozen=True, eq=False)
+class Foiled:
+    """An effect adopted, and a force that is not in the library and would do as well in its place."""
+
+    effect: str
+    damper: Damper
+    """With the effect."""
+    foil: str
+    with_foil: Damper
+    behind: float
+    """Bayesian criterion with the foil less that with the effect; negative where the foil does better."""
+
+    @property
+    def dampers(self) -> tuple[tuple[str, Damper], ...]:
+        """Either with its name."""
+        return (self.effect, self.damper), (self.foil, self.with_foil)
+
+
+@dataclass(frozen=True, eq=False)
 class Named:
     """What was adopted, and what was tried."""
 
@@ -48,12 +75,14 @@ class Named:
     """Weighed by what the plain damper leaves."""
     last: Evidence
     """Weighed by what the adopted damper leaves."""
+    foiled: tuple[Foiled, ...] = ()
+    """What is not in the library and would do as well in the place of an effect adopted, or better."""
 
     @property
     def rivalling(self) -> tuple[tuple[str, Damper], ...]:
         """An effect adopted and its rivals, with the dampers fitted with them; empty without rivals."""
         if not self._contested:
-            return ()
+            return tuple(pair for foiled in self.foiled[:1] for pair in foiled.dampers)
         step = self._contested[-1]
         wanted = [name for name in (step.chosen, *step.rivals) if name == step.chosen or name in self.rivals]
         return tuple((c.effect, c.fitted.damper) for name in wanted for c in step.tried if c.effect == name)
@@ -105,7 +134,7 @@ def name_effects(
     search.force()
     while len(search.rounds) < 2 * config.most_effects and search.step():
         pass
-    return Named(plain, search.current, tuple(search.rounds), search.reasons, first, search.evidence)
+    return Named(plain, search.current, tuple(search.rounds), search.reasons, first, search.evidence, search.foiled())
 
 
 @dataclass(eq=False)
@@ -227,14 +256,29 @@ class _Search:
         whole = self.evidence.whole
         self.current = fit(whole, found.effects, whole.start_with(found.damper))
 
+    def _without(self, effect: str) -> Fitted:
+        """The optimum with one of the adopted effects left out."""
+        whole, damper = self.evidence.whole, self.current.damper
+        effects = {name: values for name, values in damper.effects.items() if name != effect}
+        return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
+
+    def foiled(self) -> tuple[Foiled, ...]:
+        """The foils that would do as well as an effect adopted, in its place."""
+        found = []
+        for name in self.current.effects[len(self.config.force) :]:
+            without = self._without(name)
+            foil = best_foil(self.evidence.whole, without)
+            behind = foil.delta_bic - delta_bic(without, self.current)
+            if behind < self.config.rival_bic:
+                found.append(Foiled(name, self.current.damper, foil.effect, foil.fitted.damper, behind))
+        return tuple(found)
+
     def _drop_needless(self, effect: str, newest: str) -> None:
         """Take back an effect adopted earlier that no longer pays or no longer moves the force."""
         whole, current = self.evidence.whole, self.current
         if library()[effect].place == "material":
             return
-        effects = {name: values for name, values in current.damper.effects.items() if name != effect}
-        fewer = current.damper.model_copy(update={"effects": effects})
-        without = fit(whole, tuple(effects), whole.start_with(fewer))
+        without = self._without(effect)
         pays = delta_bic(without, current) <= self.config.adopt_bic
         if not pays or moved_by(whole, without, current) < self.config.visible:
             self.current, self.reasons[effect] = without, f"stand-in: not needed beside {newest}"

@@ -11,7 +11,7 @@ import numpy as np
 
 from pzd.damper.compose import force_of_rows, recorded, respond, standing_rows
 from pzd.damper.effect import Parameter, Scales
-from pzd.damper.effects import library
+from pzd.damper.foils import known
 from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.observation import Observation
@@ -104,7 +104,7 @@ class Problem:
             Unknown(name, parameter, parameter.search.scale(self.scales) or 1.0, node)
             for name in effects
             for node in (range(len(self.voltages)) if name in self.varying else (None,))
-            for parameter in library()[name].parameters
+            for parameter in known()[name].parameters
         )
 
     def start(self) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from pzd.artefacts import Ranked, Value
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library
+from pzd.damper.foils import known
 from pzd.damper.model import Damper
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence
@@ -60,8 +61,13 @@ def decide(named: Named, before: Sequence[Judged], after: Sequence[Judged], conf
     if chances[1] < config.significance and _remains(sizes, config):
         words = f"{told}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
         return Decision("unexplained", words, None)
-    if named.rivals:
-        words = f"{told}; {', '.join(named.rivals)} would do as well on these tests"
+    better = [f for f in named.foiled if f.behind < -config.rival_bic]
+    if better:
+        others = [f"{known()[f.foil].law}, which is not in the library, does better than {f.effect}" for f in better]
+        return Decision("unexplained", f"{told}; but {' and '.join(others)}", None)
+    if named.rivals or named.foiled:
+        others = [*named.rivals, *(f"{known()[f.foil].law} (not in the library)" for f in named.foiled)]
+        words = f"{told}; {', '.join(others)} would do as well on these tests"
         return Decision("ambiguous", words, confidence_of(named))
     return Decision("named", f"{told}; what is left is within the noise or negligible", confidence_of(named))
 
@@ -99,6 +105,8 @@ def confidence_of(named: Named) -> float:
             best = next(c.delta_bic for c in step.tried if c.effect == step.chosen)
             others = [c.delta_bic - best for c in step.tried if c.delta_bic >= best]  # a better one was a stand-in
             weight /= sum(float(np.exp(-0.5 * other)) for other in others)
+    for foiled in named.foiled:
+        weight /= 1.0 + float(np.exp(-0.5 * foiled.behind))
     return round(weight, 3)
 
 

@@ -5,6 +5,9 @@ Law: F recorded at t - tau; negative where the displacement is the late one. Ran
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pzd.damper.effect import Effect, Parameter, Search
 
 EFFECT = Effect(
@@ -17,6 +20,6 @@ EFFECT = Effect(
 )
 
 
-def law(time: float, tau: float) -> float:
-    """Moment [s] whose force the channel shows at `time` [s]."""
+def law(time: NDArray[np.float64] | float, tau: float) -> NDArray[np.float64] | float:
+    """Moments [s] whose force the channel shows at one or more times [s]."""
     return time - tau

@@ -6,7 +6,8 @@ Law: T0 exp(-beta_T0 (T - T_ref)), C exp(-beta_C (T - T_ref)). Range: hydraulic 
 
 from __future__ import annotations
 
-import math
+import numpy as np
+from numpy.typing import NDArray
 
 from pzd.damper.effect import Effect, Parameter, Search
 
@@ -24,6 +25,6 @@ EFFECT = Effect(
 )
 
 
-def law(temperature: float, reference: float, beta: float) -> float:
-    """Factor on T0 or C at a temperature [degC]."""
-    return math.exp(-beta * (temperature - reference))
+def law(temperature: NDArray[np.float64] | float, reference: float, beta: float) -> NDArray[np.float64]:
+    """Factor on T0 or C at one or more temperatures [degC]."""
+    return np.asarray(np.exp(-beta * (temperature - reference)))
