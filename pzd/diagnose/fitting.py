@@ -44,7 +44,7 @@ class Fitted:
     slopes: Array
     """(w, 3 b + e) derivatives of all residuals by the searched variables."""
     covariance: Array
-    """(e, e) of the effect parameters in their own units, noise alone."""
+    """(3 b + e, 3 b + e) of what was searched, noise alone; infinite for what no test shows."""
     unknowns: tuple[Unknown, ...]
 
     @property
@@ -79,7 +79,7 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
         tuple(residuals),
         tuple(forces),
         slopes,
-        _covariance(np.concatenate([slopes, prior]), found, unknowns),
+        _covariance(np.concatenate([slopes, prior])),
         unknowns,
     )
 
@@ -178,14 +178,12 @@ def _shifted(x: Array, j: int) -> Array:
     return moved
 
 
-def _covariance(jacobian: Array, x: Array, unknowns: Sequence[Unknown]) -> Array:
-    """(e, e) covariance of the effect parameters in their own units; infinite for one that no test shows."""
-    count = len(unknowns)
+def _covariance(jacobian: Array) -> Array:
+    """(p, p) covariance of what was searched; infinite for what no residual shows."""
     size = np.linalg.norm(jacobian, axis=0)
     unseen = size == 0.0
     size[unseen] = 1.0
     scaled = jacobian / size
-    whole = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True) / np.outer(size, size)
+    whole: Array = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True) / np.outer(size, size)
     whole[unseen, unseen] = np.inf
-    slopes = np.array([u.slope(float(v)) for u, v in zip(unknowns, x[x.size - count :], strict=True)])
-    return np.asarray(whole[x.size - count :, x.size - count :] * np.outer(slopes, slopes))
+    return whole

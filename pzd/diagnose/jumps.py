@@ -11,23 +11,35 @@ SUDDEN = 6.0
 """A sample at which the force bends by so many times its usual scatter lies beside a jump."""
 MOST_SUDDEN = 40
 """Samples beside jumps that are allowed for in one record or average cycle, the largest."""
+MOST_IN_SAMPLES = 150
+"""The same in a record that is compared sample by sample: no cycle stands for the others there."""
 USUAL = 1.4826
 """Standard deviation of Gaussian scatter over its median magnitude."""
 
 
-def jumps(force: Array) -> Array:
+def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
     """(n,) how far the force bends at the samples beside a jump (dry friction at a reversal) [N]; 0 at all others.
 
     Equation: |F_(i-1) - 2 F_i + F_(i+1)| where it exceeds 6 of its robust standard deviations
                                                                     Source: Hampel 1974, median deviation
+
+    Parameters
+    ----------
+    force : (n,) [N]
+    most : samples that are allowed for, the largest
     """
     bend = np.abs(np.convolve(force, (1.0, -2.0, 1.0), "same"))
     bend[[0, -1]] = 0.0
     sudden = np.flatnonzero(bend > SUDDEN * USUAL * np.median(bend))
-    largest = sudden[np.argsort(-bend[sudden], kind="stable")][:MOST_SUDDEN]
+    largest = sudden[np.argsort(-bend[sudden], kind="stable")][:most]
     found = np.zeros(force.size)
     found[largest] = bend[largest]
     return found
+
+
+def jumps_in_samples(measured: Array, predicted: Array) -> Array:
+    """(n,) the same for a record compared sample by sample: noise hides jumps of it that its prediction shows [N]."""
+    return np.maximum(jumps(measured, MOST_IN_SAMPLES), jumps(predicted, MOST_IN_SAMPLES))
 
 
 def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:

@@ -24,6 +24,7 @@ from pzd.diagnose.fitting import Fitted, fit
 from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.judge import Judged
 from pzd.diagnose.problem import Problem
+from pzd.diagnose.settling import at_rest
 from pzd.diagnose.split import Split
 from pzd.diagnose.support import closes, leaves_gap, stand_in, unsupported
 
@@ -134,6 +135,7 @@ def name_effects(
     search.force()
     while len(search.rounds) < 2 * config.most_effects and search.step():
         pass
+    search.evidence, search.current = at_rest(weighed, search.evidence, search.current)
     return Named(plain, search.current, tuple(search.rounds), search.reasons, first, search.evidence, search.foiled())
 
 

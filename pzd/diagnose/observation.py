@@ -15,12 +15,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compose import sampling_steps
+from pzd.damper.compose import respond, sampling_steps, value_of
+from pzd.damper.effects.sensor_delay import law as moment
+from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.autoregression import Autoregression
 from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.inputs import Prepared, sliced
-from pzd.diagnose.jumps import jumps
+from pzd.diagnose.jumps import jumps, jumps_in_samples
 from pzd.diagnose.noise import PureError, pure_error
 from pzd.diagnose.predict import motion_of, warms
 from pzd.diagnose.rich import rich_fit
@@ -30,6 +32,12 @@ from pzd.record import Array, Record
 
 RESOLUTION = 3e-4
 """No force is believed to be known better than this share of the record's peak (r.m.s.)."""
+SIMULATION_TOLERANCE = 1e-8
+"""Of the damper's path, as a share of the force."""
+INSTANT = 1e-6
+"""Delay by which the slope of a force over time is taken [s]."""
+LATEST = 3.0
+"""At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope."""
 DISCREPANCY = 0.3
 """Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
 fitted: a model that still lacks something must not be bent to where the noise happens to be smallest."""
@@ -72,6 +80,22 @@ class Observation:
     def at_compared(self, simulated: Array) -> Array:
         """(n,) or (n, p) of what was simulated at the samples that are compared."""
         return simulated[self.first :: self.stride][: self.measured.size]
+
+    def delayed(self, simulated: Array, delay: float) -> Array:
+        """(m,) what was simulated as a channel shows it that comes late [s], between the samples by a cubic."""
+        from scipy.interpolate import CubicSpline
+
+        if delay == 0.0:
+            return simulated
+        begin = self.first if isinstance(self.noise, PureError) else 0
+        time = self.motion.time[begin:]
+        shown = np.array([moment(t, delay) for t in time])
+        if begin == 0:
+            return np.asarray(CubicSpline(time, simulated)(np.clip(shown, time[0], time[-1])))
+        period = time[-1] - time[0] + self.steps[-1]
+        whole = np.append(simulated[begin:], simulated[begin])
+        cycle = CubicSpline(np.append(time, time[0] + period), whole, bc_type="periodic")
+        return np.concatenate([simulated[:begin], cycle(shown)])
 
     def in_noise(self, values: Array) -> Array:
         """(w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
@@ -145,7 +169,7 @@ def _of_cycles(
         np.zeros((2 * weights.size - 1, 0)),
         np.zeros(0),
     )
-    return with_nuisances(bare, average, nuisance, error.points / run.period)
+    return with_nuisances(bare, given.damper, nuisance)
 
 
 def _left_by(measured: Array, force: Array, variance: float) -> float:
@@ -214,7 +238,7 @@ def _of_samples(
         np.zeros((stop - start - noise.coefficients.size, 0)),
         np.zeros(0),
     )
-    return with_nuisances(bare, force[start:stop], nuisance, record.rate, given.timing[start:stop])
+    return with_nuisances(bare, given.damper, nuisance, given.timing[start:stop])
 
 
 def _part(record: Record, start: int, stop: int) -> Record:
@@ -223,25 +247,41 @@ def _part(record: Record, start: int, stop: int) -> Record:
     return sliced(record, kept)
 
 
+def response(observation: Observation, damper: Damper, late: float = 0.0) -> Array:
+    """(n,) force that a damper gives at the compared samples [N], shown by a channel that comes later by `late` [s]."""
+    o, tau = observation, value_of(damper, "sensor_delay", "tau")
+    prompt = damper.model_copy(update={"effects": {n: e for n, e in damper.effects.items() if n != "sensor_delay"}})
+    force = respond(prompt, o.motion, float(o.measured[0]), SIMULATION_TOLERANCE)
+    return o.at_compared(o.delayed(force, tau + late))
+
+
 def with_nuisances(
-    bare: Observation, force: Array, nuisance: NuisanceConfig, rate: float, timing: Array | None = None
+    bare: Observation, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
 ) -> Observation:
     """The observation with the test's own offset, gain and delay, jumps and instants of the voltage integrated out.
 
-    Equation: r' = (I + V V')^(-1/2) r, V = [s_o peak, s_g F, -s_d dF/dt, jumps, s_t dF/dt_U] in units of noise
+    Equation: r' = (I + V V')^(-1/2) r, V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise
                                                     Source: Gaussian prior, marginal likelihood
+
+    A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
+    that, F(t - d) - F + d dF/dt, is taken off the measured force.
     """
+    force, averaged = response(bare, damper), isinstance(bare.noise, PureError)
+    late = (response(bare, damper, INSTANT) - force) / INSTANT
     columns = np.column_stack(
         [
+            nuisance.delay_s * late,
             np.full(force.size, nuisance.offset * bare.peak),
             nuisance.gain * force,
-            -nuisance.delay_s * np.gradient(force) * rate,
-            _beside(jumps(bare.measured)),
+            _beside(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
             *([] if timing is None else [timing]),
         ]
     )
-    left, size, _ = np.linalg.svd(bare.in_noise(columns), full_matrices=False)
-    return replace(bare, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
+    left, size, right = np.linalg.svd(bare.in_noise(columns), full_matrices=False)
+    likeliest = right[:, 0] @ (size / (1.0 + size**2) * (left.T @ bare.in_noise(bare.measured - force)))
+    delay = nuisance.delay_s * float(np.clip(likeliest, -LATEST, LATEST))
+    measured = bare.measured - (response(bare, damper, delay) - force - delay * late)
+    return replace(bare, measured=measured, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
 
 
 def _beside(bends: Array) -> Array:

@@ -9,16 +9,14 @@ from typing import cast
 
 import numpy as np
 
-from pzd.damper.compose import force_of_rows, recorded, respond, standing_rows
+from pzd.damper.compose import force_of_rows, standing_rows
 from pzd.damper.effect import Parameter, Scales
 from pzd.damper.foils import known
 from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnose.observation import Observation
+from pzd.diagnose.observation import SIMULATION_TOLERANCE, Observation, response
 from pzd.record import Array
 
-SIMULATION_TOLERANCE = 1e-8
-"""Of the damper's path, as a share of the force."""
 SOFTEST = 0.1
 """Least C that a search starts from [largest force over largest speed]: identify may leave it undetermined."""
 BOUND = 1e3
@@ -192,8 +190,8 @@ def simulated(point: Point, observation: Observation) -> Array:
         rows, beside = standing_rows(friction, damping, stiffness, effects)
         force = force_of_rows(rows, beside, o.motion, o.steps, start, SIMULATION_TOLERANCE)
         tau = effects.get("sensor_delay", {}).get("tau", 0.0)
-        return o.at_compared(recorded(tau, o.motion.time, force))
+        return o.at_compared(o.delayed(force, tau))
     damper = point.damper()
     if o.place >= 0:
         damper = damper.model_copy(update={"base": damper.base[o.place : o.place + 1]})
-    return o.at_compared(respond(damper, o.motion, start, SIMULATION_TOLERANCE))
+    return response(o, damper)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from pzd.diagnose.candidates import Candidate
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence
 from pzd.diagnose.fitting import Fitted, fit, misfit_beside
 from pzd.diagnose.gap import visible_gap
+from pzd.diagnose.intervals import LEVEL, standard_errors
 from pzd.diagnose.problem import Problem
-from pzd.record import Array
 
 AGREES = 0.001
 """Halves of the tests disagree about a parameter when chance would let them so seldom."""
@@ -22,8 +20,6 @@ TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, ("val
 """A common offset [share of the lowest peak], delay or lag [s] that counts as nothing missing."""
 LEAST_CUT = 0.2
 """An effect closes at least this share of the gap (mean square): what is real is not one of many small corrections."""
-LEVEL = 1.96
-"""Standard errors in a 95 % interval."""
 
 
 def unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate) -> str | None:
@@ -69,12 +65,6 @@ def trivial(fitted: Fitted, effect: str, force: float) -> bool:
             unit = limit * (force if unknown.parameter.unit == "N" else 1.0)
             sizes.append((abs(unknown.of(fitted.damper)) - LEVEL * error) / unit)
     return bool(sizes) and max(sizes) < 1.0
-
-
-def standard_errors(fitted: Fitted) -> Array:
-    """(e,) of the effect parameters, widened by what the fit leaves above the noise."""
-    freedom = max(fitted.size - fitted.searched.size, 1)
-    return np.sqrt(np.diag(fitted.covariance) * max(1.0, fitted.misfit / freedom))
 
 
 def stand_in(

@@ -29,8 +29,9 @@ NEIGHBOURS = 2
 class Expected:
     """The force that a damper gives in a record, and how uncertain it is."""
 
+    damper: Damper
     force: Array
-    """(n,) [N]."""
+    """(n,) that it gives [N]."""
     unsure: Array | float
     """(H + 1,) variance |.|^2 of the harmonics of its average cycle by the displacement [N^2]; 0 where none repeats."""
     timing: Array
@@ -47,7 +48,7 @@ def expected(damper: Damper, prepared: Prepared, delay: float) -> Expected:
     delay : standard deviation of a test's own delay [s]
     """
     force = predicted_force(damper, prepared)
-    return Expected(force, force_error(damper, prepared), _timing(damper, prepared, force, delay))
+    return Expected(damper, force, force_error(damper, prepared), _timing(damper, prepared, force, delay))
 
 
 def _timing(damper: Damper, prepared: Prepared, force: Array, delay: float) -> Array:

@@ -16,9 +16,9 @@ from pzd.damper.model import Damper
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence
 from pzd.diagnose.gap import probability_of_noise, visible_gap
+from pzd.diagnose.intervals import LEVEL, standard_errors
 from pzd.diagnose.judge import Judged
 from pzd.diagnose.naming import Named
-from pzd.diagnose.support import LEVEL, standard_errors
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
