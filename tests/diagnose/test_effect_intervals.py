@@ -13,7 +13,7 @@ from pzd.damper.effects import library
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit
-from pzd.diagnose.inputs import prepare
+from pzd.diagnose.inputs import prepare, sliced
 from pzd.diagnose.intervals import LEVEL, disagreement, standard_errors
 from pzd.diagnose.problem import Unknown
 from pzd.diagnose.split import split
@@ -82,7 +82,10 @@ def shown_late(delay: float, effects: dict[str, dict[str, float]], test: tuple[f
     voltage, frequency, amplitude = test
     late = {"sensor_delay": {"tau": effects.get("sensor_delay", {}).get("tau", 0.0) + delay}}
     record = sine(damper_of((voltage,), **{**effects, **late}), voltage, frequency, amplitude,
-                  np.random.default_rng(0), noise=0.0, cycles=4, rate=500.0)  # fmt: skip
+                  np.random.default_rng(0), noise=0.0, cycles=5, rate=500.0)  # fmt: skip
+    record = sliced(
+        record, record.time < record.time[-1] - 0.05
+    )  # a channel ahead of time has nothing to show at the end
     rng = np.random.default_rng()
     return replace(record, force=record.force + 1e-4 * np.max(record.force) * rng.standard_normal(record.force.size))
 
