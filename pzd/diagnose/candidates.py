@@ -21,6 +21,10 @@ PATIENT = 100
 """Evaluations after which even a settled optimum is left as it is."""
 FIRST = 6
 """Evaluations after which the candidates are compared for the first time; the better ones go on."""
+OTHERS = 2
+"""Starting values tried before fainter ones."""
+FAINTER = (0.3, 0.1, 0.03, 0.01)
+"""Shares of the way from no effect to the most promising starting values."""
 NEAR = 0.5
 """A candidate that pays less than this share of what the best pays is not searched on."""
 STUCK = 1.0
@@ -110,14 +114,22 @@ def finished(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
 def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     """One effect fitted beside those of `before`, from its most promising starting values.
 
-    The others are tried only while what is reached is worse than without the effect: a search that got stuck.
+    Others, then ever fainter ones, are tried only while what is reached is worse than without the effect: a search
+    that got stuck, for without the effect is one of its own values.
     """
     problem, reached = _for(problem, effect), []
-    for start in promising_starts(problem, before, effect):
+    starts = promising_starts(problem, before, effect)
+    for start in (*starts[:OTHERS], *(_fainter(problem, effect, starts[0], share) for share in FAINTER)):
         reached.append(_from(problem, before, effect.name, np.concatenate([_base(problem, before), start]), FIRST))
         if reached[-1].fitted.misfit <= before.misfit + STUCK:
             break
     return min(reached, key=lambda c: c.fitted.misfit)
+
+
+def _fainter(problem: Problem, effect: Effect, start: Array, share: float) -> Array:
+    """Starting values that lie so much nearer to those that switch the effect off."""
+    unknowns = problem.unknowns((effect.name,))
+    return np.array([u.searched(u.fainter(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
 
 
 def best_foil(problem: Problem, before: Fitted) -> Candidate:

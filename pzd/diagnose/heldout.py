@@ -9,7 +9,7 @@ from pzd.diagnose.evidence import Evidence
 from pzd.diagnose.fitting import fit
 from pzd.diagnose.gap import gap_of
 from pzd.diagnose.judge import Judged, judge
-from pzd.diagnose.naming import Named
+from pzd.diagnose.named import Named
 from pzd.diagnose.split import UNTOUCHED, Split
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
@@ -21,8 +22,10 @@ from pzd.diagnose.candidates import (
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit
+from pzd.diagnose.gap import visible_gap
 from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.judge import Judged
+from pzd.diagnose.named import Foiled, Named, Round
 from pzd.diagnose.problem import Problem
 from pzd.diagnose.settling import at_rest
 from pzd.diagnose.split import Split
@@ -30,83 +33,10 @@ from pzd.diagnose.support import closes, leaves_gap, stand_in, unsupported
 
 log = logging.getLogger(__name__)
 
+WIDER = 1.1
+"""An optimum that widens the gap by more than this factor over where its search began is not gone to."""
 CLOSE = 0.95
 """Candidates that pay at least this share of what the chosen one pays are searched to the end like it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Round:
-    """One step: the candidates, best first, which of them was adopted, and which would have done as well."""
-
-    tried: tuple[Candidate, ...]
-    chosen: str | None
-    rivals: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Foiled:
-    """An effect adopted, and a force that is not in the library and would do as well in its place."""
-
-    effect: str
-    damper: Damper
-    """With the effect."""
-    foil: str
-    with_foil: Damper
-    behind: float
-    """Bayesian criterion with the foil less that with the effect; negative where the foil does better."""
-
-    @property
-    def dampers(self) -> tuple[tuple[str, Damper], ...]:
-        """Either with its name."""
-        return (self.effect, self.damper), (self.foil, self.with_foil)
-
-
-@dataclass(frozen=True, eq=False)
-class Named:
-    """What was adopted, and what was tried."""
-
-    plain: Fitted
-    """No effect, on the samples seen."""
-    fitted: Fitted
-    """With all that was adopted, on the samples seen."""
-    rounds: tuple[Round, ...]
-    reasons: dict[str, str]
-    """Why an effect was adopted or not."""
-    first: Evidence
-    """Weighed by what the plain damper leaves."""
-    last: Evidence
-    """Weighed by what the adopted damper leaves."""
-    foiled: tuple[Foiled, ...] = ()
-    """What is not in the library and would do as well in the place of an effect adopted, or better."""
-
-    @property
-    def rivalling(self) -> tuple[tuple[str, Damper], ...]:
-        """An effect adopted and its rivals, with the dampers fitted with them; empty without rivals."""
-        if not self._contested:
-            return tuple(pair for foiled in self.foiled[:1] for pair in foiled.dampers)
-        step = self._contested[-1]
-        wanted = [name for name in (step.chosen, *step.rivals) if name == step.chosen or name in self.rivals]
-        return tuple((c.effect, c.fitted.damper) for name in wanted for c in step.tried if c.effect == name)
-
-    @property
-    def rivals(self) -> tuple[str, ...]:
-        """Effects that explain some step as well as the one adopted there, and were not adopted later."""
-        found = dict.fromkeys(name for step in self._contested for name in step.rivals)
-        return tuple(name for name in found if name not in self.adopted)
-
-    @property
-    def _contested(self) -> list[Round]:
-        """The steps that stand and in which another effect would have done as well."""
-        return [r for r in self.rounds if r.chosen in self.adopted and not set(r.rivals) <= set(self.adopted)]
-
-    def deciding(self, effect: str) -> tuple[Candidate, ...]:
-        """The round that decided on an effect: the last in which it was tried; empty for a forced one."""
-        return next((r.tried for r in reversed(self.rounds) if any(c.effect == effect for c in r.tried)), ())
-
-    @property
-    def adopted(self) -> tuple[str, ...]:
-        """The effects adopted, best first."""
-        return self.fitted.effects
 
 
 def name_effects(
@@ -187,8 +117,8 @@ class _Search:
         chosen = self._first_supported(steps)
         if chosen is None:
             return self._pair(tried)
-        chosen = settled(self.evidence.whole, self.current, chosen)
-        self._adopt(chosen, _ended(self.evidence.whole, self.current, chosen, tried))
+        ended = settled(self.evidence.whole, self.current, chosen)
+        self._adopt(ended, _ended(self.evidence.whole, self.current, ended, tried), _before(chosen, steps))
         return True
 
     def _tried(self, evidence: Evidence, current: Fitted) -> tuple[Candidate, ...]:
@@ -221,14 +151,13 @@ class _Search:
         if lead is None or found is None:
             self.rounds += [Round(tried, None)] if tried else []
             return False
-        second, seconds = found
-        self.rounds.append(Round(tried, lead.effect))
+        self.rounds.append(Round(tried, lead.effect, refused=_before(lead, tried)))
         self.reasons[lead.effect] = "adopted"
-        self._adopt(second, seconds)
+        self._adopt(*found)
         return True
 
-    def _beside(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...]] | None:
-        """The effect that is supported together with another one, and what else was tried beside that."""
+    def _beside(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...], frozenset[str]] | None:
+        """The effect that is supported together with another one, what else was tried beside that, and was refused."""
         evidence = self.weighed(lead.fitted.damper)
         at = fit(evidence.whole, lead.fitted.effects, evidence.whole.start_with(lead.fitted.damper))
         seconds = self._tried(evidence, at)
@@ -239,13 +168,14 @@ class _Search:
         if not closes(self.evidence, self.config, self.current, both):
             return None
         failed = stand_in(self.evidence, self.weighed(both.fitted.damper), self.config, self.current, both)
-        return (both, _ended(evidence.whole, at, both, seconds)) if failed is None else None
+        return None if failed else (both, _ended(evidence.whole, at, both, seconds), _before(best, seconds))
 
-    def _adopt(self, chosen: Candidate, tried: tuple[Candidate, ...]) -> None:
+    def _adopt(self, chosen: Candidate, tried: tuple[Candidate, ...], refused: frozenset[str]) -> None:
         self.reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
         if not chosen.varies:
             finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
-            self.rounds.append(Round(finished, chosen.effect, _rivals(chosen, tried, self.config)))
+            step = Round(finished, chosen.effect, refused=refused)
+            self.rounds.append(replace(step, rivals=_rivals(chosen, step.contenders, self.config)))
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
         self._weigh(chosen.fitted)
         self.settle_temperature()
@@ -253,10 +183,16 @@ class _Search:
             self._drop_needless(name, chosen.effect)
 
     def _weigh(self, found: Fitted) -> None:
-        """Go on from an optimum, the evidence weighed by what it leaves."""
+        """Go on from an optimum, the evidence weighed by what it leaves, unless that bends it to a wider gap."""
         self.evidence = self.weighed(found.damper)
         whole = self.evidence.whole
-        self.current = fit(whole, found.effects, whole.start_with(found.damper))
+        start = whole.start_with(found.damper)
+        self.current = fit(whole, found.effects, start)
+        if self._gap(self.current) > max(WIDER * self._gap(found), self.config.negligible):
+            self.current = fit(whole, found.effects, start, evaluations=1)
+
+    def _gap(self, fitted: Fitted) -> float:
+        return visible_gap(self.evidence.judged(fitted.damper, self.config))
 
     def _without(self, effect: str) -> Fitted:
         """The optimum with one of the adopted effects left out."""
@@ -292,7 +228,12 @@ def _ended(problem: Problem, before: Fitted, chosen: Candidate, tried: Sequence[
     return tuple(settled(problem, before, c) if c.effect != chosen.effect and c.delta_bic < near else c for c in tried)
 
 
+def _before(chosen: Candidate, tried: Sequence[Candidate]) -> frozenset[str]:
+    """The effects that promised more than the one chosen: they were refused."""
+    return frozenset(c.effect for c in itertools.takewhile(lambda c: c is not chosen, tried) if not c.varies)
+
+
 def _rivals(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseConfig) -> tuple[str, ...]:
     """The other effects that explain a step as well as the one chosen, best first."""
-    others = [c for c in tried if c.effect != chosen.effect and c.delta_bic >= chosen.delta_bic]
+    others = [c for c in tried if c.effect != chosen.effect]
     return tuple(c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic)

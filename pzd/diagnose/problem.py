@@ -19,7 +19,7 @@ from pzd.record import Array
 
 SOFTEST = 0.1
 """Least C that a search starts from [largest force over largest speed]: identify may leave it undetermined."""
-BOUND = 1e3
+BOUND = 1e4
 """No scaled parameter is looked for beyond this, nor one with ratio steps below its inverse."""
 
 
@@ -50,6 +50,11 @@ class Unknown:
         """The searched variable at a value of the parameter."""
         scaled = value / self.scale
         return float(np.log(max(scaled, 1.0 / BOUND))) if self.parameter.search.logarithmic else scaled
+
+    def fainter(self, searched: float, share: float) -> float:
+        """The parameter [own unit] so much nearer to the value that switches its effect off."""
+        value, neutral = self.value(searched), self.parameter.neutral
+        return neutral + share * (value - neutral) if np.isfinite(neutral) else value / share
 
     def of(self, damper: Damper) -> float:
         """The value [own unit] that a damper has."""

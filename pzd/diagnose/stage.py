@@ -45,10 +45,12 @@ def diagnose(
     from pzd.diagnose.naming import name_effects
     from pzd.diagnose.next_test import next_test, reach_of
     from pzd.diagnose.split import split
+    from pzd.diagnose.used import whole_records, without
     from pzd.diagnose.verdict import decide, parameters_of, ranking_of, weak
     from pzd.diagnose.where import regions
 
-    prepared = prepare([record for record in rig.records if record.setting == setting])
+    used, cut_off = whole_records(rig, setting)
+    prepared = prepare(used)
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
     named = name_effects(prepared, parts, plain, diagnose, jobs)
@@ -60,7 +62,7 @@ def diagnose(
     voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
     told = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + weak(parts.hold_out),
+        reason=decision.reason + weak(parts.hold_out) + without(cut_off),
         effects=named.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(named, parts, diagnose),

@@ -18,7 +18,7 @@ from pzd.diagnose.evidence import Evidence
 from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.intervals import LEVEL, standard_errors
 from pzd.diagnose.judge import Judged
-from pzd.diagnose.naming import Named
+from pzd.diagnose.named import Named
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
@@ -103,7 +103,7 @@ def confidence_of(named: Named) -> float:
     for step in named.rounds:
         if step.chosen in named.adopted:
             best = next(c.delta_bic for c in step.tried if c.effect == step.chosen)
-            others = [c.delta_bic - best for c in step.tried if c.delta_bic >= best]  # a better one was a stand-in
+            others = [c.delta_bic - best for c in step.contenders]
             weight /= sum(float(np.exp(-0.5 * other)) for other in others)
     for foiled in named.foiled:
         weight /= 1.0 + float(np.exp(-0.5 * foiled.behind))

@@ -14,7 +14,7 @@ from test_naming import TWO, diagnosed
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.naming import Named, Round
+from pzd.diagnose.named import Named, Round
 from pzd.record import Record
 
 
