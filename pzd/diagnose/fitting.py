@@ -15,6 +15,9 @@ from pzd.damper.model import Damper
 from pzd.diagnose.problem import Problem, Unknown, simulated
 from pzd.record import Array
 
+Left = tuple[list[Array], list[Array]]
+"""Residuals in units of noise and simulated forces, an observation each."""
+
 DIFFERENCE = 1e-4
 """Step of the searched variables for forward differences."""
 MOST_EVALUATIONS = 20
@@ -69,8 +72,7 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
     evaluations : of the model, at most
     """
     unknowns = problem.unknowns(effects)
-    found, slopes = _search(problem, unknowns, start, start.size, evaluations)
-    residuals, forces = _residuals(problem, unknowns, found)
+    found, slopes, (residuals, forces) = _search(problem, unknowns, start, start.size, evaluations)
     prior = _prior(problem, len(unknowns))
     return Fitted(
         problem.point(found, unknowns).damper(),
@@ -88,15 +90,14 @@ def misfit_beside(problem: Problem, damper: Damper) -> float:
     """Smallest misfit that T0, C and k alone reach while the effects stay as a damper has them."""
     unknowns = problem.unknowns(tuple(damper.effects))
     start = problem.start_with(damper)
-    found, _ = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS)
-    residuals, _ = _residuals(problem, unknowns, found)
+    _, _, (residuals, _) = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS)
     return float(sum(r @ r for r in residuals))
 
 
 def _search(
     problem: Problem, unknowns: Sequence[Unknown], start: Array, free: int, evaluations: int
-) -> tuple[Array, Array]:
-    """Where a search over the first `free` variables ends, (3 b + e,), and the slopes of the residuals there."""
+) -> tuple[Array, Array, Left]:
+    """Where a search over the first `free` variables ends, (3 b + e,), with slopes, residuals and forces there."""
     from scipy.optimize import least_squares
 
     low, high = _bounds(problem, unknowns)
@@ -106,12 +107,20 @@ def _search(
     def whole(x: Array) -> Array:
         return np.concatenate([x, begin[free:]])
 
+    known: dict[bytes, Left] = {}
+
+    def left_at(x: Array) -> Left:
+        """Asked twice of each point, for its residuals and for its slopes."""
+        key = x.tobytes()
+        if key not in known:
+            known[key] = _residuals(problem, unknowns, whole(x))
+        return known[key]
+
     def residuals_at(x: Array) -> Array:
-        data = _residuals(problem, unknowns, whole(x))[0]
-        return np.concatenate([*data, prior[:, : centre.size] @ (x[: centre.size] - centre)])
+        return np.concatenate([*left_at(x)[0], prior[:, : centre.size] @ (x[: centre.size] - centre)])
 
     def slopes_at(x: Array) -> Array:
-        return np.concatenate([_slopes(problem, unknowns, whole(x), free), prior[:, :free]])
+        return np.concatenate([_slopes(problem, unknowns, whole(x), free, left_at(x)[1]), prior[:, :free]])
 
     found = least_squares(
         residuals_at,
@@ -124,7 +133,7 @@ def _search(
         gtol=PRECISION,
         max_nfev=evaluations,
     )
-    return whole(found.x), np.asarray(found.jac, dtype=np.float64)[: -len(prior)]
+    return whole(found.x), np.asarray(found.jac, dtype=np.float64)[: -len(prior)], left_at(found.x)
 
 
 def _prior(problem: Problem, effects: int) -> Array:
@@ -147,19 +156,21 @@ def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array
     )
 
 
-def _residuals(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> tuple[list[Array], list[Array]]:
+def _residuals(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Left:
     point = problem.point(x, unknowns)
     forces = [simulated(point, o) for o in problem.observations]
     return [o.in_noise(o.measured - f) for o, f in zip(problem.observations, forces, strict=True)], forces
 
 
-def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array, free: int) -> Array:
-    """(w, free) derivatives of the residuals by forward differences; a test moves with its own voltage alone."""
-    point, rows = problem.point(x, unknowns), len(problem.base)
+def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array, free: int, forces: Sequence[Array]) -> Array:
+    """(w, free) derivatives of the residuals by forward differences; a test moves with its own voltage alone.
+
+    `forces` are those at the point itself.
+    """
+    rows = len(problem.base)
     shifted = [problem.point(_shifted(x, j), unknowns) for j in range(free)]
     blocks = []
-    for o in problem.observations:
-        here = simulated(point, o)
+    for o, here in zip(problem.observations, forces, strict=True):
         own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(3 * rows)
         moving = [
             j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]

@@ -77,6 +77,12 @@ class Observation:
         """Sampling intervals of the motion [s], one where they are even."""
         return sampling_steps(self.motion.time)
 
+    @property
+    def begins_with(self) -> float:
+        """Force with which the simulation begins [N]: that of the same phase where the motion repeats."""
+        lead = self.first // self.stride
+        return float(self.measured[-lead % self.measured.size if isinstance(self.noise, PureError) else 0])
+
     def at_compared(self, simulated: Array) -> Array:
         """(n,) or (n, p) of what was simulated at the samples that are compared."""
         return simulated[self.first :: self.stride][: self.measured.size]
@@ -89,7 +95,7 @@ class Observation:
             return simulated
         begin = self.first if isinstance(self.noise, PureError) else 0
         time = self.motion.time[begin:]
-        shown = np.array([moment(t, delay) for t in time])
+        shown = np.asarray(moment(time, delay))
         if begin == 0:
             return np.asarray(CubicSpline(time, simulated)(np.clip(shown, time[0], time[-1])))
         period = time[-1] - time[0] + self.steps[-1]
@@ -185,23 +191,24 @@ def _kinematics(record: Record) -> tuple[Array, Array, Array]:
 
 
 def _cycle_motion(record: Record, period: float, points: int, channels: Sequence[Array]) -> tuple[Motion, int, int]:
-    """Two cycles of the mean motion, the first to settle in, on a grid fine enough to simulate."""
+    """A cycle of the mean motion, half a cycle before it to settle in, on a grid fine enough to simulate."""
     factor = int(np.ceil(CYCLE_POINTS / points))
     fine: Array = np.stack([_refined(channel, factor) for channel in channels])
-    count = points * factor
-    time: Array = np.arange(2 * count, dtype=np.float64) * (period / count)
+    lead = points // 2 * factor  # it holds a reversal, after which the element has forgotten how it began
+    led = np.concatenate([fine[:, -lead:], fine], axis=1)
+    count = led.shape[1]
+    time: Array = np.arange(count, dtype=np.float64) * (period / (points * factor))
     temperature = record.median_temperature()
     voltage = record.median_voltage()
-    twice = np.concatenate([fine, fine], axis=1)
     motion = Motion(
         time,
-        twice[0],
-        twice[1],
-        twice[2],
-        None if voltage is None else np.full(2 * count, voltage),
-        None if temperature is None else np.full(2 * count, temperature),
+        led[0],
+        led[1],
+        led[2],
+        None if voltage is None else np.full(count, voltage),
+        None if temperature is None else np.full(count, temperature),
     )
-    return motion, count, factor
+    return motion, lead, factor
 
 
 def _refined(cycle: Array, factor: int) -> Array:
@@ -251,7 +258,7 @@ def response(observation: Observation, damper: Damper, late: float = 0.0) -> Arr
     """(n,) force that a damper gives at the compared samples [N], shown by a channel that comes later by `late` [s]."""
     o, tau = observation, value_of(damper, "sensor_delay", "tau")
     prompt = damper.model_copy(update={"effects": {n: e for n, e in damper.effects.items() if n != "sensor_delay"}})
-    force = respond(prompt, o.motion, float(o.measured[0]), SIMULATION_TOLERANCE)
+    force = respond(prompt, o.motion, o.begins_with, SIMULATION_TOLERANCE)
     return o.at_compared(o.delayed(force, tau + late))
 
 

@@ -188,12 +188,12 @@ class Point:
 
 def simulated(point: Point, observation: Observation) -> Array:
     """(n,) force at the compared samples of an observation [N]."""
-    o, start = observation, float(observation.measured[0])
+    o = observation
     if o.place >= 0 and "temperature_drift" not in point.effects:
         friction, damping, stiffness = point.base[o.place]
         effects = point.at(o.place)
         rows, beside = standing_rows(friction, damping, stiffness, effects)
-        force = force_of_rows(rows, beside, o.motion, o.steps, start, SIMULATION_TOLERANCE)
+        force = force_of_rows(rows, beside, o.motion, o.steps, o.begins_with, SIMULATION_TOLERANCE)
         tau = effects.get("sensor_delay", {}).get("tau", 0.0)
         return o.at_compared(o.delayed(force, tau))
     damper = point.damper()

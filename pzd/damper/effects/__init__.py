@@ -15,10 +15,10 @@ _PLACES = ("drive", "material", "stroke", "flow", "parallel", "sensor")
 @cache
 def library() -> dict[str, Effect]:
     """Every effect by name, in the physical order of the places and by name within one."""
-    found = sorted(effects_in(__name__, __path__), key=lambda e: (_PLACES.index(e.place), e.name))
+    found = sorted(effects_in(__name__, pkgutil.iter_modules(__path__)), key=lambda e: (_PLACES.index(e.place), e.name))
     return {effect.name: effect for effect in found}
 
 
-def effects_in(package: str, path: Iterable[str]) -> list[Effect]:
+def effects_in(package: str, modules: Iterable[pkgutil.ModuleInfo]) -> list[Effect]:
     """The effects that the modules of a package declare, one each."""
-    return [importlib.import_module(f"{package}.{info.name}").EFFECT for info in pkgutil.iter_modules(path)]
+    return [importlib.import_module(f"{package}.{info.name}").EFFECT for info in modules]

@@ -6,6 +6,7 @@ better than one of these is not; the fewer parameters of a foil count for it. On
 
 from __future__ import annotations
 
+import pkgutil
 from functools import cache
 
 from pzd.damper.effect import Effect
@@ -15,7 +16,7 @@ from pzd.damper.effects import effects_in, library
 @cache
 def foils() -> dict[str, Effect]:
     """Every foil by name; all are parallel to the element."""
-    return {effect.name: effect for effect in effects_in(__name__, __path__)}
+    return {effect.name: effect for effect in effects_in(__name__, pkgutil.iter_modules(__path__))}
 
 
 @cache
