@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -25,6 +25,11 @@ OTHERS = 2
 """Starting values tried before fainter ones."""
 FAINTER = (0.3, 0.1, 0.03, 0.01)
 """Shares of the way from no effect to the most promising starting values."""
+FAINT = 0.1
+"""Share of the way at which an effect that noise nearly hides is linearised."""
+HOPELESS = 15.0
+"""An effect that promises to lower the misfit by less is not searched for where noise explains what is left: it
+pays from twice that on."""
 NEAR = 0.5
 """A candidate that pays less than this share of what the best pays is not searched on."""
 STUCK = 1.0
@@ -76,7 +81,8 @@ def candidates(
     before: Fitted,
     forbidden: Sequence[str] = (),
     jobs: int = 1,
-    told: Callable[[str], None] = lambda _: None,
+    *,
+    silent: bool = False,
 ) -> tuple[Candidate, ...]:
     """Every effect that the tests could show, fitted beside those of `before`, best first.
 
@@ -86,7 +92,7 @@ def candidates(
     before : the optimum with the effects adopted so far
     forbidden : effects that are not tried
     jobs : how many are fitted at the same time
-    told : called with the name of each effect when it has been tried
+    silent : noise explains what is left, so that only a faint effect can be missing
     """
     tried = [
         effect
@@ -95,9 +101,8 @@ def candidates(
     ]
 
     def one(effect: Effect) -> Candidate:
-        found = candidate(problem, before, effect)
-        told(effect.name)
-        return found
+        unlikely = silent and _hopeless(problem, before, effect)
+        return (_barely if unlikely else candidate)(problem, before, effect)
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         found = list(pool.map(one, tried))
@@ -124,6 +129,23 @@ def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
         if reached[-1].fitted.misfit <= before.misfit + STUCK:
             break
     return min(reached, key=lambda c: c.fitted.misfit)
+
+
+def _hopeless(problem: Problem, before: Fitted, effect: Effect) -> bool:
+    """Whether a faint effect of one parameter promises nothing; one of more may act where nobody looks yet."""
+    if len(effect.parameters) > 1:
+        return False
+    frame, _ = np.linalg.qr(before.slopes)
+    starts = _starts(problem, effect)
+    faint = (*starts, *(_fainter(problem, effect, start, FAINT) for start in starts))
+    promised = min(_promised(problem, before, effect, start, frame) for start in faint)
+    return before.misfit - promised < HOPELESS
+
+
+def _barely(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
+    """An effect as faint as it is looked for."""
+    start = _fainter(problem, effect, _starts(problem, effect)[0], FAINTER[-1])
+    return _from(problem, before, effect.name, np.concatenate([before.searched, start]), 1)
 
 
 def _fainter(problem: Problem, effect: Effect, start: Array, share: float) -> Array:
@@ -213,14 +235,18 @@ def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[A
     Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
                                                                 Source: Gauss-Newton step
     """
-    unknowns = problem.unknowns((effect.name,))
-    grid = itertools.product(*(u.parameter.search.starts for u in unknowns))
-    starts = [np.array([_searched(u, value) for u, value in zip(unknowns, values, strict=True)]) for values in grid]
+    starts = _starts(problem, effect)
     if len(starts) == 1:
         return starts
     frame, _ = np.linalg.qr(before.slopes)
     promised = [_promised(problem, before, effect, start, frame) for start in starts]
     return [starts[i] for i in np.argsort(promised, kind="stable")]
+
+
+def _starts(problem: Problem, effect: Effect) -> list[Array]:
+    unknowns = problem.unknowns((effect.name,))
+    grid = itertools.product(*(u.parameter.search.starts for u in unknowns))
+    return [np.array([_searched(u, value) for u, value in zip(unknowns, values, strict=True)]) for values in grid]
 
 
 def _searched(unknown: Unknown, start: float) -> float:

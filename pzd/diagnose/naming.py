@@ -124,7 +124,8 @@ class _Search:
     def _tried(self, evidence: Evidence, current: Fitted) -> tuple[Candidate, ...]:
         if len(current.effects) == self.config.most_effects:
             return ()
-        return candidates(evidence.whole, current, self.config.forbid, self.jobs)
+        silent = not evidence.something_missing(current, self.config)
+        return candidates(evidence.whole, current, self.config.forbid, self.jobs, silent=silent)
 
     def _first_supported(self, tried: Sequence[Candidate]) -> Candidate | None:
         """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""

@@ -45,6 +45,8 @@ MOST_HARMONICS = 80
 """Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart."""
 CYCLE_POINTS = 256
 """A cycle is simulated on at least this many points."""
+MOST_POINTS = 2048
+"""And on no more: the harmonics that are compared need no finer grid, however slow the test."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,9 +159,10 @@ def _of_cycles(
     if not counted:
         return None
     error = pure_error(whole - run.fold(time, force))
-    cycle = whole[counted].mean(axis=0)
+    points = min(error.points, MOST_POINTS)
+    cycle = _resampled(whole[counted].mean(axis=0), points)
     peak = float(np.max(np.abs(cycle)))
-    average = run.mean(time, force)
+    average = _resampled(run.mean(time, force), points)
     left = DISCREPANCY * _left_by(cycle, average, error.sample_variance / len(counted))
     floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size + given.unsure
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
@@ -167,7 +170,7 @@ def _of_cycles(
     bare = Observation(
         record.name,
         place,
-        *_cycle_motion(record, run.period, error.points, [run.mean(time, c) for c in _kinematics(record)]),
+        *_cycle_motion(record, run.period, [_resampled(run.mean(time, c), points) for c in _kinematics(record)]),
         cycle,
         peak,
         error,
@@ -190,10 +193,11 @@ def _kinematics(record: Record) -> tuple[Array, Array, Array]:
     return record.displacement, record.velocity, record.acceleration
 
 
-def _cycle_motion(record: Record, period: float, points: int, channels: Sequence[Array]) -> tuple[Motion, int, int]:
+def _cycle_motion(record: Record, period: float, channels: Sequence[Array]) -> tuple[Motion, int, int]:
     """A cycle of the mean motion, half a cycle before it to settle in, on a grid fine enough to simulate."""
+    points = channels[0].size
     factor = int(np.ceil(CYCLE_POINTS / points))
-    fine: Array = np.stack([_refined(channel, factor) for channel in channels])
+    fine: Array = np.stack([_resampled(channel, points * factor) for channel in channels])
     lead = points // 2 * factor  # it holds a reversal, after which the element has forgotten how it began
     led = np.concatenate([fine[:, -lead:], fine], axis=1)
     count = led.shape[1]
@@ -211,10 +215,11 @@ def _cycle_motion(record: Record, period: float, points: int, channels: Sequence
     return motion, lead, factor
 
 
-def _refined(cycle: Array, factor: int) -> Array:
-    """A periodic channel on `factor` times as many points, by its own harmonics."""
-    spectrum = np.fft.rfft(cycle)
-    return np.asarray(np.fft.irfft(spectrum, cycle.size * factor) * factor, dtype=np.float64)
+def _resampled(cycle: Array, points: int) -> Array:
+    """A periodic channel on more points or fewer, by its own harmonics."""
+    if points == cycle.size:
+        return cycle
+    return np.asarray(np.fft.irfft(np.fft.rfft(cycle), points) * (points / cycle.size), dtype=np.float64)
 
 
 def _of_samples(
