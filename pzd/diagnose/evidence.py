@@ -16,10 +16,11 @@ from pzd.diagnose.fitting import Fitted
 from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.judge import Judged, judge
-from pzd.diagnose.observation import Observation, observations
+from pzd.diagnose.observation import Observation
 from pzd.diagnose.problem import Problem
 from pzd.diagnose.split import TRAINING, UNTOUCHED, VALIDATION, Split
 from pzd.diagnose.unsure import expected
+from pzd.diagnose.weighing import observations
 from pzd.record import Array, voltage_scale
 
 Mask = NDArray[np.bool_]

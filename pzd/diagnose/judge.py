@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pzd.damper.model import Damper
 from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.inputs import Prepared
-from pzd.diagnose.jumps import jumps, jumps_in_cycles
+from pzd.diagnose.jumps import jumps, jumps_in_cycles, within_a_sample
 from pzd.diagnose.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
 from pzd.diagnose.noise import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.diagnose.nuisance import nuisance
@@ -67,12 +67,10 @@ def judge(damper: Damper, prepared: Prepared, wanted: Mask, config: NuisanceConf
     predicted, residual = given.force, record.force - given.force
     mask = wanted & counted(prepared)
     rough = _rough_variance(prepared, residual, mask)
-    bends = _jumps(prepared)
+    calm = _jumps(prepared) == 0.0
     slack = np.zeros(residual.size)
-    slack[mask] = nuisance(
-        residual[mask], predicted[mask], record.rate, rough, config, given.timing[mask], bends[mask] == 0.0
-    )
-    slack[mask] += np.clip((residual - slack)[mask], -bends[mask], bends[mask])
+    slack[mask] = nuisance(residual[mask], predicted[mask], record.rate, rough, config, given.timing[mask], calm[mask])
+    slack += np.where(mask & ~calm, within_a_sample(record.force - slack, predicted), 0.0)
     folded = _folded(prepared, residual - slack, mask)
     if folded is not None:
         return _repeating(prepared, mask, residual, slack, folded, given.unsure)
@@ -80,7 +78,7 @@ def judge(damper: Damper, prepared: Prepared, wanted: Mask, config: NuisanceConf
 
 
 def _jumps(prepared: Prepared) -> Array:
-    """(n,) what chance makes of the samples beside a jump, at most [N]."""
+    """(n,) how far the force bends beside a jump [N]; 0 elsewhere."""
     record = prepared.record
     return jumps_in_cycles(prepared.cycles, record.time, record.force) if prepared.cycles else jumps(record.force)
 

@@ -49,3 +49,27 @@ def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:
     before = np.floor(place).astype(np.int64) % cycle.size
     found: Array = np.maximum(cycle[before], cycle[(before + 1) % cycle.size])
     return found
+
+
+def within_a_sample(measured: Array, predicted: Array) -> Array:
+    """(n,) what a jump makes of the residual that comes up to one sample earlier or later than predicted [N].
+
+    Only where the record jumps as well, by half of what is predicted from one sample to the next: a flank that it
+    resolves is no matter of timing.
+
+    Parameters
+    ----------
+    measured : (n,) force [N]
+    predicted : (n,) force [N]
+    """
+    around, beside = (_neighbours(force) for force in (predicted, measured))
+    low, high = around.min(axis=0), around.max(axis=0)
+    step = np.abs(np.diff(beside, axis=0)).max(axis=0)
+    found: Array = np.where(step >= 0.5 * (high - low), np.clip(measured, low, high) - predicted, 0.0)
+    return found
+
+
+def _neighbours(force: Array) -> Array:
+    """(3, n) force one sample before, at, and after each."""
+    padded = np.pad(force, 1, mode="edge")
+    return np.stack([padded[:-2], force, padded[2:]])

@@ -65,7 +65,7 @@ def name_effects(
     search.force()
     while len(search.rounds) < 2 * config.most_effects and search.step():
         pass
-    search.evidence, search.current = at_rest(weighed, search.evidence, search.current)
+    search.rest()
     return Named(plain, search.current, tuple(search.rounds), search.reasons, first, search.evidence, search.foiled())
 
 
@@ -191,6 +191,12 @@ class _Search:
         self.current = fit(whole, found.effects, start)
         if self._gap(self.current) > max(WIDER * self._gap(found), self.config.negligible):
             self.current = fit(whole, found.effects, start, evaluations=1)
+
+    def rest(self) -> None:
+        """Weigh and fit in turn until no parameter moves, unless that widens the gap."""
+        evidence, current = at_rest(self.weighed, self.evidence, self.current)
+        if self._gap(current) <= max(WIDER * self._gap(self.current), self.config.negligible):
+            self.evidence, self.current = evidence, current
 
     def _gap(self, fitted: Fitted) -> float:
         return visible_gap(self.evidence.judged(fitted.damper, self.config))

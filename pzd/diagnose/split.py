@@ -7,7 +7,7 @@ rig always splits the same way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.diagnose.inputs import Prepared, sliced
-from pzd.record import Record, conditions
+from pzd.record import Array, Record, conditions
 
 TRAINING, VALIDATION, UNTOUCHED = 0, 1, 2
 """Fitted to; looked at to choose; seen by nothing but the final figures."""
@@ -28,6 +28,8 @@ BESIDE_UNTOUCHED = (TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION, TRAINI
 """Segments of such a record when another of its condition is untouched."""
 MANY = 4
 """Fewer records with a moving voltage are each parted: a step and a ramp do not stand for one another."""
+NEAR = 0.05
+"""Records within this share of the rig's largest force, speed or displacement show the same as the one with it."""
 FEWEST = 50
 """A stretch of fewer samples is not fitted."""
 
@@ -58,7 +60,7 @@ def split(prepared: Sequence[Prepared], voltage_within: float | None, temperatur
     groups = [condition.records for condition in found] + (
         [moving] if len(moving) >= MANY else [(record,) for record in moving]
     )
-    extreme = _extreme(prepared)
+    extreme = {int(np.argmax(peaks)) for peaks in _peaks(prepared)}
     roles: dict[int, Roles] = {}
     kinds: set[HoldOut] = set()
     for turn, group in enumerate(groups):
@@ -67,6 +69,9 @@ def split(prepared: Sequence[Prepared], voltage_within: float | None, temperatur
         shared, kind = _group(members, prepared)
         roles |= shared
         kinds.add(kind)
+    for i in _unfitted(prepared, roles):
+        roles[i] = _parted(prepared[i], alone=True)
+        kinds.add(_parts(prepared[i]))
     ordered = tuple(roles[i] for i in range(len(prepared)))
     names = tuple(p.record.name for p, role in zip(prepared, ordered, strict=True) if np.any(role == UNTOUCHED))
     return Split(ordered, names, kinds.pop() if len(kinds) == 1 else "mixed")
@@ -89,14 +94,24 @@ def _order(prepared: Prepared) -> tuple[float, float, str]:
     return frequency, float(np.max(np.abs(prepared.record.velocity))), prepared.record.name
 
 
-def _extreme(prepared: Sequence[Prepared]) -> set[int]:
-    """Places of the records with the rig's largest force, speed and stroke: what they show no other record may."""
+def _peaks(prepared: Sequence[Prepared]) -> list[Array]:
+    """(r,) largest force, speed and displacement of every record: some effects show at the rig's largest alone."""
+    channels = ("force", "velocity", "displacement")
+    return [np.array([np.max(np.abs(getattr(p.record, channel))) for p in prepared]) for channel in channels]
 
-    def largest(channel: str) -> int:
-        peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in prepared]
-        return int(np.argmax(peaks))
 
-    return {largest("force"), largest("velocity"), largest("displacement")}
+def _unfitted(prepared: Sequence[Prepared], roles: Mapping[int, Roles]) -> set[int]:
+    """Places of the records with the rig's largest force, speed or displacement, where nothing near it is fitted."""
+    found = set()
+    for peaks in _peaks(prepared):
+        near = np.flatnonzero(peaks >= (1.0 - NEAR) * peaks.max())
+        if not any(np.any(roles[int(i)] == TRAINING) for i in near):
+            found.add(int(np.argmax(peaks)))
+    return found
+
+
+def _parts(prepared: Prepared) -> HoldOut:
+    return "segments" if prepared.cycles is None else "cycles"
 
 
 def _rotated(members: list[int], turn: int, extreme: set[int]) -> list[int]:
@@ -123,7 +138,7 @@ def _group(rotated: list[int], prepared: Sequence[Prepared]) -> tuple[dict[int, 
     """Roles in one condition, by the order of its members."""
     if len(rotated) == 1:
         only = prepared[rotated[0]]
-        return {rotated[0]: _parted(only, alone=True)}, "segments" if only.cycles is None else "cycles"
+        return {rotated[0]: _parted(only, alone=True)}, _parts(only)
     if len(rotated) == 2:
         first, second = rotated
         return {first: _parted(prepared[first], alone=False), second: _whole(prepared[second], UNTOUCHED)}, "records"
