@@ -205,9 +205,11 @@ def _from(
     fitted = fit(problem, (*before.effects, effect), start, evaluations)
     pays = delta_bic(before, fitted)
     if len(problem.base) < len(before.damper.base):
-        # Fewer base rows alone may pay already; that is not the effect's merit.
+        # Fewer base rows alone may pay already; that is not the effect's merit, nor are the parameters that they save.
         pooled = fit(problem, before.effects, problem.start_with(before.damper))
-        pays = max(pays, delta_bic(pooled, fitted))
+        own = len(fitted.unknowns) - len(before.unknowns)
+        alone = fitted.misfit - before.misfit + own * float(np.log(fitted.size))
+        pays = max(pays, alone, delta_bic(pooled, fitted))
     return Candidate(effect, fitted, pays, moved_by(problem, before, fitted))
 
 
