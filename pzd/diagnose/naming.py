@@ -150,7 +150,8 @@ class _Search:
         lead = next((c for c in tried if missing and self._too_little(self.evidence, self.current, c) is None), None)
         found = None if lead is None else self._beside(lead)
         if lead is None or found is None:
-            self.rounds += [Round(tried, None)] if tried else []
+            # Once noise explains what is left, the round that adopted something tells more of the others.
+            self.rounds += [Round(tried, None)] if tried and (missing or not self.rounds) else []
             return False
         self.rounds.append(Round(tried, lead.effect, refused=_before(lead, tried)))
         self.reasons[lead.effect] = "adopted"
