@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pzd.identify.trial import warm_up
 from pzd.record import Array, Record, is_constant, voltage_scale
 from pzd.report.story import Story
 
@@ -47,9 +48,14 @@ def criterion(measured: Array, simulated: Array) -> float:
 
 
 def of_record(story: Story, record: Record) -> tuple[float, float]:
-    """W_s of a record before and after diagnose, over all of its samples."""
-    before, after = (criterion(record.force, force) for force in story.simulated(record))
+    """W_s of a record before and after diagnose, past what hangs on how it began."""
+    part = _begun(record)
+    before, after = (criterion(record.force[part], force[part]) for force in story.simulated(record))
     return before, after
+
+
+def _begun(record: Record) -> slice:
+    return slice(warm_up(record.displacement), None)
 
 
 def gap_map(story: Story) -> GapMap:
@@ -60,10 +66,10 @@ def gap_map(story: Story) -> GapMap:
     groups = _groups(story)
     before, after = np.full((2, len(groups), _BINS), np.nan)
     for i, records in enumerate(groups.values()):
-        cells = np.clip(np.digitize(np.concatenate([r.velocity for r in records]), edges) - 1, 0, _BINS - 1)
+        cells = np.clip(np.digitize(np.concatenate([r.velocity[_begun(r)] for r in records]), edges) - 1, 0, _BINS - 1)
         count = np.bincount(cells, minlength=_BINS)
         for grid, which in ((before, 0), (after, 1)):
-            gap = np.concatenate([r.force - story.simulated(r)[which] for r in records])
+            gap = np.concatenate([(r.force - story.simulated(r)[which])[_begun(r)] for r in records])
             square = np.bincount(cells, weights=gap**2, minlength=_BINS)
             with np.errstate(invalid="ignore", divide="ignore"):
                 grid[i] = np.where(count >= _FEWEST, 100.0 / peak * np.sqrt(square / count), np.nan)

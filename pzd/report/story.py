@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from pzd.artefacts import ComfortRow, Diagnosed, Identified, ParameterRow, RecordEntry, Rides, Rig, SummaryRow, Table
+from pzd.damper.foils import foils
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.report.comfort.ride import SettledRide
@@ -81,8 +82,9 @@ class Story:
             from pzd.damper.motion import Motion
 
             motion = Motion.of(record)
-            before = respond(self.diagnosed.plain, motion)
-            after = respond(self.diagnosed.damper, motion) if self.extended else before
+            start = float(record.force[0])
+            before = respond(self.diagnosed.plain, motion, start)
+            after = respond(self.diagnosed.damper, motion, start) if self.extended else before
             self._forces[record.name] = (before, after)
         return self._forces[record.name]
 
@@ -185,7 +187,8 @@ class Story:
 
 def effect_in_words(name: str) -> str:
     """What an effect is, in the first sentence of its own documentation."""
-    text = importlib.import_module(f"pzd.damper.effects.{name}").__doc__ or name
+    package = "foils" if name in foils() else "effects"
+    text = importlib.import_module(f"pzd.damper.{package}.{name}").__doc__ or name
     first = text.split("\n")[0].rstrip(".")
     return first[0].lower() + first[1:]
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
-from pzd.damper.effects import library
+from pzd.damper.foils import known
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.rig.programmes import Temperature, Voltage
@@ -262,7 +262,7 @@ def _needs_voltage(damper: Damper) -> str | None:
     if len({row.voltage_V for row in damper.base}) > 1:
         return "the damper has base rows at several voltages"
     for name, values in damper.effects.items():
-        if "at_voltage_V" in values or library()[name].place == "drive":
+        if "at_voltage_V" in values or known()[name].place == "drive":
             return f"{name} depends on the voltage"
     return None
 

@@ -7,7 +7,7 @@ from itertools import groupby, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.effects import library
+from pzd.damper.foils import known
 from pzd.damper.model import Damper
 from pzd.table.force import forces, voltages_of
 
@@ -36,7 +36,7 @@ def lost(damper: Damper, temperatures: tuple[float | None, ...], velocity: Array
 
 
 def _words(name: str) -> str:
-    effect = library()[name]
+    effect = known()[name]
     return f"{name}: {effect.law} (steady slip does not show it)"
 
 

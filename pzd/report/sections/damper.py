@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import ParameterRow
-from pzd.damper.effects import library
+from pzd.damper.foils import known
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS, VOLTAGE
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
 from pzd.report.sections.pictures import Pictures, galleries
@@ -36,7 +36,7 @@ def tell(story: Story, pictures: Pictures) -> Section:
 
 def _intro(story: Story) -> str:
     effects = story.diagnosed.damper.effects
-    laws = [f"{effect_in_words(name)}, {library()[name].law}" for name in effects]
+    laws = [f"{effect_in_words(name)}, {known()[name].law}" for name in effects]
     beside = f" Beside it stands: {listed(laws)}." if laws else ""
     return (
         "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. A value that the "

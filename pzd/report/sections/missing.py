@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pzd.artefacts import Diagnosis, NextTest, Ranked, Value
-from pzd.damper.effects import library
+from pzd.damper.foils import known
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
 from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.story import Story, effect_in_words, effects_in_words
@@ -95,11 +95,11 @@ def _ranking(diagnosis: Diagnosis) -> Sheet:
 
 
 def _fitted(ranked: Ranked) -> str:
-    effects = library()
+    effects = known()
     texts = []
     for name, value in ranked.parameters.items():
-        known = effects.get(ranked.effect)
-        unit = next((p.unit for p in known.parameters if p.name == name), "") if known else ""
+        effect = effects.get(ranked.effect)
+        unit = next((p.unit for p in effect.parameters if p.name == name), "") if effect else ""
         values = value if isinstance(value, tuple) else (value,)
         shown = ", ".join(number(each) for each in values)
         texts.append(f"{name} = {shown} {unit_of(unit)}".rstrip())
@@ -110,7 +110,7 @@ def next_test(story: Story, test: NextTest | None) -> str:
     """The next rig test in plain words, with what it would settle."""
     if test is None:
         return "Next test: none is proposed."
-    names = [effect_in_words(name) if name in library() else name for name in test.separates]
+    names = [effect_in_words(name) if name in known() else name for name in test.separates]
     aim = f". It separates: {'; '.join(names)}" if names else ""
     far = (
         f". They differ there by {number(test.distance_percent, 2)} % of the peak force"
