@@ -22,8 +22,7 @@ def draw(story: Story) -> Iterator[Panel]:
     for i, bar in enumerate(bars):
         lift = 8 if bar is last else 0
         ax.annotate(number(bar[1]), (bar[1], i), (6, lift), textcoords="offset points", va="center")
-    ax.margins(x=0.18)
-    ax.set_xlim(left=0.0)
+    ax.set_xlim(0.0, 1.3 * max(bar[1] for bar in bars) or 1.0)
     ax.set_xlabel("W_s on held-out data [-]")
     ax.grid(visible=False, axis="y")
     figures = ", ".join(f"{name} {number(value)}" for name, value, _ in reversed(bars))
