@@ -59,34 +59,42 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
     felt = felt_by_valve(damper, standing(motion.voltage), steps)
     rows = element_rows(damper, felt, standing(motion.temperature))
     beside = parallel_rows(damper, felt)
-    force = force_of_rows(rows, beside, motion, steps, initial_force, tolerance)
+    force = with_beside(element_force(rows, motion, steps, initial_force, tolerance), beside, motion)
     return recorded(value_of(damper, "sensor_delay", "tau"), motion.time, force)
 
 
-def force_of_rows(
-    rows: Array, beside: Array | None, motion: Motion, steps: Array, initial_force: float, tolerance: float
-) -> Array:
-    """(n,) force [N] of the element with its flow effects and of what stands beside it.
+def element_force(rows: Array, motion: Motion, steps: Array, initial_force: float, tolerance: float) -> Array:
+    """(n,) force [N] of the element with its stroke and flow effects.
 
     Parameters
     ----------
     rows : (n, 10) or (1, 10) parameter rows
-    beside : (n, m) or (1, m) rows of the parallel effects; None without any
     motion : (n,) sampled motion
     steps : (n - 1,) or (1,) sampling intervals [s]
     initial_force : force of the oil spring at the first sample [N]
     tolerance : admissible error of a piece, as a share of the force
     """
-    force = march(motion.displacement, motion.velocity, steps, rows, initial_force, tolerance)
-    if beside is not None:
-        force += beside_all(motion.displacement, motion.velocity, motion.acceleration, beside)
-    return force
+    return march(motion.displacement, motion.velocity, steps, rows, initial_force, tolerance)
+
+
+def with_beside(force: Array, beside: Array | None, motion: Motion) -> Array:
+    """(n,) force [N] of the element together with what stands beside it.
+
+    Parameters
+    ----------
+    force : (n,) of the element [N]
+    beside : (n, m) or (1, m) rows of the parallel effects; None without any
+    motion : (n,) sampled motion
+    """
+    if beside is None:
+        return force
+    return force + beside_all(motion.displacement, motion.velocity, motion.acceleration, beside)
 
 
 def standing_rows(
     friction: float, damping: float, stiffness: float, effects: Mapping[str, Mapping[str, float]]
 ) -> tuple[Array, Array | None]:
-    """The (1, 10) and (1, m) rows for `force_of_rows` where voltage and temperature stand still."""
+    """The (1, 10) and (1, m) rows for `element_force` and `with_beside` where voltage and temperature stand still."""
     flow = [effects.get(name, {}).get(parameter, _NEUTRAL[name, parameter]) for name, parameter in _FLOW_COLUMNS]
     row = np.array([[friction, damping, stiffness, *flow]])
     if not any(name in effects for name, _ in COLUMNS):

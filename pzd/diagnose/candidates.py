@@ -34,6 +34,8 @@ NEAR = 0.5
 """A candidate that pays less than this share of what the best pays is not searched on."""
 STUCK = 1.0
 """A model that holds another one is worse than it by more [in squares of noise] only where its search got stuck."""
+AT_EDGE = 0.01
+"""A searched variable that ends so near to a limit ends at it."""
 VARIES = ("stroke", "flow", "parallel")
 """Places of effects whose parameters may differ by voltage."""
 MOVES = 0.02
@@ -96,7 +98,7 @@ def candidates(
     """
     tried = [
         effect
-        for effect in library().values()
+        for effect in sorted(library().values(), key=lambda e: e.place != "flow")  # the slow ones first
         if effect.name not in (*before.effects, *forbidden) and seen_in(problem, effect)
     ]
 
@@ -126,9 +128,16 @@ def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     starts = promising_starts(problem, before, effect)
     for start in (*starts[:OTHERS], *(_fainter(problem, effect, starts[0], share) for share in FAINTER)):
         reached.append(_from(problem, before, effect.name, np.concatenate([_base(problem, before), start]), FIRST))
-        if reached[-1].fitted.misfit <= before.misfit + STUCK:
+        if reached[-1].fitted.misfit <= before.misfit + STUCK or _switched_off(effect, reached[-1].fitted):
             break
     return min(reached, key=lambda c: c.fitted.misfit)
+
+
+def _switched_off(effect: Effect, fitted: Fitted) -> bool:
+    """Whether the search of an effect's only parameter went to the limit below which lies zero, its absence."""
+    (only, *more), nearest = effect.parameters, fitted.unknowns[-1].bounds[0]
+    vanishes = only.search.logarithmic and only.neutral == 0.0 and not more
+    return vanishes and bool(fitted.searched[-1] - nearest < AT_EDGE)
 
 
 def _hopeless(problem: Problem, before: Fitted, effect: Effect) -> bool:
@@ -154,10 +163,11 @@ def _fainter(problem: Problem, effect: Effect, start: Array, share: float) -> Ar
     return np.array([u.searched(u.fainter(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
 
 
-def best_foil(problem: Problem, before: Fitted) -> Candidate:
-    """The foil that explains most, fitted as a candidate is."""
-    tried = (settled(problem, before, candidate(problem, before, foil)) for foil in foils().values())
-    return min(tried, key=lambda c: c.delta_bic)
+def best_foil(problem: Problem, before: Fitted, jobs: int = 1) -> Candidate:
+    """The foil that explains most, fitted as a candidate is, so many at the same time."""
+    with ThreadPoolExecutor(max(jobs, 1)) as pool:
+        tried = pool.map(lambda foil: settled(problem, before, candidate(problem, before, foil)), foils().values())
+        return min(tried, key=lambda c: c.delta_bic)
 
 
 def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:

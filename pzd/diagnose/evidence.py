@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from pzd.damper.effect import Scales
 from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
+from pzd.diagnose.campaign import Campaign, in_use
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fitting import Fitted
 from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.inputs import Prepared
-from pzd.diagnose.judge import Judged, judge
 from pzd.diagnose.observation import Observation
 from pzd.diagnose.problem import Problem
-from pzd.diagnose.split import TRAINING, UNTOUCHED, VALIDATION, Split
-from pzd.diagnose.unsure import expected
-from pzd.diagnose.weighing import observations
+from pzd.diagnose.split import TRAINING, VALIDATION
+from pzd.diagnose.weighing import observation
 from pzd.record import Array, voltage_scale
 
 Mask = NDArray[np.bool_]
@@ -33,28 +32,20 @@ PER_SAMPLE = 3.0
 class Evidence:
     """What the tests of one setting say, ready for fitting."""
 
-    prepared: tuple[Prepared, ...]
-    seen: tuple[Mask, ...]
-    """(n,) the samples that naming may look at."""
+    campaign: Campaign
     whole: Problem
     """All samples seen."""
     halves: tuple[Problem, Problem]
     """Those for training, and those that choose."""
-    known: dict[str, list[Judged]]
-    """What was judged before, by damper: what the evidence weighs does not change it."""
 
-    def judged(self, damper: Damper, config: DiagnoseConfig) -> list[Judged]:
-        """Every record seen against a damper."""
-        key = damper.model_dump_json()
-        if key not in self.known:
-            pairs = zip(self.prepared, self.seen, strict=True)
-            self.known[key] = [judge(damper, p, mask, config.nuisance) for p, mask in pairs if mask.any()]
-        return self.known[key]
+    def gap(self, fitted: Fitted) -> float:
+        """The gap that a fit leaves over all that is seen, as a share of peak."""
+        return visible_gap(self.campaign.judged(fitted.damper))
 
     def something_missing(self, fitted: Fitted, config: DiagnoseConfig) -> bool:
         """Whether the fit misses the tests by more than noise and by more than nothing."""
-        judged = self.judged(fitted.damper, config)
-        return probability_of_noise(judged) < config.significance and visible_gap(judged) >= config.negligible
+        likely = probability_of_noise(self.campaign.judged(fitted.damper))
+        return likely < config.significance and self.gap(fitted) >= config.negligible
 
     def criterion(self, fitted: Fitted) -> float:
         """W_s over the compared samples of all that is seen.
@@ -72,33 +63,31 @@ class Evidence:
         return replace(mine, observations=tuple(replace(other, place=o.place) for other, o in pairs))
 
 
-def evidence_of(
-    prepared: Sequence[Prepared],
-    parts: Split,
-    damper: Damper,
-    config: DiagnoseConfig,
-    known: dict[str, list[Judged]] | None = None,
-) -> Evidence:
+def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
     """The evidence of the records of one setting.
 
     Parameters
     ----------
-    prepared : the records, displacement cleaned
-    parts : which samples are fitted, which choose, which are untouched
-    damper : plain, where the fits start and along which gain and delay of a test act
-    config : priors of the nuisances
-    known : what was judged before of the same records, by damper; added to
+    campaign : the records, and which samples are fitted, which choose, which are untouched
+    damper : where the fits start and along which gain and delay of a test act
     """
-    scale = voltage_scale([p.record for p in prepared])
+    prepared = campaign.prepared
     places = [_nearest_row(damper.base, p) if p.constant else -1 for p in prepared]
-    given = [expected(damper, p, config.nuisance.delay_s) for p in prepared]
-    seen = tuple(roles != UNTOUCHED for roles in parts.roles)
+    shown = in_use(campaign.seen)
+    given = dict(zip(shown, campaign.expected(damper, shown), strict=True))
+    made: dict[tuple[int, bytes], Observation | None] = {}
 
     def observed(kept: Sequence[Mask]) -> tuple[Observation, ...]:
-        return observations(prepared, kept, places, given, config.nuisance)
+        """A record that lies in one half is the same in the whole."""
+        keys = [(i, kept[i].tobytes()) for i in in_use(kept)]
+        for i, key in keys:
+            if (i, key) not in made:
+                made[i, key] = observation(prepared[i], kept[i], places[i], given[i], campaign.nuisance)
+        found = [made[key] for key in keys]
+        return tuple(each for each in found if each is not None)
 
-    whole = observed(seen)
-    scales = _scales(whole, prepared, damper, scale)
+    whole = observed(campaign.seen)
+    scales = _scales(whole, prepared, damper, voltage_scale([p.record for p in prepared]))
     reference = damper.reference_temperature_degC
     if reference is None:
         recorded = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
@@ -107,9 +96,9 @@ def evidence_of(
     varying = frozenset(name for name, values in damper.effects.items() if "at_voltage_V" in values)
     problems = [
         Problem(part, damper.base, scales, fastest, reference, varying)
-        for part in (whole, *(observed([r == role for r in parts.roles]) for role in (TRAINING, VALIDATION)))
+        for part in (whole, *(observed(campaign.in_role(role)) for role in (TRAINING, VALIDATION)))
     ]
-    return Evidence(tuple(prepared), seen, problems[0], (problems[1], problems[2]), {} if known is None else known)
+    return Evidence(campaign, problems[0], (problems[1], problems[2]))
 
 
 def _scales(observed: Sequence[Observation], prepared: Sequence[Prepared], damper: Damper, voltage: float) -> Scales:

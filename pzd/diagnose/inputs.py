@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,8 @@ DRAWS = 6
 """Displacements sent through the damper to see what their noise makes of the force."""
 FINER = 16
 """Points per sample on which the cleaned cycle is laid."""
+DRAWN = 4
+"""Points per sample on which a drawn cycle is laid: what it differs by is noise."""
 COVERS = 0.5
 """The repeating run must hold this share of the way that the piston travels, else the record counts as not
 repeating; rest before and after does not count."""
@@ -50,6 +53,19 @@ class Prepared:
     """Whether the voltage stands still."""
     draws: tuple[Record, ...] = ()
     """Two cycles of the lead; and the same with other displacements, as likely by what noise and resolution leave."""
+
+    @cached_property
+    def folded(self) -> Array:
+        """(cycles, points) measured force [N]; nothing in it where nothing repeats."""
+        return np.zeros((0, 0)) if self.cycles is None else self.cycles.fold(self.record.time, self.record.force)
+
+    @cached_property
+    def mean_motion(self) -> Motion:
+        """Displacement, velocity and acceleration of the average cycle, (points,) each, where there are cycles."""
+        if self.cycles is None:
+            return np.zeros(0), np.zeros(0), np.zeros(0)
+        time, of = self.record.time, self.cycles.mean
+        return of(time, self.record.displacement), of(time, self.record.velocity), of(time, self.record.acceleration)
 
     @property
     def lead_samples(self) -> int:
@@ -168,28 +184,28 @@ class Average:
         found[0] = 0.0
         return found
 
-    def motion(self, harmonics: NDArray[np.complex128]) -> Callable[[Array], Motion]:
+    def motion(self, harmonics: NDArray[np.complex128], finer: int = FINER) -> Callable[[Array], Motion]:
         """Displacement, velocity and acceleration of some harmonics (H + 1,) at any time."""
         from scipy.interpolate import CubicSpline
 
         rate = 2j * np.pi * np.arange(harmonics.size) / self.run.period
-        fine = FINER * self.points
-        phase = np.arange(fine + 1) / fine
+        fine = finer * self.points
+        values = np.fft.irfft(harmonics * rate ** np.arange(3)[:, None], fine) * fine
+        values = np.concatenate([values, values[:, :1]], axis=1)
+        cycle = CubicSpline(np.arange(fine + 1) / fine, values, axis=1, bc_type="periodic")
 
-        def cycle(order: int) -> Callable[[Array], Array]:
-            values = np.fft.irfft(harmonics * rate**order, fine) * fine
-            spline = CubicSpline(phase, np.append(values, values[0]), bc_type="periodic")
-            return lambda time: np.asarray(spline(self.run.phase(time)), dtype=np.float64)
+        def at(time: Array) -> Motion:
+            x, v, a = np.ascontiguousarray(cycle(self.run.phase(time)))
+            return x, v, a
 
-        x, v, a = cycle(0), cycle(1), cycle(2)
-        return lambda time: (x(time), v(time), a(time))
+        return at
 
 
 def _drawn(lead: Record, average: Average) -> tuple[Record, ...]:
     """Two cycles of the lead as they are, and with other displacements that are as likely."""
     draw = np.random.default_rng(DRAWS)
     two = sliced(lead, np.arange(lead.time.size) < 2 * average.points)
-    motions = [average.motion(average.clear_harmonics + average.error(draw)) for _ in range(DRAWS)]
+    motions = [average.motion(average.clear_harmonics + average.error(draw), DRAWN) for _ in range(DRAWS)]
     return (two, *(_moved(two, motion(two.time)) for motion in motions))
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.model import Damper
 from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.inputs import Prepared
 from pzd.diagnose.jumps import jumps, jumps_in_cycles, within_a_sample
@@ -16,7 +15,7 @@ from pzd.diagnose.noise import PureError, harmonics_of, pure_error, repeatable_p
 from pzd.diagnose.nuisance import nuisance
 from pzd.diagnose.predict import counted
 from pzd.diagnose.rich import rich_fit
-from pzd.diagnose.unsure import expected
+from pzd.diagnose.unsure import Expected
 
 BELIEVED = 1e-4
 """A change from cycle to cycle counts in the gap where noise alone would show it less often than this."""
@@ -60,10 +59,9 @@ class Judged:
         return float(np.max(np.abs(self.prepared.record.force)))
 
 
-def judge(damper: Damper, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> Judged:
-    """The record against the damper, over the wanted samples past the warm-up."""
+def judge(given: Expected, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> Judged:
+    """The record against what a damper makes of it, over the wanted samples past the warm-up."""
     record = prepared.record
-    given = expected(damper, prepared, config.delay_s)
     predicted, residual = given.force, record.force - given.force
     mask = wanted & counted(prepared)
     rough = _rough_variance(prepared, residual, mask)

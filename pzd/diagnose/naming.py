@@ -6,9 +6,11 @@ import itertools
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
+from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.candidates import (
     Candidate,
     best_foil,
@@ -22,13 +24,9 @@ from pzd.diagnose.candidates import (
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit
-from pzd.diagnose.gap import visible_gap
-from pzd.diagnose.inputs import Prepared
-from pzd.diagnose.judge import Judged
 from pzd.diagnose.named import Foiled, Named, Round
 from pzd.diagnose.problem import Problem
 from pzd.diagnose.settling import at_rest
-from pzd.diagnose.split import Split
 from pzd.diagnose.support import closes, leaves_gap, stand_in, unsupported
 
 log = logging.getLogger(__name__)
@@ -39,24 +37,17 @@ CLOSE = 0.95
 """Candidates that pay at least this share of what the chosen one pays are searched to the end like it."""
 
 
-def name_effects(
-    prepared: Sequence[Prepared], parts: Split, damper: Damper, config: DiagnoseConfig, jobs: int = 1
-) -> Named:
+def name_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, jobs: int = 1) -> Named:
     """Adopt effects one after another while the next one pays, is supported by itself, and something is missing.
 
     Parameters
     ----------
-    prepared : the records of one setting
-    parts : which samples are fitted, which choose, which are untouched
+    campaign : the records of one setting
     damper : plain, where the fits start
     config : thresholds, forced and forbidden effects
     jobs : candidates fitted at the same time
     """
-    known: dict[str, list[Judged]] = {}
-
-    def weighed(model: Damper) -> Evidence:
-        return evidence_of(prepared, parts, model, config, known)
-
+    weighed = partial(evidence_of, campaign)
     first = weighed(damper)
     plain = fit(first.whole, (), first.whole.start())
     search = _Search(config, weighed, jobs, damper, first, plain)
@@ -200,7 +191,7 @@ class _Search:
             self.evidence, self.current = evidence, current
 
     def _gap(self, fitted: Fitted) -> float:
-        return visible_gap(self.evidence.judged(fitted.damper, self.config))
+        return self.evidence.gap(fitted)
 
     def _without(self, effect: str) -> Fitted:
         """The optimum with one of the adopted effects left out."""
@@ -213,7 +204,7 @@ class _Search:
         found = []
         for name in self.current.effects[len(self.config.force) :]:
             without = self._without(name)
-            foil = best_foil(self.evidence.whole, without)
+            foil = best_foil(self.evidence.whole, without, self.jobs)
             behind = foil.delta_bic - delta_bic(without, self.current)
             if behind < self.config.rival_bic:
                 found.append(Foiled(name, self.current.damper, foil.effect, foil.fitted.damper, behind))

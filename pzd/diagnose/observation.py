@@ -8,12 +8,13 @@ that is left counts as it should: |r|^2 is minus twice the logarithm of the like
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from pzd.damper.compose import respond, sampling_steps, value_of
+from pzd.damper.compose import element_force, respond, sampling_steps, value_of
 from pzd.damper.effects.sensor_delay import law as moment
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
@@ -23,6 +24,8 @@ from pzd.record import Array
 
 SIMULATION_TOLERANCE = 1e-8
 """Of the damper's path, as a share of the force."""
+REMEMBERED = 12
+"""Element forces kept, enough for one column of slopes each of two fits at the same time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,16 @@ class Observation:
     def steps(self) -> Array:
         """Sampling intervals of the motion [s], one where they are even."""
         return sampling_steps(self.motion.time)
+
+    @cached_property
+    def element(self) -> Callable[[bytes], Array]:
+        """(m,) force [N] of the element by its parameter row, (1, 10) as bytes; effects beside it leave it as it is."""
+
+        def marched(row: bytes) -> Array:
+            rows = np.frombuffer(row)[np.newaxis]
+            return element_force(rows, self.motion, self.steps, self.begins_with, SIMULATION_TOLERANCE)
+
+        return lru_cache(REMEMBERED)(marched)
 
     @property
     def begins_with(self) -> float:
@@ -94,9 +107,14 @@ class Observation:
         return np.concatenate([harmonics.real, harmonics.imag[1:]])
 
 
-def response(observation: Observation, damper: Damper, late: float = 0.0) -> Array:
-    """(n,) force that a damper gives at the compared samples [N], shown by a channel that comes later by `late` [s]."""
+def response(observation: Observation, damper: Damper) -> Array:
+    """(n,) force that a damper gives at the compared samples [N]."""
+    return responses(observation, damper)(0.0)
+
+
+def responses(observation: Observation, damper: Damper) -> Callable[[float], Array]:
+    """(n,) force that a damper gives at the compared samples [N], by how much later yet a channel shows it [s]."""
     o, tau = observation, value_of(damper, "sensor_delay", "tau")
     prompt = damper.model_copy(update={"effects": {n: e for n, e in damper.effects.items() if n != "sensor_delay"}})
     force = respond(prompt, o.motion, o.begins_with, SIMULATION_TOLERANCE)
-    return o.at_compared(o.delayed(force, tau + late))
+    return lambda late: o.at_compared(o.delayed(force, tau + late))

@@ -9,12 +9,12 @@ from typing import cast
 
 import numpy as np
 
-from pzd.damper.compose import force_of_rows, standing_rows
+from pzd.damper.compose import standing_rows, with_beside
 from pzd.damper.effect import Parameter, Scales
 from pzd.damper.foils import known
 from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnose.observation import SIMULATION_TOLERANCE, Observation, response
+from pzd.diagnose.observation import Observation, response
 from pzd.record import Array
 
 SOFTEST = 0.1
@@ -193,7 +193,7 @@ def simulated(point: Point, observation: Observation) -> Array:
         friction, damping, stiffness = point.base[o.place]
         effects = point.at(o.place)
         rows, beside = standing_rows(friction, damping, stiffness, effects)
-        force = force_of_rows(rows, beside, o.motion, o.steps, o.begins_with, SIMULATION_TOLERANCE)
+        force = with_beside(o.element(rows.tobytes()), beside, o.motion)
         tau = effects.get("sensor_delay", {}).get("tau", 0.0)
         return o.at_compared(o.delayed(force, tau))
     damper = point.damper()

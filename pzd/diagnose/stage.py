@@ -40,6 +40,7 @@ def diagnose(
     -------
     the verdict, and the damper with what was adopted; unchanged where nothing was
     """
+    from pzd.diagnose.campaign import Campaign
     from pzd.diagnose.heldout import held_out_gap
     from pzd.diagnose.inputs import prepare
     from pzd.diagnose.naming import name_effects
@@ -53,10 +54,10 @@ def diagnose(
     prepared = prepare(used)
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
-    named = name_effects(prepared, parts, plain, diagnose, jobs)
+    named = name_effects(Campaign(prepared, parts, diagnose.nuisance, jobs), plain, diagnose, jobs)
     evidence = named.first
-    before = evidence.judged(named.plain.damper, diagnose)
-    after = evidence.judged(named.fitted.damper, diagnose) if named.adopted else before
+    before = evidence.campaign.judged(named.plain.damper)
+    after = evidence.campaign.judged(named.fitted.damper) if named.adopted else before
     decision = decide(named, before, after, diagnose)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
@@ -65,7 +66,7 @@ def diagnose(
         reason=decision.reason + weak(parts.hold_out) + without(cut_off),
         effects=named.adopted,
         confidence=decision.confidence,
-        gap=held_out_gap(named, parts, diagnose),
+        gap=held_out_gap(named, parts),
         parameters=parameters_of(named),
         ranking=ranking_of(named, evidence),
         rivals=named.rivals,

@@ -8,7 +8,6 @@ from pzd.diagnose.candidates import Candidate
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence
 from pzd.diagnose.fitting import Fitted, fit, misfit_beside
-from pzd.diagnose.gap import visible_gap
 from pzd.diagnose.intervals import LEVEL, standard_errors
 from pzd.diagnose.problem import Problem
 
@@ -37,7 +36,7 @@ def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candi
     """Why a candidate is a stand-in by the gap that it leaves open, None where it closes enough or noise hides it."""
     if not evidence.something_missing(before, config):
         return None
-    open_before, left = _gaps(evidence, config, before, candidate)
+    open_before, left = _gaps(evidence, before, candidate)
     if left**2 <= (1.0 - LEAST_CUT) * open_before**2:
         return None
     return f"stand-in: closes less than {LEAST_CUT:.0%} of the gap"
@@ -45,13 +44,13 @@ def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candi
 
 def closes(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> bool:
     """Whether a candidate leaves so little of the gap that nothing more is looked for under a name."""
-    open_before, left = _gaps(evidence, config, before, candidate)
+    open_before, left = _gaps(evidence, before, candidate)
     return left <= max(config.unexplained_share * open_before, config.negligible)
 
 
-def _gaps(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> tuple[float, float]:
+def _gaps(evidence: Evidence, before: Fitted, candidate: Candidate) -> tuple[float, float]:
     """The gap without a candidate and with it, as shares of peak."""
-    without, with_it = (visible_gap(evidence.judged(f.damper, config)) for f in (before, candidate.fitted))
+    without, with_it = (evidence.gap(f) for f in (before, candidate.fitted))
     return without, with_it
 
 

@@ -15,7 +15,7 @@ from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.inputs import Prepared, sliced
 from pzd.diagnose.jumps import jumps, jumps_in_samples
 from pzd.diagnose.noise import PureError, pure_error
-from pzd.diagnose.observation import Observation, response
+from pzd.diagnose.observation import Observation, responses
 from pzd.diagnose.predict import motion_of, warms
 from pzd.diagnose.rich import rich_fit
 from pzd.diagnose.unsure import Expected
@@ -39,32 +39,22 @@ MOST_POINTS = 2048
 """And on no more: the harmonics that are compared need no finer grid, however slow the test."""
 
 
-def observations(
-    prepared: Sequence[Prepared],
-    kept: Sequence[NDArray[np.bool_]],
-    places: Sequence[int],
-    simulated: Sequence[Expected],
-    nuisance: NuisanceConfig,
-) -> tuple[Observation, ...]:
-    """The observations of some samples of some records.
+def observation(
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
+) -> Observation | None:
+    """The observation of some samples of a record; None where they are too few.
 
     Parameters
     ----------
-    prepared : the records
-    kept : (n,) which samples of each count
-    places : the base row of each
-    simulated : what the damper makes of each, along which gain and delay act
-    nuisance : priors of the tests' own offset, gain and delay
+    p : the record
+    mask : (n,) which of its samples count
+    place : its base row; -1 where the voltage moves
+    given : what the damper makes of it, along which gain and delay act
+    nuisance : priors of the test's own offset, gain and delay
     """
-    found = []
-    for p, mask, place, given in zip(prepared, kept, places, simulated, strict=True):
-        if np.any(mask):
-            # Cycles differ where the damper warms, and their average would hide it.
-            averaged = p.cycles is not None and place >= 0 and not warms(p.record.temperature)
-            build = _of_cycles if averaged else _of_samples
-            made = build(p, mask, place, given, nuisance)
-            found += [made] if made is not None else []
-    return tuple(found)
+    # Cycles differ where the damper warms, and their average would hide it.
+    averaged = p.cycles is not None and place >= 0 and not warms(p.record.temperature)
+    return (_of_cycles if averaged else _of_samples)(p, mask, place, given, nuisance)
 
 
 def _of_cycles(
@@ -73,17 +63,17 @@ def _of_cycles(
     run = p.cycles
     if run is None:
         return None
-    time, record, force = p.record.time, p.record, given.force
-    whole = run.fold(time, record.force)
+    time, record, whole = p.record.time, p.record, p.folded
     numbers = run.number(time)
     counted = [n for n in range(run.count) if np.all(mask[numbers == n])]
     if not counted:
         return None
-    error = pure_error(whole - run.fold(time, force))
+    simulated = run.fold(time, given.force)
+    error = pure_error(whole - simulated)
     points = min(error.points, MOST_POINTS)
     cycle = _resampled(whole[counted].mean(axis=0), points)
     peak = float(np.max(np.abs(cycle)))
-    average = _resampled(run.mean(time, force), points)
+    average = _resampled(simulated.mean(axis=0), points)
     left = DISCREPANCY * _left_by(cycle, average, error.sample_variance / len(counted))
     floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size + given.unsure
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
@@ -91,7 +81,7 @@ def _of_cycles(
     bare = Observation(
         record.name,
         place,
-        *_cycle_motion(record, run.period, [_resampled(run.mean(time, c), points) for c in _kinematics(record)]),
+        *_cycle_motion(record, run.period, [_resampled(channel, points) for channel in p.mean_motion]),
         cycle,
         peak,
         error,
@@ -108,10 +98,6 @@ def _left_by(measured: Array, force: Array, variance: float) -> float:
     residual = measured - force
     residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
     return float(np.sqrt(max(np.mean(residual**2) - variance, 0.0)))
-
-
-def _kinematics(record: Record) -> tuple[Array, Array, Array]:
-    return record.displacement, record.velocity, record.acceleration
 
 
 def _cycle_motion(record: Record, period: float, channels: Sequence[Array]) -> tuple[Motion, int, int]:
@@ -191,8 +177,9 @@ def with_nuisances(
     A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
     that, F(t - d) - F + d dF/dt, is taken off the measured force.
     """
-    force, averaged = response(bare, damper), isinstance(bare.noise, PureError)
-    late = (response(bare, damper, INSTANT) - force) / INSTANT
+    shown = responses(bare, damper)
+    force, averaged = shown(0.0), isinstance(bare.noise, PureError)
+    late = (shown(INSTANT) - force) / INSTANT
     columns = np.column_stack(
         [
             nuisance.delay_s * late,
@@ -205,7 +192,7 @@ def with_nuisances(
     left, size, right = np.linalg.svd(bare.in_noise(columns), full_matrices=False)
     likeliest = right[:, 0] @ (size / (1.0 + size**2) * (left.T @ bare.in_noise(bare.measured - force)))
     delay = nuisance.delay_s * float(np.clip(likeliest, -LATEST, LATEST))
-    measured = bare.measured - (response(bare, damper, delay) - force - delay * late)
+    measured = bare.measured - (shown(delay) - force - delay * late)
     return replace(bare, measured=measured, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
 
 

@@ -10,7 +10,8 @@ import pytest
 from campaign import damper_of, sine
 
 from pzd.damper.effects import library
-from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.campaign import Campaign
+from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit
 from pzd.diagnose.inputs import prepare, sliced
@@ -21,7 +22,7 @@ from pzd.record import Array, Record
 
 DRAWS = 400
 TESTS = 9
-DELAY = DiagnoseConfig().nuisance.delay_s
+DELAY = NuisanceConfig().delay_s
 
 
 def linear(rng: np.random.Generator, pulled: float) -> tuple[Fitted, float]:
@@ -94,7 +95,7 @@ def fitted_to(records: tuple[Record, ...], effects: dict[str, dict[str, float]])
     """Fitted from the truth, and weighed by what that leaves."""
     damper, prepared = damper_of((0.0, 150.0), **effects), prepare(records)
     for _ in range(3):
-        evidence = evidence_of(prepared, split(prepared, None, 2.0), damper, DiagnoseConfig())
+        evidence = evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper)
         found = fit(evidence.whole, tuple(effects), evidence.whole.start_with(damper))
         damper = found.damper
     return evidence, found

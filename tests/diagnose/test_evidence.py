@@ -10,7 +10,8 @@ import pytest
 from campaign import damper_of, sine, sines
 
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.campaign import Campaign
+from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import fit
 from pzd.diagnose.inputs import prepare
@@ -24,7 +25,7 @@ TWO = (0.0, 150.0)
 
 def evidence(records: tuple[Record, ...], damper: Damper) -> Evidence:
     prepared = prepare(records)
-    return evidence_of(prepared, split(prepared, None, 2.0), damper, DiagnoseConfig())
+    return evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from pzd.diagnose.judge import judge
 from pzd.diagnose.nuisance import nuisance
 from pzd.diagnose.split import TRAINING, UNTOUCHED, VALIDATION, split
 from pzd.diagnose.stage import diagnose
+from pzd.diagnose.unsure import expected
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.stage import identify
 from pzd.quantities import Control
@@ -162,7 +163,7 @@ def test_small_offset_gain_and_delay_are_nuisances_and_large_ones_a_gap() -> Non
         record = sine(damper, 0.0, 2.0, 0.03, rng, noise=1e-4, offset=offset, gain=gain)
         (prepared,) = prepare([record])
         everything = np.ones(prepared.record.time.size, dtype=np.bool_)
-        judged = judge(damper, prepared, everything, NuisanceConfig())
+        judged = judge(expected(damper, prepared, NuisanceConfig().delay_s), prepared, everything, NuisanceConfig())
         left = float(np.sqrt(np.mean(judged.cleared**2)) / np.sqrt(np.mean(judged.residual**2)))
         assert left < share if offset < 0.01 else left > share
 

@@ -10,6 +10,7 @@ from pzd.diagnose.gap import visible_gap
 from pzd.diagnose.inputs import prepare
 from pzd.diagnose.judge import judge
 from pzd.diagnose.jumps import jumps
+from pzd.diagnose.unsure import expected
 
 
 def test_a_step_is_a_jump_of_its_own_size_at_the_two_samples_beside_it() -> None:
@@ -33,6 +34,6 @@ def test_the_true_damper_with_a_large_jump_at_every_reversal_leaves_no_gap() -> 
     record = sine(damper, 0.0, 1.03, 0.03, np.random.default_rng(), noise=0.005, rate=500.0)
     (prepared,) = prepare((record,))
     wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
-    assert visible_gap([judge(damper, prepared, wanted, NuisanceConfig())]) < 0.001
-    plain = damper_of((0.0,))
-    assert visible_gap([judge(plain, prepared, wanted, NuisanceConfig())]) > 0.01
+    with_jump, without = (expected(d, prepared, NuisanceConfig().delay_s) for d in (damper, damper_of((0.0,))))
+    assert visible_gap([judge(with_jump, prepared, wanted, NuisanceConfig())]) < 0.001
+    assert visible_gap([judge(without, prepared, wanted, NuisanceConfig())]) > 0.01

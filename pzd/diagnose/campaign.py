@@ -1,0 +1,77 @@
+"""The tests of one setting, and what they say of a damper; each damper is asked about once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.model import Damper
+from pzd.diagnose.config import NuisanceConfig
+from pzd.diagnose.inputs import Prepared
+from pzd.diagnose.judge import Judged, judge
+from pzd.diagnose.split import UNTOUCHED, Split
+from pzd.diagnose.unsure import Expected, expected
+
+Mask = NDArray[np.bool_]
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """The records of one setting, and which of their samples naming may see."""
+
+    prepared: tuple[Prepared, ...]
+    parts: Split
+    nuisance: NuisanceConfig
+    jobs: int = 1
+    """Records that are asked at the same time."""
+    _expected: dict[tuple[str, int], Expected] = field(default_factory=dict, repr=False)
+    _judged: dict[str, tuple[Judged, ...]] = field(default_factory=dict, repr=False)
+
+    @property
+    def seen(self) -> tuple[Mask, ...]:
+        """(n,) the samples of each record that naming may look at."""
+        return tuple(roles != UNTOUCHED for roles in self.parts.roles)
+
+    def in_role(self, role: int) -> tuple[Mask, ...]:
+        """(n,) the samples of each record in one role of the split."""
+        return tuple(roles == role for roles in self.parts.roles)
+
+    def expected(self, damper: Damper, numbers: Sequence[int]) -> tuple[Expected, ...]:
+        """What the damper makes of some of the records."""
+        key = damper.model_dump_json()
+        new = [i for i in numbers if (key, i) not in self._expected]
+        made = self._each(lambda i: expected(damper, self.prepared[i], self.nuisance.delay_s), new)
+        self._expected.update(zip(((key, i) for i in new), made, strict=True))
+        return tuple(self._expected[key, i] for i in numbers)
+
+    def judged(self, damper: Damper) -> tuple[Judged, ...]:
+        """Every record against a damper, over the samples seen."""
+        key = damper.model_dump_json()
+        if key not in self._judged:
+            self._judged[key] = self._against(damper, self.seen)
+        return self._judged[key]
+
+    def untouched(self, damper: Damper) -> tuple[Judged, ...]:
+        """Every record against a damper, over the samples that naming may not see."""
+        return self._against(damper, self.in_role(UNTOUCHED))
+
+    def _against(self, damper: Damper, masks: Sequence[Mask]) -> tuple[Judged, ...]:
+        asked = in_use(masks)
+        given = [(e, self.prepared[i], masks[i]) for i, e in zip(asked, self.expected(damper, asked), strict=True)]
+        return self._each(lambda each: judge(*each, self.nuisance), given)
+
+    def _each(self, function: Callable[[Item], Made], items: Iterable[Item]) -> tuple[Made, ...]:
+        with ThreadPoolExecutor(max(self.jobs, 1)) as pool:
+            return tuple(pool.map(function, items))
+
+
+def in_use(masks: Sequence[Mask]) -> list[int]:
+    """The records of which a mask (n,) keeps any sample."""
+    return [i for i, mask in enumerate(masks) if mask.any()]
