@@ -63,6 +63,8 @@ class Parameter:
     meaning: str
     search: Search
     """How a fit looks for it."""
+    natural_from: float = -math.inf
+    """Smallest value that the effect has in nature; a fit may go below, and is then something that looks alike."""
 
     def admits(self, value: float) -> bool:
         """Whether the value lies within the limits."""

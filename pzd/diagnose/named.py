@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.diagnose.candidates import Candidate
 from pzd.diagnose.evidence import Evidence
 from pzd.diagnose.fitting import Fitted
+
+
+def against_nature(damper: Damper) -> tuple[str, ...]:
+    """The effects of a damper that have a value which they have nowhere in nature, such as a negative mass."""
+    limits = ((name, p) for name in damper.effects for p in library()[name].parameters)
+    return tuple(n for n, p in limits if float(np.min(damper.effects[n].get(p.name, p.neutral))) < p.natural_from)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from pzd.diagnose.candidates import (
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.evidence import Evidence, evidence_of
 from pzd.diagnose.fitting import Fitted, fit
-from pzd.diagnose.named import Foiled, Named, Round
+from pzd.diagnose.named import Foiled, Named, Round, against_nature
 from pzd.diagnose.problem import Problem
 from pzd.diagnose.settling import at_rest
 from pzd.diagnose.support import closes, leaves_gap, stand_in, unsupported
@@ -105,12 +105,19 @@ class _Search:
         """Adopt one effect more, an adopted one by voltage, or two that are supported together; whether any was."""
         tried = self._tried(self.evidence, self.current)
         steps = sorted((*tried, *by_voltage(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
-        chosen = self._first_supported(steps)
-        if chosen is None:
+        first = self._first_supported(steps)
+        if first is None:
             return self._pair(tried)
-        ended = settled(self.evidence.whole, self.current, chosen)
-        self._adopt(ended, _ended(self.evidence.whole, self.current, ended, tried), _before(chosen, steps))
+        ended = settled(self.evidence.whole, self.current, self._natural(first, steps))
+        self._adopt(ended, _ended(self.evidence.whole, self.current, ended, tried), _before(first, steps))
         return True
+
+    def _natural(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
+        """Of the candidates that pay as much as the first and are supported, one with values that nature has."""
+        if not against_nature(first.fitted.damper):
+            return first
+        alike = [c for c in steps if not c.varies and c.delta_bic - first.delta_bic < self.config.rival_bic]
+        return self._first_supported([c for c in alike if not against_nature(c.fitted.damper)]) or first
 
     def _tried(self, evidence: Evidence, current: Fitted) -> tuple[Candidate, ...]:
         if len(current.effects) == self.config.most_effects:

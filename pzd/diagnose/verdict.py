@@ -18,7 +18,7 @@ from pzd.diagnose.evidence import Evidence
 from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.intervals import LEVEL, standard_errors
 from pzd.diagnose.judge import Judged
-from pzd.diagnose.named import Named
+from pzd.diagnose.named import Named, against_nature
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
@@ -60,6 +60,10 @@ def decide(named: Named, before: Sequence[Judged], after: Sequence[Judged], conf
     told = f"{' and '.join(named.adopted)}: the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
     if chances[1] < config.significance and _remains(sizes, config):
         words = f"{told}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
+        return Decision("unexplained", words, None)
+    odd = against_nature(named.fitted.damper)
+    if odd and not named.rivals:
+        words = f"{told}; but with a value that no {' and no '.join(odd)} has, so that it is something that looks alike"
         return Decision("unexplained", words, None)
     better = [f for f in named.foiled if f.behind < -config.rival_bic]
     if better:

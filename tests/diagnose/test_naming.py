@@ -73,17 +73,27 @@ def named_well(name: str, found: Diagnosed) -> bool:
     return values == pytest.approx(TRUTHS[name], rel=0.1) and shrinks and set(found.damper.effects) == {name}
 
 
-def test_a_spring_and_a_mass_cannot_be_told_apart_on_one_frequency_and_the_next_test_has_another() -> None:
+@pytest.mark.parametrize("truth", ["gas_spring", "fluid_inertia"])
+def test_a_spring_and_a_mass_cannot_be_told_apart_on_one_frequency_and_the_next_test_has_another(truth: str) -> None:
     rng = np.random.default_rng()
     tests = ((2.0, 0.015), (2.0, 0.03))
-    told = diagnosed(sines(damper_of(TWO, gas_spring={"k_g": 3000.0}), rng, TWO, tests=tests)).diagnosis
+    effects = {truth: {"gas_spring": {"k_g": 3000.0}, "fluid_inertia": {"m": 25.0}}[truth]}
+    told = diagnosed(sines(damper_of(TWO, **effects), rng, TWO, tests=tests)).diagnosis
     assert told.verdict == "ambiguous"
     assert {*told.effects, *told.rivals} >= {"gas_spring", "fluid_inertia"}
+    # What the car runs on is the one of the two that nature has: the other is a spring or a mass below zero.
+    assert told.effects == (truth,)
     assert told.next_test is not None
     assert set(told.next_test.separates) == {*told.effects, *told.rivals}
     assert told.next_test.frequency_Hz != pytest.approx(2.0)
     assert told.next_test.distance_percent is not None
     assert told.next_test.distance_percent > 0.5
+
+
+def test_a_spring_that_pushes_away_is_not_called_a_gas_spring() -> None:
+    told = diagnosed(sines(damper_of(TWO, gas_spring={"k_g": -3000.0}), np.random.default_rng(), TWO)).diagnosis
+    assert told.verdict == "unexplained", told.reason
+    assert "no gas_spring has" in told.reason
 
 
 def test_something_that_is_not_in_the_library_is_unexplained() -> None:

@@ -21,6 +21,7 @@ EFFECT = Effect(
             1.0e5,
             "apparent mass of the oil column",
             Search(lambda s: s.force / s.acceleration, (0.0,)),
+            natural_from=0.0,
         ),
     ),
     source="fluid inerter; Swift et al. 2013, Vehicle System Dynamics 51(11)",

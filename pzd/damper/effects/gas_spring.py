@@ -20,6 +20,7 @@ EFFECT = Effect(
             1.0e7,
             "stiffness beside the element",
             Search(lambda s: s.force / s.stroke, (0.0,)),
+            natural_from=0.0,
         ),
     ),
     source="Dixon 2007, The Shock Absorber Handbook",
