@@ -81,6 +81,8 @@ class Scored(Frozen):
     gap_cut_gains_out: float | None
     """The same with the best gain of each record taken out, before and after alike: what tests whose gains jitter can
     show of the shape."""
+    gap_cut_of_truth: float | None
+    """What the truth itself would cut, with the mean gain of the tests that were fitted."""
     next_test: bool
     """Whether a next test was proposed."""
     seconds: float

@@ -21,6 +21,19 @@ class Clean:
     motion: Motion
     force: Array
     """(n,) [N]"""
+    recorded: Array
+    """(n,) what the force channel has of it [N]."""
+
+    @property
+    def gain(self) -> float:
+        """Slope of what was recorded over the force."""
+        force = self.force - np.mean(self.force)
+        return float(force @ self.recorded / (force @ force))
+
+    @property
+    def voltage(self) -> float:
+        """Median voltage [V]; 0 without one."""
+        return 0.0 if self.motion.voltage is None else round(float(np.median(self.motion.voltage)), 1)
 
     @property
     def peak(self) -> float:
@@ -33,7 +46,11 @@ def write_clean(path: Path, records: Sequence[Clean]) -> None:
     arrays = {
         f"{number:02d}.{key}": channel
         for number, record in enumerate(records, start=1)
-        for key, channel in [("force", record.force), *((key, getattr(record.motion, key)) for key in _CHANNELS)]
+        for key, channel in [
+            ("force", record.force),
+            ("recorded", record.recorded),
+            *((key, getattr(record.motion, key)) for key in _CHANNELS),
+        ]
         if channel is not None
     }
     np.savez(path, allow_pickle=False, **arrays)
@@ -48,6 +65,7 @@ def read_clean(path: Path) -> dict[str, Clean]:
         f"r{number}": Clean(
             Motion(*(arrays.get(f"{number}.{key}") for key in _CHANNELS)),  # type: ignore[arg-type]  # the first four always stand there
             arrays[f"{number}.force"],
+            arrays[f"{number}.recorded"],
         )
         for number in numbers
     }

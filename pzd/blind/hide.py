@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +55,7 @@ def hide(setup: Setup, planned: Planned, places: Places) -> None:
         write_columns(rig / f"r{number:02d}.csv", _channels(record), setup.control)
     places.truth(planned.id).parent.mkdir(parents=True, exist_ok=True)
     write_json(places.truth(planned.id), truth, setup.control)
-    write_clean(places.clean(planned.id), [Clean(record.truth, record.true_force) for record in records])
+    write_clean(places.clean(planned.id), _known(records))
 
 
 def drawn(setup: Setup, planned: Planned) -> tuple[Truth, list[Taken]]:
@@ -83,7 +83,7 @@ def drawn(setup: Setup, planned: Planned) -> tuple[Truth, list[Taken]]:
         damper = with_effects(stand.damper, wanted, plain, draw)
     recorded = stand.model_copy(update={"damper": damper, **_noise(setup, share, rho, unsteady)})
     records = list(take(recorded, stand_seed, control=setup.control, law=law))
-    clean = [Clean(record.truth, record.true_force) for record in records]
+    clean = _known(records)
     return Truth(
         id=planned.id,
         seed=blind.seed,
@@ -146,7 +146,11 @@ def _noise(setup: Setup, share: float, rho: float, unsteady: float) -> dict[str,
 
 
 def _clean(stand: VirtualEntry, seed: int, control: Control) -> list[Clean]:
-    return [Clean(record.truth, record.true_force) for record in take(stand, seed, control=control)]
+    return _known(take(stand, seed, control=control))
+
+
+def _known(records: Iterable[Taken]) -> list[Clean]:
+    return [Clean(record.truth, record.true_force, record.force) for record in records]
 
 
 def _given_other(records: Sequence[Clean], damper: Damper) -> dict[str, float]:

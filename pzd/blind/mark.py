@@ -5,15 +5,11 @@ from __future__ import annotations
 import shutil
 from collections.abc import Mapping
 
-import numpy as np
-
 from pzd.artefacts import Diagnosed, Diagnosis
 from pzd.blind.case import Cost, Places, Scored, Truth
 from pzd.blind.clean import Clean, read_clean
+from pzd.blind.cuts import gap_cut, gap_cut_of_truth
 from pzd.blind.seek import COST
-from pzd.damper.compose import respond
-from pzd.damper.model import Damper
-from pzd.identify.trial import warm_up
 from pzd.quantities import Control
 from pzd.schema.jsonfile import read_json, write_json
 
@@ -87,6 +83,7 @@ def scored(truth: Truth, cost: Cost, found: Diagnosed | None, clean: Mapping[str
         inside=_inside(told, truth) if told and set(told.effects) == set(there) else {},
         gap_cut=gap_cut(found, clean) if found and found.diagnosis.effects else None,
         gap_cut_gains_out=gap_cut(found, clean, gains_out=True) if found and found.diagnosis.effects else None,
+        gap_cut_of_truth=gap_cut_of_truth(found, clean) if found and found.diagnosis.effects else None,
         next_test=bool(told and told.next_test),
         seconds=cost.seconds,
         diagnose_seconds=cost.diagnose_seconds,
@@ -119,30 +116,3 @@ def _inside(told: Diagnosis, truth: Truth) -> dict[str, bool]:
             if isinstance(low, float) and isinstance(high, float) and isinstance(true, float):
                 found[f"{effect}.{name}"] = low <= true <= high
     return found
-
-
-def gap_cut(found: Diagnosed, clean: Mapping[str, Clean], *, gains_out: bool = False) -> float:
-    """How much of the gap to the noise-free force the found effects take away on the held-out records.
-
-    Equation: 1 - W_s after / W_s before                    Source: Makowski and Knap 2021, eq. (4)
-
-    Parameters
-    ----------
-    found : the diagnosis with the damper before and after
-    clean : the noise-free records by name
-    gains_out : compare shapes alone: the best gain of each record taken out, before and after alike
-    """
-    held_out = [clean[name] for name in found.diagnosis.gap.held_out]
-    before, after = (
-        sum(_squares(damper, record, gains_out=gains_out) for record in held_out)
-        for damper in (found.plain, found.damper)
-    )
-    return 1.0 - after / before
-
-
-def _squares(damper: Damper, record: Clean, *, gains_out: bool) -> float:
-    first = warm_up(record.motion.displacement)
-    force = record.force[first:]
-    simulated = respond(damper, record.motion, float(record.force[0]), 1e-7)[first:]
-    gain = float(force @ simulated / (simulated @ simulated)) if gains_out else 1.0
-    return float(np.sum((force - gain * simulated) ** 2))

@@ -143,7 +143,12 @@ def _gap_cuts(cases: Sequence[Scored]) -> Iterator[Line]:
     named = [c for c in cases if c.truth and right(c) and visible(c)]
     cuts = [c.gap_cut for c in named if c.gap_cut is not None]
     shapes = [c.gap_cut_gains_out for c in named if c.gap_cut_gains_out is not None]
-    for about, values, targets in (("", cuts, (">= 90 %", ">= 75 %")), (", gains left out", shapes, ("", ""))):
+    best = [c.gap_cut_of_truth for c in named if c.gap_cut_of_truth is not None]
+    for about, values, targets in (
+        ("", cuts, (">= 90 %", ">= 75 %")),
+        (" of the truth, gains as fitted", best, ("", "")),
+        (", gains left out", shapes, ("", "")),
+    ):
         yield _percentile(f"gap cut{about}, median", values, 50, targets[0])
         yield _percentile(f"gap cut{about}, tenth percentile", values, 10, targets[1])
     inside = [hit for c in cases if c.truth and visible(c) for hit in c.inside.values()]

@@ -93,6 +93,7 @@ def case() -> Callable[..., Scored]:
             "inside": {"asymmetry.alpha": True},
             "gap_cut": 0.95,
             "gap_cut_gains_out": 0.97,
+            "gap_cut_of_truth": 0.96,
             "next_test": False,
             "seconds": 2.0,
             "diagnose_seconds": 1.0,

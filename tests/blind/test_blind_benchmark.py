@@ -18,8 +18,8 @@ from pzd.blind import benchmark as module
 from pzd.blind.benchmark import Benchmark, processes
 from pzd.blind.case import Places, Scored
 from pzd.blind.clean import Clean
+from pzd.blind.cuts import gap_cut, gap_cut_of_truth
 from pzd.blind.hide import Setup, drawn, hide
-from pzd.blind.mark import gap_cut
 from pzd.blind.plan import plan
 from pzd.blind.seek import COST, seek
 from pzd.cli.app import status
@@ -195,16 +195,23 @@ def test_the_gap_cut_is_one_when_the_truth_is_found_and_nothing_when_nothing_cha
     t = np.arange(0.0, 2.0, 1e-3)
     w = 2.0 * np.pi
     motion = Motion(t, 0.02 * np.sin(w * t), 0.02 * w * np.cos(w * t), -0.02 * w**2 * np.sin(w * t))
-    clean = {"r01": Clean(motion, respond(true, motion))}
+    force = respond(true, motion)
+    clean = {"r01": Clean(motion, force, 1.02 * force - 5.0)}
     stronger = Damper(base=(row.model_copy(update={"T0_N": 510.0, "C_Ns_per_m": 3060.0, "k_N_per_m": 3.06e5}),))
 
-    def cut(damper: Damper, *, gains_out: bool = False) -> float:
+    def said(damper: Damper) -> Diagnosed:
         gap = Gap(before=1.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=("r01",), hold_out="records")
-        said = Diagnosis(verdict="named", reason="", effects=("asymmetry",), confidence=None, gap=gap, parameters={},
+        told = Diagnosis(verdict="named", reason="", effects=("asymmetry",), confidence=None, gap=gap, parameters={},
                          ranking=(), rivals=(), where=(), next_test=None)  # fmt: skip
-        return gap_cut(Diagnosed(said, damper, plain), clean, gains_out=gains_out)
+        return Diagnosed(told, damper, plain)
+
+    def cut(damper: Damper, *, gains_out: bool = False) -> float:
+        return gap_cut(said(damper), clean, gains_out=gains_out)
 
     assert cut(true) == pytest.approx(1.0, abs=1e-9)
     assert cut(plain) == pytest.approx(0.0, abs=1e-9)
     assert cut(stronger.with_effect("asymmetry", {"alpha": 0.1})) < 0.99
     assert cut(stronger.with_effect("asymmetry", {"alpha": 0.1}), gains_out=True) == pytest.approx(1.0, abs=1e-3)
+    # A force that is recorded 2 % too large is that of a damper whose T0, C and k are.
+    most = gap_cut_of_truth(said(plain), clean)
+    assert most == pytest.approx(cut(stronger.with_effect("asymmetry", {"alpha": 0.1})), abs=1e-3)

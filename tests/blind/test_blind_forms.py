@@ -89,7 +89,7 @@ MOTIONS = [sine(stroke=s, frequency=f) for s, f in ((0.01, 2.0), (0.02, 2.0), (0
 
 
 def hidden(damper: Damper) -> list[Clean]:
-    return [Clean(motion, respond(damper, motion)) for motion in MOTIONS]
+    return [Clean(motion, force, force) for motion in MOTIONS for force in (respond(damper, motion),)]
 
 
 def test_nothing_hidden_leaves_no_visible_gap_wherever_the_search_starts() -> None:
