@@ -62,8 +62,10 @@ def _value(value: Value) -> str:
 def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
     told = {*diagnosis.effects, *diagnosis.rivals}
     others = [one for one in diagnosis.ranking if one.effect not in told]
+    adopted = [one.gap_after for one in diagnosis.ranking if one.effect in diagnosis.effects]
+    against = f" against {number(min(adopted))}" if adopted else ""
     for one in others[:_MOST]:
-        yield f"not taken: {one.effect}, W_s {number(one.gap_after)}, {one.reason}"
+        yield f"not taken: {one.effect}, W_s {number(one.gap_after)}{against} on the tests seen, {one.reason}"
 
 
 def _next(test: NextTest) -> str:

@@ -38,6 +38,8 @@ class Reach:
     """Largest speed [m/s]."""
     frequency: float
     """Largest frequency [Hz]."""
+    force: float
+    """Largest force [N]."""
     voltages: tuple[float, ...]
     """Voltages to choose from [V]; empty without a control signal."""
 
@@ -56,6 +58,7 @@ def reach_of(limits: Limits, scales: Scales, voltages: Sequence[float]) -> Reach
         scales.stroke if limits.stroke_m is None else 0.5 * limits.stroke_m,
         limits.speed_m_per_s or scales.speed,
         limits.frequency_Hz or 2.0 * scales.speed / scales.stroke / (2.0 * np.pi),
+        limits.force_N or np.inf,
         tuple(v for v in voltages if low <= v <= high),
     )
 
@@ -78,6 +81,8 @@ def next_test(rivals: Sequence[tuple[str, Damper]], reach: Reach, temperature: f
     best: tuple[float, NextTest] | None = None
     for plan, motion in _plans(reach, temperature):
         forces = [respond(damper, motion)[-POINTS:] for _, damper in rivals]
+        if np.max(np.abs(forces)) > reach.force:  # any of them may be the truth
+            continue
         distance = min(_distance(forces[0], other) for other in forces[1:])
         if best is None or distance > best[0]:
             best = distance, plan
@@ -88,13 +93,16 @@ def next_test(rivals: Sequence[tuple[str, Damper]], reach: Reach, temperature: f
 
 
 def _plans(reach: Reach, temperature: float | None) -> Iterator[tuple[NextTest, Motion]]:
-    shapes: tuple[tuple[str, Callable[[Array], Array]], ...] = (("sine", _sine), ("triangle", _triangle))
+    shapes: tuple[tuple[str, Callable[[Array], Array], float], ...] = (
+        ("sine", _sine, 1.0),
+        ("triangle", _triangle, 3.0),
+    )
     voltages: list[float | tuple[float, ...] | None] = [*reach.voltages] or [None]
     if len(reach.voltages) > 1:
         voltages.append((reach.voltages[0], reach.voltages[-1]))
-    for (name, shape), f, share, voltage in itertools.product(shapes, FREQUENCIES, STROKES, voltages):
+    for (name, shape, harmonic), f, share, voltage in itertools.product(shapes, FREQUENCIES, STROKES, voltages):
         amplitude = min(share * reach.amplitude, reach.speed / (2.0 * np.pi * f))
-        if f > reach.frequency or amplitude < 0.02 * reach.amplitude:
+        if harmonic * f > reach.frequency or amplitude < 0.02 * reach.amplitude:
             continue
         stepped = isinstance(voltage, tuple)
         plan = NextTest(
