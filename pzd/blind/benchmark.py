@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
+import os
 import shutil
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
@@ -28,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 def processes(count: int) -> Executor:
-    """A pool of processes that share nothing with this one."""
+    """A pool of processes that share nothing with this one, and end with it however it ends."""
     return ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _ends_quietly)
 
 
@@ -36,6 +38,15 @@ def _ends_quietly() -> None:
     """Let a process end without a traceback when it is interrupted, and say nothing: the parent speaks for all."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     logging.getLogger("pzd").addHandler(logging.NullHandler())
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A parent that is killed tells nobody: its pool would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -186,6 +190,34 @@ def test_a_config_that_cannot_be_used_is_refused(
     assert status(["blind", str(path), "--runs", str(tmp_path / "runs")]) == ConfigError.exit_code
     assert said in capsys.readouterr().err
     assert not (tmp_path / "runs").exists()
+
+
+def test_no_process_outlives_a_benchmark_that_is_killed() -> None:
+    text = """
+import os, time
+from pzd.blind.benchmark import processes
+if __name__ == "__main__":
+    pool = processes(1)
+    print(pool.submit(os.getpid).result(), flush=True)
+    time.sleep(600)
+"""
+    with subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True, cwd=ROOT) as benchmark:
+        assert benchmark.stdout is not None
+        worker = int(benchmark.stdout.readline())
+        benchmark.kill()
+    deadline = time.monotonic() + 60.0
+    while running(worker):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def running(process: int) -> bool:
+    """Whether a process of that number is there."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def test_the_gap_cut_is_one_when_the_truth_is_found_and_nothing_when_nothing_changes() -> None:
