@@ -99,7 +99,7 @@ def _comfort(story: Story) -> Card:
     if iso2631_1978.EDITION not in story.config.editions:
         return Card(gain, levels, f"Acceleration a_w. {beside}")
     longer = "; ".join(f"{road}: {times(story, a, b[0])}" for road, a, b in told)
-    source = f"Within reduced comfort, {iso2631_1978.EDITION} ({iso2631_1978.TRUST})."
+    source = f"Within reduced comfort, if nothing else is said, {iso2631_1978.EDITION} ({iso2631_1978.TRUST})."
     detail = f"{beside} {source} Acceleration a_w: {levels}.{_ideal(story, told)}"
     return Card("How much longer can a passenger sit?", longer, detail)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.report.drawing import FINAL, GRID, MEASURED, PLAIN, Panel, Plot, axes, legend
+from pzd.report.drawing import FINAL, GRID, Panel, Plot, axes
 from pzd.report.story import Story
 
 _MOST = 10
@@ -19,14 +19,13 @@ def draw(story: Story) -> Iterator[Panel]:
     figure, ax = axes(1.0 + 0.26 * max(len(ranked), 3), [r.effect for r in ranked])
     colours = [FINAL if r.effect in diagnosis.effects else "#b8c4d0" for r in ranked]
     ax.barh([r.effect for r in ranked], [r.gap_after for r in ranked], color=colours, height=0.62)
-    ax.axvline(diagnosis.gap.before, color=PLAIN, linestyle="--", linewidth=1.2, label="simple model")
-    ax.axvline(diagnosis.gap.noise_floor, color=MEASURED, linestyle=":", linewidth=1.2, label="noise alone")
-    ax.set_xlabel("W_s that is left [-]")
+    ax.locator_params(axis="x", nbins=4)
+    ax.set_xlabel("W_s left on the tests seen [-]")
     ax.grid(visible=False, axis="y")
     ax.grid(color=GRID, axis="x")
-    legend(figure)
     alt = f"What each candidate leaves of the gap; best: {ranked[-1].effect}, W_s {ranked[-1].gap_after:.3g}."
-    yield Panel(figure, "What each candidate leaves of the gap", alt, "Adopted effects stand out in dark blue.")
+    caption = "Best first by what the noise makes likely. Adopted effects stand out in dark blue."
+    yield Panel(figure, "What each candidate leaves of the gap", alt, caption)
 
 
 PLOT = Plot("ranking", "missing", 1, draw)

@@ -19,6 +19,7 @@ _FOLD = 12
 def tell(story: Story, pictures: Pictures) -> Section:
     """The fourth section."""
     blocks: list[Block] = [Paragraph(_intro(story)), _parameters(story)]
+    blocks += [_completed(story)] if story.extended else []
     blocks += galleries(pictures["damper"])
     blocks += [_force(story)] if story.table.force else []
     notes = story.table.notes
@@ -37,17 +38,36 @@ def tell(story: Story, pictures: Pictures) -> Section:
 def _intro(story: Story) -> str:
     effects = story.diagnosed.damper.effects
     laws = [f"{effect_in_words(name)}, {known()[name].law}" for name in effects]
-    beside = f" Beside it stands: {listed(laws)}." if laws else ""
+    beside = f" What was missing stands beside it: {listed(laws)}." if laws else ""
     return (
-        "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. A value that the "
-        f"data do not determine is left out, and the status says so.{beside}"
+        "Dry friction T0, damping C and oil spring k of the Bingham element alone, with 95 % intervals. A value that "
+        f"the data do not determine is left out, and the status says so.{beside}"
     )
 
 
 def _parameters(story: Story) -> Sheet:
     units = [f"{q.symbol} [{unit_of(q.unit)}]" for q in _QUANTITIES]
     header = (story.control.name, "temperature", *units, "W_s", "r.m.s. error", "status")
-    return Sheet("Identified parameters", header, tuple(_row(story, row) for row in story.parameters), False)
+    return Sheet(
+        "Identified parameters of the Bingham element alone",
+        header,
+        tuple(_row(story, row) for row in story.parameters),
+        False,
+    )
+
+
+def _completed(story: Story) -> Sheet:
+    """T0, C and k beside what was added: alone they also stood in for it."""
+    units = [f"{q.symbol} [{unit_of(q.unit)}]" for q in _QUANTITIES]
+    rows = tuple(
+        (
+            story.voltage(row.voltage_V),
+            amount(row.temperature_degC, "degC"),
+            *(number(getattr(row, q.column)) for q in _QUANTITIES),
+        )
+        for row in story.diagnosed.damper.base
+    )
+    return Sheet("With what was missing", (story.control.name, "temperature", *units), rows)
 
 
 def _row(story: Story, row: ParameterRow) -> tuple[str, ...]:

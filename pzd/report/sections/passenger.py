@@ -13,6 +13,11 @@ from pzd.report.wording import DASH, amount, minutes, number, percent
 from pzd.simulate.policies import policies
 
 COMFORT_TIME = "exposure_time_reduced_comfort"
+BEYOND_COMFORT = {
+    "exposure_time_fatigue_decreased_proficiency": "until fatigue",
+    "exposure_time_exposure_limit": "until the exposure limit",
+}
+"""The boundaries that tell rides apart which are over that of comfort from the start, in words."""
 
 
 def tell(story: Story, pictures: Pictures) -> Section:
@@ -85,7 +90,7 @@ def _gain(story: Story, reference: SummaryRow, row: SummaryRow) -> str:
     less = f" ({change(before, after)})" if before and after is not None else ""
     if iso2631_1978.EDITION not in story.config.editions:
         return less
-    return f"{less}; within reduced comfort {times(story, reference, row)}"
+    return f"{less}; within reduced comfort, if nothing else is said, {times(story, reference, row)}"
 
 
 def change(before: float, after: float) -> str:
@@ -95,13 +100,24 @@ def change(before: float, after: float) -> str:
 
 
 def times(story: Story, reference: SummaryRow, controlled: SummaryRow) -> str:
-    """Time within reduced comfort of a controlled ride, beside that at constant damping."""
-    before, after = (story.value(row.case, COMFORT_TIME) for row in (reference, controlled))
+    """Time within reduced comfort of a controlled ride beside that at constant damping.
+
+    Where both are over that boundary from the start, the next one that either keeps to at all is taken, and said.
+    """
+    for measure, until in ((COMFORT_TIME, ""), *BEYOND_COMFORT.items()):
+        before, after = (story.value(row.case, measure) for row in (reference, controlled))
+        if before or after:
+            return f"{_beside(before, after)}{f' {until}' if until else ''}"
+    return _beside(*(story.value(row.case, COMFORT_TIME) for row in (reference, controlled)))
+
+
+def _beside(before: float | None, after: float | None) -> str:
     if before is None or after is None:
         return DASH
     if before == after:
         return f"{minutes(after)} either way"
-    factor = f" ({number(after / before, 2)} times)" if before > 0.0 and after < iso2631_1978.LONGEST_MIN else ""
+    told = before > 0.0 and 0.0 < after < iso2631_1978.LONGEST_MIN
+    factor = f" ({number(after / before, 2)} times)" if told else ""
     return f"{minutes(after)} instead of {minutes(before)}{factor}"
 
 
