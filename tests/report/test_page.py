@@ -128,7 +128,8 @@ def test_intervals_statuses_and_findings_stand_on_the_page(read: Reader) -> None
 def test_the_parameters_are_given_alone_and_with_what_was_missing(read: Reader, run: Any) -> None:
     _, _, completed = read.text.partition("With what was missing")
     for row in run.diagnosed.damper.base:
-        assert " ".join(map(number, (row.T0_N, row.C_Ns_per_m, row.k_N_per_m))) in completed[:400]
+        told = " ".join(map(number, (row.T0_N, row.C_Ns_per_m, row.k_N_per_m)))
+        assert told.replace("\u202f", " ") in completed[:400]
 
 
 def test_with_and_without_the_missing_effect_stand_side_by_side(read: Reader) -> None:
