@@ -23,6 +23,7 @@ from pzd.cli.app import status
 from pzd.cli.story import story
 from pzd.config import load
 from pzd.damper.effects import library
+from pzd.quantities import Control
 from pzd.runs import Run
 
 COMMANDS = [
@@ -435,7 +436,7 @@ def diagnosis() -> Diagnosis:
 
 
 def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
-    assert story(diagnosis()) == [
+    assert story(diagnosis(), Control()) == [
         "verdict: named, one answer fits, and no other does",
         "reason: only orifice_quadratic closes the gap",
         "gap on what no fit has seen (2 records): W_s 0.0121 before, 0.0009 after, 93% less; noise alone gives 0.0008",
@@ -443,15 +444,17 @@ def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
         "adopted: orifice_quadratic, q = 1510 (1490 to 1530) N s2/m2",
         "confidence: 97%",
         "rivals: shear_thinning",
-        "not taken: lash, W_s 0.012, closes nothing",
-        "next test: sine 4 Hz 0.01 m at 150 to tell orifice_quadratic from shear_thinning",
+        "not taken: lash, W_s 0.012 against 0.0009 on the tests seen, closes nothing",
+        "next test: sine 4 Hz 0.01 m at 150 V to tell orifice_quadratic from shear_thinning",
     ]
 
 
 def test_a_parameter_that_moves_with_the_voltage_is_told_at_each() -> None:
     value = Value(value=(1.0, 2.0), low95=(0.9, 1.9), high95=(1.1, 2.1), unit="N", at_voltage_V=(0.0, 150.0))
-    told = story(diagnosis().model_copy(update={"parameters": {"orifice_quadratic": {"q": value}}}))
-    assert "adopted: orifice_quadratic, q = 1 at 0; 2 at 150 N" in told
+    told = story(
+        diagnosis().model_copy(update={"parameters": {"orifice_quadratic": {"q": value}}}), Control("current", "A")
+    )
+    assert "adopted: orifice_quadratic, q = 1 N at 0 A; 2 N at 150 A" in told
 
 
 # ---------------------------------------------------------------- as a program

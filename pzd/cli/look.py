@@ -49,11 +49,11 @@ def show(
     from pzd.pipeline.command import opened
     from pzd.pipeline.standing import standing
 
-    found = standing(opened(config, runs, overrides or ()).run)
-    output = Output(quiet=quiet, verbose=verbose)
+    run = opened(config, runs, overrides or ()).run
+    found, output = standing(run), Output(quiet=quiet, verbose=verbose)
     output.say(f"run: {found.folder}")
     _section(output, "parameters", _parameters(found))
-    _section(output, "diagnosis", [[line] for line in story(found.diagnosis)] if found.diagnosis else [])
+    _section(output, "diagnosis", [[line] for line in story(found.diagnosis, run.control)] if found.diagnosis else [])
     _section(output, "rides", _rides(found))
     _section(output, "comfort", _comfort(found))
     output.say(*(f"not to be trusted: {mark}" for mark in found.marks))

@@ -35,7 +35,7 @@ def _story(run: Run) -> list[str]:
     from pzd.pipeline.standing import standing
 
     found = standing(run).diagnosis
-    return story(found) if found else []
+    return story(found, run.control) if found else []
 
 
 _AT_THE_END: dict[str, Callable[[Run], list[str]]] = {"run": _page, "report": _page, "diagnose": _story}

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from pzd.artefacts import Diagnosis, NextTest, Value
 from pzd.cli.layout import interval, number
+from pzd.quantities import Control
 
 _VERDICTS = {
     "named": "one answer fits, and no other does",
@@ -17,22 +18,23 @@ _MOST = 3
 """How many places and candidates are told."""
 
 
-def story(diagnosis: Diagnosis) -> list[str]:
+def story(diagnosis: Diagnosis, control: Control) -> list[str]:
     """What is missing, where, how sure that is, what it was worth, and what to test next."""
+    unit = control.unit
     lines = [
         f"verdict: {diagnosis.verdict}, {_VERDICTS[diagnosis.verdict]}",
         f"reason: {diagnosis.reason}",
         _gap(diagnosis),
     ]
     lines += [f"where: {where.region}, {where.share_of_gap:.0%} of the gap" for where in diagnosis.where[:_MOST]]
-    lines += [f"adopted: {name}, {_parameters(diagnosis.parameters.get(name, {}))}" for name in diagnosis.effects]
+    lines += [f"adopted: {name}, {_parameters(diagnosis.parameters.get(name, {}), unit)}" for name in diagnosis.effects]
     if diagnosis.confidence is not None:
         lines.append(f"confidence: {diagnosis.confidence:.0%}")
     if diagnosis.rivals:
         lines.append(f"rivals: {', '.join(diagnosis.rivals)}")
     lines += _rejected(diagnosis)
     if diagnosis.next_test:
-        lines.append(_next(diagnosis.next_test))
+        lines.append(_next(diagnosis.next_test, unit))
     return lines
 
 
@@ -46,17 +48,17 @@ def _gap(diagnosis: Diagnosis) -> str:
     )
 
 
-def _parameters(values: Mapping[str, Value]) -> str:
-    return ", ".join(f"{name} = {_value(value)} {value.unit}" for name, value in values.items())
+def _parameters(values: Mapping[str, Value], unit: str) -> str:
+    return ", ".join(f"{name} = {_value(value, unit)}" for name, value in values.items())
 
 
-def _value(value: Value) -> str:
+def _value(value: Value, unit: str) -> str:
     if isinstance(value.value, tuple):
         places = zip(value.value, value.at_voltage_V or (), strict=False)
-        return "; ".join(f"{number(one)} at {number(voltage)}" for one, voltage in places)
+        return "; ".join(f"{number(one)} {value.unit} at {number(voltage)} {unit}" for one, voltage in places)
     low = None if isinstance(value.low95, tuple) else value.low95
     high = None if isinstance(value.high95, tuple) else value.high95
-    return interval(value.value, low, high)
+    return f"{interval(value.value, low, high)} {value.unit}"
 
 
 def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
@@ -68,13 +70,13 @@ def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"not taken: {one.effect}, W_s {number(one.gap_after)}{against} on the tests seen, {one.reason}"
 
 
-def _next(test: NextTest) -> str:
+def _next(test: NextTest, unit: str) -> str:
     voltages = test.voltage_V if isinstance(test.voltage_V, tuple) else (test.voltage_V,)
     parts = [
         test.waveform,
         f"{number(test.frequency_Hz)} Hz" if test.frequency_Hz is not None else "",
         f"{number(test.amplitude_m)} m" if test.amplitude_m is not None else "",
-        f"at {', '.join(number(v) for v in voltages)}" if voltages != (None,) else "",
+        f"at {' and '.join(f'{number(v)} {unit}' for v in voltages)}" if voltages != (None,) else "",
     ]
     between = f" to tell {' from '.join(test.separates)}" if test.separates else ""
     return f"next test: {' '.join(part for part in parts if part)}{between}"
