@@ -1,0 +1,71 @@
+"""What is known of a damper is not computed again, and what is remembered stays as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from campaign import damper_of, sines
+
+from pzd.damper.compose import respond, standing_rows
+from pzd.diagnose.campaign import Campaign
+from pzd.diagnose.config import NuisanceConfig
+from pzd.diagnose.evidence import evidence_of
+from pzd.diagnose.fitting import fit
+from pzd.diagnose.inputs import prepare
+from pzd.diagnose.observation import SIMULATION_TOLERANCE
+from pzd.diagnose.problem import simulated
+from pzd.diagnose.split import UNTOUCHED, split
+
+TWO = (0.0, 150.0)
+PLAIN = damper_of(TWO)
+
+
+@pytest.fixture
+def asked(fresh_seeds: Callable[[int], list[int]]) -> Callable[[int], Campaign]:
+    """The same campaign, so many records at the same time."""
+    prepared = prepare(sines(PLAIN, np.random.default_rng(fresh_seeds(1)[0]), TWO))
+
+    def made(jobs: int) -> Campaign:
+        return Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig(), jobs)
+
+    return made
+
+
+def test_a_damper_is_judged_once(asked: Callable[[int], Campaign]) -> None:
+    campaign = asked(1)
+    assert campaign.judged(PLAIN) is campaign.judged(damper_of(TWO))
+    assert campaign.judged(PLAIN) is not campaign.judged(damper_of(TWO, gas_spring={"k_g": 100.0}))
+
+
+def test_naming_sees_all_but_the_untouched_samples(asked: Callable[[int], Campaign]) -> None:
+    campaign = asked(1)
+    seen = {j.prepared.record.name: j.wanted for j in campaign.judged(PLAIN)}
+    held_out = {j.prepared.record.name: j.wanted for j in campaign.untouched(PLAIN)}
+    assert held_out
+    for prepared, roles in zip(campaign.prepared, campaign.parts.roles, strict=True):
+        nothing = np.zeros(roles.size, dtype=np.bool_)
+        assert not np.any(seen.get(prepared.record.name, nothing) & (roles == UNTOUCHED))
+        assert not np.any(held_out.get(prepared.record.name, nothing) & (roles != UNTOUCHED))
+
+
+def test_records_judged_at_the_same_time_are_judged_the_same(asked: Callable[[int], Campaign]) -> None:
+    for one, other in zip(asked(1).judged(PLAIN), asked(2).judged(PLAIN), strict=True):
+        np.testing.assert_array_equal(one.residual, other.residual)
+
+
+def test_effects_beside_the_element_leave_what_is_remembered_of_it(asked: Callable[[int], Campaign]) -> None:
+    problem = evidence_of(asked(1), PLAIN).whole
+    start = np.append(fit(problem, (), problem.start(), evaluations=1).searched, 0.1)
+    unknowns = problem.unknowns(("gas_spring",))
+    for observation in problem.observations:
+        point = problem.point(start, unknowns)
+        row, _ = standing_rows(*point.base[observation.place], {})
+        before = observation.element(row.tobytes()).copy()
+        force = simulated(point, observation)
+        np.testing.assert_array_equal(observation.element(row.tobytes()), before)
+        damper = point.damper()
+        alone = damper.model_copy(update={"base": damper.base[observation.place : observation.place + 1]})
+        whole = respond(alone, observation.motion, observation.begins_with, SIMULATION_TOLERANCE)
+        np.testing.assert_allclose(force, observation.at_compared(whole), rtol=1e-12)
