@@ -59,6 +59,14 @@ def probability_of_noise(judged: Sequence[Judged]) -> float:
 
 def visible_gap(judged: Sequence[Judged]) -> float:
     """R.m.s. of the gap above the noise as a share of each record's peak force, pooled over the samples."""
+    return _pooled(judged, [j.power / j.peak**2 for j in judged])
+
+
+def gap_in_force(judged: Sequence[Judged]) -> float:
+    """R.m.s. of the gap above the noise [N], pooled over the samples: the tests of large force count most."""
+    return _pooled(judged, [j.power for j in judged])
+
+
+def _pooled(judged: Sequence[Judged], squares: Sequence[float]) -> float:
     samples = np.array([np.count_nonzero(j.wanted) for j in judged], dtype=np.float64)
-    shares = np.array([j.power / j.peak**2 for j in judged])
-    return float(np.sqrt(max(float(samples @ shares / samples.sum()), 0.0)))
+    return float(np.sqrt(max(float(samples @ np.array(squares) / samples.sum()), 0.0)))
