@@ -21,7 +21,7 @@ TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, ("val
 LEAST_CUT = 0.2
 """An effect closes at least this share of the gap (mean square): what is real is not one of many small corrections.
 
-Each test counts by its own peak, or all by their force: soft conditions may keep a gap of another kind. Neither way does
+Each test counts by its own peak, or all by their force: soft conditions may keep a gap of another kind. By neither does
 it widen.
 """
 
@@ -46,7 +46,7 @@ def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candi
     closed = [left**2 <= (1.0 - LEAST_CUT) * open_before**2 for open_before, left in gaps]
     if any(closed) and all(left <= open_before for open_before, left in gaps):
         return None
-    return f"stand-in: closes less than {LEAST_CUT:.0%} of the gap"
+    return f"stand-in: closes less than {LEAST_CUT:.0%} of the gap, or widens it"
 
 
 def closes(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> bool:
