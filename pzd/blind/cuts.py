@@ -35,7 +35,7 @@ def gap_cut(found: Diagnosed, clean: Mapping[str, Clean], *, gains_out: bool = F
 def gap_cut_of_truth(found: Diagnosed, clean: Mapping[str, Clean]) -> float:
     """What the truth itself would take away, its force at every voltage with the mean gain of the tests fitted there.
 
-    No fit does better but by chance: a gain that the tests of a voltage share is a larger T0, C and k.
+    About what a fit can reach: a gain that the tests of a voltage share is the same to it as a larger T0, C and k.
 
     Parameters
     ----------

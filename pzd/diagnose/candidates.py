@@ -98,7 +98,7 @@ def candidates(
     """
     tried = [
         effect
-        for effect in sorted(library().values(), key=lambda e: e.place != "flow")  # the slow ones first
+        for effect in library().values()
         if effect.name not in (*before.effects, *forbidden) and seen_in(problem, effect)
     ]
 
@@ -163,11 +163,10 @@ def _fainter(problem: Problem, effect: Effect, start: Array, share: float) -> Ar
     return np.array([u.searched(u.fainter(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
 
 
-def best_foil(problem: Problem, before: Fitted, jobs: int = 1) -> Candidate:
-    """The foil that explains most, fitted as a candidate is, so many at the same time."""
-    with ThreadPoolExecutor(max(jobs, 1)) as pool:
-        tried = pool.map(lambda foil: settled(problem, before, candidate(problem, before, foil)), foils().values())
-        return min(tried, key=lambda c: c.delta_bic)
+def best_foil(problem: Problem, before: Fitted) -> Candidate:
+    """The foil that explains most, fitted as a candidate is."""
+    tried = (settled(problem, before, candidate(problem, before, foil)) for foil in foils().values())
+    return min(tried, key=lambda c: c.delta_bic)
 
 
 def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:

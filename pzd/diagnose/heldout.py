@@ -6,23 +6,21 @@ from pzd.artefacts import Gap
 from pzd.diagnose.fitting import fit
 from pzd.diagnose.gap import gap_of
 from pzd.diagnose.named import Named
-from pzd.diagnose.split import Split
 
 
-def held_out_gap(named: Named, parts: Split) -> Gap:
+def held_out_gap(named: Named) -> Gap:
     """Criterion (4) on the untouched samples, nuisances at their prior mean, before and after alike.
 
     Parameters
     ----------
     named : what was adopted, and the evidence whose first half trains
-    parts : the split
     """
-    training = named.first.halves[0]
+    campaign, training = named.first.campaign, named.first.halves[0]
     plain = fit(training, (), training.start()).damper
-    before = gap_of(named.first.campaign.untouched(plain), parts)
+    before = gap_of(campaign.untouched(plain), campaign.parts)
     if not named.adopted:
         return before
     training = named.last.halves[0]
     adopted = fit(training, named.adopted, training.start_with(named.fitted.damper)).damper
-    after = gap_of(named.last.campaign.untouched(adopted), parts)
+    after = gap_of(campaign.untouched(adopted), campaign.parts)
     return after.model_copy(update={"before": before.before})

@@ -211,7 +211,7 @@ class _Search:
         found = []
         for name in self.current.effects[len(self.config.force) :]:
             without = self._without(name)
-            foil = best_foil(self.evidence.whole, without, self.jobs)
+            foil = best_foil(self.evidence.whole, without)
             behind = foil.delta_bic - delta_bic(without, self.current)
             if behind < self.config.rival_bic:
                 found.append(Foiled(name, self.current.damper, foil.effect, foil.fitted.damper, behind))

@@ -66,7 +66,7 @@ def diagnose(
         reason=decision.reason + weak(parts.hold_out) + without(cut_off),
         effects=named.adopted,
         confidence=decision.confidence,
-        gap=held_out_gap(named, parts),
+        gap=held_out_gap(named),
         parameters=parameters_of(named),
         ranking=ranking_of(named, evidence),
         rivals=named.rivals,

@@ -51,14 +51,7 @@ def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candi
 
 def closes(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> bool:
     """Whether a candidate leaves so little of the gap that nothing more is looked for under a name."""
-    open_before, left = _gaps(evidence, before, candidate)
-    return left <= max(config.unexplained_share * open_before, config.negligible)
-
-
-def _gaps(evidence: Evidence, before: Fitted, candidate: Candidate) -> tuple[float, float]:
-    """The gap without a candidate and with it, as shares of peak."""
-    without, with_it = (evidence.gap(f) for f in (before, candidate.fitted))
-    return without, with_it
+    return evidence.gap(candidate.fitted) <= max(config.unexplained_share * evidence.gap(before), config.negligible)
 
 
 def trivial(fitted: Fitted, effect: str, force: float) -> bool:
