@@ -6,8 +6,8 @@ from typing import Self
 
 from pydantic import Field, field_validator, model_validator
 
-from pzd.rig.programmes import Warming
-from pzd.rig.virtual_config import StandTest
+from pzd.rig.stand.config import StandTest
+from pzd.rig.stand.programmes import Warming
 from pzd.schema.model import Frozen
 
 

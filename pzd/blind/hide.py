@@ -17,9 +17,9 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.config import NuisanceConfig
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control
 from pzd.record import Array
-from pzd.rig.frame import force_in_frame
-from pzd.rig.stand import Taken, take
-from pzd.rig.virtual_config import DisplacementNoise, ForceNoise, Jitter, Noise, VirtualEntry
+from pzd.rig.stand.config import DisplacementNoise, ForceNoise, Jitter, Noise, VirtualEntry
+from pzd.rig.stand.frame import force_in_frame
+from pzd.rig.stand.recording import Taken, take
 from pzd.schema.csvfile import write_columns
 from pzd.schema.jsonfile import write_json
 

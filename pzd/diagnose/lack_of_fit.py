@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.diagnose.noise import PureError, harmonics_of, pure_error
+from pzd.diagnose.noise.between_cycles import PureError, harmonics_of, pure_error
 
 Array = NDArray[np.float64]
 

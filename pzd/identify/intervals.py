@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.record import Array
-from pzd.rig.recursion import all_pole
+from pzd.signals.recursion import all_pole
 
 LARGEST_ORDER = 30
 """Largest order of the autoregression; the one used is chosen by BIC."""

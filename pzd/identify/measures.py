@@ -10,7 +10,7 @@ import numpy as np
 from pzd.artefacts import MeasureRow
 from pzd.identify.trial import reversals, warm_up
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
-from pzd.rig.cycles import Cycles, cycles
+from pzd.signals.cycles import Cycles, cycles
 
 SAME_SPEED = 0.05
 """Tests whose peak speeds differ by less, relative, are at the same speed."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from pzd.artefacts import AXLE_COLUMNS, AXLES, RIDE_COLUMNS, Ride, SummaryRow
 from pzd.record import Array
-from pzd.rig.recursion import all_pole
+from pzd.signals.recursion import all_pole
 
 JERK_CORNER = 80.0
 """Corner of the low-pass behind which the jerk is taken [Hz]: the raw jerk of a law that switches has no r.m.s."""

@@ -7,7 +7,7 @@ from itertools import groupby, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.foils import known
+from pzd.damper.competing_forms import known
 from pzd.damper.model import Damper
 from pzd.table.force import forces, voltages_of
 

@@ -60,8 +60,8 @@ def test_a_ripple_returns_after_its_length() -> None:
     length = MIDDLE["ripple"]["length"] * STROKE
     x = np.linspace(-STROKE, 0.0, 50)
     zero = np.zeros(50)
-    here, there = (force("ripple", Motion(zero, place, zero, zero)) for place in (x, x + length))
-    assert np.allclose(here, there, atol=1e-9)
+    here, true_row = (force("ripple", Motion(zero, place, zero, zero)) for place in (x, x + length))
+    assert np.allclose(here, true_row, atol=1e-9)
 
 
 def test_rubber_dissipates_the_same_at_any_speed() -> None:
