@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.record import Array
 from pzd.signals.edges import ROUNDS, averaged, force_span, motion_span
 from pzd.signals.period import Repeats, repeats
-
-Array = NDArray[np.float64]
 
 FITTED_POINTS = 1000
 """Points of a cycle that the period is fitted to, at least, as far as there are samples."""

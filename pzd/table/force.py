@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.artefacts import ForceRow
 from pzd.damper.compose import steady_force
 from pzd.damper.model import Damper
+from pzd.record import Array
 from pzd.table.config import TableConfig
 from pzd.table.reach import Reach
-
-Array = NDArray[np.float64]
 
 HALVINGS = 5
 """Most often that an interval between two nodes is halved."""
