@@ -20,7 +20,7 @@ HALVINGS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class TableNodes:
     """The nodes of the table."""
 
     temperatures: tuple[float | None, ...]
@@ -57,7 +57,7 @@ def temperatures_of(damper: Damper) -> tuple[float | None, ...]:
     return tuple(sorted(nodes)) or (None,)
 
 
-def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | None], reach: Reach) -> Grid:
+def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | None], reach: Reach) -> TableNodes:
     """Nodes between which straight lines keep to the damper's law within the tolerance."""
     voltages = voltages_of(damper)
     if config.voltages_V is not None and voltages != (None,):
@@ -78,7 +78,9 @@ def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | Non
         pair = np.array([-speed, speed])
         return np.concatenate([forces(damper, warm, u, pair) for u in known or (None,)])
 
-    return Grid(tuple(temperatures), tuple(known) or (None,), np.array(refined(list(speeds), over_speed, allowed)))
+    return TableNodes(
+        tuple(temperatures), tuple(known) or (None,), np.array(refined(list(speeds), over_speed, allowed))
+    )
 
 
 def _speeds(config: TableConfig, reach: Reach) -> Array:
@@ -121,7 +123,7 @@ def _halved(low: float, high: float, law: Callable[[float], Array], allowed: flo
     ]
 
 
-def force_rows(config: TableConfig, damper: Damper, nodes: Grid, reach: Reach) -> tuple[ForceRow, ...]:
+def force_rows(config: TableConfig, damper: Damper, nodes: TableNodes, reach: Reach) -> tuple[ForceRow, ...]:
     """One row a node; beyond the rig's reach held, empty or the law itself, as the config says."""
     rows: list[ForceRow] = []
     for temperature in nodes.temperatures:
