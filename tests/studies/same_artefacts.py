@@ -34,7 +34,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from itertools import zip_longest
@@ -56,6 +56,8 @@ UNREPEATABLE = ("seconds", "diagnose_seconds", "peak_memory_MB", "made_from")
 """Entries of a blind case's cost and score that no two runs share: time, memory, and the hash of config and code."""
 DECISIVE = ("verdict", "effects", "rivals", "status", "met")
 """Entries and columns whose change is printed whatever the mode: what a reader acts on."""
+ABSENT = "absent"
+"""Printed where only one of two files has a value."""
 SHOWN = 10
 """Differing files, and differing decisions, that are printed for each config; the rest is counted."""
 
@@ -236,14 +238,14 @@ def cells(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
     number is measured by itself, and no peak is given.
     """
     with path.open(encoding="utf-8", newline="") as file:
-        header, *rows = csv.reader(file)
+        header, *rows = [*csv.reader(file)] or [[]]
     found = {
         f"row {number}, {column}": number_or_text(cell)
         for number, row in enumerate(rows, 2)
         for column, cell in zip_longest(header, row, fillvalue="")
     }
     peaks: dict[str, float] = {}
-    if header[0] == "time_s":
+    if header[:1] == ["time_s"]:
         for place, value in found.items():
             if isinstance(value, float):
                 column = place.partition(", ")[2]
@@ -270,10 +272,6 @@ def values(path: Path) -> tuple[dict[str, Any], dict[str, float]] | None:
     if unrepeatable(path):
         found = {place: value for place, value in found.items() if place not in UNREPEATABLE}
     return found, {}
-
-
-ABSENT = "absent"
-"""Stands where only one of two files has a value."""
 
 
 def apart(before: Any, after: Any, peak: float = 0.0) -> float:
@@ -347,9 +345,40 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
-def faults(side: str, made: Made) -> list[str]:
-    """Commands that came to no whole result."""
-    return [f"    {side}: pzd {step.command} exits with {step.exit}" for step in made.steps if step.exit not in FINE]
+def unavailable(stem: str, checkouts: Iterable[Path]) -> tuple[str, bool] | None:
+    """Why a config cannot be compared, and whether that is a fault of the checkouts; None where it can be."""
+    configs = [checkout / "configs" / f"{stem}.yaml" for checkout in checkouts]
+    for config in configs:
+        if not config.exists():
+            return f"MISSING: there is no {config}", True
+    for config in configs:
+        if pattern := absent_records(config):
+            return f"skipped: no file matches {pattern} beside {config}", False
+    return None
+
+
+def report(made: dict[str, Made], relative: float | None) -> tuple[list[str], bool]:
+    """What is printed about one config, and whether all is well with it.
+
+    Parameters
+    ----------
+    made : by side; without an `after` only the exit codes are judged
+    relative : as for `compare`
+    """
+    took = ", ".join(f"{side} {one.seconds:.0f} s" for side, one in made.items())
+    faults = [
+        f"    {side}: pzd {step.command} exits with {step.exit}"
+        for side, one in made.items()
+        for step in one.steps
+        if step.exit not in FINE
+    ]
+    if "after" not in made:
+        return [f"{len(made['before'].files())} files   ({took})", *faults], not faults
+    outcome = compare(made["before"], made["after"], relative)
+    close = "" if relative is None else f"{outcome.close} within {relative:g}, "
+    counts = f"{len(outcome.differing)} differing, {len(outcome.missing)} missing, {len(outcome.new)} new"
+    first = f"{outcome.files} files: {outcome.equal} equal, {close}{counts}   ({took})"
+    return [first, *faults, *outcome.lines()], outcome.same and not faults
 
 
 def arguments() -> argparse.Namespace:
@@ -383,28 +412,13 @@ def main() -> int:
         say(f"{side}: {checkout}, artefacts in {folders[side]}")
     good = True
     for stem in given.only:
-        configs = {side: checkout / "configs" / f"{stem}.yaml" for side, checkout in sides.items()}
-        gone = [side for side, config in configs.items() if not config.exists()]
-        absent = {side: absent_records(config) for side, config in configs.items() if side not in gone}
-        if gone or any(absent.values()):
-            good = good and not gone
-            reasons = [f"no such config {gone[0]}"] if gone else [f"no records {p} {s}" for s, p in absent.items() if p]
-            say(f"{stem:<12}{'MISSING' if gone else 'skipped'}: {', '.join(reasons)}")
-            continue
-        made = {side: make(sides[side], folders[side], stem, given.blind, given.jobs) for side in sides}
-        text = ", ".join(f"{side} {one.seconds:.0f} s" for side, one in made.items())
-        lines = [line for side, one in made.items() for line in faults(side, one)]
-        good = good and not lines
-        if "after" in made:
-            outcome = compare(made["before"], made["after"], given.relative)
-            good = good and outcome.same
-            close = "" if given.relative is None else f"{outcome.close} within {given.relative:g}, "
-            counts = f"{len(outcome.differing)} differing, {len(outcome.missing)} missing, {len(outcome.new)} new"
-            text = f"{outcome.files} files: {outcome.equal} equal, {close}{counts}   ({text})"
-            lines += outcome.lines()
+        if reason := unavailable(stem, sides.values()):
+            lines, well = [reason[0]], not reason[1]
         else:
-            text = f"{len(made['before'].files())} files   ({text})"
-        say("\n".join([f"{stem:<12}{text}", *lines]))
+            made = {side: make(sides[side], folders[side], stem, given.blind, given.jobs) for side in sides}
+            lines, well = report(made, given.relative)
+        good = good and well
+        say("\n".join([f"{stem:<12}{lines[0]}", *lines[1:]]))
     return 0 if good else 1
 
 
