@@ -76,7 +76,14 @@ def _next(test: NextTest, unit: str) -> str:
         test.waveform,
         f"{number(test.frequency_Hz)} Hz" if test.frequency_Hz is not None else "",
         f"{number(test.amplitude_m)} m" if test.amplitude_m is not None else "",
+        f"about {test.middle_m:.6g} m" if test.middle_m is not None else "",
         f"at {' and '.join(f'{number(v)} {unit}' for v in voltages)}" if voltages != (None,) else "",
     ]
+    reached = [
+        f"{number(value)} {of}"
+        for value, of in ((test.peak_speed_m_per_s, "m/s"), (test.peak_force_N, "N"))
+        if value is not None
+    ]
+    far = f", up to {' and '.join(reached)}" if reached else ""
     between = f" to tell {' from '.join(test.separates)}" if test.separates else ""
-    return f"next test: {' '.join(part for part in parts if part)}{between}"
+    return f"next test: {' '.join(part for part in parts if part)}{far}{between}"

@@ -178,7 +178,7 @@ def steady_force(
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """A damper at one temperature, laid out for compiled loops: all of it piecewise linear in the effective voltage."""
+    """A damper at one temperature, laid out for compiled loops: everything piecewise linear in the effective voltage."""
 
     voltages: Array
     """(m,) rising nodes [V]; held beyond."""

@@ -61,6 +61,8 @@ def diagnose(
     decision = decide(named, before, after, diagnose)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
+    reach = reach_of(stand.limits, prepared, voltages)
+    offsets = [evidence.campaign.offset(damper) for _, damper in named.rivalling]
     told = Diagnosis(
         verdict=decision.verdict,
         reason=decision.reason + weak(parts.hold_out) + without(cut_off),
@@ -71,8 +73,6 @@ def diagnose(
         ranking=ranking_of(named, evidence),
         rivals=named.rivals,
         where=() if decision.verdict == "none" else regions(before, control.unit),
-        next_test=next_test(
-            named.rivalling, reach_of(stand.limits, evidence.whole.scales, voltages), evidence.whole.reference
-        ),
+        next_test=next_test(named.rivalling, reach, evidence.whole.reference, offsets),
     )
     return Diagnosed(told, named.fitted.damper if named.adopted else plain, plain)
