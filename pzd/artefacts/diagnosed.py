@@ -86,6 +86,8 @@ class Diagnosis(Frozen):
     rivals: tuple[str, ...]
     where: tuple[Region, ...]
     next_test: NextTest | None
+    zero_m: float = 0.0
+    """Recorded displacement from which the parameters of an effect count x, such as x_e of `end_stop`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from pzd.artefacts import Diagnosis, NextTest, Value
 from pzd.cli.layout import interval, number
@@ -27,7 +27,7 @@ def story(diagnosis: Diagnosis, control: Control) -> list[str]:
         _gap(diagnosis),
     ]
     lines += [f"where: {where.region}, {where.share_of_gap:.0%} of the gap" for where in diagnosis.where[:_MOST]]
-    lines += [f"adopted: {name}, {_parameters(diagnosis.parameters.get(name, {}), unit)}" for name in diagnosis.effects]
+    lines += [f"adopted: {name}, {_parameters(diagnosis, name, unit)}" for name in diagnosis.effects]
     if diagnosis.confidence is not None:
         lines.append(f"confidence: {diagnosis.confidence:.0%}")
     if diagnosis.rivals:
@@ -48,8 +48,10 @@ def _gap(diagnosis: Diagnosis) -> str:
     )
 
 
-def _parameters(values: Mapping[str, Value], unit: str) -> str:
-    return ", ".join(f"{name} = {_value(value, unit)}" for name, value in values.items())
+def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:
+    values = diagnosis.parameters.get(effect, {})
+    told = ", ".join(f"{name} = {_value(value, unit)}" for name, value in values.items())
+    return f"{told} to either side of x = {diagnosis.zero_m:.4g} m" if effect == "end_stop" else told
 
 
 def _value(value: Value, unit: str) -> str:

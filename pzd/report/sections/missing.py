@@ -69,9 +69,16 @@ def _parameters(context: ReportContext, diagnosis: Diagnosis) -> Sheet:
         row
         for effect, values in diagnosis.parameters.items()
         for name, value in values.items()
-        for row in _value_rows(context, effect, name, value)
+        for row in _value_rows(context, effect, _measured_from(diagnosis, effect, name), value)
     ]
     return Sheet("What was added", ("effect", "parameter", "value (95 % interval)", "unit"), tuple(rows))
+
+
+def _measured_from(diagnosis: Diagnosis, effect: str, name: str) -> str:
+    """The name of a parameter, with the recorded displacement from which a place is counted."""
+    if (effect, name) != ("end_stop", "x_e"):
+        return name
+    return f"{name} to either side of x = {number(1000.0 * diagnosis.zero_m)} mm"
 
 
 def _value_rows(context: ReportContext, effect: str, name: str, value: Value) -> list[tuple[str, ...]]:
