@@ -41,7 +41,10 @@ def story(diagnosis: Diagnosis, control: Control) -> list[str]:
 def _gap(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
     share = f", {1.0 - gap.after / gap.before:.0%} less" if gap.after < gap.before else ""
-    held = f"{len(gap.held_out)} {gap.hold_out}" if gap.hold_out != "mixed" else f"{len(gap.held_out)} parts"
+    records = f"{len(gap.held_out)} record{'s' if len(gap.held_out) != 1 else ''}"
+    held = {"records": records, "mixed": f"{records}, whole or in part"}.get(
+        gap.hold_out, f"{gap.hold_out} of {records}"
+    )
     return (
         f"gap on what no fit has seen ({held}): W_s {number(gap.before)} before, {number(gap.after)} after{share}; "
         f"noise alone gives {number(gap.noise_floor)}"
