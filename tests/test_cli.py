@@ -121,7 +121,7 @@ def test_force_runs_again(typed: Terminal) -> None:
 def test_what_is_not_to_be_trusted_is_code_4_every_time(typed: Terminal) -> None:
     for _ in range(2):
         assert typed("run", "first.yaml", "--set", f"seed={UNDETERMINED}") == 4
-        assert typed.err == ["not to be trusted: rig, 1.0 V, 22.0 degC: undetermined: C, the records are too slow"]
+        assert typed.err == ["not to be trusted: rig, 1 V, 22 degC: undetermined: C, the records are too slow"]
         assert Path("runs/first/6-report/report.html").is_file()
     assert typed("ingest", "first.yaml", "--set", f"seed={UNDETERMINED}") == 0
 
