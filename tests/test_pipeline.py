@@ -12,7 +12,7 @@ import stand_ins
 from stand_ins import NAMES, UNDETERMINED, project
 
 from pzd.artefacts import Identified, Manifest
-from pzd.pipeline.command import bring, opened
+from pzd.pipeline.command import execute, opened
 from pzd.pipeline.sources import PACKAGE, _mentioned, _used, code_hash
 from pzd.pipeline.stages import Stage
 from pzd.quantities import Control
@@ -34,7 +34,7 @@ class Bench:
         """Bring the run up to date; gives the stages that ran."""
         self.lines.clear()
         given = opened(self.config, self.runs, overrides)
-        self.marks = bring(given, target, force=force, jobs=1, say=self.lines.append)
+        self.marks = execute(given, target, force=force, jobs=1, say=self.lines.append)
         return [line.split()[0] for line in self.lines if " runs: " in line]
 
     def said(self, stage: str) -> str:

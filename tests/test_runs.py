@@ -63,11 +63,11 @@ def level(run: Run) -> float | None:
 
 def test_what_is_written_reads_back_with_its_manifest(run: Run) -> None:
     write(run, identified(3.0))
-    kept = run.kept("2-identify")
+    state = run.stage_folder("2-identify")
     assert level(run) == 3.0
-    assert kept.manifest is not None
-    assert kept.manifest.outputs == run.hashes("2-identify")
-    assert (kept.missing, kept.edited) == ((), ())
+    assert state.manifest is not None
+    assert state.manifest.outputs == run.hashes("2-identify")
+    assert (state.missing, state.edited) == ((), ())
     assert [path.name for path in run.folder.iterdir() if path.name != ".lock"] == ["2-identify"]
 
 
@@ -75,8 +75,8 @@ def test_an_edited_and_a_missing_file_are_told_from_each_other(run: Run) -> None
     write(run, identified(3.0))
     (run.folder / "2-identify" / "parameters.csv").write_text("edited")
     (run.folder / "2-identify" / "measures.csv").unlink()
-    kept = run.kept("2-identify")
-    assert (kept.missing, kept.edited) == (("measures.csv",), ("parameters.csv",))
+    state = run.stage_folder("2-identify")
+    assert (state.missing, state.edited) == (("measures.csv",), ("parameters.csv",))
 
 
 def test_a_hash_follows_the_content_even_when_the_length_stays(tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_a_first_run_killed_in_the_middle_of_writing_leaves_nothing(run: Run) ->
     process = other_process(run, hold=False)
     end(process)
     assert not (run.folder / "2-identify").exists()
-    assert run.kept("2-identify").manifest is None
+    assert run.stage_folder("2-identify").manifest is None
 
 
 @pytest.mark.parametrize("renames", [0, 1, 2])
@@ -207,7 +207,7 @@ def test_a_run_killed_between_the_renames_leaves_the_old_result_or_the_new(
 def test_a_held_run_is_refused_after_a_short_wait_and_names_who_holds_it(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pzd.runs.folder.PATIENCE", 0.2)
+    monkeypatch.setattr("pzd.runs.folder.LOCK_TIMEOUT_S", 0.2)
     process = other_process(run, hold=True)
     try:
         begun = time.monotonic()

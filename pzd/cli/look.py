@@ -15,7 +15,7 @@ from pzd.cli.output import Output
 
 if TYPE_CHECKING:
     from pzd.artefacts import ParameterRow, RecordEntry
-    from pzd.pipeline.standing import Standing
+    from pzd.pipeline.run_summary import RunSummary
 
 RunFolders = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of runs, e.g. runs/quickstart.")]
 
@@ -47,10 +47,10 @@ def show(
     """Print what stands in the run of a config."""
     from pzd.cli.story import story
     from pzd.pipeline.command import opened
-    from pzd.pipeline.standing import standing
+    from pzd.pipeline.run_summary import run_summary
 
     run = opened(config, runs, overrides or ()).run
-    found, output = standing(run), Output(quiet=quiet, verbose=verbose)
+    found, output = run_summary(run), Output(quiet=quiet, verbose=verbose)
     output.say(f"run: {found.folder}")
     _section(output, "parameters", _parameters(found))
     _section(output, "diagnosis", [[line] for line in story(found.diagnosis, run.control)] if found.diagnosis else [])
@@ -66,7 +66,7 @@ def _section(output: Output, title: str, rows: list[list[str]]) -> None:
         output.say("", f"{title}:", *aligned(rows, "  "))
 
 
-def _parameters(found: Standing) -> list[list[str]]:
+def _parameters(found: RunSummary) -> list[list[str]]:
     if not found.parameters:
         return []
     control = found.control
@@ -96,7 +96,7 @@ def _parameter_row(row: ParameterRow) -> list[str]:
     ]
 
 
-def _rides(found: Standing) -> list[list[str]]:
+def _rides(found: RunSummary) -> list[list[str]]:
     head = ["case", "point", "peak |a_K| [m/s2]", "rms a_K [m/s2]", "peak deflection [m]", "outside the table"]
     rows = [
         [
@@ -112,7 +112,7 @@ def _rides(found: Standing) -> list[list[str]]:
     return [head, *rows] if rows else []
 
 
-def _comfort(found: Standing) -> list[list[str]]:
+def _comfort(found: RunSummary) -> list[list[str]]:
     return [
         [row.case, row.point, row.edition, row.measure, f"{number(row.value)} {row.unit}", row.status]
         for row in found.comfort
@@ -121,11 +121,11 @@ def _comfort(found: Standing) -> list[list[str]]:
 
 def compare(runs: RunFolders, quiet: Quiet = False, verbose: Verbose = False) -> int:
     """Print the numbers of several runs side by side."""
-    from pzd.cli.beside import beside
-    from pzd.pipeline.standing import standing_in
+    from pzd.cli.comparison import comparison
+    from pzd.pipeline.run_summary import summary_of
 
     output = Output(quiet=quiet, verbose=verbose)
-    output.say(*aligned(beside([standing_in(folder) for folder in runs])))
+    output.say(*aligned(comparison([summary_of(folder) for folder in runs])))
     return DONE
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pzd.artefacts import RecordEntry, Rig
 from pzd.config import RunConfig, setting_in_use, validated
-from pzd.pipeline.bring import Pipeline, Say
+from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
 from pzd.runs import Run
 from pzd.schema.errors import ConfigError
@@ -59,7 +59,7 @@ def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:
     return Opened(document, config, Run.of(path, runs, config.control.signal()))
 
 
-def bring(given: Opened, target: str, *, force: bool, jobs: int, say: Say) -> tuple[str, ...]:
+def execute(given: Opened, target: str, *, force: bool, jobs: int, say: Say) -> tuple[str, ...]:
     """Bring a run up to date as far as a stage.
 
     Parameters
@@ -83,7 +83,7 @@ def bring(given: Opened, target: str, *, force: bool, jobs: int, say: Say) -> tu
     _right_source(line, last)
     forced = [stage.name for stage in line if target in ("run", stage.name)] if force else []
     with given.placed(), given.run.locked(f"pzd {target}"):
-        return Pipeline(given.config, given.run, line, say, jobs).bring_up_to_date(last, forced)
+        return Pipeline(given.config, given.run, line, say, jobs).execute(last, forced)
 
 
 def _right_source(line: Sequence[Stage], target: str) -> None:

@@ -32,7 +32,7 @@ from pzd.rig.reading import Test, read
 from pzd.rig.stand import Taken, record_of
 from pzd.rig.virtual_config import Planned
 from pzd.schema.errors import ConfigError, DataError
-from pzd.schema.processes import at_once
+from pzd.schema.processes import parallel_map
 
 
 def measured(entries: Sequence[FilesEntry], limits: Limits, control: Control, folder: Path, jobs: int = 1) -> Rig:
@@ -123,7 +123,7 @@ def overview(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:
         test = given()
         return test.record, _entry(test)
 
-    found = at_once(listed, tests, jobs)
+    found = parallel_map(listed, tests, jobs)
     return Rig(tuple(record for record, _ in found), tuple(entry for _, entry in found))
 
 

@@ -28,14 +28,14 @@ Made = TypeVar("Made", Rig, Identified, Diagnosed, Table, Rides, Report, Artefac
 MANIFEST = "manifest.json"
 CONFIG = "config.yaml"
 _LOCK = ".lock"
-PATIENCE = 2.0
+LOCK_TIMEOUT_S = 2.0
 """How long to wait for another command on the same run [s]."""
 _NAMES = Control()
 """Manifests name files and keys as they are, whatever the control is called."""
 
 
 @dataclass(frozen=True)
-class Kept:
+class StageFolder:
     """What stands in a stage's folder, against what its manifest says was written."""
 
     manifest: Manifest | None
@@ -97,13 +97,13 @@ class Run:
         written = manifest.outputs if manifest else {}
         return {name: digest for name, digest in self.hashes(stage).items() if name in written}
 
-    def kept(self, stage: str) -> Kept:
+    def stage_folder(self, stage: str) -> StageFolder:
         """What stands in a stage's folder."""
         manifest = self._manifest(stage)
         if manifest is None:
-            return Kept(None)
+            return StageFolder(None)
         now = self.hashes(stage)
-        return Kept(
+        return StageFolder(
             manifest,
             tuple(name for name in manifest.outputs if name not in now),
             tuple(name for name, digest in manifest.outputs.items() if now.get(name, digest) != digest),
@@ -138,7 +138,7 @@ class Run:
             self.folder.mkdir(parents=True, exist_ok=True)
             lock = FileLock(self.folder / _LOCK)
             try:
-                lock.acquire(timeout=PATIENCE)
+                lock.acquire(timeout=LOCK_TIMEOUT_S)
             except Timeout:
                 who = holder.read_text(encoding="utf-8") if holder.exists() else "another command"
                 raise FilesError(
@@ -150,14 +150,14 @@ class Run:
                 holder.write_text(
                     f"{command} (process {os.getpid()} on {platform.node()}, since {started})", encoding="utf-8"
                 )
-                self._settle()
+                self._clean_up()
             yield
         finally:
             holder.unlink(missing_ok=True)
-            self._leave_nothing_for_nothing()
+            self._remove_if_empty()
             lock.release()
 
-    def _leave_nothing_for_nothing(self) -> None:
+    def _remove_if_empty(self) -> None:
         """Take the folder away again where a first run came to no result."""
         if [path.name for path in self.folder.iterdir()] == [_LOCK]:
             (self.folder / _LOCK).unlink()
@@ -165,7 +165,7 @@ class Run:
             with suppress(OSError):
                 self.folder.parent.rmdir()
 
-    def _settle(self) -> None:
+    def _clean_up(self) -> None:
         for leftover in self.folder.glob(".*.new"):
             shutil.rmtree(leftover)
         for old in self.folder.glob(".*.old"):

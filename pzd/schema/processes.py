@@ -16,7 +16,7 @@ _FORKS = sys.platform == "linux"
 """Elsewhere a process would have to import everything anew, which takes longer than what is saved."""
 
 
-def at_once(function: Callable[[Item], Made], items: Sequence[Item], jobs: int) -> list[Made]:
+def parallel_map(function: Callable[[Item], Made], items: Sequence[Item], jobs: int) -> list[Made]:
     """What a function makes of each item, in order, however many processes there are.
 
     Parameters

@@ -1,4 +1,4 @@
-"""What stands in a run's folder, for those who only want to look."""
+"""The numbers of a finished run, for the commands that only print them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pzd.schema.yamlfile import read_yaml
 
 
 @dataclass(frozen=True)
-class Standing:
+class RunSummary:
     """The numbers of a run; empty or None where a stage has not run."""
 
     folder: Path
@@ -45,7 +45,7 @@ def page_of(run: Run) -> Path:
     return run.folder / Report.folder / "report.html"
 
 
-def standing(run: Run) -> Standing:
+def run_summary(run: Run) -> RunSummary:
     """What stands in a run's folder, checked.
 
     Raises
@@ -53,14 +53,14 @@ def standing(run: Run) -> Standing:
     ConfigError : when nothing stands there
     DataError : when a file of it is at fault
     """
-    kept = {kind: run.kept(kind.folder).manifest for kind in (Identified, Diagnosed, Rides, Report)}
-    there = {kind for kind, manifest in kept.items() if manifest is not None}
+    manifests = {kind: run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Rides, Report)}
+    there = {kind for kind, manifest in manifests.items() if manifest is not None}
     if not there:
         raise ConfigError(f"{run.folder}: no results stand here yet; pzd run {run.config} makes them")
     at, control = run.folder, run.control
     diagnosis = at / Diagnosed.folder / "diagnosis.json"
     comfort = at / Report.folder / "comfort.csv"
-    return Standing(
+    return RunSummary(
         at,
         control,
         run.read(Identified).rows if Identified in there else (),
@@ -68,11 +68,11 @@ def standing(run: Run) -> Standing:
         read_rows(at / Rides.folder / "summary.csv", SummaryRow, control) if Rides in there else (),
         read_rows(comfort, ComfortRow, control) if Report in there else (),
         page_of(run) if Report in there else None,
-        tuple(dict.fromkeys(mark for manifest in kept.values() if manifest for mark in manifest.marks)),
+        tuple(dict.fromkeys(mark for manifest in manifests.values() if manifest for mark in manifest.marks)),
     )
 
 
-def standing_in(folder: Path) -> Standing:
+def summary_of(folder: Path) -> RunSummary:
     """What stands in a folder that a run wrote.
 
     Raises
@@ -83,4 +83,4 @@ def standing_in(folder: Path) -> Standing:
     written = folder / CONFIG
     if not written.is_file():
         raise ConfigError(f"{folder}: no run stands here, it has no {CONFIG}; give a folder like runs/quickstart")
-    return standing(Run(folder, written, control_of(read_yaml(written).data)))
+    return run_summary(Run(folder, written, control_of(read_yaml(written).data)))

@@ -1,4 +1,4 @@
-"""Brings the stages up to date, as make would, and says of each why it runs or does not."""
+"""Runs the stages that are out of date, as make would, and says of each why it runs or does not."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pzd.config import RunConfig
 from pzd.pipeline.dependencies import block_of, changes, dependencies, is_artefact, key_of, setting_of
 from pzd.pipeline.stages import Stage
 from pzd.quantities import Control
-from pzd.runs import Kept, Run
+from pzd.runs import Run, StageFolder
 from pzd.schema.yamlfile import yaml_text
 
 Say = Callable[[str], None]
@@ -36,7 +36,7 @@ class Pipeline:
     _compiles: bool = False
     """Whether the ride's kernels may still have to be compiled, which a second core can do meanwhile."""
 
-    def bring_up_to_date(self, target: str, forced: Sequence[str] = ()) -> tuple[str, ...]:
+    def execute(self, target: str, forced: Sequence[str] = ()) -> tuple[str, ...]:
         """Run every stage up to the target that is stale.
 
         Parameters
@@ -55,7 +55,7 @@ class Pipeline:
         wanted = self.stages[: [stage.name for stage in self.stages].index(target) + 1]
         self._compiles = any(stage.function.__module__ == "pzd.simulate.stage" for stage in wanted)
         for number, stage in enumerate(wanted):
-            self._bring(stage, force=stage.name in forced)
+            self._execute_stage(stage, force=stage.name in forced)
             if number == 0:
                 self._after_first(wanted)
         return tuple(dict.fromkeys(mark for marks in self.marks.values() for mark in marks))
@@ -66,16 +66,16 @@ class Pipeline:
         if any("setting" in stage.takes for stage in wanted):
             setting_of(self.config, self.run)
 
-    def _bring(self, stage: Stage, *, force: bool) -> None:
+    def _execute_stage(self, stage: Stage, *, force: bool) -> None:
         inputs = dependencies(stage, self.config, self.run, self._carried(stage, ()))
-        kept = self.run.kept(stage.folder)
-        reason = "forced" if force else stale(kept, inputs)
+        state = self.run.stage_folder(stage.folder)
+        reason = "forced" if force else stale(state, inputs)
         if reason is None:
-            self.marks[stage.folder] = self._marks_as_it_stands(stage, kept)
-            by_hand = f"; edited by hand and kept: {', '.join(kept.edited)}" if kept.edited else ""
+            self.marks[stage.folder] = self._marks_as_it_stands(stage, state)
+            by_hand = f"; edited by hand and kept: {', '.join(state.edited)}" if state.edited else ""
             self._say(stage, f"fresh: nothing it depends on has changed{by_hand}")
             return
-        lost = f"; edited by hand, now beside the new as .edited: {', '.join(kept.edited)}" if kept.edited else ""
+        lost = f"; edited by hand, now beside the new as .edited: {', '.join(state.edited)}" if state.edited else ""
         self._say(stage, f"runs: {reason}{lost}")
         self._run(stage, inputs)
 
@@ -118,11 +118,11 @@ class Pipeline:
             self._in_hand[kind.folder] = (now, artefact)
         return artefact
 
-    def _marks_as_it_stands(self, stage: Stage, kept: Kept) -> tuple[str, ...]:
+    def _marks_as_it_stands(self, stage: Stage, state: StageFolder) -> tuple[str, ...]:
         """The marks of the manifest, or of the artefact itself where it was edited, which checks it too."""
-        if kept.edited:
+        if state.edited:
             return self._carried(stage, getattr(self._read_back(stage.makes), "untrusted", ()))
-        return kept.manifest.marks if kept.manifest else ()
+        return state.manifest.marks if state.manifest else ()
 
     def _carried(self, stage: Stage, own: Sequence[str]) -> tuple[str, ...]:
         """A stage's own marks behind those of what it was made from."""
@@ -133,12 +133,12 @@ class Pipeline:
         self.say(f"{stage.name:<10} {line}")
 
 
-def stale(kept: Kept, inputs: dict[str, str]) -> str | None:
+def stale(state: StageFolder, inputs: dict[str, str]) -> str | None:
     """Why a stage must run, in words; None where it need not."""
-    if kept.manifest is None:
+    if state.manifest is None:
         return "no result of it stands here"
-    if kept.missing:
-        return f"{', '.join(kept.missing)} missing"
-    if kept.manifest.key != key_of(inputs):
-        return changes(kept.manifest.inputs, inputs) or "its manifest was edited"
+    if state.missing:
+        return f"{', '.join(state.missing)} missing"
+    if state.manifest.key != key_of(inputs):
+        return changes(state.manifest.inputs, inputs) or "its manifest was edited"
     return None
