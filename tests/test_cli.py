@@ -227,7 +227,7 @@ def test_a_second_config_of_the_same_stem_is_refused_and_both_are_named(typed: T
 
 
 def test_a_run_in_use_is_code_5_and_names_who_uses_it(typed: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pzd.runs.folder.LOCK_TIMEOUT_S", 0.1)
+    monkeypatch.setattr("pzd.runs.lock.LOCK_TIMEOUT_S", 0.1)
     with Run.of(typed.config, Path("runs"), load(typed.config).control.signal()).locked("pzd simulate"):
         assert typed("run", "first.yaml") == 5
     assert typed.err[0].startswith(f"runs/first: pzd simulate (process {os.getpid()} on ")
