@@ -317,6 +317,77 @@ def test_show_says_what_is_not_to_be_trusted(typed: Terminal) -> None:
     assert [line for line in typed.out if line.startswith("not to be trusted: rig")]
 
 
+def stale(typed: Terminal) -> list[str]:
+    return [line for line in typed.out if line.startswith("stale: ")]
+
+
+def test_numbers_of_the_config_as_it_is_are_not_called_stale(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    for look in (["show", "first.yaml"], ["compare", "runs/first"]):
+        assert typed(*look) == 0
+        assert stale(typed) == []
+
+
+def test_show_and_compare_say_what_is_of_an_older_config_and_why(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    with typed.config.open("a") as file:
+        file.write("table: {speed_max_m_per_s: 2}\n")
+    wanted = [
+        "table: table.speed_max_m_per_s has changed",
+        "simulate: it is made from table",
+        "report: it is made from simulate",
+    ]
+    assert typed("show", "first.yaml") == 0
+    assert typed.out[1:4] == [f"stale: {line}" for line in wanted]
+    assert "comfort:" in typed.out
+    assert typed("compare", "runs/first") == 0
+    assert stale(typed) == [f"stale: runs/first: {line}" for line in wanted]
+    typed("table", "first.yaml")
+    typed("show", "first.yaml")
+    assert [line.split(":")[1] for line in stale(typed)] == [" simulate", " report"]
+
+
+def test_show_says_stale_where_a_rig_file_has_changed_or_gone(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    Path("data/a.csv").write_text("101")
+    typed("show", "first.yaml")
+    assert stale(typed)[0] == "stale: ingest: data/a.csv has changed"
+    assert len(stale(typed)) == len(NAMES)
+    for name in ("a", "b"):
+        Path(f"data/{name}.csv").unlink()
+    typed("compare", "runs/first")
+    assert stale(typed)[0] == "stale: runs/first: ingest: 2 files of data have changed"
+
+
+def test_a_number_mended_by_hand_makes_stale_what_hangs_on_it_and_not_itself(typed: Terminal) -> None:
+    typed("run", "first.yaml", "--set", f"seed={UNDETERMINED}")
+    path = Path("runs/first/2-identify/parameters.csv")
+    path.write_text(path.read_text().replace("200.0,200.0,200.0,,,,", "200.0,200.0,200.0,5,4,6,"))
+    show = ["show", "first.yaml", "--set", f"seed={UNDETERMINED}"]
+    typed(*show)
+    assert [line.split(":")[1].strip() for line in stale(typed)] == ["diagnose", "table", "simulate", "report"]
+    typed("run", "first.yaml", "--set", f"seed={UNDETERMINED}")
+    typed(*show)
+    assert stale(typed) == []
+
+
+def test_show_reads_what_an_older_config_called_by_another_name(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    typed.config.write_text("control: {name: current, unit: A}\n" + typed.config.read_text())
+    assert typed("show", "first.yaml") == 0
+    assert "stale: ingest: control.name has changed, control.unit has changed" in typed.out
+
+
+def test_compare_says_where_the_config_of_a_run_is_gone_or_broken(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    typed.config.write_text("rig: 1\n")
+    assert typed("compare", "runs/first") == 0
+    assert stale(typed)[0].startswith("stale: runs/first: all: their config would be refused: first.yaml:1:6: ")
+    typed.config.unlink()
+    assert typed("compare", "runs/first") == 0
+    assert stale(typed)[0].startswith("stale: runs/first: all: their config first.yaml is missing")
+
+
 def test_compare_sets_runs_side_by_side(typed: Terminal) -> None:
     shutil.copy("first.yaml", "second.yaml")
     typed("run", "first.yaml")

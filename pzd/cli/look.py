@@ -47,18 +47,23 @@ def show(
     """Print what stands in the run of a config."""
     from pzd.cli.story import story
     from pzd.pipeline.command import opened
-    from pzd.pipeline.run_summary import run_summary
+    from pzd.pipeline.run_summary import summary_with_stale
 
-    run = opened(config, runs, overrides or ()).run
-    found, output = run_summary(run), Output(quiet=quiet, verbose=verbose)
-    output.say(f"run: {found.folder}")
+    found = summary_with_stale(opened(config, runs, overrides or ()))
+    output = Output(quiet=quiet, verbose=verbose)
+    output.say(f"run: {found.folder}", *stale_lines(found))
     _section(output, "parameters", _parameters(found))
-    _section(output, "diagnosis", [[line] for line in story(found.diagnosis, run.control)] if found.diagnosis else [])
+    _section(output, "diagnosis", [[line] for line in story(found.diagnosis, found.control)] if found.diagnosis else [])
     _section(output, "rides", _rides(found))
     _section(output, "comfort", _comfort(found))
     output.say(*(f"not to be trusted: {mark}" for mark in found.marks))
     output.say(f"report: {found.page or 'not written yet'}")
     return DONE
+
+
+def stale_lines(found: RunSummary, place: str = "") -> list[str]:
+    """A line a stage whose numbers are not those of the config as it is today."""
+    return [f"stale: {place}{stage}: {reason}" for stage, reason in found.stale.items()]
 
 
 def _section(output: Output, title: str, rows: list[list[str]]) -> None:
@@ -125,7 +130,10 @@ def compare(runs: RunFolders, quiet: Quiet = False, verbose: Verbose = False) ->
     from pzd.pipeline.run_summary import summary_of
 
     output = Output(quiet=quiet, verbose=verbose)
-    output.say(*aligned(comparison([summary_of(folder) for folder in runs])))
+    found = [summary_of(folder) for folder in runs]
+    output.say(*aligned(comparison(found)))
+    for run in found:
+        output.say(*stale_lines(run, f"{run.folder}: "))
     return DONE
 
 

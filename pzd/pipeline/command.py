@@ -92,6 +92,11 @@ def _right_source(line: Sequence[Stage], target: str) -> None:
         raise ConfigError(f"pzd {target}: the config has {held}, so the command is pzd {line[0].name}")
 
 
+def stale_stages(given: Opened) -> dict[str, str]:
+    """Why the results in a run are not those of the config as it is today, by stage; empty where they are."""
+    return Pipeline(given.config, given.run, stages(given.config), lambda _: None).stale_stages()
+
+
 def preflight(given: Opened) -> tuple[RecordEntry, ...]:
     """The rig's records and what the preflight finds in them, written nowhere.
 

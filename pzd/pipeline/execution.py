@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +13,7 @@ from pzd.pipeline.dependencies import block_of, changes, dependencies, is_artefa
 from pzd.pipeline.stages import Stage
 from pzd.quantities import Control
 from pzd.runs import Run, StageFolder
+from pzd.schema.errors import UserError
 from pzd.schema.yamlfile import yaml_text
 
 Say = Callable[[str], None]
@@ -78,6 +79,31 @@ class Pipeline:
         lost = f"; edited by hand, now beside the new as .edited: {', '.join(state.edited)}" if state.edited else ""
         self._say(stage, f"runs: {reason}{lost}")
         self._run(stage, inputs)
+
+    def stale_stages(self) -> dict[str, str]:
+        """Why the results of each stage are not what it would make today, by its name; nothing is run or written."""
+        reasons: dict[str, str] = {}
+        results: set[str] = set()
+        for stage in self.stages:
+            state = self.run.stage_folder(stage.folder)
+            if state.manifest:
+                results.add(stage.name)
+            reason = self._why_stale(stage, state) or self._made_from_stale(stage, reasons)
+            if reason is not None:
+                reasons[stage.name] = reason
+        return {name: reason for name, reason in reasons.items() if name in results}
+
+    def _why_stale(self, stage: Stage, state: StageFolder) -> str | None:
+        try:
+            self.marks[stage.folder] = self._marks_as_it_stands(stage, state)
+            return stale(state, dependencies(stage, self.config, self.run, self._carried(stage, ())))
+        except UserError as error:
+            return f"it would be refused: {'; '.join(error.messages)}"
+
+    def _made_from_stale(self, stage: Stage, reasons: Mapping[str, str]) -> str | None:
+        needed = {kind.folder for kind in stage.takes.values() if is_artefact(kind)}
+        makers = [maker.name for maker in self.stages if maker.folder in needed and maker.name in reasons]
+        return f"it is made from {' and '.join(makers)}" if makers else None
 
     def _run(self, stage: Stage, inputs: dict[str, str]) -> None:
         if self._compiles:

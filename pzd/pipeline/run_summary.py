@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pzd.artefacts import (
@@ -15,11 +16,12 @@ from pzd.artefacts import (
     Rides,
     SummaryRow,
 )
-from pzd.config import control_of
+from pzd.config import control_of, validated
+from pzd.pipeline.command import Opened, stale_stages
 from pzd.quantities import Control
 from pzd.runs import CONFIG, Run
 from pzd.schema.csvfile import read_rows
-from pzd.schema.errors import ConfigError
+from pzd.schema.errors import ConfigError, UserError
 from pzd.schema.jsonfile import read_json
 from pzd.schema.yamlfile import read_yaml
 
@@ -38,6 +40,8 @@ class RunSummary:
     """The report's page."""
     marks: tuple[str, ...]
     """Why the results are not to be trusted."""
+    stale: Mapping[str, str] = field(default_factory=dict)
+    """Why results are not those of the config as it is today, by stage."""
 
 
 def page_of(run: Run) -> Path:
@@ -46,18 +50,20 @@ def page_of(run: Run) -> Path:
 
 
 def run_summary(run: Run) -> RunSummary:
-    """What stands in a run's folder, checked.
+    """The numbers in a run's folder, checked, under the name that the control had when they were written.
 
     Raises
     ------
-    ConfigError : when nothing stands there
+    ConfigError : when there are none
     DataError : when a file of it is at fault
     """
     manifests = {kind: run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Rides, Report)}
     there = {kind for kind, manifest in manifests.items() if manifest is not None}
     if not there:
         raise ConfigError(f"{run.folder}: no results stand here yet; pzd run {run.config} makes them")
-    at, control = run.folder, run.control
+    at = run.folder
+    control = control_of(read_yaml(at / CONFIG).data) if (at / CONFIG).is_file() else run.control
+    run = replace(run, control=control)
     diagnosis = at / Diagnosed.folder / "diagnosis.json"
     comfort = at / Report.folder / "comfort.csv"
     return RunSummary(
@@ -72,8 +78,19 @@ def run_summary(run: Run) -> RunSummary:
     )
 
 
+def summary_with_stale(given: Opened) -> RunSummary:
+    """The numbers of a config's run, with what makes them those of an older config or of other files.
+
+    Raises
+    ------
+    ConfigError : when there are none
+    DataError : when a file of the run is at fault
+    """
+    return replace(run_summary(given.run), stale=stale_stages(given))
+
+
 def summary_of(folder: Path) -> RunSummary:
-    """What stands in a folder that a run wrote.
+    """The numbers in a folder that a run wrote, with what makes them stale against the config that it is of.
 
     Raises
     ------
@@ -83,4 +100,16 @@ def summary_of(folder: Path) -> RunSummary:
     written = folder / CONFIG
     if not written.is_file():
         raise ConfigError(f"{folder}: no run stands here, it has no {CONFIG}; give a folder like runs/quickstart")
-    return run_summary(Run(folder, written, control_of(read_yaml(written).data)))
+    run = Run(folder, written, control_of(read_yaml(written).data))
+    return replace(run_summary(run), stale=_stale_by_its_config(run))
+
+
+def _stale_by_its_config(run: Run) -> dict[str, str]:
+    config = run.config_of_results()
+    if config is None or not config.is_file():
+        return {"all": f"their config {config or ''} is missing, so nobody can say whether these are its numbers"}
+    try:
+        document = read_yaml(config)
+        return stale_stages(Opened(document, validated(document), replace(run, config=config)))
+    except UserError as error:
+        return {"all": f"their config would be refused: {'; '.join(error.messages)}"}

@@ -78,6 +78,12 @@ class Run:
                 )
         return run
 
+    def config_of_results(self) -> Path | None:
+        """The config that the results are of, by the manifests; None where there are none."""
+        owners = (self._owner(manifest.parent.name) for manifest in sorted(self.folder.glob(f"*/{MANIFEST}")))
+        owner = next((owner for owner in owners if owner is not None), None)
+        return Path(os.path.relpath(owner)) if owner else None
+
     def _owner(self, stage: str) -> Path | None:
         manifest = self._manifest(stage)
         return (self.folder / manifest.config).resolve() if manifest else None
