@@ -10,7 +10,8 @@ import typer
 
 from pzd.cli.exits import DONE
 from pzd.cli.layout import aligned, interval, number
-from pzd.cli.options import RUNS, Config, Quiet, Runs, Set, Verbose
+from pzd.cli.machine import run_as_data
+from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose
 from pzd.cli.output import Output
 
 if TYPE_CHECKING:
@@ -21,13 +22,23 @@ RunFolders = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folder
 
 
 def check(
-    config: Config, runs: Runs = RUNS, overrides: Set = None, quiet: Quiet = False, verbose: Verbose = False
+    config: Config,
+    runs: Runs = RUNS,
+    overrides: Set = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> int:
     """Check config and rig records; write nothing."""
     from pzd.pipeline.command import opened, preflight
+    from pzd.schema.jsonfile import plain
 
     output = Output(quiet=quiet, verbose=verbose)
-    entries = preflight(opened(config, runs, overrides or ()))
+    given = opened(config, runs, overrides or ())
+    entries = preflight(given)
+    if as_json:
+        output.say_json(plain({"config": config.as_posix(), "records": entries}, given.run.control))
+        return DONE
     for entry in entries:
         output.say(*_entry(entry))
     found = sum(len(entry.findings) for entry in entries)
@@ -42,15 +53,26 @@ def _entry(entry: RecordEntry) -> Iterator[str]:
 
 
 def show(
-    config: Config, runs: Runs = RUNS, overrides: Set = None, quiet: Quiet = False, verbose: Verbose = False
+    config: Config,
+    runs: Runs = RUNS,
+    overrides: Set = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> int:
-    """Print what stands in the run of a config."""
+    """Print the numbers in the run of a config.
+
+    A stage whose numbers are of an older config, of other files or of other code is called stale, with the reason.
+    """
     from pzd.cli.story import story
     from pzd.pipeline.command import opened
     from pzd.pipeline.run_summary import summary_with_stale
 
     found = summary_with_stale(opened(config, runs, overrides or ()))
     output = Output(quiet=quiet, verbose=verbose)
+    if as_json:
+        output.say_json(run_as_data(found))
+        return DONE
     output.say(f"run: {found.folder}", *stale_lines(found))
     _section(output, "parameters", _parameters(found))
     _section(output, "diagnosis", [[line] for line in story(found.diagnosis, found.control)] if found.diagnosis else [])
@@ -124,13 +146,19 @@ def _comfort(found: RunSummary) -> list[list[str]]:
     ]
 
 
-def compare(runs: RunFolders, quiet: Quiet = False, verbose: Verbose = False) -> int:
-    """Print the numbers of several runs side by side."""
+def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbose: Verbose = False) -> int:
+    """Print the numbers of several runs side by side.
+
+    A stage whose numbers are not those of the run's config as it is today is called stale, with the reason.
+    """
     from pzd.cli.comparison import comparison
     from pzd.pipeline.run_summary import summary_of
 
     output = Output(quiet=quiet, verbose=verbose)
     found = [summary_of(folder) for folder in runs]
+    if as_json:
+        output.say_json([run_as_data(run) for run in found])
+        return DONE
     output.say(*aligned(comparison(found)))
     for run in found:
         output.say(*stale_lines(run, f"{run.folder}: "))

@@ -10,7 +10,7 @@ import tempfile
 import traceback
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 _BAR = 24
 """Width of the progress bar in characters."""
@@ -36,6 +36,12 @@ class Output:
             clear_progress()
             for line in lines:
                 _print(line, sys.stdout)
+
+    def say_json(self, data: Any) -> None:
+        """Print plain data as JSON to stdout."""
+        from pzd.schema.jsonfile import json_text
+
+        self.say(json_text(data))
 
 
 class _Handler(logging.Handler):
