@@ -22,11 +22,13 @@ from stand_ins import NAMES, UNDETERMINED, project
 
 from pzd.artefacts import Diagnosis, Gap, NextTest, Ranked, Region, Value
 from pzd.cli.app import status
+from pzd.cli.output import Output
 from pzd.cli.story import story
 from pzd.config import load
 from pzd.damper.effects import library
 from pzd.quantities import Control
 from pzd.runs import Run
+from pzd.schema.progress import Progress
 
 COMMANDS = [
     *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report"),
@@ -694,6 +696,73 @@ def test_ctrl_c_is_code_130_in_one_line(tmp_path: Path) -> None:
     assert running.returncode == 130
     assert err.count("\n") == 1
     assert err.startswith("interrupted; ")
+
+
+SLOW = """
+import sys, time
+from concurrent.futures import ThreadPoolExecutor
+sys.path[:0] = [{here!r}, {root!r}]
+import stand_ins
+from pzd.artefacts import Identified, Rig
+from pzd.identify.config import IdentifyConfig
+from pzd.pipeline import command
+from pzd.pipeline.stages import Stage
+
+def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
+    with ThreadPoolExecutor(2) as pool:
+        futures = [pool.submit(time.sleep, 30) for _ in range(4)]
+        print("at work", flush=True)
+        futures[0].result()
+
+identify.__module__ = "pzd.identify.stage"
+command.stages = lambda config: tuple(
+    Stage("identify", identify) if stage.name == "identify" else stage for stage in stand_ins.stages(config)
+)
+sys.argv = ["pzd", "run", "first.yaml"]
+from pzd.cli import main
+main()
+"""
+
+
+def test_an_interrupted_command_ends_in_a_second_and_the_next_one_goes_on(typed: Terminal, tmp_path: Path) -> None:
+    here = Path(__file__).resolve().parent
+    command = [sys.executable, "-c", SLOW.format(here=str(here), root=str(here.parent))]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    with subprocess.Popen(command, **pipes, text=True, cwd=tmp_path, env=ENVIRONMENT) as running:
+        signal.signal(signal.SIGINT, before)
+        try:
+            assert running.stdout is not None
+            assert any(line == "at work\n" for line in running.stdout), running.communicate()
+            running.send_signal(signal.SIGINT)
+            begun = time.monotonic()
+            _, err = running.communicate(timeout=20.0)
+            took = time.monotonic() - begun
+        finally:
+            running.kill()
+    assert running.returncode == 130
+    assert took < 5.0  # a second, on a machine that is not busy; its threads sleep for a minute
+    assert err == "interrupted; finished stages stand, the one at work left what was there before\n"
+    assert typed("run", "first.yaml") == 0
+    assert typed.out[0] == "ingest     fresh: nothing it depends on has changed"
+    assert typed.err == []
+    assert not [path for path in Path("runs/first").iterdir() if path.suffix == ".new" or path.name == ".holder"]
+
+
+@pytest.mark.parametrize(
+    ("flags", "out", "err"),
+    [
+        ({}, "", "\r\x1b[K[######..................] 1 of 4 conditions: ok"),
+        ({"verbose": True}, "  1 of 4 conditions: ok\n", "\r\x1b[K"),
+        ({"quiet": True, "verbose": True}, "", ""),
+    ],
+)
+def test_progress_is_a_bar_on_a_terminal_and_a_line_where_all_is_wanted(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, flags: dict[str, bool], out: str, err: str
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    Output(**({"quiet": False, "verbose": False} | flags)).progress(Progress(1, 4, "conditions: ok"))
+    assert capsys.readouterr() == (out, err)
 
 
 def test_a_terminal_of_another_encoding_is_no_fault() -> None:

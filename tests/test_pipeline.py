@@ -13,17 +13,20 @@ import pytest
 import stand_ins
 from stand_ins import NAMES, UNDETERMINED, project
 
-from pzd.artefacts import Identified, Manifest
+from pzd.artefacts import Identified, Manifest, Rig
 from pzd.cli import start
 from pzd.config import load
 from pzd.damper.effects import library
 from pzd.pipeline.command import execute, opened
+from pzd.pipeline.execution import Pipeline
 from pzd.pipeline.sources import PACKAGE, _file, _used, code_hash, modules_used
 from pzd.pipeline.stages import Stage, stages
 from pzd.quantities import Control
+from pzd.rig.config import RigConfig
 from pzd.runs import versions
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.jsonfile import read_json
+from pzd.schema.progress import Listener, Progress, unheard
 
 
 class Bench:
@@ -535,3 +538,16 @@ def test_a_stage_declares_itself_by_its_signature() -> None:
     assert list(stage.takes) == ["identify", "rig", "seed"]
     assert stage.makes is Identified
     assert stage.folder == "2-identify"
+
+
+def test_a_stage_that_asks_for_it_can_say_how_far_it_is(bench: Bench) -> None:
+    def slow(rig: RigConfig, control: Control, folder: Path, progress: Listener = unheard) -> Rig:
+        progress(Progress(1, 2, "files"))
+        return stand_ins.ingest(rig, control, folder)
+
+    heard: list[Progress] = []
+    given = opened(bench.config, bench.runs)
+    pipeline = Pipeline(given.config, given.run, (Stage("ingest", slow),), lambda _: None, heard.append)
+    assert pipeline.stages[0].folder == "1-rig"
+    pipeline.made(pipeline.stages[0])
+    assert heard == [Progress(1, 2, "files")]

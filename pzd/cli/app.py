@@ -12,6 +12,7 @@ import typer
 
 from pzd.cli import blind, figures, look, stages, start
 from pzd.cli.exits import DONE, INTERRUPTED, OWN_FAULT
+from pzd.cli.interrupt import end_soon_after_interrupt, say_interrupted
 from pzd.cli.output import complain, own_fault, silence
 from pzd.schema.errors import ConfigError, FilesError, UserError
 
@@ -63,6 +64,7 @@ def main() -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
+    end_soon_after_interrupt()
     code = status(sys.argv[1:])
     try:
         sys.stdout.flush()
@@ -92,7 +94,7 @@ def status(arguments: Sequence[str]) -> int:
     except Exception as error:  # noqa: BLE001  # every ending has its exit code
         return _failed(error)
     if code == INTERRUPTED:  # typer may make an exit of its own of it
-        complain(["interrupted; finished stages stand, the one at work left what was there before"])
+        say_interrupted()
     return code
 
 

@@ -38,7 +38,7 @@ def blind(
     places = folder_of(given.run.folder / FOLDER, setup.blind.seed)
     methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
     with given.run.locked("pzd blind"):
-        benchmark = Benchmark(setup, methods, places, _made_from(whole))
+        benchmark = Benchmark(setup, methods, places, _made_from(whole), progress=output.progress)
         cases = benchmark.run(jobs, afresh=force)
         lines = write(cases, places.folder, setup.control, tuning=setup.blind.tuning)
     output.say(*lines, f"tables and picture: {places.folder}")

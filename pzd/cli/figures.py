@@ -22,7 +22,7 @@ def figures(
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
-    marks = execute(given, "identify", force=False, jobs=jobs, say=output.say)
+    marks = execute(given, "identify", force=False, jobs=jobs, say=output.say, progress=output.progress)
     gallery = drawn(Evidence.of(given.run, given.config), output.say)
     with given.run.locked("pzd figures"):
         given.run.write_beside(FOLDER, gallery.write)

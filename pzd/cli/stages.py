@@ -56,7 +56,7 @@ def _command(name: str, summary: str) -> Callable[..., int]:
 
         output = Output(quiet=quiet, verbose=verbose)
         given = opened(config, runs, overrides or ())
-        marks = execute(given, name, force=force, jobs=jobs, say=output.say)
+        marks = execute(given, name, force=force, jobs=jobs, say=output.say, progress=output.progress)
         if name in _AT_THE_END:
             output.say(*_AT_THE_END[name](given.run))
         complain(f"not to be trusted: {mark}" for mark in marks)

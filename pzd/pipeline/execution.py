@@ -14,6 +14,7 @@ from pzd.pipeline.stages import Stage
 from pzd.quantities import Control
 from pzd.runs import Run, StageFolder
 from pzd.schema.errors import UserError
+from pzd.schema.progress import Listener, unheard
 from pzd.schema.yamlfile import yaml_text
 
 Say = Callable[[str], None]
@@ -28,6 +29,8 @@ class Pipeline:
     stages: Sequence[Stage]
     say: Say
     """Takes a line about each stage."""
+    progress: Listener = unheard
+    """Hears how far a stage has come."""
     jobs: int = 1
     """Processes that a stage may use, where it can use several."""
     marks: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -133,7 +136,8 @@ class Pipeline:
             return self.run.control
         if name == "setting":
             return setting_of(self.config, self.run)
-        return {"seed": self.config.seed, "folder": self.run.config.parent, "jobs": self.jobs}[name]
+        given = {"seed": self.config.seed, "folder": self.run.config.parent}
+        return (given | {"jobs": self.jobs, "progress": self.progress})[name]
 
     def _read_back(self, kind: type[Artefact]) -> Artefact:
         """An artefact as its files have it: read and checked once, and again where they have changed since."""
