@@ -237,8 +237,8 @@ def _killer(home: Path, at: int, *, torn: bool) -> Any:
 
 
 FEW = settings(
-    max_examples=15,
-    stateful_step_count=12,
+    max_examples=10,
+    stateful_step_count=10,
     derandomize=True,
     database=None,
     suppress_health_check=list(HealthCheck),
