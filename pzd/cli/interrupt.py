@@ -15,7 +15,7 @@ import time
 from pzd.cli.exits import INTERRUPTED
 from pzd.cli.output import complain
 
-_GRACE_S = 0.6
+_GRACE_S = 0.4
 """How long the program may take to tidy up; with what it takes to notice, it is gone within a second."""
 _said = threading.Event()
 
