@@ -213,7 +213,7 @@ class Run:
 
         self._replace(artefact.folder, fill)
 
-    def write_beside(self, folder: str, write: Callable[[Path], None]) -> None:
+    def write_extra(self, folder: str, write: Callable[[Path], None]) -> None:
         """Write a folder that is no stage in place of what was there before, whole or not at all.
 
         Parameters

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from campaign import damper_of, sines
 
-from pzd.damper.compose import respond, standing_rows
+from pzd.damper.compose import constant_rows, respond
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import NuisanceConfig
-from pzd.diagnose.evidence import evidence_of
-from pzd.diagnose.fitting import fit
-from pzd.diagnose.inputs import prepare
-from pzd.diagnose.observation import SIMULATION_TOLERANCE
-from pzd.diagnose.problem import simulated
-from pzd.diagnose.split import UNTOUCHED, split
+from pzd.diagnose.data.cleaning import prepare
+from pzd.diagnose.data.split import UNTOUCHED, split
+from pzd.diagnose.fit.least_squares import fit
+from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
+from pzd.diagnose.fit.parameters import simulated
+from pzd.diagnose.search.evidence import evidence_of
 
 TWO = (0.0, 150.0)
 PLAIN = damper_of(TWO)
@@ -35,13 +35,13 @@ def asked(fresh_seeds: Callable[[int], list[int]]) -> Callable[[int], Campaign]:
 
 def test_a_damper_is_judged_once(asked: Callable[[int], Campaign]) -> None:
     campaign = asked(1)
-    assert campaign.judged(PLAIN) is campaign.judged(damper_of(TWO))
-    assert campaign.judged(PLAIN) is not campaign.judged(damper_of(TWO, gas_spring={"k_g": 100.0}))
+    assert campaign.checks(PLAIN) is campaign.checks(damper_of(TWO))
+    assert campaign.checks(PLAIN) is not campaign.checks(damper_of(TWO, gas_spring={"k_g": 100.0}))
 
 
 def test_naming_sees_all_but_the_untouched_samples(asked: Callable[[int], Campaign]) -> None:
     campaign = asked(1)
-    seen = {j.prepared.record.name: j.wanted for j in campaign.judged(PLAIN)}
+    seen = {j.prepared.record.name: j.wanted for j in campaign.checks(PLAIN)}
     held_out = {j.prepared.record.name: j.wanted for j in campaign.untouched(PLAIN)}
     assert held_out
     for prepared, roles in zip(campaign.prepared, campaign.parts.roles, strict=True):
@@ -51,7 +51,7 @@ def test_naming_sees_all_but_the_untouched_samples(asked: Callable[[int], Campai
 
 
 def test_records_judged_at_the_same_time_are_judged_the_same(asked: Callable[[int], Campaign]) -> None:
-    for one, other in zip(asked(1).judged(PLAIN), asked(2).judged(PLAIN), strict=True):
+    for one, other in zip(asked(1).checks(PLAIN), asked(2).checks(PLAIN), strict=True):
         np.testing.assert_array_equal(one.residual, other.residual)
 
 
@@ -61,7 +61,7 @@ def test_effects_beside_the_element_leave_what_is_remembered_of_it(asked: Callab
     unknowns = problem.unknowns(("gas_spring",))
     for observation in problem.observations:
         point = problem.point(start, unknowns)
-        row, _ = standing_rows(*point.base[observation.place], {})
+        row, _ = constant_rows(*point.base[observation.place], {})
         before = observation.element(row.tobytes()).copy()
         force = simulated(point, observation)
         np.testing.assert_array_equal(observation.element(row.tobytes()), before)
