@@ -366,7 +366,7 @@ def test_the_written_config_is_kept_where_a_person_edited_it(run: Run) -> None:
 def test_what_a_person_left_beside_the_figures_is_kept(run: Run) -> None:
     def drawn(text: str) -> None:
         with run.locked("pzd figures"):
-            run.write_beside("figures", lambda folder: (folder / "fig-01.svg").write_text(text))
+            run.write_extra("figures", lambda folder: (folder / "fig-01.svg").write_text(text))
 
     drawn("one")
     drawn("two")
