@@ -11,7 +11,7 @@ from pzd.quantities import Control
 from pzd.record import Array
 from pzd.schema.csvfile import read_columns, read_rows, write_columns, write_rows
 from pzd.schema.model import Frozen
-from pzd.schema.processes import at_once
+from pzd.schema.processes import parallel_map
 
 RIDE_COLUMNS = ("time_s", "z_m", "phi_rad", "a_K_m_per_s2")
 AXLE_COLUMNS = (
@@ -84,7 +84,7 @@ class Rides:
             columns = {name: ride.columns.get(name) for name in _RIDE_HEADER}
             write_columns(folder / f"{ride.case}.csv", columns, control)
 
-        at_once(written, self.rides, jobs)
+        parallel_map(written, self.rides, jobs)
         write_rows(folder / "summary.csv", SummaryRow, self.summary, control)
         write_rows(folder / "response.csv", Response, self.responses, control)
 
@@ -96,7 +96,7 @@ class Rides:
             return Ride(row.case, read_columns(folder / f"{row.case}.csv", _RIDE_HEADER, control, _RIDE_OPTIONAL))
 
         summary = read_rows(folder / "summary.csv", SummaryRow, control)
-        rides = tuple(at_once(ride, summary, jobs))
+        rides = tuple(parallel_map(ride, summary, jobs))
         return cls(rides, summary, read_rows(folder / "response.csv", Response, control))
 
     def untrusted(self, _: Control) -> tuple[str, ...]:

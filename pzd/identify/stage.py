@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pzd.artefacts import Identified, ParameterRow, Rig
 from pzd.identify.config import IdentifyConfig
 from pzd.record import Condition, Record, conditions
+from pzd.schema.progress import Listener, Progress, unheard
 from pzd.schema.wording import supported
 
 Labels = tuple[str | None, float | None, float | None]
@@ -15,7 +16,7 @@ Labels = tuple[str | None, float | None, float | None]
 log = logging.getLogger(__name__)
 
 
-def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
+def identify(identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener = unheard) -> Identified:
     """The Bingham parameters of every condition of every setting, with intervals and their trust.
 
     Parameters
@@ -23,6 +24,7 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
     identify : how they are found
     rig : the records
     seed : of the evolutionary search
+    progress : hears of every condition that is done
 
     Returns
     -------
@@ -31,18 +33,20 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
     from pzd.identify.measures import measures
 
     constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
-    rows = {_labels(row): row for row in _constant_rows(constant, identify, seed)}
+    rows = {_labels(row): row for row in _constant_rows(constant, identify, seed, progress)}
     rows |= {_labels(row): row for row in _moving_rows(moving, constant, list(rows.values()), identify)}
     return Identified(tuple(rows[labels] for labels in sorted(rows, key=_order)), measures(rig.records))
 
 
-def _constant_rows(found: Sequence[Condition], config: IdentifyConfig, seed: int) -> list[ParameterRow]:
+def _constant_rows(
+    found: Sequence[Condition], config: IdentifyConfig, seed: int, progress: Listener
+) -> list[ParameterRow]:
     from pzd.identify.fit import fit_condition
 
     rows = []
     for index, condition in enumerate(found):
         rows.append(fit_condition(condition, config, seed + index))
-        log.info("%d of %d conditions: %s", index + 1, len(found), _line(rows[-1]))
+        progress(Progress(index + 1, len(found), f"conditions: {_line(rows[-1])}"))
     return rows
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pzd.artefacts import Gap, Identified, ParameterRow
-from pzd.cli.context import context
 from pzd.cli.layout import interval
+from pzd.cli.story import story
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.verdict import weak
 from pzd.quantities import Control
@@ -80,7 +80,7 @@ def test_what_was_held_out_is_told_in_words() -> None:
 )
 def test_the_story_says_of_how_many_records_something_was_held_out(kind: str, told: str) -> None:
     gap = Gap.model_validate({**diagnosis().gap.model_dump(), "hold_out": kind})
-    lines = context(diagnosis().model_copy(update={"gap": gap}), Control())
+    lines = story(diagnosis().model_copy(update={"gap": gap}), Control())
     assert told in lines[2]
 
 
