@@ -11,7 +11,8 @@ import pytest
 import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
-CONFIGS = sorted((ROOT / "configs").glob("*.yaml"))
+CONFIGS = sorted(path for path in (ROOT / "configs").glob("*.yaml") if path.stem != "reference")
+"""The configs to run; the reference shows every key, and is held to the schema instead."""
 CONTRACT = (
     "config.yaml",
     "1-rig/records.json",
