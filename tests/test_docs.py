@@ -156,7 +156,9 @@ def test_every_make_target_of_a_page_exists(name: str) -> None:
 
 @every_page
 def test_every_path_that_a_page_names_exists(name: str) -> None:
-    known = r"(?<![\w./-])(?:pzd|tests|configs|\.ci|\.github)/[\w./*-]*|(?<![\w./-])(?:README\.md|Makefile|pyproject\.toml)"
+    known = (
+        r"(?<![\w./-])(?:pzd|tests|configs|\.ci|\.github)/[\w./*-]*|(?<![\w./-])(?:README\.md|Makefile|pyproject\.toml)"
+    )
     named = {path.rstrip(".") for path in re.findall(known, code_of(page(name)))}
     assert [path for path in sorted(named) if not any(ROOT.glob(path.rstrip("/")))] == []
 

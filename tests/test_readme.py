@@ -105,7 +105,9 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], subproces
     """Type a command where `make demo` was run; a small damper takes the place of the quickstart."""
     folder = tmp_path_factory.mktemp("clone")
     (folder / "bin").mkdir()
-    (folder / "bin" / "pzd").write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m pzd "$@"\n', encoding="utf-8")
+    (folder / "bin" / "pzd").write_text(
+        f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m pzd "$@"\n', encoding="utf-8"
+    )
     (folder / "bin" / "pzd").chmod(0o755)
     (folder / "configs").mkdir()
     (folder / "configs" / "quickstart.yaml").write_text(yaml.safe_dump(SMALL, sort_keys=False), encoding="utf-8")

@@ -59,7 +59,9 @@ def taken(alternative: Alternative) -> str:
     """The reference with one alternative taken: its marks removed, and what it replaces removed."""
     text = lines()
     indent = MARK.match(text[alternative.first])[1]  # type: ignore[index]  # an alternative begins with a mark
-    inserted = [f"{indent}{match[2]}" for line in text[alternative.first : alternative.last] if (match := MARK.match(line))]
+    inserted = [
+        f"{indent}{match[2]}" for line in text[alternative.first : alternative.last] if (match := MARK.match(line))
+    ]
     above = text[: alternative.first]
     for key in alternative.replaces:
         begin = max(number for number, line in enumerate(above) if line.startswith(f"{indent}{key}:"))
