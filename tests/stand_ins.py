@@ -40,7 +40,7 @@ from pzd.quantities import Control
 from pzd.record import Record
 from pzd.report.config import ReportConfig
 from pzd.rig.config import RigConfig
-from pzd.rig.listing import listed
+from pzd.rig.files.listing import listed
 from pzd.schema.errors import DataError
 from pzd.simulate.config import SimulateConfig
 from pzd.table.config import TableConfig

@@ -36,14 +36,14 @@ def confusion(cases: Sequence[Scored]) -> Confusion:
 
     Effects and pairs whose visible gap is below 0.5 % of the peak have rows of their own.
     """
-    found = Counter((there(case), said(case)) for case in cases)
+    found = Counter((true_row(case), said(case)) for case in cases)
     rows = (*library(), "pair", "invisible effect", "invisible pair", "none", *FORMS, "invisible form")
     columns = (*library(), *SAID)
     kept = tuple(row for row in rows if any(found[row, column] for column in columns))
     return Confusion(kept, columns, np.array([[float(found[row, column]) for column in columns] for row in kept]))
 
 
-def there(case: Scored) -> str:
+def true_row(case: Scored) -> str:
     """The row of a case."""
     if case.kind == "outside":
         return case.hidden if visible(case) else "invisible form"

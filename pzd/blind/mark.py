@@ -61,8 +61,8 @@ def scored(truth: Truth, cost: Cost, found: Diagnosed | None, clean: Mapping[str
     clean : the noise-free records by name
     made_from : what config and code the case was made with
     """
-    told = found.diagnosis if found else None
-    there = counted(truth)
+    diagnosis = found.diagnosis if found else None
+    counted_truth = counted(truth)
     return Scored(
         id=truth.id,
         made_from=made_from,
@@ -70,21 +70,21 @@ def scored(truth: Truth, cost: Cost, found: Diagnosed | None, clean: Mapping[str
         campaign=truth.campaign,
         one_frequency=truth.one_frequency,
         hidden=truth.form or "+".join(truth.effects) or "none",
-        truth=there,
+        truth=counted_truth,
         force_noise=truth.force_noise,
         noise_rho=truth.noise_rho,
         displacement_noise_m=truth.displacement_noise_m,
         visible_gap=truth.visible_gap,
         gap_given_other=truth.gap_given_other,
-        verdict=told.verdict if told else None,
-        effects=told.effects if told else (),
-        rivals=told.rivals if told else (),
-        confidence=told.confidence if told else None,
-        inside=_inside(told, truth) if told and set(told.effects) == set(there) else {},
+        verdict=diagnosis.verdict if diagnosis else None,
+        effects=diagnosis.effects if diagnosis else (),
+        rivals=diagnosis.rivals if diagnosis else (),
+        confidence=diagnosis.confidence if diagnosis else None,
+        inside=_inside(diagnosis, truth) if diagnosis and set(diagnosis.effects) == set(counted_truth) else {},
         gap_cut=gap_cut(found, clean) if found and found.diagnosis.effects else None,
         gap_cut_gains_out=gap_cut(found, clean, gains_out=True) if found and found.diagnosis.effects else None,
         gap_cut_of_truth=gap_cut_of_truth(found, clean) if found and found.diagnosis.effects else None,
-        next_test=bool(told and told.next_test),
+        next_test=bool(diagnosis and diagnosis.next_test),
         seconds=cost.seconds,
         diagnose_seconds=cost.diagnose_seconds,
         peak_memory_MB=cost.peak_memory_MB,
@@ -107,10 +107,10 @@ def _one(value: float | tuple[float, ...]) -> float:
     return value if isinstance(value, float) else value[0]
 
 
-def _inside(told: Diagnosis, truth: Truth) -> dict[str, bool]:
+def _inside(diagnosis: Diagnosis, truth: Truth) -> dict[str, bool]:
     """Of each parameter with one value and an interval: whether the true value lies in it."""
     found = {}
-    for effect, parameters in told.parameters.items():
+    for effect, parameters in diagnosis.parameters.items():
         for name, value in parameters.items():
             low, high, true = value.low95, value.high95, truth.damper.effects[effect][name]
             if isinstance(low, float) and isinstance(high, float) and isinstance(true, float):

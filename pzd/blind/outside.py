@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.damper.drive import felt_voltage
+from pzd.damper.drive import effective_voltage
 from pzd.damper.motion import Motion
 from pzd.record import Array
 
@@ -101,7 +101,7 @@ def rubber(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Arr
     """
     half_width = values["r"] * reached.stroke
     steps = np.diff(motion.time)
-    follows = felt_voltage(np.ascontiguousarray(motion.displacement), steps, 0.0, half_width)
+    follows = effective_voltage(np.ascontiguousarray(motion.displacement), steps, 0.0, half_width)
     return np.asarray((motion.displacement - follows) / half_width)
 
 

@@ -16,7 +16,7 @@ from pzd.damper.effect import Scales
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.record import Array
-from pzd.rig.frame import force_in_frame
+from pzd.rig.stand.frame import force_in_frame
 
 
 def with_effects(

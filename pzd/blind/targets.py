@@ -54,7 +54,7 @@ class Line(Frozen):
 
 def lines(cases: Sequence[Scored]) -> list[Line]:
     """Every line of what the benchmark says, in the order of the printed page."""
-    return [*_naming(cases), *_nothing_to_name(cases), *_gap_cuts(cases), *_calibration(cases), *_counts(cases)]
+    return [*_selection(cases), *_nothing_to_name(cases), *_gap_cuts(cases), *_calibration(cases), *_counts(cases)]
 
 
 # ---------------------------------------------------------------- lines of rates
@@ -95,7 +95,7 @@ def _verdict(share: float | None, target: str) -> Met:
     return "met" if (share <= limit if sign == "<=" else share >= limit) else "missed"
 
 
-def _naming(cases: Sequence[Scored]) -> Iterator[Line]:
+def _selection(cases: Sequence[Scored]) -> Iterator[Line]:
     single = [c for c in cases if c.kind == "single" and c.truth]
     several = [c for c in single if not c.one_frequency]
     seen = [c for c in several if visible(c)]

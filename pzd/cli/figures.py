@@ -25,7 +25,7 @@ def figures(
     marks = bring(given, "identify", force=False, jobs=jobs, say=output.say)
     gallery = drawn(Evidence.of(given.run, given.config), output.say)
     with given.run.locked("pzd figures"):
-        given.run.write_beside(FOLDER, gallery.write)
+        given.run.write_extra(FOLDER, gallery.write)
     output.say(f"figures: {given.run.folder / FOLDER / 'index.html'}")
     complain(f"not to be trusted: {mark}" for mark in marks)
     return UNTRUSTED if marks else DONE

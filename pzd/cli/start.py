@@ -17,7 +17,7 @@ RigFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Rig fil
 
 def init(files: RigFiles, verbose: Verbose = False) -> int:
     """Print a config guessed from rig files."""
-    from pzd.rig.guess import guessed
+    from pzd.rig.files.guess import guessed
     from pzd.schema.errors import ConfigError
 
     output = Output(quiet=False, verbose=verbose)

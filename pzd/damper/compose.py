@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.beside import COLUMNS, beside_all
-from pzd.damper.drive import felt_voltage
+from pzd.damper.competing_forms import known
+from pzd.damper.drive import effective_voltage
 from pzd.damper.effects import library
 from pzd.damper.effects.sensor_delay import law as moment
 from pzd.damper.flow import ROW, flow_force
-from pzd.damper.foils import known
 from pzd.damper.material import base_voltages, material
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
+from pzd.damper.parallel import COLUMNS, parallel_forces
 from pzd.damper.path import march
 from pzd.damper.rows import row_of
 
@@ -56,10 +56,10 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
     ValueError : when the damper needs a voltage or temperature that the motion does not have
     """
     steps = sampling_steps(motion.time)
-    felt = felt_by_valve(damper, standing(motion.voltage), steps)
-    rows = element_rows(damper, felt, standing(motion.temperature))
-    beside = parallel_rows(damper, felt)
-    force = with_beside(element_force(rows, motion, steps, initial_force, tolerance), beside, motion)
+    effective = voltage_at_valve(damper, standing(motion.voltage), steps)
+    rows = element_rows(damper, effective, standing(motion.temperature))
+    parallel = parallel_rows(damper, effective)
+    force = with_parallel(element_force(rows, motion, steps, initial_force, tolerance), parallel, motion)
     return recorded(value_of(damper, "sensor_delay", "tau"), motion.time, force)
 
 
@@ -77,7 +77,7 @@ def element_force(rows: Array, motion: Motion, steps: Array, initial_force: floa
     return march(motion.displacement, motion.velocity, steps, rows, initial_force, tolerance)
 
 
-def with_beside(force: Array, beside: Array | None, motion: Motion) -> Array:
+def with_parallel(force: Array, parallel: Array | None, motion: Motion) -> Array:
     """(n,) force [N] of the element together with what stands beside it.
 
     Parameters
@@ -86,12 +86,12 @@ def with_beside(force: Array, beside: Array | None, motion: Motion) -> Array:
     beside : (n, m) or (1, m) rows of the parallel effects; None without any
     motion : (n,) sampled motion
     """
-    if beside is None:
+    if parallel is None:
         return force
-    return force + beside_all(motion.displacement, motion.velocity, motion.acceleration, beside)
+    return force + parallel_forces(motion.displacement, motion.velocity, motion.acceleration, parallel)
 
 
-def standing_rows(
+def constant_rows(
     friction: float, damping: float, stiffness: float, effects: Mapping[str, Mapping[str, float]]
 ) -> tuple[Array, Array | None]:
     """The (1, 10) and (1, m) rows for `element_force` and `with_beside` where voltage and temperature stand still."""
@@ -114,25 +114,27 @@ def sampling_steps(time: Array) -> Array:
     return np.array([usual]) if np.max(np.abs(steps - usual)) <= _EVEN * usual else steps
 
 
-def felt_by_valve(damper: Damper, voltage: Array | None, steps: Array) -> Array | None:
+def voltage_at_valve(damper: Damper, voltage: Array | None, steps: Array) -> Array | None:
     """(n,) voltage as the valve feels it [V]; None where none is given."""
     tau, r = value_of(damper, "valve_lag", "tau"), value_of(damper, "piezo_hysteresis", "r")
     if voltage is None or (tau == 0.0 and r == 0.0):
         return voltage
-    return felt_voltage(voltage, steps, tau, r)
+    return effective_voltage(voltage, steps, tau, r)
 
 
-def element_rows(damper: Damper, felt: Array | None, temperature: Array | float | None) -> Array:
+def element_rows(damper: Damper, effective: Array | None, temperature: Array | float | None) -> Array:
     """(n, 10) parameter rows of the element with its stroke and flow effects, (1, 10) where nothing moves."""
-    base = material(damper, felt, temperature)
-    extra = _effect_columns(damper, _FLOW_COLUMNS, felt)
+    base = material(damper, effective, temperature)
+    extra = _effect_columns(damper, _FLOW_COLUMNS, effective)
     rows = np.hstack([np.broadcast_to(part, (max(len(base), len(extra)), part.shape[1])) for part in (base, extra)])
     return rows[:1] if np.all(rows == rows[0]) else rows
 
 
-def parallel_rows(damper: Damper, felt: Array | None) -> Array | None:
+def parallel_rows(damper: Damper, effective: Array | None) -> Array | None:
     """(n, m) or (1, m) rows of the parallel effects; None without any."""
-    return _effect_columns(damper, COLUMNS, felt) if any(effect in damper.effects for effect, _ in COLUMNS) else None
+    return (
+        _effect_columns(damper, COLUMNS, effective) if any(effect in damper.effects for effect, _ in COLUMNS) else None
+    )
 
 
 def recorded(tau: float, time: Array, force: Array) -> Array:
@@ -163,26 +165,26 @@ def steady_force(
         np.asarray(velocity, dtype=np.float64), np.asarray(0.0 if voltage is None else voltage, dtype=np.float64)
     )
     v, u = speeds.ravel(), voltages.ravel()
-    felt = None if voltage is None else u
-    rows = np.broadcast_to(element_rows(damper, felt, temperature), (v.size, len(ROW)))
+    effective = None if voltage is None else u
+    rows = np.broadcast_to(element_rows(damper, effective, temperature), (v.size, len(ROW)))
     side = np.copysign(1.0, v)
     force = np.array([s * flow_force(abs(w), row_of(row), s) for w, s, row in zip(v, side, rows, strict=True)])
-    beside = _effect_columns(damper, COLUMNS, felt)
+    parallel = _effect_columns(damper, COLUMNS, effective)
     rest = np.zeros(v.size)
     moving = np.where(v == 0.0, side * np.finfo(np.float64).tiny, v)
-    force += beside_all(rest, moving, rest, beside) - beside_all(rest, rest, rest, beside)
+    force += parallel_forces(rest, moving, rest, parallel) - parallel_forces(rest, rest, rest, parallel)
     return force.reshape(speeds.shape)
 
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """A damper at one temperature, laid out for compiled loops: everything piecewise linear in the voltage felt."""
+    """A damper at one temperature, laid out for compiled loops: all of it piecewise linear in the effective voltage."""
 
     voltages: Array
     """(m,) rising nodes [V]; held beyond."""
     rows: Array
     """(m, 10) parameter rows of the element."""
-    beside: Array
+    parallel: Array
     """(m, b) rows of the parallel effects, columns as `beside.COLUMNS`."""
     tau: float
     """Time constant of the valve lag [s]."""
@@ -196,11 +198,11 @@ def nodes_of(damper: Damper, temperature: float | None) -> Nodes:
     voltages = np.unique(np.concatenate([base_voltages(damper), *(np.atleast_1d(v) for v in listed)]))
     shape = (voltages.size, -1)
     rows = element_rows(damper, voltages, temperature)
-    beside = _effect_columns(damper, COLUMNS, voltages)
+    parallel = _effect_columns(damper, COLUMNS, voltages)
     return Nodes(
         voltages,
         np.broadcast_to(rows, (voltages.size, rows.shape[1])).reshape(shape).copy(),
-        np.broadcast_to(beside, (voltages.size, beside.shape[1])).reshape(shape).copy(),
+        np.broadcast_to(parallel, (voltages.size, parallel.shape[1])).reshape(shape).copy(),
         value_of(damper, "valve_lag", "tau"),
         value_of(damper, "piezo_hysteresis", "r"),
     )
@@ -219,17 +221,17 @@ def value_of(damper: Damper, effect: str, parameter: str) -> float:
     return value
 
 
-def _effect_columns(damper: Damper, columns: tuple[tuple[str, str], ...], felt: Array | None) -> Array:
-    """(n, m) or (1, m) values of effect parameters, by the voltage felt where they are lists."""
-    values = [_column(damper, effect, parameter, felt) for effect, parameter in columns]
+def _effect_columns(damper: Damper, columns: tuple[tuple[str, str], ...], effective: Array | None) -> Array:
+    """(n, m) or (1, m) values of effect parameters, by the effective voltage where they are lists."""
+    values = [_column(damper, effect, parameter, effective) for effect, parameter in columns]
     return np.stack(np.broadcast_arrays(*values), axis=-1)
 
 
-def _column(damper: Damper, effect: str, parameter: str, felt: Array | None) -> Array:
+def _column(damper: Damper, effect: str, parameter: str, effective: Array | None) -> Array:
     given = damper.effects.get(effect, {})
     value = given.get(parameter, _NEUTRAL[effect, parameter])
     if not isinstance(value, tuple):
         return np.array([value])
-    if felt is None:
+    if effective is None:
         raise ValueError(f"{effect}.{parameter} depends on the voltage, and none is given")
-    return np.asarray(np.interp(felt, np.atleast_1d(given["at_voltage_V"]), np.array(value)))
+    return np.asarray(np.interp(effective, np.atleast_1d(given["at_voltage_V"]), np.array(value)))

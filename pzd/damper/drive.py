@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 from pzd.damper.effects import piezo_hysteresis, valve_lag
 
 Array = NDArray[np.float64]
@@ -14,7 +14,7 @@ lagged = compiled(valve_lag.law)
 with_play = compiled(piezo_hysteresis.law)
 
 
-def felt_voltage(voltage: Array, steps: Array, tau: float, r: float) -> Array:
+def effective_voltage(voltage: Array, steps: Array, tau: float, r: float) -> Array:
     """Voltage as the valve feels it, at rest with the first sample.
 
     Parameters
@@ -26,17 +26,17 @@ def felt_voltage(voltage: Array, steps: Array, tau: float, r: float) -> Array:
 
     Returns
     -------
-    (n,) voltage felt [V]
+    (n,) effective voltage [V]
     """
-    felt = np.empty_like(voltage)
-    _feel(voltage, steps, tau, r, felt)
-    return felt
+    effective = np.empty_like(voltage)
+    _follow_voltage(voltage, steps, tau, r, effective)
+    return effective
 
 
 @compiled
-def _feel(voltage: Array, steps: Array, tau: float, r: float, felt: Array) -> None:
+def _follow_voltage(voltage: Array, steps: Array, tau: float, r: float, effective: Array) -> None:
     late = voltage[0]
-    felt[0] = late
+    effective[0] = late
     for i in range(1, voltage.size):
         late = lagged(late, voltage[i - 1], voltage[i], steps[min(i - 1, steps.size - 1)], tau)
-        felt[i] = with_play(felt[i - 1], late, r)
+        effective[i] = with_play(effective[i - 1], late, r)

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 
 Array = NDArray[np.float64]
 

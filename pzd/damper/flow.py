@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 from pzd.damper.effects import asymmetry, lash, orifice_quadratic, relief_valve, rounded_yield, shear_thinning
 
 Row = tuple[float, ...]

@@ -24,12 +24,12 @@ def base_voltages(damper: Damper) -> Array:
 
 
 def material(damper: Damper, voltage: Array | float | None, temperature: Array | float | None) -> Array:
-    """T0 [N], C [N s/m] and k [N/m] at a voltage as felt and a temperature.
+    """T0 [N], C [N s/m] and k [N/m] at an effective voltage and a temperature.
 
     Parameters
     ----------
     damper : the damper
-    voltage : (n,) or a number, voltage felt [V]; None where the damper has a single one
+    voltage : (n,) or a number, effective voltage [V]; None where the damper has a single one
     temperature : (n,) or a number [degC]; None where the damper has a single one
 
     Returns

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 from pydantic import Field, model_validator
 
+from pzd.damper.competing_forms import known
 from pzd.damper.effects import library
-from pzd.damper.foils import known
 from pzd.schema.model import Frozen
 
 EffectValues = Mapping[str, float | tuple[float, ...]]

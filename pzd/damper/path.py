@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 from pzd.damper.dormand_prince import STAGES
 from pzd.damper.flow import DELTA, T0, C, K, Row, smooth_force, spring_extension
 from pzd.damper.pieces import Step, piece, row_in

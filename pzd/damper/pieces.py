@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
 from pzd.damper.flow import (
     C_R,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 from pzd.damper.flow import C_R, DELTA, K, Row, breakaway, relief, smooth_speed, spring_extension
 
 STICK, SMOOTH, RELIEF = 0, 1, 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 from pzd.damper.flow import Row
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ def row_of(a: Array) -> Row:
 
 @compiled
 def row_at(voltages: Array, rows: Array, voltage: float) -> Row:
-    """The parameter row at a voltage felt, linear between the (m,) nodes, held beyond them."""
+    """The parameter row at a effective voltage, linear between the (m,) nodes, held beyond them."""
     last = voltages.size - 1
     if last == 0 or voltage <= voltages[0]:
         return row_of(rows[0])

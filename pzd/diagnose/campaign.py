@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from pzd.damper.model import Damper
 from pzd.diagnose.config import NuisanceConfig
-from pzd.diagnose.inputs import Prepared
-from pzd.diagnose.judge import Judged, judge
-from pzd.diagnose.split import UNTOUCHED, Split
-from pzd.diagnose.unsure import Expected, expected
+from pzd.diagnose.data.cleaning import Prepared
+from pzd.diagnose.data.split import UNTOUCHED, Split
+from pzd.diagnose.noise.input_uncertainty import Expected, expected
+from pzd.diagnose.residual_check import ResidualCheck, judge
 
 Mask = NDArray[np.bool_]
 Item = TypeVar("Item")
@@ -32,7 +32,7 @@ class Campaign:
     jobs: int = 1
     """Records that are asked at the same time."""
     _expected: dict[tuple[str, int], Expected] = field(default_factory=dict, repr=False)
-    _judged: dict[str, tuple[Judged, ...]] = field(default_factory=dict, repr=False)
+    _judged: dict[str, tuple[ResidualCheck, ...]] = field(default_factory=dict, repr=False)
 
     @property
     def seen(self) -> tuple[Mask, ...]:
@@ -51,18 +51,18 @@ class Campaign:
         self._expected.update(zip(((key, i) for i in new), made, strict=True))
         return tuple(self._expected[key, i] for i in numbers)
 
-    def judged(self, damper: Damper) -> tuple[Judged, ...]:
+    def judged(self, damper: Damper) -> tuple[ResidualCheck, ...]:
         """Every record against a damper, over the samples seen."""
         key = damper.model_dump_json()
         if key not in self._judged:
             self._judged[key] = self._against(damper, self.seen)
         return self._judged[key]
 
-    def untouched(self, damper: Damper) -> tuple[Judged, ...]:
+    def untouched(self, damper: Damper) -> tuple[ResidualCheck, ...]:
         """Every record against a damper, over the samples that naming may not see."""
         return self._against(damper, self.in_role(UNTOUCHED))
 
-    def _against(self, damper: Damper, masks: Sequence[Mask]) -> tuple[Judged, ...]:
+    def _against(self, damper: Damper, masks: Sequence[Mask]) -> tuple[ResidualCheck, ...]:
         asked = in_use(masks)
         given = [(e, self.prepared[i], masks[i]) for i, e in zip(asked, self.expected(damper, asked), strict=True)]
         return self._each(lambda each: judge(*each, self.nuisance), given)

@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.artefacts import Gap
-from pzd.diagnose.judge import Judged
+from pzd.diagnose.data.split import Split
 from pzd.diagnose.lack_of_fit import pooled
-from pzd.diagnose.split import Split
-
-Array = NDArray[np.float64]
+from pzd.diagnose.residual_check import ResidualCheck
+from pzd.record import Array
 
 BLOCKS = 8
 """Parts in which the scatter of the gap is read off a record that does not repeat."""
 
 
-def gap_of(held_out: Sequence[Judged], split: Split) -> Gap:
+def gap_of(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
     """Criterion (4) pooled over the held-out samples; nothing is adopted, so after is before.
 
     Equation: W_s = sum r^2 / sum F^2;  floor = sum (s^2 + nuisances^2) / sum F^2;  standard error of
@@ -41,7 +39,7 @@ def gap_of(held_out: Sequence[Judged], split: Split) -> Gap:
     )
 
 
-def _by_block(judged: Judged, values: Array) -> Array:
+def _by_block(judged: ResidualCheck, values: Array) -> Array:
     """Sums of (n,) values over the judged samples of each cycle, or of each of a few blocks."""
     kept = values[judged.wanted]
     run = judged.prepared.cycles
@@ -51,22 +49,22 @@ def _by_block(judged: Judged, values: Array) -> Array:
     return np.array([kept[number == j].sum() for j in np.unique(number)])
 
 
-def probability_of_noise(judged: Sequence[Judged]) -> float:
+def probability_of_noise(judged: Sequence[ResidualCheck]) -> float:
     """Probability that noise alone looks so in any kind of test (Bonferroni over the kinds)."""
     kinds = {kind for j in judged for kind in j.probability}
     return min(1.0, *(len(kinds) * pooled([j.probability[k] for j in judged if k in j.probability]) for k in kinds))
 
 
-def visible_gap(judged: Sequence[Judged]) -> float:
+def visible_gap(judged: Sequence[ResidualCheck]) -> float:
     """R.m.s. of the gap above the noise as a share of each record's peak force, pooled over the samples."""
     return _pooled(judged, [j.power / j.peak**2 for j in judged])
 
 
-def gap_in_force(judged: Sequence[Judged]) -> float:
+def gap_in_force(judged: Sequence[ResidualCheck]) -> float:
     """R.m.s. of the gap above the noise [N], pooled over the samples: the tests of large force count most."""
     return _pooled(judged, [j.power for j in judged])
 
 
-def _pooled(judged: Sequence[Judged], squares: Sequence[float]) -> float:
+def _pooled(judged: Sequence[ResidualCheck], squares: Sequence[float]) -> float:
     samples = np.array([np.count_nonzero(j.wanted) for j in judged], dtype=np.float64)
     return float(np.sqrt(max(float(samples @ np.array(squares) / samples.sum()), 0.0)))

@@ -41,12 +41,12 @@ def diagnose(
     the verdict, and the damper with what was adopted; unchanged where nothing was
     """
     from pzd.diagnose.campaign import Campaign
-    from pzd.diagnose.heldout import held_out_gap
-    from pzd.diagnose.inputs import prepare
-    from pzd.diagnose.naming import name_effects
+    from pzd.diagnose.data.cleaning import prepare
+    from pzd.diagnose.data.exclusions import whole_records, without
+    from pzd.diagnose.data.split import split
+    from pzd.diagnose.held_out import held_out_gap
     from pzd.diagnose.next_test import next_test, reach_of
-    from pzd.diagnose.split import split
-    from pzd.diagnose.used import whole_records, without
+    from pzd.diagnose.search.forward_selection import select_effects
     from pzd.diagnose.verdict import decide, parameters_of, ranking_of, weak
     from pzd.diagnose.where import regions
 
@@ -54,7 +54,7 @@ def diagnose(
     prepared = prepare(used)
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
-    named = name_effects(Campaign(prepared, parts, diagnose.nuisance, jobs), plain, diagnose, jobs)
+    named = select_effects(Campaign(prepared, parts, diagnose.nuisance, jobs), plain, diagnose, jobs)
     evidence = named.first
     before = evidence.campaign.judged(named.plain.damper)
     after = evidence.campaign.judged(named.fitted.damper) if named.adopted else before

@@ -9,20 +9,20 @@ from typing import Any, Literal
 import numpy as np
 
 from pzd.artefacts import Ranked, Value
+from pzd.damper.competing_forms import known
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library
-from pzd.damper.foils import known
 from pzd.damper.model import Damper
 from pzd.diagnose.config import DiagnoseConfig
-from pzd.diagnose.evidence import Evidence
+from pzd.diagnose.fit.intervals import LEVEL, standard_errors
 from pzd.diagnose.gap import probability_of_noise, visible_gap
-from pzd.diagnose.intervals import LEVEL, standard_errors
-from pzd.diagnose.judge import Judged
-from pzd.diagnose.named import Named, against_nature
+from pzd.diagnose.residual_check import ResidualCheck
+from pzd.diagnose.search.evidence import Evidence
+from pzd.diagnose.search.selection import Selection, against_nature
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
-PLAIN = 2.0
+CONTRADICTS = 2.0
 """A remainder of so many times what is visible contradicts that these effects are all, whatever they closed."""
 OUTSIDE = 0.03
 """Share of cases in which what is missing is not in the library and yet one of its effects fits within the noise."""
@@ -44,7 +44,9 @@ def weak(hold_out: str) -> str:
     return f"; held out were {hold_out} of tests that were also fitted, which is weak evidence"
 
 
-def decide(named: Named, before: Sequence[Judged], after: Sequence[Judged], config: DiagnoseConfig) -> Decision:
+def decide(
+    named: Selection, before: Sequence[ResidualCheck], after: Sequence[ResidualCheck], config: DiagnoseConfig
+) -> Decision:
     """The verdict on what was adopted, from what is left of the gap.
 
     Parameters
@@ -65,12 +67,12 @@ def decide(named: Named, before: Sequence[Judged], after: Sequence[Judged], conf
     if odd and not named.rivals:
         words = f"{told}; but with a value that no {' and no '.join(odd)} has, so that it is something that looks alike"
         return Decision("unexplained", words, None)
-    better = [f for f in named.foiled if f.behind < -config.rival_bic]
+    better = [f for f in named.competitions if f.behind < -config.rival_bic]
     if better:
-        others = [f"{known()[f.foil].law}, which is not in the library, does better than {f.effect}" for f in better]
+        others = [f"{known()[f.form].law}, which is not in the library, does better than {f.effect}" for f in better]
         return Decision("unexplained", f"{told}; but {' and '.join(others)}", None)
-    if named.rivals or named.foiled:
-        others = [*named.rivals, *(f"{known()[f.foil].law} (not in the library)" for f in named.foiled)]
+    if named.rivals or named.competitions:
+        others = [*named.rivals, *(f"{known()[f.form].law} (not in the library)" for f in named.competitions)]
         words = f"{told}; {', '.join(others)} would do as well on these tests"
         return Decision("ambiguous", words, confidence_of(named))
     return Decision("named", f"{told}; what is left is within the noise or negligible", confidence_of(named))
@@ -79,7 +81,7 @@ def decide(named: Named, before: Sequence[Judged], after: Sequence[Judged], conf
 def _remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
     """Whether too much of the gap is left, as r.m.s. with the noise floor taken off: as a share, or plain to see."""
     share = sizes[1] > config.unexplained_share * sizes[0] and sizes[1] >= config.negligible
-    return share or sizes[1] >= PLAIN * config.visible
+    return share or sizes[1] >= CONTRADICTS * config.visible
 
 
 def _nothing_adopted(size: float, chance: float, config: DiagnoseConfig) -> Decision:
@@ -97,7 +99,7 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %"
 
 
-def confidence_of(named: Named) -> float:
+def confidence_of(named: Selection) -> float:
     """Posterior weight of the effects adopted among all that were tried, by their Bayesian criteria.
 
     Equation: w_i = exp(-BIC_i / 2) / sum_j exp(-BIC_j / 2), times what the library leaves out
@@ -109,12 +111,12 @@ def confidence_of(named: Named) -> float:
             best = next(c.delta_bic for c in step.tried if c.effect == step.chosen)
             others = [c.delta_bic - best for c in step.contenders]
             weight /= sum(float(np.exp(-0.5 * other)) for other in others)
-    for foiled in named.foiled:
-        weight /= 1.0 + float(np.exp(-0.5 * foiled.behind))
+    for competitions in named.competitions:
+        weight /= 1.0 + float(np.exp(-0.5 * competitions.behind))
     return round(weight, 3)
 
 
-def ranking_of(named: Named, evidence: Evidence) -> tuple[Ranked, ...]:
+def ranking_of(named: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
     """Every candidate in the round that decided on it, best first; what was adopted leads.
 
     `gap_after` is criterion (4) on the samples seen, the tests' nuisances left in.
@@ -135,7 +137,7 @@ def ranking_of(named: Named, evidence: Evidence) -> tuple[Ranked, ...]:
     return tuple(sorted(rows.values(), key=lambda r: (r.effect not in named.adopted, r.delta_bic)))
 
 
-def parameters_of(named: Named) -> dict[str, dict[str, Value]]:
+def parameters_of(named: Selection) -> dict[str, dict[str, Value]]:
     """The parameters of what was adopted, with 95 % intervals."""
     damper, errors = named.fitted.damper, standard_errors(named.fitted)
     found: dict[str, dict[str, Value]] = {}

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Region
-from pzd.diagnose.judge import Judged
-from pzd.diagnose.noise import repeatable_power
+from pzd.diagnose.noise.between_cycles import repeatable_power
+from pzd.diagnose.residual_check import ResidualCheck
+from pzd.record import Array
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.str_]
 
 DENSER = 1.25
 """A region is told when it holds so many times more of the gap than of the samples."""
-TOLD = 0.15
+LEAST_SHARE = 0.15
 """A region is told when it holds at least this share of the gap."""
 THIRD = 0.5
 """A third of the run is told from this share on: single cycles are noisy."""
@@ -38,7 +38,7 @@ class GapMap:
     """Axis -> (n,) the region in words that each point belongs to."""
 
 
-def regions(judged: Sequence[Judged], unit: str) -> tuple[Region, ...]:
+def regions(judged: Sequence[ResidualCheck], unit: str) -> tuple[Region, ...]:
     """The regions in which the gap is denser than elsewhere, most telling first.
 
     Parameters
@@ -63,7 +63,7 @@ def regions(judged: Sequence[Judged], unit: str) -> tuple[Region, ...]:
     return tuple(region for _, region in found[:MOST]) or (Region(region="everywhere alike", share_of_gap=1.0),)
 
 
-def gap_map(judged: Sequence[Judged], unit: str) -> GapMap:
+def gap_map(judged: Sequence[ResidualCheck], unit: str) -> GapMap:
     """The gap sample by sample, noise's share taken off."""
     points = [_points(j) for j in judged]
     speed = max(float(np.max(np.abs(p["velocity"]))) for p in points)
@@ -79,7 +79,7 @@ def gap_map(judged: Sequence[Judged], unit: str) -> GapMap:
     )
 
 
-def _points(j: Judged) -> dict[str, Array]:
+def _points(j: ResidualCheck) -> dict[str, Array]:
     """Kinematics, density of the gap and weight: along the average cycle, or at every sample."""
     record, run = j.prepared.record, j.prepared.cycles
     if j.folded is None or run is None:
@@ -101,7 +101,7 @@ def _points(j: Judged) -> dict[str, Array]:
     return {**motion, "density": density, "weight": np.full(mean.size, float(count)), "voltage": voltage}
 
 
-def _labels(j: Judged, p: dict[str, Array], speed: float, stroke: float, unit: str) -> dict[str, Labels]:
+def _labels(j: ResidualCheck, p: dict[str, Array], speed: float, stroke: float, unit: str) -> dict[str, Labels]:
     v, x, a = p["velocity"], p["displacement"], p["acceleration"]
     fast = _bands(np.abs(v), _round(np.array([0.1, 0.33, 0.67]) * speed), "abs(v)", "m/s")
     found = {
@@ -147,18 +147,18 @@ def _denser(labels: Labels, density: Array, weight: Array) -> list[tuple[float, 
         return []
     shares = np.bincount(index, density) / density.sum()
     samples = np.bincount(index, weight) / weight.sum()
-    return _told(zip(names, shares, samples, strict=True))
+    return _described(zip(names, shares, samples, strict=True))
 
 
-def _told(shares: Iterable[tuple[str, float, float]]) -> list[tuple[float, Region]]:
+def _described(shares: Iterable[tuple[str, float, float]]) -> list[tuple[float, Region]]:
     return [
         (share - samples, Region(region=str(name), share_of_gap=float(min(share, 1.0))))
         for name, share, samples in shares
-        if share >= TOLD and share >= DENSER * samples
+        if share >= LEAST_SHARE and share >= DENSER * samples
     ]
 
 
-def _frequencies(judged: Sequence[Judged]) -> list[tuple[float, Region]]:
+def _frequencies(judged: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
     """The octaves of frequency that hold most of the repeatable gap; an offset is one of its own."""
     power: dict[str, float] = {}
     for j in judged:
@@ -171,7 +171,7 @@ def _frequencies(judged: Sequence[Judged]) -> list[tuple[float, Region]]:
     total = sum(power.values())
     if total <= 0.0 or len(power) < 2:
         return []
-    return _told((word, part / total, 1.0 / len(power)) for word, part in power.items())
+    return _described((word, part / total, 1.0 / len(power)) for word, part in power.items())
 
 
 def _octave(frequency: float) -> str:
@@ -181,7 +181,7 @@ def _octave(frequency: float) -> str:
     return f"{2.0**octave:g} to {2.0 ** (octave + 1):g} Hz in the force"
 
 
-def _thirds(judged: Sequence[Judged]) -> list[tuple[float, Region]]:
+def _thirds(judged: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
     """The third of the run in which the gap is larger."""
     names = ("first third of the run", "middle third of the run", "last third of the run")
     shares, samples = np.zeros(3), np.zeros(3)
@@ -192,5 +192,5 @@ def _thirds(judged: Sequence[Judged]) -> list[tuple[float, Region]]:
             samples[third] += part.size
     if shares.sum() <= 0.0:
         return []
-    told = _told(zip(names, shares / shares.sum(), samples / samples.sum(), strict=True))
+    told = _described(zip(names, shares / shares.sum(), samples / samples.sum(), strict=True))
     return [item for item in told if item[1].share_of_gap >= THIRD]

@@ -31,7 +31,7 @@ def survey(evidence: Evidence) -> Drawing:
         ax.set_ylabel("controlled peak at 4.5 Hz [m/s²]")
         ax.set_xlim(0.0, 2.2)
         ax.set_ylim(0.0, 2.2)
-        said.append(_told(best))
+        said.append(_described(best))
     key(figure, axes[0])
     count = len({(row.a1_m, row.a2_m, row.pitch_inertia_kgm2, row.x_K_m) for row in rows if row.found == "survey"})
     caption = (
@@ -64,7 +64,7 @@ def _spread(ax: Axes, cars: list[CarRow], colour: str, alpha: float, label: str,
     )
 
 
-def _told(row: CarRow) -> str:
+def _described(row: CarRow) -> str:
     return (
         f"{row.tie_break} {row.miss:.1%} at worst (a1 {row.a1_m:g} m, a2 {row.a2_m:g} m, "
         f"J_y {row.pitch_inertia_kgm2:g} kg m², x_K {row.x_K_m:g} m; constant {row.constant[0]:.3f} and "

@@ -83,12 +83,12 @@ def drawn(evidence: Evidence, say: Callable[[str], None] = lambda _: None) -> Ga
             entry, mine = _entry(figure, evidence)
             entries.append(entry)
             files |= mine
-            for line in _told(entry):
+            for line in _described(entry):
                 say(line)
     return Gallery(tuple(entries), files)
 
 
-def _told(entry: Entry) -> Iterator[str]:
+def _described(entry: Entry) -> Iterator[str]:
     if entry.missing is not None:
         yield f"figure {entry.figure:2d}: not drawn: {entry.missing}"
     for picture in entry.pictures:

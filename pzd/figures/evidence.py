@@ -8,7 +8,7 @@ import numpy as np
 
 from pzd.artefacts import Identified, MeasureRow, ParameterRow, Rig, SummaryRow, base_of
 from pzd.config import RunConfig, setting_in_use
-from pzd.paper.fidelity import Outing, rides_on
+from pzd.paper.fidelity import SettingRides, rides_on
 from pzd.paper.published import Published
 from pzd.quantities import Control
 from pzd.record import Array, Record
@@ -73,7 +73,7 @@ class Test:
 
     def cycle(self) -> Loop:
         """The average cycle, closed."""
-        from pzd.rig.cycles import cycles
+        from pzd.signals.cycles import cycles
 
         record = self.record
         run = cycles(record.time, record.displacement)
@@ -95,7 +95,7 @@ class Evidence:
 
     rig: Rig
     identified: Identified
-    outing: Outing
+    outing: SettingRides
     """The plain damper's table in the chosen setting, and the ideal rides."""
     simulate: SimulateConfig
     tabulate: TableConfig

@@ -19,10 +19,10 @@ from pzd.paper.car_search import (
     SPEED,
     constant_peaks,
 )
-from pzd.paper.fidelity import Outing, rides_on
+from pzd.paper.fidelity import SettingRides, rides_on
 from pzd.paper.published import LARGE_GAP, SMALL_GAP, published
-from pzd.report.comfort.iso2631_1978 import TRUST, Boundary, Exposure, exposure, shortest
-from pzd.report.comfort.ride import settled
+from pzd.comfort.iso2631_1978 import TRUST, Boundary, Exposure, exposure, shortest
+from pzd.report.ride_comfort import settled
 from pzd.simulate.linear import harmonic_response
 
 _BOUNDARY: Boundary = "reduced_comfort"
@@ -64,7 +64,7 @@ def fidelities(evidence: Evidence) -> Iterator[Drawing]:
     yield Drawing("fidelity", figure, "Peaks of |a_K| and exposure times, ideal, by table and dynamically.", caption)
 
 
-def _gap(evidence: Evidence, setting: str) -> Outing:
+def _gap(evidence: Evidence, setting: str) -> SettingRides:
     """Control by the table and dynamically, and the damper without voltage, on one setting of the valve."""
     records = tuple(record for record in evidence.rig.records if record.setting == setting)
     if not records:
@@ -101,7 +101,7 @@ def _ideal(evidence: Evidence) -> list[Bar]:
     return [*bars, _bar(evidence, "control, ideal", COLOURS[0], evidence.outing.rides.rides, rows)]
 
 
-def _real(evidence: Evidence, gap: Outing) -> Iterator[Bar]:
+def _real(evidence: Evidence, gap: SettingRides) -> Iterator[Bar]:
     colour = COLOURS[1] if gap.setting == LARGE_GAP else COLOURS[2]
     for policy, fidelity in (("passive", "dynamic"), ("comfort", "table"), ("comfort", "dynamic")):
         rows = [row for row in gap.rides.summary if (row.policy, row.fidelity) == (policy, fidelity)]

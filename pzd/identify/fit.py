@@ -8,7 +8,7 @@ import numpy as np
 
 from pzd.artefacts import ParameterRow
 from pzd.identify.config import IdentifyConfig
-from pzd.identify.evidence import evidence_of, scales_of
+from pzd.identify.determination import evidence_of, scales_of
 from pzd.identify.evolutionary import fit_evolutionary
 from pzd.identify.intervals import uncertainty
 from pzd.identify.objective import Bingham, Fit, Objective

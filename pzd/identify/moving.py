@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pzd.artefacts import ParameterRow
 from pzd.identify.config import IdentifyConfig
-from pzd.identify.evidence import evidence_of, scales_of
+from pzd.identify.determination import evidence_of, scales_of
 from pzd.identify.fit import row_of
 from pzd.identify.intervals import uncertainty
 from pzd.identify.nodes import nodes_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from pzd.paper.telling import calibration, contested, contradiction
+from pzd.paper.printing import calibration, contested, contradiction
 
 TOPICS = {"claims": contested, "calibration": calibration, "contradiction": contradiction}
 

@@ -13,7 +13,7 @@ from pzd.table.config import TableConfig
 
 
 @dataclass(frozen=True, eq=False)
-class Outing:
+class SettingRides:
     """The rides on one setting of the valve."""
 
     setting: str | None
@@ -30,7 +30,7 @@ def rides_on(
     simulate: SimulateConfig,
     table: TableConfig,
     control: Control,
-) -> Outing:
+) -> SettingRides:
     """The run's car and roads on the plain damper of one setting of the valve.
 
     Parameters
@@ -57,4 +57,4 @@ def rides_on(
         for row in made.force
         if row.force_N is not None and row.velocity_m_per_s != 0.0 and row.inside == 1
     ]
-    return Outing(setting, made, rides, min(slopes))
+    return SettingRides(setting, made, rides, min(slopes))

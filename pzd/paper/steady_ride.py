@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 from pzd.record import Array
 from pzd.simulate.admissible import coefficient_bounds
 from pzd.simulate.car import HalfCar
@@ -19,7 +19,19 @@ from pzd.simulate.equations import body_acceleration
 from pzd.simulate.kinematics import suspension
 from pzd.simulate.minimise import LARGEST, TIE_BREAKS, TieBreak, farther_end, least_acceleration_forces
 from pzd.simulate.profile import Profile
-from pzd.simulate.scene import DEFLECTION, FORCE, HIGH, LOW, RATE, SPRINGS, Ground, Vehicle, desk, ground, vehicle
+from pzd.simulate.ride_model import (
+    DEFLECTION,
+    FORCE,
+    HIGH,
+    LOW,
+    RATE,
+    SPRINGS,
+    RoadCoefficients,
+    Vehicle,
+    road_coefficients,
+    vehicle,
+    workspace,
+)
 
 STEP, SETTLE, DURATION = 0.001, 8.0, 16.0
 """Step of integration, time before the peak is taken, and end of the ride [s]."""
@@ -58,13 +70,13 @@ def settled_peak(
     return float(
         _peak(
             vehicle(car, vehicle_speed),
-            ground(road, car.wheelbase),
+            road_coefficients(road, car.wheelbase),
             bounds,
             TIE_BREAKS[tie_break],
             step,
             round(DURATION / step),
             round(SETTLE / step),
-            desk(),
+            workspace(),
             np.zeros((6, _BODY)),
         )
     )
@@ -73,31 +85,31 @@ def settled_peak(
 @compiled
 def _peak(
     car: Vehicle,
-    road: Ground,
+    road: RoadCoefficients,
     bounds: tuple[float, float],
     tie: int,
     step: float,
     steps: int,
     settle: int,
-    desk: Array,
-    room: Array,
+    workspace: Array,
+    scratch: Array,
 ) -> float:
     """Largest |a_K| at the steps from `settle` on; the room (6, 4) holds the state, one to try, and four rates."""
-    x, trial, rates = room[0], room[1], room[2:]
+    x, trial, rates = scratch[0], scratch[1], scratch[2:]
     peak = 0.0
     for n in range(steps + 1):
         time = n * step
-        end = _rates(time, x, car, road, bounds, tie, -1, desk, rates[0])
+        end = _rates(time, x, car, road, bounds, tie, -1, workspace, rates[0])
         if n >= settle:
             a = 0.0
             for i in range(2):
-                a += car.comfort[i] * (desk[SPRINGS, i] + desk[FORCE, i])
+                a += car.comfort[i] * (workspace[SPRINGS, i] + workspace[FORCE, i])
             peak = max(peak, abs(a))
         for stage in range(1, 4):
             part = step if stage == 3 else 0.5 * step
             for i in range(_BODY):
                 trial[i] = x[i] + part * rates[stage - 1, i]
-            _rates(time + part, trial, car, road, bounds, tie, end, desk, rates[stage])
+            _rates(time + part, trial, car, road, bounds, tie, end, workspace, rates[stage])
         for i in range(_BODY):
             x[i] += step / 6.0 * (rates[0, i] + 2.0 * rates[1, i] + 2.0 * rates[2, i] + rates[3, i])
     return peak
@@ -108,21 +120,23 @@ def _rates(
     time: float,
     x: Array,
     car: Vehicle,
-    road: Ground,
+    road: RoadCoefficients,
     bounds: tuple[float, float],
     tie: int,
     end: int,
-    desk: Array,
+    workspace: Array,
     rates: Array,
 ) -> int:
     """Fill the derivative of the body's state; the end of the segment that `largest` takes is chosen where it is -1."""
-    suspension(time, x, car, road, desk)
+    suspension(time, x, car, road, workspace)
     for i in range(2):
-        desk[LOW, i], desk[HIGH, i] = coefficient_bounds(desk[RATE, i], bounds[0], bounds[1])
-    a0 = spring_acceleration(car, desk[DEFLECTION])
+        workspace[LOW, i], workspace[HIGH, i] = coefficient_bounds(workspace[RATE, i], bounds[0], bounds[1])
+    a0 = spring_acceleration(car, workspace[DEFLECTION])
     if tie == LARGEST and end < 0:
-        end = farther_end(a0, car.comfort, desk[LOW], desk[HIGH])
-    least_acceleration_forces(a0, car.comfort, desk[LOW], desk[HIGH], tie, end, desk[FORCE])
+        end = farther_end(a0, car.comfort, workspace[LOW], workspace[HIGH])
+    least_acceleration_forces(a0, car.comfort, workspace[LOW], workspace[HIGH], tie, end, workspace[FORCE])
     rates[0], rates[1] = x[2], x[3]
-    rates[2], rates[3] = body_acceleration(car, desk[SPRINGS, 0] + desk[FORCE, 0], desk[SPRINGS, 1] + desk[FORCE, 1])
+    rates[2], rates[3] = body_acceleration(
+        car, workspace[SPRINGS, 0] + workspace[FORCE, 0], workspace[SPRINGS, 1] + workspace[FORCE, 1]
+    )
     return end

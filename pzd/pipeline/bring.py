@@ -81,7 +81,7 @@ class Pipeline:
 
     def _run(self, stage: Stage, inputs: dict[str, str]) -> None:
         if self._compiles:
-            from pzd.simulate.warm import in_background
+            from pzd.simulate.precompile import in_background
 
             in_background()
             self._compiles = False

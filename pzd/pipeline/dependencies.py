@@ -114,7 +114,7 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 def _files_named(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
     """Hashes of the files beside the config that its values name; absent ones are the stage's to refuse."""
-    from pzd.rig.listing import matching
+    from pzd.rig.files.listing import matching
 
     named = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
     try:

@@ -12,7 +12,7 @@ import numpy as np
 
 from pzd.record import Array
 from pzd.report.blocks import Picture
-from pzd.report.story import Story
+from pzd.report.context import ReportContext
 from pzd.schema.processes import at_once
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class Plot:
     name: str
     place: Place
     order: int
-    draw: Callable[[Story], Iterable[Panel]]
+    draw: Callable[[ReportContext], Iterable[Panel]]
 
 
 _WIDTH_IN = 4.5
@@ -114,14 +114,14 @@ def legend(figure: Figure, columns: int = 3) -> None:
     figure.legend(loc="upper left", ncols=columns, bbox_to_anchor=(0.02, 1.01), columnspacing=1.3, handlelength=1.6)
 
 
-def pictures(plots: Sequence[Plot], story: Story, jobs: int = 1) -> list[tuple[Picture, ...]]:
+def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> list[tuple[Picture, ...]]:
     """Draw and encode what the plots have to show, plot by plot, so many at the same time."""
     import matplotlib as mpl
     import matplotlib.backends.backend_svg
     import matplotlib.figure  # once, before the processes part
 
     def drawn(plot: Plot) -> tuple[Picture, ...]:
-        return tuple(_encoded(panel) for panel in plot.draw(story))
+        return tuple(_encoded(panel) for panel in plot.draw(context))
 
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
         return at_once(drawn, plots, jobs)

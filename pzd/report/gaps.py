@@ -8,7 +8,7 @@ import numpy as np
 
 from pzd.identify.trial import warm_up
 from pzd.record import Array, Record, is_constant, voltage_scale
-from pzd.report.story import Story
+from pzd.report.context import ReportContext
 
 _BINS = 14
 """Classes of velocity in the map."""
@@ -47,10 +47,10 @@ def criterion(measured: Array, simulated: Array) -> float:
     return float(np.sum((measured - simulated) ** 2) / np.sum(measured**2))
 
 
-def of_record(story: Story, record: Record) -> tuple[float, float]:
+def of_record(context: ReportContext, record: Record) -> tuple[float, float]:
     """W_s of a record before and after diagnose, past what hangs on how it began."""
     part = _begun(record)
-    before, after = (criterion(record.force[part], force[part]) for force in story.simulated(record))
+    before, after = (criterion(record.force[part], force[part]) for force in context.simulated(record))
     return before, after
 
 
@@ -58,34 +58,34 @@ def _begun(record: Record) -> slice:
     return slice(warm_up(record.displacement), None)
 
 
-def gap_map(story: Story) -> GapMap:
+def gap_map(context: ReportContext) -> GapMap:
     """Where in voltage and velocity the gap lies, over the records of the setting."""
-    top = max(float(np.abs(record.velocity).max()) for record in story.sampled)
-    peak = max(float(np.abs(record.force).max()) for record in story.sampled)
+    top = max(float(np.abs(record.velocity).max()) for record in context.sampled)
+    peak = max(float(np.abs(record.force).max()) for record in context.sampled)
     edges = np.linspace(-top, top, _BINS + 1)
-    groups = _groups(story)
+    groups = _groups(context)
     before, after = np.full((2, len(groups), _BINS), np.nan)
     for i, records in enumerate(groups.values()):
         cells = np.clip(np.digitize(np.concatenate([r.velocity[_begun(r)] for r in records]), edges) - 1, 0, _BINS - 1)
         count = np.bincount(cells, minlength=_BINS)
         for grid, which in ((before, 0), (after, 1)):
-            gap = np.concatenate([(r.force - story.simulated(r)[which])[_begun(r)] for r in records])
+            gap = np.concatenate([(r.force - context.simulated(r)[which])[_begun(r)] for r in records])
             square = np.bincount(cells, weights=gap**2, minlength=_BINS)
             with np.errstate(invalid="ignore", divide="ignore"):
                 grid[i] = np.where(count >= _FEWEST, 100.0 / peak * np.sqrt(square / count), np.nan)
     return GapMap(tuple(groups), edges, before, after)
 
 
-def _groups(story: Story) -> dict[str, list[Record]]:
+def _groups(context: ReportContext) -> dict[str, list[Record]]:
     """Records by voltage; by name where all share one; those whose voltage moves stand together."""
-    scale = voltage_scale(story.sampled)
-    moving = [r for r in story.sampled if not is_constant(r, scale)]
-    still = sorted((r for r in story.sampled if is_constant(r, scale)), key=lambda r: story.level(r) or 0.0)
+    scale = voltage_scale(context.sampled)
+    moving = [r for r in context.sampled if not is_constant(r, scale)]
+    still = sorted((r for r in context.sampled if is_constant(r, scale)), key=lambda r: context.level(r) or 0.0)
     found: dict[str, list[Record]] = {}
     for record in still:
-        found.setdefault(story.voltage(story.level(record)), []).append(record)
+        found.setdefault(context.voltage(context.level(record)), []).append(record)
     if len(found) < 2:
         found = {record.name: [record] for record in still[:_ROWS]}
     if moving:
-        found[f"moving {story.control.name}"] = moving
+        found[f"moving {context.control.name}"] = moving
     return found

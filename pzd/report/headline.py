@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 from pzd.artefacts import ForceRow, SummaryRow
+from pzd.comfort import iso2631_1978
 from pzd.report.blocks import Card
-from pzd.report.comfort import iso2631_1978
+from pzd.report.context import ReportContext, effect_in_words, policy_in_words
 from pzd.report.sections.missing import rig_test, verdict
 from pzd.report.sections.passenger import change, times
-from pzd.report.story import Story, effect_in_words, policy_in_words
 from pzd.report.wording import DASH, amount, listed, number, percent, sentence
 
 
-def cards(story: Story) -> tuple[Card, ...]:
+def cards(context: ReportContext) -> tuple[Card, ...]:
     """Damper, missing effect, confidence, next test, comfort: each a question with its answer."""
     question = "What is missing from the simple model?"
-    missing = Card(question, _missing(story), _meaning(story))
-    return _damper(story), missing, _confidence(story), _next(story), _comfort(story)
+    missing = Card(question, _missing(context), _meaning(context))
+    return _damper(context), missing, _confidence(context), _next(context), _comfort(context)
 
 
-def _damper(story: Story) -> Card:
-    rows = [row for row in story.table.force if row.force_N is not None and row.velocity_m_per_s > 0.0]
+def _damper(context: ReportContext) -> Card:
+    rows = [row for row in context.table.force if row.force_N is not None and row.velocity_m_per_s > 0.0]
     question = "What is the damper?"
     if not rows:
         return Card(question, "No force is known", "")
-    reached = story.table.notes.reached_m_per_s
+    reached = context.table.notes.reached_m_per_s
     speed = min({row.velocity_m_per_s for row in rows}, key=lambda v: abs(v - reached))
     first = min((row.temperature_degC for row in rows), key=lambda t: float("-inf") if t is None else t)
     here = [row for row in rows if row.velocity_m_per_s == speed and row.temperature_degC == first]
@@ -31,15 +31,15 @@ def _damper(story: Story) -> Card:
     at = f"In rebound at {amount(speed, 'm/s')}" + (f" and {amount(first, 'degC')}." if first is not None else ".")
     if low.voltage_V == high.voltage_V:
         return Card(question, f"It gives {amount(low.force_N, 'N')}", at)
-    return Card(question, f"{_force(story, low)} to {_force(story, high)}", at)
+    return Card(question, f"{_force(context, low)} to {_force(context, high)}", at)
 
 
-def _force(story: Story, row: ForceRow) -> str:
-    return f"{amount(row.force_N, 'N')} at {story.voltage(row.voltage_V)}"
+def _force(context: ReportContext, row: ForceRow) -> str:
+    return f"{amount(row.force_N, 'N')} at {context.voltage(row.voltage_V)}"
 
 
-def _missing(story: Story) -> str:
-    diagnosis = story.diagnosed.diagnosis
+def _missing(context: ReportContext) -> str:
+    diagnosis = context.diagnosed.diagnosis
     names = listed([_name(effect) for effect in diagnosis.effects])
     if diagnosis.verdict == "named":
         return _capital(names)
@@ -50,8 +50,8 @@ def _missing(story: Story) -> str:
     return f"Something unexplained, beside {names}" if names else "Something unexplained"
 
 
-def _meaning(story: Story) -> str:
-    diagnosis = story.diagnosed.diagnosis
+def _meaning(context: ReportContext) -> str:
+    diagnosis = context.diagnosed.diagnosis
     if diagnosis.verdict == "named":
         return sentence("; ".join(effect_in_words(effect) for effect in diagnosis.effects))
     return verdict(diagnosis)
@@ -65,8 +65,8 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _confidence(story: Story) -> Card:
-    diagnosis = story.diagnosed.diagnosis
+def _confidence(context: ReportContext) -> Card:
+    diagnosis = context.diagnosed.diagnosis
     gap = diagnosis.gap
     moved = (
         f"stays {number(gap.before)}"
@@ -79,40 +79,42 @@ def _confidence(story: Story) -> Card:
     )
 
 
-def _next(story: Story) -> Card:
-    test = story.diagnosed.diagnosis.next_test
+def _next(context: ReportContext) -> Card:
+    test = context.diagnosed.diagnosis.next_test
     if test is None:
         return Card("Which test next?", "None is proposed", "")
     names = listed([_name(effect) for effect in test.separates])
-    return Card("Which test next?", _capital(rig_test(story, test)), sentence(f"it separates {names}") if names else "")
+    return Card(
+        "Which test next?", _capital(rig_test(context, test)), sentence(f"it separates {names}") if names else ""
+    )
 
 
-def _comfort(story: Story) -> Card:
-    pairs = [(road, story.reference(road), story.controlled(road)) for road in story.roads]
-    told = [(story.road(road), a, rows) for road, a, rows in pairs if a is not None and rows]
+def _comfort(context: ReportContext) -> Card:
+    pairs = [(road, context.reference(road), context.controlled(road)) for road in context.roads]
+    told = [(context.road(road), a, rows) for road, a, rows in pairs if a is not None and rows]
     gain = "What does the passenger gain?"
     if not told:
         return Card(gain, "Not compared", "No ride at constant damping stands beside another.")
     _, reference, rows = told[0]
     beside = f"{_capital(policy_in_words(rows[0]))}, beside {policy_in_words(reference)}."
-    levels = "; ".join(f"{road}: {_levels(story, a, b[0])}" for road, a, b in told)
-    if iso2631_1978.EDITION not in story.config.editions:
+    levels = "; ".join(f"{road}: {_levels(context, a, b[0])}" for road, a, b in told)
+    if iso2631_1978.EDITION not in context.config.editions:
         return Card(gain, levels, f"Acceleration a_w. {beside}")
-    longer = "; ".join(f"{road}: {times(story, a, b[0])}" for road, a, b in told)
+    longer = "; ".join(f"{road}: {times(context, a, b[0])}" for road, a, b in told)
     source = f"Within reduced comfort, if nothing else is said, {iso2631_1978.EDITION} ({iso2631_1978.TRUST})."
-    detail = f"{beside} {source} Acceleration a_w: {levels}.{_ideal(story, told)}"
+    detail = f"{beside} {source} Acceleration a_w: {levels}.{_ideal(context, told)}"
     return Card("How much longer can a passenger sit?", longer, detail)
 
 
-def _ideal(story: Story, told: list[tuple[str, SummaryRow, tuple[SummaryRow, ...]]]) -> str:
+def _ideal(context: ReportContext, told: list[tuple[str, SummaryRow, tuple[SummaryRow, ...]]]) -> str:
     """What control would reach if every demanded force were there at once."""
     found = [(road, a, row) for road, a, rows in told for row in rows[1:] if row.fidelity == "ideal"]
-    texts = "; ".join(f"{road}: {times(story, a, row)}" for road, a, row in found)
+    texts = "; ".join(f"{road}: {times(context, a, row)}" for road, a, row in found)
     return f" With ideal dampers: {texts}." if texts else ""
 
 
-def _levels(story: Story, reference: SummaryRow, controlled: SummaryRow) -> str:
-    before, after = (story.value(row.case, "a_w") for row in (reference, controlled))
+def _levels(context: ReportContext, reference: SummaryRow, controlled: SummaryRow) -> str:
+    before, after = (context.value(row.case, "a_w") for row in (reference, controlled))
     if before is None or after is None:
         before, after = reference.rms_aK_m_per_s2, controlled.rms_aK_m_per_s2
     return change(before, after) if before else DASH

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from pzd.report.blocks import Card, Section
+from pzd.report.context import ReportContext
 from pzd.report.drawing import pictures
 from pzd.report.headline import cards
 from pzd.report.plots import library
 from pzd.report.sections import damper, made, missing, model, passenger, tested, trust
 from pzd.report.sections.pictures import Pictures
-from pzd.report.story import Story
 
 _PLACES = ("model", "missing", "damper", "passenger")
 
 
-def page(story: Story, jobs: int = 1) -> str:
+def page(context: ReportContext, jobs: int = 1) -> str:
     """The whole page as text.
 
     Parameters
@@ -25,27 +25,27 @@ def page(story: Story, jobs: int = 1) -> str:
     -------
     HTML, the same for the same story
     """
-    drawn = _drawn(story, jobs)
+    drawn = _drawn(context, jobs)
     sections = (
-        tested.tell(story),
-        model.tell(story, drawn),
-        missing.tell(story, drawn),
-        damper.tell(story, drawn),
-        passenger.tell(story, drawn),
-        trust.tell(story),
-        made.tell(story),
+        tested.render(context),
+        model.render(context, drawn),
+        missing.render(context, drawn),
+        damper.render(context, drawn),
+        passenger.render(context, drawn),
+        trust.render(context),
+        made.render(context),
     )
-    return render(_title(story), cards(story), sections)
+    return render(_title(context), cards(context), sections)
 
 
-def _drawn(story: Story, jobs: int) -> Pictures:
+def _drawn(context: ReportContext, jobs: int) -> Pictures:
     plots = list(library().values())
-    drawn = list(zip(plots, pictures(plots, story, jobs), strict=True))
+    drawn = list(zip(plots, pictures(plots, context, jobs), strict=True))
     return {place: tuple(of_plot for plot, of_plot in drawn if plot.place == place) for place in _PLACES}
 
 
-def _title(story: Story) -> str:
-    return f"Damper and comfort report: {story.chosen}" if story.chosen else "Damper and comfort report"
+def _title(context: ReportContext) -> str:
+    return f"Damper and comfort report: {context.chosen}" if context.chosen else "Damper and comfort report"
 
 
 def render(title: str, headline: tuple[Card, ...], sections: tuple[Section, ...]) -> str:

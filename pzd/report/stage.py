@@ -37,10 +37,10 @@ def report(
     -------
     the comfort rows, the page, and the paper's numbers where the config asks for them
     """
-    from pzd.report.comfort.ride import assess, settled
+    from pzd.report.context import ReportContext
     from pzd.report.page import page
     from pzd.report.published import published_rows
-    from pzd.report.story import Story
+    from pzd.report.ride_comfort import assess, settled
     from pzd.simulate.roads.sine import Sine
 
     log = logging.getLogger(__name__)
@@ -52,7 +52,7 @@ def report(
     )
     comfort = tuple(row for ride in finished for row in assess(ride, report))
     log.info("%d comfort values of %d rides", len(comfort), len(finished))
-    story = Story(
+    context = ReportContext(
         config=report,
         simulate=simulate,
         rig=rig,
@@ -66,4 +66,4 @@ def report(
         setting=setting,
     )
     published = published_rows(simulate, identified, rides, comfort) if report.published else None
-    return Report(comfort=comfort, page=page(story, jobs), published=published)
+    return Report(comfort=comfort, page=page(context, jobs), published=published)

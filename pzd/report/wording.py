@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pzd.report.comfort.iso2631_1978 import LONGEST_MIN
+from pzd.comfort.iso2631_1978 import LONGEST_MIN
 
 THIN = "\u202f"
 MINUS = "\u2212"

@@ -19,20 +19,20 @@ from pzd.quantities import (
     Control,
 )
 from pzd.record import Record
-from pzd.rig.believable import faults, reversals, sign_faults
-from pzd.rig.channels import check_keys
 from pzd.rig.config import FilesEntry, Limits
-from pzd.rig.cycles import cycles
-from pzd.rig.fixture import Freed, free
-from pzd.rig.kinematics import kinematics
-from pzd.rig.listing import Listed, listed, names
+from pzd.rig.files.channels import check_keys
+from pzd.rig.files.fixture import Freed, free
+from pzd.rig.files.listing import Listed, listed, names
+from pzd.rig.files.reading import Test, read
+from pzd.rig.files.refusals import faults, reversals, sign_faults
 from pzd.rig.measured import Measured
 from pzd.rig.preflight import findings
-from pzd.rig.reading import Test, read
-from pzd.rig.stand import Taken, record_of
-from pzd.rig.virtual_config import Planned
+from pzd.rig.stand.config import Planned
+from pzd.rig.stand.recording import Taken, record_of
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.processes import at_once
+from pzd.signals.cycles import cycles
+from pzd.signals.kinematics import kinematics
 
 
 def measured(entries: Sequence[FilesEntry], limits: Limits, control: Control, folder: Path, jobs: int = 1) -> Rig:

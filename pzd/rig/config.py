@@ -7,7 +7,7 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from pzd.rig.virtual_config import VirtualEntry
+from pzd.rig.stand.config import VirtualEntry
 from pzd.schema.model import Frozen
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from pzd.record import Record
 from pzd.rig.config import Limits
-from pzd.rig.cycles import Cycles
-from pzd.rig.kinematics import Kinematics
+from pzd.signals.cycles import Cycles
+from pzd.signals.kinematics import Kinematics
 
 
 @dataclass(frozen=True, eq=False)

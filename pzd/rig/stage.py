@@ -55,7 +55,7 @@ def synthesise(rig: RigConfig, seed: int, control: Control, folder: Path, jobs: 
     ConfigError : when the config has measured files instead, or two records would have one name
     """
     from pzd.rig.assembly import made, overview
-    from pzd.rig.stand import taker
+    from pzd.rig.stand.recording import taker
 
     if rig.virtual is None:
         raise ConfigError("rig: this config has measured files and no virtual stand; use ingest (got rig.files)")

@@ -239,7 +239,7 @@ class Run:
         finally:
             shutil.rmtree(fresh, ignore_errors=True)
 
-    def write_beside(self, folder: str, write: Callable[[Path], None]) -> None:
+    def write_extra(self, folder: str, write: Callable[[Path], None]) -> None:
         """Write a folder that is no stage in place of what was there before, whole or not at all.
 
         Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pzd.damper.compiled import laid_in
+from pzd.compiled import laid_in
 from pzd.record import Array
 from pzd.table.kernel import table_range
 

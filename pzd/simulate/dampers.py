@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import ForceRow, Table
-from pzd.damper.beside import beside
 from pzd.damper.compose import nodes_of, steady_force
 from pzd.damper.flow import C, K
 from pzd.damper.model import Damper
+from pzd.damper.parallel import parallel_force
 from pzd.record import Array
 from pzd.schema.errors import DataError
 from pzd.simulate.car import HalfCar
-from pzd.simulate.oil import Oil
-from pzd.simulate.scene import Grid
+from pzd.simulate.dynamic_damper import DynamicDamper
+from pzd.simulate.ride_model import TableArrays
 from pzd.table.lookup import Lookup
 
 LEAST_RELAXATION = 1e-5
@@ -26,10 +26,10 @@ def lowest_temperature(table: Table) -> float | None:
     return min(known, default=None)
 
 
-def grid_of(table: Table, temperature: float | None) -> Grid:
+def grid_of(table: Table, temperature: float | None) -> TableArrays:
     """The table at one temperature [degC], as the compiled loop reads it."""
     lookup = Lookup.of(table, temperature)
-    return Grid(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.reach)
+    return TableArrays(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.reach)
 
 
 def table_of(damper: Damper, table: Table) -> Table:
@@ -62,7 +62,7 @@ def _of(damper: Damper, row: ForceRow, fastest: float) -> ForceRow:
     return row.model_copy(update={"force_N": force})
 
 
-def oil_of(damper: Damper, temperature: float | None, valve: float) -> Oil:
+def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -> DynamicDamper:
     """The damper at one temperature, as the compiled loop reads it.
 
     Parameters
@@ -75,31 +75,33 @@ def oil_of(damper: Damper, temperature: float | None, valve: float) -> Oil:
     rows = np.array(nodes.rows)
     rows[:, K] = np.minimum(rows[:, K], rows[:, C] / LEAST_RELAXATION)
     lag = nodes.tau if "valve_lag" in damper.effects else valve
-    parallel = np.ascontiguousarray(nodes.beside)
-    alone = not any(_stands_beside(row) for row in parallel)
-    return Oil(nodes.voltages, rows, parallel, float(lag), float(nodes.r), alone, np.zeros(parallel.shape[1]))
+    parallel = np.ascontiguousarray(nodes.parallel)
+    alone = not any(_is_parallel(row) for row in parallel)
+    return DynamicDamper(nodes.voltages, rows, parallel, float(lag), float(nodes.r), alone, np.zeros(parallel.shape[1]))
 
 
-def rubs(oil: Oil) -> bool:
+def rubs(dynamic: DynamicDamper) -> bool:
     """Whether friction beside the element jumps where the speed crosses nought."""
     tiny = np.finfo(np.float64).tiny
-    return any(beside(0.0, tiny, 0.0, row) != beside(0.0, 0.0, 0.0, row) for row in oil.beside)
+    return any(parallel_force(0.0, tiny, 0.0, row) != parallel_force(0.0, 0.0, 0.0, row) for row in dynamic.parallel)
 
 
-def _stands_beside(row: Array) -> bool:
-    rest = beside(0.0, 0.0, 0.0, row)
+def _is_parallel(row: Array) -> bool:
+    rest = parallel_force(0.0, 0.0, 0.0, row)
     tries = [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.0, -1e-6, 0.0), (0.0, 0.0, 1.0)]
-    return any(beside(x, v, a, row) != rest for x, v, a in tries)
+    return any(parallel_force(x, v, a, row) != rest for x, v, a in tries)
 
 
-def check_inertance(oil: Oil, car: HalfCar) -> None:
+def check_inertance(dynamic: DynamicDamper, car: HalfCar) -> None:
     """Refuse a damper whose apparent mass would outweigh the car's.
 
     Raises
     ------
     DataError : when it would
     """
-    apart = min(float(beside(0.0, 0.0, 1.0, row) - beside(0.0, 0.0, 0.0, row)) for row in oil.beside)
+    apart = min(
+        float(parallel_force(0.0, 0.0, 1.0, row) - parallel_force(0.0, 0.0, 0.0, row)) for row in dynamic.parallel
+    )
     per_axle = apart * max(n * r * r for n, r in zip(car.dampers, car.motion_ratios, strict=True))
     mobility = np.max(
         np.linalg.eigvalsh(car.force_directions().T @ np.linalg.solve(car.mass_matrix(), car.force_directions()))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.compiled import compiled, laid_in
+from pzd.compiled import compiled, laid_in
 from pzd.record import Array
 from pzd.simulate.admissible import coefficient_bounds, table_bounds
 from pzd.simulate.minimise import least_acceleration_forces
-from pzd.simulate.scene import (
+from pzd.simulate.ride_model import (
     BY_COEFFICIENTS,
     BY_TABLE,
     DEFLECTION,
@@ -21,8 +21,8 @@ from pzd.simulate.scene import (
     PITCH,
     PITCH_RATE,
     RATE,
-    Grid,
-    Law,
+    ControlSpec,
+    TableArrays,
     Vehicle,
 )
 
@@ -34,21 +34,23 @@ def one_sided(velocity: float, side: float) -> float:
 
 
 @compiled
-def bounds_of(law: Law, car: Vehicle, grid: Grid, axle: int, velocity: float) -> tuple[float, float]:
+def bounds_of(
+    control_spec: ControlSpec, car: Vehicle, grid: TableArrays, axle: int, velocity: float
+) -> tuple[float, float]:
     """Lowest and highest force of an axle [N] at a suspension speed [m/s]."""
-    if law.bounds == BY_COEFFICIENTS:
-        return coefficient_bounds(velocity, law.c_min, law.c_max)
-    if law.bounds == BY_TABLE:
+    if control_spec.bounds == BY_COEFFICIENTS:
+        return coefficient_bounds(velocity, control_spec.c_min, control_spec.c_max)
+    if control_spec.bounds == BY_TABLE:
         return table_bounds(velocity, car.ratio[axle], car.dampers[axle], grid.speeds, grid.rebound, grid.compression)
     return -math.inf, math.inf
 
 
 @laid_in
-def feedback_force(gains: Array, y: Array, desk: Array) -> float:
+def feedback_force(gains: Array, y: Array, workspace: Array) -> float:
     """Force of one axle that is proportional to what a policy senses: gains (8,) on `SENSED` [N]."""
     force = gains[4] * y[HEAVE] + gains[5] * y[PITCH] + gains[6] * y[HEAVE_RATE] + gains[7] * y[PITCH_RATE]
     for i in range(2):
-        force += gains[i] * desk[DEFLECTION, i] + gains[2 + i] * desk[RATE, i]
+        force += gains[i] * workspace[DEFLECTION, i] + gains[2 + i] * workspace[RATE, i]
     return float(force)
 
 
@@ -65,11 +67,15 @@ def spring_acceleration(car: Vehicle, deflection: Array) -> float:
 
 
 @compiled
-def demand(law: Law, car: Vehicle, y: Array, desk: Array, branch: int) -> None:
+def demand(control_spec: ControlSpec, car: Vehicle, y: Array, workspace: Array, branch: int) -> None:
     """Fill the desk's forces with what the policy asks of both axles within the desk's bounds [N]."""
-    if law.aim == MINIMISE:
-        a0 = spring_acceleration(car, desk[DEFLECTION])
-        least_acceleration_forces(a0, car.comfort, desk[LOW], desk[HIGH], law.tie, branch, desk[FORCE])
+    if control_spec.aim == MINIMISE:
+        a0 = spring_acceleration(car, workspace[DEFLECTION])
+        least_acceleration_forces(
+            a0, car.comfort, workspace[LOW], workspace[HIGH], control_spec.tie, branch, workspace[FORCE]
+        )
         return
     for i in range(2):
-        desk[FORCE, i] = min(max(feedback_force(law.gains[i], y, desk), desk[LOW, i]), desk[HIGH, i])
+        workspace[FORCE, i] = min(
+            max(feedback_force(control_spec.gains[i], y, workspace), workspace[LOW, i]), workspace[HIGH, i]
+        )

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 from pzd.damper.rows import row_at
 from pzd.record import Array
+from pzd.simulate.dynamic_damper import effective_voltage, stored
 from pzd.simulate.kinematics import suspension
-from pzd.simulate.oil import felt, stored
-from pzd.simulate.scene import (
+from pzd.simulate.ride_model import (
     BEFORE,
     BESIDE_WORK,
     DEFLECTION,
     DISSIPATED,
     DYNAMIC,
-    FELT,
+    EFFECTIVE,
     HEAVE_RATE,
     OIL_1,
     PITCH_RATE,
@@ -21,7 +21,7 @@ from pzd.simulate.scene import (
     SET,
     SINCE,
     VALVE_WORK,
-    Scene,
+    RideModel,
 )
 
 NOTHING = 1e-12
@@ -29,7 +29,7 @@ NOTHING = 1e-12
 
 
 @compiled
-def stored_energy(time: float, y: Array, scene: Scene, control: Array, desk: Array) -> float:
+def stored_energy(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> float:
     """Energy of body, springs and oil springs.
 
     Equation: E = m (dz/dt)^2 / 2 + J (dphi/dt)^2 / 2 + sum k_i U_i^2 / 2 + sum n_i k s_i^2 / 2
@@ -44,15 +44,15 @@ def stored_energy(time: float, y: Array, scene: Scene, control: Array, desk: Arr
     -------
     energy [J]
     """
-    car, oil = scene.car, scene.oil
-    suspension(time, y, car, scene.ground, desk)
+    car, damper = model.car, model.damper
+    suspension(time, y, car, model.road_coefficients, workspace)
     energy = 0.5 * car.mass * y[HEAVE_RATE] ** 2 + 0.5 * car.inertia * y[PITCH_RATE] ** 2
     for i in range(2):
-        energy += 0.5 * car.stiffness[i] * desk[DEFLECTION, i] ** 2
-        if scene.law.fidelity == DYNAMIC:
+        energy += 0.5 * car.stiffness[i] * workspace[DEFLECTION, i] ** 2
+        if model.control_spec.fidelity == DYNAMIC:
             elapsed = time - control[SINCE, 0]
-            voltage, _ = felt(oil, control[SET, i], control[BEFORE, i], control[FELT, i], elapsed)
-            energy += car.dampers[i] * stored(y[OIL_1 + i], row_at(oil.voltages, oil.rows, voltage))
+            voltage, _ = effective_voltage(damper, control[SET, i], control[BEFORE, i], control[EFFECTIVE, i], elapsed)
+            energy += car.dampers[i] * stored(y[OIL_1 + i], row_at(damper.voltages, damper.rows, voltage))
     return float(energy)
 
 

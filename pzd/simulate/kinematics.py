@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 from pzd.record import Array
-from pzd.simulate.scene import (
+from pzd.simulate.ride_model import (
     DEFLECTION,
     HEAVE,
     HEAVE_RATE,
@@ -16,36 +16,36 @@ from pzd.simulate.scene import (
     RATE,
     RISE,
     SPRINGS,
-    Ground,
+    RoadCoefficients,
     Vehicle,
 )
 
 
 @compiled
-def road_at(ground: Ground, distance: float) -> tuple[float, float, float]:
+def road_at(road_coefficients: RoadCoefficients, distance: float) -> tuple[float, float, float]:
     """Height [m] of the road at a distance [m], its slope [-] and its curvature [1/m]."""
-    phase = ground.wavenumber * distance
-    height = ground.amplitude * math.sin(phase)
-    slope = ground.amplitude * ground.wavenumber * math.cos(phase)
-    curvature = -ground.wavenumber * ground.wavenumber * height
-    count = ground.coefficients.shape[0]
+    phase = road_coefficients.wavenumber * distance
+    height = road_coefficients.amplitude * math.sin(phase)
+    slope = road_coefficients.amplitude * road_coefficients.wavenumber * math.cos(phase)
+    curvature = -road_coefficients.wavenumber * road_coefficients.wavenumber * height
+    count = road_coefficients.coefficients.shape[0]
     if count == 0:
         return height, slope, curvature
-    place = distance / ground.spacing
+    place = distance / road_coefficients.spacing
     if place <= 0.0:
-        return height + ground.coefficients[0, 0], slope, curvature
+        return height + road_coefficients.coefficients[0, 0], slope, curvature
     knot = min(int(place), count - 1)
-    c = ground.coefficients[knot]
+    c = road_coefficients.coefficients[knot]
     if place >= count:
-        d = ground.spacing
+        d = road_coefficients.spacing
         return height + c[0] + d * (c[1] + d * (c[2] + d * c[3])), slope, curvature
-    d = (place - knot) * ground.spacing
+    d = (place - knot) * road_coefficients.spacing
     height += c[0] + d * (c[1] + d * (c[2] + d * c[3]))
     return height, slope + c[1] + d * (2.0 * c[2] + 3.0 * d * c[3]), curvature + 2.0 * c[2] + 6.0 * d * c[3]
 
 
 @compiled
-def suspension(time: float, y: Array, car: Vehicle, ground: Ground, desk: Array) -> None:
+def suspension(time: float, y: Array, car: Vehicle, road_coefficients: RoadCoefficients, workspace: Array) -> None:
     """Fill deflection and its rate, speed and acceleration of the road, and spring force of both axles.
 
     Equation: U = H^T X - xi, V = dU/dt, S_i = k_i U_i      Source: Makowski and Knap 2021, section 5
@@ -58,9 +58,9 @@ def suspension(time: float, y: Array, car: Vehicle, ground: Ground, desk: Array)
     desk : see `scene`; filled
     """
     for i in range(2):
-        height, slope, curvature = road_at(ground, car.speed * time - ground.behind[i])
-        desk[RISE, i] = slope * car.speed
-        desk[LIFT, i] = curvature * car.speed * car.speed
-        desk[DEFLECTION, i] = y[HEAVE] + car.arms[i] * y[PITCH] - height
-        desk[RATE, i] = y[HEAVE_RATE] + car.arms[i] * y[PITCH_RATE] - desk[RISE, i]
-        desk[SPRINGS, i] = car.stiffness[i] * desk[DEFLECTION, i]
+        height, slope, curvature = road_at(road_coefficients, car.speed * time - road_coefficients.behind[i])
+        workspace[RISE, i] = slope * car.speed
+        workspace[LIFT, i] = curvature * car.speed * car.speed
+        workspace[DEFLECTION, i] = y[HEAVE] + car.arms[i] * y[PITCH] - height
+        workspace[RATE, i] = y[HEAVE_RATE] + car.arms[i] * y[PITCH_RATE] - workspace[RISE, i]
+        workspace[SPRINGS, i] = car.stiffness[i] * workspace[DEFLECTION, i]

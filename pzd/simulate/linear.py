@@ -14,7 +14,7 @@ from pzd.record import Array
 from pzd.simulate.car import HalfCar
 from pzd.simulate.energy import balance_error
 from pzd.simulate.outcome import Outcome
-from pzd.simulate.scene import DISSIPATED, ROAD_WORK, STATES
+from pzd.simulate.ride_model import DISSIPATED, ROAD_WORK, STATES
 
 Complex = NDArray[np.complex128]
 

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.compiled import compiled, laid_in
+from pzd.compiled import compiled, laid_in
 from pzd.damper.dormand_prince import STAGES
 from pzd.damper.rows import row_at
 from pzd.record import Array
 from pzd.simulate.demand import bounds_of, demand, spring_acceleration
+from pzd.simulate.dynamic_damper import effective_voltage, lagging, place, stored
 from pzd.simulate.equations import motion
 from pzd.simulate.minimise import LARGEST, farther_end
-from pzd.simulate.oil import felt, lagging, place, stored
-from pzd.simulate.scene import (
+from pzd.simulate.ride_model import (
     ASKED,
     BEFORE,
     COMFORT,
     DEFLECTION,
     DYNAMIC,
-    FELT,
+    EFFECTIVE,
     FORCE,
     HIGH,
     IDEAL,
@@ -33,7 +33,7 @@ from pzd.simulate.scene import (
     TIE_END,
     VALVE_WORK,
     VOLTAGE,
-    Scene,
+    RideModel,
 )
 from pzd.simulate.stepper import advance, choose_side
 from pzd.table.kernel import table_voltage
@@ -46,7 +46,7 @@ COLUMNS = 16
 
 
 @compiled
-def set_control(time: float, y: Array, scene: Scene, control: Array, desk: Array, room: Array) -> None:
+def set_control(time: float, y: Array, model: RideModel, control: Array, workspace: Array, scratch: Array) -> None:
     """Let the controller act once: what it asks of each axle, and the voltage that gives it by the table.
 
     Parameters
@@ -56,35 +56,35 @@ def set_control(time: float, y: Array, scene: Scene, control: Array, desk: Array
     scene, control, desk : see `scene`; the control is changed in place
     room : (STATES,) to work in
     """
-    law, car = scene.law, scene.car
-    if law.fidelity == IDEAL and (law.aim != MINIMISE or law.tie != LARGEST):
+    control_spec, car = model.control_spec, model.car
+    if control_spec.fidelity == IDEAL and (control_spec.aim != MINIMISE or control_spec.tie != LARGEST):
         return
-    motion(time, y, scene, control, desk, room)
+    motion(time, y, model, control, workspace, scratch)
     for i in range(2):
-        desk[LOW, i], desk[HIGH, i] = bounds_of(law, car, scene.grid, i, desk[RATE, i])
-    if law.aim == MINIMISE and law.tie == LARGEST:
-        a0 = spring_acceleration(car, desk[DEFLECTION])
-        control[TIE_END, 1] = farther_end(a0, car.comfort, desk[LOW], desk[HIGH])
-    if law.fidelity == IDEAL:
+        workspace[LOW, i], workspace[HIGH, i] = bounds_of(control_spec, car, model.grid, i, workspace[RATE, i])
+    if control_spec.aim == MINIMISE and control_spec.tie == LARGEST:
+        a0 = spring_acceleration(car, workspace[DEFLECTION])
+        control[TIE_END, 1] = farther_end(a0, car.comfort, workspace[LOW], workspace[HIGH])
+    if control_spec.fidelity == IDEAL:
         return
-    if law.aim != VOLTAGE:
-        demand(law, car, y, desk, int(control[TIE_END, 1]))
+    if control_spec.aim != VOLTAGE:
+        demand(control_spec, car, y, workspace, int(control[TIE_END, 1]))
     for i in range(2):
-        voltage = law.voltage
-        if law.aim != VOLTAGE:
-            control[ASKED, i] = desk[FORCE, i]
-            voltage = _voltage_for(scene, i, desk[FORCE, i], desk[RATE, i], control[SET, i])
-        _set_voltage(time, y, scene, control, i, voltage)
+        voltage = control_spec.voltage
+        if control_spec.aim != VOLTAGE:
+            control[ASKED, i] = workspace[FORCE, i]
+            voltage = _voltage_for(model, i, workspace[FORCE, i], workspace[RATE, i], control[SET, i])
+        _set_voltage(time, y, model, control, i, voltage)
     control[SINCE, 0] = time
     for i in range(2):
         if control[SIDE, i] == 0.0:
-            choose_side(i, time, y, scene, control, desk, room)
+            choose_side(i, time, y, model, control, workspace, scratch)
 
 
 @laid_in
-def _voltage_for(scene: Scene, axle: int, force: float, velocity: float, otherwise: float) -> float:
+def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, otherwise: float) -> float:
     """The voltage that gives a force of the axle within its bounds; a rounding beyond them is let pass."""
-    grid, car = scene.grid, scene.car
+    grid, car = model.grid, model.car
     ratio = car.ratio[axle]
     alone = force / (car.dampers[axle] * ratio)
     for share in (0.0, 1e-12, -1e-12):
@@ -97,64 +97,66 @@ def _voltage_for(scene: Scene, axle: int, force: float, velocity: float, otherwi
 
 
 @compiled
-def _set_voltage(time: float, y: Array, scene: Scene, control: Array, axle: int, voltage: float) -> None:
-    oil, elapsed = scene.oil, time - control[SINCE, 0]
-    was, _ = felt(oil, control[SET, axle], control[BEFORE, axle], control[FELT, axle], elapsed)
-    control[BEFORE, axle] = lagging(oil, control[SET, axle], control[BEFORE, axle], elapsed)
-    control[FELT, axle] = was
+def _set_voltage(time: float, y: Array, model: RideModel, control: Array, axle: int, voltage: float) -> None:
+    damper, elapsed = model.damper, time - control[SINCE, 0]
+    was, _ = effective_voltage(damper, control[SET, axle], control[BEFORE, axle], control[EFFECTIVE, axle], elapsed)
+    control[BEFORE, axle] = lagging(damper, control[SET, axle], control[BEFORE, axle], elapsed)
+    control[EFFECTIVE, axle] = was
     control[SET, axle] = voltage
-    if scene.law.fidelity == DYNAMIC:
-        now, _ = felt(oil, voltage, control[BEFORE, axle], was, 0.0)
+    if model.control_spec.fidelity == DYNAMIC:
+        now, _ = effective_voltage(damper, voltage, control[BEFORE, axle], was, 0.0)
         if now != was:
             e = y[OIL_1 + axle]
-            change = stored(e, row_at(oil.voltages, oil.rows, now)) - stored(e, row_at(oil.voltages, oil.rows, was))
-            y[VALVE_WORK] += scene.car.dampers[axle] * change
+            change = stored(e, row_at(damper.voltages, damper.rows, now)) - stored(
+                e, row_at(damper.voltages, damper.rows, was)
+            )
+            y[VALVE_WORK] += model.car.dampers[axle] * change
 
 
 @laid_in
-def beyond_reach(scene: Scene, control: Array, desk: Array) -> bool:
+def beyond_reach(model: RideModel, control: Array, workspace: Array) -> bool:
     """Whether a damper moves faster than the rig did at its voltage; `ideal` has none, so at the best one."""
-    grid, car = scene.grid, scene.car
+    grid, car = model.grid, model.car
     last = grid.reach.size - 1
     for i in range(2):
         n, share = place(grid.voltages, control[SET, i])
         reach = grid.reach[n] + share * (grid.reach[min(n + 1, last)] - grid.reach[n])
-        if scene.law.fidelity == IDEAL:
+        if model.control_spec.fidelity == IDEAL:
             for n in range(last + 1):
                 reach = max(reach, grid.reach[n])
-        if abs(car.ratio[i] * desk[RATE, i]) > reach * (1.0 + 1e-9):
+        if abs(car.ratio[i] * workspace[RATE, i]) > reach * (1.0 + 1e-9):
             return True
     return False
 
 
 @laid_in
-def _note(time: float, y: Array, scene: Scene, control: Array, desk: Array, row: Array) -> None:
+def _note(time: float, y: Array, model: RideModel, control: Array, workspace: Array, row: Array) -> None:
     """Fill one row of the history."""
-    row[0], row[1], row[2], row[3] = time, y[0], y[1], desk[COMFORT, 0]
+    row[0], row[1], row[2], row[3] = time, y[0], y[1], workspace[COMFORT, 0]
     for i in range(2):
-        row[4 + 6 * i] = desk[DEFLECTION, i]
-        row[5 + 6 * i] = desk[RATE, i]
-        row[6 + 6 * i] = desk[SPRINGS, i]
-        row[7 + 6 * i] = desk[FORCE, i]
-        row[8 + 6 * i] = desk[FORCE, i] if scene.law.fidelity == IDEAL else control[ASKED, i]
+        row[4 + 6 * i] = workspace[DEFLECTION, i]
+        row[5 + 6 * i] = workspace[RATE, i]
+        row[6 + 6 * i] = workspace[SPRINGS, i]
+        row[7 + 6 * i] = workspace[FORCE, i]
+        row[8 + 6 * i] = workspace[FORCE, i] if model.control_spec.fidelity == IDEAL else control[ASKED, i]
         row[9 + 6 * i] = control[SET, i]
 
 
 @laid_in
-def _tally(desk: Array, tally: Array) -> None:
+def _tally(workspace: Array, tally: Array) -> None:
     """Take one step into peaks and sums."""
     tally[SAMPLES] += 1.0
     for i in range(2):
-        tally[PEAK_DEFLECTION] = max(tally[PEAK_DEFLECTION], abs(desk[DEFLECTION, i]))
-        tally[LOAD_1 + i] += (desk[SPRINGS, i] + desk[FORCE, i]) ** 2
+        tally[PEAK_DEFLECTION] = max(tally[PEAK_DEFLECTION], abs(workspace[DEFLECTION, i]))
+        tally[LOAD_1 + i] += (workspace[SPRINGS, i] + workspace[FORCE, i]) ** 2
 
 
 @compiled
 def ride(
     y: Array,
-    scene: Scene,
+    model: RideModel,
     control: Array,
-    desk: Array,
+    workspace: Array,
     steps: int,
     h: float,
     tolerance: float,
@@ -182,27 +184,27 @@ def ride(
     tally : (TALLIES,) filled; fewer steps are done where the table ends
     stages, end : room to work in, see `advance`
     """
-    room = stages[STAGES]
-    motion(0.0, y, scene, control, desk, room)
+    scratch = stages[STAGES]
+    motion(0.0, y, model, control, workspace, scratch)
     for i in range(2):
-        control[SIDE, i] = 1.0 if desk[RATE, i] >= 0.0 else -1.0
-        if scene.law.jumps and desk[RATE, i] == 0.0:
-            choose_side(i, 0.0, y, scene, control, desk, room)
+        control[SIDE, i] = 1.0 if workspace[RATE, i] >= 0.0 else -1.0
+        if model.control_spec.jumps and workspace[RATE, i] == 0.0:
+            choose_side(i, 0.0, y, model, control, workspace, scratch)
     dt = h
     for n in range(steps + 1):
         time = n * h
         if n % per_control == 0:
-            set_control(time, y, scene, control, desk, room)
-        motion(time, y, scene, control, desk, room)
-        acceleration[n] = desk[COMFORT, 0]
+            set_control(time, y, model, control, workspace, scratch)
+        motion(time, y, model, control, workspace, scratch)
+        acceleration[n] = workspace[COMFORT, 0]
         tally[STEPS_DONE] = n
-        if math.isnan(desk[COMFORT, 0]):
+        if math.isnan(workspace[COMFORT, 0]):
             return
-        if beyond_reach(scene, control, desk):
+        if beyond_reach(model, control, workspace):
             tally[OUTSIDE] += 1.0
         if n >= settle:
-            _tally(desk, tally)
+            _tally(workspace, tally)
         if n % per_output == 0:
-            _note(time, y, scene, control, desk, history[n // per_output])
+            _note(time, y, model, control, workspace, history[n // per_output])
         if n < steps:
-            dt = advance(time, h, y, scene, control, desk, tolerance, min(dt, h), stages, end)
+            dt = advance(time, h, y, model, control, workspace, tolerance, min(dt, h), stages, end)

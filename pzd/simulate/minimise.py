@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from pzd.damper.compiled import compiled
+from pzd.compiled import compiled
 from pzd.record import Array
 
 Pair = tuple[float, float]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pzd.damper.compiled import compiled, laid_in
+from pzd.compiled import compiled, laid_in
 from pzd.record import Array
 from pzd.simulate.demand import bounds_of, demand, feedback_force, one_sided, spring_acceleration
-from pzd.simulate.scene import (
+from pzd.simulate.ride_model import (
     DEFLECTION,
     FORCE,
     HIGH,
@@ -19,8 +19,8 @@ from pzd.simulate.scene import (
     SPRINGS,
     TABLE,
     TIE_END,
-    Grid,
-    Scene,
+    RideModel,
+    TableArrays,
     Vehicle,
 )
 from pzd.simulate.sticking import holding_force, holding_share
@@ -28,7 +28,7 @@ from pzd.table.kernel import table_force
 
 
 @compiled
-def tabled(car: Vehicle, grid: Grid, axle: int, voltage: float, velocity: float) -> float:
+def tabled(car: Vehicle, grid: TableArrays, axle: int, voltage: float, velocity: float) -> float:
     """Force of an axle [N] whose dampers stand at a voltage [V], at a suspension speed [m/s].
 
     Equation: T = n r F(U, r V)      Source: virtual work, r the motion ratio and n the number of dampers
@@ -39,38 +39,38 @@ def tabled(car: Vehicle, grid: Grid, axle: int, voltage: float, velocity: float)
 
 
 @compiled
-def quasistatic_forces(y: Array, scene: Scene, control: Array, desk: Array) -> None:
+def quasistatic_forces(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Fill the desk's forces for axles that slip; one that sticks is left to what holds it."""
-    law = scene.law
+    control_spec = model.control_spec
     for i in range(2):
-        velocity = desk[RATE, i]
-        if law.jumps and control[SIDE, i] != 0.0:
+        velocity = workspace[RATE, i]
+        if control_spec.jumps and control[SIDE, i] != 0.0:
             velocity = one_sided(velocity, control[SIDE, i])
-        desk[NEAR, i] = velocity
-        if law.fidelity == TABLE:
-            desk[FORCE, i] = tabled(scene.car, scene.grid, i, control[SET, i], velocity)
+        workspace[NEAR, i] = velocity
+        if control_spec.fidelity == TABLE:
+            workspace[FORCE, i] = tabled(model.car, model.grid, i, control[SET, i], velocity)
         else:
-            desk[LOW, i], desk[HIGH, i] = bounds_of(law, scene.car, scene.grid, i, velocity)
-    if law.fidelity == TABLE:
+            workspace[LOW, i], workspace[HIGH, i] = bounds_of(control_spec, model.car, model.grid, i, velocity)
+    if control_spec.fidelity == TABLE:
         return
-    if law.jumps and control[SIDE, 0] * control[SIDE, 1] == 0.0:
+    if control_spec.jumps and control[SIDE, 0] * control[SIDE, 1] == 0.0:
         if control[SIDE, 0] != control[SIDE, 1]:
-            _force_beside_sticking(y, scene, control, desk)
+            _force_outside_sticking(y, model, control, workspace)
         return
-    demand(law, scene.car, y, desk, int(control[TIE_END, 1]))
+    demand(control_spec, model.car, y, workspace, int(control[TIE_END, 1]))
 
 
 @laid_in
-def _force_beside_sticking(y: Array, scene: Scene, control: Array, desk: Array) -> None:
+def _force_outside_sticking(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Fill the force of the free axle where the other sticks: the policy knows that the stuck one answers."""
-    law, car = scene.law, scene.car
+    control_spec, car = model.control_spec, model.car
     stuck = 0 if control[SIDE, 0] == 0.0 else 1
     free = 1 - stuck
-    if law.aim == MINIMISE:
-        alone = holding_force(car, stuck, desk[SPRINGS, stuck], desk[LIFT, stuck], desk[SPRINGS, free])
-        a0 = spring_acceleration(car, desk[DEFLECTION]) + car.comfort[stuck] * alone
+    if control_spec.aim == MINIMISE:
+        alone = holding_force(car, stuck, workspace[SPRINGS, stuck], workspace[LIFT, stuck], workspace[SPRINGS, free])
+        a0 = spring_acceleration(car, workspace[DEFLECTION]) + car.comfort[stuck] * alone
         slope = car.comfort[free] + car.comfort[stuck] * holding_share(car, stuck)
         wanted = -a0 / slope if slope != 0.0 else 0.0
     else:
-        wanted = feedback_force(law.gains[free], y, desk)
-    desk[FORCE, free] = min(max(wanted, desk[LOW, free]), desk[HIGH, free])
+        wanted = feedback_force(control_spec.gains[free], y, workspace)
+    workspace[FORCE, free] = min(max(wanted, workspace[LOW, free]), workspace[HIGH, free])

@@ -11,15 +11,15 @@ from pzd.schema.errors import DataError
 from pzd.simulate.car import HalfCar
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.dampers import rubs
+from pzd.simulate.dynamic_damper import DynamicDamper
 from pzd.simulate.energy import balance_error, stored_energy
 from pzd.simulate.linear import ride_exactly
 from pzd.simulate.loop import COLUMNS, LOAD_1, OUTSIDE, PEAK_DEFLECTION, SAMPLES, STEPS_DONE, TALLIES, ride
 from pzd.simulate.minimise import TIE_BREAKS
-from pzd.simulate.oil import Oil
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.plan import Case
 from pzd.simulate.profile import Profile
-from pzd.simulate.scene import (
+from pzd.simulate.ride_model import (
     BY_COEFFICIENTS,
     BY_TABLE,
     DISSIPATED,
@@ -32,13 +32,13 @@ from pzd.simulate.scene import (
     TABLE,
     UNBOUNDED,
     VOLTAGE,
-    Grid,
-    Law,
-    Scene,
+    ControlSpec,
+    RideModel,
+    TableArrays,
     control,
-    desk,
-    ground,
+    road_coefficients,
     vehicle,
+    workspace,
 )
 
 KM_PER_H = 1.0 / 3.6
@@ -69,7 +69,7 @@ class Clock:
         )
 
 
-def law_of(config: SimulateConfig, case: Case, car: HalfCar, oil: Oil) -> Law:
+def law_of(config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamper) -> ControlSpec:
     """Policy, bounds and fidelity of a case as numbers."""
     policy, fidelity = case.policy, _FIDELITIES[case.fidelity]
     bounds = BY_TABLE
@@ -80,8 +80,8 @@ def law_of(config: SimulateConfig, case: Case, car: HalfCar, oil: Oil) -> Law:
     gains = np.zeros((2, SENSED))
     if policy.feedback is not None:
         gains = np.ascontiguousarray(policy.feedback(car, config.constant_damping_Ns_per_m))
-    jumps = rubs(oil) if fidelity == DYNAMIC else bounds == BY_TABLE
-    return Law(
+    jumps = rubs(damper) if fidelity == DYNAMIC else bounds == BY_TABLE
+    return ControlSpec(
         fidelity,
         _AIMS[policy.aim],
         bounds,
@@ -94,7 +94,9 @@ def law_of(config: SimulateConfig, case: Case, car: HalfCar, oil: Oil) -> Law:
     )
 
 
-def ride_case(config: SimulateConfig, case: Case, profile: Profile, grid: Grid, oil: Oil, ends: bool) -> Outcome:
+def ride_case(
+    config: SimulateConfig, case: Case, profile: Profile, grid: TableArrays, damper: DynamicDamper, ends: bool
+) -> Outcome:
     """Ride one case.
 
     Parameters
@@ -129,23 +131,25 @@ def ride_case(config: SimulateConfig, case: Case, profile: Profile, grid: Grid, 
             clock.settle,
             float(np.max(grid.reach)),
         )
-    own = oil._replace(room=np.zeros_like(oil.room))  # rides at the same time work in rooms of their own
-    scene = Scene(vehicle(car, speed), ground(profile, car.wheelbase), law_of(config, case, car, oil), grid, own)
-    return ride_scene(scene, clock, config.tolerance, case.name, ends)
+    own = damper._replace(scratch=np.zeros_like(damper.scratch))  # rides at the same time work in rooms of their own
+    model = RideModel(
+        vehicle(car, speed), road_coefficients(profile, car.wheelbase), law_of(config, case, car, damper), grid, own
+    )
+    return ride_of_model(model, clock, config.tolerance, case.name, ends)
 
 
-def ride_scene(scene: Scene, clock: Clock, tolerance: float, name: str, ends: bool) -> Outcome:
+def ride_of_model(model: RideModel, clock: Clock, tolerance: float, name: str, ends: bool) -> Outcome:
     """Ride from rest on a level start, and balance the energies; see `ride_case`."""
-    acts, room, y = control(scene.law.voltage), desk(), np.zeros(STATES)
+    acts, scratch, y = control(model.control_spec.voltage), workspace(), np.zeros(STATES)
     comfort = np.zeros(clock.steps + 1)
     history = np.zeros((clock.steps // clock.per_output + 1, COLUMNS))
     tally = np.zeros(TALLIES)
-    before = stored_energy(0.0, y, scene, acts, room)
+    before = stored_energy(0.0, y, model, acts, scratch)
     ride(
         y,
-        scene,
+        model,
         acts,
-        room,
+        scratch,
         clock.steps,
         clock.step,
         tolerance,
@@ -159,8 +163,8 @@ def ride_scene(scene: Scene, clock: Clock, tolerance: float, name: str, ends: bo
         np.zeros(STATES),
     )
     if tally[STEPS_DONE] < clock.steps or not np.all(np.isfinite(y)):
-        raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(room[1])))))
-    change = stored_energy(clock.steps * clock.step, y, scene, acts, room) - before
+        raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(scratch[1])))))
+    change = stored_energy(clock.steps * clock.step, y, model, acts, scratch) - before
     return Outcome(
         history=history,
         comfort=comfort,

@@ -38,7 +38,7 @@ def simulate(
     ConfigError : when a policy needs the voltage of a rig without one
     DataError : when a ride needs the table where it ends
     """
-    from pzd.simulate.dampers import check_inertance, grid_of, lowest_temperature, oil_of, table_of
+    from pzd.simulate.dampers import check_inertance, dynamic_damper_of, grid_of, lowest_temperature, table_of
     from pzd.simulate.outcome import ride_of, summary_row
     from pzd.simulate.plan import cases
     from pzd.simulate.response import responses
@@ -57,7 +57,7 @@ def simulate(
     for plain in {case.plain for case in planned} | {False}:
         damper = diagnosed.plain if plain else diagnosed.damper
         grids[plain] = grid_of(table_of(damper, table) if plain else table, temperature)
-        oils[plain] = oil_of(damper, temperature, simulate.valve_response_s)
+        oils[plain] = dynamic_damper_of(damper, temperature, simulate.valve_response_s)
         check_inertance(oils[plain], simulate.car.car())
 
     def ridden(case: Case) -> Outcome:

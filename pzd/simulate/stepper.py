@@ -11,11 +11,11 @@ import math
 
 import numpy as np
 
-from pzd.damper.compiled import compiled, laid_in
+from pzd.compiled import compiled, laid_in
 from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
 from pzd.record import Array
 from pzd.simulate.equations import motion
-from pzd.simulate.scene import (
+from pzd.simulate.ride_model import (
     COMPRESSION_PUSH,
     HEAVE_RATE,
     PITCH_RATE,
@@ -23,7 +23,7 @@ from pzd.simulate.scene import (
     REBOUND_PUSH,
     SIDE,
     STATES,
-    Scene,
+    RideModel,
 )
 
 SCALES = np.array([1e-2, 1e-2, 1e-1, 1e-1, 1e-3, 1e-3, 10.0, 10.0, 10.0, 10.0])
@@ -37,7 +37,7 @@ _MOST_CUTS = 50
 
 @laid_in
 def trial(
-    time: float, dt: float, y: Array, scene: Scene, control: Array, desk: Array, stages: Array, end: Array
+    time: float, dt: float, y: Array, model: RideModel, control: Array, workspace: Array, stages: Array, end: Array
 ) -> float:
     """Fill `end` with the state after dt; the desk is left as it is there.
 
@@ -61,7 +61,7 @@ def trial(
             for j in range(i):
                 change += STAGE_WEIGHTS[i, j] * stages[j, n]
             end[n] = y[n] + dt * change
-        motion(time + TIMES[i] * dt, end, scene, control, desk, stages[i])
+        motion(time + TIMES[i] * dt, end, model, control, workspace, stages[i])
     worst = 0.0
     for n in range(STATES):
         error = 0.0
@@ -72,28 +72,30 @@ def trial(
 
 
 @compiled
-def choose_side(axle: int, time: float, y: Array, scene: Scene, control: Array, desk: Array, dy: Array) -> None:
+def choose_side(
+    axle: int, time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array
+) -> None:
     """Stop the suspension of an axle that is at V = 0, and let it slip to whichever side its forces push it."""
-    car = scene.car
-    impulse = desk[RATE, axle] / car.mobility[axle]
+    car = model.car
+    impulse = workspace[RATE, axle] / car.mobility[axle]
     y[HEAVE_RATE] -= impulse / car.mass
     y[PITCH_RATE] -= impulse * car.arms[axle] / car.inertia
     control[SIDE, axle] = 0.0
-    motion(time, y, scene, control, desk, dy)
-    if desk[REBOUND_PUSH, axle] > 0.0:
+    motion(time, y, model, control, workspace, dy)
+    if workspace[REBOUND_PUSH, axle] > 0.0:
         control[SIDE, axle] = 1.0
-    elif desk[COMPRESSION_PUSH, axle] > 0.0:
+    elif workspace[COMPRESSION_PUSH, axle] > 0.0:
         control[SIDE, axle] = -1.0
 
 
 @laid_in
-def leaver(control: Array, desk: Array) -> int:
+def leaver(control: Array, workspace: Array) -> int:
     """The first axle that has left its side of V = 0 or its stick, as the desk stands; -1 where none has."""
     for i in range(2):
         side = control[SIDE, i]
-        if side == 0.0 and max(desk[REBOUND_PUSH, i], desk[COMPRESSION_PUSH, i]) > 0.0:
+        if side == 0.0 and max(workspace[REBOUND_PUSH, i], workspace[COMPRESSION_PUSH, i]) > 0.0:
             return i
-        if side * desk[RATE, i] < -_CROSSED:
+        if side * workspace[RATE, i] < -_CROSSED:
             return i
     return -1
 
@@ -103,9 +105,9 @@ def advance(
     time: float,
     h: float,
     y: Array,
-    scene: Scene,
+    model: RideModel,
     control: Array,
-    desk: Array,
+    workspace: Array,
     tolerance: float,
     first: float,
     stages: Array,
@@ -130,12 +132,12 @@ def advance(
     shortest, longest = 0.0, math.inf
     while done < h * (1.0 - 1e-12):
         dt = min(dt, h - done)
-        worst = trial(time + done, dt, y, scene, control, desk, stages, end)
+        worst = trial(time + done, dt, y, model, control, workspace, stages, end)
         growth = 0.9 * (tolerance / max(worst, 1e-3 * tolerance)) ** 0.2 if tolerance < math.inf else 5.0
         if worst > tolerance and dt > _SMALLEST * h and longest == math.inf:
             dt *= max(growth, 0.1)
             continue
-        axle = leaver(control, desk) if scene.law.jumps and cuts < _MOST_CUTS else -1
+        axle = leaver(control, workspace) if model.control_spec.jumps and cuts < _MOST_CUTS else -1
         if axle >= 0:
             longest = dt
         elif longest < math.inf:
@@ -153,5 +155,5 @@ def advance(
         if axle >= 0:
             cuts += 1
             shortest, longest, dt = 0.0, math.inf, h - done
-            choose_side(axle, time + done, y, scene, control, desk, stages[STAGES])
+            choose_side(axle, time + done, y, model, control, workspace, stages[STAGES])
     return dt

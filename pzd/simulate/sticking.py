@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pzd.damper.compiled import laid_in
+from pzd.compiled import laid_in
 from pzd.record import Array
-from pzd.simulate.scene import ACCELERATION, FORCE, INERTANCE, LIFT, SIDE, SPRINGS, Vehicle
+from pzd.simulate.ride_model import ACCELERATION, FORCE, INERTANCE, LIFT, SIDE, SPRINGS, Vehicle
 
 
 @laid_in
@@ -35,7 +35,7 @@ def holding_share(car: Vehicle, axle: int) -> float:
 
 
 @laid_in
-def accelerate(car: Vehicle, control: Array, desk: Array) -> None:
+def accelerate(car: Vehicle, control: Array, workspace: Array) -> None:
     """Fill dV/dt of both axles, and complete the damper forces by what holds a sticking axle and by inertia.
 
     Equation: dV/dt = -W (S + T + mu dV/dt) - d2xi/dt2, W = H^T M^-1 H, dV_i/dt = 0 where it sticks
@@ -47,35 +47,35 @@ def accelerate(car: Vehicle, control: Array, desk: Array) -> None:
     control, desk : see `scene`; forces and accelerations are filled
     """
     w0, w1, cross = car.mobility
-    s0, s1 = desk[SPRINGS, 0], desk[SPRINGS, 1]
-    lift0, lift1 = desk[LIFT, 0], desk[LIFT, 1]
+    s0, s1 = workspace[SPRINGS, 0], workspace[SPRINGS, 1]
+    lift0, lift1 = workspace[LIFT, 0], workspace[LIFT, 1]
     determinant = w0 * w1 - cross * cross
-    desk[ACCELERATION, 0] = desk[ACCELERATION, 1] = 0.0
+    workspace[ACCELERATION, 0] = workspace[ACCELERATION, 1] = 0.0
     if control[SIDE, 0] == 0.0 and control[SIDE, 1] == 0.0:
-        desk[FORCE, 0] = -(w1 * lift0 - cross * lift1) / determinant - s0
-        desk[FORCE, 1] = -(w0 * lift1 - cross * lift0) / determinant - s1
+        workspace[FORCE, 0] = -(w1 * lift0 - cross * lift1) / determinant - s0
+        workspace[FORCE, 1] = -(w0 * lift1 - cross * lift0) / determinant - s1
         return
     if control[SIDE, 0] == 0.0 or control[SIDE, 1] == 0.0:
-        _accelerate_one(car, 1 if control[SIDE, 0] == 0.0 else 0, desk)
+        _accelerate_one(car, 1 if control[SIDE, 0] == 0.0 else 0, workspace)
         return
-    pull0 = -w0 * (s0 + desk[FORCE, 0]) - cross * (s1 + desk[FORCE, 1]) - lift0
-    pull1 = -cross * (s0 + desk[FORCE, 0]) - w1 * (s1 + desk[FORCE, 1]) - lift1
-    a, b = 1.0 + w0 * desk[INERTANCE, 0], cross * desk[INERTANCE, 1]
-    c, d = cross * desk[INERTANCE, 0], 1.0 + w1 * desk[INERTANCE, 1]
-    desk[ACCELERATION, 0] = (pull0 * d - b * pull1) / (a * d - b * c)
-    desk[ACCELERATION, 1] = (a * pull1 - c * pull0) / (a * d - b * c)
+    pull0 = -w0 * (s0 + workspace[FORCE, 0]) - cross * (s1 + workspace[FORCE, 1]) - lift0
+    pull1 = -cross * (s0 + workspace[FORCE, 0]) - w1 * (s1 + workspace[FORCE, 1]) - lift1
+    a, b = 1.0 + w0 * workspace[INERTANCE, 0], cross * workspace[INERTANCE, 1]
+    c, d = cross * workspace[INERTANCE, 0], 1.0 + w1 * workspace[INERTANCE, 1]
+    workspace[ACCELERATION, 0] = (pull0 * d - b * pull1) / (a * d - b * c)
+    workspace[ACCELERATION, 1] = (a * pull1 - c * pull0) / (a * d - b * c)
     for i in range(2):
-        desk[FORCE, i] += desk[INERTANCE, i] * desk[ACCELERATION, i]
+        workspace[FORCE, i] += workspace[INERTANCE, i] * workspace[ACCELERATION, i]
 
 
 @laid_in
-def _accelerate_one(car: Vehicle, free: int, desk: Array) -> None:
+def _accelerate_one(car: Vehicle, free: int, workspace: Array) -> None:
     """The same where one axle is free and the other sticks."""
     stuck, cross = 1 - free, car.mobility[2]
     freed = car.mobility[free] - cross * cross / car.mobility[stuck]
-    pull = cross / car.mobility[stuck] * desk[LIFT, stuck] - desk[LIFT, free]
-    pull -= freed * (desk[SPRINGS, free] + desk[FORCE, free])
-    desk[ACCELERATION, free] = pull / (1.0 + freed * desk[INERTANCE, free])
-    desk[FORCE, free] += desk[INERTANCE, free] * desk[ACCELERATION, free]
-    other = desk[SPRINGS, free] + desk[FORCE, free]
-    desk[FORCE, stuck] = holding_force(car, stuck, desk[SPRINGS, stuck], desk[LIFT, stuck], other)
+    pull = cross / car.mobility[stuck] * workspace[LIFT, stuck] - workspace[LIFT, free]
+    pull -= freed * (workspace[SPRINGS, free] + workspace[FORCE, free])
+    workspace[ACCELERATION, free] = pull / (1.0 + freed * workspace[INERTANCE, free])
+    workspace[FORCE, free] += workspace[INERTANCE, free] * workspace[ACCELERATION, free]
+    other = workspace[SPRINGS, free] + workspace[FORCE, free]
+    workspace[FORCE, stuck] = holding_force(car, stuck, workspace[SPRINGS, stuck], workspace[LIFT, stuck], other)

@@ -13,7 +13,7 @@ import pytest
 
 import pzd
 from pzd.damper.compose import nodes_of, respond
-from pzd.damper.drive import felt_voltage
+from pzd.damper.drive import effective_voltage
 from pzd.damper.material import material
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
@@ -24,15 +24,15 @@ TIME = np.arange(0, 1, 1e-3)
 
 def test_the_lag_answers_a_step_as_an_exponential_and_a_ramp_late_by_tau() -> None:
     steps = np.array([1e-3])
-    step = felt_voltage(np.where(TIME > 0, 100.0, 0.0), steps, 0.05, 0.0)
+    step = effective_voltage(np.where(TIME > 0, 100.0, 0.0), steps, 0.05, 0.0)
     np.testing.assert_allclose(step[200], 100 * (1 - np.exp(-(0.2 - 5e-4) / 0.05)), rtol=1e-5)
-    ramp = felt_voltage(100 * TIME, steps, 0.05, 0.0)
+    ramp = effective_voltage(100 * TIME, steps, 0.05, 0.0)
     np.testing.assert_allclose(ramp[-1], 100 * (TIME[-1] - 0.05), rtol=1e-6)
 
 
 def test_the_play_turns_only_after_its_whole_width() -> None:
     triangle = np.interp(TIME, [0, 0.25, 0.5, 1.0], [0, 100, 0, 100])
-    felt = felt_voltage(triangle, np.array([1e-3]), 0.0, 10.0)
+    felt = effective_voltage(triangle, np.array([1e-3]), 0.0, 10.0)
     assert felt.max() == pytest.approx(90.0)
     assert felt[400] == pytest.approx(min(90.0, triangle[400] + 10.0))
     assert np.max(np.abs(felt - triangle)) == pytest.approx(10.0)

@@ -14,7 +14,7 @@ from test_naming import TWO, diagnosed
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.named import Named, Round
+from pzd.diagnose.search.selection import Round, Selection
 from pzd.record import Record
 
 
@@ -78,10 +78,10 @@ def test_rivals_of_one_step_stay_rivals_when_another_effect_is_adopted_but_not_w
     spring_or_mass = Round((), "gas_spring", ("fluid_inertia",))
     then = Round((), "asymmetry")
 
-    def named(*effects: str) -> Named:
+    def named(*effects: str) -> Selection:
         standing: Any = SimpleNamespace(effects=effects)
         nothing: Any = None
-        return Named(standing, standing, (spring_or_mass, then), {}, nothing, nothing)
+        return Selection(standing, standing, (spring_or_mass, then), {}, nothing, nothing)
 
     assert named("gas_spring", "asymmetry").rivals == ("fluid_inertia",)
     assert named("gas_spring", "asymmetry", "fluid_inertia").rivals == ()

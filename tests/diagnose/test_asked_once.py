@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from campaign import damper_of, sines
 
-from pzd.damper.compose import respond, standing_rows
+from pzd.damper.compose import constant_rows, respond
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import NuisanceConfig
-from pzd.diagnose.evidence import evidence_of
-from pzd.diagnose.fitting import fit
-from pzd.diagnose.inputs import prepare
-from pzd.diagnose.observation import SIMULATION_TOLERANCE
-from pzd.diagnose.problem import simulated
-from pzd.diagnose.split import UNTOUCHED, split
+from pzd.diagnose.data.cleaning import prepare
+from pzd.diagnose.data.split import UNTOUCHED, split
+from pzd.diagnose.fit.least_squares import fit
+from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
+from pzd.diagnose.fit.parameters import simulated
+from pzd.diagnose.search.evidence import evidence_of
 
 TWO = (0.0, 150.0)
 PLAIN = damper_of(TWO)
@@ -61,7 +61,7 @@ def test_effects_beside_the_element_leave_what_is_remembered_of_it(asked: Callab
     unknowns = problem.unknowns(("gas_spring",))
     for observation in problem.observations:
         point = problem.point(start, unknowns)
-        row, _ = standing_rows(*point.base[observation.place], {})
+        row, _ = constant_rows(*point.base[observation.place], {})
         before = observation.element(row.tobytes()).copy()
         force = simulated(point, observation)
         np.testing.assert_array_equal(observation.element(row.tobytes()), before)

@@ -12,12 +12,12 @@ from campaign import damper_of, sine
 from pzd.damper.effects import library
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import NuisanceConfig
-from pzd.diagnose.evidence import Evidence, evidence_of
-from pzd.diagnose.fitting import Fitted, fit
-from pzd.diagnose.inputs import prepare, sliced
-from pzd.diagnose.intervals import LEVEL, disagreement, standard_errors
-from pzd.diagnose.problem import Unknown
-from pzd.diagnose.split import split
+from pzd.diagnose.data.cleaning import prepare, sliced
+from pzd.diagnose.data.split import split
+from pzd.diagnose.fit.intervals import LEVEL, disagreement, standard_errors
+from pzd.diagnose.fit.least_squares import Fitted, fit
+from pzd.diagnose.fit.parameters import Unknown
+from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.record import Array, Record
 
 DRAWS = 400

@@ -12,12 +12,12 @@ from campaign import damper_of, sine, sines
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import NuisanceConfig
-from pzd.diagnose.evidence import Evidence, evidence_of
-from pzd.diagnose.fitting import fit
-from pzd.diagnose.inputs import prepare
-from pzd.diagnose.predict import counted
-from pzd.diagnose.split import TRAINING, split
-from pzd.diagnose.unsure import expected
+from pzd.diagnose.data.cleaning import prepare
+from pzd.diagnose.data.split import TRAINING, split
+from pzd.diagnose.fit.least_squares import fit
+from pzd.diagnose.fit.prediction import counted
+from pzd.diagnose.noise.input_uncertainty import expected
+from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.record import Record
 
 TWO = (0.0, 150.0)

@@ -10,7 +10,7 @@ import pytest
 
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.gap import gap_in_force, visible_gap
-from pzd.diagnose.support import leaves_gap
+from pzd.diagnose.search.acceptance import leaves_gap
 
 SOFT, HARD = 100.0, 1000.0
 """Peak forces of two tests [N]."""

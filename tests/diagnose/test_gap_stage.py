@@ -12,12 +12,12 @@ from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.config import DiagnoseConfig, NuisanceConfig
-from pzd.diagnose.inputs import prepare
-from pzd.diagnose.judge import judge
-from pzd.diagnose.nuisance import nuisance
-from pzd.diagnose.split import TRAINING, UNTOUCHED, VALIDATION, split
+from pzd.diagnose.data.cleaning import prepare
+from pzd.diagnose.data.split import TRAINING, UNTOUCHED, VALIDATION, split
+from pzd.diagnose.noise.input_uncertainty import expected
+from pzd.diagnose.noise.test_effects import nuisance
+from pzd.diagnose.residual_check import judge
 from pzd.diagnose.stage import diagnose
-from pzd.diagnose.unsure import expected
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.stage import identify
 from pzd.quantities import Control

@@ -12,7 +12,7 @@ from test_naming import TWO, diagnosed
 
 from pzd.artefacts import Rig
 from pzd.artefacts.rig import Finding, RecordEntry
-from pzd.diagnose.used import whole_records, without
+from pzd.diagnose.data.exclusions import whole_records, without
 from pzd.record import Record
 
 LINEAR_TESTS = ((0.5, 0.015), (0.5, 0.03), (2.0, 0.01), (2.0, 0.02))
@@ -20,13 +20,13 @@ LINEAR_TESTS = ((0.5, 0.015), (0.5, 0.03), (2.0, 0.01), (2.0, 0.02))
 
 @pytest.mark.parametrize(("foil", "values"), [("guide_friction", {"F_g": 40.0}), ("cubic_spring", {"k_3": 6e6})])
 def test_a_force_that_is_in_no_library_is_not_named_after_the_effect_next_to_it(
-    foil: str, values: dict[str, float], fresh_seeds: Callable[[int], list[int]]
+    form: str, values: dict[str, float], fresh_seeds: Callable[[int], list[int]]
 ) -> None:
     (seed,) = fresh_seeds(1)
-    records = sines(damper_of(TWO).with_effect(foil, values), np.random.default_rng(seed), TWO, tests=LINEAR_TESTS)
+    records = sines(damper_of(TWO).with_effect(form, values), np.random.default_rng(seed), TWO, tests=LINEAR_TESTS)
     told = diagnosed(records).diagnosis
     assert told.verdict in ("ambiguous", "unexplained"), told.reason
-    assert foil not in {*told.effects, *told.rivals}
+    assert form not in {*told.effects, *told.rivals}
     assert told.confidence is None or told.confidence < 0.9
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from campaign import damper_of, sines
 
-from pzd.diagnose.inputs import prepare
-from pzd.diagnose.split import TRAINING, UNTOUCHED, split
+from pzd.diagnose.data.cleaning import prepare
+from pzd.diagnose.data.split import TRAINING, UNTOUCHED, split
 
 
 @pytest.mark.parametrize("channel", ["force", "velocity", "displacement"])

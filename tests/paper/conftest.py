@@ -10,8 +10,8 @@ from pzd.artefacts import Diagnosed, Diagnosis, Identified, PublishedRow, Rides,
 from pzd.config import RunConfig, load
 from pzd.identify.stage import identify
 from pzd.quantities import Control
-from pzd.report.comfort.ride import assess, settled
 from pzd.report.published import published_rows
+from pzd.report.ride_comfort import assess, settled
 from pzd.rig.stage import synthesise
 from pzd.simulate.stage import simulate
 from pzd.table.stage import tabulate

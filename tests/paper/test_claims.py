@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from pzd.paper.claims import claims
-from pzd.paper.telling import contested
+from pzd.paper.printing import contested
 
 GIVEN = {
     "227 N": "2270",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pzd.paper.contradiction import Attempt, attempts, excluded, misses
-from pzd.paper.telling import judged
+from pzd.paper.printing import judged
 
 FORCES = {
     "F4-0": 2085,

@@ -18,5 +18,5 @@ def test_a_force_that_differs_only_until_the_motion_has_turned_leaves_no_gap() -
     force = 1000.0 * np.sign(v)
     record = Record("sine", None, time, x, v, -((2 * np.pi) ** 2) * x, force)
     begun_elsewhere = np.where(time < 0.1, 0.0, force)
-    story: Any = SimpleNamespace(simulated=lambda _: (0.9 * force, begun_elsewhere))
-    assert of_record(story, record) == pytest.approx((0.01, 0.0), abs=1e-12)
+    context: Any = SimpleNamespace(simulated=lambda _: (0.9 * force, begun_elsewhere))
+    assert of_record(context, record) == pytest.approx((0.01, 0.0), abs=1e-12)

@@ -74,7 +74,7 @@ def read(page: str) -> Reader:
 @pytest.fixture
 def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """No pictures: for what the text alone must say."""
-    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, story, jobs: [()] * len(plots))
+    monkeypatch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
 
 
 def test_the_story_is_told_in_its_order_and_every_tag_is_closed(read: Reader) -> None:

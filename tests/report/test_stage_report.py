@@ -11,11 +11,11 @@ import pytest
 from pydantic import ValidationError
 
 from pzd.artefacts import Report
+from pzd.comfort.iso2631_1978 import exposure
+from pzd.comfort.weighting import WK, response
 from pzd.quantities import Control
-from pzd.report.comfort.iso2631_1978 import exposure
-from pzd.report.comfort.ride import assess, settled
-from pzd.report.comfort.weighting import WK, response
 from pzd.report.config import ReportConfig
+from pzd.report.ride_comfort import assess, settled
 
 ALL = ReportConfig(
     editions=("ISO 2631-1:1997", "ISO 2631:1978", "Directive 2002/44/EC"), health_guidance_zone="0.45-0.90"
@@ -26,7 +26,7 @@ ALL = ReportConfig(
 def rows_only() -> Iterator[None]:
     """No pictures: these tests are about the rows."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pzd.report.page.pictures", lambda plots, story, jobs: [()] * len(plots))
+        patch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
         yield
 
 

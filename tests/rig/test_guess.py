@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pzd.rig.guess import guessed
+from pzd.rig.files.guess import guessed
 from pzd.schema.errors import DataError
 
 NO_RIG_FILES = {

@@ -14,8 +14,8 @@ from pzd.damper.element import element_force
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
 from pzd.rig.stage import ingest
-from pzd.rig.stand import take
-from pzd.rig.virtual_config import VirtualEntry
+from pzd.rig.stand.config import VirtualEntry
+from pzd.rig.stand.recording import take
 from pzd.schema.errors import ConfigError, DataError
 
 TIME = np.arange(500) * 2e-3

@@ -12,8 +12,8 @@ import pytest
 from pzd.artefacts import Rig
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
-from pzd.rig.cycles import cycles
 from pzd.rig.stage import ingest
+from pzd.signals.cycles import cycles
 
 CURRENT = Control("current", "A")
 MILLIMETRES = {"columns": {"displacement": "displacement_mm"}, "units": {"displacement": "mm"}}

@@ -14,10 +14,10 @@ from pzd.artefacts import Finding
 from pzd.damper.element import element_force
 from pzd.record import Record
 from pzd.rig.config import Limits
-from pzd.rig.cycles import cycles
-from pzd.rig.kinematics import kinematics
 from pzd.rig.measured import Measured
 from pzd.rig.preflight import checks, findings
+from pzd.signals.cycles import cycles
+from pzd.signals.kinematics import kinematics
 
 Array = NDArray[np.float64]
 

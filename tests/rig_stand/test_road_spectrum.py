@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pzd.rig.roads import classes, height_density, profile
-from pzd.rig.waveforms import waveforms
+from pzd.rig.stand.waveforms import waveforms
+from pzd.signals.iso8608 import classes, height_density, profile
 
 BAND = (0.02, 2.0)
 

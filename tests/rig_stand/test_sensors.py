@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.rig.recursion import all_pole, recursion
-from pzd.rig.sensors import coloured, draw_for, sensed
-from pzd.rig.virtual_config import ChannelNoise, DisplacementNoise, ForceNoise, TemperatureNoise, VoltageNoise
+from pzd.rig.stand.config import ChannelNoise, DisplacementNoise, ForceNoise, TemperatureNoise, VoltageNoise
+from pzd.rig.stand.sensors import coloured, draw_for, sensed
+from pzd.signals.recursion import all_pole, recursion
 
 COUNT = 40_000
 

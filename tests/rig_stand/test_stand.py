@@ -14,10 +14,10 @@ from pzd.damper.element import element_force
 from pzd.damper.motion import Motion
 from pzd.quantities import Control
 from pzd.rig.config import Fixture, RigConfig
-from pzd.rig.fixture import free
+from pzd.rig.files.fixture import free
 from pzd.rig.stage import synthesise
-from pzd.rig.stand import Taken, records, take
-from pzd.rig.virtual_config import VirtualEntry
+from pzd.rig.stand.config import VirtualEntry
+from pzd.rig.stand.recording import Taken, records, take
 
 SINE = {"kind": "sine", "frequency_Hz": 2.0, "amplitude_m": 0.03}
 TRIANGLE = {"kind": "triangle", "frequency_Hz": 1.5, "amplitude_m": 0.02}

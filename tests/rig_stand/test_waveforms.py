@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pzd.rig.fourier import FourierSum
-from pzd.rig.waveform import Course, Waveform, started
-from pzd.rig.waveforms import waveforms
+from pzd.rig.stand.waveform import Course, Waveform, started
+from pzd.rig.stand.waveforms import waveforms
 from pzd.schema.errors import ConfigError, DataError
+from pzd.signals.harmonics import FourierSum
 
 SIZES: dict[str, dict[str, object]] = {
     "sine": {"frequency_Hz": 2.0, "amplitude_m": 0.03},

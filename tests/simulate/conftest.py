@@ -15,7 +15,7 @@ from simulate_dampers import damper_after_table_2, table_of
 from pzd.artefacts import Table
 from pzd.damper.model import Damper
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.dampers import grid_of, oil_of
+from pzd.simulate.dampers import dynamic_damper_of, grid_of
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
@@ -55,8 +55,8 @@ def ride(damper: Damper, table: Table) -> Rider:
         profile = case.road.profile(Way(speed, speed * config.duration_s, 1, Path()))
         if generic:
             profile = replace(profile, coefficients=np.zeros((1, 4)))  # a level spline beside the sine
-        grid, oil = grid_of(with_table, None), oil_of(on, 22.0, config.valve_response_s)
-        return ride_case(config, case, profile, grid, oil, with_table.notes.outside == "error")
+        grid, dynamic = grid_of(with_table, None), dynamic_damper_of(on, 22.0, config.valve_response_s)
+        return ride_case(config, case, profile, grid, dynamic, with_table.notes.outside == "error")
 
     return go
 

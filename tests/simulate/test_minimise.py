@@ -81,13 +81,13 @@ def test_the_law_is_continuous_in_speed_and_spring_force(fresh_seeds, tie_break)
     for _ in range(300):
         D = random.normal(size=2) / 600.0
 
-        def law(v: Array, a0: float, D: Array = D) -> Array:
+        def control_spec(v: Array, a0: float, D: Array = D) -> Array:
             ends = np.stack([750.0 * v, 45000.0 * v])
             return least_acceleration(a0, D, ends.min(axis=0), ends.max(axis=0), tie_break)
 
         v, a0 = random.normal(size=2) * 0.2, random.normal()
         step = 1e-7 * random.normal(size=3)
-        jump = law(v + step[:2], a0 + step[2]) - law(v, a0)
+        jump = control_spec(v + step[:2], a0 + step[2]) - control_spec(v, a0)
         assert np.max(np.abs(jump)) < 1.0
 
 

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from pzd.rig.roads import classes
 from pzd.schema.errors import DataError, FilesError
+from pzd.signals.iso8608 import classes
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.kinematics import road_at
 from pzd.simulate.profile import through
+from pzd.simulate.ride_model import road_coefficients
 from pzd.simulate.road import Way
 from pzd.simulate.roads import roads
-from pzd.simulate.scene import ground
 
 WAY = Way(25.0, 400.0, 1, Path())
 SAMPLES = {
@@ -38,7 +38,7 @@ def test_every_file_in_the_folder_is_a_road() -> None:
 @pytest.mark.parametrize("kind", SAMPLES)
 def test_slope_and_curvature_are_the_derivatives_of_the_height(kind, fresh_seeds) -> None:
     profile = read({"kind": kind, **SAMPLES[kind]}).roads[0].profile(WAY)
-    numbers = ground(profile, 2.9)
+    numbers = road_coefficients(profile, 2.9)
     h = 1e-5
     for s in np.random.default_rng(fresh_seeds(1)[0]).uniform(0.5, 30.0, 50):
         (low, *_), (height, slope, curvature), (high, *_) = (road_at(numbers, s + d) for d in (-h, 0.0, h))

@@ -15,7 +15,7 @@ from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.dampers import grid_of, oil_of
+from pzd.simulate.dampers import dynamic_damper_of, grid_of
 from pzd.simulate.plan import cases
 from pzd.simulate.riding import ride_case
 from pzd.simulate.road import Way
@@ -168,8 +168,8 @@ BY_VOLTAGE = {"at_voltage_V": (0.0, 150.0), "k_g": (1000.0, 40000.0)}
 
 
 def test_rides_at_the_same_time_are_the_same(damper) -> None:
-    beside = damper.with_effect("gas_spring", BY_VOLTAGE)
-    given = (config(), Diagnosed.undiagnosed(beside, damper), table_of(beside), 1, Path())
+    parallel = damper.with_effect("gas_spring", BY_VOLTAGE)
+    given = (config(), Diagnosed.undiagnosed(parallel, damper), table_of(parallel), 1, Path())
     alone, together = simulate(*given), simulate(*given, jobs=6)
     assert together.summary == alone.summary
     for one, other in zip(together.rides, alone.rides, strict=True):
@@ -180,9 +180,12 @@ def test_rides_at_the_same_time_are_the_same(damper) -> None:
 def test_a_ride_leaves_what_it_shares_with_others_untouched(damper) -> None:
     setup = config(policies=["comfort"], fidelities=["dynamic"])
     (case,) = cases(setup, with_voltage=True, changed=False)
-    oil, grid = oil_of(damper.with_effect("gas_spring", BY_VOLTAGE), 22.0, 0.001), grid_of(table_of(damper), None)
+    dynamic, grid = (
+        dynamic_damper_of(damper.with_effect("gas_spring", BY_VOLTAGE), 22.0, 0.001),
+        grid_of(table_of(damper), None),
+    )
     profile = case.road.profile(Way(25.0, 25.0, 1, Path()))
-    before = [array.copy() for array in (*oil, *grid) if isinstance(array, np.ndarray)]
-    ride_case(setup, case, profile, grid, oil, ends=False)
-    after = [array for array in (*oil, *grid) if isinstance(array, np.ndarray)]
+    before = [array.copy() for array in (*dynamic, *grid) if isinstance(array, np.ndarray)]
+    ride_case(setup, case, profile, grid, dynamic, ends=False)
+    after = [array for array in (*dynamic, *grid) if isinstance(array, np.ndarray)]
     assert all(np.array_equal(one, other) for one, other in zip(before, after, strict=True))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pzd.simulate.cars import cars
-from pzd.simulate.scene import ACCELERATION, FORCE, INERTANCE, LIFT, SIDE, SPRINGS, control, desk, vehicle
+from pzd.simulate.ride_model import ACCELERATION, FORCE, INERTANCE, LIFT, SIDE, SPRINGS, control, vehicle, workspace
 from pzd.simulate.sticking import accelerate
 
 
@@ -16,18 +16,18 @@ def test_the_suspensions_accelerate_as_body_and_road_do(fresh_seeds, sides) -> N
     car = cars()["makowski2021"]
     random = np.random.default_rng(fresh_seeds(1)[0])
     for _ in range(20):
-        acts, room = control(0.0), desk()
+        acts, scratch = control(0.0), workspace()
         acts[SIDE] = sides
-        room[SPRINGS], room[FORCE] = random.normal(size=(2, 2)) * 1000.0
-        room[LIFT] = random.normal(size=2) * 5.0
-        room[INERTANCE] = random.uniform(0.0, 50.0, 2)
-        before = room[FORCE].copy()
-        accelerate(vehicle(car, 25.0), acts, room)
-        body = car.acceleration(room[SPRINGS] + room[FORCE])
-        assert room[ACCELERATION] == pytest.approx(car.force_directions().T @ body - room[LIFT], abs=1e-10)
+        scratch[SPRINGS], scratch[FORCE] = random.normal(size=(2, 2)) * 1000.0
+        scratch[LIFT] = random.normal(size=2) * 5.0
+        scratch[INERTANCE] = random.uniform(0.0, 50.0, 2)
+        before = scratch[FORCE].copy()
+        accelerate(vehicle(car, 25.0), acts, scratch)
+        body = car.acceleration(scratch[SPRINGS] + scratch[FORCE])
+        assert scratch[ACCELERATION] == pytest.approx(car.force_directions().T @ body - scratch[LIFT], abs=1e-10)
         for i, side in enumerate(sides):
             if side == 0.0:
-                assert room[ACCELERATION, i] == 0.0
+                assert scratch[ACCELERATION, i] == 0.0
             else:
-                inertia = room[INERTANCE, i] * room[ACCELERATION, i]
-                assert room[FORCE, i] == pytest.approx(before[i] + inertia, abs=1e-9)
+                inertia = scratch[INERTANCE, i] * scratch[ACCELERATION, i]
+                assert scratch[FORCE, i] == pytest.approx(before[i] + inertia, abs=1e-9)

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from pzd.damper import compiled
-from pzd.simulate import warm
+from pzd import compiled
+from pzd.simulate import precompile as warm
 
 
 @pytest.fixture

@@ -25,14 +25,14 @@ EFFECT = Effect(
     ),
     source="Prandtl-Ishlinskii play operator; Brokate and Sprekels 1996, Hysteresis and Phase Transitions",
     tests=(
-        ({"felt": 0.0, "now": 30.0, "r": 10.0}, 20.0),
-        ({"felt": 20.0, "now": 15.0, "r": 10.0}, 20.0),
-        ({"felt": 20.0, "now": 5.0, "r": 10.0}, 15.0),
+        ({"effective": 0.0, "now": 30.0, "r": 10.0}, 20.0),
+        ({"effective": 20.0, "now": 15.0, "r": 10.0}, 20.0),
+        ({"effective": 20.0, "now": 5.0, "r": 10.0}, 15.0),
     ),
     needs="voltage",
 )
 
 
-def law(felt: float, now: float, r: float) -> float:
+def law(effective: float, now: float, r: float) -> float:
     """Voltage felt [V] when the voltage arrives at `now` [V]."""
-    return max(now - r, min(now + r, felt))
+    return max(now - r, min(now + r, effective))

@@ -28,16 +28,16 @@ EFFECT = Effect(
     ),
     source="first-order lag; response times in Makowski and Knap 2021, sec. 1",
     tests=(
-        ({"felt": 0.0, "before": 100.0, "now": 100.0, "step": 0.01, "tau": 0.01}, 63.21205588285577),
-        ({"felt": 7.0, "before": 0.0, "now": 100.0, "step": 0.01, "tau": 0.0}, 100.0),
+        ({"effective": 0.0, "before": 100.0, "now": 100.0, "step": 0.01, "tau": 0.01}, 63.21205588285577),
+        ({"effective": 7.0, "before": 0.0, "now": 100.0, "step": 0.01, "tau": 0.0}, 100.0),
     ),
     needs="voltage",
 )
 
 
-def law(felt: float, before: float, now: float, step: float, tau: float) -> float:
+def law(effective: float, before: float, now: float, step: float, tau: float) -> float:
     """Voltage felt [V] a step [s] later, the voltage going linearly from `before` to `now` [V]."""
     if tau <= 0.0:
         return now
     lag = (now - before) * tau / step
-    return now - lag + (felt - before + lag) * math.exp(-step / tau)
+    return now - lag + (effective - before + lag) * math.exp(-step / tau)

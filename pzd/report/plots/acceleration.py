@@ -7,26 +7,26 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.artefacts import SummaryRow
-from pzd.report.comfort.ride import SettledRide
+from pzd.report.context import REFERENCE, ReportContext, policy_in_words
 from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes, legend, thinned
-from pzd.report.story import REFERENCE, Story, policy_in_words
+from pzd.report.ride_comfort import SettledRide
 from pzd.report.wording import number
 
 _PERIODS = 3.0
 _WINDOW_S = 4.0
 
 
-def draw(story: Story) -> Iterator[Panel]:
+def draw(context: ReportContext) -> Iterator[Panel]:
     """The last three periods of a harmonic road; of any other the four seconds with the largest peak."""
-    for road in story.roads:
-        rides = {ride.row.case: ride for ride in story.settled}
-        reference, others = story.reference(road), [*story.controlled(road)[::-1]]
+    for road in context.roads:
+        rides = {ride.row.case: ride for ride in context.settled}
+        reference, others = context.reference(road), [*context.controlled(road)[::-1]]
         shown = ([reference] if reference else []) + others
         if shown:
-            yield _panel(story, road, shown, rides)
+            yield _panel(context, road, shown, rides)
 
 
-def _panel(story: Story, road: str, shown: list[SummaryRow], rides: dict[str, SettledRide]) -> Panel:
+def _panel(context: ReportContext, road: str, shown: list[SummaryRow], rides: dict[str, SettledRide]) -> Panel:
     figure, ax = axes(key=2)
     window = _window(rides[shown[0].case])
     for row in shown:
@@ -42,7 +42,7 @@ def _panel(story: Story, road: str, shown: list[SummaryRow], rides: dict[str, Se
     ax.set_ylim(bottom=0.0)
     legend(figure, 2)
     peaks = "; ".join(f"{policy_in_words(row)} {number(row.peak_abs_aK_m_per_s2)} m/s²" for row in shown)
-    title = f"Acceleration at {shown[0].point}, {story.road(road)}"
+    title = f"Acceleration at {shown[0].point}, {context.road(road)}"
     return Panel(figure, title, f"Peaks of |a_K| on {road}: {peaks}.", "")
 
 

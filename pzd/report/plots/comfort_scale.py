@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pzd.artefacts import SummaryRow
-from pzd.report.comfort import iso2631_1997
+from pzd.comfort import iso2631_1997
+from pzd.report.context import REFERENCE, ReportContext, policy_in_words
 from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes
-from pzd.report.story import REFERENCE, Story, policy_in_words
 from pzd.report.wording import number
 
 if TYPE_CHECKING:
@@ -20,13 +20,13 @@ _HEIGHT = 2.8
 _SHADES = ("#f3f6f9", "#e6ecf2", "#d9e2ea", "#ccd7e2", "#bfccd9", "#b2c1d0")
 
 
-def draw(story: Story) -> Iterator[Panel]:
+def draw(context: ReportContext) -> Iterator[Panel]:
     """One panel a road, one line a ride, over bands that overlap as they do in the standard."""
-    for road in story.roads:
-        values = [(row, story.value(row.case, "a_w")) for row in story.cases(road)]
+    for road in context.roads:
+        values = [(row, context.value(row.case, "a_w")) for row in context.cases(road)]
         known = [(row, value) for row, value in values if value is not None]
         if known:
-            yield _panel(story.road(road), known[::-1])
+            yield _panel(context.road(road), known[::-1])
 
 
 def _panel(road: str, known: list[tuple[SummaryRow, float]]) -> Panel:

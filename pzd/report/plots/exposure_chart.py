@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pzd.report.comfort import iso2631_1978
+from pzd.comfort import iso2631_1978
+from pzd.report.context import REFERENCE, ReportContext, policy_in_words
 from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes, legend
-from pzd.report.story import REFERENCE, Story, policy_in_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,20 +19,20 @@ _SMALLEST = 0.02
 """Components below this share of the largest are not drawn."""
 
 
-def draw(story: Story) -> Iterator[Panel]:
+def draw(context: ReportContext) -> Iterator[Panel]:
     """Lines of equal time, and every component of the rides."""
-    if iso2631_1978.EDITION not in story.config.editions:
+    if iso2631_1978.EDITION not in context.config.editions:
         return
-    for road in story.roads:
-        rows = [row for row in (story.reference(road), *story.controlled(road)[:1]) if row is not None]
+    for road in context.roads:
+        rows = [row for row in (context.reference(road), *context.controlled(road)[:1]) if row is not None]
         if rows:
-            yield _panel(story, road, [row.case for row in rows])
+            yield _panel(context, road, [row.case for row in rows])
 
 
-def _panel(story: Story, road: str, cases: list[str]) -> Panel:
+def _panel(context: ReportContext, road: str, cases: list[str]) -> Panel:
     figure, ax = axes(3.3)
     _boundaries(ax)
-    for ride in (ride for ride in story.settled if ride.row.case in cases):
+    for ride in (ride for ride in context.settled if ride.row.case in cases):
         parts, _ = ride.components
         kept = parts.rms >= _SMALLEST * float(parts.rms.max())
         constant = ride.row.policy == REFERENCE
@@ -43,7 +43,7 @@ def _panel(story: Story, road: str, cases: list[str]) -> Panel:
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("acceleration, r.m.s. [m/s²]")
     legend(figure)
-    title = f"Reduced comfort, {story.road(road)}"
+    title = f"Reduced comfort, {context.road(road)}"
     alt = f"Components of the rides over {road} on the chart of reduced comfort of ISO 2631:1978."
     return Panel(figure, title, alt, "Boundaries of ISO 2631:1978: unverified transcription of a withdrawn standard.")
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pzd.report.context import ReportContext
 from pzd.report.drawing import FINAL, MEASURED, PLAIN, Panel, Plot, axes
-from pzd.report.story import Story
 from pzd.report.wording import number
 
 
-def draw(story: Story) -> Iterator[Panel]:
+def draw(context: ReportContext) -> Iterator[Panel]:
     """Bars before, after and of noise; before and noise alone where nothing was adopted."""
-    gap = story.diagnosed.diagnosis.gap
+    gap = context.diagnosed.diagnosis.gap
     noise, after = ("noise alone", gap.noise_floor, MEASURED), ("after", gap.after, FINAL)
-    before = ("before" if story.extended else "simple model", gap.before, PLAIN)
-    bars = [noise, after, before] if story.extended else [noise, before]
+    before = ("before" if context.extended else "simple model", gap.before, PLAIN)
+    bars = [noise, after, before] if context.extended else [noise, before]
     last = bars[1]
     figure, ax = axes(1.0 + 0.4 * len(bars), [bar[0] for bar in bars], key=0)
     ax.barh([b[0] for b in bars], [b[1] for b in bars], color=[b[2] for b in bars], height=0.6)

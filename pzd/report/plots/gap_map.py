@@ -7,19 +7,19 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.record import Array
+from pzd.report.context import ReportContext
 from pzd.report.drawing import MAP, Panel, Plot, axes
 from pzd.report.gaps import GapMap, gap_map
-from pzd.report.story import Story
 
 
-def draw(story: Story) -> Iterator[Panel]:
+def draw(context: ReportContext) -> Iterator[Panel]:
     """The map of the simple model, and beside it that of the final damper where there is another."""
-    if not story.records:
+    if not context.records:
         return
-    found = gap_map(story)
+    found = gap_map(context)
     top = float(np.nanmax(found.before))
     yield _panel(found, found.before, top, "simple model")
-    if story.extended:
+    if context.extended:
         yield _panel(found, found.after, top, "with what was missing")
 
 

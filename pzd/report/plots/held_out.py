@@ -6,23 +6,23 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pzd.report.context import ReportContext
 from pzd.report.drawing import FINAL, PLAIN, Panel, Plot, axes, legend
 from pzd.report.gaps import of_record
-from pzd.report.story import Story
 
 _MOST = 16
 
 
-def draw(story: Story) -> Iterator[Panel]:
+def draw(context: ReportContext) -> Iterator[Panel]:
     """Two dots a record, joined; nothing where diagnose changed nothing."""
-    if not story.extended:
+    if not context.extended:
         return
-    held_out = set(story.diagnosed.diagnosis.gap.held_out)
-    records = [record for record in story.records if record.name in held_out][:_MOST][::-1]
+    held_out = set(context.diagnosed.diagnosis.gap.held_out)
+    records = [record for record in context.records if record.name in held_out][:_MOST][::-1]
     if not records:
         return
     names = [record.name for record in records]
-    before, after = np.array([of_record(story, record) for record in records]).T
+    before, after = np.array([of_record(context, record) for record in records]).T
     figure, ax = axes(1.0 + 0.26 * max(len(names), 3), names)
     ax.hlines(names, after, before, color="#b8c4d0", linewidth=2.0)
     ax.plot(before, names, "o", color=PLAIN, label="before")

@@ -6,21 +6,21 @@ from collections.abc import Iterator
 
 from pzd.artefacts import ParameterRow
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS
+from pzd.report.context import ReportContext
 from pzd.report.drawing import Panel, Plot, axes, legend, shades
-from pzd.report.story import Story
 from pzd.report.wording import amount, unit_of
 
 
-def draw(story: Story) -> Iterator[Panel]:
+def draw(context: ReportContext) -> Iterator[Panel]:
     """One panel a parameter; nothing where there are fewer than two voltages."""
-    if len({row.voltage_V for row in story.parameters if row.voltage_V is not None}) < 2:
+    if len({row.voltage_V for row in context.parameters if row.voltage_V is not None}) < 2:
         return
-    temperatures = sorted({row.temperature_degC for row in story.parameters}, key=lambda t: t or 0.0)
-    voltages = [row.voltage_V for row in story.parameters if row.voltage_V is not None]
+    temperatures = sorted({row.temperature_degC for row in context.parameters}, key=lambda t: t or 0.0)
+    voltages = [row.voltage_V for row in context.parameters if row.voltage_V is not None]
     for quantity in (FRICTION, DAMPING, STIFFNESS):
         figure, ax = axes(2.6, key=int(len(temperatures) > 1))
         for temperature, colour in zip(temperatures, shades(len(temperatures)), strict=True):
-            rows = [row for row in story.parameters if row.temperature_degC == temperature]
+            rows = [row for row in context.parameters if row.temperature_degC == temperature]
             known = sorted(
                 (row.voltage_V, *_bounds(row, quantity.column))
                 for row in rows
@@ -30,7 +30,7 @@ def draw(story: Story) -> Iterator[Panel]:
                 x, y, below, above = zip(*known, strict=True)
                 label = amount(temperature, "degC") if temperature is not None else None
                 ax.errorbar(x, y, yerr=(below, above), fmt="o-", color=colour, capsize=3.0, markersize=4.0, label=label)
-        ax.set_xlabel(f"{story.control.name} [{story.control.unit}]")
+        ax.set_xlabel(f"{context.control.name} [{context.control.unit}]")
         ax.set_ylabel(f"{quantity.symbol} [k{unit_of(quantity.unit)}]")
         margin = 0.05 * (max(voltages) - min(voltages))
         ax.set_xlim(min(voltages) - margin, max(voltages) + margin)
@@ -40,7 +40,10 @@ def draw(story: Story) -> Iterator[Panel]:
         name = quantity.meaning.removesuffix(" of the Bingham element")
         title = f"{quantity.symbol}: {name}"
         yield Panel(
-            figure, title, f"{title}, over the {story.control.name}, with 95 % intervals.", "Whiskers: 95 % intervals."
+            figure,
+            title,
+            f"{title}, over the {context.control.name}, with 95 % intervals.",
+            "Whiskers: 95 % intervals.",
         )
 
 

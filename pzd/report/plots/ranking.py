@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pzd.report.context import ReportContext
 from pzd.report.drawing import FINAL, GRID, Panel, Plot, axes
-from pzd.report.story import Story
 
 _MOST = 10
 
 
-def draw(story: Story) -> Iterator[Panel]:
+def draw(context: ReportContext) -> Iterator[Panel]:
     """One bar a candidate, best on top."""
-    diagnosis = story.diagnosed.diagnosis
+    diagnosis = context.diagnosed.diagnosis
     ranked = diagnosis.ranking[:_MOST][::-1]
     if not ranked:
         return

@@ -5,38 +5,38 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import ParameterRow
-from pzd.damper.foils import known
+from pzd.damper.competing_forms import known
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS, VOLTAGE
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
+from pzd.report.context import ReportContext, effect_in_words
 from pzd.report.sections.pictures import Pictures, galleries
-from pzd.report.story import Story, effect_in_words
 from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
 
 _QUANTITIES = (FRICTION, DAMPING, STIFFNESS)
 _FOLD = 12
 
 
-def tell(story: Story, pictures: Pictures) -> Section:
+def render(context: ReportContext, pictures: Pictures) -> Section:
     """The fourth section."""
-    blocks: list[Block] = [Paragraph(_intro(story)), _parameters(story)]
-    blocks += [_completed(story)] if story.extended else []
+    blocks: list[Block] = [Paragraph(_intro(context)), _parameters(context)]
+    blocks += [_completed(context)] if context.extended else []
     blocks += galleries(pictures["damper"])
-    blocks += [_force(story)] if story.table.force else []
-    notes = story.table.notes
+    blocks += [_force(context)] if context.table.force else []
+    notes = context.table.notes
     if notes.not_monotone:
         blocks += [
-            Paragraph(f"Force does not always rise with the {story.control.name}:"),
+            Paragraph(f"Force does not always rise with the {context.control.name}:"),
             Notes(notes.not_monotone, "care"),
         ]
     if notes.lost:
         blocks += [Paragraph("A table of force cannot carry:"), Notes(notes.lost)]
-    blocks += [_responses(story)] if story.rides.responses else []
-    blocks += [_measures(story)] if story.identified.measures else []
+    blocks += [_responses(context)] if context.rides.responses else []
+    blocks += [_measures(context)] if context.identified.measures else []
     return Section("damper", "What the damper is", tuple(blocks))
 
 
-def _intro(story: Story) -> str:
-    effects = story.diagnosed.damper.effects
+def _intro(context: ReportContext) -> str:
+    effects = context.diagnosed.damper.effects
     laws = [f"{effect_in_words(name)}, {known()[name].law}" for name in effects]
     beside = f" What was missing stands beside it: {listed(laws)}." if laws else ""
     return (
@@ -45,35 +45,35 @@ def _intro(story: Story) -> str:
     )
 
 
-def _parameters(story: Story) -> Sheet:
+def _parameters(context: ReportContext) -> Sheet:
     units = [f"{q.symbol} [{unit_of(q.unit)}]" for q in _QUANTITIES]
-    header = (story.control.name, "temperature", *units, "W_s", "r.m.s. error", "status")
+    header = (context.control.name, "temperature", *units, "W_s", "r.m.s. error", "status")
     return Sheet(
         "Identified parameters of the Bingham element alone",
         header,
-        tuple(_row(story, row) for row in story.parameters),
+        tuple(_row(context, row) for row in context.parameters),
         False,
     )
 
 
-def _completed(story: Story) -> Sheet:
+def _completed(context: ReportContext) -> Sheet:
     """T0, C and k beside what was added: alone they also stood in for it."""
     units = [f"{q.symbol} [{unit_of(q.unit)}]" for q in _QUANTITIES]
     rows = tuple(
         (
-            story.voltage(row.voltage_V),
+            context.voltage(row.voltage_V),
             amount(row.temperature_degC, "degC"),
             *(number(getattr(row, q.column)) for q in _QUANTITIES),
         )
-        for row in story.diagnosed.damper.base
+        for row in context.diagnosed.damper.base
     )
-    return Sheet("With what was missing", (story.control.name, "temperature", *units), rows)
+    return Sheet("With what was missing", (context.control.name, "temperature", *units), rows)
 
 
-def _row(story: Story, row: ParameterRow) -> tuple[str, ...]:
+def _row(context: ReportContext, row: ParameterRow) -> tuple[str, ...]:
     values = (interval(*(getattr(row, f"{q.column}{end}") for end in ("", "_low95", "_high95"))) for q in _QUANTITIES)
     return (
-        story.voltage(row.voltage_V),
+        context.voltage(row.voltage_V),
         amount(row.temperature_degC, "degC"),
         *values,
         number(row.W_s),
@@ -82,16 +82,16 @@ def _row(story: Story, row: ParameterRow) -> tuple[str, ...]:
     )
 
 
-def _force(story: Story) -> Sheet:
-    first = min((row.temperature_degC for row in story.table.force), key=lambda t: -np.inf if t is None else t)
-    rows = [row for row in story.table.force if row.temperature_degC == first and row.velocity_m_per_s > 0.0]
+def _force(context: ReportContext) -> Sheet:
+    first = min((row.temperature_degC for row in context.table.force), key=lambda t: -np.inf if t is None else t)
+    rows = [row for row in context.table.force if row.temperature_degC == first and row.velocity_m_per_s > 0.0]
     voltages = sorted({row.voltage_V for row in rows}, key=lambda v: v or 0.0)
     speeds = sorted({row.velocity_m_per_s for row in rows})
     at = {(row.velocity_m_per_s, row.voltage_V): row for row in rows}
-    chosen = _spread(speeds, story.table.notes.reached_m_per_s)
+    chosen = _spread(speeds, context.table.notes.reached_m_per_s)
     cells = tuple((amount(v, "m/s"), *(_cell(at.get((v, volt))) for volt in voltages)) for v in chosen)
     degrees = f" at {amount(first, 'degC')}" if first is not None else ""
-    header = ("speed in rebound", *(f"force at {story.voltage(volt)}" for volt in voltages))
+    header = ("speed in rebound", *(f"force at {context.voltage(volt)}" for volt in voltages))
     return Sheet(f"Force{degrees}; in brackets the model beyond what the rig reached", header, cells)
 
 
@@ -111,28 +111,28 @@ def _spread(speeds: list[float], reached: float) -> list[float]:
     return sorted({min(speeds, key=lambda v: abs(v - target)) for target in wanted})
 
 
-def _responses(story: Story) -> Sheet:
+def _responses(context: ReportContext) -> Sheet:
     rows = tuple(
         (
-            story.control.name if r.signal == VOLTAGE.name else r.signal,
-            f"{story.voltage(r.from_voltage_V)} to {story.voltage(r.to_voltage_V)}",
+            context.control.name if r.signal == VOLTAGE.name else r.signal,
+            f"{context.voltage(r.from_voltage_V)} to {context.voltage(r.to_voltage_V)}",
             amount(r.velocity_m_per_s, "m/s"),
             *(f"{number(1000.0 * t)} ms" if t is not None else DASH for t in (r.to_63_percent_s, r.to_90_percent_s)),
         )
-        for r in story.rides.responses
+        for r in context.rides.responses
     )
     return Sheet(
         "Answer to a step at constant speed", ("signal", "step", "speed", "to 63 %", "to 90 %"), rows, len(rows) > _FOLD
     )
 
 
-def _measures(story: Story) -> Sheet:
-    conditions = ("record", story.control.name, "temperature", "frequency", "amplitude")
+def _measures(context: ReportContext) -> Sheet:
+    conditions = ("record", context.control.name, "temperature", "frequency", "amplitude")
     found = ("peak force", "force at zero velocity", "work per cycle", "equivalent c", "dynamic range")
     rows = tuple(
         (
             m.record,
-            story.voltage(m.voltage_V),
+            context.voltage(m.voltage_V),
             amount(m.temperature_degC, "degC"),
             amount(m.frequency_Hz, "Hz"),
             f"{number(1000.0 * m.amplitude_m)} mm",
@@ -142,7 +142,7 @@ def _measures(story: Story) -> Sheet:
             amount(m.equivalent_damping_Ns_per_m, "N s/m"),
             number(m.dynamic_range),
         )
-        for m in story.identified.measures
-        if m.setting == story.chosen
+        for m in context.identified.measures
+        if m.setting == context.chosen
     )
     return Sheet("Every test as an equivalent viscous damper", conditions + found, rows, folded=True)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from pzd.comfort import directive, iso2631_1978, iso2631_1997
 from pzd.report.blocks import Notes, Paragraph, Section
-from pzd.report.comfort import directive, iso2631_1978, iso2631_1997
-from pzd.report.story import Story
+from pzd.report.context import ReportContext
 
 _STAGES = (
     "rig: records in SI units, checked, never corrected unasked (1-rig)",
@@ -28,8 +28,8 @@ _SIGNS = (
 )
 
 
-def tell(story: Story) -> Section:
+def render(context: ReportContext) -> Section:
     """The last section."""
-    sources = tuple(f"{edition}: {_SOURCES[edition]}" for edition in story.config.editions)
+    sources = tuple(f"{edition}: {_SOURCES[edition]}" for edition in context.config.editions)
     blocks = (Paragraph(_LINE), Notes(_STAGES), Paragraph("Standards:"), Notes(sources), Paragraph(_SIGNS))
     return Section("made", "How it was made", blocks)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from pzd.artefacts import Diagnosis, NextTest, Ranked, Value
-from pzd.damper.foils import known
+from pzd.damper.competing_forms import known
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
+from pzd.report.context import ReportContext, effect_in_words, effects_in_words
 from pzd.report.sections.pictures import Pictures, galleries
-from pzd.report.story import Story, effect_in_words, effects_in_words
 from pzd.report.wording import DASH, amount, interval, listed, number, percent, sentence, unit_of
 
 _FOLD = 6
 
 
-def tell(story: Story, pictures: Pictures) -> Section:
+def render(context: ReportContext, pictures: Pictures) -> Section:
     """The third section."""
-    diagnosis = story.diagnosed.diagnosis
+    diagnosis = context.diagnosed.diagnosis
     sure = (
         "" if diagnosis.confidence is None else f" The confidence in this verdict is {percent(diagnosis.confidence)}."
     )
@@ -22,10 +22,10 @@ def tell(story: Story, pictures: Pictures) -> Section:
     blocks += [Paragraph(text) for text in (sentence(diagnosis.reason), _gap(diagnosis)) if text]
     blocks += [*galleries(pictures["missing"])]
     if diagnosis.parameters:
-        blocks.append(_parameters(story, diagnosis))
+        blocks.append(_parameters(context, diagnosis))
     if diagnosis.ranking:
         blocks.append(_ranking(diagnosis))
-    blocks.append(Notes((next_test(story, diagnosis.next_test),)))
+    blocks.append(Notes((next_test(context, diagnosis.next_test),)))
     return Section("missing", "What is missing, and how sure that is", tuple(blocks))
 
 
@@ -62,17 +62,17 @@ def _gap(diagnosis: Diagnosis) -> str:
     return f"{text} {weak[gap.hold_out]}"
 
 
-def _parameters(story: Story, diagnosis: Diagnosis) -> Sheet:
+def _parameters(context: ReportContext, diagnosis: Diagnosis) -> Sheet:
     rows = [
         row
         for effect, values in diagnosis.parameters.items()
         for name, value in values.items()
-        for row in _value_rows(story, effect, name, value)
+        for row in _value_rows(context, effect, name, value)
     ]
     return Sheet("What was added", ("effect", "parameter", "value (95 % interval)", "unit"), tuple(rows))
 
 
-def _value_rows(story: Story, effect: str, name: str, value: Value) -> list[tuple[str, ...]]:
+def _value_rows(context: ReportContext, effect: str, name: str, value: Value) -> list[tuple[str, ...]]:
     unit = unit_of(value.unit)
     if not isinstance(value.value, tuple):
         low, high = (bound if not isinstance(bound, tuple) else None for bound in (value.low95, value.high95))
@@ -81,7 +81,7 @@ def _value_rows(story: Story, effect: str, name: str, value: Value) -> list[tupl
     unknown = (None,) * len(value.value)
     lows, highs = (bound if isinstance(bound, tuple) else unknown for bound in (value.low95, value.high95))
     return [
-        (effect, f"{name} at {story.voltage(node)}", interval(each, low, high), unit)
+        (effect, f"{name} at {context.voltage(node)}", interval(each, low, high), unit)
         for node, each, low, high in zip(nodes, value.value, lows, highs, strict=True)
     ]
 
@@ -106,7 +106,7 @@ def _fitted(ranked: Ranked) -> str:
     return "; ".join(texts) or DASH
 
 
-def next_test(story: Story, test: NextTest | None) -> str:
+def next_test(context: ReportContext, test: NextTest | None) -> str:
     """The next rig test in plain words, with what it would settle."""
     if test is None:
         return "Next test: none is proposed."
@@ -117,15 +117,15 @@ def next_test(story: Story, test: NextTest | None) -> str:
         if test.distance_percent
         else ""
     )
-    return f"Next test: {rig_test(story, test)}{aim}{far}."
+    return f"Next test: {rig_test(context, test)}{aim}{far}."
 
 
-def rig_test(story: Story, test: NextTest) -> str:
+def rig_test(context: ReportContext, test: NextTest) -> str:
     """A rig test in a few words."""
     parts = [test.waveform.replace("_", " ")]
     parts += [amount(test.frequency_Hz, "Hz")] if test.frequency_Hz is not None else []
     parts += [f"amplitude {number(1000.0 * test.amplitude_m)} mm"] if test.amplitude_m is not None else []
     if test.voltage_V is not None:
         volts = test.voltage_V if isinstance(test.voltage_V, tuple) else (test.voltage_V,)
-        parts.append(f"at {' and '.join(story.voltage(v) for v in volts)}")
+        parts.append(f"at {' and '.join(context.voltage(v) for v in volts)}")
     return ", ".join(parts)

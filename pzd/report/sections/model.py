@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pzd.report.blocks import Block, Paragraph, Section, Sheet
+from pzd.report.context import ReportContext
 from pzd.report.sections.pictures import Pictures, galleries
-from pzd.report.story import Story
 from pzd.report.wording import number, percent
 
 
-def tell(story: Story, pictures: Pictures) -> Section:
+def render(context: ReportContext, pictures: Pictures) -> Section:
     """The second section."""
-    gap = story.diagnosed.diagnosis.gap
+    gap = context.diagnosed.diagnosis.gap
     text = (
         "The simple model is the Bingham element of the paper: dry friction T0 and viscous damping C in series with "
         f"the oil spring k. On data that no fit has seen it leaves W_s = {number(gap.before)}, where noise alone would "
@@ -18,7 +18,7 @@ def tell(story: Story, pictures: Pictures) -> Section:
         f"{percent(gap.before**0.5)} of the force, and noise alone would be {percent(gap.noise_floor**0.5)}."
     )
     blocks: list[Block] = [Paragraph(text), *galleries(pictures["model"])]
-    where = story.diagnosed.diagnosis.where
+    where = context.diagnosed.diagnosis.where
     if where:
         rows = tuple((region.region, percent(region.share_of_gap)) for region in where)
         blocks.append(Sheet("Where the gap lies", ("region", "share of the gap"), rows))

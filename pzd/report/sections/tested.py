@@ -7,17 +7,17 @@ import numpy as np
 from pzd.artefacts import RecordEntry
 from pzd.record import Record
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
-from pzd.report.story import Story
+from pzd.report.context import ReportContext
 from pzd.report.wording import amount, number
 
 _FOLD = 12
 """Tables longer than this are folded."""
 
 
-def tell(story: Story) -> Section:
+def render(context: ReportContext) -> Section:
     """The first section."""
-    blocks: list[Block] = [Paragraph(_summary(story)), _records(story)]
-    findings = _findings(story)
+    blocks: list[Block] = [Paragraph(_summary(context)), _records(context)]
+    findings = _findings(context)
     if findings.rows:
         text = "Nothing was corrected unasked: each finding says where it is, how large it is and what follows."
         blocks += [
@@ -26,7 +26,7 @@ def tell(story: Story) -> Section:
         ]
     else:
         blocks.append(Notes(("The preflight had no objection to any record.",), "good"))
-    removed = tuple(f"{e.name}: {e.removed}" for e in story.rig.entries if e.removed)
+    removed = tuple(f"{e.name}: {e.removed}" for e in context.rig.entries if e.removed)
     if removed:
         blocks += [Paragraph("A known fixture was taken out of the force:"), Notes(removed)]
     return Section("tested", "What was tested", tuple(blocks))
@@ -36,37 +36,40 @@ def _count(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def _summary(story: Story) -> str:
-    records = story.records
+def _summary(context: ReportContext) -> str:
+    records = context.records
     if not records:
         return "No record belongs to this setting."
     stroke = max(float(np.ptp(r.displacement)) for r in records)
     speed = max(float(np.abs(r.velocity).max()) for r in records)
     force = max(float(np.abs(r.force).max()) for r in records)
     seconds = sum(float(r.time[-1] - r.time[0]) for r in records)
-    where = f" of the setting {story.chosen}" if story.chosen else ""
+    where = f" of the setting {context.chosen}" if context.chosen else ""
     parts = [
         f"{_count(len(records), 'record')}{where}, {number(seconds)} s in all",
         f"stroke up to {number(1000.0 * stroke)} mm, speed up to {number(speed)} m/s, force up to {amount(force, 'N')}",
     ]
-    others = len(story.rig.records) - len(records)
+    others = len(context.rig.records) - len(records)
     if others:
         parts.append(f"{_count(others, 'record')} of other settings were identified as well, and not used further")
-    return "; ".join([*parts[:1], *_conditions(story), *parts[1:]]) + "."
+    return "; ".join([*parts[:1], *_conditions(context), *parts[1:]]) + "."
 
 
-def _conditions(story: Story) -> list[str]:
+def _conditions(context: ReportContext) -> list[str]:
     found = []
     volts = [
-        v for r in story.records if r.voltage is not None for v in (float(r.voltage.min()), float(r.voltage.max()))
+        v for r in context.records if r.voltage is not None for v in (float(r.voltage.min()), float(r.voltage.max()))
     ]
     if volts:
         span = number(min(volts)), number(max(volts))
-        found.append(f"{story.control.name} {_span(*span)} {story.control.unit}")
+        found.append(f"{context.control.name} {_span(*span)} {context.control.unit}")
     else:
-        found.append(f"no {story.control.name} was recorded")
+        found.append(f"no {context.control.name} was recorded")
     degrees = [
-        float(t) for r in story.records if r.temperature is not None for t in (r.temperature.min(), r.temperature.max())
+        float(t)
+        for r in context.records
+        if r.temperature is not None
+        for t in (r.temperature.min(), r.temperature.max())
     ]
     if degrees:
         found.append(f"temperature {_span(number(min(degrees)), number(max(degrees)))} °C")
@@ -79,10 +82,10 @@ def _span(low: str, high: str) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _records(story: Story) -> Sheet:
+def _records(context: ReportContext) -> Sheet:
     header = (
         "record",
-        story.control.name,
+        context.control.name,
         "temperature",
         "rate",
         "cycles",
@@ -91,15 +94,15 @@ def _records(story: Story) -> Sheet:
         "top force",
         "findings",
     )
-    pairs = [(story.entries[r.name], r) for r in story.records if r.name in story.entries]
-    rows = tuple(_row(story, entry, record) for entry, record in pairs)
+    pairs = [(context.entries[r.name], r) for r in context.records if r.name in context.entries]
+    rows = tuple(_row(context, entry, record) for entry, record in pairs)
     return Sheet("Records", header, rows, folded=len(rows) > _FOLD)
 
 
-def _row(story: Story, entry: RecordEntry, record: Record) -> tuple[str, ...]:
+def _row(context: ReportContext, entry: RecordEntry, record: Record) -> tuple[str, ...]:
     return (
         entry.name,
-        amount(entry.voltage_V, story.control.unit),
+        amount(entry.voltage_V, context.control.unit),
         amount(entry.temperature_degC, "degC"),
         amount(entry.rate_Hz, "Hz", 4),
         number(entry.cycles),
@@ -110,10 +113,10 @@ def _row(story: Story, entry: RecordEntry, record: Record) -> tuple[str, ...]:
     )
 
 
-def _findings(story: Story) -> Sheet:
+def _findings(context: ReportContext) -> Sheet:
     rows = tuple(
         (entry.name, finding.check, finding.where, amount(finding.size, finding.unit), finding.follows)
-        for entry in story.rig.entries
+        for entry in context.rig.entries
         for finding in entry.findings
     )
     return Sheet(

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pzd.artefacts import ENERGY_LIMIT
+from pzd.comfort import iso2631_1978
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
-from pzd.report.comfort import iso2631_1978
-from pzd.report.story import Story
+from pzd.report.context import ReportContext
 from pzd.report.wording import number, percent
 
 _MUCH = 0.01
 
 
-def tell(story: Story) -> Section:
+def render(context: ReportContext) -> Section:
     """The sixth section."""
-    marks = (*story.identified.untrusted, *story.rides.untrusted)
+    marks = (*context.identified.untrusted, *context.rides.untrusted)
     blocks: list[Block] = []
     if marks:
         blocks += [Paragraph("These results are not to be trusted as they stand:"), Notes(marks, "care")]
@@ -23,22 +23,22 @@ def tell(story: Story) -> Section:
         balance = f"the energy of every ride balances to {number(ENERGY_LIMIT)} or better"
         text = f"T0 and C are determined everywhere, and {balance}."
         blocks.append(Notes((text,), "good"))
-    cares = tuple(_cares(story))
+    cares = tuple(_cares(context))
     if cares:
         blocks += [Paragraph("To be kept in mind:"), Notes(cares, "care")]
-    blocks.append(_balance(story))
+    blocks.append(_balance(context))
     return Section("trust", "How far to trust it", tuple(blocks))
 
 
-def _cares(story: Story) -> Iterator[str]:
-    weak = [row for row in story.parameters if row.status.startswith("weak")]
+def _cares(context: ReportContext) -> Iterator[str]:
+    weak = [row for row in context.parameters if row.status.startswith("weak")]
     if weak:
-        yield f"{len(weak)} of {len(story.parameters)} conditions hold a parameter that the data determine weakly"
-    if story.diagnosed.diagnosis.verdict == "unexplained":
+        yield f"{len(weak)} of {len(context.parameters)} conditions hold a parameter that the data determine weakly"
+    if context.diagnosed.diagnosis.verdict == "unexplained":
         yield "part of the measured force is repeatable and not explained; the rides carry that gap"
-    if story.diagnosed.diagnosis.verdict == "ambiguous":
+    if context.diagnosed.diagnosis.verdict == "ambiguous":
         yield "which effect is missing is not settled; another one would change the rides"
-    beyond = [row for row in story.rides.summary if row.outside_table > _MUCH]
+    beyond = [row for row in context.rides.summary if row.outside_table > _MUCH]
     if beyond:
         worst = max(beyond, key=lambda row: row.outside_table)
         does = {
@@ -47,21 +47,22 @@ def _cares(story: Story) -> Iterator[str]:
             "model": "the model goes on there",
         }
         yield (
-            f"{len(beyond)} rides leave what the rig reached ({number(story.table.notes.reached_m_per_s)} m/s), "
-            f"{worst.case} for {percent(worst.outside_table)} of its time: {does[story.table.notes.outside]}, untested"
+            f"{len(beyond)} rides leave what the rig reached ({number(context.table.notes.reached_m_per_s)} m/s), "
+            f"{worst.case} for {percent(worst.outside_table)} of its time: "
+            f"{does[context.table.notes.outside]}, untested"
         )
-    if iso2631_1978.EDITION in story.config.editions:
+    if iso2631_1978.EDITION in context.config.editions:
         yield f"the exposure times of {iso2631_1978.EDITION}, withdrawn in 1997, rest on an {iso2631_1978.TRUST}"
-    findings = sum(len(entry.findings) for entry in story.rig.entries)
+    findings = sum(len(entry.findings) for entry in context.rig.entries)
     if findings:
         yield f"the preflight left {findings} finding{'s' if findings > 1 else ''} on the records"
     yield "vibration is judged in the vertical direction at point K only, without a seat"
 
 
-def _balance(story: Story) -> Sheet:
+def _balance(context: ReportContext) -> Sheet:
     rows = tuple(
         (row.case, number(row.energy_error, 2), percent(row.outside_table) if row.outside_table else "0 %")
-        for row in story.rides.summary
+        for row in context.rides.summary
     )
     return Sheet(
         "Energy balance and table", ("ride", "energy error / dissipated", "time outside of the rig's range"), rows, True

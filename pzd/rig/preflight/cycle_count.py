@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pzd.artefacts import Finding
-from pzd.rig.believable import reversals
+from pzd.rig.files.refusals import reversals
 from pzd.rig.measured import Measured
 
 ENOUGH = 3.0

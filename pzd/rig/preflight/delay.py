@@ -6,8 +6,8 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.record import is_constant, voltage_scale
-from pzd.rig.coarse import VISIBLE, fitted, plain
 from pzd.rig.measured import Measured
+from pzd.rig.reference_fit import VISIBLE, fit_reference, fitted
 
 LEAST_DELAY = 1e-3
 """Smallest delay that is said [s]; what is less is within the nuisances of a diagnosis."""
@@ -22,7 +22,7 @@ def check(test: Measured) -> list[Finding]:
     """A delay of the force against the displacement that a plain Bingham element asks for."""
     if not is_constant(test.record, voltage_scale([test.record])):
         return []
-    part, undelayed = plain(test)
+    part, undelayed = fit_reference(test)
     longest = min(LONGEST, test.run.period / 20.0) if test.run else LONGEST
     delays = np.linspace(-longest, longest, TRIES)
     best = fitted(part, part.force_later(delays))

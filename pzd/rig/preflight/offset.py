@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.coarse import plain, unit_force
 from pzd.rig.measured import Measured
+from pzd.rig.reference_fit import fit_reference, unit_force
 
 SHARE = 0.04
 """Offset that is said, as a share of half the force's range."""
@@ -22,7 +22,7 @@ def check(test: Measured) -> list[Finding]:
 
     Equation: F = F_0 + k f(T0/k, C/k) + c_1 x + c_2 a               Source: least squares on a coarse element
     """
-    part, element = plain(test)
+    part, element = fit_reference(test)
     force = part.force_later(np.zeros(1))[0]
     unit = unit_force(part, element.friction_extension, element.lag)
     slips = min(np.mean(sign * unit > element.friction_extension) for sign in (1.0, -1.0))

@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.rig.measured import Measured
-from pzd.rig.period import moving
+from pzd.signals.period import moving
 
 RESTS = 0.1
 """Share of a record at rest, before and after the motion, that is said."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.believable import reversals, work_done
+from pzd.rig.files.refusals import reversals, work_done
 from pzd.rig.measured import Measured
 
 LEAST = 0.05

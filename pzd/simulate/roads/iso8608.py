@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field, field_validator
 from typing_extensions import override
 
-from pzd.rig.roads import classes
-from pzd.rig.roads import profile as drawn
+from pzd.signals.iso8608 import classes
+from pzd.signals.iso8608 import profile as drawn
 from pzd.simulate.profile import Profile, through
 from pzd.simulate.road import Road, Way
 

@@ -1,0 +1,117 @@
+"""ISO 2631:1978 (withdrawn in 1997): how long a seated person may be exposed to vertical vibration.
+
+The boundaries are an unverified transcription: no printed copy was within reach. One outside check
+stands: a 1976 report of the Royal Aircraft Establishment puts 1.2 m/s2 at 5 Hz at 1 h
+(proficiency) and 3 h (exposure limit); this table gives 58 and 197 min.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Literal
+
+import numpy as np
+
+from pzd.comfort.spectrum import Components
+from pzd.record import Array
+
+EDITION = "ISO 2631:1978"
+TRUST = "unverified transcription"
+
+Boundary = Literal["fatigue_decreased_proficiency", "exposure_limit", "reduced_comfort"]
+
+FACTORS: dict[Boundary, float] = {
+    "reduced_comfort": 1.0 / 3.15,
+    "fatigue_decreased_proficiency": 1.0,
+    "exposure_limit": 2.0,
+}
+"""Each boundary as a multiple of the tabulated one (6 dB above, 10 dB below)."""
+
+FLAT_TOP_MIN = 4.0
+"""The chart is flat from 1 to 4 min: the 1-min column holds up to here."""
+
+_MINUTES = {"24h": 1440.0, "16h": 960.0, "8h": 480.0, "4h": 240.0, "2.5h": 150.0, "1h": 60.0, "25min": 25.0}
+_MINUTES |= {"16min": 16.0, "1min": FLAT_TOP_MIN}
+
+LONGEST_MIN = _MINUTES["24h"]
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """How long a vibration may last."""
+
+    minutes: float | None
+    """0 over the chart, 1440 (or more) beyond it, None where the chart says nothing [min]."""
+    remark: str
+    """Where on the chart that is; empty inside of it."""
+    frequency: float | None = None
+    """Frequency of the component that governs [Hz]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """The tabulated boundary of fatigue-decreased proficiency, a_z."""
+
+    frequency: Array
+    """(n,) nominal third-octave centres [Hz]"""
+    minutes: Array
+    """(m,) times, falling [min]"""
+    level: Array
+    """(n, m) r.m.s. acceleration [m/s2]"""
+
+    def levels_at(self, frequency: float) -> Array:
+        """(m,) boundary at one frequency [m/s2 r.m.s.], interpolated log-log between the centres."""
+        place = np.log(frequency)
+        columns = np.log(self.level).T
+        return np.exp([np.interp(place, np.log(self.frequency), column) for column in columns])
+
+
+@cache
+def chart() -> Chart:
+    """The boundary table of the package."""
+    text = files("pzd.comfort").joinpath("iso2631_1978_az_limits.csv").read_text(encoding="utf-8")
+    header, *lines = [line.split(",") for line in text.splitlines() if line]
+    values = np.array(lines, dtype=np.float64)
+    return Chart(values[:, 0], np.array([_MINUTES[name] for name in header[1:]]), values[:, 1:])
+
+
+def exposure(acceleration: float, frequency: float, boundary: Boundary) -> Exposure:
+    """Time for which a tone may last before it reaches a boundary, interpolated log-log.
+
+    Parameters
+    ----------
+    acceleration : r.m.s. of the tone [m/s2]
+    frequency : of the tone itself, not of the band that holds it [Hz]
+    boundary : which boundary
+
+    Returns
+    -------
+    the time, and where on the chart it lies
+    """
+    table = chart()
+    if not table.frequency[0] * (1 - _SAME) <= frequency <= table.frequency[-1] * (1 + _SAME):
+        return Exposure(None, "the chart covers 1 to 80 Hz only", frequency)
+    levels = FACTORS[boundary] * table.levels_at(frequency)
+    if acceleration > levels[-1] * (1.0 + _SAME):
+        return Exposure(0.0, "over the chart", frequency)
+    if acceleration >= levels[-1] * (1.0 - _SAME):
+        return Exposure(FLAT_TOP_MIN, "4 min or less", frequency)
+    if acceleration < levels[0] * (1.0 - _SAME):
+        return Exposure(LONGEST_MIN, "beyond the chart (more than 24 h)", frequency)
+    minutes = np.exp(np.interp(np.log(acceleration), np.log(levels), np.log(table.minutes)))
+    return Exposure(float(minutes), "", frequency)
+
+
+def shortest(components: Components, boundary: Boundary) -> Exposure:
+    """The shortest time of any component: each is rated by itself, as the standard does with bands."""
+    rated = [
+        (found.minutes, -float(level / FACTORS[boundary] / chart().levels_at(float(frequency))[0]), found)
+        for frequency, level in zip(components.frequency, components.rms, strict=True)
+        if (found := exposure(float(level), float(frequency), boundary)).minutes is not None
+    ]
+    if not rated:
+        return Exposure(None, "the chart covers 1 to 80 Hz only")
+    return min(rated, key=lambda item: item[:2])[2]

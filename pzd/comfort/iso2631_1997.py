@@ -1,0 +1,103 @@
+"""ISO 2631-1:1997: the weighted measures of a ride, when they do not suffice, and how it is likely to be felt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pzd.comfort.measures import crest_factor, maximum_transient, rms, vibration_dose
+from pzd.record import Array
+
+EDITION = "ISO 2631-1:1997"
+
+CREST_LIMIT = 9.0
+MTVV_LIMIT = 1.5
+VDV_LIMIT = 1.75
+"""Beyond any of these the r.m.s. alone understates the vibration (6.2.1 and 6.3.3)."""
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """One of the standard's likely reactions in public transport; neighbours overlap on purpose."""
+
+    text: str
+    low: float
+    """[m/s2]"""
+    high: float
+    """[m/s2]"""
+    trust: str
+
+
+REACTIONS = (
+    Reaction("not uncomfortable", 0.0, 0.315, "verified"),
+    Reaction("a little uncomfortable", 0.315, 0.63, "verified"),
+    Reaction("fairly uncomfortable", 0.5, 1.0, "verified"),
+    Reaction("uncomfortable", 0.8, 1.6, "verified"),
+    Reaction("very uncomfortable", 1.25, 2.5, "recalled, not verified"),
+    Reaction("extremely uncomfortable", 2.0, float("inf"), "recalled, not verified"),
+)
+
+HEALTH_ZONES = {"0.45-0.90": (0.45, 0.90), "0.47-0.93": (0.47, 0.93)}
+"""Readings of the health guidance caution zone at 8 h [m/s2]: secondary sources disagree."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The weighted measures of one ride."""
+
+    a_w: float
+    """Weighted r.m.s. [m/s2]."""
+    peak: float
+    """Weighted peak [m/s2]."""
+    vdv: float
+    """[m/s^1.75]"""
+    mtvv: float
+    """[m/s2]"""
+    crest: float
+    mtvv_ratio: float
+    """MTVV / a_w."""
+    vdv_ratio: float
+    """VDV / (a_w T^(1/4))."""
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """The conditions under which MTVV and VDV are to be reported beside a_w, as far as they are met."""
+        found = (
+            (self.crest > CREST_LIMIT, f"crest factor above {CREST_LIMIT:g}"),
+            (self.mtvv_ratio > MTVV_LIMIT, f"MTVV/a_w above {MTVV_LIMIT:g}"),
+            (self.vdv_ratio > VDV_LIMIT, f"VDV/(a_w T^(1/4)) above {VDV_LIMIT:g}"),
+        )
+        return tuple(text for met, text in found if met)
+
+
+def evaluate(weighted: Array, rate: float) -> Evaluation:
+    """All measures of a weighted history.
+
+    Source: ISO 2631-1:1997, eq. (1), (2), (4), (5) and 6.3.3
+
+    Parameters
+    ----------
+    weighted : (n,) weighted acceleration of the settled ride [m/s2]
+    rate : sampling rate [Hz]
+
+    Returns
+    -------
+    the measures; ratios are 0 for a vehicle at rest
+    """
+    a_w, vdv, mtvv = rms(weighted), vibration_dose(weighted, rate), maximum_transient(weighted, rate)
+    duration = weighted.size / rate
+    crest = crest_factor(weighted)
+    moving = a_w > 0.0
+    return Evaluation(
+        a_w=a_w,
+        peak=crest * a_w,
+        vdv=vdv,
+        mtvv=mtvv,
+        crest=crest,
+        mtvv_ratio=mtvv / a_w if moving else 0.0,
+        vdv_ratio=vdv / (a_w * duration**0.25) if moving else 0.0,
+    )
+
+
+def reactions(a_w: float) -> tuple[Reaction, ...]:
+    """The likely reactions to a weighted r.m.s. [m/s2]; the bands overlap, so there may be two."""
+    return tuple(reaction for reaction in REACTIONS if reaction.low <= a_w < reaction.high)

@@ -1,0 +1,25 @@
+"""Forces beside the element that the library does not hold: never named, they show what a name may be mistaken for.
+
+A posterior over the library alone calls the least bad of its effects certain. An effect that does no
+better than one of these is not; the fewer parameters of a foil count for it. One file each, found by itself.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from functools import cache
+
+from pzd.damper.effect import Effect
+from pzd.damper.effects import effects_in, library
+
+
+@cache
+def competing_forms() -> dict[str, Effect]:
+    """Every foil by name; all are parallel to the element."""
+    return {effect.name: effect for effect in effects_in(__name__, pkgutil.iter_modules(__path__))}
+
+
+@cache
+def known() -> dict[str, Effect]:
+    """Everything that a damper can be computed with: the library, and the foils."""
+    return {**library(), **competing_forms()}

@@ -1,0 +1,233 @@
+"""Records made ready for judging: displacement freed of its noise without a fixed corner.
+
+Noise of the displacement goes through a stiff oil spring into the force, and a second derivative
+makes it look like inertia. Where the motion repeats, cycles are averaged and only harmonics well
+above their own scatter are kept; where it does not, the spectrum is cut where it sinks into its floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.diagnose.noise.between_cycles import pure_error
+from pzd.record import Array, Record, is_constant, voltage_scale
+from pzd.signals.cycles import Cycles, cycles, drift, settled
+
+Motion = tuple[Array, Array, Array]
+"""Displacement, velocity and acceleration, each (n,)."""
+
+CLEAR = 4.0
+"""A harmonic of the displacement is kept from this many standard errors on."""
+DRAWS = 6
+"""Displacements sent through the damper to see what their noise makes of the force."""
+FINER = 16
+"""Points per sample on which the cleaned cycle is laid."""
+DRAWN = 4
+"""Points per sample on which a drawn cycle is laid: what it differs by is noise."""
+COVERS = 0.5
+"""The repeating run must hold this share of the way that the piston travels, else the record counts as not
+repeating; rest before and after does not count."""
+ABOVE_FLOOR = 4.0
+"""The spectrum of a motion that does not repeat is cut where it comes within this factor of its floor."""
+MEDIAN = 0.4549
+"""Median of chi-square with one degree of freedom: a line of a sine transform has one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """One record as the diagnosis sees it."""
+
+    record: Record
+    """With cleaned displacement and its derivatives; only the repeating run where there is one."""
+    cycles: Cycles | None
+    """The run of cycles, where motion and voltage both repeat."""
+    lead: Record | None
+    """The same motion for one cycle more in front, for the simulation to settle."""
+    constant: bool
+    """Whether the voltage stands still."""
+    draws: tuple[Record, ...] = ()
+    """Two cycles of the lead; and the same with other displacements, as likely by what noise and resolution leave."""
+
+    @cached_property
+    def folded(self) -> Array:
+        """(cycles, points) measured force [N]; nothing in it where nothing repeats."""
+        return np.zeros((0, 0)) if self.cycles is None else self.cycles.fold(self.record.time, self.record.force)
+
+    @cached_property
+    def mean_motion(self) -> Motion:
+        """Displacement, velocity and acceleration of the average cycle, (points,) each, where there are cycles."""
+        if self.cycles is None:
+            return np.zeros(0), np.zeros(0), np.zeros(0)
+        time, of = self.record.time, self.cycles.mean
+        return of(time, self.record.displacement), of(time, self.record.velocity), of(time, self.record.acceleration)
+
+    @property
+    def lead_samples(self) -> int:
+        """Samples by which the lead is longer."""
+        return 0 if self.lead is None else self.lead.time.size - self.record.time.size
+
+
+def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
+    """Every record of one rig, its displacement cleaned."""
+    scale = voltage_scale(records)
+    return tuple(_prepared(record, is_constant(record, scale)) for record in records)
+
+
+def _prepared(record: Record, constant: bool) -> Prepared:
+    run = cycles(record.time, record.displacement)
+    if run is None:
+        return Prepared(_smoothed(record), None, None, constant)
+    inside = run.inside(record.time)
+    travel = np.abs(np.gradient(record.displacement))
+    if travel[inside].sum() < COVERS * travel.sum():
+        return Prepared(_smoothed(record), None, None, constant)
+    average = Average.of(record, run)
+    motion = average.motion(average.clear_harmonics)
+    if constant:
+        run = settled(run, record.time, record.force)
+    kept = sliced(record, run.inside(record.time))
+    cleaned = _moved(kept, motion(kept.time))
+    if not constant:
+        return Prepared(cleaned, None, None, constant)
+    step = 1.0 / record.rate
+    early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
+    lead = _led_in(cleaned, early, motion(early))
+    return Prepared(cleaned, run, lead, constant, _drawn(lead, average))
+
+
+def sliced(record: Record, kept: NDArray[np.bool_]) -> Record:
+    """The record's samples where the mask (n,) is set."""
+
+    def cut(channel: Array | None) -> Array | None:
+        return None if channel is None else channel[kept]
+
+    return Record(
+        record.name,
+        record.setting,
+        record.time[kept],
+        record.displacement[kept],
+        record.velocity[kept],
+        record.acceleration[kept],
+        record.force[kept],
+        cut(record.voltage),
+        cut(record.temperature),
+        cut(record.pressure),
+    )
+
+
+def _moved(record: Record, motion: Motion) -> Record:
+    """The record with another displacement and its derivatives."""
+    return replace(record, displacement=motion[0], velocity=motion[1], acceleration=motion[2])
+
+
+def _led_in(cleaned: Record, early: Array, motion: Motion) -> Record:
+    def longer(channel: Array | None) -> Array | None:
+        return None if channel is None else np.concatenate([np.full(early.size, channel[0]), channel])
+
+    return Record(
+        cleaned.name,
+        cleaned.setting,
+        np.concatenate([early, cleaned.time]),
+        np.concatenate([motion[0], cleaned.displacement]),
+        np.concatenate([motion[1], cleaned.velocity]),
+        np.concatenate([motion[2], cleaned.acceleration]),
+        np.concatenate([np.full(early.size, cleaned.force[0]), cleaned.force]),
+        longer(cleaned.voltage),
+        longer(cleaned.temperature),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Average:
+    """The average cycle of a displacement, harmonic by harmonic."""
+
+    run: Cycles
+    points: int
+    harmonics: NDArray[np.complex128]
+    """(H + 1,) Fourier coefficients [m]."""
+    variance: Array
+    """(H + 1,) of them |.|^2, by noise and resolution [m^2]."""
+
+    @classmethod
+    def of(cls, record: Record, run: Cycles) -> Average:
+        """The average cycle of a record, and how well it is known."""
+        folded = run.fold(record.time, record.displacement)
+        creep = drift(folded)  # else a mean that walks would end every cycle with a step, which the oil spring feels
+        error = pure_error(folded - creep + creep.mean())
+        finest = float(np.median(np.diff(np.unique(record.displacement))))
+        hidden = finest**2 / 12.0 if error.sample_variance < (0.5 * finest) ** 2 else 0.0
+        return cls(run, error.points, error.mean, error.of_mean + hidden / error.points)
+
+    @property
+    def clear(self) -> NDArray[np.bool_]:
+        """(H + 1,) whether a harmonic stands clear of its own uncertainty."""
+        clear: NDArray[np.bool_] = np.abs(self.harmonics) > CLEAR * np.sqrt(self.variance)
+        clear[0] = True
+        return clear
+
+    @property
+    def clear_harmonics(self) -> NDArray[np.complex128]:
+        """(H + 1,) the coefficients that stand clear, the others zero [m]."""
+        return np.where(self.clear, self.harmonics, 0.0)
+
+    def error(self, draw: np.random.Generator) -> NDArray[np.complex128]:
+        """(H + 1,) one error of `clear_harmonics` as likely as any: noise in those kept, what is left out of others."""
+        left_out = np.maximum(np.abs(self.harmonics) ** 2 - 2.0 * self.variance, 0.0)
+        size = np.sqrt(0.5 * np.where(self.clear, self.variance, left_out))
+        found: NDArray[np.complex128] = size * (draw.standard_normal(size.size) + 1j * draw.standard_normal(size.size))
+        found[0] = 0.0
+        return found
+
+    def motion(self, harmonics: NDArray[np.complex128], finer: int = FINER) -> Callable[[Array], Motion]:
+        """Displacement, velocity and acceleration of some harmonics (H + 1,) at any time."""
+        from scipy.interpolate import CubicSpline
+
+        rate = 2j * np.pi * np.arange(harmonics.size) / self.run.period
+        fine = finer * self.points
+        values = np.fft.irfft(harmonics * rate ** np.arange(3)[:, None], fine) * fine
+        values = np.concatenate([values, values[:, :1]], axis=1)
+        cycle = CubicSpline(np.arange(fine + 1) / fine, values, axis=1, bc_type="periodic")
+
+        def at(time: Array) -> Motion:
+            x, v, a = np.ascontiguousarray(cycle(self.run.phase(time)))
+            return x, v, a
+
+        return at
+
+
+def _drawn(lead: Record, average: Average) -> tuple[Record, ...]:
+    """Two cycles of the lead as they are, and with other displacements that are as likely."""
+    draw = np.random.default_rng(DRAWS)
+    two = sliced(lead, np.arange(lead.time.size) < 2 * average.points)
+    motions = [average.motion(average.clear_harmonics + average.error(draw), DRAWN) for _ in range(DRAWS)]
+    return (two, *(_moved(two, motion(two.time)) for motion in motions))
+
+
+def _smoothed(record: Record) -> Record:
+    """The record with its displacement cut where the spectrum sinks into its floor; derivatives by the spectrum."""
+    n = record.time.size
+    line = np.linspace(record.displacement[0], record.displacement[-1], n)
+    odd = record.displacement - line
+    spectrum = np.fft.rfft(np.concatenate([odd, -odd[:0:-1]]))
+    frequency = np.arange(spectrum.size) * record.rate / (2 * n - 1)
+    spectrum[frequency > _corner(frequency, np.abs(spectrum) ** 2, record.rate)] = 0.0
+    slope = float(line[-1] - line[0]) / ((n - 1) / record.rate)
+
+    def derivative(order: int) -> Array:
+        return np.fft.irfft(spectrum * (2j * np.pi * frequency) ** order, 2 * n - 1)[:n]
+
+    return _moved(record, (derivative(0) + line, derivative(1) + slope, derivative(2)))
+
+
+def _corner(frequency: Array, power: Array, rate: float) -> float:
+    """Frequency beyond which nothing rises above the floor, read on an average over neighbouring lines [Hz]."""
+    floor = float(np.median(power[frequency > 0.3 * rate])) / MEDIAN
+    width = max(power.size // 200, 3)
+    level = np.convolve(power, np.full(width, 1.0 / width), "same")
+    above = np.flatnonzero(level > ABOVE_FLOOR * floor)
+    return float(frequency[above[-1]]) if above.size else float(frequency[-1])

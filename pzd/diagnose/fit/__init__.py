@@ -1,0 +1,1 @@
+"""Dampers fitted to records: likelihood, parameters, least squares, intervals."""

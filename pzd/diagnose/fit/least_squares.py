@@ -1,0 +1,200 @@
+"""A damper with some effects fitted to observations: T0, C, k of every base row together with the effects.
+
+Every residual is in units of noise with the tests' nuisances integrated out, so that half the sum of
+squares is minus the logarithm of the likelihood, and fits of different effects can be compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.damper.model import Damper
+from pzd.diagnose.fit.parameters import Problem, Unknown, simulated
+from pzd.record import Array
+
+Left = tuple[list[Array], list[Array]]
+"""Residuals in units of noise and simulated forces, an observation each."""
+
+DIFFERENCE = 1e-4
+"""Step of the searched variables for forward differences."""
+MOST_EVALUATIONS = 20
+PRECISION = 1e-5
+"""Relative change of the sum of squares at which a search ends."""
+STIFFER = 2.0
+"""By this factor the search may exceed the fastest element."""
+USUAL = 1.5
+"""Prior standard deviation of ln C and ln k about their starting values: holds a row still where the tests do not
+show it (C under an open relief valve, k of a soft drive), and nowhere else."""
+WIDEST = 3.0
+"""C and k stay within e^3 = 20 times their starting values."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """An optimum: the damper, and what it leaves."""
+
+    damper: Damper
+    effects: tuple[str, ...]
+    searched: Array
+    """(3 b + e,) the optimum in the units of the search."""
+    residuals: tuple[Array, ...]
+    """(w,) an observation, in units of noise."""
+    simulated: tuple[Array, ...]
+    """(n,) an observation, force at the compared samples [N]."""
+    slopes: Array
+    """(w, 3 b + e) derivatives of all residuals by the searched variables."""
+    covariance: Array
+    """(3 b + e, 3 b + e) of what was searched, noise alone; infinite for what no test shows."""
+    unknowns: tuple[Unknown, ...]
+
+    @property
+    def misfit(self) -> float:
+        """Sum of squares in units of noise: minus twice the logarithm of the likelihood, but for a constant."""
+        return float(sum(r @ r for r in self.residuals))
+
+    @property
+    def size(self) -> int:
+        """Number of residuals."""
+        return sum(r.size for r in self.residuals)
+
+
+def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int = MOST_EVALUATIONS) -> Fitted:
+    """The optimum reached from a starting point, by trust-region least squares within the limits.
+
+    Parameters
+    ----------
+    problem : what is fitted to what
+    effects : names of the effects fitted together with the base rows
+    start : (3 b + e,) in the units of the search
+    evaluations : of the model, at most
+    """
+    unknowns = problem.unknowns(effects)
+    found, slopes, (residuals, forces) = _search(problem, unknowns, start, start.size, evaluations)
+    prior = _prior(problem, len(unknowns))
+    return Fitted(
+        problem.point(found, unknowns).damper(),
+        tuple(effects),
+        found,
+        tuple(residuals),
+        tuple(forces),
+        slopes,
+        _covariance(np.concatenate([slopes, prior])),
+        unknowns,
+    )
+
+
+def misfit_of(problem: Problem, damper: Damper) -> float:
+    """Smallest misfit that T0, C and k alone reach while the effects stay as a damper has them."""
+    unknowns = problem.unknowns(tuple(damper.effects))
+    start = problem.start_with(damper)
+    _, _, (residuals, _) = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS)
+    return float(sum(r @ r for r in residuals))
+
+
+def _search(
+    problem: Problem, unknowns: Sequence[Unknown], start: Array, free: int, evaluations: int
+) -> tuple[Array, Array, Left]:
+    """Where a search over the first `free` variables ends, (3 b + e,), with slopes, residuals and forces there."""
+    from scipy.optimize import least_squares
+
+    low, high = _bounds(problem, unknowns)
+    begin = np.clip(start, low + 1e-9, high - 1e-9)
+    centre, prior = problem.start(), _prior(problem, len(unknowns))
+
+    def whole(x: Array) -> Array:
+        return np.concatenate([x, begin[free:]])
+
+    known: dict[bytes, Left] = {}
+
+    def left_at(x: Array) -> Left:
+        """Asked twice of each point, for its residuals and for its slopes."""
+        key = x.tobytes()
+        if key not in known:
+            known[key] = _residuals(problem, unknowns, whole(x))
+        return known[key]
+
+    def residuals_at(x: Array) -> Array:
+        return np.concatenate([*left_at(x)[0], prior[:, : centre.size] @ (x[: centre.size] - centre)])
+
+    def slopes_at(x: Array) -> Array:
+        return np.concatenate([_slopes(problem, unknowns, whole(x), free, left_at(x)[1]), prior[:, :free]])
+
+    found = least_squares(
+        residuals_at,
+        begin[:free],
+        jac=slopes_at,
+        bounds=(low[:free], high[:free]),
+        x_scale="jac",
+        ftol=PRECISION,
+        xtol=PRECISION,
+        gtol=PRECISION,
+        max_nfev=evaluations,
+    )
+    return whole(found.x), np.asarray(found.jac, dtype=np.float64)[: -len(prior)], left_at(found.x)
+
+
+def _prior(problem: Problem, effects: int) -> Array:
+    """(2 b, 3 b + e) slopes of the prior on ln C and ln k of every base row, in its standard deviations."""
+    rows = len(problem.base)
+    columns = [3 * row + i for row in range(rows) for i in (1, 2)]
+    return np.eye(3 * rows + effects)[columns] / USUAL
+
+
+def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
+    """Base rows within a ratio of where they start: far from there lie only stiff or dead dampers."""
+    start = problem.start().reshape(-1, 3)
+    low, high = start - WIDEST, start + WIDEST
+    low[:, 0], high[:, 0] = 0.0, 2.0
+    high[:, 2] = np.minimum(high[:, 2], start[:, 1] + np.log(STIFFER * problem.fastest))
+    limits = [u.bounds for u in unknowns]
+    return (
+        np.array([*low.ravel(), *(lower for lower, _ in limits)]),
+        np.array([*high.ravel(), *(upper for _, upper in limits)]),
+    )
+
+
+def _residuals(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Left:
+    point = problem.point(x, unknowns)
+    forces = [simulated(point, o) for o in problem.observations]
+    return [o.in_noise(o.measured - f) for o, f in zip(problem.observations, forces, strict=True)], forces
+
+
+def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array, free: int, forces: Sequence[Array]) -> Array:
+    """(w, free) derivatives of the residuals by forward differences; a test moves with its own voltage alone.
+
+    `forces` are those at the point itself.
+    """
+    rows = len(problem.base)
+    shifted = [problem.point(_shifted(x, j), unknowns) for j in range(free)]
+    blocks = []
+    for o, here in zip(problem.observations, forces, strict=True):
+        own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(3 * rows)
+        moving = [
+            j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]
+        ]
+        columns = [*own, *(3 * rows + j for j in moving if 3 * rows + j < free)]
+        change = o.in_noise(np.stack([here - simulated(shifted[j], o) for j in columns], axis=-1) / DIFFERENCE)
+        block = np.zeros((len(change), free))
+        block[:, columns] = change
+        blocks.append(block)
+    return np.concatenate(blocks)
+
+
+def _shifted(x: Array, j: int) -> Array:
+    moved = x.copy()
+    moved[j] += DIFFERENCE
+    return moved
+
+
+def _covariance(jacobian: Array) -> Array:
+    """(p, p) covariance of what was searched; infinite for what no residual shows."""
+    size = np.linalg.norm(jacobian, axis=0)
+    unseen = size == 0.0
+    size[unseen] = 1.0
+    scaled = jacobian / size
+    whole: Array = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True) / np.outer(size, size)
+    whole[unseen, unseen] = np.inf
+    return whole

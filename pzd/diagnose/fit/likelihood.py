@@ -1,0 +1,120 @@
+"""One record as the evidence weighs it: what is simulated, what it is held against, and in which units of noise.
+
+A periodic record under constant conditions is its average cycle, harmonic by harmonic, each in
+units of its own noise; any other is its samples, whitened. What offset, gain and delay of the test
+may explain within their priors is taken out of both sides once and for all, so that a residual
+that is left counts as it should: |r|^2 is minus twice the logarithm of the likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from pzd.damper.compose import element_force, respond, sampling_steps, value_of
+from pzd.damper.effects.sensor_delay import law as moment
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
+from pzd.diagnose.noise.between_cycles import PureError
+from pzd.record import Array
+from pzd.signals.autoregression import Autoregression
+
+SIMULATION_TOLERANCE = 1e-8
+"""Of the damper's path, as a share of the force."""
+REMEMBERED = 12
+"""Element forces kept, enough for one column of slopes each of two fits at the same time."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordLikelihood:
+    """What one record, or a part of it, says."""
+
+    name: str
+    place: int
+    """Which base row it belongs to; -1 where the voltage moves."""
+    motion: Motion
+    """(m,) what is simulated."""
+    first: int
+    """Samples of the motion that come before the first one compared."""
+    stride: int
+    """Motion samples from one compared sample to the next."""
+    measured: Array
+    """(n,) force [N]."""
+    peak: float
+    """Largest measured force [N]."""
+    noise: PureError | Autoregression
+    weights: Array
+    """(H + 1,) of the harmonics of an average cycle; empty where samples are compared."""
+    frame: Array
+    """(w, q) orthonormal columns, in units of noise, along which nuisances move the force."""
+    shrink: Array
+    """(q,) factor on the residual along each of them."""
+
+    @cached_property
+    def steps(self) -> Array:
+        """Sampling intervals of the motion [s], one where they are even."""
+        return sampling_steps(self.motion.time)
+
+    @cached_property
+    def element(self) -> Callable[[bytes], Array]:
+        """(m,) force [N] of the element by its parameter row, (1, 10) as bytes; effects beside it leave it as it is."""
+
+        def marched(row: bytes) -> Array:
+            rows = np.frombuffer(row)[np.newaxis]
+            return element_force(rows, self.motion, self.steps, self.begins_with, SIMULATION_TOLERANCE)
+
+        return lru_cache(REMEMBERED)(marched)
+
+    @property
+    def begins_with(self) -> float:
+        """Force with which the simulation begins [N]: that of the same phase where the motion repeats."""
+        lead = self.first // self.stride
+        return float(self.measured[-lead % self.measured.size if isinstance(self.noise, PureError) else 0])
+
+    def at_compared(self, simulated: Array) -> Array:
+        """(n,) or (n, p) of what was simulated at the samples that are compared."""
+        return simulated[self.first :: self.stride][: self.measured.size]
+
+    def delayed(self, simulated: Array, delay: float) -> Array:
+        """(m,) what was simulated as a channel shows it that comes late [s], between the samples by a cubic."""
+        from scipy.interpolate import CubicSpline
+
+        if delay == 0.0:
+            return simulated
+        begin = self.first if isinstance(self.noise, PureError) else 0
+        time = self.motion.time[begin:]
+        shown = np.asarray(moment(time, delay))
+        if begin == 0:
+            return np.asarray(CubicSpline(time, simulated)(np.clip(shown, time[0], time[-1])))
+        period = time[-1] - time[0] + self.steps[-1]
+        whole = np.append(simulated[begin:], simulated[begin])
+        cycle = CubicSpline(np.append(time, time[0] + period), whole, bc_type="periodic")
+        return np.concatenate([simulated[:begin], cycle(shown)])
+
+    def in_noise(self, values: Array) -> Array:
+        """(w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
+        flat = self._scaled(values)
+        return flat - self.frame @ ((1.0 - self.shrink).reshape(-1, *([1] * (flat.ndim - 1))) * (self.frame.T @ flat))
+
+    def _scaled(self, values: Array) -> Array:
+        if isinstance(self.noise, Autoregression):
+            return self.noise.whitened(values)
+        weights = self.weights.reshape(-1, *([1] * (values.ndim - 1)))
+        harmonics = np.fft.rfft(values, axis=0)[: self.weights.size] / len(values) * weights
+        return np.concatenate([harmonics.real, harmonics.imag[1:]])
+
+
+def response(observation: RecordLikelihood, damper: Damper) -> Array:
+    """(n,) force that a damper gives at the compared samples [N]."""
+    return responses(observation, damper)(0.0)
+
+
+def responses(observation: RecordLikelihood, damper: Damper) -> Callable[[float], Array]:
+    """(n,) force that a damper gives at the compared samples [N], by how much later yet a channel shows it [s]."""
+    o, tau = observation, value_of(damper, "sensor_delay", "tau")
+    prompt = damper.model_copy(update={"effects": {n: e for n, e in damper.effects.items() if n != "sensor_delay"}})
+    force = respond(prompt, o.motion, o.begins_with, SIMULATION_TOLERANCE)
+    return lambda late: o.at_compared(o.delayed(force, tau + late))

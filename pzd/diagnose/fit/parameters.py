@@ -1,0 +1,202 @@
+"""What is fitted to what: T0, C, k of every base row and the parameters of effects, and the forces they give."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+
+from pzd.damper.competing_forms import known
+from pzd.damper.compose import constant_rows, with_parallel
+from pzd.damper.effect import Parameter, Scales
+from pzd.damper.material import by_voltage
+from pzd.damper.model import BaseRow, Damper
+from pzd.diagnose.fit.likelihood import RecordLikelihood, response
+from pzd.record import Array
+
+SOFTEST = 0.1
+"""Least C that a search starts from [largest force over largest speed]: identify may leave it undetermined."""
+BOUND = 1e4
+"""No scaled parameter is looked for beyond this, nor one with ratio steps below its inverse."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One effect parameter in the units of the search."""
+
+    effect: str
+    parameter: Parameter
+    scale: float
+    node: int | None = None
+    """Index of the voltage it holds at; None for one value at every voltage."""
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Limits of the searched variable."""
+        low, high = (limit / self.scale for limit in (self.parameter.low, self.parameter.high))
+        if self.parameter.search.logarithmic:
+            return float(np.log(max(low, 1.0 / BOUND))), float(np.log(min(high, BOUND)))
+        return max(low, -BOUND), min(high, BOUND)
+
+    def value(self, searched: float) -> float:
+        """The parameter in its own unit."""
+        scaled = float(np.exp(searched)) if self.parameter.search.logarithmic else searched
+        return float(np.clip(scaled * self.scale, self.parameter.low, self.parameter.high))
+
+    def searched(self, value: float) -> float:
+        """The searched variable at a value of the parameter."""
+        scaled = value / self.scale
+        return float(np.log(max(scaled, 1.0 / BOUND))) if self.parameter.search.logarithmic else scaled
+
+    def fainter(self, searched: float, share: float) -> float:
+        """The parameter [own unit] so much nearer to the value that switches its effect off."""
+        value, neutral = self.value(searched), self.parameter.neutral
+        return neutral + share * (value - neutral) if np.isfinite(neutral) else value / share
+
+    def of(self, damper: Damper) -> float:
+        """The value [own unit] that a damper has."""
+        value = damper.effects[self.effect][self.parameter.name]
+        return value if isinstance(value, float) else value[self.node or 0]
+
+    def slope(self, searched: float) -> float:
+        """Derivative of the parameter by the searched variable."""
+        return self.scale * (float(np.exp(searched)) if self.parameter.search.logarithmic else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is fitted to what."""
+
+    observations: tuple[RecordLikelihood, ...]
+    base: tuple[BaseRow, ...]
+    """Labels and starting values of the base rows."""
+    scales: Scales
+    fastest: float
+    """Largest k / C that is looked for [1/s]: an element that answers within a sample shows no spring."""
+    reference: float | None = None
+    """T_ref for temperature drift [degC]."""
+    varying: frozenset[str] = frozenset()
+    """Effects whose parameters are numbers by voltage, one a voltage of the base rows."""
+
+    @cached_property
+    def voltages(self) -> tuple[float, ...]:
+        """(v,) voltages of the base rows [V], rising."""
+        return tuple(voltage for voltage, _ in by_voltage(self.base))
+
+    @cached_property
+    def nodes(self) -> tuple[int, ...]:
+        """(b,) index of the voltage of every base row."""
+        place = {id(row): i for i, (_, rows) in enumerate(by_voltage(self.base)) for row in rows}
+        return tuple(place[id(row)] for row in self.base)
+
+    def pooled(self) -> Problem:
+        """The same with one base row a voltage, whatever the temperature: an effect stands for its axis then."""
+        groups = [rows for _, rows in by_voltage(self.base)]
+        if len(groups) == len(self.base):
+            return self
+        place = {id(row): i for i, rows in enumerate(groups) for row in rows}
+        moved = tuple(o if o.place < 0 else replace(o, place=place[id(self.base[o.place])]) for o in self.observations)
+        return replace(self, observations=moved, base=tuple(_mean_row(rows) for rows in groups))
+
+    def unknowns(self, effects: Sequence[str]) -> tuple[Unknown, ...]:
+        """The parameters of some effects, in the order of the search."""
+        return tuple(
+            Unknown(name, parameter, parameter.search.scale(self.scales) or 1.0, node)
+            for name in effects
+            for node in (range(len(self.voltages)) if name in self.varying else (None,))
+            for parameter in known()[name].parameters
+        )
+
+    def start(self) -> Array:
+        """(3 b,) the base rows in the units of the search."""
+        softest = SOFTEST * self.scales.force / self.scales.speed
+        damping = [max(r.C_Ns_per_m, softest) for r in self.base]
+        stiffness = [min(r.k_N_per_m, self.fastest * C) for r, C in zip(self.base, damping, strict=True)]
+        rows = zip(self.base, damping, stiffness, strict=True)
+        return np.concatenate([(r.T0_N / self.scales.force, np.log(C), np.log(k)) for r, C, k in rows])
+
+    def start_with(self, damper: Damper) -> Array:
+        """(3 b + e,) the base rows, and the effects that a damper has."""
+        unknowns = self.unknowns(tuple(damper.effects))
+        return np.concatenate([self.start(), [u.searched(u.of(damper)) for u in unknowns]])
+
+    def point(self, searched: Array, unknowns: Sequence[Unknown]) -> Point:
+        """What a point of the search stands for."""
+        split = 3 * len(self.base)
+        base = searched[:split].reshape(-1, 3)
+        values = np.column_stack([np.maximum(base[:, 0], 0.0) * self.scales.force, np.exp(base[:, 1:])])
+        effects: dict[str, dict[str, float | tuple[float, ...]]] = {}
+        for unknown, x in zip(unknowns, searched[split:], strict=True):
+            given, name, value = effects.setdefault(unknown.effect, {}), unknown.parameter.name, unknown.value(float(x))
+            given[name] = value if unknown.node is None else (*cast("tuple[float, ...]", given.get(name, ())), value)
+        return Point(values, effects, self)
+
+
+def _mean_row(rows: Sequence[BaseRow]) -> BaseRow:
+    """One row for several temperatures or none: means of T0, C and k."""
+    friction, damping, stiffness = np.mean([(r.T0_N, r.C_Ns_per_m, r.k_N_per_m) for r in rows], axis=0)
+    return BaseRow(
+        voltage_V=rows[0].voltage_V,
+        T0_N=float(friction),
+        C_Ns_per_m=float(damping),
+        k_N_per_m=float(stiffness),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Numbers for T0, C and k of every base row, and for the effects."""
+
+    base: Array
+    """(b, 3)"""
+    effects: Mapping[str, Mapping[str, float | tuple[float, ...]]]
+    """Lists are by voltage."""
+    problem: Problem
+
+    def damper(self) -> Damper:
+        """The same as a damper."""
+        rows = tuple(
+            BaseRow(
+                voltage_V=label.voltage_V,
+                temperature_degC=label.temperature_degC,
+                T0_N=float(friction),
+                C_Ns_per_m=float(damping),
+                k_N_per_m=float(stiffness),
+            )
+            for label, (friction, damping, stiffness) in zip(self.problem.base, self.base, strict=True)
+        )
+        return Damper(
+            base=rows,
+            effects={name: {**values, **self._nodes(name)} for name, values in self.effects.items()},
+            reference_temperature_degC=self.problem.reference,
+        )
+
+    def _nodes(self, effect: str) -> dict[str, tuple[float, ...]]:
+        return {"at_voltage_V": self.problem.voltages} if effect in self.problem.varying else {}
+
+    def at(self, place: int) -> Mapping[str, Mapping[str, float]]:
+        """The effects at the voltage of one base row."""
+        node = self.problem.nodes[place]
+        return {
+            name: {key: value[node] if isinstance(value, tuple) else value for key, value in values.items()}
+            for name, values in self.effects.items()
+        }
+
+
+def simulated(point: Point, observation: RecordLikelihood) -> Array:
+    """(n,) force at the compared samples of an observation [N]."""
+    o = observation
+    if o.place >= 0 and "temperature_drift" not in point.effects:
+        friction, damping, stiffness = point.base[o.place]
+        effects = point.at(o.place)
+        rows, parallel = constant_rows(friction, damping, stiffness, effects)
+        force = with_parallel(o.element(rows.tobytes()), parallel, o.motion)
+        tau = effects.get("sensor_delay", {}).get("tau", 0.0)
+        return o.at_compared(o.delayed(force, tau))
+    damper = point.damper()
+    if o.place >= 0:
+        damper = damper.model_copy(update={"base": damper.base[o.place : o.place + 1]})
+    return response(o, damper)

@@ -1,0 +1,105 @@
+"""What a damper predicts for a record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.compose import respond
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
+from pzd.diagnose.data.cleaning import Prepared
+from pzd.identify.trial import warm_up
+from pzd.record import Array, Record
+from pzd.signals.reversals import reversals
+
+FEWEST_IN_HALF_CYCLE = 25
+"""Samples of the fastest half cycle from which a parabola between them is exact enough: 1e-4 of the force."""
+PREDICTION_TOLERANCE = 1e-7
+"""Of the damper's path, as a share of the force."""
+
+WARMS = 0.5
+"""A temperature that moves by less [K] counts as standing still."""
+STEP = 0.1
+"""A voltage that moves by more from one sample to the next [share of its range in the record] has stepped."""
+ENDS = 0.02
+"""Share of a record at either end where its smoothed displacement rests on one side alone: not judged."""
+
+
+def predicted_force(damper: Damper, prepared: Prepared) -> Array:
+    """(n,) force that the damper gives under the record's cleaned motion [N]."""
+    record = prepared.lead or prepared.record
+    motion, stride = motion_of(record, constant=prepared.constant)
+    force = respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)
+    return force[::stride][prepared.lead_samples :]
+
+
+def motion_of(record: Record, *, constant: bool) -> tuple[Motion, int]:
+    """The record's motion, on a finer grid where its samples are too far apart for a parabola between them.
+
+    Parameters
+    ----------
+    record : displacement cleaned
+    constant : whether the voltage counts as standing still, at its median; so does a temperature that hardly moves
+
+    Returns
+    -------
+    the motion, and how many of its samples make one of the record
+    """
+    half_cycle = min(np.diff(reversals(record.displacement)), default=record.displacement.size)
+    stride = max(int(np.ceil(FEWEST_IN_HALF_CYCLE / max(half_cycle, 1))), 1)
+    motion = Motion.of(record) if stride == 1 else _refined(record, stride)
+    if constant:
+        motion = replace(motion, voltage=_held(motion.voltage))
+    if motion.temperature is not None and not warms(motion.temperature):
+        motion = replace(motion, temperature=_held(motion.temperature))
+    return motion, stride
+
+
+def warms(temperature: Array | None) -> bool:
+    """Whether a temperature (n,) moves from beginning to end; False where none was recorded."""
+    return temperature is not None and float(np.ptp(ends(temperature))) > WARMS
+
+
+def ends(temperature: Array) -> tuple[float, float]:
+    """Temperature [degC] at the beginning and at the end of a test, the noise of (n,) samples averaged out."""
+    tenth = max(temperature.size // 10, 1)
+    return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
+
+
+def _refined(record: Record, stride: int) -> Motion:
+    """The record's motion on `stride` times as many samples, by cubic splines."""
+    from scipy.interpolate import CubicSpline
+
+    samples = np.arange(record.time.size)
+    fine = np.arange((record.time.size - 1) * stride + 1) / stride
+    smooth = (record.displacement, record.velocity, record.acceleration)
+    displacement, velocity, acceleration = (CubicSpline(samples, channel)(fine) for channel in smooth)
+    held = (None if c is None else np.interp(fine, samples, c) for c in (record.voltage, record.temperature))
+    return Motion(np.interp(fine, samples, record.time), displacement, velocity, acceleration, *held)
+
+
+def _held(channel: Array | None) -> Array | None:
+    return None if channel is None else np.full(channel.size, np.median(channel))
+
+
+def counted(prepared: Prepared) -> NDArray[np.bool_]:
+    """(n,) whether the prediction depends neither on how the record began nor on when exactly a voltage stepped."""
+    size = prepared.record.time.size
+    if prepared.lead is not None:
+        return np.ones(size, dtype=np.bool_)
+    ends = int(ENDS * size)
+    order = np.arange(size)
+    begun = (order >= max(warm_up(prepared.record.displacement), ends)) & (order < size - ends)
+    return begun & ~_stepping(prepared.record.voltage, size)
+
+
+def _stepping(voltage: Array | None, size: int) -> NDArray[np.bool_]:
+    """(n,) whether the voltage steps right before or after a sample."""
+    beside = np.zeros(size, dtype=np.bool_)
+    if voltage is not None and np.ptp(voltage) > 0.0:
+        steps = np.flatnonzero(np.abs(np.diff(voltage)) > STEP * np.ptp(voltage))
+        beside[steps] = beside[steps + 1] = True
+    return beside

@@ -1,0 +1,206 @@
+"""How the evidence weighs every record: average cycles or samples, the noise in each, and what is no evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
+from pzd.diagnose.config import NuisanceConfig
+from pzd.diagnose.data.cleaning import Prepared, sliced
+from pzd.diagnose.fit.likelihood import RecordLikelihood, responses
+from pzd.diagnose.fit.prediction import motion_of, warms
+from pzd.diagnose.noise.between_cycles import PureError, pure_error
+from pzd.diagnose.noise.input_uncertainty import Expected
+from pzd.diagnose.noise.jumps import jumps, jumps_in_samples
+from pzd.diagnose.noise.smooth_residual import fit_smooth_residual
+from pzd.identify.trial import warm_up
+from pzd.record import Array, Record
+from pzd.signals.autoregression import Autoregression
+
+RESOLUTION = 3e-4
+"""No force is believed to be known better than this share of the record's peak (r.m.s.)."""
+INSTANT = 1e-6
+"""Delay by which the slope of a force over time is taken [s]."""
+LATEST = 3.0
+"""At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope."""
+DISCREPANCY = 0.3
+"""Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
+fitted: a model that still lacks something must not be bent to where the noise happens to be smallest."""
+MOST_HARMONICS = 80
+"""Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart."""
+CYCLE_POINTS = 256
+"""A cycle is simulated on at least this many points."""
+MOST_POINTS = 2048
+"""And on no more: the harmonics that are compared need no finer grid, however slow the test."""
+
+
+def record_likelihood(
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
+) -> RecordLikelihood | None:
+    """The observation of some samples of a record; None where they are too few.
+
+    Parameters
+    ----------
+    p : the record
+    mask : (n,) which of its samples count
+    place : its base row; -1 where the voltage moves
+    given : what the damper makes of it, along which gain and delay act
+    nuisance : priors of the test's own offset, gain and delay
+    """
+    # Cycles differ where the damper warms, and their average would hide it.
+    averaged = p.cycles is not None and place >= 0 and not warms(p.record.temperature)
+    return (_of_cycles if averaged else _of_samples)(p, mask, place, given, nuisance)
+
+
+def _of_cycles(
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
+) -> RecordLikelihood | None:
+    run = p.cycles
+    if run is None:
+        return None
+    time, record, whole = p.record.time, p.record, p.folded
+    numbers = run.number(time)
+    counted = [n for n in range(run.count) if np.all(mask[numbers == n])]
+    if not counted:
+        return None
+    simulated = run.fold(time, given.force)
+    error = pure_error(whole - simulated)
+    points = min(error.points, MOST_POINTS)
+    cycle = _resampled(whole[counted].mean(axis=0), points)
+    peak = float(np.max(np.abs(cycle)))
+    average = _resampled(simulated.mean(axis=0), points)
+    left = DISCREPANCY * _left_by(cycle, average, error.sample_variance / len(counted))
+    floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size + given.unsure
+    weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
+    weights[0] /= np.sqrt(2.0)
+    bare = RecordLikelihood(
+        record.name,
+        place,
+        *_cycle_motion(record, run.period, [_resampled(channel, points) for channel in p.mean_motion]),
+        cycle,
+        peak,
+        error,
+        weights,
+        np.zeros((2 * weights.size - 1, 0)),
+        np.zeros(0),
+    )
+    return with_nuisances(bare, given.damper, nuisance)
+
+
+def _left_by(measured: Array, force: Array, variance: float) -> float:
+    """R.m.s. of what a model leaves above the noise [N], offset, gain and delay of the test taken off."""
+    columns = np.column_stack([np.ones(force.size), force, np.gradient(force)])
+    residual = measured - force
+    residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
+    return float(np.sqrt(max(np.mean(residual**2) - variance, 0.0)))
+
+
+def _cycle_motion(record: Record, period: float, channels: Sequence[Array]) -> tuple[Motion, int, int]:
+    """A cycle of the mean motion, half a cycle before it to settle in, on a grid fine enough to simulate."""
+    points = channels[0].size
+    factor = int(np.ceil(CYCLE_POINTS / points))
+    fine: Array = np.stack([_resampled(channel, points * factor) for channel in channels])
+    lead = points // 2 * factor  # it holds a reversal, after which the element has forgotten how it began
+    led = np.concatenate([fine[:, -lead:], fine], axis=1)
+    count = led.shape[1]
+    time: Array = np.arange(count, dtype=np.float64) * (period / (points * factor))
+    temperature = record.median_temperature()
+    voltage = record.median_voltage()
+    motion = Motion(
+        time,
+        led[0],
+        led[1],
+        led[2],
+        None if voltage is None else np.full(count, voltage),
+        None if temperature is None else np.full(count, temperature),
+    )
+    return motion, lead, factor
+
+
+def _resampled(cycle: Array, points: int) -> Array:
+    """A periodic channel on more points or fewer, by its own harmonics."""
+    if points == cycle.size:
+        return cycle
+    return np.asarray(np.fft.irfft(np.fft.rfft(cycle), points) * (points / cycle.size), dtype=np.float64)
+
+
+def _of_samples(
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
+) -> RecordLikelihood | None:
+    record, force = p.record, given.force
+    start = max(int(np.argmax(mask)), warm_up(record.displacement))
+    stop = int(mask.size - np.argmax(mask[::-1]))
+    if stop - start < 2 * CYCLE_POINTS:
+        return None
+    noise = fit_smooth_residual(
+        record.force[start:stop] - force[start:stop], _part(record, start, stop), force[start:stop]
+    ).noise
+    peak = float(np.max(np.abs(record.force[start:stop])))
+    left = DISCREPANCY * _left_by(record.force[start:stop], force[start:stop], noise.variance)
+    if left**2 > noise.variance:
+        noise = Autoregression(np.zeros(0), noise.variance + left**2)
+    noise = Autoregression(noise.coefficients, max(noise.innovation, (RESOLUTION * peak) ** 2))
+    motion, factor = motion_of(record, constant=p.constant)
+    bare = RecordLikelihood(
+        record.name,
+        place,
+        motion,
+        start * factor,
+        factor,
+        record.force[start:stop],
+        peak,
+        noise,
+        np.zeros(0),
+        np.zeros((stop - start - noise.coefficients.size, 0)),
+        np.zeros(0),
+    )
+    return with_nuisances(bare, given.damper, nuisance, given.timing[start:stop])
+
+
+def _part(record: Record, start: int, stop: int) -> Record:
+    kept = np.zeros(record.time.size, dtype=np.bool_)
+    kept[start:stop] = True
+    return sliced(record, kept)
+
+
+def with_nuisances(
+    bare: RecordLikelihood, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
+) -> RecordLikelihood:
+    """The observation with the test's own offset, gain and delay, jumps and instants of the voltage integrated out.
+
+    Equation: r' = (I + V V')^(-1/2) r, V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise
+                                                    Source: Gaussian prior, marginal likelihood
+
+    A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
+    that, F(t - d) - F + d dF/dt, is taken off the measured force.
+    """
+    shown = responses(bare, damper)
+    force, averaged = shown(0.0), isinstance(bare.noise, PureError)
+    late = (shown(INSTANT) - force) / INSTANT
+    columns = np.column_stack(
+        [
+            nuisance.delay_s * late,
+            np.full(force.size, nuisance.offset * bare.peak),
+            nuisance.gain * force,
+            _neighbours_of(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
+            *([] if timing is None else [timing]),
+        ]
+    )
+    left, size, right = np.linalg.svd(bare.in_noise(columns), full_matrices=False)
+    likeliest = right[:, 0] @ (size / (1.0 + size**2) * (left.T @ bare.in_noise(bare.measured - force)))
+    delay = nuisance.delay_s * float(np.clip(likeliest, -LATEST, LATEST))
+    measured = bare.measured - (shown(delay) - force - delay * late)
+    return replace(bare, measured=measured, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
+
+
+def _neighbours_of(bends: Array) -> Array:
+    """(n, j) one column a sample beside a jump, as large as the force bends there [N]."""
+    beside = np.flatnonzero(bends)
+    columns = np.zeros((bends.size, beside.size))
+    columns[beside, np.arange(beside.size)] = bends[beside]
+    return columns

@@ -1,0 +1,111 @@
+"""Noise and misfit where nothing repeats: against a rich smooth model of the residual.
+
+Whatever the damper misses is a function of motion, force, voltage and time; a model with many smooth
+functions of them takes it up, and what is left is noise. Whether the model takes up more than noise
+would let it is Fisher's test on the whitened residual.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.record import Array, Record
+from pzd.signals.autoregression import Autoregression, autoregression
+
+HATS = 8
+"""Piecewise linear functions over each quantity."""
+ROUNDS = 3
+"""Rounds of fitting the model and the colour of what it leaves."""
+SINGULAR = 1e-9
+"""Combinations of terms smaller than this share of the largest are the same term twice."""
+LAGS = (0.005, 0.02, 0.08)
+"""Time constants with which the force may follow a moving voltage [s]."""
+SAMPLES_PER_TERM = 20
+"""Fewest samples for each term of the model; with fewer nothing is judged."""
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothResidual:
+    """A residual parted into what a rich smooth model explains and noise."""
+
+    explained: Array
+    """(n,) [N]."""
+    spread: Array
+    """(n,) variance that noise alone gives to what is explained [N^2]."""
+    noise: Autoregression
+    """What is left."""
+    probability: float
+    """That noise alone lets the model explain so much."""
+
+
+def fit_smooth_residual(residual: Array, record: Record, predicted: Array) -> SmoothResidual:
+    """The residual of a record that does not repeat, parted into misfit and noise.
+
+    Equation: F = ((RSS_0 - RSS) / p) / (RSS / (n - p)) on the whitened residual     Source: Aitken 1935, Fisher
+
+    Parameters
+    ----------
+    residual : (n,) measured less predicted force, the test's nuisances taken off [N]
+    record : the motion, (n,)
+    predicted : (n,) force [N]
+    """
+    from scipy.special import fdtrc
+
+    terms = _terms(record, predicted)
+    if residual.size < SAMPLES_PER_TERM * terms.shape[1]:
+        nothing = np.zeros(residual.size)
+        return SmoothResidual(nothing, nothing, autoregression([residual - residual.mean()]), 1.0)
+    explained = terms @ np.linalg.lstsq(terms, residual, rcond=None)[0]
+    for _ in range(ROUNDS):
+        noise = autoregression([residual - explained])
+        flat = noise.whitened(residual)
+        left, sizes, right = np.linalg.svd(noise.whitened(terms), full_matrices=False)
+        rank = int(np.count_nonzero(sizes > SINGULAR * sizes[0]))
+        to_samples = terms @ (right[:rank].T / sizes[:rank])
+        taken = left[:, :rank].T @ flat
+        explained = to_samples @ taken
+    spread = np.sum(to_samples**2, axis=1) if noise.innovation > 0.0 else np.zeros(residual.size)
+    free = flat.size - rank - noise.coefficients.size
+    over = float(flat @ flat - taken @ taken)
+    ratio = float(taken @ taken) / rank / (over / free) if over > 0.0 else np.inf
+    return SmoothResidual(explained, spread, noise, float(fdtrc(rank, free, ratio)))
+
+
+def _terms(record: Record, predicted: Array) -> Array:
+    """(n, p) smooth functions of motion, force, voltage and time, scaled to about one, without repeated columns."""
+    v, a = _scaled(record.velocity), _scaled(record.acceleration)
+    rate = _scaled(np.gradient(predicted))
+    columns = [
+        _hats(record.velocity),
+        _hats(record.displacement),
+        _hats(predicted),
+        np.column_stack([a, v * np.abs(v), a * np.sign(v), rate, np.abs(rate), _scaled(record.displacement) * v]),
+        _hats(record.time)[:, ::3],
+    ]
+    along = np.column_stack([np.sign(v), v])
+    if record.voltage is not None and np.ptp(record.voltage) > 0.0:
+        columns.append(_hats(record.voltage)[:, ::2] * np.sign(v)[:, None])
+        columns += [_behind(record.voltage, tau * record.rate)[:, None] * along for tau in LAGS]
+    return np.column_stack(columns)
+
+
+def _behind(voltage: Array, samples: float) -> Array:
+    """What a first-order lag of so many samples leaves between the voltage and itself."""
+    from scipy.signal import lfilter
+
+    share = 1.0 - np.exp(-1.0 / samples)
+    lagged, _ = lfilter([share], [1.0, share - 1.0], voltage, zi=[voltage[0] * (1.0 - share)])
+    return _scaled(voltage - lagged)
+
+
+def _scaled(values: Array) -> Array:
+    size = float(np.sqrt(np.mean(values**2)))
+    return values / size if size > 0.0 else values
+
+
+def _hats(values: Array) -> Array:
+    """(n, HATS) piecewise linear functions with nodes at even quantiles."""
+    nodes = np.unique(np.quantile(values, np.linspace(0.0, 1.0, HATS)))
+    return np.stack([np.interp(values, nodes, unit) for unit in np.eye(nodes.size)], axis=-1)

@@ -1,0 +1,62 @@
+"""What may differ from test to test without being an effect: offset, gain and delay of the force."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.diagnose.config import NuisanceConfig
+from pzd.record import Array
+
+AT_MOST = 3.5
+"""Offset, gain, delay and the instant of the voltage explain at most so many standard deviations of a test: chance
+goes further in one of two thousand; more is a gap. What all tests share shows in the fits, whatever this allows."""
+
+
+def nuisance(
+    residual: Array,
+    predicted: Array,
+    rate: float,
+    variance: float,
+    config: NuisanceConfig,
+    timing: Array,
+    calm: NDArray[np.bool_],
+) -> Array:
+    """The part of a residual that offset, gain and delay of the test explain within their priors.
+
+    Equation: min_b |r - A b|^2 / s^2 + |b|^2, |b_i| <= 3.5, A = [sd_o peak, sd_g F, -sd_d dF/dt, sd_t dF/dt_U]
+                                                                    Source: Gaussian prior, truncated
+
+    Parameters
+    ----------
+    residual : (n,) measured less predicted force [N]
+    predicted : (n,) force [N]
+    rate : sampling rate [Hz]
+    variance : of the noise [N^2]
+    config : standard deviations of the priors
+    timing : (n, 1) what one standard deviation of the voltage's instant makes of the force [N]; (n, 0) without
+    calm : (n,) the samples that count, those beside no jump
+
+    Returns
+    -------
+    (n,) force [N]
+    """
+    columns = np.hstack([columns_of(predicted, rate, config), timing])
+    weight = max(variance, 1e-12 * float(np.max(np.abs(predicted))) ** 2)
+    counted = columns[calm]
+    normal = counted.T @ counted / weight + np.eye(columns.shape[1])
+    estimate = np.linalg.solve(normal, counted.T @ residual[calm] / weight)
+    explained: Array = columns @ np.clip(estimate, -AT_MOST, AT_MOST)
+    return explained
+
+
+def columns_of(predicted: Array, rate: float, config: NuisanceConfig) -> Array:
+    """(n, 3) force [N] that one standard deviation of offset, gain and delay makes of a predicted force (n,)."""
+    peak = float(np.max(np.abs(predicted)))
+    return np.column_stack(
+        [
+            np.full(predicted.size, config.offset * peak),
+            config.gain * predicted,
+            -config.delay_s * np.gradient(predicted) * rate,
+        ]
+    )

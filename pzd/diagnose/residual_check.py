@@ -1,0 +1,141 @@
+"""One record against one damper: the residual, its noise, and how unlikely it is by noise alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.diagnose.config import NuisanceConfig
+from pzd.diagnose.data.cleaning import Prepared
+from pzd.diagnose.fit.prediction import counted
+from pzd.diagnose.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
+from pzd.diagnose.noise.between_cycles import PureError, harmonics_of, pure_error, repeatable_power
+from pzd.diagnose.noise.input_uncertainty import Expected
+from pzd.diagnose.noise.jumps import jumps, jumps_in_cycles, within_a_sample
+from pzd.diagnose.noise.smooth_residual import fit_smooth_residual
+from pzd.diagnose.noise.test_effects import nuisance
+from pzd.record import Array
+
+BELIEVED = 1e-4
+"""A change from cycle to cycle counts in the gap where noise alone would show it less often than this."""
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualCheck:
+    """What one record says about a damper, over the wanted samples."""
+
+    prepared: Prepared
+    wanted: Mask
+    """(n,) the samples that were judged."""
+    residual: Array
+    """(n,) measured less predicted force [N]."""
+    nuisances: Array
+    """(n,) the part of it that offset, gain and delay of the test explain, and chance beside jumps [N]."""
+    variance: float
+    """Of one sample by noise [N^2]."""
+    power: float
+    """Mean square of what repeats or is smooth above the noise [N^2]; about zero without a gap."""
+    probability: dict[str, Array]
+    """By kind of test (`harmonics`, `trend`, `smooth`), that noise alone looks so."""
+    error: PureError | None
+    """Harmonics and noise of the average cycle, where cycles repeat."""
+    folded: Array | None
+    """(cycles, points) residual less nuisances, where cycles repeat [N]."""
+    explained: Array | None
+    """(n,) square of what a rich smooth model explains of it, noise's share taken off, where nothing repeats [N^2]."""
+
+    @property
+    def cleared(self) -> Array:
+        """(n,) residual less nuisances [N]."""
+        return self.residual - self.nuisances
+
+    @property
+    def peak(self) -> float:
+        """Peak force of the record [N]."""
+        return float(np.max(np.abs(self.prepared.record.force)))
+
+
+def judge(given: Expected, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> ResidualCheck:
+    """The record against what a damper makes of it, over the wanted samples past the warm-up."""
+    record = prepared.record
+    predicted, residual = given.force, record.force - given.force
+    mask = wanted & counted(prepared)
+    rough = _rough_variance(prepared, residual, mask)
+    calm = _jumps(prepared) == 0.0
+    slack = np.zeros(residual.size)
+    slack[mask] = nuisance(residual[mask], predicted[mask], record.rate, rough, config, given.timing[mask], calm[mask])
+    slack += np.where(mask & ~calm, within_a_sample(record.force - slack, predicted), 0.0)
+    folded = _folded(prepared, residual - slack, mask)
+    if folded is not None:
+        return _repeating(prepared, mask, residual, slack, folded, given.unsure)
+    return _not_repeating(prepared, mask, residual, slack, predicted)
+
+
+def _jumps(prepared: Prepared) -> Array:
+    """(n,) how far the force bends beside a jump [N]; 0 elsewhere."""
+    record = prepared.record
+    return jumps_in_cycles(prepared.cycles, record.time, record.force) if prepared.cycles else jumps(record.force)
+
+
+def _repeating(
+    prepared: Prepared, mask: Mask, residual: Array, slack: Array, folded: Array, unsure: Array | float
+) -> ResidualCheck:
+    error = replace(pure_error(folded), shared=unsure)
+    trend = by_trend(folded)
+    probability = {"harmonics": by_harmonics(error)}
+    if trend is not None:
+        probability["trend"] = np.array([trend])
+    power = float(repeatable_power(error).sum())
+    if trend is not None and trend < BELIEVED:
+        power += _trend_power(folded, error)
+    return ResidualCheck(
+        prepared, mask, residual, slack, error.sample_variance, power, probability, error, folded, None
+    )
+
+
+def _not_repeating(prepared: Prepared, mask: Mask, residual: Array, slack: Array, predicted: Array) -> ResidualCheck:
+    from pzd.diagnose.data.cleaning import sliced
+
+    fit = fit_smooth_residual((residual - slack)[mask], sliced(prepared.record, mask), predicted[mask])
+    left = (residual - slack)[mask] - fit.explained
+    variance = min(fit.noise.variance, float(np.mean(left**2)) + float(np.mean(fit.spread)))
+    explained = np.zeros(residual.size)
+    explained[mask] = fit.explained**2 - fit.spread
+    power = float(np.mean(explained[mask]))
+    probability = {"smooth": np.array([fit.probability])}
+    return ResidualCheck(prepared, mask, residual, slack, variance, power, probability, None, None, explained)
+
+
+def _folded(prepared: Prepared, residual: Array, mask: Mask) -> Array | None:
+    """The residual's wanted whole cycles, one row each; None with fewer than two."""
+    run = prepared.cycles
+    if run is None:
+        return None
+    time = prepared.record.time
+    number = run.number(time)
+    whole = [j for j in range(run.count) if np.all(mask[number == j])]
+    return run.fold(time, residual)[whole] if len(whole) >= 2 else None
+
+
+def _rough_variance(prepared: Prepared, residual: Array, mask: Mask) -> float:
+    """Variance by noise, enough to weigh the priors of the nuisances."""
+    folded = _folded(prepared, residual, mask)
+    if folded is not None:
+        return float(np.mean(np.diff(folded, axis=0) ** 2) / 2.0)
+    return float(np.mean(np.diff(residual[mask]) ** 2) / 2.0)
+
+
+def _trend_power(folded: Array, error: PureError) -> float:
+    """Mean square of a steady change from cycle to cycle, noise's share taken off [N^2]."""
+    count, points = folded.shape
+    if count < TREND_CYCLES:
+        return 0.0
+    last = min(TREND_HARMONICS, harmonics_of(points))
+    order = np.arange(count) - (count - 1) / 2.0
+    coefficients = np.fft.rfft(folded, axis=1)[:, : last + 1] / points
+    slopes = np.abs(order @ coefficients / (order @ order)) ** 2 - error.single[: last + 1] / (order @ order)
+    return float((slopes[0] + 2.0 * slopes[1:].sum()) * np.mean(order**2))

@@ -1,0 +1,111 @@
+"""Whether the data support an effect by itself, or it merely stands in for something else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.fit.intervals import LEVEL, standard_errors
+from pzd.diagnose.fit.least_squares import Fitted, fit, misfit_of
+from pzd.diagnose.fit.parameters import Problem
+from pzd.diagnose.gap import gap_in_force, visible_gap
+from pzd.diagnose.search.candidates import Candidate
+from pzd.diagnose.search.evidence import Evidence
+
+AGREES = 0.001
+"""Halves of the tests disagree about a parameter when chance would let them so seldom."""
+ALIKE = 0.1
+"""Values within this ratio of one another agree, whatever their intervals."""
+TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, ("valve_lag", "tau"): 1e-3}
+"""A common offset [share of the lowest peak], delay or lag [s] that counts as nothing missing."""
+LEAST_CUT = 0.2
+"""An effect closes at least this share of the gap (mean square): what is real is not one of many small corrections.
+
+Each test counts by its own peak, or all by their force: soft conditions may keep a gap of another kind. By neither does
+it widen.
+"""
+
+
+def unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate) -> str | None:
+    """Why a candidate is too little to be adopted, None where it is not."""
+    if candidate.delta_bic > config.adopt_bic:
+        return "does not pay"
+    if candidate.explained < config.visible:
+        return f"moves the force by less than {100 * config.visible:g} % of peak"
+    if trivial(candidate.fitted, candidate.effect, evidence.whole.scales.low_force):
+        return "so small that it counts as an offset or a delay of the tests"
+    return None
+
+
+def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> str | None:
+    """Why a candidate is a stand-in by the gap that it leaves open, None where it closes enough or noise hides it."""
+    if not evidence.something_missing(before, config):
+        return None
+    judged = [evidence.campaign.judged(fitted.damper) for fitted in (before, candidate.fitted)]
+    gaps = [[size(each) for each in judged] for size in (visible_gap, gap_in_force)]
+    closed = [left**2 <= (1.0 - LEAST_CUT) * open_before**2 for open_before, left in gaps]
+    if any(closed) and all(left <= open_before for open_before, left in gaps):
+        return None
+    return f"stand-in: closes less than {LEAST_CUT:.0%} of the gap, or widens it"
+
+
+def closes(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> bool:
+    """Whether a candidate leaves so little of the gap that nothing more is looked for under a name."""
+    return evidence.gap(candidate.fitted) <= max(config.unexplained_share * evidence.gap(before), config.negligible)
+
+
+def trivial(fitted: Fitted, effect: str, force: float) -> bool:
+    """Whether the 95 % interval of a common offset or delay reaches below what counts as an effect."""
+    errors = standard_errors(fitted)
+    sizes = []
+    for unknown, error in zip(fitted.unknowns, errors, strict=True):
+        limit = TRIVIAL.get((unknown.effect, unknown.parameter.name))
+        if unknown.effect == effect and limit is not None:
+            unit = limit * (force if unknown.parameter.unit == "N" else 1.0)
+            sizes.append((abs(unknown.of(fitted.damper)) - LEVEL * error) / unit)
+    return bool(sizes) and max(sizes) < 1.0
+
+
+def spurious(
+    evidence: Evidence, weighed: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate
+) -> str | None:
+    """Why an effect is a stand-in: it fails on tests that it was not fitted to, or takes other values on either half.
+
+    Parameters
+    ----------
+    evidence : weighed by what is left without the candidate
+    weighed : by what it leaves, so that each test's own gain and delay act along its force
+    config : how much worse counts as worse
+    before : the optimum without the candidate
+    candidate : the optimum with it
+    """
+    halves = weighed.halves
+    if any(not half.observations for half in halves):
+        return None
+    fits = [fit(half, candidate.fitted.effects, half.start_with(candidate.fitted.damper)) for half in halves]
+    without = fit(evidence.halves[0], before.effects, before.searched)
+    with_it, left = misfit_of(halves[1], fits[0].damper), misfit_of(evidence.choosing(weighed), without.damper)
+    if with_it > left + config.rival_bic:
+        return "stand-in: widens the gap on tests it was not fitted to"
+    fresh = tuple(e for e in candidate.fitted.effects if e not in before.effects) or (candidate.effect,)
+    if not _agree(halves, (fits[0], fits[1]), fresh):
+        return "stand-in: takes other values on either half of the tests"
+    return None
+
+
+def _agree(halves: tuple[Problem, Problem], fits: tuple[Fitted, Fitted], effects: Sequence[str]) -> bool:
+    """Whether one half of the tests does nearly as well with the values that the other half gives to some effects.
+
+    Equation: min_ij (|r_j(p_i)|^2 - |r_j(p_j)|^2) < 2 chi2_e        Source: likelihood ratio, either half for granted
+    """
+    from scipy.special import chdtri
+
+    values = [[u.of(f.damper) for u in f.unknowns if u.effect in effects] for f in fits]
+    if all(abs(a - b) <= ALIKE * max(abs(a), abs(b)) for a, b in zip(*values, strict=True)):
+        return True
+    limit = 2.0 * float(chdtri(len(fits[0].unknowns), AGREES))
+    for half, own, other in ((halves[0], fits[0], fits[1]), (halves[1], fits[1], fits[0])):
+        spread = max(1.0, own.misfit / max(own.size - own.searched.size, 1))
+        if misfit_of(half, other.damper) - own.misfit <= limit * spread:
+            return True
+    return False

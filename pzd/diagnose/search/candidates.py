@@ -1,0 +1,290 @@
+"""Every effect of the library tried on the observations, one at a time, beside those already adopted."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pzd.damper.competing_forms import competing_forms, known
+from pzd.damper.effect import Effect
+from pzd.damper.effects import library
+from pzd.diagnose.fit.least_squares import DIFFERENCE, MOST_EVALUATIONS, Fitted, fit
+from pzd.diagnose.fit.parameters import Problem, Unknown, simulated
+from pzd.diagnose.fit.prediction import WARMS, ends
+from pzd.record import Array
+
+MOST_EVALUATIONS_OF_BEST = 100
+"""Evaluations after which even a converged optimum is left as it is."""
+FIRST = 6
+"""Evaluations after which the candidates are compared for the first time; the better ones go on."""
+OTHERS = 2
+"""Starting values tried before fainter ones."""
+FAINTER = (0.3, 0.1, 0.03, 0.01)
+"""Shares of the way from no effect to the most promising starting values."""
+FAINT = 0.1
+"""Share of the way at which an effect that noise nearly hides is linearised."""
+LEAST_PROMISE = 15.0
+"""An effect that promises to lower the misfit by less is not searched for where noise explains what is left: it
+pays from twice that on."""
+WORTH_SEARCHING = 0.5
+"""A candidate that pays less than this share of what the best pays is not searched on."""
+WORSE_THAN_CONTAINED = 1.0
+"""A model that holds another one is worse than it by more [in squares of noise] only where its search got stuck."""
+AT_EDGE = 0.01
+"""A searched variable that ends so near to a limit ends at it."""
+VARIES = ("stroke", "flow", "parallel")
+"""Places of effects whose parameters may differ by voltage."""
+MOVES = 0.02
+"""A channel moves in a test if its range there exceeds this share of the rig's scale."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One effect fitted together with the base rows and the effects adopted so far."""
+
+    effect: str
+    fitted: Fitted
+    delta_bic: float
+    """Change of the Bayesian criterion against the model without it; negative where it pays."""
+    explained: float
+    """R.m.s. by which it moves the simulated force, as a share of each record's peak."""
+    varies: bool = False
+    """Whether it is an effect adopted before, its parameters now by voltage."""
+
+
+def seen_in(problem: Problem, effect: Effect) -> bool:
+    """Whether something moves in some test that the effect needs to be seen at all."""
+    if effect.needs == "voltage":
+        return any(
+            o.motion.voltage is not None
+            and float(np.ptp(o.motion.voltage)) > MOVES * (problem.scales.voltage or np.inf)
+            for o in problem.observations
+        )
+    if effect.needs == "temperature":
+        return any(np.ptp(warmth) > WARMS for warmth in _warmth(problem).values())
+    return True
+
+
+def _warmth(problem: Problem) -> dict[int, list[float]]:
+    """Temperatures at the beginning and end of every test [degC], by base row."""
+    found: dict[int, list[float]] = {}
+    for o in problem.observations:
+        if o.motion.temperature is not None:
+            found.setdefault(o.place, []).extend(ends(o.motion.temperature))
+    return found
+
+
+def candidates(
+    problem: Problem,
+    before: Fitted,
+    forbidden: Sequence[str] = (),
+    jobs: int = 1,
+    *,
+    silent: bool = False,
+) -> tuple[Candidate, ...]:
+    """Every effect that the tests could show, fitted beside those of `before`, best first.
+
+    Parameters
+    ----------
+    problem : what is fitted to what
+    before : the optimum with the effects adopted so far
+    forbidden : effects that are not tried
+    jobs : how many are fitted at the same time
+    silent : noise explains what is left, so that only a faint effect can be missing
+    """
+    tried = [
+        effect
+        for effect in library().values()
+        if effect.name not in (*before.effects, *forbidden) and seen_in(problem, effect)
+    ]
+
+    def one(effect: Effect) -> Candidate:
+        unlikely = silent and _hopeless(problem, before, effect)
+        return (_barely if unlikely else candidate)(problem, before, effect)
+
+    with ThreadPoolExecutor(max(jobs, 1)) as pool:
+        found = list(pool.map(one, tried))
+        best = min((c.delta_bic for c in found), default=0.0)
+        found = list(
+            pool.map(lambda c: finished(problem, before, c) if c.delta_bic < WORTH_SEARCHING * best else c, found)
+        )
+    return tuple(sorted(found, key=lambda c: c.delta_bic))
+
+
+def finished(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
+    """A candidate whose search was broken off early, searched on from there."""
+    return _from(_for(problem, known()[found.effect]), before, found.effect, found.fitted.searched)
+
+
+def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
+    """One effect fitted beside those of `before`, from its most promising starting values.
+
+    Others, then ever fainter ones, are tried only while what is reached is worse than without the effect: a search
+    that got stuck, for without the effect is one of its own values.
+    """
+    problem, reached = _for(problem, effect), []
+    starts = promising_starts(problem, before, effect)
+    for start in (*starts[:OTHERS], *(_fainter(problem, effect, starts[0], share) for share in FAINTER)):
+        reached.append(_from(problem, before, effect.name, np.concatenate([_base(problem, before), start]), FIRST))
+        if reached[-1].fitted.misfit <= before.misfit + WORSE_THAN_CONTAINED or _switched_off(
+            effect, reached[-1].fitted
+        ):
+            break
+    return min(reached, key=lambda c: c.fitted.misfit)
+
+
+def _switched_off(effect: Effect, fitted: Fitted) -> bool:
+    """Whether the search of an effect's only parameter went to the limit below which lies zero, its absence."""
+    (only, *more), nearest = effect.parameters, fitted.unknowns[-1].bounds[0]
+    vanishes = only.search.logarithmic and only.neutral == 0.0 and not more
+    return vanishes and bool(fitted.searched[-1] - nearest < AT_EDGE)
+
+
+def _hopeless(problem: Problem, before: Fitted, effect: Effect) -> bool:
+    """Whether a faint effect of one parameter promises nothing; one of more may act where nobody looks yet."""
+    if len(effect.parameters) > 1:
+        return False
+    frame, _ = np.linalg.qr(before.slopes)
+    starts = _starts(problem, effect)
+    faint = (*starts, *(_fainter(problem, effect, start, FAINT) for start in starts))
+    promised = min(_promised(problem, before, effect, start, frame) for start in faint)
+    return before.misfit - promised < LEAST_PROMISE
+
+
+def _barely(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
+    """An effect as faint as it is looked for."""
+    start = _fainter(problem, effect, _starts(problem, effect)[0], FAINTER[-1])
+    return _from(problem, before, effect.name, np.concatenate([before.searched, start]), 1)
+
+
+def _fainter(problem: Problem, effect: Effect, start: Array, share: float) -> Array:
+    """Starting values that lie so much nearer to those that switch the effect off."""
+    unknowns = problem.unknowns((effect.name,))
+    return np.array([u.searched(u.fainter(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
+
+
+def best_competing_form(problem: Problem, before: Fitted) -> Candidate:
+    """The foil that explains most, fitted as a candidate is."""
+    tried = (converged(problem, before, candidate(problem, before, form)) for form in competing_forms().values())
+    return min(tried, key=lambda c: c.delta_bic)
+
+
+def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:
+    """Every effect of `before` whose parameters may differ by voltage, fitted so."""
+    free = [
+        name
+        for name in before.effects
+        if library()[name].place in VARIES and name not in problem.varying and len(problem.voltages) > 1
+    ]
+    return [_varied(problem, before, name) for name in free]
+
+
+def _varied(problem: Problem, before: Fitted, effect: str, evaluations: int = MOST_EVALUATIONS) -> Candidate:
+    wider = replace(problem, varying=problem.varying | {effect})
+    fitted = fit(wider, before.effects, wider.start_with(before.damper), evaluations)
+    return Candidate(effect, fitted, delta_bic(before, fitted), moved_by(problem, before, fitted), varies=True)
+
+
+def converged(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
+    """A candidate with its optimum searched to the end, from all its starting values."""
+    if found.varies:
+        return _varied(problem, before, found.effect, MOST_EVALUATIONS_OF_BEST)
+    effect = known()[found.effect]
+    problem = _for(problem, effect)
+    others = [np.concatenate([_base(problem, before), s]) for s in promising_starts(problem, before, effect)[1:]]
+    fits = [fit(problem, found.fitted.effects, start) for start in others]
+    best = min([found.fitted, *fits], key=lambda f: f.misfit)
+    return _from(problem, before, found.effect, best.searched, MOST_EVALUATIONS_OF_BEST)
+
+
+def _for(problem: Problem, effect: Effect) -> Problem:
+    """The problem that an effect is tried on: what changes the base with heat stands for its temperature axis."""
+    return problem.pooled() if effect.place == "material" else problem
+
+
+def _base(problem: Problem, before: Fitted) -> Array:
+    """(3 b + e,) where the search starts in the base rows and the effects of `before`."""
+    rows = before.searched.size - len(before.unknowns)
+    return before.searched if rows == 3 * len(problem.base) else problem.start_with(before.damper)
+
+
+def _from(
+    problem: Problem, before: Fitted, effect: str, start: Array, evaluations: int = MOST_EVALUATIONS
+) -> Candidate:
+    fitted = fit(problem, (*before.effects, effect), start, evaluations)
+    pays = delta_bic(before, fitted)
+    if len(problem.base) < len(before.damper.base):
+        # Fewer base rows alone may pay already; that is not the effect's merit, nor are the parameters that they save.
+        pooled = fit(problem, before.effects, problem.start_with(before.damper))
+        own = len(fitted.unknowns) - len(before.unknowns)
+        alone = fitted.misfit - before.misfit + own * float(np.log(fitted.size))
+        pays = max(pays, alone, delta_bic(pooled, fitted))
+    return Candidate(effect, fitted, pays, moved_by(problem, before, fitted))
+
+
+def delta_bic(before: Fitted, after: Fitted) -> float:
+    """Change of the Bayesian information criterion.
+
+    Equation: BIC = |r|^2 + p ln n                                  Source: Schwarz 1978
+    """
+    more = after.searched.size - before.searched.size
+    return after.misfit - before.misfit + more * float(np.log(after.size))
+
+
+def moved_by(problem: Problem, before: Fitted, after: Fitted) -> float:
+    """R.m.s. difference of two simulated forces, each record in units of its peak."""
+    squares = [
+        np.mean((a - b) ** 2) / o.peak**2
+        for o, a, b in zip(problem.observations, after.simulated, before.simulated, strict=True)
+    ]
+    return float(np.sqrt(np.mean(squares)))
+
+
+def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
+    """All starting values of an effect, first those from which one linearised step promises the smallest misfit.
+
+    Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
+                                                                Source: Gauss-Newton step
+    """
+    starts = _starts(problem, effect)
+    if len(starts) == 1:
+        return starts
+    frame, _ = np.linalg.qr(before.slopes)
+    promised = [_promised(problem, before, effect, start, frame) for start in starts]
+    return [starts[i] for i in np.argsort(promised, kind="stable")]
+
+
+def _starts(problem: Problem, effect: Effect) -> list[Array]:
+    unknowns = problem.unknowns((effect.name,))
+    grid = itertools.product(*(u.parameter.search.starts for u in unknowns))
+    return [np.array([_searched(u, value) for u, value in zip(unknowns, values, strict=True)]) for values in grid]
+
+
+def _searched(unknown: Unknown, start: float) -> float:
+    return float(np.log(start)) if unknown.parameter.search.logarithmic else start
+
+
+def _promised(problem: Problem, before: Fitted, effect: Effect, start: Array, frame: Array) -> float:
+    effects = (*before.effects, effect.name)
+    unknowns = problem.unknowns(effects)
+    here = np.concatenate([before.searched, start])
+    points = [problem.point(here, unknowns)]
+    for j in range(before.searched.size, here.size):
+        shifted = here.copy()
+        shifted[j] += DIFFERENCE
+        points.append(problem.point(shifted, unknowns))
+    residuals, slopes = [], []
+    for o in problem.observations:
+        forces = [simulated(point, o) for point in points]
+        residuals.append(o.in_noise(o.measured - forces[0]))
+        slopes.append(o.in_noise(np.stack([forces[0] - f for f in forces[1:]], axis=-1) / DIFFERENCE))
+    r, columns = np.concatenate(residuals), np.concatenate(slopes)
+    r, columns = r - frame @ (frame.T @ r), columns - frame @ (frame.T @ columns)
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns / np.where(size > 0.0, size, 1.0)
+    left = r - columns @ np.linalg.lstsq(columns, r, rcond=1e-6)[0]
+    return float(left @ left)

@@ -1,0 +1,131 @@
+"""The observations that naming works with: all samples seen, and their two halves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.effect import Scales
+from pzd.damper.material import by_voltage
+from pzd.damper.model import BaseRow, Damper
+from pzd.diagnose.campaign import Campaign, in_use
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.data.cleaning import Prepared
+from pzd.diagnose.data.split import TRAINING, VALIDATION
+from pzd.diagnose.fit.least_squares import Fitted
+from pzd.diagnose.fit.likelihood import RecordLikelihood
+from pzd.diagnose.fit.parameters import Problem
+from pzd.diagnose.fit.weights import record_likelihood
+from pzd.diagnose.gap import probability_of_noise, visible_gap
+from pzd.record import Array, voltage_scale
+
+Mask = NDArray[np.bool_]
+
+PER_SAMPLE = 3.0
+"""Time constants C/k of an element that fit into one sample at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What the tests of one setting say, ready for fitting."""
+
+    campaign: Campaign
+    whole: Problem
+    """All samples seen."""
+    halves: tuple[Problem, Problem]
+    """Those for training, and those that choose."""
+
+    def gap(self, fitted: Fitted) -> float:
+        """The gap that a fit leaves over all that is seen, as a share of peak."""
+        return visible_gap(self.campaign.judged(fitted.damper))
+
+    def something_missing(self, fitted: Fitted, config: DiagnoseConfig) -> bool:
+        """Whether the fit misses the tests by more than noise and by more than nothing."""
+        likely = probability_of_noise(self.campaign.judged(fitted.damper))
+        return likely < config.significance and self.gap(fitted) >= config.negligible
+
+    def criterion(self, fitted: Fitted) -> float:
+        """W_s over the compared samples of all that is seen.
+
+        Equation: sum (F - F_sim)^2 / sum F^2                       Source: Makowski and Knap 2021, eq. (4)
+        """
+        pairs = list(zip(self.whole.observations, fitted.simulated, strict=True))
+        missed = sum(float(np.sum((o.measured - force) ** 2)) for o, force in pairs)
+        return missed / sum(float(np.sum(o.measured**2)) for o, _ in pairs)
+
+    def choosing(self, weights: Evidence) -> Problem:
+        """The tests that choose, with the base rows of this evidence and the weights of another one."""
+        mine = self.halves[1]
+        pairs = zip(weights.halves[1].observations, mine.observations, strict=True)
+        return replace(mine, observations=tuple(replace(other, place=o.place) for other, o in pairs))
+
+
+def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
+    """The evidence of the records of one setting.
+
+    Parameters
+    ----------
+    campaign : the records, and which samples are fitted, which choose, which are untouched
+    damper : where the fits start and along which gain and delay of a test act
+    """
+    prepared = campaign.prepared
+    places = [_nearest_row(damper.base, p) if p.constant else -1 for p in prepared]
+    shown = in_use(campaign.seen)
+    given = dict(zip(shown, campaign.expected(damper, shown), strict=True))
+    made: dict[tuple[int, bytes], RecordLikelihood | None] = {}
+
+    def observed(kept: Sequence[Mask]) -> tuple[RecordLikelihood, ...]:
+        """A record that lies in one half is the same in the whole."""
+        keys = [(i, kept[i].tobytes()) for i in in_use(kept)]
+        for i, key in keys:
+            if (i, key) not in made:
+                made[i, key] = record_likelihood(prepared[i], kept[i], places[i], given[i], campaign.nuisance)
+        found = [made[key] for key in keys]
+        return tuple(each for each in found if each is not None)
+
+    whole = observed(campaign.seen)
+    scales = _scales(whole, prepared, damper, voltage_scale([p.record for p in prepared]))
+    reference = damper.reference_temperature_degC
+    if reference is None:
+        recorded = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
+        reference = float(np.median(recorded)) if recorded else None
+    fastest = PER_SAMPLE * max(p.record.rate for p in prepared)
+    varying = frozenset(name for name, values in damper.effects.items() if "at_voltage_V" in values)
+    problems = [
+        Problem(part, damper.base, scales, fastest, reference, varying)
+        for part in (whole, *(observed(campaign.in_role(role)) for role in (TRAINING, VALIDATION)))
+    ]
+    return Evidence(campaign, problems[0], (problems[1], problems[2]))
+
+
+def _scales(
+    observed: Sequence[RecordLikelihood], prepared: Sequence[Prepared], damper: Damper, voltage: float
+) -> Scales:
+    def largest(channel: str) -> float:
+        return max(float(np.max(np.abs(_of(p, channel)))) for p in prepared)
+
+    peaks = [o.peak for o in observed]
+    return Scales(
+        max(peaks),
+        min(peaks),
+        largest("velocity"),
+        largest("displacement"),
+        largest("acceleration"),
+        float(np.median([row.C_Ns_per_m for row in damper.base])),
+        voltage,
+    )
+
+
+def _of(prepared: Prepared, channel: str) -> Array:
+    return np.asarray(getattr(prepared.record, channel))
+
+
+def _nearest_row(rows: Sequence[BaseRow], prepared: Prepared) -> int:
+    """Index of the base row of a record: of the rows of the nearest voltage, that of the nearest temperature."""
+    voltage, temperature = prepared.record.median_voltage() or 0.0, prepared.record.median_temperature() or 0.0
+    _, nearest = min(by_voltage(rows), key=lambda group: abs(group[0] - voltage))
+    row = min(nearest, key=lambda r: abs((r.temperature_degC or 0.0) - temperature))
+    return next(i for i, each in enumerate(rows) if each is row)

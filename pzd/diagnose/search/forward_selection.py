@@ -1,0 +1,249 @@
+"""From candidates to adopted effects: one after another, as long as the data support the next by themselves."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+from pzd.damper.effects import library
+from pzd.damper.model import Damper
+from pzd.diagnose.campaign import Campaign
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.fit.least_squares import Fitted, fit
+from pzd.diagnose.fit.parameters import Problem
+from pzd.diagnose.search.acceptance import closes, leaves_gap, spurious, unsupported
+from pzd.diagnose.search.candidates import (
+    Candidate,
+    best_competing_form,
+    by_voltage,
+    candidate,
+    candidates,
+    converged,
+    delta_bic,
+    moved_by,
+)
+from pzd.diagnose.search.evidence import Evidence, evidence_of
+from pzd.diagnose.search.reweighting import at_rest
+from pzd.diagnose.search.selection import Competition, Round, Selection, against_nature
+
+log = logging.getLogger(__name__)
+
+WIDER = 1.1
+"""An optimum that widens the gap by more than this factor over where its search began is not gone to."""
+CLOSE = 0.95
+"""Candidates that pay at least this share of what the chosen one pays are searched to the end like it."""
+
+
+def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, jobs: int = 1) -> Selection:
+    """Adopt effects one after another while the next one pays, is supported by itself, and something is missing.
+
+    Parameters
+    ----------
+    campaign : the records of one setting
+    damper : plain, where the fits start
+    config : thresholds, forced and forbidden effects
+    jobs : candidates fitted at the same time
+    """
+    weighed = partial(evidence_of, campaign)
+    first = weighed(damper)
+    plain = fit(first.whole, (), first.whole.start())
+    search = _Search(config, weighed, jobs, damper, first, plain)
+    search.choose_temperature_axis()
+    first, plain = search.evidence, search.current
+    search.force()
+    while len(search.rounds) < 2 * config.most_effects and search.step():
+        pass
+    search.rest()
+    return Selection(
+        plain, search.current, tuple(search.rounds), search.reasons, first, search.evidence, search.competitions()
+    )
+
+
+@dataclass(eq=False)
+class _Search:
+    """Where the adoption of effects stands."""
+
+    config: DiagnoseConfig
+    weighed: Callable[[Damper], Evidence]
+    jobs: int
+    identified: Damper
+    """Plain, with the base rows of identify."""
+    evidence: Evidence
+    """Weighed by what the current damper leaves."""
+    current: Fitted
+    rounds: list[Round] = field(default_factory=list)
+    reasons: dict[str, str] = field(default_factory=dict)
+
+    def force(self) -> None:
+        """Adopt what the config asks for."""
+        for name in self.config.force:
+            self.current = candidate(self.evidence.whole, self.current, library()[name]).fitted
+            self.reasons[name] = "adopted because the config asks for it"
+
+    def choose_temperature_axis(self) -> None:
+        """Keep T0, C, k by temperature where that pays, and more than an effect would; else one row a voltage.
+
+        Rows by temperature follow each test's own gain, and bend between the tests what is missing.
+        """
+        if len(self.identified.base) == len(self.evidence.whole.voltages) or self._drifts():
+            return
+        whole = self.weighed(self.identified.model_copy(update={"effects": self.current.damper.effects})).whole
+        few, effects, damper = whole.pooled(), self.current.effects, self.current.damper
+        rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, few))
+        pays = delta_bic(one, rows)
+        if pays <= self.config.adopt_bic and not effects:
+            drifts = tuple(name for name, effect in library().items() if effect.place == "material")
+            tried = candidates(few, one, (*self.config.forbid, *drifts), self.jobs)
+            pays -= min((c.delta_bic for c in tried), default=0.0)
+        self._reweight(rows if pays <= self.config.adopt_bic else one)
+
+    def _drifts(self) -> bool:
+        return any(library()[name].place == "material" for name in self.current.effects)
+
+    def step(self) -> bool:
+        """Adopt one effect more, an adopted one by voltage, or two that are supported together; whether any was."""
+        tried = self._tried(self.evidence, self.current)
+        steps = sorted((*tried, *by_voltage(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
+        first = self._first_supported(steps)
+        if first is None:
+            return self._pair(tried)
+        ended = converged(self.evidence.whole, self.current, self._natural(first, steps))
+        self._adopt(ended, _ended(self.evidence.whole, self.current, ended, tried), _before(first, steps))
+        return True
+
+    def _natural(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
+        """Of the candidates that pay as much as the first and are supported, one with values that nature has."""
+        if not against_nature(first.fitted.damper):
+            return first
+        alike = [c for c in steps if not c.varies and c.delta_bic - first.delta_bic < self.config.rival_bic]
+        return self._first_supported([c for c in alike if not against_nature(c.fitted.damper)]) or first
+
+    def _tried(self, evidence: Evidence, current: Fitted) -> tuple[Candidate, ...]:
+        if len(current.effects) == self.config.most_effects:
+            return ()
+        silent = not evidence.something_missing(current, self.config)
+        return candidates(evidence.whole, current, self.config.forbid, self.jobs, silent=silent)
+
+    def _first_supported(self, tried: Sequence[Candidate]) -> Candidate | None:
+        """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""
+        for each in tried:
+            reason = self._too_little(self.evidence, self.current, each) or spurious(
+                self.evidence, self.weighed(each.fitted.damper), self.config, self.current, each
+            )
+            if reason is None:
+                return each
+            if not each.varies:
+                self.reasons[each.effect] = reason
+            if each.delta_bic > self.config.adopt_bic:
+                break
+        return None
+
+    def _too_little(self, evidence: Evidence, before: Fitted, each: Candidate) -> str | None:
+        return unsupported(evidence, self.config, each) or leaves_gap(evidence, self.config, before, each)
+
+    def _pair(self, tried: tuple[Candidate, ...]) -> bool:
+        """Adopt two effects at once: alone either takes on values that the other distorts."""
+        missing = self.evidence.something_missing(self.current, self.config)
+        lead = next((c for c in tried if missing and self._too_little(self.evidence, self.current, c) is None), None)
+        found = None if lead is None else self._beside_lead(lead)
+        if lead is None or found is None:
+            # Once noise explains what is left, the round that adopted something tells more of the others.
+            self.rounds += [Round(tried, None)] if tried and (missing or not self.rounds) else []
+            return False
+        self.rounds.append(Round(tried, lead.effect, refused=_before(lead, tried)))
+        self.reasons[lead.effect] = "adopted"
+        self._adopt(*found)
+        return True
+
+    def _beside_lead(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...], frozenset[str]] | None:
+        """The effect that is supported together with another one, what else was tried beside that, and was refused."""
+        evidence = self.weighed(lead.fitted.damper)
+        at = fit(evidence.whole, lead.fitted.effects, evidence.whole.start_with(lead.fitted.damper))
+        seconds = self._tried(evidence, at)
+        best = next((c for c in seconds if self._too_little(evidence, at, c) is None), None)
+        if best is None:
+            return None
+        both = converged(evidence.whole, at, best)
+        if not closes(self.evidence, self.config, self.current, both):
+            return None
+        failed = spurious(self.evidence, self.weighed(both.fitted.damper), self.config, self.current, both)
+        return None if failed else (both, _ended(evidence.whole, at, both, seconds), _before(best, seconds))
+
+    def _adopt(self, chosen: Candidate, tried: tuple[Candidate, ...], refused: frozenset[str]) -> None:
+        self.reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
+        if not chosen.varies:
+            finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
+            step = Round(finished, chosen.effect, refused=refused)
+            self.rounds.append(replace(step, rivals=_rivals(chosen, step.contenders, self.config)))
+        log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
+        self._reweight(chosen.fitted)
+        self.choose_temperature_axis()
+        for name in self.current.effects[len(self.config.force) : -1]:
+            self._drop_needless(name, chosen.effect)
+
+    def _reweight(self, found: Fitted) -> None:
+        """Go on from an optimum, the evidence weighed by what it leaves, unless that bends it to a wider gap."""
+        self.evidence = self.weighed(found.damper)
+        whole = self.evidence.whole
+        start = whole.start_with(found.damper)
+        self.current = fit(whole, found.effects, start)
+        if self._gap(self.current) > max(WIDER * self._gap(found), self.config.negligible):
+            self.current = fit(whole, found.effects, start, evaluations=1)
+
+    def rest(self) -> None:
+        """Weigh and fit in turn until no parameter moves, unless that widens the gap."""
+        evidence, current = at_rest(self.weighed, self.evidence, self.current)
+        if self._gap(current) <= max(WIDER * self._gap(self.current), self.config.negligible):
+            self.evidence, self.current = evidence, current
+
+    def _gap(self, fitted: Fitted) -> float:
+        return self.evidence.gap(fitted)
+
+    def _without(self, effect: str) -> Fitted:
+        """The optimum with one of the adopted effects left out."""
+        whole, damper = self.evidence.whole, self.current.damper
+        effects = {name: values for name, values in damper.effects.items() if name != effect}
+        return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
+
+    def competitions(self) -> tuple[Competition, ...]:
+        """The foils that would do as well as an effect adopted, in its place."""
+        found = []
+        for name in self.current.effects[len(self.config.force) :]:
+            without = self._without(name)
+            form = best_competing_form(self.evidence.whole, without)
+            behind = form.delta_bic - delta_bic(without, self.current)
+            if behind < self.config.rival_bic:
+                found.append(Competition(name, self.current.damper, form.effect, form.fitted.damper, behind))
+        return tuple(found)
+
+    def _drop_needless(self, effect: str, newest: str) -> None:
+        """Take back an effect adopted earlier that no longer pays or no longer moves the force."""
+        whole, current = self.evidence.whole, self.current
+        if library()[effect].place == "material":
+            return
+        without = self._without(effect)
+        pays = delta_bic(without, current) <= self.config.adopt_bic
+        if not pays or moved_by(whole, without, current) < self.config.visible:
+            self.current, self.reasons[effect] = without, f"stand-in: not needed beside {newest}"
+
+
+def _ended(problem: Problem, before: Fitted, chosen: Candidate, tried: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """The candidates of a step, those nearly as good as the one chosen searched to the end as it was."""
+    near = CLOSE * chosen.delta_bic
+    return tuple(
+        converged(problem, before, c) if c.effect != chosen.effect and c.delta_bic < near else c for c in tried
+    )
+
+
+def _before(chosen: Candidate, tried: Sequence[Candidate]) -> frozenset[str]:
+    """The effects that promised more than the one chosen: they were refused."""
+    return frozenset(c.effect for c in itertools.takewhile(lambda c: c is not chosen, tried) if not c.varies)
+
+
+def _rivals(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseConfig) -> tuple[str, ...]:
+    """The other effects that explain a step as well as the one chosen, best first."""
+    others = [c for c in tried if c.effect != chosen.effect]
+    return tuple(c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic)

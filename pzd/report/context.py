@@ -1,0 +1,205 @@
+"""All that the page tells of, in one place: every artefact, and what sections and pictures both need of them."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pzd.artefacts import ComfortRow, Diagnosed, Identified, ParameterRow, RecordEntry, Rides, Rig, SummaryRow, Table
+from pzd.damper.competing_forms import competing_forms
+from pzd.quantities import Control
+from pzd.record import Array, Record
+from pzd.report.config import ReportConfig
+from pzd.report.ride_comfort import SettledRide
+from pzd.report.wording import amount
+from pzd.simulate.config import SimulateConfig
+from pzd.simulate.roads.sine import Sine
+
+PLAIN = "-plain"
+"""Ends the name of a ride on the damper before diagnose."""
+REFERENCE = "constant"
+"""The policy that the others are set beside."""
+_OF_A_SINE = 1.5
+"""A motion whose peak speed stays within so many times that of a sine is a simple swing."""
+_MOST_SAMPLES = 300_000
+"""A map of the gap is made from about so many samples."""
+_REALISTIC = ("dynamic", "table", "ideal")
+"""Fidelities, the one nearest to the road first."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReportContext:
+    """The whole run, seen from its end."""
+
+    config: ReportConfig
+    simulate: SimulateConfig
+    rig: Rig
+    identified: Identified
+    diagnosed: Diagnosed
+    table: Table
+    rides: Rides
+    settled: tuple[SettledRide, ...]
+    comfort: tuple[ComfortRow, ...]
+    control: Control
+    setting: str | None
+
+    @cached_property
+    def chosen(self) -> str | None:
+        """The setting that diagnose and everything behind it used."""
+        settings = {row.setting for row in self.identified.rows}
+        return self.setting if self.setting is not None or len(settings) != 1 else next(iter(settings))
+
+    @cached_property
+    def records(self) -> tuple[Record, ...]:
+        """The records of the chosen setting."""
+        return tuple(record for record in self.rig.records if record.setting == self.chosen)
+
+    @cached_property
+    def entries(self) -> dict[str, RecordEntry]:
+        """What records.json says of each record."""
+        return {entry.name: entry for entry in self.rig.entries}
+
+    @cached_property
+    def parameters(self) -> tuple[ParameterRow, ...]:
+        """The identified rows of the chosen setting."""
+        return tuple(row for row in self.identified.rows if row.setting == self.chosen)
+
+    @cached_property
+    def sampled(self) -> tuple[Record, ...]:
+        """Records for maps: all of the setting, or every so manyth where they are too many to simulate at leisure."""
+        total = sum(record.time.size for record in self.records)
+        return self.records[:: max(math.ceil(total / _MOST_SAMPLES), 1)]
+
+    def simulated(self, record: Record) -> tuple[Array, Array]:
+        """(n,) force of the plain and of the final damper in the motion of a record [N]."""
+        if record.name not in self._forces:
+            from pzd.damper.compose import respond
+            from pzd.damper.motion import Motion
+
+            motion = Motion.of(record)
+            start = float(record.force[0])
+            before = respond(self.diagnosed.plain, motion, start)
+            after = respond(self.diagnosed.damper, motion, start) if self.extended else before
+            self._forces[record.name] = (before, after)
+        return self._forces[record.name]
+
+    @cached_property
+    def _forces(self) -> dict[str, tuple[Array, Array]]:
+        return {}
+
+    @property
+    def extended(self) -> bool:
+        """Whether diagnose changed the damper."""
+        return self.diagnosed.damper != self.diagnosed.plain
+
+    @cached_property
+    def shown(self) -> tuple[Record, ...]:
+        """The records shown as force: of each voltage the fastest sine or triangle, spread over the voltages."""
+        ordered = sorted(self.records, key=lambda r: (self.swings(r), float(np.abs(r.velocity).max())))
+        by_voltage = {self.level(record): record for record in ordered}
+        chosen = sorted(by_voltage.values(), key=lambda r: self.level(r) or 0.0)
+        if len(chosen) == 1:
+            chosen = ordered
+        count = min(self.config.records_shown, len(chosen))
+        places = {round(place) for place in np.linspace(0, len(chosen) - 1, count)}
+        return tuple(chosen[place] for place in sorted(places))
+
+    def swings(self, record: Record) -> bool:
+        """Whether the record goes to and fro once a cycle, as a sine or triangle does and a repeated road does not."""
+        for m in self.identified.measures:
+            if m.record == record.name and m.frequency_Hz is not None:
+                return m.peak_velocity_m_per_s <= _OF_A_SINE * 2.0 * math.pi * m.frequency_Hz * m.amplitude_m
+        return False
+
+    def level(self, record: Record) -> float | None:
+        """The identified voltage nearest to that of a record; its own where none was identified."""
+        own = record.median_voltage()
+        known = [row.voltage_V for row in self.parameters if row.voltage_V is not None]
+        return own if own is None or not known else min(known, key=lambda voltage: abs(voltage - own))
+
+    def middle(self, record: Record) -> slice:
+        """Two cycles of a simple swing, ten of any other record, from its middle: it may start and end at rest."""
+        cycles = self.entries[record.name].cycles if record.name in self.entries else 0.0
+        wanted = 2.0 if self.swings(record) else 10.0
+        share = min(wanted / max(cycles, 1.0), 1.0)
+        start = round(record.time.size * 0.5 * (1.0 - share))
+        return slice(start, record.time.size - start)
+
+    def voltage(self, value: float | None) -> str:
+        """A value of the control signal with its unit, in words where there is none."""
+        unit = self.control.unit
+        return f"no {self.control.name}" if value is None else amount(value, unit)
+
+    def conditions(self, record: Record) -> str:
+        """The conditions of a record; its name where it has none."""
+        parts = [self.voltage(self.level(record))] if record.voltage is not None else []
+        if record.temperature is not None:
+            parts.append(amount(record.median_temperature(), "degC"))
+        return ", ".join(parts) or record.name
+
+    def road(self, name: str) -> str:
+        """A road in words: a sine by its frequency and amplitude, any other by its name."""
+        for road in self.simulate.roads:
+            if road.name == name and isinstance(road, Sine) and road.label is None:
+                return f"{amount(road.frequency_Hz, 'Hz')} sine"
+        return name
+
+    @cached_property
+    def measures(self) -> dict[tuple[str, str], ComfortRow]:
+        """Comfort rows by case and measure."""
+        return {(row.case, row.measure): row for row in self.comfort}
+
+    def value(self, case: str, measure: str) -> float | None:
+        """A comfort value; None where the edition was not asked for."""
+        row = self.measures.get((case, measure))
+        return None if row is None else row.value
+
+    @cached_property
+    def roads(self) -> tuple[str, ...]:
+        """Names of the roads in the order of the rides."""
+        return tuple(dict.fromkeys(row.road for row in self.rides.summary))
+
+    def cases(self, road: str, *, plain: bool = False) -> tuple[SummaryRow, ...]:
+        """The rides over one road, on the final damper or on the one before diagnose."""
+        mine = [row for row in self.rides.summary if row.road == road]
+        return tuple(row for row in mine if row.case.endswith(PLAIN) == plain)
+
+    def reference(self, road: str) -> SummaryRow | None:
+        """The ride at constant damping over a road, on plain viscous dampers where there is one."""
+        constant = [row for row in self.cases(road) if row.policy == REFERENCE]
+        return max(constant, key=lambda row: _REALISTIC.index(row.fidelity), default=None)
+
+    def controlled(self, road: str) -> tuple[SummaryRow, ...]:
+        """The rides of the first policy that controls, nearest to a real one first."""
+        others = [row for row in self.cases(road) if row.policy != REFERENCE]
+        first = [row for row in others if row.policy == others[0].policy]
+        return tuple(sorted(first, key=lambda row: _REALISTIC.index(row.fidelity)))
+
+    def without(self, row: SummaryRow) -> SummaryRow | None:
+        """The same ride on the damper before diagnose."""
+        return next((other for other in self.rides.summary if other.case == f"{row.case}{PLAIN}"), None)
+
+
+def effect_in_words(name: str) -> str:
+    """What an effect is, in the first sentence of its own documentation."""
+    package = "competing_forms" if name in competing_forms() else "effects"
+    text = importlib.import_module(f"pzd.damper.{package}.{name}").__doc__ or name
+    first = text.split("\n")[0].rstrip(".")
+    return first[0].lower() + first[1:]
+
+
+def effects_in_words(names: Sequence[str]) -> list[str]:
+    """Each effect in words, with its name."""
+    return [f"{effect_in_words(name)} ({name})" for name in names]
+
+
+def policy_in_words(row: SummaryRow) -> str:
+    """What drove the dampers, and how exactly it was computed."""
+    if row.policy == REFERENCE:
+        return "constant c" if row.fidelity == _REALISTIC[-1] else f"constant c, {row.fidelity}"
+    return f"{row.policy}, {row.fidelity}"

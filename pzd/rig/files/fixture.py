@@ -1,0 +1,49 @@
+"""The known fixture taken out of a record: tare and moving mass from the force, the frame from the displacement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pzd.record import Array
+from pzd.rig.config import Fixture
+from pzd.signals.cycles import cycles
+from pzd.signals.kinematics import kinematics
+
+
+@dataclass(frozen=True, eq=False)
+class Freed:
+    """Displacement and force of the damper alone, and what was taken out."""
+
+    displacement: Array
+    force: Array
+    said: str
+
+
+def free(fixture: Fixture, time: Array, displacement: Array, force: Array) -> Freed:
+    """Displacement and force of the damper alone.
+
+    Equation: F = F_cell - F_tare - m a, x = x_rig - F / k_frame      Source: equilibrium of the mass, springs in series
+
+    Parameters
+    ----------
+    fixture : what is known of it
+    time : (n,) [s]
+    displacement : (n,) as the rig measures it [m]
+    force : (n,) as the cell measures it [N]
+
+    Returns
+    -------
+    both without the fixture, and a sentence that says so
+    """
+    said: list[str] = []
+    force = force - fixture.tare_N
+    if fixture.tare_N:
+        said.append(f"tare of {fixture.tare_N:g} N")
+    if fixture.mass_kg:
+        motion = kinematics(time, displacement, cycles(time, displacement))
+        force = force - fixture.mass_kg * motion.acceleration
+        said.append(f"inertia of {fixture.mass_kg:g} kg")
+    if fixture.stiffness_N_per_m:
+        displacement = displacement - force / fixture.stiffness_N_per_m
+        said.append(f"give of the frame at {fixture.stiffness_N_per_m:g} N/m")
+    return Freed(displacement, force, ", ".join(said))

@@ -1,0 +1,247 @@
+"""Delimited text: CSV and the exports of loggers, with a preamble, any separator and decimal sign.
+
+pandas reads a trailing comma or `0,001;1,5` wrongly without a word, so the number of fields
+in every line is checked first and the separator is known before a number is parsed.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.rig.config import FilesEntry
+from pzd.rig.files.dialect import BLANKS, after_lines, field_counts, fields_of, separator_of, text_of, without_blank_end
+from pzd.rig.files.sheet import Array
+from pzd.schema.errors import DataError, at
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+
+MOST_FAULTS = 5
+"""Faults of one kind that are listed for one file."""
+
+
+@dataclass(frozen=True, eq=False)
+class TextSheet:
+    """A text file whose lines all have as many fields as the header."""
+
+    path: Path
+    header: tuple[str, ...]
+    header_line: int | None
+    units: tuple[str, ...] | None
+    body: str
+    """The data lines, fields separated by `separator`, nothing quoted."""
+    lines: NDArray[np.int64]
+    """Line in the file of every data row."""
+    separator: str
+    decimal: str
+
+    @property
+    def rows(self) -> int:
+        """Number of data rows."""
+        return int(self.lines.size)
+
+    def line(self, row: int) -> int:
+        """Line of a data row in the file."""
+        return int(self.lines[row])
+
+    def numbers(self, columns: list[int]) -> dict[int, Array]:
+        """Columns (rows,) of numbers; an empty cell is NaN."""
+        try:
+            frame = self._parsed(columns, "float64")
+            values = {column: frame[column].to_numpy() for column in columns}
+        except (ValueError, OverflowError):
+            values = {}
+            faults: list[str] = []
+            for column in columns:
+                try:
+                    values[column] = self._cell_by_cell(column)
+                except DataError as error:
+                    faults += error.messages
+            if faults:
+                raise DataError(faults) from None
+        infinite = [fault for column in columns for fault in self._infinite(column, values[column])]
+        if infinite:
+            raise DataError(infinite)
+        return values
+
+    def texts(self, column: int) -> list[str]:
+        """The cells of one column, stripped; empty where a line ends before it."""
+        cells = self._parsed([column], "str")[column]
+        return [cell.strip() for cell in cells.fillna("").tolist()]
+
+    def _parsed(self, columns: list[int], kind: str) -> pd.DataFrame:
+        import pandas as pd
+
+        return pd.read_csv(
+            io.StringIO(self.body),
+            sep=r"\s+" if self.separator == BLANKS else self.separator,
+            decimal=self.decimal,
+            header=None,
+            names=list(range(len(self.header))),
+            usecols=columns,
+            dtype=kind,
+            keep_default_na=False,
+            na_values=[""],
+            skip_blank_lines=False,
+            skipinitialspace=True,
+            quoting=csv.QUOTE_NONE,
+            engine="c",
+        )
+
+    def _cell_by_cell(self, column: int) -> Array:
+        """The slow way, which knows the place of every bad cell."""
+        cells = self.texts(column)
+        values = np.full(len(cells), np.nan)
+        bad: list[int] = []
+        for row, cell in enumerate(cells):
+            try:
+                values[row] = _number(cell, self.decimal)
+            except ValueError:
+                bad.append(row)
+        if bad:
+            hint = "; for decimal commas say decimal: ','" if any("," in cells[row] for row in bad) else ""
+            raise DataError(
+                self._listed(column, bad, [f"a number is needed (got {cells[row]!r}){hint}" for row in bad])
+            )
+        return values
+
+    def _infinite(self, column: int, values: Array) -> list[str]:
+        bad = [int(row) for row in np.flatnonzero(np.isinf(values))]
+        return self._listed(column, bad, ["a finite number is needed (got inf)"] * len(bad))
+
+    def _listed(self, column: int, rows: list[int], messages: list[str]) -> list[str]:
+        name = self.header[column]
+        shown = [f"{at(self.path, self.line(r))}: {name}: {m}" for r, m in zip(rows, messages, strict=True)][
+            :MOST_FAULTS
+        ]
+        return shown + (
+            [f"{at(self.path)}: {name}: and {len(rows) - MOST_FAULTS} more"] if len(rows) > len(shown) else []
+        )
+
+
+def read(path: Path, entry: FilesEntry, wanted: Collection[str]) -> TextSheet:
+    """Read a text file as far as its headers, and check the number of fields in every line.
+
+    Parameters
+    ----------
+    path : the file
+    entry : how it is to be read
+    wanted : headers that are looked for; they tell the separator
+
+    Raises
+    ------
+    DataError : when it is no text, has no header or no data rows, or lines differ in their number of fields
+    """
+    text = text_of(path, entry.encoding)
+    skipped = after_lines(text, entry.skip)
+    if entry.comment is None and '"' not in text:
+        return _plain(path, entry, wanted, without_blank_end(text[skipped:]))
+    return _quoted(path, entry, wanted, text[skipped:])
+
+
+def _plain(path: Path, entry: FilesEntry, wanted: Collection[str], text: str) -> TextSheet:
+    """A file without quotes and comments: its body is parsed as it stands."""
+    above = (entry.header is None) + entry.units_row
+    start = after_lines(text, above)
+    top = text[:start].split("\n")[:above]
+    first = top[0] if top else text[: after_lines(text, 1)].rstrip("\n")
+    separator = entry.separator or separator_of(first, wanted, entry.decimal)
+    body = text[start:]
+    count = body.count("\n") + 1 if body else 0
+    lines = np.arange(count) + entry.skip + above + 1
+    heads = [fields_of(line, separator) for line in top]
+    fields = field_counts(body, separator) if body else np.empty(0, dtype=np.int64)
+    return _checked(path, entry, heads, body, lines, fields, separator)
+
+
+def _quoted(path: Path, entry: FilesEntry, wanted: Collection[str], text: str) -> TextSheet:
+    """A file with quotes or comments: taken apart by the csv module and put together without them."""
+    numbered = [
+        (number, line)
+        for number, line in enumerate(text.split("\n"), start=entry.skip + 1)
+        if entry.comment is None or not line.lstrip().startswith(entry.comment)
+    ]
+    while numbered and not numbered[-1][1].strip():
+        numbered.pop()
+    first = numbered[0][1] if numbered else ""
+    separator = entry.separator or separator_of(first, wanted, entry.decimal)
+    if separator == BLANKS:
+        rows = [line.split() for _, line in numbered]
+    else:
+        rows = [next(csv.reader([line], delimiter=separator, skipinitialspace=True), []) for _, line in numbered]
+    above = (entry.header is None) + entry.units_row
+    body = "\n".join("\x1f".join(cell.replace("\x1f", " ") for cell in row) for row in rows[above:])
+    lines = np.array([number for number, _ in numbered[above:]], dtype=np.int64)
+    fields = np.array([len(row) for row in rows[above:]], dtype=np.int64)
+    return _checked(path, entry, [[c.strip() for c in row] for row in rows[:above]], body, lines, fields, "\x1f")
+
+
+def _checked(
+    path: Path,
+    entry: FilesEntry,
+    heads: list[list[str]],
+    body: str,
+    lines: NDArray[np.int64],
+    fields: NDArray[np.int64],
+    separator: str,
+) -> TextSheet:
+    header = list(entry.header) if entry.header is not None else (heads[0] if heads else [])
+    header_line = None if entry.header is not None else int(lines[0]) - len(heads) if lines.size else entry.skip + 1
+    if not any(header):
+        raise DataError(f"{at(path, entry.skip + 1)}: no header line")
+    if lines.size == 0:
+        raise DataError(f"{at(path, header_line)}: no data rows below the header")
+    uneven = (fields != len(header)) & ~_ends_before_the_event(entry, header, fields)
+    if uneven.any():
+        raise DataError(_uneven(path, lines, fields, np.flatnonzero(uneven), len(header), separator))
+    units = tuple(heads[-1]) if entry.units_row else None
+    if units is not None and len(units) != len(header):
+        raise DataError(f"{at(path, int(lines[0]) - 1)}: {len(units)} units for {len(header)} columns")
+    return TextSheet(path, tuple(header), header_line, units, body, lines, separator, entry.decimal)
+
+
+def _uneven(
+    path: Path,
+    lines: NDArray[np.int64],
+    fields: NDArray[np.int64],
+    rows: NDArray[np.int64],
+    wanted: int,
+    separator: str,
+) -> list[str]:
+    said = "" if separator == "\x1f" else f" (separator {separator!r})"
+    shown = [
+        f"{at(path, int(lines[r]))}: {fields[r]} fields where the header has {wanted}{said}" for r in rows[:MOST_FAULTS]
+    ]
+    if rows.size <= MOST_FAULTS:
+        return shown
+    hint = "; if the header stands further down, say skip: lines above it" if rows.size > lines.size // 2 else ""
+    return [*shown, f"{at(path)}: and {rows.size - MOST_FAULTS} more such lines{hint}"]
+
+
+def _ends_before_the_event(entry: FilesEntry, header: list[str], fields: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Rows that leave out the last column, where that is the column of events."""
+    allowed = entry.split is not None and entry.split.event is not None and header[-1] == entry.split.event
+    shorter: NDArray[np.bool_] = fields == len(header) - 1
+    return shorter if allowed else np.zeros_like(shorter)
+
+
+def _number(cell: str, decimal: str) -> float:
+    """The number in a cell, NaN where it is empty; infinities and NaN are no numbers."""
+    if not cell:
+        return float("nan")
+    if "_" in cell or (decimal == "," and "." in cell):
+        raise ValueError(cell)
+    value = float(cell.replace(",", ".") if decimal == "," else cell)
+    if not np.isfinite(value):
+        raise ValueError(cell)
+    return value

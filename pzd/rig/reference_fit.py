@@ -1,0 +1,157 @@
+"""A fit_reference Bingham element fitted coarsely: what the preflight holds a record against.
+
+Fine enough to tell an offset or a delay from the damper's own hysteresis, far too coarse to identify.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from pzd.damper.element import element_force
+from pzd.record import Array
+from pzd.rig.measured import Measured
+from pzd.signals.cycles import Cycles
+from pzd.signals.kinematics import drift_of
+
+MOST_SAMPLES = 800
+RATE = 250.0
+"""A record without cycles is read at about this rate [Hz]."""
+VISIBLE = 2e-3
+"""Share of the force's squares that is looked into: what is less is noise, or how coarse the element is."""
+_GRID = (24, 16)
+_ZOOM = (7, 7)
+_ZOOMS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """What is looked at of a record: its average cycle, or its beginning."""
+
+    step: float
+    """Interval of the samples [s]."""
+    displacement: Array
+    """(n,) [m]"""
+    force_later: Callable[[Array], Array]
+    """Delays (m,) [s] -> the force (m, n) read that much later [N]."""
+    closed: bool
+    """Whether the end joins the beginning."""
+
+
+@dataclass(frozen=True)
+class ReferenceFit:
+    """The element that leaves least of any of the forces that it was held against."""
+
+    left: float
+    """Share of the force's squares about its mean that is left."""
+    left_without: float
+    """The same without the element: what offset, spring and inertia leave by themselves."""
+    force: int
+    """Which of the forces."""
+    friction_extension: float
+    """T0 / k [m]."""
+    lag: float
+    """C / k [s]."""
+
+    def explains(self) -> bool:
+        """Whether something is left without it, and it takes more than half; else its parameters say nothing."""
+        return self.left_without > VISIBLE and self.left < 0.5 * self.left_without
+
+
+@lru_cache(maxsize=1)
+def fit_reference(test: Measured) -> tuple[Piece, ReferenceFit]:
+    """What is looked at of a record, and the element that fits it as it stands; kept for the checks that share it."""
+    part = piece(test)
+    return part, fitted(part, part.force_later(np.zeros(1)))
+
+
+def piece(test: Measured) -> Piece:
+    """The average cycle of a record, or its beginning where nothing repeats."""
+    return _beginning(test) if test.run is None else _average_cycle(test, test.run)
+
+
+def _beginning(test: Measured) -> Piece:
+    record = test.record
+    every = max(round(record.rate / RATE), 1)
+    rows = slice(0, every * MOST_SAMPLES, every)
+
+    def later(delays: Array) -> Array:
+        return np.stack([np.interp(record.time[rows] + delay, record.time, record.force) for delay in delays])
+
+    return Piece(every / record.rate, test.clean.displacement[rows], later, closed=False)
+
+
+def _average_cycle(test: Measured, run: Cycles) -> Piece:
+    record = test.record
+    steady = test.clean.displacement - drift_of(record.time, test.clean.displacement, run)
+    x, cycle = run.mean(record.time, steady), run.mean(record.time, record.force)
+    every = -(-x.size // MOST_SAMPLES)
+    spectrum, harmonics = np.fft.rfft(cycle), np.arange(cycle.size // 2 + 1)
+
+    def later(delays: Array) -> Array:
+        turn = np.exp(2j * np.pi * np.outer(delays, harmonics) * run.frequency)
+        values: Array = np.fft.irfft(spectrum * turn, cycle.size, axis=1)[:, ::every]
+        return values
+
+    return Piece(every * run.period / x.size, x[::every], later, closed=True)
+
+
+def fitted(part: Piece, forces: Array) -> ReferenceFit:
+    """The Bingham element that leaves least of any of the forces, unexplained offset, spring and inertia.
+
+    Parameters
+    ----------
+    part : the displacement
+    forces : (m, n) [N]
+    """
+    x = part.displacement
+    free = _free_terms(x)
+    targets, unexplained = _unit(forces, free), _unexplained_share(forces, free)
+    half = 0.5 * float(np.ptp(x))
+    longest = max(2.0 * part.step, min(0.1, 0.1 * part.step * x.size))
+    spans = [(np.log(2e-3 * half), np.log(0.7 * half)), (np.log(0.2 * part.step), np.log(longest))]
+    counts = _GRID
+    for _ in range(1 + _ZOOMS):
+        frictions, lags = (np.linspace(*span, count) for span, count in zip(spans, counts, strict=True))
+        pairs = [(float(np.exp(u)), float(np.exp(w))) for u in frictions for w in lags]
+        elements = _unit(np.stack([unit_force(part, *pair) for pair in pairs]), free)
+        left = unexplained * (1.0 - np.maximum(elements @ targets.T, 0.0) ** 2)
+        best, force = (int(i) for i in np.unravel_index(int(np.argmin(left)), left.shape))
+        spans = [
+            (np.log(value) - (grid[1] - grid[0]), np.log(value) + (grid[1] - grid[0]))
+            for value, grid in zip(pairs[best], (frictions, lags), strict=True)
+        ]
+        counts = _ZOOM
+    return ReferenceFit(float(left[best, force]), float(unexplained[force]), force, *pairs[best])
+
+
+def unit_force(part: Piece, friction_extension: float, lag: float) -> Array:
+    """Force (n,) of the element over its stiffness [m], in the second pass where the motion is closed."""
+    x = part.displacement
+    passes = np.concatenate((x, x)) if part.closed else x
+    return element_force(passes, part.step, friction_extension, lag, 1.0)[-x.size :]
+
+
+def _free_terms(x: Array) -> Array:
+    """Orthonormal columns (n, 3) of what may stand unexplained the element: offset, spring, inertia."""
+    bend = np.gradient(np.gradient(x))
+    result: Array = np.linalg.qr(np.stack([np.ones(x.size), x, bend], axis=1))[0]
+    return result
+
+
+def _unexplained_share(forces: Array, free: Array) -> Array:
+    """Share (m,) of each force's squares about its mean that what stands unexplained the element leaves."""
+    rest = forces - (forces @ free) @ free.T
+    about_mean = forces - forces.mean(axis=1, keepdims=True)
+    result: Array = np.sum(rest**2, axis=1) / np.maximum(np.sum(about_mean**2, axis=1), 1e-300)
+    return result
+
+
+def _unit(forces: Array, free: Array) -> Array:
+    """Rows without what stands unexplained the element, of unit length."""
+    rest = forces - (forces @ free) @ free.T
+    result: Array = rest / np.maximum(np.linalg.norm(rest, axis=1, keepdims=True), 1e-300)
+    return result

@@ -1,0 +1,1 @@
+"""The virtual test stand: waveforms, voltage and temperature programmes, warming, frame, sensors."""

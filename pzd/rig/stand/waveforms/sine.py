@@ -1,0 +1,43 @@
+"""A sine, as on most damper test stands: x = A sin(2 pi f t)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from pzd.rig.stand.waveform import Course, Waveform
+from pzd.signals.harmonics import FourierSum
+
+
+class Sine(Waveform):
+    """A harmonic motion."""
+
+    kind: Literal["sine"] = "sine"
+    """A harmonic motion."""
+    frequency_Hz: float = Field(gt=0.0)
+    """Frequency."""
+    amplitude_m: float = Field(gt=0.0)
+    """Amplitude, half the stroke."""
+
+    def own_name(self) -> str:
+        """`sine-2Hz-0.03m`."""
+        return f"sine-{self.frequency_Hz:g}Hz-{self.amplitude_m:g}m"
+
+    def cycle(self, folder: Path) -> float:
+        """1 / f."""
+        return 1.0 / self.frequency_Hz
+
+    @property
+    def settling(self) -> float:
+        """Two cycles, or a second."""
+        return max(2.0 / self.frequency_Hz, 1.0)
+
+    def course(self, draw: np.random.Generator, folder: Path) -> Course:
+        """The sine."""
+        return FourierSum(1.0 / self.frequency_Hz, np.array([0.0, -1j * self.amplitude_m]))
+
+
+WAVEFORM = Sine

@@ -1,0 +1,1 @@
+"""What any record is made of: cycles, kinematics, smoothing, recursions, autoregression, harmonics, roads."""

@@ -1,0 +1,98 @@
+"""Coloured noise as a short autoregressive model: its spectrum, its variance, and whitening by it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.record import Array
+
+ORDER_MAX = 12
+"""Longest model tried unless said otherwise: two poles each for sensor, amplifier and mains, and as many to spare."""
+SAMPLES_PER_ORDER = 20
+"""At least this many samples stand behind each coefficient: its standard error is then below 0.25."""
+FLOOR = 1e-12
+"""Innovation variance is never below this share of the variance: rounding is no noise model."""
+
+
+@dataclass(frozen=True, eq=False)
+class Autoregression:
+    """Noise e_i = sum_j a_j e_(i-j) + w_i with white w."""
+
+    coefficients: Array
+    """(p,) a_1 ... a_p; empty for white noise."""
+    innovation: float
+    """Variance of w, in the square of the noise's unit."""
+
+    def whitened(self, series: Array) -> Array:
+        """The series (n,) or (n, m) without its colour, scaled to unit variance; the first p rows dropped.
+
+        Equation: w_i = (e_i - sum_j a_j e_(i-j)) / sigma_w      Source: Box and Jenkins 1970, ch. 3
+        """
+        p = self.coefficients.size
+        out = np.array(series[p:], dtype=np.float64)
+        for j, a in enumerate(self.coefficients, start=1):
+            out -= a * series[p - j : len(series) - j]
+        return out / np.sqrt(self.innovation) if self.innovation > 0.0 else out
+
+    def density(self, share_of_rate: Array) -> Array:
+        """Variance density at frequencies given as a share of the sampling rate.
+
+        Equation: S = sigma_w^2 / |1 - sum_j a_j exp(-2 pi i f j)|^2      Source: Box and Jenkins 1970, eq. (3.2.5)
+        """
+        j = np.arange(1, self.coefficients.size + 1)
+        response = 1.0 - np.exp(-2j * np.pi * np.outer(share_of_rate, j)) @ self.coefficients
+        density: Array = self.innovation / np.abs(response) ** 2
+        return density
+
+    @property
+    def whitening_filter(self) -> Array:
+        """(p + 1,) coefficients 1, -a_1, ... -a_p of the filter that gives w from e."""
+        return np.concatenate([np.ones(1), -self.coefficients])
+
+    @property
+    def variance(self) -> float:
+        """Variance of the noise itself: the density summed over all frequencies."""
+        return float(np.mean(self.density((np.arange(4096) + 0.5) / 4096)))
+
+
+def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autoregression:
+    """The short model that describes stretches of noise best, its order by the Bayesian criterion.
+
+    Equation: minimise the forward and backward prediction errors together       Source: Burg 1975
+    Equation: BIC = n ln sigma_p^2 + p ln n                                      Source: Schwarz 1978
+
+    Parameters
+    ----------
+    series : stretches (n_i,) of one noise, zero mean
+    order_max : longest model tried
+
+    Returns
+    -------
+    the model; white noise of variance 0 where the stretches are zero
+    """
+    count = sum(stretch.size for stretch in series)
+    order_max = min(order_max, count // SAMPLES_PER_ORDER, min(stretch.size for stretch in series) - 1)
+    variance = whole = sum(float(stretch @ stretch) for stretch in series) / max(count, 1)
+    a = np.zeros(0)
+    best = Autoregression(a, variance)
+    if variance <= 0.0:
+        return best
+    best_bic = count * np.log(variance)
+    errors = [(stretch[1:].copy(), stretch[:-1].copy()) for stretch in series]
+    for order in range(1, order_max + 1):
+        total = sum(float(forward @ forward + backward @ backward) for forward, backward in errors)
+        if total <= 0.0:
+            break
+        reflection = 2.0 * sum(float(forward @ backward) for forward, backward in errors) / total
+        a = np.append(a - reflection * a[::-1], reflection)
+        variance *= 1.0 - reflection**2
+        if variance <= FLOOR * whole:
+            break
+        errors = [((f - reflection * b)[1:], (b - reflection * f)[:-1]) for f, b in errors]
+        bic = count * np.log(variance) + order * np.log(count)
+        if bic < best_bic:
+            best, best_bic = Autoregression(a.copy(), variance), bic
+    return best

@@ -1,0 +1,190 @@
+"""The cycles of a periodic test: its period, and the run of cycles that repeat.
+
+A record may begin at rest, ramp in and out, drift, and end inside a cycle; the run found
+here holds only whole cycles that repeat. A record without one (a road, a sweep) has None.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.record import Array
+from pzd.signals.edges import ROUNDS, averaged, force_span, motion_span
+from pzd.signals.period import Repeats, repeats
+
+FITTED_POINTS = 1000
+"""Points of a cycle that the period is fitted to, at least, as far as there are samples."""
+REFINEMENTS = 6
+"""Rounds of the refinement of the period; each squares the error."""
+CORNER = 3
+"""Points at either end of the cycle that the period is not fitted to."""
+TWO = 1.99
+"""Fewer cycles than these make no run."""
+MARGIN = 0.1
+"""Share of a cycle by which the run keeps off the end of the section, where there is so much to spare."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """A run of whole cycles that repeat."""
+
+    period: float
+    """Length of one cycle [s]."""
+    start: float
+    """Time at which the first repeating cycle begins, a sample of the record [s]."""
+    count: int
+    """Number of whole cycles in the run, at least two."""
+
+    @property
+    def frequency(self) -> float:
+        """Cycles per second [Hz]."""
+        return 1.0 / self.period
+
+    @property
+    def end(self) -> float:
+        """Time at which the last repeating cycle ends [s]."""
+        return self.start + self.count * self.period
+
+    def inside(self, time: Array) -> NDArray[np.bool_]:
+        """Mask (n,) of the samples inside the run."""
+        rounding = 1e-9 * self.period
+        return (time >= self.start - rounding) & (time < self.end - rounding)
+
+    def phase(self, time: Array) -> Array:
+        """Position (n,) in the cycle, 0 <= phase < 1, also outside the run."""
+        return np.mod((time - self.start) / self.period, 1.0)
+
+    def number(self, time: Array) -> NDArray[np.int64]:
+        """Index (n,) of the cycle that each sample belongs to, -1 outside the run."""
+        index = np.floor((time - self.start) / self.period + 1e-9).astype(np.int64)
+        return np.where(self.inside(time), index, -1)
+
+    def points(self, time: Array) -> int:
+        """Samples in one cycle, rounded down: the length of a folded cycle."""
+        return max(int(np.floor(self.period / float(np.median(np.diff(time))) + 1e-6)), 4)
+
+    def fold(self, time: Array, values: Array) -> Array:
+        """One row a cycle (count, points), from a cubic through the samples."""
+        points = self.points(time)
+        steps = np.arange(self.count * points) / points
+        return _cubic(time, values, self.start + steps * self.period).reshape(self.count, points)
+
+    def mean(self, time: Array, values: Array) -> Array:
+        """The average cycle (points,)."""
+        average: Array = self.fold(time, values).mean(axis=0)
+        return average
+
+
+def cycles(time: Array, displacement: Array) -> Cycles | None:
+    """The longest run of cycles that repeat, or None where no two whole cycles do.
+
+    Parameters
+    ----------
+    time : (n,) strictly increasing, nearly regular [s]
+    displacement : (n,) of any shape: sine, triangle, a road driven twice [any unit]
+
+    Returns
+    -------
+    the run, with the period refined on the shift between its cycles
+    """
+    found = repeats(time, displacement)
+    return None if found is None else _refined(time, displacement, found)
+
+
+def settled(run: Cycles, time: Array, force: Array) -> Cycles:
+    """The cycles of a run whose force repeats as well: at a constant voltage, the transient at its ends left out.
+
+    Parameters
+    ----------
+    run : of the displacement
+    time : (n,) of the record [s]
+    force : (n,) [N]
+
+    Returns
+    -------
+    the same run where its force repeats throughout, or where fewer than two cycles would remain
+    """
+    span = force_span(time, force, run.period, (run.start, run.end))
+    if span == (run.start, run.end) or span[1] - span[0] < TWO * run.period:
+        return run
+    return _whole(time, Repeats(run.period, *span), run.period)
+
+
+def _refined(time: Array, displacement: Array, found: Repeats) -> Cycles:
+    """Find the edges of the run and its period in turn: either needs the other."""
+    coarse, x = averaged(time, displacement, found.period, FITTED_POINTS)
+    run = _fitted(time, coarse, x, found)
+    for _ in range(ROUNDS):
+        start, end = motion_span(time, displacement, run.period, (found.start, found.end))
+        if (start, end) == (found.start, found.end) or end - start < TWO * run.period:
+            break
+        found = Repeats(run.period, start, end)
+        run = _fitted(time, coarse, x, found)
+    return run
+
+
+def _fitted(time: Array, coarse: Array, displacement: Array, found: Repeats) -> Cycles:
+    """Fit the period to few cycles first, so that a shift never exceeds a small part of the cycle."""
+    run = _whole(time, found, found.period)
+    for round_number in range(REFINEMENTS):
+        used = Cycles(run.period, run.start, min(run.count, 3 * 4**round_number))
+        run = _whole(time, found, run.period + _shift_per_cycle(coarse, displacement, used))
+    return run
+
+
+def _whole(time: Array, found: Repeats, period: float) -> Cycles:
+    """Whole cycles at the end of the repeating section, the first starting on a sample.
+
+    What is left over goes to the front, where a transient may linger; a little of it keeps the run from the end.
+    """
+    step = float(np.median(np.diff(time)))
+    end = min(found.end, float(time[-1]) + step)
+    count = max(int((end - found.start + 0.5 * step) / period), 2)
+    left_over = max(end - found.start - count * period, 0.0)
+    end -= min(0.5 * left_over, MARGIN * period)
+    first = int(np.searchsorted(time, end - count * period - 0.5 * step))
+    return Cycles(period, float(time[first]), count)
+
+
+def _shift_per_cycle(time: Array, displacement: Array, run: Cycles) -> float:
+    """How much later each cycle comes than the last [s], by least squares on the average cycle.
+
+    Equation: shift_i = - sum((x_i - m) m') / sum(m'^2), m the average cycle      Source: first-order Taylor series
+    """
+    order = np.arange(run.count, dtype=np.float64) - (run.count - 1) / 2.0
+    folded = run.fold(time, displacement)
+    folded = folded - drift(folded)
+    average: Array = folded.mean(axis=0)
+    slope = np.asarray((np.roll(average, -1) - np.roll(average, 1)) * average.size / (2.0 * run.period))
+    # Where the run begins and ends it may touch the corner of a start out of rest, which no cubic follows.
+    touched = min(CORNER, average.size // 20)
+    slope[:touched] = slope[average.size - touched :] = 0.0
+    slope[touched : average.size - touched] -= slope.sum() / (average.size - 2 * touched)
+    shifts = -(folded - average) @ slope / float(slope @ slope)
+    return float(order @ shifts / (order @ order))
+
+
+def drift(folded: Array) -> Array:
+    """Slow drift (count, points), a parabola that the means of the cycles show and their shape has no part in.
+
+    Parameters
+    ----------
+    folded : (count, points) one row a cycle
+    """
+    order = np.arange(len(folded)) - (len(folded) - 1) / 2.0
+    degree = min(order.size - 1, 2)
+    phase = (np.arange(folded.shape[1]) - 0.5 * (folded.shape[1] - 1)) / folded.shape[1]
+    course = np.polynomial.Polynomial.fit(order, folded.mean(axis=1), degree)
+    found: Array = course(order[:, None] + phase)
+    return found
+
+
+def _cubic(time: Array, values: Array, at: Array) -> Array:
+    from scipy.interpolate import CubicSpline
+
+    near = (time >= at[0] - 8 * (time[1] - time[0])) & (time <= at[-1] + 8 * (time[1] - time[0]))
+    result: Array = CubicSpline(time[near], values[near])(at)
+    return result

@@ -1,0 +1,127 @@
+"""Velocity and acceleration from the displacement, never by differencing what was sampled.
+
+Where cycles repeat, their average is differentiated with the harmonics that stand out of their
+own scatter; elsewhere the displacement is smoothed as far as its noise asks for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.record import Array
+from pzd.signals.cycles import Cycles
+from pzd.signals.smoothing import low_pass
+
+STANDARD_ERRORS = 4.0
+"""A harmonic is kept where its mean exceeds this many standard errors of its scatter over cycles."""
+NOT_CYCLIC = 3.0
+"""Departures from the average cycle are followed up to this many times its frequency."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """The motion without its noise; every array is (n,)."""
+
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+
+
+def kinematics(time: Array, displacement: Array, run: Cycles | None) -> Kinematics:
+    """Displacement, velocity and acceleration without the noise of the displacement sensor.
+
+    Parameters
+    ----------
+    time : (n,) strictly increasing [s]
+    displacement : (n,) [m]
+    run : the cycles that repeat, None where none do
+
+    Returns
+    -------
+    inside the run from the average cycle and what departs from it slowly, outside from the
+    smoothed displacement
+    """
+    if run is None:
+        return _smoothed(time, displacement, np.inf)
+    inside = run.inside(time)
+    cyclic = _average_cycle(time, displacement - drift_of(time, displacement, run), run)
+    drift = _smoothed(time[inside], displacement[inside] - cyclic.displacement, NOT_CYCLIC * run.frequency)
+    parts = [cyclic.displacement + drift.displacement, cyclic.velocity + drift.velocity]
+    parts.append(cyclic.acceleration + drift.acceleration)
+    if inside.all():
+        return Kinematics(*parts)
+    outside = _smoothed(time, displacement, np.inf)
+    for whole, part in zip((outside.displacement, outside.velocity, outside.acceleration), parts, strict=True):
+        whole[inside] = part
+    return outside
+
+
+def significant_harmonics(folded: Array) -> Array:
+    """Mask (points // 2 + 1,) of the harmonics whose mean stands out of its scatter over the cycles.
+
+    Equation: abs(mean c_h) > 4 sqrt(sum abs(c_h - mean)^2 / (n (n - 1)))     Source: standard error of a complex mean
+
+    Parameters
+    ----------
+    folded : (cycles, points) one row a cycle, at least two
+    """
+    spectrum = np.fft.rfft(folded, axis=1)
+    mean = spectrum.mean(axis=0)
+    count = folded.shape[0]
+    error = np.sqrt(np.sum(np.abs(spectrum - mean) ** 2, axis=0) / (count * (count - 1)))
+    kept = np.abs(mean) > STANDARD_ERRORS * error + 1e-12 * np.abs(mean).max()
+    kept[0] = True
+    if folded.shape[1] % 2 == 0:
+        kept[-1] = False
+    result: Array = kept
+    return result
+
+
+def drift_of(time: Array, displacement: Array, run: Cycles) -> Array:
+    """The mean over one period around every sample (n,), which no harmonic of the cycle moves.
+
+    Half a cycle at either end of the run is continued as a straight line; outside it is held.
+    """
+    from scipy.integrate import cumulative_trapezoid
+
+    whole = cumulative_trapezoid(displacement, time, initial=0)
+    half = 0.5 * run.period
+    middle = np.linspace(run.start + half, min(run.end, float(time[-1])) - half, 4 * run.count)
+    mean = (np.interp(middle + half, time, whole) - np.interp(middle - half, time, whole)) / run.period
+    edge = min(4, mean.size) - 1
+    first = mean[0] - half * (mean[edge] - mean[0]) / (middle[edge] - middle[0])
+    last = mean[-1] + half * (mean[-1] - mean[-1 - edge]) / (middle[-1] - middle[-1 - edge])
+    knots = np.concatenate(([middle[0] - half], middle, [middle[-1] + half]))
+    drift: Array = np.interp(time, knots, np.concatenate(([first], mean, [last])))
+    return drift
+
+
+def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:
+    """The average cycle and its derivatives at the samples inside the run."""
+    from scipy.interpolate import CubicSpline
+
+    folded = run.fold(time, displacement)
+    points = folded.shape[1]
+    spectrum = np.where(significant_harmonics(folded), np.fft.rfft(folded.mean(axis=0)), 0.0)
+    rate = 2j * np.pi * np.arange(spectrum.size) * run.frequency
+    fine = 8 * points
+    cycle = [np.fft.irfft(spectrum * rate**order, fine) * (fine / points) for order in range(3)]
+    grid = np.linspace(0.0, 1.0, fine + 1)
+    phase = run.phase(time[run.inside(time)])
+    wrapped = [CubicSpline(grid, np.append(values, values[0]), bc_type="periodic")(phase) for values in cycle]
+    return Kinematics(*wrapped)
+
+
+def _smoothed(time: Array, displacement: Array, highest: float) -> Kinematics:
+    """The displacement smoothed as far as cross-validation asks, with a corner of at most `highest` [Hz]."""
+    from scipy.interpolate import CubicSpline
+
+    steps = np.diff(time)
+    step = max(float(np.median(steps)), float(time[-1] - time[0]) / (4.0 * time.size))
+    regular = bool(np.all(np.abs(steps - step) < 1e-3 * step))
+    grid = time if regular else np.arange(time[0], time[-1] + 0.5 * step, step)
+    values = displacement if regular else np.interp(grid, time, displacement)
+    smooth = CubicSpline(grid, low_pass(values, min(2.0 * np.pi * highest * step, 20.0)))
+    return Kinematics(smooth(time), smooth(time, 1), smooth(time, 2))

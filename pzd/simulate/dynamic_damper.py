@@ -1,0 +1,147 @@
+"""The damper with its own dynamics in the car: valve, oil spring, flow, and the forces beside the element."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from pzd.compiled import compiled, laid_in
+from pzd.damper.drive import with_play
+from pzd.damper.flow import DELTA, K, Row, flow_speed, spring_extension
+from pzd.damper.parallel import parallel_force
+from pzd.damper.regimes import spring_force
+from pzd.record import Array
+from pzd.table.kernel import bracket
+
+_TINY = 1e-300  # m/s: a speed that only carries its sign
+
+
+class DynamicDamper(NamedTuple):
+    """One damper: parameter rows over the effective voltage, linear between; see `pzd.damper.compose.Nodes`."""
+
+    voltages: Array
+    rows: Array
+    parallel: Array
+    lag: float
+    """Time constant of the valve [s]."""
+    play: float
+    """Half-width of the piezo's play [V]."""
+    alone: bool
+    """Whether nothing stands beside the element."""
+    scratch: Array
+    """A row of parallel effects to work in."""
+
+
+@laid_in
+def place(nodes: Array, value: float) -> tuple[int, float]:
+    """Interval of rising nodes that holds a value, and the share of it that lies below; held beyond the ends."""
+    if nodes.size == 1 or value <= nodes[0]:
+        return 0, 0.0
+    if value >= nodes[-1]:
+        return nodes.size - 1, 0.0
+    i = bracket(nodes, value)
+    return i, (value - nodes[i]) / (nodes[i + 1] - nodes[i])
+
+
+@laid_in
+def parallel_at(damper: DynamicDamper, voltage: float, row: Array) -> None:
+    """Fill `row` with the parameters of the parallel effects at a effective voltage: linear between, held beyond."""
+    i, share = place(damper.voltages, voltage)
+    for j in range(row.size):
+        row[j] = damper.parallel[i, j] + share * (
+            damper.parallel[min(i + 1, damper.voltages.size - 1), j] - damper.parallel[i, j]
+        )
+
+
+@laid_in
+def row_slope(voltages: Array, rows: Array, voltage: float, column: int) -> float:
+    """Derivative of one parameter by the effective voltage."""
+    if voltages.size == 1 or voltage <= voltages[0] or voltage >= voltages[-1]:
+        return 0.0
+    i = bracket(voltages, voltage)
+    return float((rows[i + 1, column] - rows[i, column]) / (voltages[i + 1] - voltages[i]))
+
+
+@laid_in
+def lagging(damper: DynamicDamper, voltage: float, before: float, elapsed: float) -> float:
+    """Voltage behind the lag of the valve [V], a time [s] after it was set while the lag stood at `before` [V].
+
+    Equation: tau dUe/dt + Ue = U, U constant      Source: effect `valve_lag`
+    """
+    if damper.lag <= 0.0:
+        return voltage
+    return voltage + (before - voltage) * math.exp(-elapsed / damper.lag)
+
+
+@compiled
+def effective_voltage(
+    damper: DynamicDamper, voltage: float, before: float, effective_before: float, elapsed: float
+) -> tuple[float, float]:
+    """Voltage that the stack shows [V] and its rate [V/s], a time after the voltage was set.
+
+    Parameters
+    ----------
+    oil : the damper
+    voltage : set by the controller, and held since [V]
+    before, felt_before : behind the lag, and behind lag and play, when it was set [V]
+    elapsed : time since [s]
+    """
+    late = lagging(damper, voltage, before, elapsed)
+    shown = with_play(effective_before, late, damper.play)
+    if damper.lag <= 0.0 or abs(late - shown) < damper.play * (1.0 - 1e-9) or (late - shown) * (voltage - late) < 0.0:
+        return shown, 0.0
+    return shown, (voltage - late) / damper.lag
+
+
+@laid_in
+def flowing(e: float, row: Row, guess: float) -> tuple[float, float]:
+    """Force of the oil spring [N] at its elastic deflection [m], and the speed at which the oil flows [m/s].
+
+    Equation: F = k e, |F| = flow curve (|dy/dt|)      Source: Makowski and Knap 2021, eq. (1) to (3)
+    """
+    force = spring_force(e, row)
+    side = 1.0 if force >= 0.0 else -1.0
+    return force, side * flow_speed(abs(force), row, side, guess)
+
+
+@compiled
+def stored(e: float, row: Row) -> float:
+    """Energy of the oil spring [J] at its elastic deflection [m]: k s^2 / 2, s behind the lash."""
+    extension = spring_extension(e, row[DELTA])
+    return float(0.5 * row[K] * extension * extension)
+
+
+@compiled
+def valve_power(damper: DynamicDamper, e: float, row: Row, voltage: float, rate: float) -> float:
+    """Power with which the valve tightens the oil spring [W] while the effective voltage moves at `rate` [V/s].
+
+    Equation: (dk/dt) s^2 / 2 + F (ds/d delta) (d delta/dt)      Source: first law, the state being y
+    """
+    if rate == 0.0:
+        return 0.0
+    extension = spring_extension(e, row[DELTA])
+    power = 0.5 * row_slope(damper.voltages, damper.rows, voltage, K) * extension * extension
+    power -= 0.5 * abs(row[K] * extension) * row_slope(damper.voltages, damper.rows, voltage, DELTA)
+    return power * rate
+
+
+@laid_in
+def rubbing_force(v: float, row: Array) -> float:
+    """Friction beside the element [N] at a speed [m/s]; the sign bit of 0 picks the side."""
+    moving = math.copysign(_TINY, v) if v == 0.0 else v
+    return float(parallel_force(0.0, moving, 0.0, row) - parallel_force(0.0, 0.0, 0.0, row))
+
+
+@laid_in
+def elastic_force(x: float, row: Array) -> float:
+    """Force beside the element [N] at an extension [m] from where the car stands: it gives its work back.
+
+    A force that is there at rest is carried by the static balance and left out.
+    """
+    return float(parallel_force(x, 0.0, 0.0, row) - parallel_force(0.0, 0.0, 0.0, row))
+
+
+@laid_in
+def inertance(row: Array) -> float:
+    """Force beside the element for each acceleration [kg]."""
+    return float(parallel_force(0.0, 0.0, 1.0, row) - parallel_force(0.0, 0.0, 0.0, row))

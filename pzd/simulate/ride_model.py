@@ -1,0 +1,169 @@
+"""What the compiled loop knows: car, road, table, oil and law as named tuples of numbers, and the state."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pzd.record import Array
+from pzd.simulate.car import HalfCar
+from pzd.simulate.dynamic_damper import DynamicDamper
+from pzd.simulate.profile import Profile
+
+HEAVE, PITCH, HEAVE_RATE, PITCH_RATE, OIL_1, OIL_2, DISSIPATED, ROAD_WORK, VALVE_WORK, BESIDE_WORK = range(10)
+"""The state: the body, the elastic deflection of the oil at each axle, and the energies, each by itself."""
+STATES = 10
+IDEAL, TABLE, DYNAMIC = range(3)
+"""How a demanded force comes about."""
+UNBOUNDED, BY_COEFFICIENTS, BY_TABLE = range(3)
+"""What bounds a demanded force."""
+FEEDBACK, MINIMISE, VOLTAGE = range(3)
+"""What the policy asks for."""
+SENSED = 8
+"""Deflection 1, 2, its rate 1, 2, z, phi, dz, dphi: what a feedback policy reads."""
+
+
+(
+    DEFLECTION,
+    RATE,
+    RISE,
+    LIFT,
+    SPRINGS,
+    FORCE,
+    ACCELERATION,
+    INERTANCE,
+    OIL_FORCE,
+    FLOW,
+    ELASTIC,
+    RUBBING,
+    VALVE,
+    NEAR,
+    LOW,
+    HIGH,
+    BODY,
+    COMFORT,
+    REBOUND_PUSH,
+    COMPRESSION_PUSH,
+) = range(20)
+WORKSPACE_ROWS = 20
+"""Rows of the desk (DESK_ROWS, 2), a column an axle: what the equations of motion leave to be read off. Deflection U
+[m], its rate V [m/s], speed and acceleration of the road, spring force S and damper force T [N], dV/dt,
+mass that the dampers add [kg]; of one damper: oil spring [N], flow [m/s], elastic and rubbing force beside
+the element [N], power of the valve [W]; speed on its side of nought, lowest and highest force; acceleration
+of z and phi; acceleration at K (first column); of an axle that sticks, dV/dt away from V = 0, were it to
+slip to either side."""
+ASKED, SET, BEFORE, EFFECTIVE, SIDE, SINCE = range(6)
+TIE_END = SINCE
+"""Rows of the control (6, 2), a column an axle: force asked [N], voltage set [V], and when it was set the
+voltage behind the lag and behind lag and play [V]; side of V = 0 (+1 rebound, -1 compression, 0 sticking);
+when the voltage was set [s] (first column), and the end of the segment of minimisers that `largest`
+takes (TIE_END, second column)."""
+
+Two = tuple[float, float]
+
+
+class Vehicle(NamedTuple):
+    """The half-car; see `HalfCar`."""
+
+    mass: float
+    inertia: float
+    arms: Two
+    """Second row of H: -a1, a2 [m]."""
+    stiffness: Two
+    comfort: Two
+    """D of eq. (9) [1/kg]."""
+    mobility: tuple[float, float, float]
+    """W11, W22 and W12 of W = H^T M^-1 H [1/kg]."""
+    ratio: Two
+    dampers: Two
+    speed: float
+
+
+class RoadCoefficients(NamedTuple):
+    """The road; see `Profile`."""
+
+    amplitude: float
+    wavenumber: float
+    spacing: float
+    behind: Two
+    """How far each axle follows the first [m]."""
+    coefficients: Array
+
+
+class TableArrays(NamedTuple):
+    """The table at the temperature of the ride; see `pzd.table.lookup.Lookup`."""
+
+    voltages: Array
+    speeds: Array
+    rebound: Array
+    compression: Array
+    reach: Array
+
+
+class ControlSpec(NamedTuple):
+    """Policy, bounds and fidelity as numbers."""
+
+    fidelity: int
+    aim: int
+    bounds: int
+    tie: int
+    c_min: float
+    c_max: float
+    voltage: float
+    """Of the aim `VOLTAGE` [V], and where the valves stand at the start."""
+    jumps: bool
+    """Whether the force jumps where the suspension speed crosses nought, so that an axle can stick."""
+    gains: Array
+    """(2, SENSED) of the aim `FEEDBACK`."""
+
+
+class RideModel(NamedTuple):
+    """All that stays the same during a ride."""
+
+    car: Vehicle
+    road_coefficients: RoadCoefficients
+    control_spec: ControlSpec
+    grid: TableArrays
+    damper: DynamicDamper
+
+
+def vehicle(car: HalfCar, speed: float) -> Vehicle:
+    """The car as numbers; speed of the vehicle in m/s."""
+    H, D = car.force_directions(), car.force_to_comfort()
+    W = H.T @ np.linalg.solve(car.mass_matrix(), H)
+    return Vehicle(
+        float(car.mass),
+        float(car.pitch_inertia),
+        (float(H[1, 0]), float(H[1, 1])),
+        (float(car.stiffnesses[0]), float(car.stiffnesses[1])),
+        (float(D[0]), float(D[1])),
+        (float(W[0, 0]), float(W[1, 1]), float(W[0, 1])),
+        (float(car.motion_ratios[0]), float(car.motion_ratios[1])),
+        (float(car.dampers[0]), float(car.dampers[1])),
+        float(speed),
+    )
+
+
+def road_coefficients(profile: Profile, wheelbase: float) -> RoadCoefficients:
+    """The road as numbers; axle 2 follows by the wheelbase [m]."""
+    return RoadCoefficients(
+        float(profile.amplitude),
+        float(profile.wavenumber),
+        float(profile.spacing),
+        (0.0, float(wheelbase)),
+        np.ascontiguousarray(profile.coefficients),
+    )
+
+
+def control(voltage: float) -> Array:
+    """The controller before its first act, the valves at rest at a voltage [V]."""
+    table = np.zeros((6, 2))
+    table[[SET, BEFORE, EFFECTIVE]] = voltage
+    table[SIDE] = 1.0
+    return table
+
+
+def workspace() -> Array:
+    """Empty room to work in."""
+    return np.zeros((WORKSPACE_ROWS, 2))

@@ -1,0 +1,84 @@
+"""The weighting is that of the standard, and no artefact of sampling, padding or starting."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pzd.comfort.weighting import WK, Weighting, response, weighted
+
+WD = Weighting("Wd", 0.4, 100.0, 2.0, 2.0, 0.63, None)
+TABLE = Path(__file__).parent / "reference" / "wk_wd_third_octave.csv"
+MISPRINT_HZ = 10.0
+
+
+def printed() -> list[dict[str, float]]:
+    with TABLE.open(encoding="utf-8") as file:
+        return [{name: float(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
+
+
+def factors(weighting: Weighting, column: str) -> np.ndarray:
+    return 1000.0 * np.abs(response(weighting, np.array([row[column] for row in printed()])))
+
+
+def test_wk_of_1997_is_the_formula_at_nominal_centres() -> None:
+    table = np.array([row["Wk_x1000_ISO2631-1_1997_Table3"] for row in printed()])
+    assert np.abs(factors(WK, "f_nominal_Hz") / table - 1.0).max() < 0.00285
+
+
+def test_wk_of_2017_is_the_formula_at_true_centres() -> None:
+    table = np.array([row["Wk_x1000_ISO8041-1_2017_AnnexB"] for row in printed()])
+    assert np.abs(factors(WK, "f_true_Hz_10^(n/10)") / table - 1.0).max() < 0.000345
+
+
+def test_the_same_formula_without_the_upward_step_gives_wd() -> None:
+    rows = printed()
+    table = np.array([row["Wd_x1000_ISO2631-1_1997_Table3"] for row in rows])
+    kept = np.array([row["f_nominal_Hz"] != MISPRINT_HZ for row in rows])
+    assert np.abs(factors(WD, "f_nominal_Hz") / table - 1.0)[kept].max() < 0.0062
+
+
+@pytest.mark.parametrize(("frequency", "factor"), [(2.25, 0.5740), (4.5, 1.0143)])
+def test_wk_at_the_papers_frequencies(frequency: float, factor: float) -> None:
+    assert abs(response(WK, np.array([frequency]))[0]) == pytest.approx(factor, abs=5e-5)
+
+
+@pytest.mark.parametrize("rate", [200.0, 500.0, 1000.0])
+@pytest.mark.parametrize("frequency", [0.5, 2.25, 4.5, 20.0, 63.0, 80.0])
+def test_a_settled_sine_keeps_its_form_and_takes_the_factor(rate: float, frequency: float) -> None:
+    time = np.arange(round(24.0 * rate)) / rate
+    settled = weighted(np.sin(2.0 * np.pi * frequency * time), rate)[round(8.0 * rate) :]
+    expected = abs(response(WK, np.array([frequency]))[0]) / np.sqrt(2.0)
+    assert np.sqrt(np.mean(settled**2)) == pytest.approx(expected, rel=2e-3)
+
+
+def test_four_seconds_of_ride_are_enough_to_settle() -> None:
+    rate = 500.0
+    for phase in np.linspace(0.0, np.pi, 5):
+        time = np.arange(round(20.0 * rate)) / rate
+        settled = weighted(np.cos(2.0 * np.pi * 2.25 * time + phase), rate)[round(4.0 * rate) :]
+        assert np.sqrt(2.0 * np.mean(settled**2)) == pytest.approx(0.5740, rel=3e-4)
+
+
+def test_the_end_of_a_ride_does_not_wrap_round_to_its_start() -> None:
+    rate = 500.0
+    ride = np.zeros(5000)
+    ride[-50:] = 10.0
+    assert np.abs(weighted(ride, rate)[:4000]).max() < 2e-4 * 10.0
+
+
+def test_gravity_left_in_is_forgotten() -> None:
+    rate = 500.0
+    assert np.abs(weighted(np.full(10000, 9.81), rate)[round(8.0 * rate) :]).max() < 1e-5
+
+
+def test_weighting_is_linear_and_shifts_with_time() -> None:
+    draw = np.random.default_rng(11)
+    ride = np.concatenate([np.zeros(500), draw.normal(size=2500)])
+    later = np.concatenate([np.zeros(250), ride])[: ride.size]
+    once, moved = weighted(ride, 500.0), weighted(later, 500.0)
+    assert np.abs(moved[1000:] - once[750:-250]).max() < 1e-2 * np.abs(once).max()
+    assert np.allclose(weighted(3.0 * ride, 500.0), 3.0 * once)
