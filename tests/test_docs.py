@@ -163,6 +163,24 @@ def test_every_path_that_a_page_names_exists(name: str) -> None:
     assert [path for path in sorted(named) if not any(ROOT.glob(path.rstrip("/")))] == []
 
 
+def test_every_folder_inside_a_package_that_the_page_of_the_code_names_exists() -> None:
+    rows = re.findall(r"^\| `pzd/(\w+)/` \| (.*) \|$", page("pzd/README.md"), re.MULTILINE)
+    inside = [(room, folder) for room, text in rows for folder in re.findall(r"`(\w+)/`", text)]
+    assert inside
+    assert [f"pzd/{room}/{folder}" for room, folder in inside if not (PACKAGE / room / folder).is_dir()] == []
+
+
+def test_what_a_new_file_of_a_set_must_define_is_defined_by_the_one_to_copy() -> None:
+    rows = re.findall(r"^\| an? [\w ]+ \| `(pzd/[\w/]+\.py)` \| (.*) \|$", page("pzd/README.md"), re.MULTILINE)
+    assert rows
+    assert [
+        f"{name}: {symbol}"
+        for name, text in rows
+        for symbol in re.findall(r"`([\w(), ]+)`", text)
+        if symbol.partition("(")[0] not in page(name)
+    ] == []
+
+
 @every_page
 def test_links_to_files_lead_somewhere(name: str) -> None:
     folder = (ROOT / name).parent
