@@ -5,7 +5,6 @@ Those over measured data that is absent are skipped and say so.
 
 from __future__ import annotations
 
-import re
 import shlex
 import subprocess
 from collections.abc import Callable
@@ -14,6 +13,7 @@ from typing import Any
 
 import pytest
 import yaml
+from listings import listings, missing
 
 ROOT = Path(__file__).resolve().parent.parent
 CONFIGS = sorted(path for path in (ROOT / "configs").glob("*.yaml") if path.stem != "reference")
@@ -61,19 +61,11 @@ def written(folder: Path) -> dict[str, int]:
     return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
 
 
-def listings(config: Path) -> list[tuple[str, str]]:
+def shown_of(config: Path) -> list[tuple[str, str]]:
     """Each command that a page shows with this config, and what the page says it prints, in whole or in part."""
     pages = [*ROOT.glob("*.md"), *ROOT.glob("configs/*.md"), *ROOT.glob("pzd/**/*.md")]
-    blocks = [
-        block
-        for path in sorted(pages)
-        for block in re.findall(
-            r"^<!-- printed by: pzd (.*?) -->\n```\w+\n(.*?)^```",
-            path.read_text(encoding="utf-8"),
-            re.MULTILINE | re.DOTALL,
-        )
-    ]
-    return [(command, shown) for command, shown in blocks if f"configs/{config.name}" in command.split()]
+    found = [listing for path in sorted(pages) for listing in listings(path.read_text(encoding="utf-8"))]
+    return [(command, shown) for command, shown in found if f"configs/{config.name}" in command.split()]
 
 
 def test_there_are_configs_to_run() -> None:
@@ -100,7 +92,7 @@ def test_a_config_runs_from_end_to_end_and_once_only(config: Path, pzd: Command,
     assert second.returncode == first.returncode, second.stdout + second.stderr
     assert written(folder) == before
 
-    for command, shown in listings(config):
-        told = pzd(*shlex.split(command), "--runs", tmp_path)
+    for command, shown in shown_of(config):
+        told = pzd(*shlex.split(command)[1:], "--runs", tmp_path)
         assert told.returncode == first.returncode, told.stdout + told.stderr
-        assert [line for line in shown.splitlines() if line not in told.stdout.splitlines()] == []
+        assert missing(shown, told.stdout) == []
