@@ -56,8 +56,8 @@ def diagnose(
     plain = base_of(identified.rows, setting)
     named = select_effects(Campaign(prepared, parts, diagnose.nuisance, jobs), plain, diagnose, jobs)
     evidence = named.first
-    before = evidence.campaign.judged(named.plain.damper)
-    after = evidence.campaign.judged(named.fitted.damper) if named.adopted else before
+    before = evidence.campaign.checks(named.plain.damper)
+    after = evidence.campaign.checks(named.fitted.damper) if named.adopted else before
     decision = decide(named, before, after, diagnose)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]

@@ -103,7 +103,7 @@ def candidates(
     ]
 
     def one(effect: Effect) -> Candidate:
-        unlikely = silent and _hopeless(problem, before, effect)
+        unlikely = silent and _without_promise(problem, before, effect)
         return (_barely if unlikely else candidate)(problem, before, effect)
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
@@ -144,7 +144,7 @@ def _switched_off(effect: Effect, fitted: Fitted) -> bool:
     return vanishes and bool(fitted.searched[-1] - nearest < AT_EDGE)
 
 
-def _hopeless(problem: Problem, before: Fitted, effect: Effect) -> bool:
+def _without_promise(problem: Problem, before: Fitted, effect: Effect) -> bool:
     """Whether a faint effect of one parameter promises nothing; one of more may act where nobody looks yet."""
     if len(effect.parameters) > 1:
         return False
