@@ -121,7 +121,7 @@ def test_force_runs_again(typed: Terminal) -> None:
 def test_what_is_not_to_be_trusted_is_code_4_every_time(typed: Terminal) -> None:
     for _ in range(2):
         assert typed("run", "first.yaml", "--set", f"seed={UNDETERMINED}") == 4
-        assert typed.err == ["not to be trusted: rig, 1.0 V, 22.0 degC: undetermined: C, the records are too slow"]
+        assert typed.err == ["not to be trusted: rig, 1 V, 22 degC: undetermined: C, the records are too slow"]
         assert Path("runs/first/6-report/report.html").is_file()
     assert typed("ingest", "first.yaml", "--set", f"seed={UNDETERMINED}") == 0
 
@@ -431,6 +431,9 @@ def diagnosis() -> Diagnosis:
             amplitude_m=0.01,
             voltage_V=150.0,
             separates=("orifice_quadratic", "shear_thinning"),
+            middle_m=0.03135,
+            peak_speed_m_per_s=0.251327,
+            peak_force_N=1512.345,
         ),
     )
 
@@ -445,7 +448,10 @@ def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
         "confidence: 97%",
         "rivals: shear_thinning",
         "not taken: lash, W_s 0.012 against 0.0009 on the tests seen, closes nothing",
-        "next test: sine 4 Hz 0.01 m at 150 V to tell orifice_quadratic from shear_thinning",
+        (
+            "next test: sine 4 Hz 0.01 m about 0.03135 m at 150 V, up to 0.2513 m/s and 1512 N"
+            " to tell orifice_quadratic from shear_thinning"
+        ),
     ]
 
 

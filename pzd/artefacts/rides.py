@@ -99,8 +99,7 @@ class Rides:
         rides = tuple(at_once(ride, summary, jobs))
         return cls(rides, summary, read_rows(folder / "response.csv", Response, control))
 
-    @property
-    def untrusted(self) -> tuple[str, ...]:
+    def untrusted(self, _: Control) -> tuple[str, ...]:
         """Why the result is not to be trusted (exit 4): rides whose energy balance does not close."""
         return tuple(
             f"{row.case}: energy error {row.energy_error:.1e}, above {ENERGY_LIMIT:g}"

@@ -62,6 +62,12 @@ class Campaign:
         """Every record against a damper, over the samples that naming may not see."""
         return self._against(damper, self.in_role(UNTOUCHED))
 
+    def offset(self, damper: Damper) -> float:
+        """By how much the median record lies above what the damper makes of it [N]; naming leaves it to each test."""
+        asked = in_use(self.seen)
+        given = zip(asked, self.expected(damper, asked), strict=True)
+        return float(np.median([np.mean(self.prepared[i].record.force - each.force) for i, each in given]))
+
     def _against(self, damper: Damper, masks: Sequence[Mask]) -> tuple[ResidualCheck, ...]:
         asked = in_use(masks)
         given = [(e, self.prepared[i], masks[i]) for i, e in zip(asked, self.expected(damper, asked), strict=True)]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pzd.artefacts import Identified, ParameterRow, Rig
 from pzd.identify.config import IdentifyConfig
 from pzd.record import Condition, Record, conditions
+from pzd.schema.wording import supported
 
 Labels = tuple[str | None, float | None, float | None]
 
@@ -70,19 +71,22 @@ def _order(labels: Labels) -> tuple[str, float, float]:
 
 
 def _line(row: ParameterRow) -> str:
-    def shown(value: float | None) -> str:
-        return "-" if value is None else f"{value:.4g}"
+    def shown(value: float | None, low: float | None, high: float | None) -> str:
+        if value is None:
+            return "-"
+        return f"{value:.4g}" if low is None or high is None else supported(value, low, high)
 
     place = ", ".join(
         part
         for part in (
             row.setting,
-            None if row.voltage_V is None else f"{row.voltage_V:g}",
-            None if row.temperature_degC is None else f"{row.temperature_degC:g} degC",
+            None if row.voltage_V is None else f"{row.voltage_V:.4g}",
+            None if row.temperature_degC is None else f"{row.temperature_degC:.4g} degC",
         )
         if part
     )
     return (
-        f"{place or 'all records'}: T0 = {shown(row.T0_N)} N, C = {shown(row.C_Ns_per_m)} N s/m,"
-        f" k = {shown(row.k_N_per_m)} N/m, W_s = {row.W_s:.3g}, {row.status}"
+        f"{place or 'all records'}: T0 = {shown(row.T0_N, row.T0_N_low95, row.T0_N_high95)} N,"
+        f" C = {shown(row.C_Ns_per_m, row.C_Ns_per_m_low95, row.C_Ns_per_m_high95)} N s/m,"
+        f" k = {shown(row.k_N_per_m, row.k_N_per_m_low95, row.k_N_per_m_high95)} N/m, W_s = {row.W_s:.3g}, {row.status}"
     )

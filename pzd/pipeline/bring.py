@@ -87,7 +87,7 @@ class Pipeline:
             self._compiles = False
         begun = time.monotonic()
         artefact = self.made(stage)
-        marks = self._carried(stage, getattr(artefact, "untrusted", ()))
+        marks = self._carried(stage, self._untrusted(artefact))
         seconds = time.monotonic() - begun
         self.run.write(stage.name, artefact, inputs, key_of(inputs), marks, seconds, self.jobs)
         self.marks[stage.folder] = marks
@@ -121,8 +121,13 @@ class Pipeline:
     def _marks_as_it_stands(self, stage: Stage, kept: Kept) -> tuple[str, ...]:
         """The marks of the manifest, or of the artefact itself where it was edited, which checks it too."""
         if kept.edited:
-            return self._carried(stage, getattr(self._read_back(stage.makes), "untrusted", ()))
+            return self._carried(stage, self._untrusted(self._read_back(stage.makes)))
         return kept.manifest.marks if kept.manifest else ()
+
+    def _untrusted(self, artefact: Artefact) -> tuple[str, ...]:
+        """Why an artefact is not to be trusted as it stands, in the units of the config."""
+        told = getattr(artefact, "untrusted", None)
+        return told(self.run.control) if told else ()
 
     def _carried(self, stage: Stage, own: Sequence[str]) -> tuple[str, ...]:
         """A stage's own marks behind those of what it was made from."""

@@ -37,7 +37,7 @@ def test_records_of_one_condition_share_a_row_and_settings_do_not() -> None:
         ("wide", 150.0),
     ]
     assert len(found.measures) == 8
-    assert found.untrusted == ()
+    assert found.untrusted(Control()) == ()
 
 
 def test_a_narrower_group_splits_conditions() -> None:

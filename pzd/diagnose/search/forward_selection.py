@@ -90,7 +90,11 @@ class _Search:
         """
         if len(self.identified.base) == len(self.evidence.whole.voltages) or self._drifts():
             return
-        whole = self.weighed(self.identified.model_copy(update={"effects": self.current.damper.effects})).whole
+        whole = self.weighed(
+            self.identified.model_copy(
+                update={"effects": self.current.damper.effects, "zero_m": self.current.damper.zero_m}
+            )
+        ).whole
         few, effects, damper = whole.pooled(), self.current.effects, self.current.damper
         rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, few))
         pays = delta_bic(one, rows)
