@@ -1,6 +1,7 @@
 # Everything lives in .venv and is made from the hashed locks; stamps in .venv say what is up to date.
 PYTHON ?= python3
 JOBS ?= 2
+N ?= 20
 BIN := .venv/bin
 RUNTIME := .venv/.runtime
 DEV := .venv/.dev
@@ -33,6 +34,10 @@ check: $(DEV)  ## Check style (ruff), format (ruff) and types (mypy --strict)
 .PHONY: ci
 ci: check  ## What a merge must pass besides `make test`: check, every config, the wheel installed elsewhere
 	$(BIN)/python -m pytest -m ci --durations 10
+
+.PHONY: fresh
+fresh: $(DEV)  ## Run the tests that draw on N=20 new seeds, repeat what failed, print seed and rate per test
+	$(BIN)/python tests/studies/fresh.py --seeds $(N) --jobs $(JOBS) $(TESTS)
 
 .PHONY: figures
 figures: $(RUNTIME)  ## Draw the figures of the paper into runs/paper/figures

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -26,9 +24,8 @@ def peak_acceleration(waveform: str, frequency: float, amplitude: float) -> floa
     return share * amplitude * (2.0 * np.pi * frequency) ** 2
 
 
-def test_the_test_is_within_stroke_speed_frequency_and_force(fresh_seeds: Callable[[int], list[int]]) -> None:
-    for seed in fresh_seeds(12):
-        draw = np.random.default_rng(seed)
+def test_the_test_is_within_stroke_speed_frequency_and_force(rng: np.random.Generator) -> None:
+    for draw in rng.spawn(12):
         reach = Reach(
             draw.uniform(0.01, 0.06), draw.uniform(0.1, 1.0), draw.uniform(2.5, 30.0), 10.0 ** draw.uniform(2, 5), ()
         )

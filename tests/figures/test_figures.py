@@ -201,8 +201,7 @@ def test_the_papers_element_gives_the_peaks_that_its_tables_give() -> None:
         assert found.peak == pytest.approx(peak, abs=1.0)
 
 
-def test_heating_is_that_of_a_lump(fresh_seeds) -> None:
-    rng = np.random.default_rng(fresh_seeds(1)[0])
+def test_heating_is_that_of_a_lump(rng: np.random.Generator) -> None:
     power = float(rng.uniform(100.0, 400.0))
     time, temperature = heating(power, power, 25.0, 43.0)
     from pzd.figures.numbered.fig_07 import AMBIENT, AREA_M2, EXCHANGE_W_PER_M2_K, HEAT_J_PER_KG_K, MASS_KG

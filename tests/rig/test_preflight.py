@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -24,11 +23,6 @@ Array = NDArray[np.float64]
 KINDS = ("sine", "triangle", "random")
 FINE = 16
 NO_LIMITS = Limits()
-
-
-@pytest.fixture
-def rng(fresh_seeds: Callable[[int], list[int]]) -> np.random.Generator:
-    return np.random.default_rng(fresh_seeds(1)[0])
 
 
 def motion(kind: str, time: Array, rng: np.random.Generator) -> Array:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -15,11 +13,6 @@ Array = NDArray[np.float64]
 
 TIME = np.arange(10_000) * 1e-3
 OMEGA = 2.0 * np.pi * 2.037
-
-
-@pytest.fixture
-def rng(fresh_seeds: Callable[[int], list[int]]) -> np.random.Generator:
-    return np.random.default_rng(fresh_seeds(1)[0])
 
 
 def relative(got: Array, truth: Array) -> float:
