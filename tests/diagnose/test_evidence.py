@@ -38,8 +38,8 @@ def test_the_right_damper_leaves_no_more_than_noise(
     whole = evidence(sines(truth, rng, TWO, jitter=0.01), truth).whole
     found = fit(whole, tuple(effects), whole.start_with(truth))
     freedom = found.size - found.searched.size
-    # About a thousand residuals: a standard deviation of 0.045, and noise is estimated from seven differences.
-    assert 0.5 < found.misfit / freedom < 1.3
+    # About a thousand residuals, and noise estimated from seven differences: over 36 draws 0.975, sd 0.058; 4.5 sd.
+    assert 0.71 < found.misfit / freedom < 1.24
 
 
 def test_what_a_wrong_damper_leaves_counts_as_noise_of_every_harmonic(rng: np.random.Generator) -> None:
@@ -52,22 +52,23 @@ def test_what_a_wrong_damper_leaves_counts_as_noise_of_every_harmonic(rng: np.ra
         assert wrong.weights[quietest] < 0.7 * known.weights[quietest]
 
 
-def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(
-    rng: np.random.Generator,
-) -> None:
+def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(rng: np.random.Generator) -> None:
     # A damper that never slips is a spring: s_F = k s_x at every harmonic that is kept.
-    k = 2e5
+    k, noise, shares = 2e5, 2e-5, []
     stuck = Damper(base=(BaseRow(voltage_V=0.0, T0_N=1e6, C_Ns_per_m=3000.0, k_N_per_m=k),))
-    record = sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=2e-5, cycles=8)
-    (prepared,) = prepare((record,))
-    run = prepared.cycles
-    assert run is not None
-    variance = expected(stuck, prepared, 0.0).unsure
-    assert isinstance(variance, np.ndarray)
-    single = 2e-5**2 / run.points(record.time) / run.count
-    # Six draws of chi-square with two degrees of freedom, averaged over harmonics 0 to 3, of which one is kept.
-    assert variance[0] == 0.0
-    assert 0.05 < 4.0 * variance[1] / (k**2 * single) < 5.0
+    for _ in range(20):
+        (prepared,) = prepare((sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=noise, cycles=8),))
+        run = prepared.cycles
+        assert run is not None
+        variance = expected(stuck, prepared, 0.0).unsure
+        assert isinstance(variance, np.ndarray)
+        assert variance[0] == 0.0
+        single = noise**2 / run.points(prepared.record.time) / run.count
+        # An average over harmonics 0 to 3, of which one is kept.
+        shares.append(4.0 * variance[1] / (k**2 * single))
+    # Never too sure: of 60 draws the smallest is 0.85. What noise lets through besides makes the median 1.2, sd 0.3.
+    assert min(shares) > 0.7
+    assert 0.9 < np.median(shares) < 1.6
 
 
 def test_the_instant_of_a_standing_voltage_does_not_matter(rng: np.random.Generator) -> None:

@@ -75,8 +75,10 @@ def main() -> int:
                 tried[test] += 1
                 if not well:
                     failed[test].append(seed)
-            wrong = sum(not well for well in passed.values())
-            say(f"seed {seed:10d}: {wrong} of {len(passed)} failed, {time.monotonic() - begun:.0f} s")
+            wrong = [test for test, well in passed.items() if not well]
+            say(f"seed {seed:10d}: {len(wrong)} of {len(passed)} failed, {time.monotonic() - begun:.0f} s")
+            for test in wrong:
+                say(f"    {test}")
 
     on_new_seeds(asked.tests)
     held = len(tried) - len(failed)
