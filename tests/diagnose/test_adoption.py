@@ -31,6 +31,7 @@ def test_parameters_differ_by_voltage_where_the_data_demand_it(rng: np.random.Ge
     assert found.damper.effects["shear_thinning"]["at_voltage_V"] == TWO
 
 
+@pytest.mark.ci
 def test_two_effects_that_distort_each_other_are_found(rng: np.random.Generator) -> None:
     damper = damper_of(TWO, orifice_quadratic={"q": 2500.0}, rounded_yield={"w_s": 0.015})
     told = diagnosed(sines(damper, rng, TWO, jitter=0.01)).diagnosis
@@ -52,7 +53,7 @@ def warming(
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("drifts", [True, False])
+@pytest.mark.parametrize("drifts", [pytest.param(True, marks=pytest.mark.ci), False])
 def test_a_drift_is_named_where_the_damper_warms_and_only_if_there_is_one(
     drifts: bool,  # a parameter of the test
     rng: np.random.Generator,

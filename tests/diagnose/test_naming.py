@@ -47,6 +47,7 @@ ENOUGH = 9
 """Of the twelve: at an error rate of 3 % fewer are right in one run of 30,000, at 5 % in one of 4,000."""
 
 
+@pytest.mark.ci
 def test_hidden_effects_are_named_with_their_parameters(rng: np.random.Generator) -> None:
     right, told = [], []
     for name, draw in zip(TRUTHS, rng.spawn(len(TRUTHS)), strict=True):
@@ -114,6 +115,7 @@ def test_a_forbidden_effect_is_never_adopted_and_a_forced_one_always(rng: np.ran
     assert "asymmetry" in diagnosed(records, force=("asymmetry",)).damper.effects
 
 
+@pytest.mark.ci
 def test_a_lag_of_the_valve_is_named_from_steps_of_the_voltage(rng: np.random.Generator) -> None:
     damper = damper_of(TWO, valve_lag={"tau": 0.02})
     steady = tuple(sine(damper, U, f, 0.02, rng) for U in TWO for f in (0.5, 2.0))

@@ -117,8 +117,6 @@ def test_a_neighbour_differs_in_one_parameter_by_1_percent() -> None:
 
 @pytest.mark.parametrize("tie_break", TIE_BREAKS)
 def test_the_short_ride_gives_the_peaks_of_the_whole_simulation(config: RunConfig, tie_break) -> None:
-    import numpy as np
-
     from pzd.damper.model import BaseRow, Damper
     from pzd.simulate.dampers import dynamic_damper_of
     from pzd.simulate.plan import Case
