@@ -40,7 +40,6 @@ ORDER = (
 """The one place where the order of the house stands."""
 
 SAYS_NOTHING = {"base", "common", "helper", "helpers", "misc", "util", "utils"}
-LONGEST = 300
 PACKAGE = Path(pzd.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
@@ -117,11 +116,6 @@ def test_an_import_from_above_or_of_its_own_package_is_none(tmp_path: Path) -> N
     module.parent.mkdir(parents=True)
     module.write_text("import numpy\nfrom pzd.quantities import TIME\nfrom pzd.damper.model import Damper\nimport pzd")
     assert not faults(module, tmp_path / "pzd")
-
-
-def test_no_module_is_longer_than_it_should_be() -> None:
-    lengths = {dotted(module, PACKAGE): len(module.read_text(encoding="utf-8").splitlines()) for module in MODULES}
-    assert {name: length for name, length in lengths.items() if length > LONGEST} == {}
 
 
 def test_names_of_modules_say_something() -> None:

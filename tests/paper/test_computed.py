@@ -67,6 +67,8 @@ def test_ratios_are_computed_over_published(beside: dict[str, PublishedRow]) -> 
             assert row.ratio is None
         else:
             assert row.ratio == pytest.approx(row.computed / row.published)
+    ratios = [row.ratio for row in beside.values()]
+    assert ratios.count(None) < 0.5 * len(ratios)
 
 
 def test_inputs_are_those_of_the_paper(beside: dict[str, PublishedRow]) -> None:

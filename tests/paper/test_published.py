@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
 from importlib.resources import files
-from pathlib import Path
 
 import pytest
 
 from pzd.paper.published import LARGE_GAP, published, rig_tests, span, table_damper
 
+HANDED_OVER = "5863f2896bea5d2de2b185c63034bd25e156cdcc31d6d1c278031561f79700ce"
+"""SHA-256 of the file as it was handed over with the paper: nobody corrects what is printed."""
 
-def test_the_package_holds_the_shared_file_byte_for_byte(shared: Path) -> None:
+
+def test_the_package_holds_the_numbers_byte_for_byte_as_they_were_handed_over() -> None:
     copy = files("pzd.paper").joinpath("published.csv").read_bytes()
-    assert copy == (shared / "paper" / "published.csv").read_bytes()
+    assert hashlib.sha256(copy).hexdigest() == HANDED_OVER
 
 
 def test_every_number_has_an_id_of_its_own() -> None:
