@@ -14,6 +14,7 @@ from pzd.paper.loop import loop_in
 from pzd.paper.published import PEAK, rig_tests, span
 from pzd.paper.stand import written
 from pzd.paper.valve import STIFFNESS, least_stiffness, stand_damper
+from pzd.report.reference import same_test
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ def judged(tried: Sequence[Attempt]) -> Verdict:
     if len(explanations) == 1:
         return Verdict("named", closing, f"{explanations[0].effect} alone meets the published forces")
     unknowns = min(one.unknowns for one in explanations)
-    numbers = len({row.same_test for row in condition()})
+    forces = condition()
+    numbers = sum(not any(same_test(row, earlier) for earlier in forces[:n]) for n, row in enumerate(forces))
     reason = (
         f"{len(explanations)} of {len(tried)} attempts meet the forces, with {unknowns} unknowns or more for {numbers} "
         "numbers: none of them is put to a test, so no probability can be given to any"

@@ -49,7 +49,7 @@ def test_parameters_identified_from_the_stand_stand_beside_the_tables_with_inter
     rows = [row for row in published().values() if row.kind == "identified"]
     assert len(rows) == 33
     for row in rows:
-        found, wanted = beside[row.id], IDENTIFIED[row.setting, row.voltage_V, row.temperature_C]
+        found, wanted = beside[row.id], IDENTIFIED[row.setting, row.voltage_V, row.temperature_degC]
         expected = dict(zip(("T0", "C", "k"), wanted, strict=True))[row.quantity]
         assert found.computed == pytest.approx(expected, rel={"T0": 0.05, "C": 0.02, "k": 0.1}[row.quantity]), row.id
         assert "95 %" in found.note, row.id

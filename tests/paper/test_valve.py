@@ -107,6 +107,7 @@ def test_the_config_runs_the_tests_of_every_published_force(root: Path) -> None:
         for planned in entry.plan()
     }
     wanted = {
-        (r.setting, r.voltage_V, r.temperature_C, f"sine-{r.frequency_Hz:g}Hz-{r.amplitude_m:g}m") for r in rig_tests()
+        (r.setting, r.voltage_V, r.temperature_degC, f"sine-{r.frequency_Hz:g}Hz-{r.amplitude_m:g}m")
+        for r in rig_tests()
     }
     assert wanted <= taken

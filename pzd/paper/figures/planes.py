@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from pzd.artefacts import ParameterRow
 from pzd.damper.model import BaseRow, Damper
 from pzd.paper.figures.canvas import COLOURS, DISPLACEMENT, FORCE, VELOCITY, key, panels
-from pzd.paper.figures.sources import FigureData, Loop, Sine, Test
+from pzd.paper.figures.sources import FigureData, Sine, Test
 from pzd.paper.figures.figure import Drawing
+from pzd.paper.loop import Loop, loop_of
 from pzd.paper.published import published
 from pzd.record import Array
 from pzd.report.gaps import criterion
@@ -20,8 +19,8 @@ from pzd.report.gaps import criterion
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_CYCLES, _POINTS = 4, 1000
-"""Cycles until the element has forgotten how it started, and points in one."""
+_POINTS = 1000
+"""Of a drawn cycle: fewer than one a pixel would show."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,16 +79,7 @@ def element(row: BaseRow) -> Damper:
 
 def loop(damper: Damper, sine: Sine) -> Loop:
     """The settled cycle of a damper in a sine."""
-    from pzd.damper.compose import respond
-    from pzd.damper.motion import Motion
-
-    w = 2.0 * np.pi * sine.frequency
-    time = np.arange(_CYCLES * _POINTS + 1) / (_POINTS * sine.frequency)
-    x = sine.amplitude * np.sin(w * time)
-    motion = Motion(time, x, sine.amplitude * w * np.cos(w * time), -w * w * x, None, None)
-    last = slice(-_POINTS - 1, None)
-    force = respond(damper, motion)[last]
-    return Loop(x[last], motion.velocity[last], force, time[: _POINTS + 1])
+    return loop_of(damper, sine.frequency, sine.amplitude, samples=_POINTS)
 
 
 def fitted(test: Test, row: ParameterRow) -> tuple[Array, float]:

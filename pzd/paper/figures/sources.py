@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pzd.artefacts import Identified, MeasureRow, ParameterRow, Rig, SummaryRow, base_of
+from pzd.artefacts.matching import Conditions, matching
 from pzd.config import RunConfig, setting_in_use
 from pzd.paper.fidelity import SettingRides, rides_on
-from pzd.paper.published import Published
+from pzd.paper.loop import Loop
+from pzd.report.reference import Expected
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.runs import Run
 from pzd.simulate.config import SimulateConfig
 from pzd.table.config import TableConfig
-
-_SAME_VOLTAGE, _SAME_TEMPERATURE = 3.0, 2.5
-"""How far the voltage [V] and the temperature [degC] of a test may be from what is asked for."""
-_SAME_SINE = 0.05
-"""How far frequency and amplitude of a test may be from what is asked for, as a share."""
-
 
 @dataclass(frozen=True)
 class Sine:
@@ -48,20 +44,10 @@ class Condition:
         """In words."""
         return f"{self.setting}, {self.voltage:g} V, {self.temperature:g} °C"
 
-
-@dataclass(frozen=True, eq=False)
-class Loop:
-    """One closed cycle; every array is (n,)."""
-
-    displacement: Array
-    velocity: Array
-    force: Array
-    time: Array
-
     @property
-    def peak(self) -> float:
-        """Largest magnitude of the force [N]."""
-        return float(np.max(np.abs(self.force)))
+    def conditions(self) -> Conditions:
+        """What of a test it states."""
+        return Conditions(self.setting, self.voltage, self.temperature)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,20 +104,20 @@ class FigureData:
         ------
         LookupError : when the rig has none
         """
-        found = [one for one in self.identified.measures if _is(one, condition) and _swings(one, sine)]
+        wanted = replace(condition.conditions, frequency_Hz=sine.frequency, amplitude_m=sine.amplitude)
+        found = matching(self.identified.measures, wanted)
         if not found:
             raise LookupError(f"the rig has no test at {condition}, {sine}")
-        measure = min(found, key=lambda one: _too_warm(one, condition))
-        return Test(next(record for record in self.rig.records if record.name == measure.record), measure)
+        return Test(next(record for record in self.rig.records if record.name == found[0].record), found[0])
 
-    def test_of(self, row: Published) -> Test:
+    def test_of(self, row: Expected) -> Test:
         """The test that a published number tells of.
 
         Raises
         ------
         LookupError : when the rig has none
         """
-        condition = Condition(str(row.setting), row.voltage_V or 0.0, row.temperature_C or 22.0)
+        condition = Condition(str(row.setting), row.voltage_V or 0.0, row.temperature_degC or 22.0)
         return self.test(condition, Sine(row.frequency_Hz or 0.0, row.amplitude_m or 0.0))
 
     def row(self, condition: Condition) -> ParameterRow:
@@ -141,10 +127,10 @@ class FigureData:
         ------
         LookupError : when there are none
         """
-        found = [row for row in self.identified.rows if _is(row, condition)]
+        found = matching(self.identified.rows, condition.conditions)
         if not found:
             raise LookupError(f"the rig has no tests at {condition}")
-        return min(found, key=lambda row: _too_warm(row, condition))
+        return found[0]
 
     def ride(self, frequency: float, policy: str, fidelity: str) -> SummaryRow:
         """The line of a ride over a sine.
@@ -158,21 +144,3 @@ class FigureData:
             if row.case == wanted:
                 return row
         raise LookupError(f"the run has no ride {wanted}")
-
-
-def _too_warm(row: MeasureRow | ParameterRow, condition: Condition) -> float:
-    """How far a row is from the temperature asked for [K]."""
-    return 0.0 if row.temperature_degC is None else abs(row.temperature_degC - condition.temperature)
-
-
-def _is(row: MeasureRow | ParameterRow, condition: Condition) -> bool:
-    return (
-        row.setting == condition.setting
-        and abs((row.voltage_V or 0.0) - condition.voltage) <= _SAME_VOLTAGE
-        and _too_warm(row, condition) <= _SAME_TEMPERATURE
-    )
-
-
-def _swings(measure: MeasureRow, sine: Sine) -> bool:
-    pairs = ((measure.frequency_Hz or 0.0, sine.frequency), (measure.amplitude_m, sine.amplitude))
-    return all(abs(found - wanted) <= _SAME_SINE * wanted for found, wanted in pairs)
