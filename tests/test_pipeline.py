@@ -111,6 +111,16 @@ def test_a_rig_file_that_changes_reruns_everything(bench: Bench) -> None:
     assert "1-rig/a.csv has changed" in bench.said("identify")
 
 
+def test_expected_numbers_that_change_rerun_the_report_alone(bench: Bench) -> None:
+    path = bench.config.parent / "lab.csv"
+    path.write_text("id,value,unit\npeak,1,N\n")
+    bench("report.reference=lab.csv")
+    assert bench("report.reference=lab.csv") == []
+    path.write_text("id,value,unit\npeak,2,N\n")
+    assert bench("report.reference=lab.csv") == ["report"]
+    assert bench.said("report") == "report     runs: lab.csv has changed"
+
+
 def test_many_files_that_change_are_counted_and_not_listed(bench: Bench) -> None:
     bench()
     for name in ("a", "b"):

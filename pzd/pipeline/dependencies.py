@@ -114,14 +114,15 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 def _files_named(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
     """Hashes of the files beside the config that its values name; absent ones are the stage's to refuse."""
-    from pzd.report.reference import file_of
     from pzd.rig.files.listing import matching
 
     named = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
-    expected = values.get("report.reference")
     try:
         files = [file for value in named for file in matching(folder, value)]
-        files += [file_of(expected, folder)] if expected else []
+        if expected := values.get("report.reference"):
+            from pzd.report.reference import file_of
+
+            files.append(file_of(expected, folder))
         return {Path(os.path.relpath(file, folder)).as_posix(): file_hash(file) for file in files}
     except OSError as error:
         raise FilesError(f"{error.filename}: {error.strerror}") from error

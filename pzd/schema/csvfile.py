@@ -71,7 +71,7 @@ def read_table(
 ) -> tuple[tuple[int, Row], ...]:
     """Read rows that a person wrote: columns in any order, and those of fields with a default may be missing.
 
-    An empty cell of a field with a default takes the default.
+    An empty cell of a field with a default takes the default; empty lines are passed over.
 
     Parameters
     ----------
@@ -93,6 +93,8 @@ def read_table(
     rows: list[tuple[int, Row]] = []
     faults: list[str] = []
     for number, cells in numbered[1:]:
+        if not cells:
+            continue
         if len(cells) != len(names):
             faults.append(f"{at(path, number)}: {len(cells)} fields where the header has {len(names)}")
             continue
@@ -113,12 +115,12 @@ def _columns_of(
     known = {control.renamed(name): name for name in model.model_fields}
     names = [known.get(name) or also.get(name) or "" for name in header]
     faults = []
-    for given, name in zip(header, names, strict=True):
+    for place, (given, name) in enumerate(zip(header, names, strict=True)):
         near = nearest(given, known)
         hint = f"did you mean {near}?" if near else f"there is {', '.join(known)}"
         if not name:
             faults.append(f"{at(path, 1)}: no such column; {hint} (got {given})")
-        elif names.count(name) > 1 and names.index(name) == header.index(given):
+        elif name in names[:place]:
             faults.append(f"{at(path, 1)}: the column stands there twice (got {given})")
     for column, name in known.items():
         if model.model_fields[name].is_required() and name not in names:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from pzd.artefacts import Identified, PublishedRow, Rig, base_of
+from pzd.artefacts import Identified, ReferenceRow, Rig, base_of
 from pzd.config import RunConfig
 from pzd.paper.fidelity import SettingRides, rides_on
 from pzd.paper.published import LARGE_GAP, SMALL_GAP
@@ -47,13 +47,13 @@ def test_no_voltage_is_as_soft_as_c_min(rides_by_gap: Mapping[str, SettingRides]
 
 
 def test_the_smaller_gap_is_harder_than_constant_c(
-    rides_by_gap: Mapping[str, SettingRides], beside: dict[str, PublishedRow]
+    rides_by_gap: Mapping[str, SettingRides], beside: dict[str, ReferenceRow]
 ) -> None:
     constant = (beside["F19a-c"].computed, beside["F19b-c"].computed)
     rows = [row for row in rides_by_gap[SMALL_GAP].rides.summary if row.fidelity == "table"]
     assert all(row.peak_abs_aK_m_per_s2 > peak for row, peak in zip(rows, constant, strict=True) if peak is not None)
 
 
-def test_by_the_table_the_exposure_time_grows_to_minutes_at_most(beside: dict[str, PublishedRow]) -> None:
+def test_by_the_table_the_exposure_time_grows_to_minutes_at_most(beside: dict[str, ReferenceRow]) -> None:
     assert "table 4." in beside["EXPa-ctrl"].note
     assert "table 0 min" in beside["EXPb-ctrl"].note
