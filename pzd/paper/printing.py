@@ -27,7 +27,7 @@ class Verdict:
     reason: str
 
 
-def judged(tried: Sequence[Attempt]) -> Verdict:
+def verdict_on(tried: Sequence[Attempt]) -> Verdict:
     """The verdict on the attempts: named only where one explanation is left.
 
     Parameters
@@ -65,7 +65,7 @@ def _contradiction() -> Iterator[str]:
     yield "An orifice would have to give the last column, rising as the slot closes: at gap 0.15 mm it falls, when hot"
     yield "it is negative. With Tables 2 and 3 the peak at 0 V rises with heat; the measured one falls."
     tried = attempts()
-    verdict = judged(tried)
+    verdict = verdict_on(tried)
     for base in BASES:
         yield f"\nGap 0.25 mm, 0 V, five forces; of the element is kept: {_KEPT[base]}"
         yield from (_line(one) for one in tried if one.base == base)
@@ -109,6 +109,6 @@ def _calibration() -> Iterator[str]:
     yield f"\n{written(valve)}"
 
 
-def contested() -> str:
+def claims_text() -> str:
     """What the paper says, and what its own numbers give."""
     return "\n".join(f"{claim.says}\n    {claim.gives}" for claim in claims())

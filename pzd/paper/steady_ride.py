@@ -98,7 +98,7 @@ def _peak(
     workspace: Array,
     scratch: Array,
 ) -> float:
-    """Largest |a_K| at the steps from `settle` on; the room (6, 4) holds the state, one to try, and four rates."""
+    """Largest |a_K| at the steps from `settle` on; scratch (6, 4) holds the state, a trial state and four rates."""
     x, trial, rates = scratch[0], scratch[1], scratch[2:]
     peak = 0.0
     for n in range(steps + 1):

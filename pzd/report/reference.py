@@ -246,11 +246,11 @@ def _derived(row: Expected, direct: Mapping[str, Found], units: Mapping[str, str
     if lacking:
         return Found(None, "; ".join(lacking))
     numbers = {name: direct[name].value or 0.0 for name in names}
-    said = ", ".join(f"{name} {value:.5g} {units[name]}" for name, value in numbers.items())
+    terms_text = ", ".join(f"{name} {value:.5g} {units[name]}" for name, value in numbers.items())
     try:
-        return Found(evaluated(row.selector, numbers), f"{row.selector} of {said}")
+        return Found(evaluated(row.selector, numbers), f"{row.selector} of {terms_text}")
     except ZeroDivisionError:
-        return Found(None, f"{row.selector} of {said} divides by 0")
+        return Found(None, f"{row.selector} of {terms_text} divides by 0")
 
 
 def _also_expected(row: Expected, expected: Iterable[Expected]) -> str:

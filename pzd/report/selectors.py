@@ -1,7 +1,7 @@
 """Which numbers of a run can be asked for by name, in which unit, and how one of them is found.
 
 `measures`, `parameters`, `summary` and `response` are the files of the run, `comfort` the measures of comfort.csv,
-`simulate` the inputs of the ride. Which row of a file is meant is said by conditions:
+`simulate` the inputs of the ride. Which row of a file is meant, conditions say:
 
     measures     setting, voltage_V, temperature_degC, frequency_Hz, amplitude_m, record
     parameters   setting, voltage_V, temperature_degC

@@ -18,7 +18,7 @@ def survey(data: FigureData) -> Drawing:
     """Peak at 4.5 Hz over peak at 2.25 Hz, a panel a tie-break, with the spread for 1 % in each parameter."""
     rows = stored()
     figure, axes = panels(width=10.2, height=3.9, ratios=(1.0, 1.0, 1.0))
-    said = []
+    captions = []
     for ax, tie_break, colour in zip(axes, TIE_BREAKS, COLOURS, strict=False):
         cars = [row for row in rows if row.tie_break == tie_break]
         best = closest(cars)
@@ -31,11 +31,11 @@ def survey(data: FigureData) -> Drawing:
         ax.set_ylabel("controlled peak at 4.5 Hz [m/s²]")
         ax.set_xlim(0.0, 2.2)
         ax.set_ylim(0.0, 2.2)
-        said.append(_described(best))
+        captions.append(_described(best))
     key(figure, axes[0])
     count = len({(row.a1_m, row.a2_m, row.pitch_inertia_kgm2, row.x_K_m) for row in rows if row.found == "survey"})
     caption = (
-        f"{count} plausible cars of a grid that meet both peaks with constant c within 5 %. Closest: {' '.join(said)}"
+        f"{count} plausible cars of a grid that meet both peaks with constant c within 5 %. Closest: {' '.join(captions)}"
     )
     return Drawing("cars", figure, "Controlled peaks of all plausible cars under three tie-breaks.", caption)
 

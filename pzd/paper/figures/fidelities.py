@@ -54,9 +54,9 @@ def fidelities(data: FigureData) -> Iterator[Drawing]:
         ax.set_xlim(0.0, 1.45 * max(bar.peaks[n] for bar in bars))
         ax.set_xlabel(f"peak |a_K| at {frequency:g} Hz [m/s²];  exposure time in comfort")
     floor = ", ".join(f"{gap.setting} at least {gap.least_damping:.0f} N s/m" for gap in gaps)
-    said = "; ".join(f"{bar.name} {' and '.join(f'{peak:.2f}' for peak in bar.peaks)}" for bar in bars)
+    peaks = "; ".join(f"{bar.name} {' and '.join(f'{peak:.2f}' for peak in bar.peaks)}" for bar in bars)
     caption = (
-        f"Peaks at 2.25 and 4.5 Hz [m/s²]: {said}. "
+        f"Peaks at 2.25 and 4.5 Hz [m/s²]: {peaks}. "
         f"The damper's force over speed is nowhere below: {floor}; c_min = {BOUNDS[0]:g} N s/m is out of reach at any "
         f"voltage. {_share(data)} Exposure times: reduced comfort of ISO 2631:1978, {TRUST}, "
         "each harmonic by itself; beside the bars of the paper stand its own."
@@ -130,15 +130,15 @@ def _minutes(minutes: float) -> str:
 def _share(data: FigureData) -> str:
     """How much of the gain c_min alone gives."""
     car = data.simulate.car.car()
-    said = []
+    captions = []
     soft = constant_peaks(car, BOUNDS[0])
     for n, frequency in enumerate(FREQUENCIES):
         constant = abs(harmonic_response(car, DAMPING, frequency, AMPLITUDE, SPEED)[1])
         controlled = data.ride(frequency, "comfort", "ideal").peak_abs_aK_m_per_s2
         share = (constant - soft[n]) / (constant - controlled)
-        judged = f"{share:.0%} of the gain" if share > 0.0 else "worse than the larger c"
-        said.append(
+        gain = f"{share:.0%} of the gain" if share > 0.0 else "worse than the larger c"
+        captions.append(
             f"{constant:.2f} to {controlled:.2f} m/s² at {frequency:g} Hz, where c_min alone gives {soft[n]:.2f}"
-            f" ({judged})"
+            f" ({gain})"
         )
-    return f"Control takes the peak from {' and from '.join(said)}."
+    return f"Control takes the peak from {' and from '.join(captions)}."

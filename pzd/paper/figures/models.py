@@ -46,20 +46,20 @@ def modelled(part: str, data: FigureData, labels: dict[str, Condition], sine: Si
     LookupError : when a condition was not identified
     """
     curves: list[Curve] = []
-    said: list[str] = []
+    captions: list[str] = []
     for (label, condition), colour in zip(labels.items(), COLOURS, strict=False):
         row = data.row(condition)
         ours, theirs = loop(element(identified(row)), sine), loop(element(tabulated(condition)), sine)
         curves.append(Curve(label, ours, colour=colour))
         curves.append(Curve(f"{label}, paper's parameters", theirs, colour=colour, style=NUMBERS_OF_OTHERS))
-        said.append(f"{label}: {ours.peak:.0f} N, with the paper's parameters {theirs.peak:.0f} N; {parameters(row)}")
+        captions.append(f"{label}: {ours.peak:.0f} N, with the paper's parameters {theirs.peak:.0f} N; {parameters(row)}")
     figure = both_planes(curves, columns=len(labels))
-    return Drawing(part, figure, what, f"{sine}. Peak, " + ". ".join(said) + ".")
+    return Drawing(part, figure, what, f"{sine}. Peak, " + ". ".join(captions) + ".")
 
 
 def parameters(row: ParameterRow) -> str:
     """T0, C, k of a row with their 95 % intervals, in words."""
-    told = [
+    intervals = [
         f"{name} {value:.4g} ({low:.4g} to {high:.4g}) {unit}"
         for name, value, low, high, unit in (
             ("T0", row.T0_N, row.T0_N_low95, row.T0_N_high95, "N"),
@@ -68,4 +68,4 @@ def parameters(row: ParameterRow) -> str:
         )
         if value is not None and low is not None and high is not None
     ]
-    return ", ".join(told)
+    return ", ".join(intervals)

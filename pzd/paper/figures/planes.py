@@ -35,7 +35,7 @@ class Curve:
 
 
 def measured(data: FigureData, labels: Mapping[str, str], what: str) -> Drawing:
-    """The average cycles of the tests that published peak forces tell of, and their peaks beside the paper's.
+    """The average cycles of the tests that published peak forces were measured in, and their peaks beside the paper's.
 
     Parameters
     ----------
@@ -51,13 +51,13 @@ def measured(data: FigureData, labels: Mapping[str, str], what: str) -> Drawing:
     ------
     LookupError : when the rig lacks one of the tests
     """
-    curves, said = [], []
+    curves, captions = [], []
     for name, label in labels.items():
         row = published()[name]
         test = data.test_of(row)
         curves.append(Curve(label, test.cycle(), test))
-        said.append(f"{label}: {test.measure.peak_force_N:.0f} N, paper {row.number:.0f} N")
-    return Drawing("measured", both_planes(curves), what, "Peak of the average cycle, " + "; ".join(said) + ".")
+        captions.append(f"{label}: {test.measure.peak_force_N:.0f} N, paper {row.number:.0f} N")
+    return Drawing("measured", both_planes(curves), what, "Peak of the average cycle, " + "; ".join(captions) + ".")
 
 
 def identified(row: ParameterRow) -> BaseRow:

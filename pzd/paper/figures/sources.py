@@ -111,7 +111,7 @@ class FigureData:
         return Test(next(record for record in self.rig.records if record.name == found[0].record), found[0])
 
     def test_of(self, row: Expected) -> Test:
-        """The test that a published number tells of.
+        """The test in which a published number was measured.
 
         Raises
         ------

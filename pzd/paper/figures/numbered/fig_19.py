@@ -31,7 +31,7 @@ def accelerations(data: FigureData) -> Drawing:
     """|a_K| over the last two seconds of the ideal rides at 2.25 and 4.5 Hz."""
     rides = {ride.case: ride.columns for ride in data.rides_of_setting.rides.rides}
     figure, axes = panels()
-    said = []
+    captions = []
     for ax, frequency, printed in zip(
         axes, FREQUENCIES, zip(CONSTANT_PEAKS, CONTROLLED_PEAKS, strict=True), strict=True
     ):
@@ -40,7 +40,7 @@ def accelerations(data: FigureData) -> Drawing:
             time = rides[row.case][_TIME]
             part = time >= time[-1] - _SHOWN
             ax.plot(time[part] - time[part][0], np.abs(rides[row.case][_ACCELERATION][part]), color=colour, label=label)
-            said.append(f"{frequency:g} Hz {label} {row.peak_abs_aK_m_per_s2:.3f} m/s², paper {peak:g}")
+            captions.append(f"{frequency:g} Hz {label} {row.peak_abs_aK_m_per_s2:.3f} m/s², paper {peak:g}")
         ax.set_xlabel("time t [s]")
         ax.set_ylabel("|a_K| [m/s²]")
         ax.set_xlim(0.0, _SHOWN)
@@ -48,7 +48,7 @@ def accelerations(data: FigureData) -> Drawing:
     key(figure, axes[0])
     caption = (
         f"Settled rides, forces ideal within c_min and c_max, tie-break {data.simulate.tie_break}. Peaks: "
-        + "; ".join(said)
+        + "; ".join(captions)
         + "."
     )
     return Drawing("acceleration", figure, "Magnitude of the acceleration at K over time at 2.25 and 4.5 Hz.", caption)
