@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pzd.artefacts import Region
 from pzd.diagnose.noise.between_cycles import repeatable_power
 from pzd.diagnose.residual_check import ResidualCheck
+from pzd.record import Array
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.str_]
 
 DENSER = 1.25

@@ -39,7 +39,8 @@ from pzd.artefacts.matching import Conditions, same_motion
 from pzd.quantities import Control, Quantity
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE
 from pzd.report.arithmetic import evaluated, parsed, terms
-from pzd.report.selectors import PURE, UNITS, Asked, Found, RunNumbers, found_in
+from pzd.report.run_numbers import Found, RunNumbers, found_in
+from pzd.report.selectors import PURE, UNITS, Asked
 from pzd.schema.csvfile import read_table
 from pzd.schema.errors import ConfigError, DataError, at
 from pzd.schema.model import Frozen

@@ -49,7 +49,7 @@ def report(
     from pzd.report.page import page
     from pzd.report.reference import compared, file_of, read_reference
     from pzd.report.ride_comfort import assess, settled
-    from pzd.report.selectors import RunNumbers
+    from pzd.report.run_numbers import RunNumbers
     from pzd.simulate.roads.sine import Sine
 
     expected = read_reference(file_of(report.reference, folder), control) if report.reference else None

@@ -33,8 +33,8 @@ from pzd.simulate.ride_model import (
     UNBOUNDED,
     VOLTAGE,
     ControlSpec,
-    Grid,
     RideModel,
+    TableArrays,
     control,
     road_coefficients,
     vehicle,
@@ -95,7 +95,7 @@ def law_of(config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamp
 
 
 def ride_case(
-    config: SimulateConfig, case: Case, profile: Profile, grid: Grid, damper: DynamicDamper, ends: bool
+    config: SimulateConfig, case: Case, profile: Profile, grid: TableArrays, damper: DynamicDamper, ends: bool
 ) -> Outcome:
     """Ride one case.
 

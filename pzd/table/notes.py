@@ -5,13 +5,11 @@ from __future__ import annotations
 from itertools import groupby, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.damper.competing_forms import known
 from pzd.damper.model import Damper
+from pzd.record import Array
 from pzd.table.force import forces, voltages_of
-
-Array = NDArray[np.float64]
 
 RULE = "the lowest voltage that gives the force is taken"
 """How a force that several voltages give is resolved; `table_voltage` does so."""

@@ -13,7 +13,7 @@ from pzd.paper.published import published
 from pzd.quantities import Control
 from pzd.report.reference import compared
 from pzd.report.ride_comfort import assess, settled
-from pzd.report.selectors import RunNumbers
+from pzd.report.run_numbers import RunNumbers
 from pzd.rig.stage import synthesise
 from pzd.simulate.stage import simulate
 from pzd.table.stage import tabulate
@@ -53,5 +53,5 @@ def beside(config: RunConfig, identified: Identified, rides: Rides) -> dict[str,
             settled(ride, rows[ride.case], config.simulate.settle_s, tones[rows[ride.case].road]), config.report
         )
     )
-    found = compared(tuple(published().values()), RunNumbers(identified, rides, comfort, config.simulate))
+    found = compared(tuple(published().values()), RunNumbers(identified, rides, comfort, config.simulate, Control()))
     return {row.id: row for row in found}

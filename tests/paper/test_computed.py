@@ -8,8 +8,9 @@ from pzd.artefacts import Identified, ReferenceRow, Rides
 from pzd.config import RunConfig
 from pzd.paper.published import AT_ZERO, LARGE_GAP, PEAK, SMALL_GAP, published, rig_tests, span
 from pzd.paper.valve import VALVE
+from pzd.quantities import Control
 from pzd.report.reference import Expected, compared
-from pzd.report.selectors import RunNumbers
+from pzd.report.run_numbers import RunNumbers
 
 PEAKS = [row for row in rig_tests() if row.quantity == PEAK]
 AT_REST = [row for row in rig_tests() if row.quantity == AT_ZERO]
@@ -105,7 +106,7 @@ def test_the_stroke_is_what_the_calibration_leaves_of_it(beside: dict[str, Refer
 
 
 def test_a_run_without_the_papers_tests_says_so(config: RunConfig) -> None:
-    empty = RunNumbers(Identified((), ()), Rides((), ()), (), config.simulate)
+    empty = RunNumbers(Identified((), ()), Rides((), ()), (), config.simulate, Control())
     for row in compared(tuple(published().values()), empty):
         assert row.note, row.id
         if row.kind not in ("input", "stated"):

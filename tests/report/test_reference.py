@@ -16,7 +16,8 @@ from pzd.report.arithmetic import evaluated, terms
 from pzd.report.config import ReportConfig
 from pzd.report.reference import Expected, compared, file_of, read_reference, same_test
 from pzd.report.ride_comfort import assess, settled
-from pzd.report.selectors import UNITS, RunNumbers
+from pzd.report.run_numbers import RunNumbers
+from pzd.report.selectors import UNITS
 from pzd.schema.errors import ConfigError, DataError
 from pzd.simulate.config import SimulateConfig
 
@@ -53,7 +54,7 @@ def numbers(run: Any) -> RunNumbers:
         on.model_copy(update={"record": "r01", "voltage_V": 149.6, "peak_force_N": 2940.0}),
         on.model_copy(update={"record": "r02", "frequency_Hz": 1.0, "peak_force_N": 870.0}),
     )
-    return RunNumbers(Identified(run.identified.rows, measures), run.rides, comfort, SimulateConfig())
+    return RunNumbers(Identified(run.identified.rows, measures), run.rides, comfort, SimulateConfig(), VOLTS)
 
 
 def rows_of(folder: Path, numbers: RunNumbers, text: str) -> dict[str, ReferenceRow]:

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.diagnose.noise.between_cycles import pure_error
-from pzd.record import Record, is_constant, voltage_scale
+from pzd.record import Array, Record, is_constant, voltage_scale
 from pzd.signals.cycles import Cycles, cycles, drift, settled
 
-Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array]
 """Displacement, velocity and acceleration, each (n,)."""
 
