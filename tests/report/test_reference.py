@@ -289,7 +289,7 @@ def test_the_response_to_a_step_is_the_rising_one(tmp_path: Path, numbers: RunNu
     step = numbers.rides.responses[0]
     rising = step.model_copy(update={"signal": "force", "to_90_percent_s": 0.0155})
     falling = rising.model_copy(update={"from_voltage_V": 150.0, "to_voltage_V": 0.0, "to_90_percent_s": 0.02})
-    rides = Rides(numbers.rides.rides, numbers.rides.summary, (step, falling, rising))
+    rides = Rides(numbers.rides.rides, numbers.rides.summary, (step, rising, falling))
     text = "id,selector,value,unit\nRESP,response.force_to_90_percent_s,9,ms\n"
     found = rows_of(tmp_path, replace(numbers, rides=rides), text)["RESP"]
     assert found.computed == pytest.approx(15.5)
