@@ -11,6 +11,7 @@ from pzd.artefacts.matching import matching, undecided
 from pzd.quantities import Control
 from pzd.report.selectors import UNITS, Asked
 from pzd.simulate.config import SimulateConfig
+from pzd.simulate.plan import PLAIN_SUFFIX
 from pzd.simulate.roads.sine import Sine
 
 
@@ -114,7 +115,7 @@ def _is_ride(run: RunNumbers, row: SummaryRow, asked: Asked) -> bool:
     if asked.case is not None:
         return row.case == asked.case
     names = ((asked.road, row.road), (asked.policy, row.policy), (asked.fidelity, row.fidelity))
-    on_final = row.case == f"{row.road}-{row.policy}-{row.fidelity}"  # `-plain` only where it is asked for by name
+    on_final = not row.case.endswith(PLAIN_SUFFIX)  # the others only where they are asked for by name
     return on_final and all(wanted in (None, found) for wanted, found in names) and _is_sine(run, row.road, asked)
 
 
