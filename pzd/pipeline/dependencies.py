@@ -123,9 +123,9 @@ def _files_named(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
     try:
         files = [file for value in named for file in matching(folder, value)]
         if expected := values.get("report.reference"):
-            from pzd.report.reference import file_of
+            from pzd.report.reference import path_of
 
-            files.append(file_of(expected, folder))
+            files += [path for path in (path_of(expected, folder),) if path.is_file()]
         return {Path(os.path.relpath(file, folder)).as_posix(): file_hash(file) for file in files}
     except OSError as error:
         raise FilesError(f"{error.filename}: {error.strerror}") from error

@@ -161,6 +161,11 @@ def range_of(row: Expected, expected: Iterable[Expected]) -> tuple[float, float]
     return (min(numbers), max(numbers)) if numbers else (0.0, 0.0)
 
 
+def path_of(reference: str, folder: Path) -> Path:
+    """Where the file that `report.reference` names should stand."""
+    return SHIPPED.get(reference, folder / reference)
+
+
 def file_of(reference: str, folder: Path) -> Path:
     """The file that `report.reference` names.
 
@@ -173,7 +178,7 @@ def file_of(reference: str, folder: Path) -> Path:
     ------
     ConfigError : when there is no such file
     """
-    path = SHIPPED.get(reference, folder / reference)
+    path = path_of(reference, folder)
     if not path.is_file():
         near = nearest(reference, SHIPPED)
         hint = f"did you mean {near}?" if near else f"a path counts from {folder}, and {', '.join(SHIPPED)} is a name"
