@@ -25,15 +25,14 @@ ORDER = (
     "table",
     "comfort",
     "simulate",
-    "paper",
     "report",
     "export",
     "blind",
     "config",
     "runs",
     "pipeline",
-    "figures",
     "sweep",
+    "paper",
     "cli",
     "__main__",
 )
@@ -90,6 +89,28 @@ def test_every_module_has_its_place_in_the_order() -> None:
 
 def test_imports_point_down_only() -> None:
     assert [fault for module in MODULES for fault in faults(module, PACKAGE)] == []
+
+
+def users_of(part: str, package: Path) -> set[str]:
+    """The layers that import one, wherever in the file."""
+    return {
+        own
+        for module in sorted(package.rglob("*.py"))
+        if (own := layer(dotted(module, package)))
+        for _, name in imported(ast.parse(module.read_text("utf-8")), own, is_package=module.stem == "__init__")
+        if layer(name) == part
+    }
+
+
+def test_only_the_command_line_knows_the_paper() -> None:
+    assert users_of("paper", PACKAGE) == {"paper", "cli"}
+
+
+def test_another_user_of_the_paper_is_found(tmp_path: Path) -> None:
+    module = tmp_path / "pzd" / "sweep" / "wrong.py"
+    module.parent.mkdir(parents=True)
+    module.write_text("def f():\n    from pzd.paper.published import published")
+    assert users_of("paper", tmp_path / "pzd") == {"sweep"}
 
 
 @pytest.mark.parametrize(

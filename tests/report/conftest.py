@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -63,11 +64,11 @@ class Run:
     control: Control = VOLTS
     setting: str | None = "gap 0.25 mm"
 
-    def told(self, config: ReportConfig | None = None, jobs: int = 1) -> Report:
+    def told(self, config: ReportConfig | None = None, jobs: int = 1, folder: Path = Path()) -> Report:
         """The report of this run."""
         simulate = SimulateConfig()
         parts = (self.rig, self.identified, self.diagnosed, self.table, self.rides)
-        return report(config or ReportConfig(), simulate, *parts, self.control, self.setting, jobs)
+        return report(config or ReportConfig(), simulate, *parts, self.control, self.setting, folder, jobs)
 
     def with_diagnosis(self, damper: Damper = PLAIN, **changes: object) -> Run:
         """The same run with another verdict."""
