@@ -115,8 +115,7 @@ def _folded(prepared: Prepared, residual: Array, mask: Mask) -> Array | None:
     if run is None:
         return None
     time = prepared.record.time
-    number = run.number(time)
-    whole = [j for j in range(run.count) if np.all(mask[number == j])]
+    whole = run.whole(time, mask)
     return run.fold(time, residual)[whole] if len(whole) >= 2 else None
 
 

@@ -40,6 +40,7 @@ def diagnose(
     -------
     the verdict, and the damper with what was adopted; unchanged where nothing was
     """
+    from pzd.diagnose.base_parameters import base_parameters
     from pzd.diagnose.campaign import Campaign
     from pzd.diagnose.data.cleaning import prepare
     from pzd.diagnose.data.exclusions import whole_records, without
@@ -75,4 +76,6 @@ def diagnose(
             named.rivalling, reach_of(stand.limits, evidence.whole.scales, voltages), evidence.whole.reference
         ),
     )
-    return Diagnosed(told, named.fitted.damper if named.adopted else plain, plain)
+    if not named.adopted:
+        return Diagnosed(told, plain, plain, tuple(row for row in identified.rows if row.setting == setting))
+    return Diagnosed(told, named.fitted.damper, plain, base_parameters(named, decision.verdict, setting))
