@@ -11,11 +11,10 @@ from pzd.artefacts import Diagnosed, Rig, base_of
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.config import DiagnoseConfig, NuisanceConfig
+from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import TRAINING, UNTOUCHED, VALIDATION, split
 from pzd.diagnose.noise.input_uncertainty import expected
-from pzd.diagnose.noise.test_effects import nuisance
 from pzd.diagnose.residual_check import check_residual
 from pzd.diagnose.stage import diagnose
 from pzd.identify.config import IdentifyConfig
@@ -23,6 +22,7 @@ from pzd.identify.stage import identify
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.rig.config import FilesEntry, RigConfig
+from pzd.signals.nuisance import NuisanceConfig, nuisance
 
 TWO = (0.0, 150.0)
 STAND = RigConfig(files=(FilesEntry(path="*.csv"),))

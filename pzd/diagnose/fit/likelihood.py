@@ -18,9 +18,9 @@ from pzd.damper.compose import element_force, respond, sampling_steps, value_of
 from pzd.damper.effects.sensor_delay import law as moment
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.noise.between_cycles import PureError
 from pzd.record import Array
 from pzd.signals.autoregression import Autoregression
+from pzd.signals.between_cycles import PureError
 
 SIMULATION_TOLERANCE = 1e-8
 """Of the damper's path, as a share of the force."""
