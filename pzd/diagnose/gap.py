@@ -19,12 +19,12 @@ BLOCKS = 8
 def gap_of(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
     """Criterion (4) pooled over the held-out samples; nothing is adopted, so after is before.
 
-    Equation: W_s = sum r^2 / sum F^2;  floor = sum (s^2 + nuisances^2) / sum F^2;  standard error of
-    the ratio over cycles or blocks        Source: Makowski and Knap 2021, eq. (4); Cochran 1977, eq. (6.9)
+    Equation: W_s = sum r^2 / sum F^2;  floor = sum_records (s^2 + nuisances) / sum F^2 as in `floor_of`;
+    standard error of the ratio over cycles or blocks
+                                           Source: Makowski and Knap 2021, eq. (4); Cochran 1977, eq. (6.9)
     """
     errors = np.concatenate([_by_block(j, j.residual**2) for j in held_out])
     forces = np.concatenate([_by_block(j, j.prepared.record.force**2) for j in held_out])
-    floors = np.concatenate([_by_block(j, j.variance + j.nuisances**2) for j in held_out])
     total = float(forces.sum())
     criterion = float(errors.sum()) / total
     count = errors.size
@@ -32,11 +32,27 @@ def gap_of(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
     return Gap(
         before=criterion,
         after=criterion,
-        noise_floor=float(floors.sum()) / total,
+        noise_floor=min(sum(floor_of(j) for j in held_out) / total, criterion),  # summed in another order,
         standard_error=float(np.sqrt(scatter)) / total,
         held_out=split.held_out,
         hold_out=split.hold_out,
     )
+
+
+def floor_of(judged: ResidualCheck) -> float:
+    """What noise and the test's own nuisances leave of one record, summed over the judged samples [N^2].
+
+    The nuisances count with what they take away, at most: beside a jump they move the residual without
+    making it smaller. Noise is the scatter between cycles or about a smooth residual, at most what the
+    nuisances leave. So noise never exceeds the gap that it is part of.
+
+    Equation: sum min(s^2, mean c^2) + min(sum n^2, sum r^2 - sum c^2), c = r - n, n the nuisances
+    """
+    residual, cleared = judged.residual[judged.wanted], judged.cleared[judged.wanted]
+    nuisances = judged.nuisances[judged.wanted]
+    before, after = float(residual @ residual), float(cleared @ cleared)
+    taken = min(max(before - after, 0.0), float(nuisances @ nuisances))
+    return min(judged.variance * residual.size, after, before) + taken
 
 
 def _by_block(judged: ResidualCheck, values: Array) -> Array:
