@@ -475,7 +475,7 @@ def test_a_manifest_says_what_was_made_of_what(bench: Bench) -> None:
     assert set(found) == {"stage", "key", "config", "inputs", "outputs", "versions", "finished", "seconds", "marks"}
     assert found["stage"] == "identify"
     assert (bench.run / found["config"]).resolve() == bench.config
-    assert set(found["outputs"]) == {"parameters.csv", "measures.csv"}
+    assert set(found["outputs"]) == {"parameters.csv", "measures.csv", "auxiliary.csv"}
     assert {"1-rig/records.json", "1-rig/a.csv", "1-rig/b.csv", "seed", "code", "identify.method"} <= set(
         found["inputs"]
     )

@@ -6,7 +6,7 @@ wrong. `control` renames the columns of the control signal.
 """
 
 from pzd.artefacts.diagnosed import Diagnosed, Diagnosis, Gap, NextTest, Ranked, Region, Value
-from pzd.artefacts.identified import FALLBACK, Identified, MeasureRow, ParameterRow, base_of
+from pzd.artefacts.identified import FALLBACK, AuxiliaryRow, Identified, MeasureRow, ParameterRow, base_of
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
 from pzd.artefacts.rides import AXLE_COLUMNS, AXLES, ENERGY_LIMIT, RIDE_COLUMNS, Response, Ride, Rides, SummaryRow
@@ -22,6 +22,7 @@ __all__ = [
     "FALLBACK",
     "RIDE_COLUMNS",
     "Artefact",
+    "AuxiliaryRow",
     "ComfortRow",
     "Diagnosed",
     "Diagnosis",

@@ -30,10 +30,31 @@ class ParameterRow(Frozen):
     k_N_per_m_low95: float | None
     k_N_per_m_high95: float | None
     W_s: float = Field(ge=0.0)
-    """Criterion (4) over the samples that the row was fitted to."""
+    """Criterion (4) over the samples that the row was fitted to, less the forces of `auxiliary.csv` where there are."""
     rmse_N: float = Field(ge=0.0)
     status: str = Field(pattern=r"^(ok|(weak|undetermined): [T0Ck, ]+.*)$")
     """`ok`, or `weak: T0 ...` / `undetermined: C, k ...` with the reason."""
+
+
+class AuxiliaryRow(Frozen):
+    """What one condition shows beside the Bingham element, F_0 + k_g (x - zero_m): the gas charge of most dampers.
+
+    It keeps T0, C and k unbiased and goes no further: which effect it stands for is named by diagnose.
+    """
+
+    setting: str | None
+    voltage_V: float | None
+    temperature_degC: float | None
+    F_0_N: float
+    """Force at `zero_m` beside the element."""
+    F_0_N_low95: float
+    F_0_N_high95: float
+    k_g_N_per_m: float
+    """Stiffness beside the element."""
+    k_g_N_per_m_low95: float
+    k_g_N_per_m_high95: float
+    zero_m: float
+    """Middle of the motion of the condition's tests, in the displacement as recorded."""
 
 
 class MeasureRow(Frozen):
@@ -65,11 +86,14 @@ class Identified:
 
     rows: tuple[ParameterRow, ...]
     measures: tuple[MeasureRow, ...]
+    auxiliary: tuple[AuxiliaryRow, ...] = ()
+    """Of the conditions that show forces beside the element."""
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write parameters.csv and measures.csv."""
+        """Write parameters.csv, measures.csv and auxiliary.csv."""
         write_rows(folder / "parameters.csv", ParameterRow, self.rows, control)
         write_rows(folder / "measures.csv", MeasureRow, self.measures, control)
+        write_rows(folder / "auxiliary.csv", AuxiliaryRow, self.auxiliary, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
@@ -77,6 +101,7 @@ class Identified:
         return cls(
             read_rows(folder / "parameters.csv", ParameterRow, control),
             read_rows(folder / "measures.csv", MeasureRow, control),
+            read_rows(folder / "auxiliary.csv", AuxiliaryRow, control),
         )
 
     def untrusted(self, control: Control) -> tuple[str, ...]:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pzd.artefacts import ParameterRow
+from pzd.artefacts import AuxiliaryRow, ParameterRow
+from pzd.identify.auxiliary import Auxiliary, auxiliary_of, relieved, remainder, rough_values, worth_a_look
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.determination import evidence_of, scales_of
 from pzd.identify.evolutionary import fit_evolutionary
@@ -15,7 +16,7 @@ from pzd.identify.misfit import misfit_of
 from pzd.identify.noise_alone import uncertainty
 from pzd.identify.objective import Bingham, Fit, Objective
 from pzd.identify.part import parts_of
-from pzd.identify.separable import fit_separable
+from pzd.identify.separable import descend, fit_separable
 from pzd.identify.trial import trial_of
 from pzd.identify.trust import Evidence, judge, stationarity, visible_shares
 from pzd.record import Array, Condition, Record
@@ -23,7 +24,14 @@ from pzd.record import Array, Condition, Record
 
 def fit_condition(condition: Condition, config: IdentifyConfig, seed: int) -> ParameterRow:
     """The Bingham parameters of one condition, pooled over its records."""
-    objective, fit = fit_records(condition.records, config, seed)
+    return identify_condition(condition, config, seed)[0]
+
+
+def identify_condition(
+    condition: Condition, config: IdentifyConfig, seed: int
+) -> tuple[ParameterRow, AuxiliaryRow | None]:
+    """The Bingham parameters of one condition, and what its tests show beside the element."""
+    objective, fit, auxiliary = fit_with_auxiliary(condition.records, config, seed)
     parts = parts_of(condition.records, objective.trials, (fit.residuals, fit.slopes), config.nuisance)
     misfit = misfit_of(parts)
     noise = uncertainty(fit.slopes, fit.residuals, objective.lengths).half_widths()
@@ -31,8 +39,9 @@ def fit_condition(condition: Condition, config: IdentifyConfig, seed: int) -> Pa
     scales = scales_of(fit.parameters, objective.measured)
     visible = visible_shares(fit.slopes, scales, objective.energy)
     cosines = stationarity(fit.slopes, fit.residuals, objective.energy)
-    return row_of(
-        (condition.setting, condition.voltage, condition.temperature),
+    labels = (condition.setting, condition.voltage, condition.temperature)
+    row = row_of(
+        labels,
         fit.parameters,
         widths,
         evidence_of(
@@ -40,14 +49,63 @@ def fit_condition(condition: Condition, config: IdentifyConfig, seed: int) -> Pa
         ),
         (objective.measured, fit.residuals),
     )
+    return row, None if auxiliary is None else _auxiliary_row(labels, auxiliary)
 
 
 def fit_records(records: Sequence[Record], config: IdentifyConfig, seed: int) -> tuple[Objective, Fit]:
     """The optimum of criterion (4) over the records, by the method that the config names."""
-    objective = Objective(tuple(trial_of(r) for r in records))
+    return fit_with_auxiliary(records, config, seed)[:2]
+
+
+def fit_with_auxiliary(
+    records: Sequence[Record], config: IdentifyConfig, seed: int
+) -> tuple[Objective, Fit, Auxiliary | None]:
+    """The optimum over the records; where they show forces beside the element, over what these leave.
+
+    Parameters
+    ----------
+    records : of one condition
+    config : the method, and what the sensors may differ by
+    seed : of the evolutionary search
+
+    Returns
+    -------
+    the data as fitted, the optimum, and what stands beside the element; None where nothing does
+    """
+    whole = Objective(tuple(trial_of(r) for r in records))
+    plain = _optimum(whole, config, seed)
+    if not worth_a_look(whole, plain):
+        return whole, plain, None
+    values = rough_values(whole)
+    objective = relieved(whole, values)
+    fit = _optimum(objective, config, seed)
+    values = values + remainder(objective, fit)
+    objective = relieved(whole, values)
+    fit = descend(objective, fit.parameters)
+    auxiliary = auxiliary_of(records, objective, fit, values, config.nuisance)
+    return (whole, plain, None) if auxiliary is None else (objective, fit, auxiliary)
+
+
+def _optimum(objective: Objective, config: IdentifyConfig, seed: int) -> Fit:
     if config.method == "evolutionary":
-        return objective, fit_evolutionary(objective, config.evolutionary, seed)
-    return objective, fit_separable(objective)
+        return fit_evolutionary(objective, config.evolutionary, seed)
+    return fit_separable(objective)
+
+
+def _auxiliary_row(labels: tuple[str | None, float | None, float | None], found: Auxiliary) -> AuxiliaryRow:
+    (force, stiffness), (of_force, of_stiffness) = found.values.tolist(), found.widths.tolist()
+    return AuxiliaryRow(
+        setting=labels[0],
+        voltage_V=labels[1],
+        temperature_degC=labels[2],
+        F_0_N=force,
+        F_0_N_low95=force - of_force,
+        F_0_N_high95=force + of_force,
+        k_g_N_per_m=stiffness,
+        k_g_N_per_m_low95=stiffness - of_stiffness,
+        k_g_N_per_m_high95=stiffness + of_stiffness,
+        zero_m=found.middle,
+    )
 
 
 def row_of(

@@ -34,6 +34,8 @@ class Objective:
     """What both methods minimise: criterion (4) pooled over the counted samples of the trials."""
 
     trials: tuple[Trial, ...]
+    basis: Array | None = None
+    """(N, q) orthonormal forces beside the element whose best multiples are solved inside, by variable projection."""
 
     @cached_property
     def measured(self) -> Array:
@@ -50,23 +52,39 @@ class Objective:
         """Counted samples of each trial."""
         return tuple(int(np.count_nonzero(t.counted)) for t in self.trials)
 
+    def simulated(self, parameters: Bingham) -> Array:
+        """(N,) force of the element [N]."""
+        return np.concatenate(
+            [
+                t.at_samples(element_force(t.displacement, t.step, *parameters, float(t.force[0])))[t.counted]
+                for t in self.trials
+            ]
+        )
+
     def residuals(self, parameters: Bingham) -> Array:
-        """(N,) measured less simulated force [N]."""
-        parts = [
-            t.at_samples(element_force(t.displacement, t.step, *parameters, float(t.force[0])))[t.counted]
-            for t in self.trials
-        ]
-        residuals: Array = self.measured - np.concatenate(parts)
-        return residuals
+        """(N,) measured less simulated force, the forces beside the element at their best [N]."""
+        return self._projected(self.measured - self.simulated(parameters))
 
     def residuals_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
-        """(N,) residuals and (N, 3) derivatives of the simulated force by T0, C and k."""
+        """(N,) residuals and (N, 3) what T0, C and k do to the force that nothing beside the element makes up."""
+        simulated, slopes = self.simulated_and_slopes(parameters)
+        return self._projected(self.measured - simulated), self._projected(slopes)
+
+    def simulated_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
+        """(N,) force of the element and (N, 3) its derivatives by T0, C and k."""
         forces, slopes = [], []
         for t in self.trials:
             force, slope = element_force_sensitivities(t.displacement, t.step, *parameters, float(t.force[0]))
             forces.append(t.at_samples(force)[t.counted])
             slopes.append(t.at_samples(slope)[t.counted])
-        return self.measured - np.concatenate(forces), np.concatenate(slopes)
+        return np.concatenate(forces), np.concatenate(slopes)
+
+    def _projected(self, values: Array) -> Array:
+        """What of (N,) or (N, p) forces the basis cannot make up.
+
+        Equation: (I - Q Q') r                      Source: Golub and Pereyra 1973, variable projection
+        """
+        return values if self.basis is None else values - self.basis @ (self.basis.T @ values)
 
     def criterion(self, parameters: Bingham) -> float:
         """W_s at the parameters."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 
-from pzd.artefacts import Identified, ParameterRow, Rig
+from pzd.artefacts import AuxiliaryRow, Identified, ParameterRow, Rig
 from pzd.identify.config import IdentifyConfig
 from pzd.record import Condition, Record, conditions
 from pzd.schema.progress import Listener, Progress, unheard
@@ -28,26 +28,41 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener =
 
     Returns
     -------
-    one row a condition or voltage node, one row of measures a record
+    one row a condition or voltage node, one row of measures a record, one of auxiliaries a condition that shows any
     """
     from pzd.identify.measures import measures
 
     constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
-    rows = {_labels(row): row for row in _constant_rows(constant, identify, seed, progress)}
+    found = _constant_rows(constant, identify, seed, progress)
+    rows = {_labels(row): row for row, _ in found}
+    beside = {_labels(row): row for _, row in found if row is not None}
     rows |= {_labels(row): row for row in _moving_rows(moving, constant, list(rows.values()), identify)}
-    return Identified(tuple(rows[labels] for labels in sorted(rows, key=_order)), measures(rig.records))
+    return Identified(
+        tuple(rows[labels] for labels in sorted(rows, key=_order)),
+        measures(rig.records),
+        tuple(beside[labels] for labels in sorted(beside, key=_order)),
+    )
 
 
 def _constant_rows(
     found: Sequence[Condition], config: IdentifyConfig, seed: int, progress: Listener
-) -> list[ParameterRow]:
-    from pzd.identify.fit import fit_condition
+) -> list[tuple[ParameterRow, AuxiliaryRow | None]]:
+    from pzd.identify.fit import identify_condition
 
     rows = []
     for index, condition in enumerate(found):
-        rows.append(fit_condition(condition, config, seed + index))
-        progress(Progress(index + 1, len(found), f"conditions: {_line(rows[-1])}"))
+        row, beside = identify_condition(condition, config, seed + index)
+        rows.append((row, beside))
+        progress(Progress(index + 1, len(found), f"conditions: {_line(row)}{_beside(beside)}"))
     return rows
+
+
+def _beside(row: AuxiliaryRow | None) -> str:
+    if row is None:
+        return ""
+    force = supported(row.F_0_N, row.F_0_N_low95, row.F_0_N_high95)
+    stiffness = supported(row.k_g_N_per_m, row.k_g_N_per_m_low95, row.k_g_N_per_m_high95)
+    return f"; beside the element {force} N and {stiffness} N/m"
 
 
 def _moving_rows(
@@ -65,7 +80,7 @@ def _moving_rows(
     return rows
 
 
-def _labels(row: ParameterRow) -> Labels:
+def _labels(row: ParameterRow | AuxiliaryRow) -> Labels:
     return row.setting, row.voltage_V, row.temperature_degC
 
 
