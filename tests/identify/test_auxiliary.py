@@ -46,11 +46,11 @@ def test_a_gas_charge_biases_neither_friction_nor_damping_nor_spring(rng: np.ran
     row, beside = identified(on_the_rig(RACING, rng, GAS))
     assert row.status == "ok"
     assert row.W_s < 0.01
-    assert row.T0_N == pytest.approx(RACING.friction, rel=0.15)
+    assert pytest.approx(RACING.friction, rel=0.15) == row.T0_N
     assert row.C_Ns_per_m == pytest.approx(RACING.damping, rel=0.05)
     assert row.k_N_per_m == pytest.approx(RACING.stiffness, rel=0.1)
     assert beside is not None
-    assert beside.F_0_N == pytest.approx(GAS[0], rel=0.05)
+    assert pytest.approx(GAS[0], rel=0.05) == beside.F_0_N
     assert beside.k_g_N_per_m == pytest.approx(GAS[1], rel=0.05)
 
 
@@ -72,8 +72,8 @@ def test_where_the_zero_of_the_displacement_lies_changes_nothing(rng: np.random.
     assert beside is not None
     assert moved is not None
     assert moved.zero_m - beside.zero_m == pytest.approx(0.031)
-    assert moved.F_0_N == pytest.approx(beside.F_0_N, rel=1e-6)
-    assert moved_row.T0_N == pytest.approx(row.T0_N, rel=1e-6)
+    assert pytest.approx(beside.F_0_N, rel=1e-6) == moved.F_0_N
+    assert pytest.approx(row.T0_N, rel=1e-6) == moved_row.T0_N
     assert moved_row.k_N_per_m == pytest.approx(row.k_N_per_m, rel=1e-6)
 
 
