@@ -41,14 +41,15 @@ class Damper(Frozen):
     effects: dict[str, dict[str, float | tuple[float, ...]]] = Field(default_factory=dict)
     """Parameters of each effect, by the effect's name; see `pzd effects`."""
     reference_temperature_degC: float | None = None
-    """T_ref of `temperature_drift`; needed only with that effect."""
+    """T_ref of the effects of the material, as `temperature_drift`; needed only with one of them."""
 
     @model_validator(mode="after")
     def _known_effects(self) -> Damper:
         for name, values in self.effects.items():
             _check_effect(name, values)
-        if "temperature_drift" in self.effects and self.reference_temperature_degC is None:
-            raise ValueError("temperature_drift needs reference_temperature_degC")
+        for name in self.effects:
+            if known()[name].place == "material" and self.reference_temperature_degC is None:
+                raise ValueError(f"{name} needs reference_temperature_degC")
         return self
 
     def with_effect(self, name: str, values: EffectValues) -> Damper:

@@ -9,11 +9,11 @@ from scipy.optimize import brentq
 
 from pzd.damper.compose import TOLERANCE, element_rows, respond, steady_force
 from pzd.damper.element import element_force
+from pzd.damper.kernels import row_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance
 from pzd.damper.pieces import STAGES, Step
-from pzd.damper.rows import row_of
 
 STEP = 1e-3
 TIME = np.arange(600) * STEP

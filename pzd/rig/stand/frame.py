@@ -10,13 +10,12 @@ from pzd.damper.compose import (
     recorded,
     respond,
     sampling_steps,
-    value_of,
+    sensors_of,
     voltage_at_valve,
 )
-from pzd.damper.flow import ROW
+from pzd.damper.kernels import K, parallel_forces
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.damper.parallel import parallel_forces
 from pzd.damper.path import march
 from pzd.record import Array
 
@@ -24,7 +23,6 @@ TOLERANCE = 1e-7
 """Admissible error of one piece of the path, as a share of the force; steps are so short that few pieces reach it."""
 _ROUNDS = 12
 _SETTLED = 1e-10  # change of the parallel force in a round, as a share of the largest force
-_STIFFNESS = ROW.index("k")
 
 
 def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None) -> Array:
@@ -56,11 +54,11 @@ def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None
     steps = sampling_steps(motion.time)
     effective = voltage_at_valve(damper, motion.voltage, steps)
     rows = np.array(element_rows(damper, effective, motion.temperature))
-    rows[:, _STIFFNESS] /= 1.0 + rows[:, _STIFFNESS] / frame_stiffness
+    rows[:, K] /= 1.0 + rows[:, K] / frame_stiffness
     element = march(motion.displacement, motion.velocity, steps, rows, 0.0, TOLERANCE)
     parallel = parallel_rows(damper, effective)
     force = element if parallel is None else _with_parallel(motion, steps, rows, parallel, element, frame_stiffness)
-    return recorded(value_of(damper, "sensor_delay", "tau"), motion.time, force)
+    return recorded(sensors_of(damper), motion.time, force)
 
 
 def _with_parallel(
