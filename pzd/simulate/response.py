@@ -63,9 +63,8 @@ def _step(damper: Damper, before: float, after: float, speed: float, temperature
     still = np.zeros_like(time)
     warmth = None if temperature is None else np.full_like(time, temperature)
     motion = Motion(time, speed * time, still + speed, still, voltage, warmth)
-    passing = {
-        name: values for name, values in damper.effects.items() if not _stands_at_rest(damper, name, motion.displacement)
-    }
+    ends = motion.displacement[[0, -1]]
+    passing = {name: values for name, values in damper.effects.items() if not _stands_at_rest(damper, name, ends)}
     alone = damper.model_copy(update={"effects": passing})
     force = respond(alone, motion)[time >= 0.0]
     late = _voltage_reached(damper, motion)
@@ -86,12 +85,11 @@ def _step(damper: Damper, before: float, after: float, speed: float, temperature
     ]
 
 
-def _stands_at_rest(damper: Damper, name: str, displacement: Array) -> bool:
-    """Whether an effect is a force that is there at rest too, at some displacement [m]: it says nothing of the speed."""
+def _stands_at_rest(damper: Damper, name: str, places: Array) -> bool:
+    """Whether an effect is a force that is there at rest too, at one of (n,) displacements [m]."""
     if known()[name].place != "parallel":
         return False
     alone = parallel_rows(damper.model_copy(update={"effects": {name: damper.effects[name]}}), base_voltages(damper))
-    places = displacement[[0, -1]]
     rest = np.zeros(places.size)
     return alone is not None and any(np.any(parallel_forces(places, rest, rest, row[np.newaxis])) for row in alone)
 
