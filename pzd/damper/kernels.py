@@ -50,8 +50,11 @@ def _call(effect: Effect, name: str, **quantities: str) -> str:
     """A law with what it asks for: quantities of the caller, and the effect's own parameters."""
     own = {parameter.name: _place((effect.name, parameter.name)) for parameter in effect.parameters}
     given = {**own, **quantities}
-    takes = arguments(functions(effect, module_of(effect))[name])
-    return f"_{effect.name}_{name}({', '.join(given[argument] for argument in takes)})"
+    return f"_{effect.name}_{name}({', '.join(given[argument] for argument in _takes(effect, name))})"
+
+
+def _takes(effect: Effect, name: str) -> tuple[str, ...]:
+    return arguments(functions(effect, module_of(effect))[name])
 
 
 def _on(effect: Effect) -> str:
@@ -92,16 +95,21 @@ def _rows() -> Iterator[str]:
 
 def _drive() -> Iterator[str]:
     """Each effect takes what the one before gives; `state` is what each gave last."""
-    step, felt = [], []
-    for i, effect in enumerate(acting("drive")):
-        own, pushed = f"state[{i}]", f"late, now, state[{i}] = state[{i}], given, given"
-        law = _call(effect, "law", effective=own, before="late", now="now", step="step")
-        rate = _call(effect, "rate", effective="given", now="now", rate="moving")
-        step += ["given = now", *_guarded(effect, f"given = {law}"), pushed]
-        felt += ["given = now", *_guarded(effect, f"given = {law}", f"moving = {rate}"), f"late, now = {own}, given"]
+    effects = acting("drive")
+    step, felt, kept = [], [], []
+    for i, effect in enumerate(effects):
+        own = f"state[{i}]"
+        law = _guarded(effect, f"given = {_call(effect, 'law', effective=own, before='late', now='now', step='step')}")
+        rate = _guarded(effect, f"moving = {_call(effect, 'rate', effective='given', now='now', rate='moving')}")
+        step += ["given = now", *law, f"late, now, {own} = {own}, given, given"]
+        at_once = _call(effect, "law", effective=own, before="late", now="late", step="0.0")
+        jump = [f"late = {at_once}"] if any("before" in _takes(other, "law") for other in effects[i + 1 :]) else []
+        felt += ["given = now", *law, *rate, *(_guarded(effect, *jump) if jump else []), "now = given"]
+        kept += ["given = now", *law, *(_guarded(effect, *jump) if jump else []), f"now, {own} = given, given"]
     yield from _function("follow_voltage(before, now, step, state, p)", "late = before", *step, "return now")
-    head = ["late, now, moving = voltage, voltage, 0.0"]
-    yield from _function("voltage_felt(voltage, step, state, p)", *head, *felt, "return now, moving")
+    head = "late, now, moving = voltage, voltage, 0.0"
+    yield from _function("voltage_felt(voltage, step, state, p)", head, *felt, "return now, moving")
+    yield from _function("keep_voltage(voltage, step, state, p)", "late, now = voltage, voltage", *kept)
 
 
 def _stroke() -> Iterator[str]:
@@ -236,6 +244,9 @@ each drive effect [V], changed in place, and the row of the drive."""
 voltage_felt: Callable[[float, float, Array, Array], tuple[float, float]] = _MODULE.voltage_felt
 """Voltage felt [V] and its rate [V/s] a time [s] after a voltage [V] was set; (d,) voltages behind each drive effect
 when it was set [V], and the row of the drive."""
+
+keep_voltage: Callable[[float, float, Array, Array], None] = _MODULE.keep_voltage
+"""Bring the (d,) voltages behind each drive effect [V] to a time [s] after a voltage [V] was set."""
 
 stroke_law: Callable[[float, float, Row], float] = _MODULE.stroke_law
 """Extension of the oil spring [m] at an elastic deflection [m] on a side; below zero inside a free play."""

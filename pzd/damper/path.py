@@ -193,6 +193,19 @@ def march(
     return force
 
 
+def deflections(force: Array, rows: Array) -> Array:
+    """(n,) elastic deflection [m] at which the oil spring carries (n,) forces [N], by (n, r) or (1, r) rows."""
+    found = np.empty(force.size)
+    _fill_deflections(force, rows, found)
+    return found
+
+
+@compiled
+def _fill_deflections(force: Array, rows: Array, found: Array) -> None:
+    for i in range(force.size):
+        found[i] = deflection_at(force[i], row_of(rows[min(i, rows.shape[0] - 1)]))
+
+
 @compiled
 def _march(
     displacement: Array,

@@ -6,7 +6,7 @@ import math
 
 from pzd.compiled import compiled, laid_in
 from pzd.damper.dormand_prince import STAGES
-from pzd.damper.kernels import follow_voltage
+from pzd.damper.kernels import keep_voltage
 from pzd.damper.rows import row_at
 from pzd.record import Array
 from pzd.simulate.demand import bounds_of, demand, spring_acceleration
@@ -100,7 +100,7 @@ def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, oth
 def _set_voltage(time: float, y: Array, model: RideModel, control: Array, axle: int, voltage: float) -> None:
     damper, elapsed = model.damper, time - control[SINCE, 0]
     was, _ = effective_voltage(damper, control[SET, axle], control[BEHIND:, axle], elapsed)
-    follow_voltage(control[SET, axle], control[SET, axle], elapsed, control[BEHIND:, axle], damper.drive)
+    keep_voltage(control[SET, axle], elapsed, control[BEHIND:, axle], damper.drive)
     control[SET, axle] = voltage
     if model.control_spec.fidelity == DYNAMIC:
         now, _ = effective_voltage(damper, voltage, control[BEHIND:, axle], 0.0)

@@ -68,6 +68,21 @@ def test_drift_is_exponential_about_the_reference() -> None:
     np.testing.assert_allclose(material(warm, None, 42.0), [[100 * np.exp(-0.8), 1000 * np.exp(-0.2), 1e5]])
 
 
+def test_drift_may_differ_by_voltage_and_then_needs_one() -> None:
+    drifting = Damper(
+        base=(BaseRow(T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e5),),
+        effects={"temperature_drift": {"beta_T0": (0.04, 0.02), "beta_C": 0.01, "at_voltage_V": (0.0, 100.0)}},
+        reference_temperature_degC=22.0,
+    )
+    voltage, temperature = np.array([0.0, 50.0, 100.0]), np.array([42.0, 42.0, 32.0])
+    expected = 100 * np.exp([-0.8, -0.6, -0.2])
+    np.testing.assert_allclose(material(drifting, voltage, temperature)[:, 0], expected)
+    np.testing.assert_allclose(material(drifting, voltage, 42.0)[:, 0], 100 * np.exp([-0.8, -0.6, -0.4]))
+    np.testing.assert_allclose(material(drifting, voltage, temperature)[:, 1], 1000 * np.exp([-0.2, -0.2, -0.1]))
+    with pytest.raises(ValueError, match="beta_T0 depends on the voltage, and none is given"):
+        material(drifting, None, 42.0)
+
+
 def test_the_nodes_for_compiled_loops_give_the_same_rows() -> None:
     damper = GRID.with_effect("orifice_quadratic", {"q": (10.0, 30.0), "at_voltage_V": (20.0, 100.0)})
     nodes = nodes_of(damper, 30.0)
