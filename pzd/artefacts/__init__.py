@@ -6,7 +6,7 @@ wrong. `control` renames the columns of the control signal.
 """
 
 from pzd.artefacts.diagnosed import Diagnosed, Diagnosis, Gap, NextTest, Ranked, Region, Value
-from pzd.artefacts.identified import UNDETERMINED, Identified, MeasureRow, ParameterRow, base_of
+from pzd.artefacts.identified import FALLBACK, Identified, MeasureRow, ParameterRow, base_of
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, PublishedRow, Report
 from pzd.artefacts.rides import AXLE_COLUMNS, AXLES, ENERGY_LIMIT, RIDE_COLUMNS, Response, Ride, Rides, SummaryRow
@@ -19,8 +19,8 @@ __all__ = [
     "AXLES",
     "AXLE_COLUMNS",
     "ENERGY_LIMIT",
+    "FALLBACK",
     "RIDE_COLUMNS",
-    "UNDETERMINED",
     "Artefact",
     "ComfortRow",
     "Diagnosed",

@@ -79,21 +79,28 @@ class Identified:
             read_rows(folder / "measures.csv", MeasureRow, control),
         )
 
-    @property
-    def untrusted(self) -> tuple[str, ...]:
+    def untrusted(self, control: Control) -> tuple[str, ...]:
         """Why the result is not to be trusted (exit 4): the rows whose T0 or C is undetermined."""
         return tuple(
-            f"{row.setting or 'rig'}, {row.voltage_V} V, {row.temperature_degC} degC: {row.status}"
+            f"{_condition(row, control)}: {row.status}"
             for row in self.rows
             if row.T0_N is None or row.C_Ns_per_m is None
         )
+
+
+def _condition(row: ParameterRow, control: Control) -> str:
+    """Setting, control signal and temperature of a row, those that it has."""
+    parts = [row.setting or "rig"]
+    parts += [f"{row.voltage_V:.4g} {control.unit}"] if row.voltage_V is not None else []
+    parts += [f"{row.temperature_degC:.4g} degC"] if row.temperature_degC is not None else []
+    return ", ".join(parts)
 
 
 def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:
     """The plain damper of one setting, from its identified parameters.
 
     A value that the data do not determine is taken from the nearest condition that has it
-    (by voltage, then temperature); where no condition has it, from `UNDETERMINED`.
+    (by voltage, then temperature); where no condition has it, from `FALLBACK`.
 
     Raises
     ------
@@ -105,8 +112,8 @@ def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:
     return Damper(base=tuple(_filled(row, mine) for row in mine))
 
 
-UNDETERMINED = {"T0_N": 0.0, "C_Ns_per_m": 1.0, "k_N_per_m": 1e8}
-"""Stand-ins where no condition determines a parameter: no friction, hardly any damping, a rigid spring."""
+FALLBACK = {"T0_N": 0.0, "C_Ns_per_m": 1.0, "k_N_per_m": 1e8}
+"""Values where no condition determines a parameter: no friction, hardly any damping, a rigid spring."""
 
 
 def _filled(row: ParameterRow, rows: list[ParameterRow]) -> BaseRow:
@@ -118,7 +125,7 @@ def _filled(row: ParameterRow, rows: list[ParameterRow]) -> BaseRow:
 
     def value(name: str) -> float:
         known = [(distance(other), float(getattr(other, name))) for other in rows if getattr(other, name) is not None]
-        return min(known)[1] if known else UNDETERMINED[name]
+        return min(known)[1] if known else FALLBACK[name]
 
     return BaseRow(
         voltage_V=row.voltage_V,

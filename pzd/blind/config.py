@@ -24,7 +24,7 @@ class Kinds(Frozen):
     """A force that is not in the library."""
 
 
-class Campaign(Frozen):
+class TestPlan(Frozen):
     """What the stand runs in one case."""
 
     name: str = Field(pattern=r"^[a-z0-9_]+$")
@@ -63,7 +63,7 @@ class BlindConfig(Frozen):
     """How many cases; the first n of them are the same whatever the number, and fairly mixed."""
     kinds: Kinds = Kinds()
     """Shares of what is hidden."""
-    campaigns: tuple[Campaign, ...] = Field(min_length=1)
+    campaigns: tuple[TestPlan, ...] = Field(min_length=1)
     """What the stand runs; every case runs one campaign."""
     sizes: tuple[float, float] = (0.02, 0.2)
     """Smallest and largest effect, as a share of the peak of the record that it changes most: the amplitude of the sine

@@ -9,10 +9,10 @@ import numpy as np
 
 from pzd.blind.case import Places, Truth
 from pzd.blind.clean import Clean, write_clean
-from pzd.blind.config import BlindConfig, Campaign
+from pzd.blind.config import BlindConfig, TestPlan
 from pzd.blind.plan import Planned
 from pzd.blind.sizes import Outside, sizes, with_effects
-from pzd.blind.visible import visible_gap
+from pzd.blind.visible import gap_after_refit
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.config import NuisanceConfig
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control
@@ -34,7 +34,7 @@ class Setup:
     """What differs from test to test."""
     control: Control
 
-    def campaign(self, name: str) -> Campaign:
+    def campaign(self, name: str) -> TestPlan:
         """The campaign of that name."""
         return next(campaign for campaign in self.blind.campaigns if campaign.name == name)
 
@@ -100,7 +100,7 @@ def drawn(setup: Setup, planned: Planned) -> tuple[Truth, list[Taken]]:
         warming=warms,
         one_frequency=campaign.one_frequency,
         lowest_peak_N=min(one.peak for one in clean),
-        visible_gap=visible_gap(clean, stand.damper),
+        visible_gap=gap_after_refit(clean, stand.damper),
         gap_given_other=_given_other(clean, damper),
     ), records
 
@@ -123,7 +123,7 @@ def _near(damper: Damper, spread: float, draw: np.random.Generator) -> Damper:
     return Damper(base=tuple(rows))
 
 
-def _stand(setup: Setup, campaign: Campaign, damper: Damper, *, warms: bool) -> VirtualEntry:
+def _stand(setup: Setup, campaign: TestPlan, damper: Damper, *, warms: bool) -> VirtualEntry:
     """The stand with this campaign, without noise and jitter."""
     changes = {"damper": damper, "tests": campaign.tests, "noise": Noise(), "jitter": Jitter(), "setting": None}
     warming = {"temperatures_degC": (setup.blind.warming,)} if warms else {}
@@ -161,7 +161,7 @@ def _given_other(records: Sequence[Clean], damper: Damper) -> dict[str, float]:
         name: {key: dict(values) for key, values in damper.effects.items() if key != name} for name in damper.effects
     }
     return {
-        name: visible_gap(records, damper.model_copy(update={"effects": effects})) for name, effects in rest.items()
+        name: gap_after_refit(records, damper.model_copy(update={"effects": effects})) for name, effects in rest.items()
     }
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal, TypeVar
 
-from pzd.blind.config import BlindConfig, Campaign
+from pzd.blind.config import BlindConfig, TestPlan
 from pzd.blind.outside import FORMS
 from pzd.damper.effect import Need
 from pzd.damper.effects import library
@@ -57,7 +57,7 @@ def plan(config: BlindConfig) -> tuple[Planned, ...]:
     return tuple(found)
 
 
-def hideable(campaign: Campaign, kind: Kind) -> list[tuple[str, ...]]:
+def hideable(campaign: TestPlan, kind: Kind) -> list[tuple[str, ...]]:
     """What a campaign can hide; effects of the drive only where the voltage moves.
 
     Pairs come in such an order that every effect has been in one before any is in many.

@@ -16,7 +16,7 @@ _STEP = 1e-4
 _EVALUATIONS = 30
 
 
-def visible_gap(records: Sequence[Clean], damper: Damper) -> float:
+def gap_after_refit(records: Sequence[Clean], damper: Damper) -> float:
     """What a damper cannot follow of noise-free records, its T0, C and k refitted in every base row.
 
     Equation: min sqrt(mean ((F - F_sim) / F_peak)^2), F_peak of each record, over all samples of all records

@@ -25,7 +25,8 @@ flow
     `extra_force`, `extra_slope`: beside both, 0 at w = 0; `extra_speed`: the flow speed at C w + extra, where there is
     a closed form. `opens_at`, `slope_beyond`: force from which the slope is another. All rise with w.
 parallel
-    `law`: force beside the element by x, v and a of the piston. It has no memory: a further slip branch (k_2, T0_2,
+    `law`: force beside the element by x, v and a of the piston, `about_zero` where a fit looks for the zero of x too.
+    It has no memory: a further slip branch (k_2, T0_2,
     C_2) or a Bouc-Wen force has a state of its own, which no place allows yet.
 sensor
     `law`: the moment whose force the channel shows.
@@ -59,7 +60,7 @@ class Scales:
     speed: float
     """Largest extension speed [m/s]."""
     stroke: float
-    """Largest displacement [m]."""
+    """Largest displacement from the middle of the stroke [m]."""
     acceleration: float
     """Largest acceleration [m/s2]."""
     damping: float
@@ -78,6 +79,8 @@ class Search:
     """Starting values, in that size; every one is tried."""
     logarithmic: bool = False
     """Whether steps are ratios."""
+    within: tuple[float, float] = (-math.inf, math.inf)
+    """Smallest and largest value that is looked at, in that size."""
 
 
 Strength = Callable[[float], dict[str, float]]
@@ -147,6 +150,8 @@ class Effect:
     """How the blind benchmark draws it; None for what it never hides, a competing form."""
     order: int = 0
     """Where it acts among the effects of its place: those of a smaller number come first."""
+    about_zero: bool = False
+    """Whether a fit looks for the zero of the displacement too: the law is another about another zero."""
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name.

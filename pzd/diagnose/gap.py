@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.artefacts import Gap
 from pzd.diagnose.data.split import Split
 from pzd.diagnose.lack_of_fit import pooled
 from pzd.diagnose.residual_check import ResidualCheck
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 BLOCKS = 8
 """Parts in which the scatter of the gap is read off a record that does not repeat."""

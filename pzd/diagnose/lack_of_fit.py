@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.diagnose.noise.between_cycles import PureError, harmonics_of, pure_error
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 TREND_CYCLES = 4
 """Fewest cycles on which a trend is judged."""

@@ -16,11 +16,11 @@ from pzd.diagnose.noise.input_uncertainty import Expected
 from pzd.diagnose.noise.jumps import jumps, jumps_in_cycles, within_a_sample
 from pzd.diagnose.noise.smooth_residual import fit_smooth_residual
 from pzd.diagnose.noise.test_effects import nuisance
+from pzd.record import Array
 
 BELIEVED = 1e-4
 """A change from cycle to cycle counts in the gap where noise alone would show it less often than this."""
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
@@ -59,7 +59,7 @@ class ResidualCheck:
         return float(np.max(np.abs(self.prepared.record.force)))
 
 
-def judge(given: Expected, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> ResidualCheck:
+def check_residual(given: Expected, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> ResidualCheck:
     """The record against what a damper makes of it, over the wanted samples past the warm-up."""
     record = prepared.record
     predicted, residual = given.force, record.force - given.force

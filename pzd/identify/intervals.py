@@ -13,22 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.record import Array
+from pzd.signals.autoregression import Autoregression, autoregression
 from pzd.signals.recursion import all_pole
 
 LARGEST_ORDER = 30
 """Largest order of the autoregression; the one used is chosen by BIC."""
-SAMPLES_PER_ORDER = 20
-"""At least this many samples stand behind each coefficient."""
-
-
-@dataclass(frozen=True)
-class Autoregression:
-    """e_t = - sum a_i e_(t-i) + white noise."""
-
-    coefficients: Array
-    """(order + 1,) 1, a_1, ... a_order."""
-    variance: float
-    """Variance of the white noise."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +61,9 @@ def uncertainty(slopes: Array, residuals: Array, lengths: Sequence[int]) -> Unce
     independent, start = 0.0, 0
     for length in lengths:
         part = slice(start, start + length)
-        noise = autoregression(residuals[part])
-        filtered = all_pole(noise.coefficients, scaled[part][::-1])
-        meat += noise.variance * filtered.T @ filtered
+        noise = autoregression([residuals[part]], LARGEST_ORDER)
+        filtered = all_pole(noise.whitening_filter, scaled[part][::-1])
+        meat += noise.innovation * filtered.T @ filtered
         independent += length * _independent_share(noise)
         start += length
     small_sample = start / max(start - slopes.shape[1], 1)
@@ -83,47 +72,10 @@ def uncertainty(slopes: Array, residuals: Array, lengths: Sequence[int]) -> Unce
     return Uncertainty(covariance, independent - slopes.shape[1])
 
 
-def autoregression(residuals: Array) -> Autoregression:
-    """The autoregression of the order that BIC prefers, by Burg's recursion.
-
-    Equation: minimise the forward and backward prediction errors together      Source: Burg 1975
-
-    Parameters
-    ----------
-    residuals : (n,) residuals of one record, mean not taken off
-
-    Returns
-    -------
-    coefficients and the variance of the white noise
-    """
-    n = residuals.size
-    forward, backward = residuals[1:].copy(), residuals[:-1].copy()
-    coefficients = np.ones(1)
-    variance = float(residuals @ residuals) / max(n, 1)
-    best = (n * _log(variance), Autoregression(coefficients, variance))
-    for order in range(1, min(LARGEST_ORDER, n // SAMPLES_PER_ORDER) + 1):
-        total = float(forward @ forward + backward @ backward)
-        if total <= 0.0:
-            break
-        reflection = -2.0 * float(forward @ backward) / total
-        padded = np.append(coefficients, 0.0)
-        coefficients = padded + reflection * padded[::-1]
-        variance *= 1.0 - reflection**2
-        forward, backward = (forward + reflection * backward)[1:], (backward + reflection * forward)[:-1]
-        score = n * _log(variance) + order * np.log(n)
-        if score < best[0]:
-            best = (score, Autoregression(coefficients, variance))
-    return best[1]
-
-
-def _log(variance: float) -> float:
-    return float(np.log(max(variance, np.finfo(float).tiny)))
-
-
 def _independent_share(noise: Autoregression) -> float:
     """Share of the samples that count as independent for the variance.
 
     Equation: (mean of P)^2 / mean of P^2, P the noise spectrum      Source: Bartlett 1946
     """
-    spectrum = 1.0 / np.abs(np.fft.rfft(noise.coefficients, 4096)) ** 2
+    spectrum = 1.0 / np.abs(np.fft.rfft(noise.whitening_filter, 4096)) ** 2
     return float(np.mean(spectrum) ** 2 / np.mean(spectrum**2))

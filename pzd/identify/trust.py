@@ -11,7 +11,7 @@ from pzd.record import Array
 
 SENSOR_ERROR = 0.005
 """A systematic force error of this share of r.m.s. is always possible: load cells are of class 0.5 at best."""
-UNDETERMINED = 0.5
+UNDETERMINED_SHARE = 0.5
 """A parameter is undetermined when its 95 % half width, or the shift that the sensor error may cause, exceeds
 this share of it."""
 WEAK_WIDTH = 0.1
@@ -63,9 +63,9 @@ class Evidence:
             return self.veto
         if self.visible <= 0.0:
             return "the force does not depend on it, or another parameter makes it up"
-        if self.shift > UNDETERMINED:
+        if self.shift > UNDETERMINED_SHARE:
             return f"a force error of {SENSOR_ERROR:.1%} may shift it by {_percent(self.shift)}"
-        if not self.half_width <= UNDETERMINED * self.scale:
+        if not self.half_width <= UNDETERMINED_SHARE * self.scale:
             return f"95 % interval of +-{_percent(self.half_width / self.scale)}"
         return None
 

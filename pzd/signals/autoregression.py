@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 ORDER_MAX = 12
-"""Longest model that is tried."""
+"""Longest model tried unless said otherwise: two poles each for sensor, amplifier and mains, and as many to spare."""
+SAMPLES_PER_ORDER = 20
+"""At least this many samples stand behind each coefficient: its standard error is then below 0.25."""
 FLOOR = 1e-12
 """Innovation variance is never below this share of the variance: rounding is no noise model."""
 
@@ -47,6 +48,11 @@ class Autoregression:
         return density
 
     @property
+    def whitening_filter(self) -> Array:
+        """(p + 1,) coefficients 1, -a_1, ... -a_p of the filter that gives w from e."""
+        return np.concatenate([np.ones(1), -self.coefficients])
+
+    @property
     def variance(self) -> float:
         """Variance of the noise itself: the density summed over all frequencies."""
         return float(np.mean(self.density((np.arange(4096) + 0.5) / 4096)))
@@ -55,29 +61,38 @@ class Autoregression:
 def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autoregression:
     """The short model that describes stretches of noise best, its order by the Bayesian criterion.
 
-    Equation: BIC = n ln sigma_p^2 + p ln n, sigma_p^2 by Levinson's recursion      Source: Schwarz 1978
+    Equation: minimise the forward and backward prediction errors together       Source: Burg 1975
+    Equation: BIC = n ln sigma_p^2 + p ln n                                      Source: Schwarz 1978
 
     Parameters
     ----------
     series : stretches (n_i,) of one noise, zero mean
     order_max : longest model tried
+
+    Returns
+    -------
+    the model; white noise of variance 0 where the stretches are zero
     """
     count = sum(stretch.size for stretch in series)
-    order_max = min(order_max, max(count // 20, 0), min(stretch.size for stretch in series) - 1)
-    covariance = np.array(
-        [sum(float(s[lag:] @ s[: s.size - lag]) for s in series) / count for lag in range(order_max + 1)]
-    )
-    if covariance[0] <= 0.0:
-        return Autoregression(np.zeros(0), 0.0)
-    best, best_bic = Autoregression(np.zeros(0), covariance[0]), count * np.log(covariance[0])
-    a, variance = np.zeros(0), float(covariance[0])
-    for p in range(1, order_max + 1):
-        reflection = (covariance[p] - a @ covariance[p - 1 : 0 : -1]) / variance
+    order_max = min(order_max, count // SAMPLES_PER_ORDER, min(stretch.size for stretch in series) - 1)
+    variance = whole = sum(float(stretch @ stretch) for stretch in series) / max(count, 1)
+    a = np.zeros(0)
+    best = Autoregression(a, variance)
+    if variance <= 0.0:
+        return best
+    best_bic = count * np.log(variance)
+    errors = [(stretch[1:].copy(), stretch[:-1].copy()) for stretch in series]
+    for order in range(1, order_max + 1):
+        total = sum(float(forward @ forward + backward @ backward) for forward, backward in errors)
+        if total <= 0.0:
+            break
+        reflection = 2.0 * sum(float(forward @ backward) for forward, backward in errors) / total
         a = np.append(a - reflection * a[::-1], reflection)
         variance *= 1.0 - reflection**2
-        if variance <= FLOOR * covariance[0]:
+        if variance <= FLOOR * whole:
             break
-        bic = count * np.log(variance) + p * np.log(count)
+        errors = [((f - reflection * b)[1:], (b - reflection * f)[:-1]) for f, b in errors]
+        bic = count * np.log(variance) + order * np.log(count)
         if bic < best_bic:
             best, best_bic = Autoregression(a.copy(), variance), bic
     return best

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pzd.record import Array
+
 Span = tuple[float, float]
 """Start and end [s]."""
 POINTS = 100

@@ -13,9 +13,8 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.record import Array
 from pzd.signals.smoothing import low_pass
-
-Array = NDArray[np.float64]
 
 MOST_SAMPLES = 2**18
 """Longer records are thinned to this many samples for the search."""

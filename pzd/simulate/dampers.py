@@ -13,7 +13,7 @@ from pzd.record import Array
 from pzd.schema.errors import DataError
 from pzd.simulate.car import HalfCar
 from pzd.simulate.dynamic_damper import DynamicDamper
-from pzd.simulate.ride_model import Grid
+from pzd.simulate.ride_model import TableArrays
 from pzd.table.lookup import Lookup
 
 LEAST_RELAXATION = 1e-5
@@ -26,10 +26,10 @@ def lowest_temperature(table: Table) -> float | None:
     return min(known, default=None)
 
 
-def grid_of(table: Table, temperature: float | None) -> Grid:
+def grid_of(table: Table, temperature: float | None) -> TableArrays:
     """The table at one temperature [degC], as the compiled loop reads it."""
     lookup = Lookup.of(table, temperature)
-    return Grid(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.reach)
+    return TableArrays(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.reach)
 
 
 def table_of(damper: Damper, table: Table) -> Table:

@@ -22,7 +22,7 @@ from pzd.simulate.ride_model import (
     PITCH_RATE,
     RATE,
     ControlSpec,
-    Grid,
+    TableArrays,
     Vehicle,
 )
 
@@ -34,7 +34,9 @@ def one_sided(velocity: float, side: float) -> float:
 
 
 @compiled
-def bounds_of(control_spec: ControlSpec, car: Vehicle, grid: Grid, axle: int, velocity: float) -> tuple[float, float]:
+def bounds_of(
+    control_spec: ControlSpec, car: Vehicle, grid: TableArrays, axle: int, velocity: float
+) -> tuple[float, float]:
     """Lowest and highest force of an axle [N] at a suspension speed [m/s]."""
     if control_spec.bounds == BY_COEFFICIENTS:
         return coefficient_bounds(velocity, control_spec.c_min, control_spec.c_max)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.artefacts import AXLE_COLUMNS, AXLES, RIDE_COLUMNS, Ride, SummaryRow
+from pzd.comfort.measures import rms
 from pzd.record import Array
 from pzd.signals.recursion import all_pole
 
@@ -70,11 +71,6 @@ def _low_passed(values: Array, warped: float, damping: float) -> Array:
     fed = np.convolve(values, np.array([1.0, 2.0, 1.0]) * square / scale)[: values.size]
     past = np.array([1.0, 2.0 * (square - 1.0) / scale, (1.0 - damping * warped + square) / scale])
     return all_pole(past, fed[:, np.newaxis])[:, 0]
-
-
-def rms(values: Array) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def summary_row(case: str, road: str, policy: str, fidelity: str, outcome: Outcome, settle: float) -> SummaryRow:

@@ -19,8 +19,8 @@ from pzd.simulate.ride_model import (
     SPRINGS,
     TABLE,
     TIE_END,
-    Grid,
     RideModel,
+    TableArrays,
     Vehicle,
 )
 from pzd.simulate.sticking import holding_force, holding_share
@@ -28,7 +28,7 @@ from pzd.table.kernel import table_force
 
 
 @compiled
-def tabled(car: Vehicle, grid: Grid, axle: int, voltage: float, velocity: float) -> float:
+def tabled(car: Vehicle, grid: TableArrays, axle: int, voltage: float, velocity: float) -> float:
     """Force of an axle [N] whose dampers stand at a voltage [V], at a suspension speed [m/s].
 
     Equation: T = n r F(U, r V)      Source: virtual work, r the motion ratio and n the number of dampers

@@ -92,7 +92,7 @@ class RoadCoefficients(NamedTuple):
     coefficients: Array
 
 
-class Grid(NamedTuple):
+class TableArrays(NamedTuple):
     """The table at the temperature of the ride; see `pzd.table.lookup.Lookup`."""
 
     voltages: Array
@@ -125,7 +125,7 @@ class RideModel(NamedTuple):
     car: Vehicle
     road_coefficients: RoadCoefficients
     control_spec: ControlSpec
-    grid: Grid
+    grid: TableArrays
     damper: DynamicDamper
 
 

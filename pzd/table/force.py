@@ -7,22 +7,20 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.artefacts import ForceRow
 from pzd.damper.compose import steady_force
 from pzd.damper.model import Damper
+from pzd.record import Array
 from pzd.table.config import TableConfig
 from pzd.table.reach import Reach
-
-Array = NDArray[np.float64]
 
 HALVINGS = 5
 """Most often that an interval between two nodes is halved."""
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class TableNodes:
     """The nodes of the table."""
 
     temperatures: tuple[float | None, ...]
@@ -59,7 +57,7 @@ def temperatures_of(damper: Damper) -> tuple[float | None, ...]:
     return tuple(sorted(nodes)) or (None,)
 
 
-def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | None], reach: Reach) -> Grid:
+def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | None], reach: Reach) -> TableNodes:
     """Nodes between which straight lines keep to the damper's law within the tolerance."""
     voltages = voltages_of(damper)
     if config.voltages_V is not None and voltages != (None,):
@@ -80,7 +78,9 @@ def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | Non
         pair = np.array([-speed, speed])
         return np.concatenate([forces(damper, warm, u, pair) for u in known or (None,)])
 
-    return Grid(tuple(temperatures), tuple(known) or (None,), np.array(refined(list(speeds), over_speed, allowed)))
+    return TableNodes(
+        tuple(temperatures), tuple(known) or (None,), np.array(refined(list(speeds), over_speed, allowed))
+    )
 
 
 def _speeds(config: TableConfig, reach: Reach) -> Array:
@@ -123,7 +123,7 @@ def _halved(low: float, high: float, law: Callable[[float], Array], allowed: flo
     ]
 
 
-def force_rows(config: TableConfig, damper: Damper, nodes: Grid, reach: Reach) -> tuple[ForceRow, ...]:
+def force_rows(config: TableConfig, damper: Damper, nodes: TableNodes, reach: Reach) -> tuple[ForceRow, ...]:
     """One row a node; beyond the rig's reach held, empty or the law itself, as the config says."""
     rows: list[ForceRow] = []
     for temperature in nodes.temperatures:

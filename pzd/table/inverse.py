@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.artefacts import InverseRow, Table
+from pzd.record import Array
 from pzd.table.config import TableConfig
 from pzd.table.lookup import Lookup
-
-Array = NDArray[np.float64]
 
 
 def inverse_rows(config: TableConfig, table: Table) -> tuple[InverseRow, ...]:

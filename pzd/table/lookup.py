@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pzd.artefacts import ForceRow, Table
+from pzd.record import Array
 from pzd.schema.errors import DataError
-
-Array = NDArray[np.float64]
 
 FAR = 1000.0
 """Speed to which the outermost interval is drawn out [m/s]."""

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.record import Record
-
-Array = NDArray[np.float64]
+from pzd.record import Array, Record
 
 REACHED = 0.999
 """The rig reached a speed that this share of a condition's samples stays below: a spike is no reach."""

@@ -7,7 +7,7 @@ import pytest
 
 from pzd.blind.clean import Clean
 from pzd.blind.outside import FORMS, Reached
-from pzd.blind.visible import visible_gap
+from pzd.blind.visible import gap_after_refit
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
@@ -94,11 +94,13 @@ def hidden(damper: Damper) -> list[Clean]:
 
 def test_nothing_hidden_leaves_no_visible_gap_wherever_the_search_starts() -> None:
     start = Damper(base=(BaseRow(T0_N=420.0, C_Ns_per_m=3500.0, k_N_per_m=2.5e5),))
-    assert visible_gap(hidden(PLAIN), start) < 1e-4
+    assert gap_after_refit(hidden(PLAIN), start) < 1e-4
 
 
 def test_the_visible_gap_of_an_orifice_falls_with_it() -> None:
-    gaps = [visible_gap(hidden(PLAIN.with_effect("orifice_quadratic", {"q": q})), PLAIN) for q in (4000.0, 1000.0, 0.0)]
+    gaps = [
+        gap_after_refit(hidden(PLAIN.with_effect("orifice_quadratic", {"q": q})), PLAIN) for q in (4000.0, 1000.0, 0.0)
+    ]
     assert gaps[0] > 0.005
     assert gaps[0] > 2.0 * gaps[1] > 0.0
     assert gaps[2] < 1e-6
@@ -106,5 +108,5 @@ def test_the_visible_gap_of_an_orifice_falls_with_it() -> None:
 
 def test_a_known_effect_leaves_no_visible_gap() -> None:
     damper = PLAIN.with_effect("asymmetry", {"alpha": 0.1})
-    assert visible_gap(hidden(damper), PLAIN) > 0.02
-    assert visible_gap(hidden(damper), damper) < 1e-6
+    assert gap_after_refit(hidden(damper), PLAIN) > 0.02
+    assert gap_after_refit(hidden(damper), damper) < 1e-6

@@ -8,8 +8,9 @@ from fresh_truths import acceptance_test, autoregressive, with_noise
 
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.fit import fit_condition
-from pzd.identify.intervals import autoregression, uncertainty
+from pzd.identify.intervals import uncertainty
 from pzd.record import Array, Condition
+from pzd.signals.autoregression import autoregression
 
 
 def straight_line(count: int) -> Array:
@@ -19,10 +20,10 @@ def straight_line(count: int) -> Array:
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9, -0.6])
 def test_the_autoregression_of_the_noise_is_found(correlation) -> None:
     noise = autoregressive(np.random.default_rng(3), 20000, correlation)
-    found = autoregression(noise)
-    coefficient = -found.coefficients[1] if found.coefficients.size > 1 else 0.0
+    found = autoregression([noise])
+    coefficient = found.coefficients[0] if found.coefficients.size else 0.0
     assert coefficient == pytest.approx(correlation, abs=0.03)
-    assert found.variance == pytest.approx(1.0 - correlation**2, rel=0.04)
+    assert found.innovation == pytest.approx(1.0 - correlation**2, rel=0.04)
 
 
 def test_white_noise_gives_the_textbook_covariance() -> None:

@@ -123,14 +123,14 @@ def test_the_short_ride_gives_the_peaks_of_the_whole_simulation(config: RunConfi
     from pzd.simulate.dampers import dynamic_damper_of
     from pzd.simulate.plan import Case
     from pzd.simulate.policies import policies
-    from pzd.simulate.ride_model import Grid
+    from pzd.simulate.ride_model import TableArrays
     from pzd.simulate.riding import ride_case
     from pzd.simulate.road import Way
 
     simulate = config.simulate.model_copy(update={"tie_break": tie_break})
     oil = dynamic_damper_of(Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=1e3, k_N_per_m=1e5),)), None, 0.0)
     still = np.zeros((1, 2))
-    grid = Grid(np.zeros(1), np.array([0.0, 10.0]), still, still, np.array([10.0]))
+    grid = TableArrays(np.zeros(1), np.array([0.0, 10.0]), still, still, np.array([10.0]))
     found = []
     for road in simulate.roads:
         profile = road.profile(Way(25.0, 1000.0, 1, Path()))

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.record import Array
 from pzd.signals.autoregression import Autoregression, autoregression
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 BAND_LIMIT = 0.4

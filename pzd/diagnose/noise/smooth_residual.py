@@ -10,12 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pzd.record import Record
+from pzd.record import Array, Record
 from pzd.signals.autoregression import Autoregression, autoregression
-
-Array = NDArray[np.float64]
 
 HATS = 8
 """Piecewise linear functions over each quantity."""

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.diagnose.config import NuisanceConfig
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 AT_MOST = 3.5
 """Offset, gain, delay and the instant of the voltage explain at most so many standard deviations of a test: chance
