@@ -126,16 +126,17 @@ def _rate(y: float, at: float, regime: int, side: float, step: Step) -> float:
     p = row_in(step, at)
     pull = side * extension_speed(step, at)
     softening = (step.p1[K] - step.p0[K]) / (step.h * p[K]) if step.moving else 0.0
-    span = _DIFFERENCE * step.h
+    bent = not stroke_straight(p) or (step.moving and stroke_moves(step.p0, step.p1))
     if regime == RELIEF:
-        approach = p[K] * (pull - speed_at(y, p, regime, side, 0.0))
-        return _behind_stroke(approach, y, at, p, side, step, span) + softening * y
+        rate = p[K] * (pull - speed_at(y, p, regime, side, 0.0))
+        return (_behind_stroke(rate, y, at, p, side, step) if bent else rate) + softening * y
     s = max(y, 0.0)
     w = viscous_speed(s, p, side)
     rate = p[K] * (pull - w)
-    if step.moving or not stroke_straight(p):
-        rate = _behind_stroke(rate, smooth_force_of(s, p, side), at, p, side, step, span)
+    if bent:
+        rate = _behind_stroke(rate, smooth_force_of(s, p, side), at, p, side, step)
     if step.moving:
+        span = _DIFFERENCE * step.h
         ahead, behind = (
             smooth_force_of(s, row_in(step, at + span), side),
             smooth_force_of(s, row_in(step, at - span), side),
@@ -145,13 +146,15 @@ def _rate(y: float, at: float, regime: int, side: float, step: Step) -> float:
 
 
 @compiled
-def _behind_stroke(approach: float, force: float, at: float, p: Row, side: float, step: Step, span: float) -> float:
-    """The rate of |F| [N/s] behind the stroke effects, at a |F| [N] that would approach at a rate without them."""
-    if stroke_straight(p) and not stroke_moves(step.p0, step.p1):
-        return approach
+def _behind_stroke(rate: float, force: float, at: float, p: Row, side: float, step: Step) -> float:
+    """Rate of |F| [N/s] behind the stroke effects, at a |F| [N] whose rate without them is given.
+
+    Equation: d|F|/dt = s'(e) rate + k ds/dt at constant e
+    """
     e = deflection_on(force, p, side)
-    approach *= stroke_slope(e, side, p)
-    if stroke_moves(step.p0, step.p1):
+    rate *= stroke_slope(e, side, p)
+    if step.moving:
+        span = _DIFFERENCE * step.h
         ahead, behind = stroke_law(e, side, row_in(step, at + span)), stroke_law(e, side, row_in(step, at - span))
-        approach += p[K] * side * (ahead - behind) / (2.0 * span)
-    return approach
+        rate += p[K] * side * (ahead - behind) / (2.0 * span)
+    return rate
