@@ -107,17 +107,19 @@ def test_a_foil_called_like_an_effect_is_an_error_with_both(monkeypatch: pytest.
 SCALES = Scales(force=2000.0, low_force=800.0, speed=0.4, stroke=0.03, acceleration=5.0, damping=2700.0, voltage=150.0)
 
 
-def hidden(name: str, strength: float) -> dict[str, float]:
+def hidden(name: str, strength: float, rng: np.random.Generator) -> dict[str, float]:
     """Parameters of an effect as the benchmark draws them."""
     hiding = library()[name].hidden
     assert hiding is not None
-    return hiding(np.random.default_rng(3), SCALES)(strength)
+    return hiding(rng, SCALES)(strength)
 
 
 @pytest.mark.parametrize("name", library())
 @pytest.mark.parametrize("strength", [1e-3, 1.0])
-def test_an_effect_is_hidden_with_admissible_values_of_all_its_parameters(name: str, strength: float) -> None:
-    values = hidden(name, strength)
+def test_an_effect_is_hidden_with_admissible_values_of_all_its_parameters(
+    name: str, strength: float, rng: np.random.Generator
+) -> None:
+    values = hidden(name, strength, rng)
     assert set(values) == {p.name for p in library()[name].parameters}
     assert all(library()[name].parameter(key).admits(value) for key, value in values.items())
 
@@ -126,8 +128,10 @@ SLOPES = {"yield_force": "yield_slope", "viscous_force": "viscous_slope", "extra
 
 
 @pytest.mark.parametrize("name", [name for name, effect in library().items() if effect.place == "flow"])
-def test_slopes_of_the_flow_are_derivatives_and_nothing_falls_with_the_speed(name: str) -> None:
-    laws, values = functions(library()[name], module_of(library()[name])), hidden(name, 0.5)
+def test_slopes_of_the_flow_are_derivatives_and_nothing_falls_with_the_speed(
+    name: str, rng: np.random.Generator
+) -> None:
+    laws, values = functions(library()[name], module_of(library()[name])), hidden(name, 0.5, rng)
     for law, slope in SLOPES.items():
         if law not in laws:
             continue
@@ -140,8 +144,8 @@ def test_slopes_of_the_flow_are_derivatives_and_nothing_falls_with_the_speed(nam
 
 
 @pytest.mark.parametrize("name", [name for name, effect in library().items() if effect.place == "flow"])
-def test_inverses_of_the_flow_give_the_speed_back(name: str) -> None:
-    laws, values = functions(library()[name], module_of(library()[name])), hidden(name, 0.5)
+def test_inverses_of_the_flow_give_the_speed_back(name: str, rng: np.random.Generator) -> None:
+    laws, values = functions(library()[name], module_of(library()[name])), hidden(name, 0.5, rng)
     for w in (0.003, 0.02, 0.3):
         if "viscous_speed" in laws:
             s = laws["viscous_force"](w, 2700.0, **values)
@@ -154,8 +158,8 @@ def test_inverses_of_the_flow_give_the_speed_back(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name, effect in library().items() if effect.place == "stroke"])
-def test_the_inverse_of_a_stroke_law_gives_the_deflection_back(name: str) -> None:
-    laws, values = functions(library()[name], module_of(library()[name])), hidden(name, 0.5)
+def test_the_inverse_of_a_stroke_law_gives_the_deflection_back(name: str, rng: np.random.Generator) -> None:
+    laws, values = functions(library()[name], module_of(library()[name])), hidden(name, 0.5, rng)
     for e in (-0.01, -0.001, 0.002, 0.02):
         side = float(np.sign(e))
         assert laws["inverse"](laws["law"](e, side, **values), side, **values) == pytest.approx(e, rel=1e-12)

@@ -25,7 +25,7 @@ def test_every_number_of_the_page_is_printed_by_a_command_that_it_names(
     assert pzd("run", "configs/paper.yaml", "--runs", tmp_path).returncode == 0
     printed = (root / "configs" / "paper.yaml").read_text(encoding="utf-8")
     printed += (root / "pzd" / "paper" / "published.csv").read_text(encoding="utf-8")
-    printed += (tmp_path / "paper" / "6-report" / "published.csv").read_text(encoding="utf-8")
+    printed += (tmp_path / "paper" / "6-report" / "reference.csv").read_text(encoding="utf-8")
     for line in block.splitlines():
         words = shlex.split(line, comments=True)
         if words[0] == "pzd":
