@@ -49,14 +49,14 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
     """
     motion = motion.about(damper.zero_m)
     steps = sampling_steps(motion.time)
-    effective = voltage_at_valve(damper, standing(motion.voltage), steps)
-    rows = element_rows(damper, effective, standing(motion.temperature))
+    effective = voltage_at_valve(damper, constant_value(motion.voltage), steps)
+    rows = element_rows(damper, effective, constant_value(motion.temperature))
     parallel = parallel_rows(damper, effective)
-    force = with_parallel(element_force(rows, motion, steps, initial_force, tolerance), parallel, motion)
+    force = with_parallel(integrated_force(rows, motion, steps, initial_force, tolerance), parallel, motion)
     return recorded(sensors_of(damper), motion.time, force)
 
 
-def element_force(rows: Array, motion: Motion, steps: Array, initial_force: float, tolerance: float) -> Array:
+def integrated_force(rows: Array, motion: Motion, steps: Array, initial_force: float, tolerance: float) -> Array:
     """(n,) force [N] of the element with its stroke and flow effects.
 
     Parameters
@@ -87,7 +87,7 @@ def with_parallel(force: Array, parallel: Array | None, motion: Motion) -> Array
 def constant_rows(
     friction: float, damping: float, stiffness: float, effects: Mapping[str, Mapping[str, float]]
 ) -> tuple[Array, Array | None]:
-    """The (1, r) and (1, m) rows for `element_force` and `with_parallel` where voltage and temperature stand still."""
+    """The (1, r) and (1, m) rows for `integrated_force` and `with_parallel` at constant voltage and temperature."""
 
     def values(columns: Sequence[Column]) -> list[float]:
         return [effects.get(name, {}).get(parameter, NEUTRAL[name, parameter]) for name, parameter in columns]
@@ -96,7 +96,7 @@ def constant_rows(
     return row, np.array([values(PARALLEL)]) if any(name in effects for name, _ in PARALLEL) else None
 
 
-def standing(channel: Array | None) -> Array | None:
+def constant_value(channel: Array | None) -> Array | None:
     """(1,) value of a channel that stands still; the channel itself (n,) where it moves, None where it is absent."""
     return channel if channel is None or np.any(channel != channel[0]) else channel[:1]
 

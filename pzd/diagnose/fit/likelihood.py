@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from pzd.damper.compose import element_force, respond, sampling_steps, sensors_of, shown_moments
+from pzd.damper.compose import integrated_force, respond, sampling_steps, sensors_of, shown_moments
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.noise.between_cycles import PureError
@@ -63,7 +63,7 @@ class RecordLikelihood:
 
         def marched(row: bytes) -> Array:
             rows = np.frombuffer(row)[np.newaxis]
-            return element_force(rows, self.motion, self.steps, self.begins_with, SIMULATION_TOLERANCE)
+            return integrated_force(rows, self.motion, self.steps, self.begins_with, SIMULATION_TOLERANCE)
 
         return lru_cache(REMEMBERED)(marched)
 
