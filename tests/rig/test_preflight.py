@@ -14,8 +14,7 @@ from pzd.artefacts import Finding
 from pzd.damper.element import element_force
 from pzd.record import Record
 from pzd.rig.config import Limits
-from pzd.rig.measured import Measured
-from pzd.rig.preflight import checks, findings
+from pzd.rig.preflight import Measured, checks, findings
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pzd.quantities import DISPLACEMENT, FORCE, TIME
 from pzd.record import Array
 from pzd.rig.config import Fixture
+from pzd.rig.files.splitting import Test
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
@@ -17,6 +19,14 @@ class Freed:
     displacement: Array
     force: Array
     said: str
+    on_the_damper: bool = True
+    """Whether the displacement was recorded on the damper itself, no frame in between."""
+
+
+def damper_alone(test: Test, fixture: Fixture | None) -> Freed:
+    """Displacement and force of the damper alone, of a test behind a fixture; None where nothing is known of one."""
+    time, displacement, force = (test.channels[quantity] for quantity in (TIME, DISPLACEMENT, FORCE))
+    return Freed(displacement, force, "") if fixture is None else free(fixture, time, displacement, force)
 
 
 def free(fixture: Fixture, time: Array, displacement: Array, force: Array) -> Freed:
@@ -46,4 +56,4 @@ def free(fixture: Fixture, time: Array, displacement: Array, force: Array) -> Fr
     if fixture.stiffness_N_per_m:
         displacement = displacement - force / fixture.stiffness_N_per_m
         said.append(f"give of the frame at {fixture.stiffness_N_per_m:g} N/m")
-    return Freed(displacement, force, ", ".join(said))
+    return Freed(displacement, force, ", ".join(said), on_the_damper=not fixture.stiffness_N_per_m)

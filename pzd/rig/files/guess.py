@@ -22,8 +22,10 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.channels import ALSO_READ, NEEDED, own
 from pzd.rig.files.formats import reader
+from pzd.rig.files.layout import ALSO_READ, NEEDED
+from pzd.rig.files.layout import own_quantity as own
+from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.units import UnitError, in_header, to_canonical
 from pzd.schema.errors import DataError, at
 from pzd.schema.scalars import written
@@ -84,7 +86,9 @@ def guessed(files: Sequence[Path]) -> list[str]:
 
 
 def _header(path: Path) -> Header:
-    sheet = reader(path, None, "rig.files")(path, FilesEntry(path=str(path)), [q.column for q in CHANNELS])
+    sheet = reader(path, None, "rig.files")(
+        path, FilesEntry(path=str(path)), Wanted(known=frozenset(q.column for q in CHANNELS))
+    )
     if not any(_column(sheet.header, quantity, _control(sheet.header)) for quantity in CHANNELS):
         shown = ", ".join(sheet.header[:_SHOWN]) + (", ..." if len(sheet.header) > _SHOWN else "")
         raise DataError(f"{at(path, sheet.header_line)}: no header names time, displacement or force (got {shown})")

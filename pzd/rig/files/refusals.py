@@ -5,36 +5,49 @@ Everything milder is a finding of the preflight.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, TIME, VELOCITY
 from pzd.record import Array
-from pzd.rig.files.reading import Test, standstills
+from pzd.rig.files.splitting import Test
+from pzd.schema.errors import DataError
+from pzd.signals.turning_points import REVERSAL_SHARE, reversal_count
 
 LONGEST_STROKE = 1.0
 """Largest stroke, end to end [m]; more is most often millimetres read as metres."""
 HIGHEST_SPEED = 10.0
 """Largest speed [m/s]."""
 LEAST_REVERSALS = 2
-REVERSAL_SHARE = 0.1
-"""A reversal counts where the motion then goes back by more than this share of the range."""
+"""Fewer turns of the motion are no test of a damper."""
 
 
-def faults(test: Test) -> list[str]:
-    """Why the motion and the channels of a test cannot be believed, each with file and line.
+def refuse(tests: Sequence[Test]) -> None:
+    """Refuse a file one of whose tests cannot be believed, whatever its fixture.
 
     Parameters
     ----------
-    test : one test in SI, as recorded
+    tests : the tests of the file in SI, as recorded
 
-    Returns
-    -------
-    one line a fault, empty where there is none
+    Raises
+    ------
+    DataError : with what is wrong with the first such test, each with file and line
     """
+    for test in tests:
+        found = _faults(test)
+        if found:
+            raise DataError(found)
+
+
+def _faults(test: Test) -> list[str]:
+    if test.faults:
+        readable = test.whole and TIME in test.channels
+        return [*test.faults, *(_standstills(test) if readable else [])]
     time, x, force = test.channels[TIME], test.channels[DISPLACEMENT], test.channels[FORCE]
     if time.size < 2:
         return [f"{test.place(0)}: only one data row"]
-    backwards = standstills(time, test.place)
+    backwards = _standstills(test)
     still = [
         f"{test.place(0)}: {quantity.name} is constant over the whole test (got {values[0]:.6g} {quantity.unit})"
         for quantity, values in ((DISPLACEMENT, x), (FORCE, force))
@@ -43,6 +56,17 @@ def faults(test: Test) -> list[str]:
     if backwards or still:
         return backwards + still
     return _too_large(test) + _too_few(test, x)
+
+
+def _standstills(test: Test) -> list[str]:
+    """Where the clock stands still or goes back, in a line; empty where it goes on. NaN is another's fault."""
+    time = test.channels[TIME]
+    backwards = np.flatnonzero(np.diff(time) <= 0.0)
+    if not backwards.size:
+        return []
+    row = int(backwards[0]) + 1
+    more = f", and {backwards.size - 1} more such rows" if backwards.size > 1 else ""
+    return [f"{test.place(row)}: time does not increase: {time[row]:.9g} s after {time[row - 1]:.9g} s{more}"]
 
 
 def _too_large(test: Test) -> list[str]:
@@ -85,59 +109,8 @@ def _despiked(x: Array) -> Array:
 
 
 def _too_few(test: Test, x: Array) -> list[str]:
-    count = reversals(x)
+    count = reversal_count(x)
     if count >= LEAST_REVERSALS:
         return []
     wanted = f"{LEAST_REVERSALS} reversals larger than {REVERSAL_SHARE:.0%} of its range"
     return [f"{test.place(0)}: the displacement needs {wanted} (got {count})"]
-
-
-def reversals(x: Array) -> int:
-    """Number of turning points after which the motion goes back by more than 10 % of its range."""
-    threshold = REVERSAL_SHARE * float(np.ptp(x))
-    count, direction, extreme, low, high = 0, 0, float(x[0]), float(x[0]), float(x[0])
-    for value in _extremes(x):
-        if direction == 0:
-            low, high = min(low, value), max(high, value)
-            if high - low > threshold:
-                direction, extreme = (1, high) if value == high else (-1, low)
-        elif (value - extreme) * direction > 0.0:
-            extreme = value
-        elif (extreme - value) * direction > threshold:
-            count, direction, extreme = count + 1, -direction, value
-    return count
-
-
-def _extremes(x: Array) -> list[float]:
-    """Turning points of the samples, thinned to the extremes of short blocks in long records."""
-    block = max(x.size // 20_000, 1)
-    if block > 1:
-        whole = x[: x.size // block * block].reshape(-1, block)
-        order = np.sort(np.stack((whole.argmin(axis=1), whole.argmax(axis=1)), axis=1), axis=1)
-        x = np.concatenate((np.take_along_axis(whole, order, axis=1).ravel(), x[whole.size :]))
-    turns: list[float] = x.tolist()
-    return turns
-
-
-def sign_faults(test: Test, x: Array, force: Array) -> list[str]:
-    """Negative work of the whole test, unless only a steady force over a net displacement makes it negative.
-
-    Parameters
-    ----------
-    test : the test, for its place
-    x : (n,) displacement of the damper [m]
-    force : (n,) force of the damper, tare and inertia of a known fixture taken out [N]
-    """
-    work, without_mean = work_done(x, force), work_done(x, force - force.mean())
-    if work >= 0.0 or without_mean >= 0.0:
-        return []
-    what = f"the damper does work on the rig over the whole test, {work:.4g} J"
-    return [f"{test.place(0)}: {what}: force or displacement has the wrong sign; say sign: {{force: -1}}"]
-
-
-def work_done(x: Array, force: Array) -> float:
-    """Work that the rig does on the damper over a record [J].
-
-    Equation: W = integral of F dx                    Source: definition, by the trapezoidal rule
-    """
-    return float(0.5 * np.sum((force[1:] + force[:-1]) * np.diff(x)))

@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.record import is_constant, voltage_scale
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 from pzd.rig.reference_fit import VISIBLE, fit_reference, fitted
 
 LEAST_DELAY = 1e-3

@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.record import Array
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 
 MAINS = (50.0, 60.0)
 LINES_OFF = 0.2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 from pzd.rig.reference_fit import fit_reference, unit_force
 
 SHARE = 0.04

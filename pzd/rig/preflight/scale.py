@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 
 LEAST_STROKE = 2e-4
 """A smaller stroke [m] is more likely a wrong unit than a test."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pzd.artefacts import Finding
 from pzd.record import Array
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 
 DEVIATIONS = 10.0
 """A spike stands out of the median of its neighbours by this many robust standard deviations,"""
