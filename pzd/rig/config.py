@@ -31,7 +31,7 @@ class Fixture(Frozen):
     stiffness_N_per_m: float | None = Field(default=None, gt=0.0)
     """Stiffness of frame and joints: F/k is taken out of the displacement."""
     tare_N: float = 0.0
-    """Force that the cell shows without a damper: taken out of the force."""
+    """Force that the cell shows without a damper, in its own direction: taken out before `sign` turns the force."""
 
 
 class Split(Frozen):
@@ -63,7 +63,8 @@ class FilesEntry(Frozen):
     path: str = Field(min_length=1)
     """Path or glob pattern (`*`, `?`, `**`), relative to the folder of this config."""
     columns: dict[str, str] = Field(default={})
-    """Quantity -> header in the file, e.g. `{time: t, force: Load}`; what is not named has its canonical header."""
+    """Quantity -> header in the file, e.g. `{time: t, force: Load}`; what is not named has its canonical header.
+    An empty header (`{voltage: ''}`) leaves a column out."""
     units: dict[str, str] = Field(default={})
     """Quantity -> unit in the file (`mm`, `kN`, `degF`), or what one recorded unit stands for (`980.665 N`).
     For time also a format of date and time (`%m/%d/%Y %H:%M:%S.%f`)."""

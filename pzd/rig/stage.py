@@ -68,12 +68,14 @@ def synthesise(rig: RigConfig, seed: int, control: Control, folder: Path, jobs: 
     if rig.virtual is None:
         raise ConfigError("rig: this config has measured files and no virtual stand; use ingest (got rig.files)")
     takers = [(entry, taker(entry, seed, folder)) for entry in rig.virtual]
-    tests = [partial(_taken, take, planned, rig.limits) for entry, take in takers for planned in entry.plan(control)]
+    tests = [
+        partial(_taken, take, planned, rig.limits, control) for entry, take in takers for planned in entry.plan(control)
+    ]
     log.info("taking %d records", len(tests))
     return examined(tests, jobs)
 
 
-def _taken(take: Callable[[Planned], Taken], planned: Planned, limits: Limits) -> Measured:
+def _taken(take: Callable[[Planned], Taken], planned: Planned, limits: Limits, control: Control) -> Measured:
     """A record of the virtual stand, with its cycles and clean motion."""
     from pzd.rig.preflight import Measured
     from pzd.rig.stand.recording import record_of
@@ -83,4 +85,4 @@ def _taken(take: Callable[[Planned], Taken], planned: Planned, limits: Limits) -
     taken = take(planned)
     run = cycles(taken.time, taken.displacement)
     clean = kinematics(taken.time, taken.displacement, run)
-    return Measured(record_of(taken, clean), run, clean, limits)
+    return Measured(record_of(taken, clean), run, clean, limits, control=control)

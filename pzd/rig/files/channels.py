@@ -8,7 +8,7 @@ import numpy as np
 
 from pzd.quantities import ACCELERATION, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Quantity
 from pzd.record import Array
-from pzd.rig.files.layout import NEEDED, ChannelSpec, Layout
+from pzd.rig.files.layout import LABELS, NEEDED, ChannelSpec, Layout
 from pzd.rig.files.sheet import Sheet
 from pzd.rig.files.units import UnitError, in_header, to_canonical
 from pzd.schema.errors import ConfigError, DataError
@@ -16,6 +16,14 @@ from pzd.schema.nearest import nearest
 
 OPTIONAL = (VELOCITY, ACCELERATION, VOLTAGE, TEMPERATURE, PRESSURE)
 """Quantities whose column may be wholly empty, which counts as absent."""
+
+
+HALF_DAY = 43200.0
+"""Twelve hours [s]."""
+_DATES = ("%d", "%j", "%x", "%c", "%D", "%F")
+"""Codes of a format that tells one day from the next."""
+ROUNDING = 1e-9
+"""A control signal, temperature or pressure that varies by less, relative to itself or to one unit, is constant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +81,18 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
             faults.append(f"{sheet.place(int(empty[0]))}: {sheet.header[source.column]}: empty cell{more}")
             continue
         try:
-            values[source.spec.quantity] = source.spec.sign * to_canonical(cells, source.unit, source.spec.own)
+            channel = source.spec.sign * to_canonical(cells, source.unit, source.spec.own)
         except UnitError as fault:
             raise ConfigError(f"{layout.place}.units: {fault} (in {sheet.path})") from None
+        values[source.spec.quantity] = _steady(channel) if source.spec.quantity in LABELS else channel
     return Channels(_clock(sheet, found), tuple(faults)) if faults else Channels(values)
+
+
+def _steady(channel: Array) -> Array:
+    """A channel that varies by no more than rounding as the constant that it is."""
+    middle = float(np.median(channel))
+    constant = np.ptp(channel) <= ROUNDING * max(1.0, abs(middle))
+    return np.full_like(channel, middle) if constant else channel
 
 
 def _sources(sheet: Sheet, layout: Layout) -> list[_Source]:
@@ -94,7 +110,7 @@ def _sources(sheet: Sheet, layout: Layout) -> list[_Source]:
                 config_faults.append(_no_unit(sheet, columns[0], layout.place, spec.own))
             else:
                 found.append(_Source(spec, columns[0], unit))
-        elif spec.named is not None or spec.quantity in NEEDED:
+        elif spec.named or spec.quantity in NEEDED:
             data_faults.append(_missing(sheet, spec, layout.place))
     if config_faults:
         raise ConfigError(config_faults)
@@ -147,4 +163,9 @@ def _instants(sheet: Sheet, source: _Source) -> Array:
             f"{sheet.place(row)}: {sheet.header[source.column]}: "
             f"no date and time like {source.unit}{more} (got {cells[row]!r})"
         )
-    return np.asarray((instants - instants[0]).dt.total_seconds(), dtype=np.float64)
+    seconds = np.asarray((instants - instants[0]).dt.total_seconds(), dtype=np.float64)
+    if any(code in source.unit for code in _DATES):
+        return seconds
+    # A clock without a date begins anew at midnight, one of twelve hours without am and pm at noon too.
+    turn = HALF_DAY if "%I" in source.unit and "%p" not in source.unit else 2.0 * HALF_DAY
+    return seconds + turn * np.concatenate(([0.0], np.cumsum(np.diff(seconds) < -0.5 * turn)))

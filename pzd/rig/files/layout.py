@@ -39,7 +39,7 @@ class ChannelSpec:
     own: Quantity
     """The quantity as this rig calls it: the control signal under its own name and unit."""
     named: str | None
-    """The header that the config names."""
+    """The header that the config names; empty where no column is to be read."""
     unit: str | None
     """The unit that the config names; for time also a format of date and time."""
     sign: int
@@ -153,7 +153,7 @@ def _spec(quantity: Quantity, entry: FilesEntry, control: Control) -> ChannelSpe
     named, unit = _of(entry.columns, own, quantity), _of(entry.units, own, quantity)
     also = ALSO_READ.get(quantity)
     canonical = (own.column,) if also is None else (own.column, also)
-    headers = canonical if named is None else (named.strip(),)
+    headers = canonical if named is None else (named.strip(),) if named.strip() else ()
     dated = quantity is TIME and unit is not None and "%" in unit
     return ChannelSpec(quantity, own, named, unit, _of(entry.sign, own, quantity) or 1, canonical, headers, dated)
 
@@ -176,6 +176,7 @@ def _faults(layout: Layout) -> list[str]:
     }
     for spec in layout.channels:
         ways = [field for field, keys in said_by.items() if spec.own.name in keys or spec.quantity.name in keys]
+        ways = [field for field in ways if field != "columns" or spec.headers]
         if spec.quantity in LABELS and len(ways) > 1:
             faults.append(f"{place}: {spec.own.name}: said twice, under {' and '.join(ways)}")
     if "setting" in groups and entry.setting is not None:

@@ -60,7 +60,7 @@ def read(
         raise DataError(data_faults)
     called = names([(test.sheet.path, test.number) for test, _ in tests])
     return tuple(
-        partial(measured, name, test, freed, limits) for name, (test, freed) in zip(called, tests, strict=True)
+        partial(measured, name, test, freed, limits, control) for name, (test, freed) in zip(called, tests, strict=True)
     )
 
 
@@ -70,7 +70,7 @@ def _read_file(path: Path, layout: Layout) -> list[tuple[Test, Freed]]:
     values, setting = layout.values(path)
     sheet = reader(path, entry.format, layout.place)(path, entry, layout.wanted())
     tests = split_into_tests(channels(sheet, layout), sheet, layout, values, setting)
-    refuse(tests)
+    refuse(tests, layout)
     freed = [damper_alone(test, entry.fixture) for test in tests]
     for test, alone in zip(tests, freed, strict=True):
         refuse_negative_work(test, alone)

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from pzd.quantities import ACCELERATION, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE
+from pzd.quantities import ACCELERATION, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
 from pzd.record import Record
 from pzd.rig.config import Limits
 from pzd.rig.files.fixture import Freed
@@ -18,7 +18,7 @@ from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
 
-def measured(name: str, test: Test, freed: Freed, limits: Limits) -> Measured:
+def measured(name: str, test: Test, freed: Freed, limits: Limits, control: Control) -> Measured:
     """The record of a test, with velocity and acceleration recorded or derived.
 
     Parameters
@@ -27,6 +27,7 @@ def measured(name: str, test: Test, freed: Freed, limits: Limits) -> Measured:
     test : the test as the rig measured it
     freed : displacement and force of the damper alone
     limits : what the stand can do
+    control : the control signal
     """
     time = test.channels[TIME]
     run = cycles(time, freed.displacement)
@@ -43,7 +44,7 @@ def measured(name: str, test: Test, freed: Freed, limits: Limits) -> Measured:
         freed.force,
         *(test.channels.get(quantity) for quantity in (VOLTAGE, TEMPERATURE, PRESSURE)),
     )
-    return Measured(record, run, clean, limits, freed.said or None)
+    return Measured(record, run, clean, limits, freed.said or None, control)
 
 
 def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, TIME, VELOCITY
 from pzd.record import Array
+from pzd.rig.files.layout import Layout
 from pzd.rig.files.splitting import Test
 from pzd.schema.errors import DataError
 from pzd.signals.turning_points import REVERSAL_SHARE, reversal_count
@@ -19,28 +20,37 @@ LONGEST_STROKE = 1.0
 """Largest stroke, end to end [m]; more is most often millimetres read as metres."""
 HIGHEST_SPEED = 10.0
 """Largest speed [m/s]."""
+STRETCH = 20
+"""Steps of the clock whose median is one rate."""
+OTHER_RATE = 1.5
+"""Ratio of two rates from which they are two; lost samples and jitter stay below over a stretch."""
+SLOWEST_STEP = 0.05
+"""Step of the clock [s] from which it may be in milliseconds: stands take 20 samples a second and more,"""
+CREEPING = 5e-3
+"""where the motion is no quicker than this [m/s], so that a thousand times as quick it is a test still."""
 LEAST_REVERSALS = 2
 """Fewer turns of the motion are no test of a damper."""
 
 
-def refuse(tests: Sequence[Test]) -> None:
+def refuse(tests: Sequence[Test], layout: Layout) -> None:
     """Refuse a file one of whose tests cannot be believed, whatever its fixture.
 
     Parameters
     ----------
     tests : the tests of the file in SI, as recorded
+    layout : what the config says about each quantity
 
     Raises
     ------
     DataError : with what is wrong with the first such test, each with file and line
     """
     for test in tests:
-        found = _faults(test)
+        found = _faults(test, layout)
         if found:
             raise DataError(found)
 
 
-def _faults(test: Test) -> list[str]:
+def _faults(test: Test, layout: Layout) -> list[str]:
     if test.faults:
         readable = test.whole and TIME in test.channels
         return [*test.faults, *(_standstills(test) if readable else [])]
@@ -55,7 +65,7 @@ def _faults(test: Test) -> list[str]:
     ]
     if backwards or still:
         return backwards + still
-    return _too_large(test) + _too_few(test, x)
+    return _too_large(test) + _too_few(test, x) + _two_rates(test) + _milliseconds(test, layout)
 
 
 def _standstills(test: Test) -> list[str]:
@@ -67,6 +77,38 @@ def _standstills(test: Test) -> list[str]:
     row = int(backwards[0]) + 1
     more = f", and {backwards.size - 1} more such rows" if backwards.size > 1 else ""
     return [f"{test.place(row)}: time does not increase: {time[row]:.9g} s after {time[row - 1]:.9g} s{more}"]
+
+
+def _two_rates(test: Test) -> list[str]:
+    """A clock that goes on at another rate: neither rate is the record's."""
+    time = test.channels[TIME]
+    steps = np.diff(time)
+    if steps.size < 2 * STRETCH:
+        return []
+    blocks = np.median(steps[: steps.size // STRETCH * STRETCH].reshape(-1, STRETCH), axis=1)
+    for row in np.flatnonzero(np.abs(np.log(blocks[1:] / blocks[:-1])) > np.log(OTHER_RATE)):
+        before, after = blocks[max(row - 1, 0) : row + 1], blocks[row + 1 : row + 4]
+        old, new = float(np.median(before)), float(np.median(after))
+        if after.size < 2 or max(old, new) < OTHER_RATE * min(old, new) or np.ptp(after[1:]) > 0.1 * new:
+            continue
+        near = slice(row * STRETCH, (row + 2) * STRETCH)
+        turn = int(np.argmax(np.abs(np.log(steps[near] / old)) > 0.5 * np.log(OTHER_RATE))) + near.start
+        rates = f"the clock goes on at {1.0 / new:.4g} Hz here, at {1.0 / old:.4g} Hz before"
+        remedy = "cut the file here, e.g. with split: {gap_s: ...} at a pause, or resample it"
+        return [f"{test.place(turn + 1)}: {rates}; a record has one rate: {remedy}"]
+    return []
+
+
+def _milliseconds(test: Test, layout: Layout) -> list[str]:
+    """A clock in steps of seconds beside a motion that creeps, unless the config itself says its unit."""
+    time, x = test.channels[TIME], test.channels[DISPLACEMENT]
+    said = any(spec.quantity is TIME and spec.unit is not None for spec in layout.channels)
+    step, speed = float(np.median(np.diff(time))), float(np.abs(_slope(time, x)).max())
+    if said or step < SLOWEST_STEP or speed > CREEPING:
+        return []
+    what = f"the clock goes in steps of {step:.4g} s while the motion reaches {1e3 * speed:.3g} mm/s"
+    remedy = "are these milliseconds? say units: {time: ms}, or units: {time: s} if they are seconds"
+    return [f"{test.place(0)}: {what}; {remedy}"]
 
 
 def _too_large(test: Test) -> list[str]:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.quantities import TIME, Quantity
+from pzd.quantities import FORCE, TIME, Quantity
 from pzd.record import Array
 from pzd.rig.config import Split
 from pzd.rig.files.channels import Channels
-from pzd.rig.files.layout import Layout, Values
+from pzd.rig.files.layout import ChannelSpec, Layout, Values
 from pzd.rig.files.sheet import Sheet
 from pzd.schema.errors import ConfigError, DataError
 
@@ -32,6 +32,8 @@ class Test:
     """Row of the sheet at which the test begins."""
     faults: tuple[str, ...] = ()
     """Cells that are bad or empty; then the test is the whole file, uncut."""
+    force_sign: int = 1
+    """What the force of the cell was multiplied by."""
     whole: bool = True
     """Whether the file is meant to be one test, in which the clock must go on."""
 
@@ -47,10 +49,19 @@ def split_into_tests(
 
     Raises
     ------
-    ConfigError : when there are more or fewer values than tests
+    ConfigError : when there are more or fewer values than tests, or a column holds what the config gives as well
     DataError : when the column that cuts the file is missing or doubled
     """
     split, place = layout.entry.split, layout.place
+    twice = [
+        f"{place}: {spec.own.name}: stands in column {_header(sheet, spec)} of {sheet.path} and under "
+        f"{_given_under(layout, spec)} as well; leave that out, or say columns: {{{spec.own.name}: ''}} to leave "
+        "the column out"
+        for spec in layout.channels
+        if spec.quantity in channels.values and spec.quantity in values
+    ]
+    if twice:
+        raise ConfigError(twice)
     if channels.faults:
         return (Test(None, setting, channels.values, sheet, faults=channels.faults, whole=split is None),)
     starts = [0] if split is None else _starts(sheet, split, channels.values[TIME], place)
@@ -70,10 +81,23 @@ def split_into_tests(
             _piece(channels.values, values, index, first, last),
             sheet,
             first,
+            force_sign=next(spec.sign for spec in layout.channels if spec.quantity is FORCE),
             whole=split is None,
         )
         for index, (first, last) in enumerate(bounds)
     )
+
+
+def _header(sheet: Sheet, spec: ChannelSpec) -> str:
+    return repr(next(head for head in sheet.header if head in spec.headers))
+
+
+def _given_under(layout: Layout, spec: ChannelSpec) -> str:
+    """The key of the config that gives the value of a quantity."""
+    entry, names = layout.entry, {spec.own.name, spec.quantity.name}
+    if names & set(entry.constants):
+        return "constants"
+    return "split.constants" if entry.split and names & set(entry.split.constants) else "pattern"
 
 
 def _starts(sheet: Sheet, split: Split, time: Array, place: str) -> list[int]:

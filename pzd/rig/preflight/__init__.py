@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib import import_module
 from types import ModuleType
 
+import numpy as np
+
 from pzd.artefacts import Finding, RecordEntry, Rig
-from pzd.record import Record
+from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
+from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
 from pzd.schema.processes import at_once
 from pzd.signals.cycles import Cycles
@@ -30,6 +33,38 @@ class Measured:
     clean: Kinematics
     limits: Limits
     removed: str | None = None
+    control: Control = field(default_factory=Control)
+    """The control signal, recorded as the voltage."""
+
+    def channels(self) -> tuple[Channel, ...]:
+        """Every recorded channel but the clock: what is sensed of the motion first, then what labels the record."""
+        record, signal = self.record, self.control.quantity
+        labels = (
+            (signal.name, signal.unit, record.voltage, 0.0),
+            (TEMPERATURE.name, TEMPERATURE.unit, record.temperature, SAME_TEMPERATURE),
+            (PRESSURE.name, PRESSURE.unit, record.pressure, 0.0),
+        )
+        return (
+            Channel(FORCE.name, FORCE.unit, record.force),
+            Channel(DISPLACEMENT.name, DISPLACEMENT.unit, record.displacement),
+            *(
+                Channel(name, unit, values, max(least, CONSTANT_SHARE * float(np.median(np.abs(values)))))
+                for name, unit, values, least in labels
+                if values is not None and np.ptp(values) > 0.0
+            ),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One recorded channel that is not one constant."""
+
+    name: str
+    unit: str
+    values: Array
+    """(n,)"""
+    least: float | None = None
+    """Of a control signal, temperature or pressure: what is less is no other condition; None for x and F."""
 
 
 @lru_cache(maxsize=1)

@@ -50,6 +50,7 @@ class _Table:
             values = {column: frame[column].to_numpy() for column in columns}
             faults: dict[int, list[str]] = {}
         except (ValueError, OverflowError):
+            self._refuse_repeated_header(columns)
             read = {column: self._cell_by_cell(column) for column in columns}
             values = {column: cells for column, cells in read.items() if not isinstance(cells, list)}
             faults = {column: cells for column, cells in read.items() if isinstance(cells, list)}
@@ -79,6 +80,17 @@ class _Table:
             quoting=csv.QUOTE_NONE,
             engine="c",
         )
+
+    def _refuse_repeated_header(self, columns: list[int]) -> None:
+        """Say so where the header stands among the data: a logger that was started again wrote on."""
+        again = [row for row, cell in enumerate(self.texts(columns[0])) if cell == self.header[columns[0]]]
+        again = again if all(self.texts(c)[row] == self.header[c] for row in again[:1] for c in columns) else []
+        if again:
+            more = f" and {len(again) - 1} more times below" if len(again) > 1 else ""
+            raise DataError(
+                f"{at(self.path, int(self.lines[again[0]]))}: the header stands here again{more}: another recording "
+                "begins; write each into a file of its own"
+            )
 
     def _cell_by_cell(self, column: int) -> Array | list[str]:
         """The slow way, which knows the place of every bad cell; the faults where there are such."""
