@@ -24,12 +24,14 @@ def check(
     config: Config, runs: Runs = RUNS, overrides: Set = None, quiet: Quiet = False, verbose: Verbose = False
 ) -> int:
     """Check config and rig records; write nothing."""
-    from pzd.pipeline.command import opened, preflight
+    from pzd.pipeline.command import check_setting, opened, preflight
 
     output = Output(quiet=quiet, verbose=verbose)
-    entries = preflight(opened(config, runs, overrides or ()))
+    given = opened(config, runs, overrides or ())
+    entries = preflight(given)
     for entry in entries:
         output.say(*_entry(entry))
+    check_setting(given, entries)
     found = sum(len(entry.findings) for entry in entries)
     output.say(f"{len(entries)} records, {found} findings; the config is in order, nothing was written")
     return DONE

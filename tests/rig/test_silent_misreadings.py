@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,8 @@ from written_files import CANONICAL, FORCE, TIME, V, X, lines, refused, run, wri
 
 from pzd.quantities import Control
 from pzd.record import conditions
+from pzd.rig.files.guess import guessed
+from pzd.schema.errors import DataError
 
 LONG = np.arange(8000) * 1e-3
 LONG_X = 0.01 * np.sin(2.0 * np.pi * 2.0 * LONG)
@@ -190,3 +194,26 @@ def test_a_clock_without_a_date_goes_on_past_midnight_and_noon(tmp_path: Path, u
     write(tmp_path / "a.csv", lines(columns))
     (record,) = run(tmp_path, {"path": "a.csv", "columns": {"time": "when"}, "units": {"time": unit}}).records
     assert np.abs(record.time - TIME).max() < 1e-5
+
+
+# ---------------------------------------------------------------- other kinds of files
+
+
+def test_a_file_that_is_no_text_is_called_what_it_is_whatever_its_name(tmp_path: Path) -> None:
+    openpyxl_like = tmp_path / "a.csv"
+    with zipfile.ZipFile(openpyxl_like, "w") as book:
+        book.writestr("xl/workbook.xml", "<workbook/>")
+    kinds = {
+        "an Excel file": openpyxl_like.read_bytes(),
+        "a MATLAB file": b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(200),
+        "an HDF5 file": b"\x89HDF\r\n\x1a\n" + bytes(200),
+        "a JSON file": json.dumps({"time": [0, 1], "force": [1, 2]}).encode(),
+        "a TDMS file": b"TDSm" + bytes(64),
+    }
+    for kind, content in kinds.items():
+        openpyxl_like.write_bytes(content)
+        (said,) = refused(tmp_path)
+        assert f"a.csv: this is {kind}" in said
+        assert "encoding" not in said
+        with pytest.raises(DataError, match=f"this is {kind}"):
+            guessed([openpyxl_like])

@@ -19,7 +19,7 @@ from pzd.rig.files.listing import listed
 from pzd.rig.files.records import measured, names
 from pzd.rig.files.refusals import refuse
 from pzd.rig.files.splitting import Test, split_into_tests
-from pzd.rig.files.work import refuse_negative_work
+from pzd.rig.files.work import sign_fault, works_on_the_rig
 from pzd.rig.preflight import Measured
 from pzd.schema.errors import ConfigError, DataError
 
@@ -45,10 +45,12 @@ def read(
     files = listed(entries, folder)
     described = layouts(entries, control)
     tests: list[tuple[Test, Freed]] = []
+    layout_of: dict[Path, Layout] = {}
     config_faults: list[str] = []
     data_faults: list[str] = []
     for file in files:
         try:
+            layout_of[file.path] = described[file.number]
             tests += _read_file(file.path, described[file.number])
         except ConfigError as error:
             config_faults += error.messages
@@ -56,6 +58,9 @@ def read(
             data_faults += error.messages
     if config_faults:
         raise ConfigError(dict.fromkeys(config_faults))
+    wrong = [believed for believed in tests if works_on_the_rig(believed[1])]
+    right = [believed for believed in tests if not works_on_the_rig(believed[1])]
+    data_faults += [sign_fault(test, freed, layout_of[test.sheet.path], right) for test, freed in wrong]
     if data_faults:
         raise DataError(data_faults)
     called = names([(test.sheet.path, test.number) for test, _ in tests])
@@ -71,7 +76,4 @@ def _read_file(path: Path, layout: Layout) -> list[tuple[Test, Freed]]:
     sheet = reader(path, entry.format, layout.place)(path, entry, layout.wanted())
     tests = split_into_tests(channels(sheet, layout), sheet, layout, values, setting)
     refuse(tests, layout)
-    freed = [damper_alone(test, entry.fixture) for test in tests]
-    for test, alone in zip(tests, freed, strict=True):
-        refuse_negative_work(test, alone)
-    return list(zip(tests, freed, strict=True))
+    return [(test, damper_alone(test, entry.fixture)) for test in tests]

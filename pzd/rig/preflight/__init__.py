@@ -1,6 +1,7 @@
 """What a test engineer would ask of a record before trusting it, one file a check.
 
-A check is `check(test) -> list[Finding]`. Nothing here changes a record.
+A check is `check(test) -> list[Finding]`; one that compares records has `compared(entries) -> entries` as well.
+Nothing here changes a record.
 """
 
 from __future__ import annotations
@@ -92,7 +93,10 @@ def examined(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:
         return test.record, _entry(test)
 
     found = at_once(listed, tests, jobs)
-    return Rig(tuple(record for record, _ in found), tuple(entry for _, entry in found))
+    entries = tuple(entry for _, entry in found)
+    for module in checks().values():
+        entries = module.compared(entries) if hasattr(module, "compared") else entries
+    return Rig(tuple(record for record, _ in found), entries)
 
 
 def _entry(test: Measured) -> RecordEntry:
