@@ -18,11 +18,11 @@ def figures(
     """Draw the figures of the paper, and their index."""
     from pzd.figures.draw import FOLDER, drawn
     from pzd.figures.evidence import Evidence
-    from pzd.pipeline.command import bring, opened
+    from pzd.pipeline.command import execute, opened
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
-    marks = bring(given, "identify", force=False, jobs=jobs, say=output.say)
+    marks = execute(given, "identify", force=False, jobs=jobs, say=output.say, progress=output.progress)
     gallery = drawn(Evidence.of(given.run, given.config), output.say)
     with given.run.locked("pzd figures"):
         given.run.write_extra(FOLDER, gallery.write)

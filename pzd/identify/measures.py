@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.artefacts import MeasureRow
-from pzd.identify.trial import reversals, warm_up
+from pzd.identify.trial import warm_up
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
 from pzd.signals.cycles import Cycles, cycles
+from pzd.signals.reversals import reversals
+from pzd.signals.work import work
 
 SAME_SPEED = 0.05
 """Tests whose peak speeds differ by less, relative, are at the same speed."""
@@ -35,26 +37,6 @@ def measures(records: Sequence[Record]) -> tuple[MeasureRow, ...]:
     scale = voltage_scale(records)
     rows = [_row(record, is_constant(record, scale)) for record in records]
     return tuple(row.model_copy(update={"dynamic_range": _dynamic_range(row, rows)}) for row in rows)
-
-
-def work(displacement: Array, force: Array, closed: bool) -> float:
-    """Work done on the damper along the path.
-
-    Equation: W = integral of F dx, the area of the loop of force over displacement      Source: definition
-
-    Parameters
-    ----------
-    displacement : (n,) extension [m]
-    force : (n,) force [N]
-    closed : whether the last sample is followed by the first
-
-    Returns
-    -------
-    work [J]
-    """
-    if closed:
-        displacement, force = np.append(displacement, displacement[0]), np.append(force, force[0])
-    return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(displacement)))
 
 
 def equivalent_damping(work_done: float, velocity: Array, step: float) -> float:

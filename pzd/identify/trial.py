@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array, Record
+from pzd.signals.reversals import REVERSAL_SHARE, reversals
 
 FINE_RATE = 4000.0
 """The fine grid has at least this rate [Hz]."""
@@ -22,8 +23,6 @@ FINE_ANGLE = 1.0 / 256.0
 """The fine step is at most this share of 1/omega of the fastest half cycle."""
 FINEST = 64
 """Largest factor between the fine grid and the samples."""
-REVERSAL_SHARE = 0.1
-"""A reversal counts when the motion before and after it exceeds this share of the range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,28 +64,6 @@ def trial_of(record: Record) -> Trial:
         np.arange(record.time.size) >= warm_up(record.displacement),
         positions,
     )
-
-
-def reversals(displacement: Array, share: float = REVERSAL_SHARE) -> list[int]:
-    """Samples at which the motion turns, each between strokes larger than that share of the range."""
-    enough = share * float(np.ptp(displacement))
-    steps = np.sign(np.diff(displacement))
-    candidates = [0, *(np.flatnonzero(steps[1:] != steps[:-1]) + 1).tolist(), displacement.size - 1]
-    turns: list[int] = []
-    low = high = 0
-    direction = 0
-    for i in candidates:
-        low = i if displacement[i] < displacement[low] else low
-        high = i if displacement[i] > displacement[high] else high
-        if direction >= 0 and displacement[high] - displacement[i] > enough:
-            if direction or displacement[high] - displacement[0] > enough:
-                turns.append(high)
-            direction, low = -1, i
-        elif direction <= 0 and displacement[i] - displacement[low] > enough:
-            if direction or displacement[0] - displacement[low] > enough:
-                turns.append(low)
-            direction, high = 1, i
-    return turns
 
 
 def warm_up(displacement: Array) -> int:

@@ -1,7 +1,8 @@
 """The cycles of a periodic test: its period, and the run of cycles that repeat.
 
 A record may begin at rest, ramp in and out, drift, and end inside a cycle; the run found
-here holds only whole cycles that repeat. A record without one (a road, a sweep) has None.
+here holds only whole cycles that repeat. A record without one (a road, a sweep) has None, and so
+has one whose average cycle would take away more than noise (two tones, a beat).
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array
+from pzd.signals.departure import TOLERATED, departure
 from pzd.signals.edges import ROUNDS, averaged, force_span, motion_span
 from pzd.signals.period import Repeats, repeats
 
@@ -79,7 +81,7 @@ class Cycles:
 
 
 def cycles(time: Array, displacement: Array) -> Cycles | None:
-    """The longest run of cycles that repeat, or None where no two whole cycles do.
+    """The longest run of cycles that repeat, or None where no two whole cycles do or their average takes motion away.
 
     Parameters
     ----------
@@ -91,7 +93,11 @@ def cycles(time: Array, displacement: Array) -> Cycles | None:
     the run, with the period refined on the shift between its cycles
     """
     found = repeats(time, displacement)
-    return None if found is None else _refined(time, displacement, found)
+    if found is None:
+        return None
+    run = _refined(time, displacement, found)
+    folded = run.fold(time, displacement)
+    return None if departure(folded - drift(folded)) > TOLERATED else run
 
 
 def settled(run: Cycles, time: Array, force: Array) -> Cycles:

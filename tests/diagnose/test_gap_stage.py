@@ -16,7 +16,7 @@ from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import TRAINING, UNTOUCHED, VALIDATION, split
 from pzd.diagnose.noise.input_uncertainty import expected
 from pzd.diagnose.noise.test_effects import nuisance
-from pzd.diagnose.residual_check import judge
+from pzd.diagnose.residual_check import check_residual
 from pzd.diagnose.stage import diagnose
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.stage import identify
@@ -163,7 +163,9 @@ def test_small_offset_gain_and_delay_are_nuisances_and_large_ones_a_gap() -> Non
         record = sine(damper, 0.0, 2.0, 0.03, rng, noise=1e-4, offset=offset, gain=gain)
         (prepared,) = prepare([record])
         everything = np.ones(prepared.record.time.size, dtype=np.bool_)
-        judged = judge(expected(damper, prepared, NuisanceConfig().delay_s), prepared, everything, NuisanceConfig())
+        judged = check_residual(
+            expected(damper, prepared, NuisanceConfig().delay_s), prepared, everything, NuisanceConfig()
+        )
         left = float(np.sqrt(np.mean(judged.cleared**2)) / np.sqrt(np.mean(judged.residual**2)))
         assert left < share if offset < 0.01 else left > share
 

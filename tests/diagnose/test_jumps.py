@@ -10,7 +10,7 @@ from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.gap import visible_gap
 from pzd.diagnose.noise.input_uncertainty import expected
 from pzd.diagnose.noise.jumps import jumps
-from pzd.diagnose.residual_check import judge
+from pzd.diagnose.residual_check import check_residual
 
 
 def test_a_step_is_a_jump_of_its_own_size_at_the_two_samples_beside_it() -> None:
@@ -35,5 +35,5 @@ def test_the_true_damper_with_a_large_jump_at_every_reversal_leaves_no_gap() -> 
     (prepared,) = prepare((record,))
     wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
     with_jump, without = (expected(d, prepared, NuisanceConfig().delay_s) for d in (damper, damper_of((0.0,))))
-    assert visible_gap([judge(with_jump, prepared, wanted, NuisanceConfig())]) < 0.001
-    assert visible_gap([judge(without, prepared, wanted, NuisanceConfig())]) > 0.01
+    assert visible_gap([check_residual(with_jump, prepared, wanted, NuisanceConfig())]) < 0.001
+    assert visible_gap([check_residual(without, prepared, wanted, NuisanceConfig())]) > 0.01

@@ -11,7 +11,8 @@ from fresh_truths import TABLE_2, sine_test
 from pzd.damper.element import element_force
 from pzd.identify.objective import Objective
 from pzd.identify.separable import fit_separable
-from pzd.identify.trial import reversals, trial_of, upsampling_factor, warm_up
+from pzd.identify.trial import trial_of, upsampling_factor, warm_up
+from pzd.signals.reversals import reversals
 
 
 def test_a_sine_turns_twice_a_cycle() -> None:

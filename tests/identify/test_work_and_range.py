@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from fresh_truths import TABLE_2, moving_test, sine_test
 
-from pzd.identify.measures import equivalent_damping, force_at_rest, measures, work
+from pzd.identify.measures import equivalent_damping, force_at_rest, measures
 from pzd.identify.objective import Bingham
+from pzd.signals.work import work
 
 
 def test_work_of_a_rigid_bingham_damper_over_a_sine() -> None:

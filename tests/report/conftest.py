@@ -189,6 +189,9 @@ def diagnosis() -> Diagnosis:
             amplitude_m=0.01,
             voltage_V=150.0,
             separates=("orifice_quadratic", "shear_thinning"),
+            middle_m=0.03135,
+            peak_speed_m_per_s=0.251327,
+            peak_force_N=1512.345,
         ),
     )
 

@@ -11,8 +11,9 @@ from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.data.cleaning import Prepared
-from pzd.identify.trial import reversals, warm_up
+from pzd.identify.trial import warm_up
 from pzd.record import Array, Record
+from pzd.signals.reversals import reversals
 
 FEWEST_IN_HALF_CYCLE = 25
 """Samples of the fastest half cycle from which a parabola between them is exact enough: 1e-4 of the force."""

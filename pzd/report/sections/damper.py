@@ -14,6 +14,8 @@ from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
 
 _QUANTITIES = (FRICTION, DAMPING, STIFFNESS)
 _FOLD = 12
+NO_FORCE = 1e-6
+"""A friction of less [N] is none: no load cell shows it, and a fit leaves such numbers where it found none."""
 
 
 def render(context: ReportContext, pictures: Pictures) -> Section:
@@ -63,11 +65,16 @@ def _completed(context: ReportContext) -> Sheet:
         (
             context.voltage(row.voltage_V),
             amount(row.temperature_degC, "degC"),
-            *(number(getattr(row, q.column)) for q in _QUANTITIES),
+            *(parameter(getattr(row, q.column)) for q in _QUANTITIES),
         )
         for row in context.diagnosed.damper.base
     )
     return Sheet("With what was missing", (context.control.name, "temperature", *units), rows)
+
+
+def parameter(value: float) -> str:
+    """A parameter that has no interval here; none is as small as a friction that no load cell shows."""
+    return number(value if value >= NO_FORCE else 0.0)
 
 
 def _row(context: ReportContext, row: ParameterRow) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from pzd.record import Array
 from pzd.rig.files.layout import Layout
 from pzd.rig.files.splitting import Test
 from pzd.schema.errors import DataError
-from pzd.signals.turning_points import REVERSAL_SHARE, reversal_count
+from pzd.signals.reversals import REVERSAL_SHARE, reversals
 
 LONGEST_STROKE = 1.0
 """Largest stroke, end to end [m]; more is most often millimetres read as metres."""
@@ -151,7 +151,7 @@ def _despiked(x: Array) -> Array:
 
 
 def _too_few(test: Test, x: Array) -> list[str]:
-    count = reversal_count(x)
+    count = len(reversals(x))
     if count >= LEAST_REVERSALS:
         return []
     wanted = f"{LEAST_REVERSALS} reversals larger than {REVERSAL_SHARE:.0%} of its range"

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE
-from pzd.record import Array
 from pzd.rig.files.fixture import Freed
 from pzd.rig.files.layout import Layout
 from pzd.rig.files.splitting import Test
+from pzd.signals.work import work
 
 CLEAR_OFFSET = 0.1
 """Mean force, as a share of half the force's range, from which its sign says which way the force is counted."""
@@ -22,7 +22,7 @@ COMPRESSION = re.compile(r"compr|bump|druck|einfed|einschub|enfonc", re.IGNORECA
 def works_on_the_rig(freed: Freed) -> bool:
     """Whether the damper does work on the rig over a test; not where a steady force over a net displacement does it."""
     x, force = freed.displacement, freed.force
-    return work_done(x, force) < 0.0 and work_done(x, force - force.mean()) < 0.0
+    return work(x, force) < 0.0 and work(x, force - force.mean()) < 0.0
 
 
 def sign_fault(test: Test, freed: Freed, layout: Layout, others: Sequence[tuple[Test, Freed]]) -> str:
@@ -35,8 +35,8 @@ def sign_fault(test: Test, freed: Freed, layout: Layout, others: Sequence[tuple[
     layout : what the config says about each quantity
     others : the tests of the rig whose work is positive
     """
-    work = work_done(freed.displacement, freed.force)
-    what = f"{test.place(0)}: the damper does work on the rig over the whole test, {work:.4g} J"
+    done = work(freed.displacement, freed.force)
+    what = f"{test.place(0)}: the damper does work on the rig over the whole test, {done:.4g} J"
     channel, why = _by_header(test, layout) or _by_others(test, freed, others) or _by_gas(freed) or (None, "")
     sign = -next(spec.sign for spec in layout.channels if spec.quantity.name == (channel or FORCE.name))
     if channel is None:
@@ -78,11 +78,3 @@ def _offset(freed: Freed) -> float | None:
     low, high = np.percentile(freed.force, (1.0, 99.0))
     middle = 0.5 * float(low + high)
     return middle if abs(middle) > CLEAR_OFFSET * 0.5 * float(high - low) else None
-
-
-def work_done(x: Array, force: Array) -> float:
-    """Work that the rig does on the damper over a record [J].
-
-    Equation: W = integral of F dx                    Source: definition, by the trapezoidal rule
-    """
-    return float(0.5 * np.sum((force[1:] + force[:-1]) * np.diff(x)))

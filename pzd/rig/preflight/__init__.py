@@ -19,10 +19,10 @@ from pzd.artefacts import Finding, RecordEntry, Rig
 from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
-from pzd.schema.processes import at_once
+from pzd.schema.processes import parallel_map
 from pzd.signals.cycles import Cycles
 from pzd.signals.kinematics import Kinematics
-from pzd.signals.turning_points import reversal_count
+from pzd.signals.reversals import reversals
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ def examined(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:
         test = given()
         return test.record, _entry(test)
 
-    found = at_once(listed, tests, jobs)
+    found = parallel_map(listed, tests, jobs)
     entries = tuple(entry for _, entry in found)
     for module in checks().values():
         entries = module.compared(entries) if hasattr(module, "compared") else entries
@@ -107,7 +107,7 @@ def _entry(test: Measured) -> RecordEntry:
         voltage_V=record.median_voltage(),
         temperature_degC=record.median_temperature(),
         rate_Hz=record.rate,
-        cycles=float(test.run.count) if test.run else 0.5 * reversal_count(record.displacement),
+        cycles=float(test.run.count) if test.run else 0.5 * len(reversals(record.displacement)),
         findings=findings(test),
         removed=test.removed,
     )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.files.work import work_done
 from pzd.rig.preflight import Measured
-from pzd.signals.turning_points import reversal_count
+from pzd.signals.reversals import reversals
+from pzd.signals.work import work
 
 LEAST = 0.05
 """Work that is said, as a share of stroke times range of the force.
@@ -21,12 +21,12 @@ def check(test: Measured) -> list[Finding]:
     """Cycles with negative work, and a record whose steady force outweighs its loops."""
     record = test.record
     least = LEAST * float(np.ptp(record.displacement) * np.subtract(*np.percentile(record.force, (99, 1))))
-    if work_done(record.displacement, record.force) < -least * np.sqrt(1.0 + 0.5 * reversal_count(record.displacement)):
+    if work(record.displacement, record.force) < -least * np.sqrt(1.0 + 0.5 * len(reversals(record.displacement))):
         return [
             Finding(
                 check="sign",
                 where="the whole record",
-                size=work_done(record.displacement, record.force),
+                size=work(record.displacement, record.force),
                 unit="J",
                 follows="a steady force over the net displacement outweighs the loops: take the tare out",
             )

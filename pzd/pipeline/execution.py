@@ -1,9 +1,9 @@
-"""Brings the stages up to date, as make would, and says of each why it runs or does not."""
+"""Runs the stages that are out of date, as make would, and says of each why it runs or does not."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +12,9 @@ from pzd.config import RunConfig
 from pzd.pipeline.dependencies import block_of, changes, dependencies, is_artefact, key_of, setting_of
 from pzd.pipeline.stages import Stage
 from pzd.quantities import Control
-from pzd.runs import Kept, Run
+from pzd.runs import Run, StageFolder
+from pzd.schema.errors import UserError
+from pzd.schema.progress import Listener, unheard
 from pzd.schema.yamlfile import yaml_text
 
 Say = Callable[[str], None]
@@ -27,6 +29,8 @@ class Pipeline:
     stages: Sequence[Stage]
     say: Say
     """Takes a line about each stage."""
+    progress: Listener = unheard
+    """Hears how far a stage has come."""
     jobs: int = 1
     """Processes that a stage may use, where it can use several."""
     marks: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -36,7 +40,7 @@ class Pipeline:
     _compiles: bool = False
     """Whether the ride's kernels may still have to be compiled, which a second core can do meanwhile."""
 
-    def bring_up_to_date(self, target: str, forced: Sequence[str] = ()) -> tuple[str, ...]:
+    def execute(self, target: str, forced: Sequence[str] = ()) -> tuple[str, ...]:
         """Run every stage up to the target that is stale.
 
         Parameters
@@ -55,7 +59,7 @@ class Pipeline:
         wanted = self.stages[: [stage.name for stage in self.stages].index(target) + 1]
         self._compiles = any(stage.function.__module__ == "pzd.simulate.stage" for stage in wanted)
         for number, stage in enumerate(wanted):
-            self._bring(stage, force=stage.name in forced)
+            self._execute_stage(stage, force=stage.name in forced)
             if number == 0:
                 self._after_first(wanted)
         return tuple(dict.fromkeys(mark for marks in self.marks.values() for mark in marks))
@@ -66,18 +70,43 @@ class Pipeline:
         if any("setting" in stage.takes for stage in wanted):
             setting_of(self.config, self.run)
 
-    def _bring(self, stage: Stage, *, force: bool) -> None:
+    def _execute_stage(self, stage: Stage, *, force: bool) -> None:
         inputs = dependencies(stage, self.config, self.run, self._carried(stage, ()))
-        kept = self.run.kept(stage.folder)
-        reason = "forced" if force else stale(kept, inputs)
+        state = self.run.stage_folder(stage.folder)
+        reason = "forced" if force else stale(state, inputs)
         if reason is None:
-            self.marks[stage.folder] = self._marks_as_it_stands(stage, kept)
-            by_hand = f"; edited by hand and kept: {', '.join(kept.edited)}" if kept.edited else ""
+            self.marks[stage.folder] = self._marks_as_it_stands(stage, state)
+            by_hand = f"; edited by hand and kept: {', '.join(state.edited)}" if state.edited else ""
             self._say(stage, f"fresh: nothing it depends on has changed{by_hand}")
             return
-        lost = f"; edited by hand, now beside the new as .edited: {', '.join(kept.edited)}" if kept.edited else ""
+        lost = f"; edited by hand, now beside the new as .edited: {', '.join(state.edited)}" if state.edited else ""
         self._say(stage, f"runs: {reason}{lost}")
         self._run(stage, inputs)
+
+    def stale_stages(self) -> dict[str, str]:
+        """Why the results of each stage are not what it would make today, by its name; nothing is run or written."""
+        reasons: dict[str, str] = {}
+        results: set[str] = set()
+        for stage in self.stages:
+            state = self.run.stage_folder(stage.folder)
+            if state.manifest:
+                results.add(stage.name)
+            reason = self._why_stale(stage, state) or self._made_from_stale(stage, reasons)
+            if reason is not None:
+                reasons[stage.name] = reason
+        return {name: reason for name, reason in reasons.items() if name in results}
+
+    def _why_stale(self, stage: Stage, state: StageFolder) -> str | None:
+        try:
+            self.marks[stage.folder] = self._marks_as_it_stands(stage, state)
+            return stale(state, dependencies(stage, self.config, self.run, self._carried(stage, ())))
+        except UserError as error:
+            return f"it would be refused: {'; '.join(error.messages)}"
+
+    def _made_from_stale(self, stage: Stage, reasons: Mapping[str, str]) -> str | None:
+        needed = {kind.folder for kind in stage.takes.values() if is_artefact(kind)}
+        makers = [maker.name for maker in self.stages if maker.folder in needed and maker.name in reasons]
+        return f"it is made from {' and '.join(makers)}" if makers else None
 
     def _run(self, stage: Stage, inputs: dict[str, str]) -> None:
         if self._compiles:
@@ -87,7 +116,7 @@ class Pipeline:
             self._compiles = False
         begun = time.monotonic()
         artefact = self.made(stage)
-        marks = self._carried(stage, getattr(artefact, "untrusted", ()))
+        marks = self._carried(stage, self._untrusted(artefact))
         seconds = time.monotonic() - begun
         self.run.write(stage.name, artefact, inputs, key_of(inputs), marks, seconds, self.jobs)
         self.marks[stage.folder] = marks
@@ -107,7 +136,8 @@ class Pipeline:
             return self.run.control
         if name == "setting":
             return setting_of(self.config, self.run)
-        return {"seed": self.config.seed, "folder": self.run.config.parent, "jobs": self.jobs}[name]
+        given = {"seed": self.config.seed, "folder": self.run.config.parent}
+        return (given | {"jobs": self.jobs, "progress": self.progress})[name]
 
     def _read_back(self, kind: type[Artefact]) -> Artefact:
         """An artefact as its files have it: read and checked once, and again where they have changed since."""
@@ -118,11 +148,16 @@ class Pipeline:
             self._in_hand[kind.folder] = (now, artefact)
         return artefact
 
-    def _marks_as_it_stands(self, stage: Stage, kept: Kept) -> tuple[str, ...]:
+    def _marks_as_it_stands(self, stage: Stage, state: StageFolder) -> tuple[str, ...]:
         """The marks of the manifest, or of the artefact itself where it was edited, which checks it too."""
-        if kept.edited:
-            return self._carried(stage, getattr(self._read_back(stage.makes), "untrusted", ()))
-        return kept.manifest.marks if kept.manifest else ()
+        if state.edited:
+            return self._carried(stage, self._untrusted(self._read_back(stage.makes)))
+        return state.manifest.marks if state.manifest else ()
+
+    def _untrusted(self, artefact: Artefact) -> tuple[str, ...]:
+        """Why an artefact is not to be trusted as it stands, in the units of the config."""
+        reasons = getattr(artefact, "untrusted", None)
+        return reasons(self.run.control) if reasons else ()
 
     def _carried(self, stage: Stage, own: Sequence[str]) -> tuple[str, ...]:
         """A stage's own marks behind those of what it was made from."""
@@ -133,12 +168,12 @@ class Pipeline:
         self.say(f"{stage.name:<10} {line}")
 
 
-def stale(kept: Kept, inputs: dict[str, str]) -> str | None:
+def stale(state: StageFolder, inputs: dict[str, str]) -> str | None:
     """Why a stage must run, in words; None where it need not."""
-    if kept.manifest is None:
+    if state.manifest is None:
         return "no result of it stands here"
-    if kept.missing:
-        return f"{', '.join(kept.missing)} missing"
-    if kept.manifest.key != key_of(inputs):
-        return changes(kept.manifest.inputs, inputs) or "its manifest was edited"
+    if state.missing:
+        return f"{', '.join(state.missing)} missing"
+    if state.manifest.key != key_of(inputs):
+        return changes(state.manifest.inputs, inputs) or "its manifest was edited"
     return None

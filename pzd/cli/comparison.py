@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from pzd.cli.layout import interval, number
 
 if TYPE_CHECKING:
-    from pzd.pipeline.standing import Standing
+    from pzd.pipeline.run_summary import RunSummary
 
 Column = dict[str, str]
 
 
-def beside(runs: Sequence[Standing]) -> list[list[str]]:
+def comparison(runs: Sequence[RunSummary]) -> list[list[str]]:
     """Rows of text; a dash where a run has no such number."""
     columns = [_parameters(run) | _diagnosis(run) | _rides(run) | _comfort(run) for run in runs]
     names = list(dict.fromkeys(name for column in columns for name in column))
@@ -21,7 +21,7 @@ def beside(runs: Sequence[Standing]) -> list[list[str]]:
     return [head, *([name, *(column.get(name, "-") for column in columns)] for name in names)]
 
 
-def _parameters(run: Standing) -> Column:
+def _parameters(run: RunSummary) -> Column:
     column: Column = {}
     for row in run.parameters:
         place = [
@@ -41,7 +41,7 @@ def _with_unit(value: float | None, unit: str) -> list[str]:
     return [] if value is None else [f"{number(value)} {unit}"]
 
 
-def _diagnosis(run: Standing) -> Column:
+def _diagnosis(run: RunSummary) -> Column:
     found = run.diagnosis
     if found is None:
         return {}
@@ -54,7 +54,7 @@ def _diagnosis(run: Standing) -> Column:
     }
 
 
-def _rides(run: Standing) -> Column:
+def _rides(run: RunSummary) -> Column:
     column: Column = {}
     for row in run.summary:
         column[f"{row.case}: peak |a_K| at {row.point} [m/s2]"] = number(row.peak_abs_aK_m_per_s2)
@@ -62,7 +62,7 @@ def _rides(run: Standing) -> Column:
     return column
 
 
-def _comfort(run: Standing) -> Column:
+def _comfort(run: RunSummary) -> Column:
     return {
         f"{row.case}: {row.measure} at {row.point} [{row.unit}], {row.edition}": number(row.value)
         for row in run.comfort
