@@ -217,3 +217,93 @@ def test_a_file_that_is_no_text_is_called_what_it_is_whatever_its_name(tmp_path:
         assert "encoding" not in said
         with pytest.raises(DataError, match=f"this is {kind}"):
             guessed([openpyxl_like])
+
+
+# ---------------------------------------------------------------- what the file says otherwise than the config
+
+
+def test_a_header_with_another_unit_than_the_config_is_a_finding(tmp_path: Path) -> None:
+    heads = {"time_s": TIME, "displacement_m": X, "Load [kN]": FORCE}
+    write(tmp_path / "a.csv", lines(heads))
+    entry = {"path": "a.csv", "columns": {"force": "Load [kN]"}, "units": {"force": "N"}}
+    assert checks(tmp_path, entry) == ["units: force, whose header is 'Load [kN]'; the config says N"]
+    assert checks(tmp_path, entry | {"units": {"force": "0.001 kN"}}) == [
+        "units: force, whose header is 'Load [kN]'; the config says 0.001 kN"
+    ]
+    write(tmp_path / "a.csv", lines({"time_s": TIME, "displacement_m": X, "Load [N]": FORCE}))
+    assert checks(tmp_path, {"path": "a.csv", "columns": {"force": "Load [N]"}, "units": {"force": "newton"}}) == []
+
+
+def test_headers_that_count_compression_ask_for_a_sign(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", lines({"time_s": TIME, "Compression [m]": -X, "Druckkraft [N]": -FORCE}))
+    entry = {"path": "a.csv", "columns": {"displacement": "Compression [m]", "force": "Druckkraft [N]"}}
+    assert [said.split(",")[0] for said in checks(tmp_path, entry)] == ["sign: displacement", "sign: force"]
+    turned = run(tmp_path, entry | {"sign": {"displacement": -1, "force": -1}})
+    assert turned.entries[0].findings == ()
+    assert np.abs(turned.records[0].force - FORCE).max() < 1e-5
+    assert checks(tmp_path, entry | {"sign": {"displacement": 1, "force": 1}}) == []
+
+
+def test_a_pattern_that_fits_twice_or_leaves_out_a_minus_is_refused(tmp_path: Path) -> None:
+    plain = {name: values for name, values in CANONICAL.items() if name != "voltage_V"}
+    write(tmp_path / "25mm_100V_-10C.csv", lines(plain))
+    loose = {"path": "*.csv", "pattern": "(?P<voltage>[0-9.]+)", "units": {"voltage": "V"}}
+    assert "fits in 3 places (25 and 100 and 10)" in wrong(tmp_path, loose)[0]
+    cold = {"path": "*.csv", "pattern": "(?P<temperature>[0-9]+)C", "units": {"temperature": "degC"}}
+    assert "the minus in front of a number is left out" in wrong(tmp_path, cold)[0]
+    right = {"path": "*.csv", "pattern": "(?P<temperature>-?[0-9]+)C", "units": {"temperature": "degC"}}
+    assert run(tmp_path, right).entries[0].temperature_degC == -10.0
+
+
+# ---------------------------------------------------------------- held channels, missing samples, odd sizes
+
+
+def held(values: np.ndarray) -> np.ndarray:
+    result = values.copy()
+    result[2010:2050] = result[2009]
+    return result
+
+
+def test_channels_that_are_held_and_samples_that_are_missing_are_said(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    noisy = LONG_FORCE + rng.standard_normal(8000)
+    gone = {name: np.delete(values, np.s_[3000:3100]) for name, values in LONGER.items()} | {"time_s": LONG[:-100]}
+    missing = noisy.copy()
+    missing[3000:3060] = -9999.0
+    ways = {
+        "force": LONGER | {"force_N": held(noisy)},
+        "displacement": LONGER | {"displacement_m": held(LONG_X), "force_N": noisy},
+        "gone": gone,
+        "missing": LONGER | {"force_N": missing},
+        "sound": LONGER | {"force_N": noisy},
+        "digitised": LONGER | {"force_N": np.round(LONG_FORCE), "displacement_m": np.round(LONG_X, 5)},
+    }
+    for name, columns in ways.items():
+        write(tmp_path / f"{name}.csv", lines(columns))
+    found = {e.name: [f.where.split(",")[0] for f in e.findings if f.check == "jumps"] for e in run(tmp_path).entries}
+    assert found == {
+        "force": ["force"],
+        "displacement": ["displacement"],
+        "gone": ["displacement"],
+        "missing": ["force"],
+        "sound": [],
+        "digitised": [],
+    }
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"temperature_degC": np.full(500, 295.0)}, "temperature of the whole record"),
+        ({"temperature_degC": np.full(500, 180.0)}, "temperature of the whole record"),
+        ({"voltage_V": np.full(500, 1e5)}, "voltage of the whole record"),
+        ({"force_N": 1e3 * FORCE}, "peak force of the whole record"),
+    ],
+)
+def test_kelvin_millivolts_and_newtons_called_kilonewtons_are_suspected(
+    tmp_path: Path, changed: dict[str, object], said: str
+) -> None:
+    write(tmp_path / "a.csv", lines(CANONICAL | changed))
+    assert f"scale: {said}" in checks(tmp_path)
+    write(tmp_path / "a.csv", lines(CANONICAL | {"temperature_degC": np.full(500, 80.0)}))
+    assert checks(tmp_path) == []

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.quantities import ACCELERATION, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Quantity
+from pzd.artefacts import Finding
+from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Quantity
 from pzd.record import Array
 from pzd.rig.files.layout import LABELS, NEEDED, ChannelSpec, Layout
 from pzd.rig.files.sheet import Sheet
@@ -14,6 +16,8 @@ from pzd.rig.files.units import UnitError, in_header, to_canonical
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.nearest import nearest
 
+COMPRESSION = re.compile(r"compr|druckkraft|einfed|einschub", re.IGNORECASE)
+"""Words of a header that counts compression positive."""
 OPTIONAL = (VELOCITY, ACCELERATION, VOLTAGE, TEMPERATURE, PRESSURE)
 """Quantities whose column may be wholly empty, which counts as absent."""
 
@@ -34,6 +38,8 @@ class Channels:
     """Canonical quantity -> (rows,); the control signal under `VOLTAGE`."""
     faults: tuple[str, ...] = ()
     """Cells that are bad or empty, each with its line."""
+    remarks: tuple[Finding, ...] = ()
+    """What the file itself says otherwise than the config."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +53,7 @@ class _Source:
     @property
     def dated(self) -> bool:
         """Whether the cells are dates and times."""
-        return self.spec.quantity is TIME and "%" in self.unit
+        return self.spec.dated or (self.spec.quantity is TIME and "%S" in self.unit)
 
 
 def channels(sheet: Sheet, layout: Layout) -> Channels:
@@ -85,7 +91,49 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
         except UnitError as fault:
             raise ConfigError(f"{layout.place}.units: {fault} (in {sheet.path})") from None
         values[source.spec.quantity] = _steady(channel) if source.spec.quantity in LABELS else channel
-    return Channels(_clock(sheet, found), tuple(faults)) if faults else Channels(values)
+    return Channels(_clock(sheet, found), tuple(faults)) if faults else Channels(values, remarks=_remarks(sheet, found))
+
+
+def _remarks(sheet: Sheet, found: list[_Source]) -> tuple[Finding, ...]:
+    """Headers that name another unit or another sign than the one the channel was read with."""
+    remarks: list[Finding] = []
+    for source in found:
+        spec, header = source.spec, sheet.header[source.column]
+        ratio = _unit_of_header_over_ours(source, sheet)
+        if abs(ratio - 1.0) > 1e-9:
+            remarks.append(
+                Finding(
+                    check="units",
+                    where=f"{spec.own.name}, whose header is {header!r}; the config says {source.unit}",
+                    size=ratio,
+                    unit="-",
+                    follows="the config was taken; by the header the channel would be this many times as large",
+                )
+            )
+        if spec.quantity in (DISPLACEMENT, FORCE) and not spec.sign_said and COMPRESSION.search(header):
+            remarks.append(
+                Finding(
+                    check="sign",
+                    where=f"{spec.own.name}, whose header is {header!r}",
+                    size=float(spec.sign),
+                    unit="-",
+                    follows=f"extension is positive: say sign: {{{spec.own.name}: -1}}, or 1 if it is so already",
+                )
+            )
+    return tuple(remarks)
+
+
+def _unit_of_header_over_ours(source: _Source, sheet: Sheet) -> float:
+    """How many times as large a channel would be by the unit that its header names; 1 where that says nothing."""
+    spec, header = source.spec, sheet.header[source.column]
+    told = spec.own.unit if header in spec.canonical_headers else in_header(header, spec.own)
+    if spec.unit is None or told is None or source.dated or spec.quantity is TEMPERATURE:
+        return 1.0
+    try:
+        theirs, ours = (float(to_canonical(np.ones(1), unit, spec.own)[0]) for unit in (told, source.unit))
+    except UnitError:
+        return 1.0
+    return theirs / ours
 
 
 def _steady(channel: Array) -> Array:

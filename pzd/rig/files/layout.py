@@ -48,6 +48,8 @@ class ChannelSpec:
     """Headers that are read without being named; their unit is known."""
     headers: tuple[str, ...]
     """Headers that this quantity may have in a file."""
+    sign_said: bool
+    """Whether the config names a sign, be it 1."""
     dated: bool
     """Whether the config says that the cells are dates and times."""
 
@@ -98,6 +100,7 @@ class Layout:
             if match is None:
                 faults.append(f"{place}.pattern: the file's name does not match {entry.pattern!r} (got {path.name})")
             else:
+                faults += self._misfits(path.stem if re.search(entry.pattern, path.stem) else path.name, path)
                 groups = match.groupdict()
                 setting = groups.pop("setting", None) or setting
                 values |= self._from_name(groups, path, faults)
@@ -107,6 +110,22 @@ class Layout:
 
     def _labels(self) -> list[ChannelSpec]:
         return [spec for spec in self.channels if spec.quantity in LABELS]
+
+    def _misfits(self, name: str, path: Path) -> list[str]:
+        """Where the pattern fits the file's name in several places, or leaves out a minus."""
+        found = list(re.finditer(self.entry.pattern or "", name))
+        values = list(dict.fromkeys(", ".join(filter(None, match.groups())) for match in found))
+        if len(values) > 1:
+            places = f"{len(values)} places ({' and '.join(values)})"
+            remedy = f"add what stands around the right one (got {path.name})"
+            return [f"{self.place}.pattern: the file's name fits in {places}; {remedy}"]
+        starts = [found[0].start(group) for group in found[0].re.groupindex if group != "setting"]
+        left_out = [
+            at for at in starts if at > 0 and name[at - 1] == "-" and not name[max(at - 2, 0) : at - 1].isalnum()
+        ]
+        if not left_out:
+            return []
+        return [f"{self.place}.pattern: the minus in front of a number is left out; write -? (got {path.name})"]
 
     def _from_name(self, groups: dict[str, str | None], path: Path, faults: list[str]) -> Values:
         values: Values = {}
@@ -155,7 +174,8 @@ def _spec(quantity: Quantity, entry: FilesEntry, control: Control) -> ChannelSpe
     canonical = (own.column,) if also is None else (own.column, also)
     headers = canonical if named is None else (named.strip(),) if named.strip() else ()
     dated = quantity is TIME and unit is not None and "%" in unit
-    return ChannelSpec(quantity, own, named, unit, _of(entry.sign, own, quantity) or 1, canonical, headers, dated)
+    sign = _of(entry.sign, own, quantity)
+    return ChannelSpec(quantity, own, named, unit, sign or 1, canonical, headers, sign is not None, dated)
 
 
 def _faults(layout: Layout) -> list[str]:

@@ -44,7 +44,7 @@ def measured(name: str, test: Test, freed: Freed, limits: Limits, control: Contr
         freed.force,
         *(test.channels.get(quantity) for quantity in (VOLTAGE, TEMPERATURE, PRESSURE)),
     )
-    return Measured(record, run, clean, limits, freed.said or None, control)
+    return Measured(record, run, clean, limits, freed.said or None, control, test.remarks)
 
 
 def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:

@@ -95,7 +95,7 @@ def _two_rates(test: Test) -> list[str]:
         turn = int(np.argmax(np.abs(np.log(steps[near] / old)) > 0.5 * np.log(OTHER_RATE))) + near.start
         rates = f"the clock goes on at {1.0 / new:.4g} Hz here, at {1.0 / old:.4g} Hz before"
         remedy = "cut the file here, e.g. with split: {gap_s: ...} at a pause, or resample it"
-        return [f"{test.place(turn + 1)}: {rates}; a record has one rate: {remedy}"]
+        return [f"{test.place(int(turn) + 1)}: {rates}; a record has one rate: {remedy}"]
     return []
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.artefacts import Finding
 from pzd.quantities import FORCE, TIME, Quantity
 from pzd.record import Array
 from pzd.rig.config import Split
@@ -30,6 +31,8 @@ class Test:
     sheet: Sheet
     first: int = 0
     """Row of the sheet at which the test begins."""
+    remarks: tuple[Finding, ...] = ()
+    """What the file itself says otherwise than the config."""
     faults: tuple[str, ...] = ()
     """Cells that are bad or empty; then the test is the whole file, uncut."""
     force_sign: int = 1
@@ -81,6 +84,7 @@ def split_into_tests(
             _piece(channels.values, values, index, first, last),
             sheet,
             first,
+            channels.remarks,
             force_sign=next(spec.sign for spec in layout.channels if spec.quantity is FORCE),
             whole=split is None,
         )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE
+from pzd.rig.files.channels import COMPRESSION
 from pzd.rig.files.fixture import Freed
 from pzd.rig.files.layout import Layout
 from pzd.rig.files.splitting import Test
@@ -15,8 +15,6 @@ from pzd.signals.work import work
 
 CLEAR_OFFSET = 0.1
 """Mean force, as a share of half the force's range, from which its sign says which way the force is counted."""
-COMPRESSION = re.compile(r"compr|bump|druck|einfed|einschub|enfonc", re.IGNORECASE)
-"""Words of a header that count compression positive."""
 
 
 def works_on_the_rig(freed: Freed) -> bool:

@@ -36,6 +36,8 @@ class Measured:
     removed: str | None = None
     control: Control = field(default_factory=Control)
     """The control signal, recorded as the voltage."""
+    remarks: tuple[Finding, ...] = ()
+    """What the file itself says otherwise than the config."""
 
     def channels(self) -> tuple[Channel, ...]:
         """Every recorded channel but the clock: what is sensed of the motion first, then what labels the record."""
@@ -75,8 +77,8 @@ def checks() -> dict[str, ModuleType]:
 
 
 def findings(test: Measured) -> tuple[Finding, ...]:
-    """What every check found in one record, in the order of the checks' names."""
-    return tuple(finding for module in checks().values() for finding in module.check(test))
+    """What the file remarks, and what every check found in one record, in the order of the checks' names."""
+    return (*test.remarks, *(finding for module in checks().values() for finding in module.check(test)))
 
 
 def examined(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:

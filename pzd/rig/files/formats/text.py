@@ -202,7 +202,7 @@ def _sheet(
     if units is not None and len(units) != len(header):
         raise DataError(f"{at(path, int(lines[0]) - 1)}: {len(units)} units for {len(header)} columns")
     table = _Table(path, tuple(header), body, lines, separator, entry.decimal)
-    dated = [i for i, head in enumerate(header) if "%" in head or (units is not None and "%" in units[i])]
+    dated = [i for i, head in enumerate(header) if "%S" in head or (units is not None and "%S" in units[i])]
     numbers, faults = table.numbers([i for i, head in enumerate(header) if head in wanted.numbers and i not in dated])
     texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
     return Sheet(path, tuple(header), header_line, units, int(lines.size), lines, numbers, texts, faults)
