@@ -9,6 +9,8 @@ from pzd.artefacts import Finding
 from pzd.record import Array
 from pzd.rig.preflight import Measured
 
+Rows = NDArray[np.intp]
+
 LEAST_HELD = 5
 """Equal samples from which a channel was held: a busy logger repeats its last value, or writes -9999."""
 LONG_HELD = 20
@@ -30,14 +32,15 @@ def check(test: Measured) -> list[Finding]:
     record, v = test.record, test.clean.velocity
     found: list[Finding] = []
     for name, unit, values in (("force", "N", record.force), ("displacement", "m", record.displacement)):
-        ends = _held_until(values)
         if name == "force":
+            ends = np.union1d(_jumping_on(values), _oddly_long(values))
             moving = np.abs(v) > IN_MOTION * float(np.percentile(np.abs(v), 99.0))
             middle = float(np.median(values))
             spread = 1.4826 * float(np.median(np.abs(values - middle)))
             ends = ends[moving[ends] | (np.abs(values[ends] - middle) > FAR_OFF * spread)]
         else:
-            ends = np.union1d(ends, _alone(values))
+            # A motion may dwell, before the test or in it: only a jump tells that it went on unseen.
+            ends = np.union1d(_jumping_on(values), _alone(values))
         if ends.size:
             steps = np.diff(values)[ends]
             worst = int(ends[np.argmax(np.abs(steps))])
@@ -58,22 +61,31 @@ def _least(values: Array) -> float:
     return max(JUMP * float(np.percentile(np.abs(np.diff(values)), 99.0)), SHARE * float(high - low), 1e-300)
 
 
-def _held_until(values: Array) -> NDArray[np.int64]:
-    """Last rows of runs of equal samples from which the channel jumps on, or that are much longer than any other.
-
-    Runs at the extremes are another check's: there the channel was cut off.
-    """
+def _runs(values: Array) -> tuple[Rows, Rows]:
+    """Last rows and lengths of the runs of equal samples, the last one left out."""
     change = np.flatnonzero(np.diff(values) != 0.0)
-    lengths = np.diff(change, prepend=-1)
-    jumps = (lengths >= LEAST_HELD) & (np.abs(values[change + 1] - values[change]) > _least(values))
+    return change, np.diff(change, prepend=-1)
+
+
+def _jumping_on(values: Array) -> Rows:
+    """Last rows of runs of equal samples from which the channel jumps on."""
+    ends, lengths = _runs(values)
+    jumps: Rows = ends[(lengths >= LEAST_HELD) & (np.abs(values[ends + 1] - values[ends]) > _least(values))]
+    return jumps
+
+
+def _oddly_long(values: Array) -> Rows:
+    """Last rows of runs much longer than any other; not at the extremes, where a channel is cut off."""
+    ends, lengths = _runs(values)
     usual = float(np.percentile(lengths, 99.0))
-    extreme = (values[change] == values.max()) | (values[change] == values.min())
-    odd = (lengths >= LONG_HELD) & (lengths >= JUMP * usual) & ~extreme
-    return change[jumps | odd]
+    extreme = (values[ends] == values.max()) | (values[ends] == values.min())
+    odd: Rows = ends[(lengths >= LONG_HELD) & (lengths >= JUMP * usual) & ~extreme]
+    return odd
 
 
-def _alone(values: Array) -> NDArray[np.int64]:
+def _alone(values: Array) -> Rows:
     """Rows from which the channel jumps in one sample, and goes on as it went before."""
     steps = np.abs(np.diff(values))
     rows = np.flatnonzero(steps[1:-1] > np.maximum(_least(values), ALONE * np.maximum(steps[:-2], steps[2:]))) + 1
-    return rows.astype(np.int64)
+    alone: Rows = rows
+    return alone
