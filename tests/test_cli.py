@@ -184,6 +184,24 @@ def test_a_path_that_matches_no_file_is_a_wrong_config(typed: Terminal) -> None:
     assert message.startswith("--set rig.files.0.path: no such file")
 
 
+def test_a_file_of_expected_numbers_at_fault_is_refused_before_anything_runs(typed: Terminal) -> None:
+    Path("lab.csv").write_text("id,selector,value,unit\npeak,measures.peak_forc,1,N\n")
+    for command in ("run", "report", "check"):
+        assert typed(command, "first.yaml", "--set", "report.reference=lab.csv") == 3
+        (message,) = typed.err
+        assert message.startswith("lab.csv:2: selector: no number of a run is called so; did you mean measures.peak_f")
+        assert typed(command, "first.yaml", "--set", "report.reference=makowski2012") == 2
+        (message,) = typed.err
+        assert message.startswith("--set report.reference: there is no such file; did you mean makowski2021?")
+    assert not Path("runs").exists()
+
+
+def test_a_key_of_an_earlier_version_names_the_one_in_its_place(typed: Terminal) -> None:
+    typed.config.write_text(typed.config.read_text() + "report:\n  published: true\n")
+    assert typed("run", "first.yaml") == 2
+    assert typed.err == ["first.yaml:5:3: report.published: no such key; did you mean reference? (got published)"]
+
+
 def test_a_setting_that_no_record_has_is_refused_once_the_records_are_known(typed: Terminal) -> None:
     assert typed("run", "first.yaml", "--set", "setting=gap") == 2
     assert [line.split()[0] for line in typed.out] == ["ingest", "ingest"]

@@ -17,7 +17,7 @@ from pzd.artefacts import Identified, Manifest, Rig
 from pzd.cli import start
 from pzd.config import load
 from pzd.damper.effects import library
-from pzd.pipeline.command import execute, opened
+from pzd.pipeline.command import execute, opened, stale_stages
 from pzd.pipeline.execution import Pipeline
 from pzd.pipeline.sources import PACKAGE, _file, _used, code_hash, modules_used
 from pzd.pipeline.stages import Stage, stages
@@ -118,6 +118,18 @@ def test_a_rig_file_that_changes_reruns_everything(bench: Bench) -> None:
     assert bench() == NAMES
     assert "a.csv has changed" in bench.said("ingest")
     assert "1-rig/a.csv has changed" in bench.said("identify")
+
+
+def test_expected_numbers_that_change_rerun_the_report_alone(bench: Bench) -> None:
+    path = bench.config.parent / "lab.csv"
+    path.write_text("id,value,unit\npeak,1,N\n")
+    bench("report.reference=lab.csv")
+    assert bench("report.reference=lab.csv") == []
+    path.write_text("id,value,unit\npeak,2,N\n")
+    assert bench("report.reference=lab.csv") == ["report"]
+    assert bench.said("report") == "report     runs: lab.csv has changed"
+    path.unlink()
+    assert stale_stages(opened(bench.config, bench.runs, ["report.reference=lab.csv"])) == {"report": "lab.csv is gone"}
 
 
 def test_many_files_that_change_are_counted_and_not_listed(bench: Bench) -> None:

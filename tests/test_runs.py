@@ -244,10 +244,9 @@ def test_a_folder_of_another_config_of_the_same_stem_is_refused_and_both_are_nam
 def test_a_config_named_by_another_path_is_the_same(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(run, identified(3.0))
     monkeypatch.chdir(tmp_path)
-    Run.of(Path("first.yaml"), Path("runs"), CONTROL)
-    (tmp_path / "link.yaml").symlink_to(tmp_path / "first.yaml")
     (tmp_path / "sub").mkdir()
-    Run.of(Path("sub/../first.yaml"), Path("runs"), CONTROL)
+    for named in (Path("first.yaml"), Path("sub/../first.yaml")):
+        assert level(Run.of(named, Path("runs"), CONTROL)) == 3.0
 
 
 def test_a_project_that_was_moved_keeps_its_runs(tmp_path: Path) -> None:

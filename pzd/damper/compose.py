@@ -84,7 +84,7 @@ def with_parallel(force: Array, parallel: Array | None, motion: Motion) -> Array
     Parameters
     ----------
     force : (n,) of the element [N]
-    beside : (n, m) or (1, m) rows of the parallel effects; None without any
+    parallel : (n, m) or (1, m) rows of the parallel effects; None without any
     motion : (n,) sampled motion
     """
     if parallel is None:

@@ -86,8 +86,20 @@ def execute(
     last = LAST if target == "run" else target
     _right_source(line, last)
     forced = [stage.name for stage in line if target in ("run", stage.name)] if force else []
+    if last == LAST:
+        _check_reference(given)
     with given.placed(), given.run.locked(f"pzd {target}"):
         return Pipeline(given.config, given.run, line, say, progress, jobs).execute(last, forced)
+
+
+def _check_reference(given: Opened) -> None:
+    """Refuse a file of expected numbers that is at fault before anything runs, though only the report reads it."""
+    if given.config.report.reference is not None:
+        from pzd.report.reference import file_of, read_reference
+
+        with given.placed():
+            path = file_of(given.config.report.reference, given.run.config.parent)
+        read_reference(path, given.run.control)
 
 
 def _right_source(line: Sequence[Stage], target: str) -> None:
@@ -109,6 +121,7 @@ def preflight(given: Opened) -> tuple[RecordEntry, ...]:
     UserError : what a run would be refused for
     """
     first = stages(given.config)[0]
+    _check_reference(given)
     with given.placed():
         made = Pipeline(given.config, given.run, (first,), lambda _: None).made(first)
     return made.entries if isinstance(made, Rig) else ()

@@ -122,6 +122,10 @@ def _files_named(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
     named = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
     try:
         files = [file for value in named for file in matching(folder, value)]
+        if expected := values.get("report.reference"):
+            from pzd.report.reference import path_of
+
+            files += [path for path in (path_of(expected, folder),) if path.is_file()]
         return {Path(os.path.relpath(file, folder)).as_posix(): file_hash(file) for file in files}
     except OSError as error:
         raise FilesError(f"{error.filename}: {error.strerror}") from error

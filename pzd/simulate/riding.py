@@ -104,7 +104,7 @@ def ride_case(
     config : the block
     case : what to ride
     profile : the road
-    grid, oil : the damper as table and with its dynamics
+    grid, damper : the damper as table and with its dynamics
     ends : whether the table ends where the rig did, so that a ride beyond is refused
 
     Returns

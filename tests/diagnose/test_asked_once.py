@@ -23,9 +23,9 @@ PLAIN = damper_of(TWO)
 
 
 @pytest.fixture
-def asked(fresh_seeds: Callable[[int], list[int]]) -> Callable[[int], Campaign]:
+def asked(rng: np.random.Generator) -> Callable[[int], Campaign]:
     """The same campaign, so many records at the same time."""
-    prepared = prepare(sines(PLAIN, np.random.default_rng(fresh_seeds(1)[0]), TWO))
+    prepared = prepare(sines(PLAIN, rng, TWO))
 
     def made(jobs: int) -> Campaign:
         return Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig(), jobs)

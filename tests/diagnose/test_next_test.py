@@ -36,18 +36,17 @@ def peak_acceleration(waveform: str, frequency: float, amplitude: float) -> floa
 
 def proposed(reach: Reach) -> tuple[NextTest, float, float, float] | None:
     """The test, and its frequency, amplitude and middle."""
-    told = next_test(RIVALS, reach, None)
-    if told is None:
+    found = next_test(RIVALS, reach, None)
+    if found is None:
         return None
-    assert told.frequency_Hz is not None
-    assert told.amplitude_m is not None
-    assert told.middle_m is not None
-    return told, told.frequency_Hz, told.amplitude_m, told.middle_m
+    assert found.frequency_Hz is not None
+    assert found.amplitude_m is not None
+    assert found.middle_m is not None
+    return found, found.frequency_Hz, found.amplitude_m, found.middle_m
 
 
-def test_the_test_is_within_stroke_speed_frequency_and_force(fresh_seeds: Callable[[int], list[int]]) -> None:
-    for seed in fresh_seeds(12):
-        draw = np.random.default_rng(seed)
+def test_the_test_is_within_stroke_speed_frequency_and_force(rng: np.random.Generator) -> None:
+    for draw in rng.spawn(12):
         force = 10.0 ** draw.uniform(2, 5)
         reach = Reach(0.0, draw.uniform(0.01, 0.06), draw.uniform(0.1, 1.0), draw.uniform(2.5, 30.0), (-force, force))
         found = proposed(reach)
@@ -125,10 +124,9 @@ def test_a_damper_measured_off_zero_is_moved_within_its_stroke() -> None:
     assert found[3] + found[2] <= 0.05 + 1e-5
 
 
-def test_a_proposed_motion_never_leaves_the_recorded_stroke_speed_and_force() -> None:
+def test_a_proposed_motion_never_leaves_the_recorded_stroke_speed_and_force(rng: np.random.Generator) -> None:
     proposals = 0
-    for seed in range(20):
-        draw = np.random.default_rng(seed)
+    for draw in rng.spawn(20):
         middle = draw.uniform(-0.1, 0.1)
         # What the rivals give at 1 Hz, with room or without.
         size = 10.0 ** draw.uniform(-0.5, 0.5)
@@ -144,17 +142,17 @@ def test_a_proposed_motion_never_leaves_the_recorded_stroke_speed_and_force() ->
         proposals += 1
         motion = moved(told)
         lowest, highest = extremes(prepared, "displacement")
-        assert lowest - 1e-12 <= motion.displacement.min(), seed
-        assert motion.displacement.max() <= highest + 1e-12, seed
+        assert lowest - 1e-12 <= motion.displacement.min(), records
+        assert motion.displacement.max() <= highest + 1e-12, records
         speed = float(np.max(np.abs(motion.velocity)))
-        assert speed <= max(map(abs, extremes(prepared, "velocity"))), seed
+        assert speed <= max(map(abs, extremes(prepared, "velocity"))), records
         assert told.peak_speed_m_per_s == pytest.approx(speed, rel=1e-3)
         low, high = extremes(prepared, "force")
         for (_, damper), offset in zip(RIVALS, (-ALIKE_AT_1_HZ * middle, 0.0), strict=True):
             force = respond(damper, motion)[2000:] + offset
             scratch = 1e-3 * (high - low)  # of the sampling
-            assert low - scratch <= force.min(), seed
-            assert force.max() <= high + scratch, seed
+            assert low - scratch <= force.min(), records
+            assert force.max() <= high + scratch, records
         assert told.peak_force_N is not None
         assert told.peak_force_N <= max(-low, high)
     assert proposals >= 15

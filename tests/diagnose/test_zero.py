@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,9 +40,9 @@ def number(found: Diagnosed, effect: str, name: str) -> float:
 
 
 @pytest.fixture(scope="module")
-def stopped() -> tuple[Diagnosed, Diagnosed]:
+def stopped(generator_for: Callable[[str], np.random.Generator]) -> tuple[Diagnosed, Diagnosed]:
     """A damper with end stops, and the same with 50 mm added to its displacement."""
-    records = sines(damper_of(TWO, end_stop=STOPS), np.random.default_rng(7), TWO)
+    records = sines(damper_of(TWO, end_stop=STOPS), generator_for("end stops"), TWO)
     return diagnosed(records), diagnosed(shifted(records))
 
 
@@ -68,9 +68,9 @@ def test_where_the_gap_lies_is_told_in_the_displacement_as_recorded(stopped: tup
     assert len(there) == len(here) > 0
 
 
-def test_a_gas_spring_and_its_next_test_are_the_same_about_a_shifted_middle() -> None:
+def test_a_gas_spring_and_its_next_test_are_the_same_about_a_shifted_middle(rng: np.random.Generator) -> None:
     tests = ((2.0, 0.015), (2.0, 0.03))
-    records = sines(damper_of(TWO, gas_spring={"k_g": 3000.0}), np.random.default_rng(7), TWO, tests=tests)
+    records = sines(damper_of(TWO, gas_spring={"k_g": 3000.0}), rng, TWO, tests=tests)
     here, there = diagnosed(records), diagnosed(shifted(records))
     assert there.diagnosis.effects == here.diagnosis.effects == ("gas_spring",)
     assert number(there, "gas_spring", "k_g") == pytest.approx(number(here, "gas_spring", "k_g"), rel=1e-3)
@@ -84,26 +84,27 @@ def test_a_gas_spring_and_its_next_test_are_the_same_about_a_shifted_middle() ->
 
 
 def test_the_damper_handed_on_gives_the_recorded_force_in_the_recorded_displacement(
-    stopped: tuple[Diagnosed, Diagnosed],
+    stopped: tuple[Diagnosed, Diagnosed], rng: np.random.Generator
 ) -> None:
     """Pasted into a stand, or asked by a figure: x_e is counted from the damper's zero."""
     damper = damper_of((0.0,), end_stop=STOPS)
-    (record,) = sines(damper, np.random.default_rng(7), (0.0,), tests=((0.5, 0.03),), noise=0.0)
+    (record,) = sines(damper, rng, (0.0,), tests=((0.5, 0.03),), noise=0.0)
     assert damper.moved(SHIFT).zero_m == SHIFT
     here = Motion.of(record)
     there = replace(here, displacement=here.displacement + SHIFT)
     assert respond(damper.moved(SHIFT), there) == pytest.approx(respond(damper, here), abs=1e-4)
     framed = force_in_frame(damper.moved(SHIFT), there, 1e7)
     assert framed == pytest.approx(force_in_frame(damper, here, 1e7), abs=1e-4)
-    record = shifted(sines(damper_of(TWO, end_stop=STOPS), np.random.default_rng(7), (150.0,), noise=0.0))[-1]
+    record = shifted(sines(damper_of(TWO, end_stop=STOPS), rng, (150.0,), noise=0.0))[-1]
     again = respond(stopped[1].damper, Motion.of(record), float(record.force[0]))[500:]
     assert np.sqrt(np.mean((again - record.force[500:]) ** 2)) < 0.02 * np.max(np.abs(record.force))
 
 
-def test_stops_that_do_not_lie_evenly_about_what_was_recorded_are_found_where_they_are() -> None:
+def test_stops_that_do_not_lie_evenly_about_what_was_recorded_are_found_where_they_are(
+    rng: np.random.Generator,
+) -> None:
     """Tests to 30 mm one way and to 24 mm the other, between stops that begin 18 mm from nought."""
     damper = damper_of(TWO, end_stop=STOPS)
-    rng = np.random.default_rng(3)
     found = diagnosed(tuple(off_middle(damper, U, f, a, 0.003, rng) for U in TWO for f in (0.5, 2.0)
                             for a in (0.02, 0.027)))  # fmt: skip
     assert "end_stop" in found.diagnosis.effects, found.diagnosis.reason
@@ -131,10 +132,10 @@ def off_middle(
     )  # fmt: skip
 
 
-def test_a_force_near_one_end_of_an_absolute_displacement_is_no_end_stop() -> None:
+def test_a_force_near_one_end_of_an_absolute_displacement_is_no_end_stop(rng: np.random.Generator) -> None:
     """Tests from 12.7 to 50 mm. Counted from the sensor's zero an end stop begins at 41.4 mm and was named."""
     tests = ((0.5, 0.01), (0.5, 0.0186), (2.0, 0.015), (2.0, 0.0186))
-    records = shifted(sines(damper_of(TWO), np.random.default_rng(5), TWO, tests=tests), 0.03135)
+    records = shifted(sines(damper_of(TWO), rng, TWO, tests=tests), 0.03135)
     told = diagnosed(
         tuple(replace(r, force=r.force + 1e6 * np.maximum(r.displacement - 0.0414, 0.0) ** 2) for r in records)
     ).diagnosis

@@ -33,11 +33,10 @@ def check(test: Measured) -> list[Finding]:
         ]
     if test.run is None:
         return []
-    number = test.run.number(record.time)[1:]
-    # A steady force does no work over a closed cycle, but it does where noise keeps its ends apart.
-    force = record.force - record.force[test.run.inside(record.time)].mean()
-    steps = 0.5 * (force[1:] + force[:-1]) * np.diff(record.displacement)
-    works = np.bincount(number[number >= 0], steps[number >= 0], test.run.count)
+    number = test.run.number(record.time)
+    # Each cycle is closed: left open, a small stroke's noise keeps its ends apart, and the force would do work there.
+    cycles = [number == k for k in range(test.run.count)]
+    works = np.array([work(record.displacement[rows], record.force[rows], closed=True) for rows in cycles])
     negative = np.flatnonzero(works < -least)
     if negative.size == 0:
         return []
