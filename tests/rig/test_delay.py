@@ -29,8 +29,9 @@ def random_motion(rng: np.random.Generator) -> Array:
 
 @pytest.mark.parametrize("rounded_at", [0.005, 0.01, 0.02, 0.05, 0.1, 0.2])
 @pytest.mark.parametrize("motion", ["1 Hz", "2 Hz", "5 Hz", "random"])
-def test_a_rigid_damper_with_sigmoid_friction_is_not_late(motion: str, rounded_at: float) -> None:
-    rng = np.random.default_rng(7)
+def test_a_rigid_damper_with_sigmoid_friction_is_not_late(
+    motion: str, rounded_at: float, rng: np.random.Generator
+) -> None:
     x = random_motion(rng) if motion == "random" else 0.01 * np.sin(2.0 * np.pi * float(motion[0]) * TIME)
     v = np.gradient(x, TIME)
     for noise in (0.0, 5.0):

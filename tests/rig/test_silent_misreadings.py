@@ -111,8 +111,8 @@ def test_a_control_cut_off_at_its_range_is_said_and_a_programme_is_not(tmp_path:
     assert said == {"cut": ["saturation"], "ramps": [], "steps": []}
 
 
-def test_labels_that_are_constant_but_for_rounding_are_constants(tmp_path: Path) -> None:
-    rounding = 1e-13 * np.random.default_rng(1).standard_normal(8000)
+def test_labels_that_are_constant_but_for_rounding_are_constants(tmp_path: Path, rng: np.random.Generator) -> None:
+    rounding = 1e-13 * rng.standard_normal(8000)
     text = [
         f"{t!r},{x!r},{f!r},{u!r},{d!r}"
         for t, x, f, u, d in zip(
@@ -151,8 +151,7 @@ def test_a_second_sampling_rate_after_a_pause_is_refused_with_its_line_and_read_
     assert rates == pytest.approx([500.0, 100.0])
 
 
-def test_lost_samples_and_jitter_are_no_second_rate(tmp_path: Path) -> None:
-    rng = np.random.default_rng(3)
+def test_lost_samples_and_jitter_are_no_second_rate(tmp_path: Path, rng: np.random.Generator) -> None:
     time = LONG + 2e-4 * rng.uniform(-1.0, 1.0, LONG.size)
     kept = np.delete(np.arange(LONG.size), [*range(3000, 3400), *rng.choice(LONG.size, 300, replace=False)])
     write(tmp_path / "a.csv", lines({"time_s": time[kept], **{k: v[kept] for k, v in list(LONGER.items())[1:]}}))
@@ -264,8 +263,7 @@ def held(values: np.ndarray) -> np.ndarray:
     return result
 
 
-def test_channels_that_are_held_and_samples_that_are_missing_are_said(tmp_path: Path) -> None:
-    rng = np.random.default_rng(5)
+def test_channels_that_are_held_and_samples_that_are_missing_are_said(tmp_path: Path, rng: np.random.Generator) -> None:
     noisy = LONG_FORCE + rng.standard_normal(8000)
     gone = {name: np.delete(values, np.s_[3000:3100]) for name, values in LONGER.items()} | {"time_s": LONG[:-100]}
     missing = noisy.copy()
