@@ -15,12 +15,16 @@ LEAST_HELD = 5
 """Equal samples from which a channel was held: a busy logger repeats its last value, or writes -9999."""
 LONG_HELD = 20
 """Equal samples from which a run is odd where others are a fifth as long at most; digits at a peak repeat less."""
+QUIET = 0.1
+"""Share of the samples that repeat the last one, held runs aside, from which a channel is too quiet to tell."""
 JUMP = 5.0
 """A jump is so many times as large as the steepest usual step from one sample to the next,"""
 SHARE = 0.02
 """and this share of the channel's usual range,"""
 ALONE = 3.0
 """and of the displacement so many times as large as the steps before and after: nothing moves so for one sample."""
+LOST = 1.5
+"""Steps of the clock, in median ones, from which samples are lost."""
 IN_MOTION = 0.2
 """A force is held where it jumps at this share of the top speed or more: at rest friction may hold it, and let go."""
 FAR_OFF = 20.0
@@ -41,6 +45,8 @@ def check(test: Measured) -> list[Finding]:
         else:
             # A motion may dwell, before the test or in it: only a jump tells that it went on unseen.
             ends = np.union1d(_jumping_on(values), _alone(values))
+        # Across a gap of the clock a jump is what the lost samples did, which another check says.
+        ends = ends[np.diff(record.time)[ends] < LOST * float(np.median(np.diff(record.time)))]
         if ends.size:
             steps = np.diff(values)[ends]
             worst = int(ends[np.argmax(np.abs(steps))])
@@ -79,8 +85,10 @@ def _oddly_long(values: Array) -> Rows:
     ends, lengths = _runs(values)
     usual = float(np.percentile(lengths, 99.0))
     extreme = (values[ends] == values.max()) | (values[ends] == values.min())
-    odd: Rows = ends[(lengths >= LONG_HELD) & (lengths >= JUMP * usual) & ~extreme]
-    return odd
+    odd = (lengths >= LONG_HELD) & (lengths >= JUMP * usual) & ~extreme
+    quiet = float(np.sum(lengths[~odd] - 1)) > QUIET * values.size
+    none: Rows = ends[:0]
+    return none if quiet else ends[odd]
 
 
 def _alone(values: Array) -> Rows:
