@@ -11,13 +11,13 @@ from campaign import damper_of, sine
 
 from pzd.damper.effects import library
 from pzd.diagnose.campaign import Campaign
-from pzd.diagnose.data.cleaning import prepare, sliced
+from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import split
 from pzd.diagnose.fit.intervals import LEVEL, disagreement, standard_errors
 from pzd.diagnose.fit.least_squares import Fitted, fit
 from pzd.diagnose.fit.parameters import Unknown
 from pzd.diagnose.search.evidence import Evidence, evidence_of
-from pzd.record import Array, Record
+from pzd.record import Array, Record, sliced
 from pzd.signals.nuisance import NuisanceConfig
 
 DRAWS = 400

@@ -105,10 +105,10 @@ def test_linearly_dependent_slopes_are_invisible() -> None:
 def test_undetermined_and_weak_stand_in_one_status() -> None:
     trust = judge(
         [
-            Evidence("T0", 100.0, 1.0, 0.3),
-            Evidence("C", 1000.0, 600.0, 0.3),
-            Evidence("k", 1e5, 2e4, 0.3),
+            Evidence("T0", 100.0, 1.0, 1.0, 0.3),
+            Evidence("C", 1000.0, 600.0, 600.0, 0.3),
+            Evidence("k", 1e5, 2e4, 2e4, 0.3),
         ]
     )
     assert trust.determined == (True, False, True)
-    assert trust.status == "undetermined: C (95 % interval of +-60 %); weak: k (95 % interval of +-20 %)"
+    assert trust.status == "undetermined: C (95 % interval of +-60 % by noise alone); weak: k (95 % interval of +-20 %)"

@@ -100,26 +100,6 @@ def _prepared(record: Record, constant: bool) -> Prepared:
     return Prepared(cleaned, run, lead, constant, _drawn(lead, average))
 
 
-def sliced(record: Record, kept: NDArray[np.bool_]) -> Record:
-    """The record's samples where the mask (n,) is set."""
-
-    def cut(channel: Array | None) -> Array | None:
-        return None if channel is None else channel[kept]
-
-    return Record(
-        record.name,
-        record.setting,
-        record.time[kept],
-        record.displacement[kept],
-        record.velocity[kept],
-        record.acceleration[kept],
-        record.force[kept],
-        cut(record.voltage),
-        cut(record.temperature),
-        cut(record.pressure),
-    )
-
-
 def _moved(record: Record, motion: Motion) -> Record:
     """The record with another displacement and its derivatives."""
     return replace(record, displacement=motion[0], velocity=motion[1], acceleration=motion[2])
