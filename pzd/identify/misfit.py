@@ -58,7 +58,7 @@ def misfit_of(parts: Sequence[Part]) -> Misfit:
     """What the model misses in the records of a fit.
 
     Equation: p = 2 min over both kinds of record of the probability by noise, pooled over the records
-                            Source: Fisher's variance ratio in signals/lack_of_fit and signals/smooth_residual; Bonferroni
+                            Source: Fisher's variance ratio, in signals/lack_of_fit and smooth_residual; Bonferroni
     """
     cycles: list[Array] = []
     smooth: list[Array] = []

@@ -140,7 +140,7 @@ def test_few_cycles_leave_more_open_than_their_number_says() -> None:
 
 def test_a_misfit_too_small_to_speak_widens_the_interval() -> None:
     records = [with_noise(sine_test(TABLE_2[0.0], 2.0, 0.02, rate=500), np.random.default_rng(19), 0.002)]
-    bent = [replace(r, force=r.force + 60.0 * r.velocity * np.abs(r.velocity)) for r in records]
+    bent = [replace(r, force=r.force + 300.0 * r.velocity * np.abs(r.velocity)) for r in records]
     parts, _ = parts_for(bent, IdentifyConfig())
     misfit = misfit_of(parts)
     assert 0.0 < misfit.share < VISIBLE

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.record import Array, Record, is_constant, voltage_scale
+from pzd.record import Array, Record, is_constant, sliced, voltage_scale
 from pzd.signals.between_cycles import pure_error
 from pzd.signals.cycles import Cycles, cycles, drift, settled
 
