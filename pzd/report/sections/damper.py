@@ -42,8 +42,8 @@ def _intro(context: ReportContext) -> str:
     beside = f" What was missing stands beside it: {listed(laws)}." if laws else ""
     return (
         "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. These allow for "
-        "noise and for a gain, offset and delay of the sensors that differ from test to test. A value that the data do not "
-        f"determine is left out, and the status says so.{beside}"
+        "noise and for a gain, offset and delay of the sensors that differ from test to test. A value that the data do "
+        f"not determine is left out, and the status says so.{beside}"
     )
 
 
