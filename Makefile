@@ -1,6 +1,7 @@
 # Everything lives in .venv and is made from the hashed locks; stamps in .venv say what is up to date.
 PYTHON ?= python3
 JOBS ?= 2
+N ?= 20
 BIN := .venv/bin
 RUNTIME := .venv/.runtime
 DEV := .venv/.dev
@@ -21,7 +22,7 @@ demo: $(RUNTIME)  ## Install pzd into .venv, run configs/quickstart.yaml, say wh
 	@echo "The report lies in runs/quickstart/6-report/report.html"
 
 .PHONY: test
-test: $(DEV)  ## Run the tests, but for those that build and install the whole
+test: $(DEV)  ## Run the tests on fixed draws, but for those that build and install the whole or take long
 	$(BIN)/python -m pytest -n $(JOBS) -m "not ci" --durations 10
 
 .PHONY: check
@@ -33,6 +34,14 @@ check: $(DEV)  ## Check style (ruff), format (ruff) and types (mypy --strict)
 .PHONY: ci
 ci: check  ## What a merge must pass besides `make test`: check, every config, the wheel installed elsewhere
 	$(BIN)/python -m pytest -m ci --durations 10
+
+.PHONY: coverage
+coverage: $(DEV)  ## As `make test`, and print how many lines and branches of each module it runs; takes longer
+	$(BIN)/python -m pytest -n $(JOBS) -m "not ci" --cov --cov-report=term
+
+.PHONY: fresh
+fresh: $(DEV)  ## Run the tests that draw on N=20 new seeds, repeat what failed, print seed and rate per test
+	$(BIN)/python tests/studies/fresh.py --seeds $(N) --jobs $(JOBS) $(TESTS)
 
 .PHONY: figures
 figures: $(RUNTIME)  ## Draw the figures of the paper into runs/paper/figures
@@ -64,7 +73,7 @@ lock: $(DEV)  ## Resolve the dependencies again, for Python 3.11 to 3.13 and eve
 
 .PHONY: clean
 clean:  ## Remove .venv, caches and builds; results in runs/ and figures/ stay
-	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist
+	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage* build dist
 	find pzd tests -name __pycache__ -prune -exec rm -rf {} +
 
 $(RUNTIME): requirements.lock requirements-build.lock pyproject.toml

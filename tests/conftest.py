@@ -1,15 +1,19 @@
-"""What the tests of every package share: the measured data, fresh seeds, and the command itself."""
+"""What the tests of every package share: random draws, the measured data, and the command itself.
+
+Every random number of a test comes from here. The draws of a test hang on its name alone, so that `make test` says
+the same at every run; PZD_SEED draws others, and `make fresh` tries many of those.
+"""
 
 from __future__ import annotations
 
 import os
-import random
-import secrets
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -20,15 +24,49 @@ for pool in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(pool, "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-settings.register_profile("pzd", deadline=None, max_examples=50, print_blob=True)
-settings.load_profile("pzd")
+FRESH = os.environ.get("PZD_SEED", "")
+"""Set by `make fresh`, or to draw again what failed there; empty: the fixed draws."""
 
-SEED = int(os.environ.get("PZD_SEED") or secrets.randbits(32))
+settings.register_profile("fixed", deadline=None, max_examples=50, derandomize=True)
+settings.register_profile("fresh", deadline=None, max_examples=50, database=None, print_blob=True)
+settings.load_profile("fresh" if FRESH else "fixed")
 
 
 def pytest_report_header() -> str:
-    """Say which data and which seed this session uses."""
-    return f"shared data: {_shared() or 'absent'}; fresh seeds are drawn from OS entropy or PZD_SEED"
+    """Say which data and which draws this session uses."""
+    drawn = f"drawn by PZD_SEED={FRESH}" if FRESH else "fixed draws"
+    return f"measured data: {_shared() or 'absent'}; {drawn}"
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what draws, so that `make fresh` finds it."""
+    for item in items:
+        if generator_for.__name__ in getattr(item, "fixturenames", ()) or item.get_closest_marker("hypothesis"):
+            item.add_marker("draws")
+
+
+def name_of(item: pytest.Item) -> str:
+    """File and test, without the folder: a file that moves keeps its draws."""
+    return f"{item.path.name}::{item.nodeid.partition('::')[2]}"
+
+
+@pytest.fixture(scope="session")
+def generator_for() -> Callable[[str], np.random.Generator]:
+    """The one source of generators, one a name: for what several tests share; a test itself asks for `rng`."""
+    return lambda name: np.random.default_rng(zlib.crc32(f"{FRESH} {name}".encode()))
+
+
+@pytest.fixture
+def rng(request: pytest.FixtureRequest, generator_for) -> np.random.Generator:
+    """The generator of this test; `rng.spawn(n)` gives n that do not hang on each other."""
+    return generator_for(name_of(request.node))
+
+
+@pytest.fixture
+def seeds(rng: np.random.Generator) -> Callable[[int], list[int]]:
+    """So many whole numbers from the generator of this test, for what asks for a seed."""
+    return lambda count: rng.integers(2**32, size=count).tolist()
 
 
 def _shared() -> Path | None:
@@ -49,18 +87,6 @@ def shared() -> Path:
     if folder is None:
         pytest.skip("measured data absent: neither PZD_SHARED nor ../shared holds a folder data/")
     return folder
-
-
-@pytest.fixture
-def fresh_seeds(request: pytest.FixtureRequest) -> Callable[[int], list[int]]:
-    """Seeds nobody has chosen; a failure prints the PZD_SEED that draws the same ones again."""
-    print(f"fresh seeds: PZD_SEED={SEED}")  # noqa: T201  # pytest shows it where the test fails
-    source = random.Random(f"{SEED} {request.node.nodeid}")
-
-    def draw(count: int) -> list[int]:
-        return [source.getrandbits(32) for _ in range(count)]
-
-    return draw
 
 
 @pytest.fixture(scope="session")

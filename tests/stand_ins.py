@@ -155,7 +155,7 @@ def simulate(simulate: SimulateConfig, diagnosed: Diagnosed, table: Table, seed:
     return Rides((ride,), (summary,))
 
 
-def report(report: ReportConfig, rides: Rides, control: Control, setting: str | None) -> Report:
+def report(report: ReportConfig, rides: Rides, control: Control, setting: str | None, folder: Path) -> Report:
     """One measure, and a page of a line."""
     row = ComfortRow(
         case="sine-comfort-ideal",

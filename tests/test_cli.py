@@ -12,7 +12,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -20,11 +22,13 @@ from stand_ins import NAMES, UNDETERMINED, project
 
 from pzd.artefacts import Diagnosis, Gap, NextTest, Ranked, Region, Value
 from pzd.cli.app import status
+from pzd.cli.output import Output
 from pzd.cli.story import story
 from pzd.config import load
 from pzd.damper.effects import library
 from pzd.quantities import Control
 from pzd.runs import Run
+from pzd.schema.progress import Progress
 
 COMMANDS = [
     *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report"),
@@ -121,7 +125,7 @@ def test_force_runs_again(typed: Terminal) -> None:
 def test_what_is_not_to_be_trusted_is_code_4_every_time(typed: Terminal) -> None:
     for _ in range(2):
         assert typed("run", "first.yaml", "--set", f"seed={UNDETERMINED}") == 4
-        assert typed.err == ["not to be trusted: rig, 1.0 V, 22.0 degC: undetermined: C, the records are too slow"]
+        assert typed.err == ["not to be trusted: rig, 1 V, 22 degC: undetermined: C, the records are too slow"]
         assert Path("runs/first/6-report/report.html").is_file()
     assert typed("ingest", "first.yaml", "--set", f"seed={UNDETERMINED}") == 0
 
@@ -180,6 +184,24 @@ def test_a_path_that_matches_no_file_is_a_wrong_config(typed: Terminal) -> None:
     assert message.startswith("--set rig.files.0.path: no such file")
 
 
+def test_a_file_of_expected_numbers_at_fault_is_refused_before_anything_runs(typed: Terminal) -> None:
+    Path("lab.csv").write_text("id,selector,value,unit\npeak,measures.peak_forc,1,N\n")
+    for command in ("run", "report", "check"):
+        assert typed(command, "first.yaml", "--set", "report.reference=lab.csv") == 3
+        (message,) = typed.err
+        assert message.startswith("lab.csv:2: selector: no number of a run is called so; did you mean measures.peak_f")
+        assert typed(command, "first.yaml", "--set", "report.reference=makowski2012") == 2
+        (message,) = typed.err
+        assert message.startswith("--set report.reference: there is no such file; did you mean makowski2021?")
+    assert not Path("runs").exists()
+
+
+def test_a_key_of_an_earlier_version_names_the_one_in_its_place(typed: Terminal) -> None:
+    typed.config.write_text(typed.config.read_text() + "report:\n  published: true\n")
+    assert typed("run", "first.yaml") == 2
+    assert typed.err == ["first.yaml:5:3: report.published: no such key; did you mean reference? (got published)"]
+
+
 def test_a_setting_that_no_record_has_is_refused_once_the_records_are_known(typed: Terminal) -> None:
     assert typed("run", "first.yaml", "--set", "setting=gap") == 2
     assert [line.split()[0] for line in typed.out] == ["ingest", "ingest"]
@@ -227,7 +249,7 @@ def test_a_second_config_of_the_same_stem_is_refused_and_both_are_named(typed: T
 
 
 def test_a_run_in_use_is_code_5_and_names_who_uses_it(typed: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pzd.runs.folder.PATIENCE", 0.1)
+    monkeypatch.setattr("pzd.runs.lock.LOCK_TIMEOUT_S", 0.1)
     with Run.of(typed.config, Path("runs"), load(typed.config).control.signal()).locked("pzd simulate"):
         assert typed("run", "first.yaml") == 5
     assert typed.err[0].startswith(f"runs/first: pzd simulate (process {os.getpid()} on ")
@@ -236,7 +258,7 @@ def test_a_run_in_use_is_code_5_and_names_who_uses_it(typed: Terminal, monkeypat
 def test_a_fault_of_ours_is_code_1_in_one_line_with_the_traceback_in_a_file(
     typed: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pzd.pipeline.bring.yaml_text", lambda *_: 1 / 0)
+    monkeypatch.setattr("pzd.pipeline.execution.yaml_text", lambda *_: 1 / 0)
     assert typed("run", "first.yaml") == 1
     (line,) = typed.err
     found = re.fullmatch(
@@ -317,6 +339,77 @@ def test_show_says_what_is_not_to_be_trusted(typed: Terminal) -> None:
     assert [line for line in typed.out if line.startswith("not to be trusted: rig")]
 
 
+def stale(typed: Terminal) -> list[str]:
+    return [line for line in typed.out if line.startswith("stale: ")]
+
+
+def test_numbers_of_the_config_as_it_is_are_not_called_stale(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    for look in (["show", "first.yaml"], ["compare", "runs/first"]):
+        assert typed(*look) == 0
+        assert stale(typed) == []
+
+
+def test_show_and_compare_say_what_is_of_an_older_config_and_why(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    with typed.config.open("a") as file:
+        file.write("table: {speed_max_m_per_s: 2}\n")
+    wanted = [
+        "table: table.speed_max_m_per_s has changed",
+        "simulate: it is made from table",
+        "report: it is made from simulate",
+    ]
+    assert typed("show", "first.yaml") == 0
+    assert typed.out[1:4] == [f"stale: {line}" for line in wanted]
+    assert "comfort:" in typed.out
+    assert typed("compare", "runs/first") == 0
+    assert stale(typed) == [f"stale: runs/first: {line}" for line in wanted]
+    typed("table", "first.yaml")
+    typed("show", "first.yaml")
+    assert [line.split(":")[1] for line in stale(typed)] == [" simulate", " report"]
+
+
+def test_show_says_stale_where_a_rig_file_has_changed_or_gone(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    Path("data/a.csv").write_text("101")
+    typed("show", "first.yaml")
+    assert stale(typed)[0] == "stale: ingest: data/a.csv has changed"
+    assert len(stale(typed)) == len(NAMES)
+    for name in ("a", "b"):
+        Path(f"data/{name}.csv").unlink()
+    typed("compare", "runs/first")
+    assert stale(typed)[0] == "stale: runs/first: ingest: 2 files of data have changed"
+
+
+def test_a_number_mended_by_hand_makes_stale_what_hangs_on_it_and_not_itself(typed: Terminal) -> None:
+    typed("run", "first.yaml", "--set", f"seed={UNDETERMINED}")
+    path = Path("runs/first/2-identify/parameters.csv")
+    path.write_text(path.read_text().replace("200.0,200.0,200.0,,,,", "200.0,200.0,200.0,5,4,6,"))
+    show = ["show", "first.yaml", "--set", f"seed={UNDETERMINED}"]
+    typed(*show)
+    assert [line.split(":")[1].strip() for line in stale(typed)] == ["diagnose", "table", "simulate", "report"]
+    typed("run", "first.yaml", "--set", f"seed={UNDETERMINED}")
+    typed(*show)
+    assert stale(typed) == []
+
+
+def test_show_reads_what_an_older_config_called_by_another_name(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    typed.config.write_text("control: {name: current, unit: A}\n" + typed.config.read_text())
+    assert typed("show", "first.yaml") == 0
+    assert "stale: ingest: control.name has changed, control.unit has changed" in typed.out
+
+
+def test_compare_says_where_the_config_of_a_run_is_gone_or_broken(typed: Terminal) -> None:
+    typed("run", "first.yaml")
+    typed.config.write_text("rig: 1\n")
+    assert typed("compare", "runs/first") == 0
+    assert stale(typed)[0].startswith("stale: runs/first: all: their config would be refused: first.yaml:1:6: ")
+    typed.config.unlink()
+    assert typed("compare", "runs/first") == 0
+    assert stale(typed)[0].startswith("stale: runs/first: all: their config first.yaml is missing")
+
+
 def test_compare_sets_runs_side_by_side(typed: Terminal) -> None:
     shutil.copy("first.yaml", "second.yaml")
     typed("run", "first.yaml")
@@ -347,6 +440,60 @@ def test_the_control_goes_by_its_own_name(typed: Terminal) -> None:
     assert any("current [A]" in line for line in typed.out)
     assert typed("compare", "runs/first") == 0
     assert any(line.startswith("T0 [N], 1 A, 22 degC") for line in typed.out)
+
+
+# ---------------------------------------------------------------- for other programs
+
+
+def printed_json(typed: Terminal, *arguments: str) -> Any:
+    assert typed(*arguments, "--json") == 0
+    return json.loads("\n".join(typed.out))
+
+
+def test_check_as_json_holds_every_record_with_its_findings(typed: Terminal) -> None:
+    found = printed_json(typed, "check", "first.yaml", "--set", "control.name=current", "--set", "control.unit=A")
+    assert found["config"] == "first.yaml"
+    assert [(one["name"], one["cycles"], one["current_A"], one["findings"]) for one in found["records"]] == [
+        ("a", 3.0, 1.0, []),
+        ("b", 3.0, 1.0, []),
+    ]
+    assert not Path("runs").exists()
+
+
+def test_show_as_json_holds_what_show_prints(typed: Terminal) -> None:
+    typed("identify", "first.yaml", "--set", f"seed={UNDETERMINED}")
+    found = printed_json(typed, "show", "first.yaml")
+    assert (found["run"], found["report"], found["diagnosis"], found["rides"]) == ("runs/first", None, None, [])
+    assert found["stale"] == {"identify": "seed has changed"}
+    assert len(found["not_to_be_trusted"]) == 1
+    typed("run", "first.yaml")
+    found = printed_json(typed, "show", "first.yaml")
+    assert (found["stale"], found["not_to_be_trusted"]) == ({}, [])
+    assert (found["parameters"][0]["T0_N"], found["parameters"][0]["C_Ns_per_m"]) == (200.0, 2.0)
+    assert (found["diagnosis"]["verdict"], found["rides"][0]["peak_abs_aK_m_per_s2"]) == ("none", 200.0)
+    assert found["comfort"][0]["measure"] == "a_w"
+    assert found["report"] == "runs/first/6-report/report.html"
+
+
+def test_compare_as_json_holds_the_runs_as_show_does(typed: Terminal) -> None:
+    shutil.copy("first.yaml", "second.yaml")
+    typed("run", "first.yaml")
+    typed("identify", "second.yaml")
+    shown = [printed_json(typed, "show", name) for name in ("second.yaml", "first.yaml")]
+    assert printed_json(typed, "compare", "runs/second", "runs/first") == shown
+
+
+def test_effects_as_json_hold_every_parameter(typed: Terminal) -> None:
+    found = printed_json(typed, "effects")
+    assert [(one["name"], p["name"]) for one in found for p in one["parameters"]] == [
+        (effect.name, p.name) for effect in library().values() for p in effect.parameters
+    ]
+
+
+@pytest.mark.parametrize("command", ["check", "show"])
+def test_a_mistake_is_a_line_on_stderr_also_where_json_is_wanted(typed: Terminal, command: str) -> None:
+    assert typed(command, "absent.yaml", "--json") == 2
+    assert (typed.out, len(typed.err)) == ([], 1)
 
 
 # ---------------------------------------------------------------- starting
@@ -431,6 +578,9 @@ def diagnosis() -> Diagnosis:
             amplitude_m=0.01,
             voltage_V=150.0,
             separates=("orifice_quadratic", "shear_thinning"),
+            middle_m=0.03135,
+            peak_speed_m_per_s=0.251327,
+            peak_force_N=1512.345,
         ),
     )
 
@@ -445,7 +595,10 @@ def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
         "confidence: 97%",
         "rivals: shear_thinning",
         "not taken: lash, W_s 0.012 against 0.0009 on the tests seen, closes nothing",
-        "next test: sine 4 Hz 0.01 m at 150 V to tell orifice_quadratic from shear_thinning",
+        (
+            "next test: sine 4 Hz 0.01 m about 0.03135 m at 150 V, up to 0.2513 m/s and 1512 N"
+            " to tell orifice_quadratic from shear_thinning"
+        ),
     ]
 
 
@@ -471,12 +624,29 @@ def test_help_takes_a_moment_and_lists_every_command(pzd: Command) -> None:
         printed = pzd("--help")
         ended = resource.getrusage(resource.RUSAGE_CHILDREN)
         spent.append(ended.ru_utime - begun.ru_utime + ended.ru_stime - begun.ru_stime)
-    assert min(spent) < 0.3  # of the processor, so that a busy machine is no fault
+    assert min(spent) < 0.2  # of the processor, so that a busy machine is no fault
     assert (printed.returncode, printed.stderr) == (0, "")
     listed = re.findall(r"^  ([a-z]+)  +\S", printed.stdout.partition("Commands:")[2], re.MULTILINE)
     assert listed == COMMANDS
     assert not re.search("[╭│╰]|\x1b", printed.stdout)
     assert pzd().stdout == printed.stdout
+
+
+def test_the_version_is_that_of_the_installed_package(typed: Terminal) -> None:
+    assert typed("--version") == 0
+    assert typed.out == [f"pzd {version('pzd')}"]
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [("pzd i", ["ingest", "identify", "init"]), ("pzd show --j", ["--json"]), ("pzd run first.yaml --f", ["--force"])],
+)
+def test_the_shell_completes_commands_and_options(words: str, completed: list[str]) -> None:
+    asked = {"_PZD_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" "))}
+    ended = subprocess.run(
+        [sys.executable, "-m", "pzd"], capture_output=True, text=True, check=True, env=ENVIRONMENT | asked
+    )
+    assert ended.stdout.split() == completed
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -550,6 +720,73 @@ def test_ctrl_c_is_code_130_in_one_line(tmp_path: Path) -> None:
     assert running.returncode == 130
     assert err.count("\n") == 1
     assert err.startswith("interrupted; ")
+
+
+SLOW = """
+import sys, time
+from concurrent.futures import ThreadPoolExecutor
+sys.path[:0] = [{here!r}, {root!r}]
+import stand_ins
+from pzd.artefacts import Identified, Rig
+from pzd.identify.config import IdentifyConfig
+from pzd.pipeline import command
+from pzd.pipeline.stages import Stage
+
+def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
+    with ThreadPoolExecutor(2) as pool:
+        futures = [pool.submit(time.sleep, 30) for _ in range(4)]
+        print("at work", flush=True)
+        futures[0].result()
+
+identify.__module__ = "pzd.identify.stage"
+command.stages = lambda config: tuple(
+    Stage("identify", identify) if stage.name == "identify" else stage for stage in stand_ins.stages(config)
+)
+sys.argv = ["pzd", "run", "first.yaml"]
+from pzd.cli import main
+main()
+"""
+
+
+def test_an_interrupted_command_ends_in_a_second_and_the_next_one_goes_on(typed: Terminal, tmp_path: Path) -> None:
+    here = Path(__file__).resolve().parent
+    command = [sys.executable, "-c", SLOW.format(here=str(here), root=str(here.parent))]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    with subprocess.Popen(command, **pipes, text=True, cwd=tmp_path, env=ENVIRONMENT) as running:
+        signal.signal(signal.SIGINT, before)
+        try:
+            assert running.stdout is not None
+            assert any(line == "at work\n" for line in running.stdout), running.communicate()
+            running.send_signal(signal.SIGINT)
+            begun = time.monotonic()
+            _, err = running.communicate(timeout=20.0)
+            took = time.monotonic() - begun
+        finally:
+            running.kill()
+    assert running.returncode == 130
+    assert took < 5.0  # a second, on a machine that is not busy; its threads sleep for a minute
+    assert err == "interrupted; finished stages stand, the one at work left what was there before\n"
+    assert typed("run", "first.yaml") == 0
+    assert typed.out[0] == "ingest     fresh: nothing it depends on has changed"
+    assert typed.err == []
+    assert not [path for path in Path("runs/first").iterdir() if path.suffix == ".new" or path.name == ".holder"]
+
+
+@pytest.mark.parametrize(
+    ("flags", "out", "err"),
+    [
+        ({}, "", "\r\x1b[K[######..................] 1 of 4 conditions: ok"),
+        ({"verbose": True}, "  1 of 4 conditions: ok\n", "\r\x1b[K"),
+        ({"quiet": True, "verbose": True}, "", ""),
+    ],
+)
+def test_progress_is_a_bar_on_a_terminal_and_a_line_where_all_is_wanted(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, flags: dict[str, bool], out: str, err: str
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    Output(**({"quiet": False, "verbose": False} | flags)).progress(Progress(1, 4, "conditions: ok"))
+    assert capsys.readouterr() == (out, err)
 
 
 def test_a_terminal_of_another_encoding_is_no_fault() -> None:

@@ -1,11 +1,13 @@
-"""The documentation says what the code does: commands, config keys, effects, files, docstrings and links."""
+"""The documentation says what the code does: commands, effects, files, paths, links and docstrings.
+
+`test_reference_config.py` tests the config in full, `test_readme.py` runs the commands of the README.
+"""
 
 from __future__ import annotations
 
 import ast
 import re
 from collections.abc import Iterator, Mapping
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +17,10 @@ from typer.core import TyperGroup, TyperOption
 
 import pzd
 from pzd import artefacts
+from pzd.cli import exits
 from pzd.cli.app import app
-from pzd.config import RunConfig
 from pzd.damper.effects import library
-from pzd.schema.yamlfile import read_yaml
+from pzd.schema.errors import ConfigError, DataError, FilesError
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = Path(pzd.__file__).parent
@@ -28,18 +30,26 @@ DOCUMENTED = 0.92
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
-@pytest.fixture(scope="module")
-def readme() -> str:
-    """The README."""
-    return (ROOT / "README.md").read_text(encoding="utf-8")
+def page(name: str) -> str:
+    """The text of a page of the documentation."""
+    return (ROOT / name).read_text(encoding="utf-8")
 
 
-@pytest.fixture(scope="module")
-def code(readme: str) -> str:
-    """What the README sets as code: fenced blocks and what stands between backticks."""
-    blocks = re.findall(r"^```.*?^```", readme, re.MULTILINE | re.DOTALL)
-    rest = re.sub(r"^```.*?^```", "", readme, flags=re.MULTILINE | re.DOTALL)
+def code_of(text: str) -> str:
+    """What a page sets as code: fenced blocks and what stands between backticks."""
+    blocks = re.findall(r"^ *```.*?^ *```", text, re.MULTILINE | re.DOTALL)
+    rest = re.sub(r"^ *```.*?^ *```", "", text, flags=re.MULTILINE | re.DOTALL)
     return "\n".join([*blocks, *re.findall(r"`[^`\n]+`", rest)])
+
+
+def pages() -> list[str]:
+    """Every page of the documentation, from the root; `runs/` holds results below its own page."""
+    folders = [ROOT, ROOT / "configs", ROOT / "runs"]
+    found = [path for folder in folders for path in folder.glob("*.md")] + [*PACKAGE.rglob("*.md")]
+    return sorted(path.relative_to(ROOT).as_posix() for path in found)
+
+
+every_page = pytest.mark.parametrize("name", pages())
 
 
 def names(word: str, text: str) -> bool:
@@ -47,7 +57,7 @@ def names(word: str, text: str) -> bool:
     return re.search(rf"(?<![\w-]){re.escape(word)}(?![\w-])", text) is not None
 
 
-# ---------------------------------------------------------------- the README
+# ---------------------------------------------------------------- the pages
 
 
 def commands() -> Mapping[str, Any]:
@@ -57,17 +67,41 @@ def commands() -> Mapping[str, Any]:
     return group.commands
 
 
-def test_every_command_is_in_the_readme(code: str) -> None:
+def test_the_readme_has_three_pages_at_most() -> None:
+    assert len(page("README.md").splitlines()) <= 250
+
+
+def test_the_readme_leads_to_every_other_page() -> None:
+    missing = [name for name in pages() if name != "README.md" and f"]({name})" not in page("README.md")]
+    assert missing == []
+
+
+def test_every_command_is_in_the_readme() -> None:
+    code = code_of(page("README.md"))
     assert [name for name in commands() if not names(f"pzd {name}", code)] == []
 
 
-def test_every_command_of_the_readme_exists(code: str) -> None:
-    assert set(re.findall(r"\bpzd ([a-z]+)\b", code)) - set(commands()) == set()
+@every_page
+def test_every_command_of_a_page_exists(name: str) -> None:
+    assert set(re.findall(r"\bpzd ([a-z]+)\b", code_of(page(name)))) - set(commands()) == set()
 
 
-def test_every_option_is_in_the_readme(code: str) -> None:
+def test_every_option_is_in_the_readme() -> None:
+    code = code_of(page("README.md"))
     options = {long for command in commands().values() for option in command.params for long in option.opts[:1]}
     assert [option for option in sorted(options) if option.startswith("-") and not names(option, code)] == []
+
+
+def test_every_option_of_the_readme_exists() -> None:
+    group = typer.main.get_command(app)
+    known = {name for command in (group, *commands().values()) for option in command.params for name in option.opts}
+    assert set(re.findall(r"(?<![\w-])--[a-z-]+", code_of(page("README.md")))) - known == set()
+
+
+def test_every_exit_code_is_in_the_readme() -> None:
+    codes = {value for name, value in vars(exits).items() if name.isupper() and isinstance(value, int)}
+    codes |= {error.exit_code for error in (ConfigError, DataError, FilesError)}
+    assert codes == {int(code) for code in re.findall(r"^\| (\d+) \|", page("README.md"), re.MULTILINE)}
 
 
 def test_every_command_and_option_has_its_help() -> None:
@@ -81,89 +115,28 @@ def test_every_command_and_option_has_its_help() -> None:
     assert silent == []
 
 
-@cache
-def config_schema() -> dict[str, Any]:
-    """The JSON schema of a config."""
-    return RunConfig.model_json_schema()
-
-
-def config_keys() -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Block, key and schema of every key that a config may hold."""
-    schema = config_schema()
-    for block, body in {"": schema, **schema.get("$defs", {})}.items():
-        for key, value in body.get("properties", {}).items():
-            yield block, key, value
-
-
-def test_every_config_key_is_in_the_readme(code: str) -> None:
-    assert sorted({f"{block}.{key}" for block, key, _ in config_keys() if not names(key, code)}) == []
-
-
-def resolved(schema: dict[str, Any], data: Any) -> tuple[str, dict[str, Any]] | None:
-    """Name and body of the block that data of the README are an example of; None where they are no block."""
-    blocks = config_schema()["$defs"]
-    ways = [schema, *schema.get("anyOf", []), *schema.get("oneOf", []), *schema.get("allOf", [])]
-    if isinstance(schema.get("items"), dict):
-        return resolved(schema["items"], data)
-    for way in ways:
-        if "$ref" in way:
-            name = way["$ref"].removeprefix("#/$defs/")
-            kind = blocks[name]["properties"].get("kind", {}).get("const")
-            if isinstance(data, dict) and kind in (None, data.get("kind")):
-                return name, blocks[name]
-        elif way is not schema and (found := resolved(way, data)):
-            return found
-    return None
-
-
-def examples(name: str, body: dict[str, Any], data: dict[str, Any]) -> Iterator[tuple[str, str, Any]]:
-    """Block, key and value of everything that the README's config says, every item of a list by itself."""
-    for key, value in data.items():
-        yield name, key, value
-        for item in value if isinstance(value, list) else [value]:
-            found = resolved(body.get("properties", {}).get(key, {}), item)
-            if found:
-                yield from examples(*found, item)
-
-
-def holds_blocks(values: list[Any]) -> bool:
-    """Whether a key holds blocks, which are shown key by key, rather than a value."""
-    first = [value[0] if isinstance(value, list) and value else value for value in values]
-    return any(isinstance(value, dict) and value for value in first)
-
-
-def test_the_config_reference_shows_every_key_with_its_default(readme: str, tmp_path: Path) -> None:
-    texts = re.findall(r"<!-- config reference -->\n```yaml\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
-    shown: dict[tuple[str, str], list[Any]] = {}
-    for text in texts:
-        (tmp_path / "part.yaml").write_text(text, encoding="utf-8")
-        data = read_yaml(tmp_path / "part.yaml").data
-        for block, key, value in examples("", config_schema(), data):
-            shown.setdefault((block, key), []).append(value)
-    known = {(block, key): value for block, key, value in config_keys()}
-    assert set(known) - set(shown) == set()
-    assert set(shown) - set(known) == set()
-    assert [
-        f"{'.'.join(place)}: {shown[place]}, by default {schema['default']}"
-        for place, schema in known.items()
-        if "default" in schema and not holds_blocks(shown[place]) and schema["default"] not in shown[place]
-    ] == []
-
-
-def test_every_config_key_says_what_it_is() -> None:
-    referenced = ("$ref", "allOf")  # a block describes itself
-    assert [
-        f"{block}.{key}"
-        for block, key, value in config_keys()
-        if "description" not in value and not any(word in value for word in referenced)
-    ] == []
-
-
-def test_every_effect_is_in_the_readme(code: str) -> None:
+def test_every_effect_is_in_the_page_of_the_code() -> None:
+    code = code_of(page("pzd/README.md"))
     assert [name for name in library() if not names(name, code)] == []
 
 
-def test_every_file_that_a_stage_writes_is_in_the_readme(code: str) -> None:
+def test_every_effect_stands_in_the_page_of_the_code_with_its_place_and_parameters() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| (\w+) \| .* \| (.*) \|$", page("pzd/README.md"), re.MULTILINE)
+    shown = {name: (place, re.findall(r"\w+(?=,| \[)", symbols)) for name, place, symbols in rows}
+    assert {
+        name: (effect.place, [parameter.name for parameter in effect.parameters]) for name, effect in library().items()
+    } == shown
+
+
+def test_every_folder_of_the_package_is_in_the_page_of_the_code() -> None:
+    text = page("pzd/README.md")
+    rooms = [path for path in PACKAGE.iterdir() if path.is_dir() and (path / "__init__.py").is_file()]
+    assert rooms
+    assert [room.name for room in sorted(rooms) if f"| `pzd/{room.name}/` |" not in text] == []
+
+
+def test_every_file_that_a_stage_writes_is_in_the_page_of_the_results() -> None:
+    code = code_of(page("runs/README.md"))
     sources = PACKAGE.rglob("artefacts*/*.py") if hasattr(artefacts, "__path__") else [PACKAGE / "artefacts.py"]
     texts = [path.read_text(encoding="utf-8") for path in sources]
     files = {name for text in texts for name in re.findall(r'"([a-z]+\.(?:csv|json|yaml|html))"', text)}
@@ -171,28 +144,69 @@ def test_every_file_that_a_stage_writes_is_in_the_readme(code: str) -> None:
     assert [name for name in sorted(files) if not names(name, code)] == []
 
 
-def test_every_make_target_of_the_readme_exists(code: str) -> None:
+def test_every_config_is_in_the_page_of_the_configs() -> None:
+    text = page("configs/README.md")
+    assert [path.name for path in (ROOT / "configs").glob("*.yaml") if f"]({path.name})" not in text] == []
+
+
+@every_page
+def test_every_make_target_of_a_page_exists(name: str) -> None:
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
-    assert set(re.findall(r"\bmake ([a-z]+)\b", code)) - targets == set()
+    assert set(re.findall(r"\bmake ([a-z]+)\b", code_of(page(name)))) - targets == set()
 
 
-def test_links_to_files_lead_somewhere() -> None:
-    pages = [*ROOT.glob("*.md"), *(ROOT / "runs").glob("*.md")]
-    dead = [
-        f"{page.relative_to(ROOT)}: {target}"
-        for page in pages
-        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
-        if "://" not in target and not (page.parent / target).exists()
-    ]
-    assert dead == []
+@every_page
+def test_every_path_that_a_page_names_exists(name: str) -> None:
+    known = (
+        r"(?<![\w./-])(?:pzd|tests|configs|\.ci|\.github)/[\w./*-]*|(?<![\w./-])(?:README\.md|Makefile|pyproject\.toml)"
+    )
+    named = {path.rstrip(".") for path in re.findall(known, code_of(page(name)))}
+    assert [path for path in sorted(named) if not any(ROOT.glob(path.rstrip("/")))] == []
 
 
-def test_headings_that_the_readme_links_to_exist(readme: str) -> None:
-    headings = {
-        re.sub(r"[^\w\- ]", "", heading).strip().lower().replace(" ", "-")
-        for heading in re.findall(r"^#+ (.+)$", readme, re.MULTILINE)
-    }
-    assert set(re.findall(r"\]\(#([^)]+)\)", readme)) - headings == set()
+def test_every_folder_inside_a_package_that_the_page_of_the_code_names_exists() -> None:
+    rows = re.findall(r"^\| `pzd/(\w+)/` \| (.*) \|$", page("pzd/README.md"), re.MULTILINE)
+    inside = [(room, folder) for room, text in rows for folder in re.findall(r"`(\w+)/`", text)]
+    assert inside
+    assert [f"pzd/{room}/{folder}" for room, folder in inside if not (PACKAGE / room / folder).is_dir()] == []
+
+
+def test_what_a_new_file_of_a_set_must_define_is_defined_by_the_one_to_copy() -> None:
+    rows = re.findall(r"^\| an? [\w ]+ \| `(pzd/[\w/]+\.py)` \| (.*) \|$", page("pzd/README.md"), re.MULTILINE)
+    assert rows
+    assert [
+        f"{name}: {symbol}"
+        for name, text in rows
+        for symbol in re.findall(r"`([\w(), ]+)`", text)
+        if symbol.partition("(")[0] not in page(name)
+    ] == []
+
+
+@every_page
+def test_links_to_files_lead_somewhere(name: str) -> None:
+    folder = (ROOT / name).parent
+    targets = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page(name))
+    assert [target for target in targets if "://" not in target and not (folder / target).exists()] == []
+
+
+def headings(text: str) -> set[str]:
+    """The anchors of the headings of a page, as GitHub makes them."""
+    found = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading).strip().lower().replace(" ", "-") for heading in found}
+
+
+@every_page
+def test_headings_that_a_page_links_to_exist(name: str) -> None:
+    folder = (ROOT / name).parent
+    links = re.findall(r"\]\(([^)#\s]*\.md)?#([^)]+)\)", page(name))
+    texts = {target: (folder / target).read_text(encoding="utf-8") if target else page(name) for target, _ in links}
+    assert [f"{target}#{anchor}" for target, anchor in links if anchor not in headings(texts[target])] == []
+
+
+def test_the_pictures_of_the_readme_are_small() -> None:
+    pictures = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", page("README.md"))
+    assert pictures
+    assert [name for name in pictures if (ROOT / name).stat().st_size > 150_000] == []
 
 
 # ---------------------------------------------------------------- the docstrings

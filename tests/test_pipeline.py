@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import ast
 import json
+import re
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
 import stand_ins
 from stand_ins import NAMES, UNDETERMINED, project
 
-from pzd.artefacts import Identified, Manifest
-from pzd.pipeline.command import bring, opened
-from pzd.pipeline.sources import PACKAGE, _mentioned, _used, code_hash
-from pzd.pipeline.stages import Stage
+from pzd.artefacts import Identified, Manifest, Rig
+from pzd.cli import start
+from pzd.config import load
+from pzd.damper.effects import library
+from pzd.pipeline.command import execute, opened, stale_stages
+from pzd.pipeline.execution import Pipeline
+from pzd.pipeline.sources import PACKAGE, _file, _used, code_hash, modules_used
+from pzd.pipeline.stages import Stage, stages
 from pzd.quantities import Control
+from pzd.rig.config import RigConfig
+from pzd.runs import versions
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.jsonfile import read_json
+from pzd.schema.progress import Listener, Progress, unheard
 
 
 class Bench:
@@ -34,7 +43,7 @@ class Bench:
         """Bring the run up to date; gives the stages that ran."""
         self.lines.clear()
         given = opened(self.config, self.runs, overrides)
-        self.marks = bring(given, target, force=force, jobs=1, say=self.lines.append)
+        self.marks = execute(given, target, force=force, jobs=1, say=self.lines.append)
         return [line.split()[0] for line in self.lines if " runs: " in line]
 
     def said(self, stage: str) -> str:
@@ -111,6 +120,18 @@ def test_a_rig_file_that_changes_reruns_everything(bench: Bench) -> None:
     assert "1-rig/a.csv has changed" in bench.said("identify")
 
 
+def test_expected_numbers_that_change_rerun_the_report_alone(bench: Bench) -> None:
+    path = bench.config.parent / "lab.csv"
+    path.write_text("id,value,unit\npeak,1,N\n")
+    bench("report.reference=lab.csv")
+    assert bench("report.reference=lab.csv") == []
+    path.write_text("id,value,unit\npeak,2,N\n")
+    assert bench("report.reference=lab.csv") == ["report"]
+    assert bench.said("report") == "report     runs: lab.csv has changed"
+    path.unlink()
+    assert stale_stages(opened(bench.config, bench.runs, ["report.reference=lab.csv"])) == {"report": "lab.csv is gone"}
+
+
 def test_many_files_that_change_are_counted_and_not_listed(bench: Bench) -> None:
     bench()
     for name in ("a", "b"):
@@ -148,48 +169,145 @@ def test_the_same_config_by_another_path_reruns_nothing(bench: Bench, monkeypatc
 def test_edited_code_reruns_what_may_use_it(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     bench()
     monkeypatch.setattr(
-        "pzd.pipeline.dependencies.code_hash", lambda part: f"edited {part}" if part == "table" else code_hash(part)
+        "pzd.pipeline.dependencies.code_hash",
+        lambda module: "edited" if module == "pzd.table.stage" else code_hash(module),
     )
     assert bench() == ["table"]
     assert bench.said("table").endswith("runs: the code has changed")
 
 
-def test_the_code_of_a_stage_is_its_package_and_all_that_this_may_import(tmp_path: Path) -> None:
+def test_another_version_of_a_library_that_computes_reruns_every_stage(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench()
+    found = versions()
+    monkeypatch.setattr("pzd.pipeline.dependencies.versions", lambda: found | {"pandas": "0.1"})
+    assert bench() == []
+    monkeypatch.setattr("pzd.pipeline.dependencies.versions", lambda: found | {"scipy": "0.1"})
+    assert bench() == NAMES
+    assert bench.said("identify") == "identify   runs: scipy version has changed"
+
+
+@pytest.fixture
+def copied(bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the package whose code the stages of the bench hang on, to be edited."""
+    package = tmp_path / "copy" / "pzd"
+    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+
+    monkeypatch.setattr("pzd.pipeline.dependencies.code_hash", lambda module: code_hash(module, package))
+    bench()
+    return package
+
+
+def edited(path: Path | None) -> None:
+    """Add a comment to a module, and have it read again."""
+    assert path is not None
+    with path.open("a") as file:
+        file.write("# edited\n")
+    code_hash.cache_clear()
+    _used.cache_clear()
+
+
+def test_a_comment_in_what_no_stage_imports_reruns_nothing(bench: Bench, copied: Path) -> None:
+    (guess,) = re.findall(r"from (pzd[\w.]+) import guessed", Path(start.__file__).read_text())
+    edited(_file(guess, copied))
+    assert bench() == []
+
+
+@pytest.mark.parametrize(
+    ("module", "ran"),
+    [
+        ("pzd.identify.stage", ["identify"]),
+        ("pzd.report.stage", ["report"]),
+        ("pzd.table.stage", ["table"]),
+        ("pzd.simulate.stage", ["simulate"]),
+        ("pzd.quantities", NAMES),
+    ],
+)
+def test_a_comment_in_what_a_stage_imports_reruns_it(
+    bench: Bench, copied: Path, module: str, ran: Sequence[str]
+) -> None:
+    edited(_file(module, copied))
+    assert bench() == ran
+
+
+def test_a_new_member_of_a_set_reruns_what_uses_the_set(bench: Bench, copied: Path) -> None:
+    edited(copied / "report" / "plots" / "another.py")
+    assert bench() == ["report"]
+    edited(copied / "damper" / "effects" / "another.py")
+    assert "identify" in bench()
+
+
+def test_the_code_of_a_stage_is_all_that_it_may_import_and_the_data_beside(tmp_path: Path) -> None:
     package = tmp_path / "pzd"
     for name, text in (
-        ("identify/fit.py", "from pzd.damper.element import f"),
-        ("identify/numbers.csv", "1"),
-        ("damper/element.py", "def f():\n    from pzd.quantities import x"),
-        ("quantities.py", "x = 1"),
-        ("report/page.py", "from pzd.identify.fit import f"),
+        ("__init__.py", ""),
+        (
+            "identify/stage.py",
+            "from pzd.identify import (\n    fit,\n)\nif TYPE_CHECKING:\n    import pzd.report.page\n",
+        ),
+        ("identify/fit.py", "from pzd.damper.element import f\n"),
+        ("identify/alone.py", "import pzd.report.page\n"),
+        ("identify/numbers.csv", "1\n"),
+        ("identify/templates/page.html", "1\n"),
+        ("damper/element.py", "def f():\n    from pzd.quantities import x\n    find(f'pzd.damper.laws.{name}')\n"),
+        ("damper/laws/__init__.py", ""),
+        ("damper/laws/lash.py", ""),
+        ("quantities.py", "x = 1\n"),
+        ("report/__init__.py", "found = pkgutil.iter_modules(__path__)\n"),
+        ("report/stage.py", "import pzd.identify.fit as fit\n"),
+        ("report/page.py", ""),
     ):
         (package / name).parent.mkdir(parents=True, exist_ok=True)
         (package / name).write_text(text)
 
     def hashes() -> dict[str, str]:
-        code_hash.cache_clear()
-        _mentioned.cache_clear()
-        return {part: code_hash(part, package) for part in ("quantities", "damper", "identify", "report")}
+        return {part: code_hash(f"pzd.{part}", package) for part in ("quantities", "identify.stage", "report.stage")}
 
-    def changed(edited: str) -> list[str]:
+    def changed(name: str) -> list[str]:
         before = hashes()
-        (package / edited).write_text((package / edited).read_text() + "\n# edited")
+        edited(package / name)
         return [part for part, value in hashes().items() if value != before[part]]
 
-    assert changed("quantities.py") == ["quantities", "damper", "identify", "report"]
-    assert changed("damper/element.py") == ["damper", "identify", "report"]
-    assert changed("identify/numbers.csv") == ["identify", "report"]
-    assert changed("report/page.py") == ["report"]
+    assert changed("__init__.py") == ["quantities", "identify.stage", "report.stage"]
+    assert changed("quantities.py") == ["quantities", "identify.stage", "report.stage"]
+    assert changed("damper/element.py") == ["identify.stage", "report.stage"]
+    assert changed("damper/laws/lash.py") == ["identify.stage", "report.stage"]
+    assert changed("identify/numbers.csv") == ["identify.stage", "report.stage"]
+    assert changed("identify/templates/page.html") == ["identify.stage", "report.stage"]
+    assert changed("identify/stage.py") == ["identify.stage"]
+    assert changed("identify/alone.py") == []
+    assert changed("report/page.py") == ["report.stage"]
     (package / "report" / "__pycache__").mkdir()
     before = hashes()
-    (package / "report" / "__pycache__" / "page.pyc").write_text("compiled")
+    edited(package / "report" / "__pycache__" / "page.pyc")
     assert hashes() == before
 
 
-def test_the_equations_of_the_damper_are_code_of_identify_and_not_of_what_stands_above() -> None:
-    assert {"damper", "record", "quantities", "schema", "artefacts", "identify"} <= _used("identify", PACKAGE)
-    assert "cli" not in _used("report", PACKAGE)
-    assert _used("quantities", PACKAGE) == {"quantities"}
+def executed_imports(tree: ast.Module) -> Iterator[str]:
+    """Everything of pzd that a module imports when it runs, by its syntax."""
+    for node in tree.body:
+        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            for inner in ast.walk(node):
+                if isinstance(inner, ast.Import):
+                    yield from (alias.name for alias in inner.names)
+                elif isinstance(inner, ast.ImportFrom):
+                    yield from (f"{inner.module}.{alias.name}" for alias in inner.names)
+
+
+def test_no_import_is_missed() -> None:
+    for path in sorted(PACKAGE.rglob("*.py")):
+        name = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
+        imports = set(executed_imports(ast.parse(path.read_text(encoding="utf-8"))))
+        modules = {one if _file(one, PACKAGE) else one.rpartition(".")[0] for one in imports if one.startswith("pzd.")}
+        assert modules - {name, "pzd"} <= _used(name, PACKAGE), name
+
+
+def test_a_stage_hangs_on_the_equations_of_the_damper_and_not_on_what_stands_above_it() -> None:
+    for stage in stages(load(PACKAGE.parent / "configs" / "quickstart.yaml")):
+        used = modules_used(stage.function.__module__)
+        assert {f"pzd.damper.effects.{name}" for name in library()} <= used, stage.name
+        assert not {"pzd.config", "pzd.runs", "pzd.pipeline", "pzd.cli"} & used, stage.name
 
 
 def test_a_deleted_file_is_made_again_and_what_hangs_on_it_stays(bench: Bench) -> None:
@@ -432,3 +550,16 @@ def test_a_stage_declares_itself_by_its_signature() -> None:
     assert list(stage.takes) == ["identify", "rig", "seed"]
     assert stage.makes is Identified
     assert stage.folder == "2-identify"
+
+
+def test_a_stage_that_asks_for_it_can_say_how_far_it_is(bench: Bench) -> None:
+    def slow(rig: RigConfig, control: Control, folder: Path, progress: Listener = unheard) -> Rig:
+        progress(Progress(1, 2, "files"))
+        return stand_ins.ingest(rig, control, folder)
+
+    heard: list[Progress] = []
+    given = opened(bench.config, bench.runs)
+    pipeline = Pipeline(given.config, given.run, (Stage("ingest", slow),), lambda _: None, heard.append)
+    assert pipeline.stages[0].folder == "1-rig"
+    pipeline.made(pipeline.stages[0])
+    assert heard == [Progress(1, 2, "files")]

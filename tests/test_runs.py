@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import json
 import os
 import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
+from filelock import FileLock, Timeout
 
 from pzd.artefacts import Identified, ParameterRow
 from pzd.quantities import Control
 from pzd.runs import Run, file_hash
+from pzd.runs.folder import MANIFEST
 from pzd.schema.errors import ConfigError, FilesError
 
 CONTROL = Control()
@@ -63,11 +67,11 @@ def level(run: Run) -> float | None:
 
 def test_what_is_written_reads_back_with_its_manifest(run: Run) -> None:
     write(run, identified(3.0))
-    kept = run.kept("2-identify")
+    state = run.stage_folder("2-identify")
     assert level(run) == 3.0
-    assert kept.manifest is not None
-    assert kept.manifest.outputs == run.hashes("2-identify")
-    assert (kept.missing, kept.edited) == ((), ())
+    assert state.manifest is not None
+    assert state.manifest.outputs == run.hashes("2-identify")
+    assert (state.missing, state.edited) == ((), ())
     assert [path.name for path in run.folder.iterdir() if path.name != ".lock"] == ["2-identify"]
 
 
@@ -75,8 +79,8 @@ def test_an_edited_and_a_missing_file_are_told_from_each_other(run: Run) -> None
     write(run, identified(3.0))
     (run.folder / "2-identify" / "parameters.csv").write_text("edited")
     (run.folder / "2-identify" / "measures.csv").unlink()
-    kept = run.kept("2-identify")
-    assert (kept.missing, kept.edited) == (("measures.csv",), ("parameters.csv",))
+    state = run.stage_folder("2-identify")
+    assert (state.missing, state.edited) == (("measures.csv",), ("parameters.csv",))
 
 
 def test_a_hash_follows_the_content_even_when_the_length_stays(tmp_path: Path) -> None:
@@ -177,7 +181,7 @@ def test_a_first_run_killed_in_the_middle_of_writing_leaves_nothing(run: Run) ->
     process = other_process(run, hold=False)
     end(process)
     assert not (run.folder / "2-identify").exists()
-    assert run.kept("2-identify").manifest is None
+    assert run.stage_folder("2-identify").manifest is None
 
 
 @pytest.mark.parametrize("renames", [0, 1, 2])
@@ -207,7 +211,7 @@ def test_a_run_killed_between_the_renames_leaves_the_old_result_or_the_new(
 def test_a_held_run_is_refused_after_a_short_wait_and_names_who_holds_it(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pzd.runs.folder.PATIENCE", 0.2)
+    monkeypatch.setattr("pzd.runs.lock.LOCK_TIMEOUT_S", 0.2)
     process = other_process(run, hold=True)
     try:
         begun = time.monotonic()
@@ -240,10 +244,9 @@ def test_a_folder_of_another_config_of_the_same_stem_is_refused_and_both_are_nam
 def test_a_config_named_by_another_path_is_the_same(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(run, identified(3.0))
     monkeypatch.chdir(tmp_path)
-    Run.of(Path("first.yaml"), Path("runs"), CONTROL)
-    (tmp_path / "link.yaml").symlink_to(tmp_path / "first.yaml")
     (tmp_path / "sub").mkdir()
-    Run.of(Path("sub/../first.yaml"), Path("runs"), CONTROL)
+    for named in (Path("first.yaml"), Path("sub/../first.yaml")):
+        assert level(Run.of(named, Path("runs"), CONTROL)) == 3.0
 
 
 def test_a_project_that_was_moved_keeps_its_runs(tmp_path: Path) -> None:
@@ -264,3 +267,205 @@ def test_the_config_is_written_once_and_then_left_alone(run: Run) -> None:
         assert (run.folder / "config.yaml").stat().st_mtime_ns == written
         run.write_config("seed: 2\n")
     assert (run.folder / "config.yaml").read_text() == "seed: 2\n"
+
+
+# ---------------------------------------------------------------- hand edits
+
+
+def edit(run: Run, text: str, name: str = "parameters.csv") -> None:
+    (run.folder / "2-identify" / name).write_text(text)
+
+
+def contents(folder: Path) -> dict[str, str]:
+    return {path.relative_to(folder).as_posix(): path.read_text() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_every_hand_edit_of_a_file_is_kept_numbered(run: Run) -> None:
+    write(run, identified(3.0))
+    for number in (1, 2, 3):
+        edit(run, f"edit {number}")
+        write(run, identified(3.0 + number))
+    found = contents(run.folder / "2-identify")
+    assert [found[f"parameters.csv.edited{n}"] for n in ("", "-2", "-3")] == ["edit 1", "edit 2", "edit 3"]
+    assert level(run) == 6.0
+
+
+def test_an_edit_that_is_kept_already_is_kept_once(run: Run) -> None:
+    write(run, identified(3.0))
+    for later in (4.0, 5.0):
+        edit(run, "the same")
+        write(run, identified(later))
+    assert [name for name in contents(run.folder / "2-identify") if "edited" in name] == ["parameters.csv.edited"]
+
+
+def test_an_edit_of_an_edited_copy_stays(run: Run) -> None:
+    write(run, identified(3.0))
+    edit(run, "edit 1")
+    write(run, identified(4.0))
+    edit(run, "edit 2", "parameters.csv.edited")
+    edit(run, "edit 3")
+    write(run, identified(5.0))
+    assert {"edit 2", "edit 3"} <= set(contents(run.folder / "2-identify").values())
+
+
+def test_a_file_of_a_person_is_kept_where_a_result_is_written_in_its_place(run: Run) -> None:
+    write(run, identified(3.0))
+    path = run.folder / "2-identify" / MANIFEST
+    manifest = json.loads(path.read_text())
+    del manifest["outputs"]["measures.csv"]  # as if this version of the stage had not written it
+    path.write_text(json.dumps(manifest))
+    edit(run, "mine", "measures.csv")
+    write(run, identified(4.0))
+    assert contents(run.folder / "2-identify")["measures.csv.edited"] == "mine"
+
+
+@pytest.mark.parametrize("manifest", [None, "", "{"])
+def test_what_a_person_wrote_is_kept_where_the_manifest_cannot_say_what_was_ours(
+    run: Run, manifest: str | None
+) -> None:
+    write(run, identified(3.0))
+    edit(run, "edited")
+    edit(run, "notes", "notes.txt")
+    (run.folder / "2-identify" / MANIFEST).unlink()
+    if manifest is not None:
+        edit(run, manifest, MANIFEST)
+    write(run, identified(4.0))
+    found = contents(run.folder / "2-identify")
+    assert found["parameters.csv.edited"] == "edited"
+    assert found["notes.txt"] == "notes"
+    assert found.get(f"{MANIFEST}.edited") == manifest
+    assert run.stage_folder("2-identify").edited == ()
+
+
+def test_a_person_may_call_a_file_as_a_manifest_is_called(run: Run) -> None:
+    write(run, identified(3.0))
+    (run.folder / "2-identify" / "mine").mkdir()
+    edit(run, "mine", f"mine/{MANIFEST}")
+    write(run, identified(4.0))
+    assert contents(run.folder / "2-identify")[f"mine/{MANIFEST}"] == "mine"
+
+
+def test_the_written_config_is_kept_where_a_person_edited_it(run: Run) -> None:
+    with run.locked("pzd run"):
+        for number in (1, 2, 3):
+            run.write_config(f"seed: {number}\n")
+    assert contents(run.folder).keys() == {"config.yaml", ".config.sha256", ".lock"}
+    for number in (4, 5):
+        (run.folder / "config.yaml").write_text(f"edit {number}")
+        with run.locked("pzd run"):
+            run.write_config(f"seed: {number}\n")
+    found = contents(run.folder)
+    assert [found[f"config.yaml{ending}"] for ending in ("", ".edited", ".edited-2")] == [
+        "seed: 5\n",
+        "edit 4",
+        "edit 5",
+    ]
+
+
+def test_what_a_person_left_beside_the_figures_is_kept(run: Run) -> None:
+    def drawn(text: str) -> None:
+        with run.locked("pzd figures"):
+            run.write_extra("figures", lambda folder: (folder / "fig-01.svg").write_text(text))
+
+    drawn("one")
+    drawn("two")
+    assert "one" not in contents(run.folder / "figures").values()
+    (run.folder / "figures" / "fig-01.svg").write_text("edited")
+    (run.folder / "figures" / "notes.txt").write_text("notes")
+    drawn("three")
+    found = contents(run.folder / "figures")
+    assert (found["fig-01.svg"], found["fig-01.svg.edited"], found["notes.txt"]) == ("three", "edited", "notes")
+
+
+# ---------------------------------------------------------------- leftovers
+
+
+def test_a_command_killed_while_it_wrote_the_config_stops_no_later_one(run: Run) -> None:
+    write(run, identified(3.0))
+    (run.folder / ".config.yaml.new").write_text("seed: ")
+    write(run, identified(4.0))
+    assert level(run) == 4.0
+    assert not (run.folder / ".config.yaml.new").exists()
+
+
+def test_what_only_looks_like_a_leftover_is_named_and_left(run: Run, caplog: pytest.LogCaptureFixture) -> None:
+    write(run, identified(3.0))
+    strange = [".config.yaml.old", ".mine.new", ".5-simulate.new"]
+    for name in strange:
+        (run.folder / name).write_text("mine")
+    (run.folder / ".4-table.old").symlink_to(run.folder.parent)
+    write(run, identified(4.0))
+    assert level(run) == 4.0
+    assert [record.args for record in caplog.records] == [
+        (run.folder / name,) for name in sorted([*strange, ".4-table.old"])
+    ]
+    assert {name: contents(run.folder)[name] for name in strange} == dict.fromkeys(strange, "mine")
+
+
+@pytest.mark.parametrize("name", [".2-identify.new", ".2-identify.old"])
+def test_what_stands_where_we_write_is_named_and_left(run: Run, name: str) -> None:
+    write(run, identified(3.0))
+    (run.folder / name).write_text("mine")
+    with pytest.raises(FilesError) as caught:
+        write(run, identified(4.0))
+    assert caught.value.messages[0].startswith(f"{run.folder / name}: this stands where ")
+    assert (run.folder / name).read_text() == "mine"
+    assert level(run) == 3.0
+
+
+# ---------------------------------------------------------------- who waits
+
+
+def test_a_waiting_command_goes_on_where_a_refused_first_run_takes_the_folder_away(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pzd.runs.lock.LOCK_TIMEOUT_S", 30.0)
+    failed: list[BaseException] = []
+
+    def wait() -> None:
+        try:
+            write(run, identified(4.0))
+        except BaseException as error:  # noqa: BLE001  # whatever it is, the test tells it
+            failed.append(error)
+
+    for _ in range(10):
+        with run.locked("pzd run"):
+            waiting = threading.Thread(target=wait)
+            waiting.start()
+            time.sleep(0.02)
+        waiting.join()
+        assert failed == []
+        assert level(run) == 4.0
+        shutil.rmtree(run.folder)
+
+
+def test_a_lock_on_a_file_that_is_no_longer_at_its_path_is_tried_again(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: list[Path] = []
+    acquire = FileLock.acquire
+
+    def unlinked_meanwhile(self: FileLock, **arguments: float) -> object:
+        proxy = acquire(self, **arguments)
+        if not taken:
+            taken.append(Path(self.lock_file))
+            Path(self.lock_file).unlink()
+        return proxy
+
+    monkeypatch.setattr(FileLock, "acquire", unlinked_meanwhile)
+    with run.locked("pzd run"):
+        assert (run.folder / ".lock").is_file()
+        with pytest.raises(Timeout), FileLock(run.folder / ".lock", timeout=0):
+            pass
+
+
+def test_a_refused_first_run_leaves_nothing(run: Run) -> None:
+    with pytest.raises(ConfigError), run.locked("pzd run"):
+        raise ConfigError("refused")
+    assert not run.folder.parent.exists()
+
+
+def test_a_folder_removed_under_a_command_is_no_second_fault(run: Run) -> None:
+    with run.locked("pzd run"):
+        shutil.rmtree(run.folder)
+    assert not run.folder.exists()

@@ -8,7 +8,7 @@ wrong. `control` renames the columns of the control signal.
 from pzd.artefacts.diagnosed import Diagnosed, Diagnosis, Gap, NextTest, Ranked, Region, Value
 from pzd.artefacts.identified import FALLBACK, Identified, MeasureRow, ParameterRow, base_of
 from pzd.artefacts.manifest import Manifest
-from pzd.artefacts.report import ComfortRow, PublishedRow, Report
+from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
 from pzd.artefacts.rides import AXLE_COLUMNS, AXLES, ENERGY_LIMIT, RIDE_COLUMNS, Response, Ride, Rides, SummaryRow
 from pzd.artefacts.rig import Finding, RecordEntry, Rig
 from pzd.artefacts.table import ForceRow, InverseRow, Table, TableNotes
@@ -34,9 +34,9 @@ __all__ = [
     "MeasureRow",
     "NextTest",
     "ParameterRow",
-    "PublishedRow",
     "Ranked",
     "RecordEntry",
+    "ReferenceRow",
     "Region",
     "Report",
     "Response",

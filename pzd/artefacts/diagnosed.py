@@ -67,6 +67,12 @@ class NextTest(Frozen):
     separates: tuple[str, ...]
     distance_percent: float | None = None
     """Predicted r.m.s. between the rivals there, in % of peak, after refitting the wrong one."""
+    middle_m: float | None = None
+    """Where the motion has its middle, in the displacement as recorded."""
+    peak_speed_m_per_s: float | None = None
+    """Largest speed of the motion."""
+    peak_force_N: float | None = None
+    """Largest force that any of the rivals would reach in it."""
 
 
 class Diagnosis(Frozen):
@@ -82,6 +88,8 @@ class Diagnosis(Frozen):
     rivals: tuple[str, ...]
     where: tuple[Region, ...]
     next_test: NextTest | None
+    zero_m: float = 0.0
+    """Recorded displacement from which the parameters of an effect count x, such as x_e of `end_stop`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,14 +79,21 @@ class Identified:
             read_rows(folder / "measures.csv", MeasureRow, control),
         )
 
-    @property
-    def untrusted(self) -> tuple[str, ...]:
+    def untrusted(self, control: Control) -> tuple[str, ...]:
         """Why the result is not to be trusted (exit 4): the rows whose T0 or C is undetermined."""
         return tuple(
-            f"{row.setting or 'rig'}, {row.voltage_V} V, {row.temperature_degC} degC: {row.status}"
+            f"{_condition(row, control)}: {row.status}"
             for row in self.rows
             if row.T0_N is None or row.C_Ns_per_m is None
         )
+
+
+def _condition(row: ParameterRow, control: Control) -> str:
+    """Setting, control signal and temperature of a row, those that it has."""
+    parts = [row.setting or "rig"]
+    parts += [f"{row.voltage_V:.4g} {control.unit}"] if row.voltage_V is not None else []
+    parts += [f"{row.temperature_degC:.4g} degC"] if row.temperature_degC is not None else []
+    return ", ".join(parts)
 
 
 def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:

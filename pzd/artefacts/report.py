@@ -25,15 +25,18 @@ class ComfortRow(Frozen):
     """How far the number can be trusted, e.g. `verified` or `unverified transcription`."""
 
 
-class PublishedRow(Frozen):
-    """One published number beside ours."""
+class ReferenceRow(Frozen):
+    """One expected number beside that of the run."""
 
     id: str
     kind: str
-    published: float | str
+    expected: float | str
+    """As the reference file has it; a range is text."""
     computed: float | None
+    """In `unit`; None where the run does not give it, and `note` says why."""
     unit: str
     ratio: float | None
+    """Computed over expected; None where there is no such ratio."""
     note: str
 
 
@@ -46,21 +49,22 @@ class Report:
     comfort: tuple[ComfortRow, ...]
     page: str
     """report.html, whole."""
-    published: tuple[PublishedRow, ...] | None = None
+    reference: tuple[ReferenceRow, ...] | None = None
+    """None where the config names no expected numbers."""
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write comfort.csv, report.html and, where the config asks, published.csv."""
+        """Write comfort.csv, report.html and, where the config names expected numbers, reference.csv."""
         write_rows(folder / "comfort.csv", ComfortRow, self.comfort, control)
         (folder / "report.html").write_text(self.page, encoding="utf-8")
-        if self.published is not None:
-            write_rows(folder / "published.csv", PublishedRow, self.published, control)
+        if self.reference is not None:
+            write_rows(folder / "reference.csv", ReferenceRow, self.reference, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
         """Read and check them again."""
-        published = folder / "published.csv"
+        reference = folder / "reference.csv"
         return cls(
             read_rows(folder / "comfort.csv", ComfortRow, control),
             (folder / "report.html").read_text(encoding="utf-8"),
-            read_rows(published, PublishedRow, control) if published.exists() else None,
+            read_rows(reference, ReferenceRow, control) if reference.exists() else None,
         )

@@ -11,7 +11,7 @@ from pzd.quantities import Control
 from pzd.record import Array
 from pzd.schema.csvfile import read_columns, read_rows, write_columns, write_rows
 from pzd.schema.model import Frozen
-from pzd.schema.processes import at_once
+from pzd.schema.processes import parallel_map
 
 RIDE_COLUMNS = ("time_s", "z_m", "phi_rad", "a_K_m_per_s2")
 AXLE_COLUMNS = (
@@ -84,7 +84,7 @@ class Rides:
             columns = {name: ride.columns.get(name) for name in _RIDE_HEADER}
             write_columns(folder / f"{ride.case}.csv", columns, control)
 
-        at_once(written, self.rides, jobs)
+        parallel_map(written, self.rides, jobs)
         write_rows(folder / "summary.csv", SummaryRow, self.summary, control)
         write_rows(folder / "response.csv", Response, self.responses, control)
 
@@ -96,11 +96,10 @@ class Rides:
             return Ride(row.case, read_columns(folder / f"{row.case}.csv", _RIDE_HEADER, control, _RIDE_OPTIONAL))
 
         summary = read_rows(folder / "summary.csv", SummaryRow, control)
-        rides = tuple(at_once(ride, summary, jobs))
+        rides = tuple(parallel_map(ride, summary, jobs))
         return cls(rides, summary, read_rows(folder / "response.csv", Response, control))
 
-    @property
-    def untrusted(self) -> tuple[str, ...]:
+    def untrusted(self, _: Control) -> tuple[str, ...]:
         """Why the result is not to be trusted (exit 4): rides whose energy balance does not close."""
         return tuple(
             f"{row.case}: energy error {row.energy_error:.1e}, above {ENERGY_LIMIT:g}"

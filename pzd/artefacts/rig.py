@@ -12,7 +12,7 @@ from pzd.record import Array, Record
 from pzd.schema.csvfile import read_columns, write_columns
 from pzd.schema.jsonfile import read_json_list, write_json
 from pzd.schema.model import Frozen
-from pzd.schema.processes import at_once
+from pzd.schema.processes import parallel_map
 
 
 class Finding(Frozen):
@@ -64,13 +64,13 @@ class Rig:
             write_columns(folder / f"{record.name}.csv", _channels(record), control)
 
         write_json(folder / "records.json", self.entries, control)
-        at_once(written, self.records, jobs)
+        parallel_map(written, self.records, jobs)
 
     @classmethod
     def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
         """Read and check them again, so many at the same time."""
         entries = read_json_list(folder / "records.json", RecordEntry, control)
-        return cls(tuple(at_once(lambda entry: _read_record(folder, entry, control), entries, jobs)), entries)
+        return cls(tuple(parallel_map(lambda entry: _read_record(folder, entry, control), entries, jobs)), entries)
 
 
 def _channels(record: Record) -> Mapping[str, Array | None]:

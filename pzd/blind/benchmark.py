@@ -7,10 +7,7 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
-import os
 import shutil
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
@@ -25,6 +22,8 @@ from pzd.blind.plan import Planned, plan
 from pzd.blind.seek import Methods, seek
 from pzd.schema.errors import DataError
 from pzd.schema.jsonfile import read_json
+from pzd.schema.processes import end_with_parent
+from pzd.schema.progress import Listener, Progress, unheard
 
 log = logging.getLogger(__name__)
 
@@ -35,18 +34,9 @@ def processes(count: int) -> Executor:
 
 
 def _ends_quietly() -> None:
-    """Let a process end without a traceback when it is interrupted, and say nothing: the parent speaks for all."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """Let a process end with its parent and without a traceback, and say nothing: the parent speaks for all."""
     logging.getLogger("pzd").addHandler(logging.NullHandler())
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """A parent that is killed tells nobody: its pool would wait for work for ever."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+    end_with_parent()
 
 
 @dataclass(frozen=True)
@@ -60,6 +50,8 @@ class Benchmark:
     """Hash of everything that a case hangs on but its number: cases with another one are done again."""
     pool: Callable[[int], Executor] = processes
     """Makes a pool of so many workers."""
+    progress: Listener = unheard
+    """Hears of every case that is done."""
 
     def run(self, jobs: int, *, afresh: bool = False) -> tuple[Scored, ...]:
         """Every case's score; those that stand there finished are not done again.
@@ -103,7 +95,8 @@ class Benchmark:
                 self.places, case.id, self.made_from, self.setup.control, keep_files=self.setup.blind.keep_files
             )
             left = (time.monotonic() - begun) / len(found) * (len(waiting) - len(found))
-            log.info("%d of %d cases, %s left", whole - len(waiting) + len(found), whole, _duration(left))
+            done = whole - len(waiting) + len(found)
+            self.progress(Progress(done, whole, f"cases, {_duration(left)} left"))
 
         drawing, seeking = (self.pool(min(jobs, len(waiting))) for _ in range(2))
         try:

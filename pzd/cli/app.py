@@ -6,12 +6,13 @@ import difflib
 import re
 import sys
 from collections.abc import Callable, Sequence
-from typing import NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
 from pzd.cli import blind, figures, look, stages, start
 from pzd.cli.exits import DONE, INTERRUPTED, OWN_FAULT
+from pzd.cli.interrupt import end_soon_after_interrupt, say_interrupted
 from pzd.cli.output import complain, own_fault, silence
 from pzd.schema.errors import ConfigError, FilesError, UserError
 
@@ -23,7 +24,7 @@ app = typer.Typer(
     help="Says what a controlled damper does: rig files in, comfort report out.",
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    add_completion=False,
+    add_completion=True,
     no_args_is_help=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -38,8 +39,21 @@ for _command in _COMMANDS:
     app.command()(_command)
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"pzd {version('pzd')}")
+        raise typer.Exit
+
+
+Version = Annotated[
+    bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+]
+
+
 @app.callback(invoke_without_command=True)
-def _bare(context: typer.Context) -> None:
+def _bare(context: typer.Context, version: Version = False) -> None:
     """Say what a controlled damper does: rig files in, comfort report out."""
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
@@ -50,6 +64,7 @@ def main() -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
+    end_soon_after_interrupt()
     code = status(sys.argv[1:])
     try:
         sys.stdout.flush()
@@ -79,7 +94,7 @@ def status(arguments: Sequence[str]) -> int:
     except Exception as error:  # noqa: BLE001  # every ending has its exit code
         return _failed(error)
     if code == INTERRUPTED:  # typer may make an exit of its own of it
-        complain(["interrupted; finished stages stand, the one at work left what was there before"])
+        say_interrupted()
     return code
 
 

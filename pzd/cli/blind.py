@@ -38,7 +38,7 @@ def blind(
     places = folder_of(given.run.folder / FOLDER, setup.blind.seed)
     methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
     with given.run.locked("pzd blind"):
-        benchmark = Benchmark(setup, methods, places, _made_from(whole))
+        benchmark = Benchmark(setup, methods, places, _made_from(whole), progress=output.progress)
         cases = benchmark.run(jobs, afresh=force)
         lines = write(cases, places.folder, setup.control, tuning=setup.blind.tuning)
     output.say(*lines, f"tables and picture: {places.folder}")
@@ -70,7 +70,7 @@ def _made_from(config: RunConfig) -> str:
     blocks = config.model_dump_json(
         include={"seed", "control", "rig", "identify", "diagnose", "blind"}, exclude=of_the_run
     )
-    return hashlib.sha256(f"{blocks}{code_hash('blind')}".encode()).hexdigest()[:16]
+    return hashlib.sha256(f"{blocks}{code_hash('pzd.blind.benchmark')}".encode()).hexdigest()[:16]
 
 
 COMMANDS = (blind,)

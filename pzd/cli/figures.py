@@ -16,16 +16,16 @@ def figures(
     verbose: Verbose = False,
 ) -> int:
     """Draw the figures of the paper, and their index."""
-    from pzd.figures.draw import FOLDER, drawn
-    from pzd.figures.evidence import Evidence
-    from pzd.pipeline.command import bring, opened
+    from pzd.paper.figures.draw import FOLDER, drawn
+    from pzd.paper.figures.sources import FigureData
+    from pzd.pipeline.command import execute, opened
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
-    marks = bring(given, "identify", force=False, jobs=jobs, say=output.say)
-    gallery = drawn(Evidence.of(given.run, given.config), output.say)
+    marks = execute(given, "identify", force=False, jobs=jobs, say=output.say, progress=output.progress)
+    figure_set = drawn(FigureData.of(given.run, given.config), output.say)
     with given.run.locked("pzd figures"):
-        given.run.write_extra(FOLDER, gallery.write)
+        given.run.write_extra(FOLDER, figure_set.write)
     output.say(f"figures: {given.run.folder / FOLDER / 'index.html'}")
     complain(f"not to be trusted: {mark}" for mark in marks)
     return UNTRUSTED if marks else DONE

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pzd.schema.wording import supported
+
 
 def number(value: float | str | None) -> str:
     """A number with the digits that matter; a dash where there is none."""
@@ -16,7 +18,7 @@ def interval(value: float | None, low: float | None, high: float | None) -> str:
     """A value with its 95 % interval."""
     if value is None or low is None or high is None:
         return number(value)
-    return f"{number(value)} ({number(low)} to {number(high)})"
+    return "{} ({} to {})".format(*(supported(each, low, high) for each in (value, low, high)))
 
 
 def aligned(rows: Sequence[Sequence[str]], indent: str = "") -> list[str]:

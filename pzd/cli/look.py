@@ -10,24 +10,35 @@ import typer
 
 from pzd.cli.exits import DONE
 from pzd.cli.layout import aligned, interval, number
-from pzd.cli.options import RUNS, Config, Quiet, Runs, Set, Verbose
+from pzd.cli.machine import run_as_data
+from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose
 from pzd.cli.output import Output
 
 if TYPE_CHECKING:
     from pzd.artefacts import ParameterRow, RecordEntry
-    from pzd.pipeline.standing import Standing
+    from pzd.pipeline.run_summary import RunSummary
 
 RunFolders = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of runs, e.g. runs/quickstart.")]
 
 
 def check(
-    config: Config, runs: Runs = RUNS, overrides: Set = None, quiet: Quiet = False, verbose: Verbose = False
+    config: Config,
+    runs: Runs = RUNS,
+    overrides: Set = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> int:
     """Check config and rig records; write nothing."""
     from pzd.pipeline.command import opened, preflight
+    from pzd.schema.jsonfile import plain
 
     output = Output(quiet=quiet, verbose=verbose)
-    entries = preflight(opened(config, runs, overrides or ()))
+    given = opened(config, runs, overrides or ())
+    entries = preflight(given)
+    if as_json:
+        output.say_json(plain({"config": config.as_posix(), "records": entries}, given.run.control))
+        return DONE
     for entry in entries:
         output.say(*_entry(entry))
     found = sum(len(entry.findings) for entry in entries)
@@ -42,18 +53,29 @@ def _entry(entry: RecordEntry) -> Iterator[str]:
 
 
 def show(
-    config: Config, runs: Runs = RUNS, overrides: Set = None, quiet: Quiet = False, verbose: Verbose = False
+    config: Config,
+    runs: Runs = RUNS,
+    overrides: Set = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> int:
-    """Print what stands in the run of a config."""
+    """Print the numbers in the run of a config.
+
+    A stage whose numbers are of an older config, of other files or of other code is called stale, with the reason.
+    """
     from pzd.cli.story import story
     from pzd.pipeline.command import opened
-    from pzd.pipeline.standing import standing
+    from pzd.pipeline.run_summary import summary_with_stale
 
-    run = opened(config, runs, overrides or ()).run
-    found, output = standing(run), Output(quiet=quiet, verbose=verbose)
-    output.say(f"run: {found.folder}")
+    found = summary_with_stale(opened(config, runs, overrides or ()))
+    output = Output(quiet=quiet, verbose=verbose)
+    if as_json:
+        output.say_json(run_as_data(found))
+        return DONE
+    output.say(f"run: {found.folder}", *stale_lines(found))
     _section(output, "parameters", _parameters(found))
-    _section(output, "diagnosis", [[line] for line in story(found.diagnosis, run.control)] if found.diagnosis else [])
+    _section(output, "diagnosis", [[line] for line in story(found.diagnosis, found.control)] if found.diagnosis else [])
     _section(output, "rides", _rides(found))
     _section(output, "comfort", _comfort(found))
     output.say(*(f"not to be trusted: {mark}" for mark in found.marks))
@@ -61,12 +83,17 @@ def show(
     return DONE
 
 
+def stale_lines(found: RunSummary, place: str = "") -> list[str]:
+    """A line a stage whose numbers are not those of the config as it is today."""
+    return [f"stale: {place}{stage}: {reason}" for stage, reason in found.stale.items()]
+
+
 def _section(output: Output, title: str, rows: list[list[str]]) -> None:
     if rows:
         output.say("", f"{title}:", *aligned(rows, "  "))
 
 
-def _parameters(found: Standing) -> list[list[str]]:
+def _parameters(found: RunSummary) -> list[list[str]]:
     if not found.parameters:
         return []
     control = found.control
@@ -96,7 +123,7 @@ def _parameter_row(row: ParameterRow) -> list[str]:
     ]
 
 
-def _rides(found: Standing) -> list[list[str]]:
+def _rides(found: RunSummary) -> list[list[str]]:
     head = ["case", "point", "peak |a_K| [m/s2]", "rms a_K [m/s2]", "peak deflection [m]", "outside the table"]
     rows = [
         [
@@ -112,20 +139,29 @@ def _rides(found: Standing) -> list[list[str]]:
     return [head, *rows] if rows else []
 
 
-def _comfort(found: Standing) -> list[list[str]]:
+def _comfort(found: RunSummary) -> list[list[str]]:
     return [
         [row.case, row.point, row.edition, row.measure, f"{number(row.value)} {row.unit}", row.status]
         for row in found.comfort
     ]
 
 
-def compare(runs: RunFolders, quiet: Quiet = False, verbose: Verbose = False) -> int:
-    """Print the numbers of several runs side by side."""
-    from pzd.cli.beside import beside
-    from pzd.pipeline.standing import standing_in
+def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbose: Verbose = False) -> int:
+    """Print the numbers of several runs side by side.
+
+    A stage whose numbers are not those of the run's config as it is today is called stale, with the reason.
+    """
+    from pzd.cli.comparison import comparison
+    from pzd.pipeline.run_summary import summary_of
 
     output = Output(quiet=quiet, verbose=verbose)
-    output.say(*aligned(beside([standing_in(folder) for folder in runs])))
+    found = [summary_of(folder) for folder in runs]
+    if as_json:
+        output.say_json([run_as_data(run) for run in found])
+        return DONE
+    output.say(*aligned(comparison(found)))
+    for run in found:
+        output.say(*stale_lines(run, f"{run.folder}: "))
     return DONE
 
 

@@ -10,21 +10,22 @@ import tempfile
 import traceback
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, Any, TextIO
+
+if TYPE_CHECKING:
+    from pzd.schema.progress import Progress
 
 _BAR = 24
 """Width of the progress bar in characters."""
-_PROGRESS = "%d of %d"
-"""How a log message begins that tells how far a stage is."""
 
 
 class Output:
     """Prints as much as the user wants to see."""
 
     def __init__(self, *, quiet: bool, verbose: bool) -> None:
-        self.quiet = quiet
+        self.quiet, self.verbose = quiet, verbose and not quiet
         logger = logging.getLogger("pzd")
-        handler = _Handler(self, verbose=verbose and not quiet)
+        handler = _Handler(self)
         logger.handlers = [handler]
         logger.setLevel(logging.DEBUG if verbose else logging.INFO)
         logging.captureWarnings(capture=True)
@@ -37,28 +38,38 @@ class Output:
             for line in lines:
                 _print(line, sys.stdout)
 
+    def say_json(self, data: Any) -> None:
+        """Print plain data as JSON to stdout."""
+        from pzd.schema.jsonfile import json_text
+
+        self.say(json_text(data))
+
+    def progress(self, event: Progress) -> None:
+        """Show how far a stage has come: a line each where the user wants to see all, else a bar on a terminal."""
+        if self.verbose:
+            self.say(f"  {event}")
+        elif not self.quiet and sys.stderr.isatty():
+            _draw(event)
+
 
 class _Handler(logging.Handler):
-    """Shows what the stages log: progress as a bar, warnings as complaints, the rest where asked for."""
+    """Shows what the stages log: warnings as complaints, the rest where asked for."""
 
-    def __init__(self, output: Output, *, verbose: bool) -> None:
+    def __init__(self, output: Output) -> None:
         super().__init__()
-        self.output, self.verbose = output, verbose
+        self.output = output
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show one message."""
         if record.levelno >= logging.WARNING:
             complain([record.getMessage()])
-        elif self.verbose:
+        elif self.output.verbose:
             self.output.say(f"  {record.getMessage()}")
-        elif str(record.msg).startswith(_PROGRESS) and not self.output.quiet and sys.stderr.isatty():
-            _draw(record)
 
 
-def _draw(record: logging.LogRecord) -> None:
-    done, whole = record.args[:2] if isinstance(record.args, tuple) else (0, 0)
-    filled = _BAR * int(str(done)) // max(int(str(whole)), 1)
-    line = f"[{'#' * filled}{'.' * (_BAR - filled)}] {record.getMessage()}"
+def _draw(event: Progress) -> None:
+    filled = _BAR * event.done // max(event.whole, 1)
+    line = f"[{'#' * filled}{'.' * (_BAR - filled)}] {event}"
     sys.stderr.write(f"\r\x1b[K{line[: shutil.get_terminal_size().columns - 1]}")
     sys.stderr.flush()
 

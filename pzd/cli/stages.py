@@ -25,16 +25,16 @@ _COMMANDS = {
 
 
 def _page(run: Run) -> list[str]:
-    from pzd.pipeline.standing import page_of
+    from pzd.pipeline.run_summary import page_of
 
     return [f"report: {page_of(run)}"]
 
 
 def _story(run: Run) -> list[str]:
     from pzd.cli.story import story
-    from pzd.pipeline.standing import standing
+    from pzd.pipeline.run_summary import run_summary
 
-    found = standing(run).diagnosis
+    found = run_summary(run).diagnosis
     return story(found, run.control) if found else []
 
 
@@ -52,11 +52,11 @@ def _command(name: str, summary: str) -> Callable[..., int]:
         quiet: Quiet = False,
         verbose: Verbose = False,
     ) -> int:
-        from pzd.pipeline.command import bring, opened
+        from pzd.pipeline.command import execute, opened
 
         output = Output(quiet=quiet, verbose=verbose)
         given = opened(config, runs, overrides or ())
-        marks = bring(given, name, force=force, jobs=jobs, say=output.say)
+        marks = execute(given, name, force=force, jobs=jobs, say=output.say, progress=output.progress)
         if name in _AT_THE_END:
             output.say(*_AT_THE_END[name](given.run))
         complain(f"not to be trusted: {mark}" for mark in marks)

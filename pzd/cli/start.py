@@ -9,7 +9,8 @@ import typer
 
 from pzd.cli.exits import DONE
 from pzd.cli.layout import aligned
-from pzd.cli.options import Verbose
+from pzd.cli.machine import effects_as_data
+from pzd.cli.options import Json, Verbose
 from pzd.cli.output import Output
 
 RigFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Rig files to make a config for.")]
@@ -30,25 +31,27 @@ def init(files: RigFiles, verbose: Verbose = False) -> int:
 
 def schema(verbose: Verbose = False) -> int:
     """Print the JSON schema of a config."""
-    import json
-
     from pzd.config import RunConfig
 
-    Output(quiet=False, verbose=verbose).say(json.dumps(RunConfig.model_json_schema(), indent=2, ensure_ascii=False))
+    Output(quiet=False, verbose=verbose).say_json(RunConfig.model_json_schema())
     return DONE
 
 
-def effects(verbose: Verbose = False) -> int:
+def effects(as_json: Json = False, verbose: Verbose = False) -> int:
     """Print the library of effects."""
     from pzd.damper.effects import library
 
+    output = Output(quiet=False, verbose=verbose)
+    if as_json:
+        output.say_json(effects_as_data(library().values()))
+        return DONE
     head = ["effect", "place", "parameter", "unit", "from", "to", "off at", "law"]
     rows = [
         [effect.name, effect.place, p.name, p.unit, f"{p.low:g}", f"{p.high:g}", f"{p.neutral:g}", effect.law]
         for effect in library().values()
         for p in effect.parameters
     ]
-    Output(quiet=False, verbose=verbose).say(*aligned([head, *rows]))
+    output.say(*aligned([head, *rows]))
     return DONE
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from pzd.artefacts import Diagnosis, NextTest, Value
 from pzd.cli.layout import interval, number
@@ -27,7 +27,7 @@ def story(diagnosis: Diagnosis, control: Control) -> list[str]:
         _gap(diagnosis),
     ]
     lines += [f"where: {where.region}, {where.share_of_gap:.0%} of the gap" for where in diagnosis.where[:_MOST]]
-    lines += [f"adopted: {name}, {_parameters(diagnosis.parameters.get(name, {}), unit)}" for name in diagnosis.effects]
+    lines += [f"adopted: {name}, {_parameters(diagnosis, name, unit)}" for name in diagnosis.effects]
     if diagnosis.confidence is not None:
         lines.append(f"confidence: {diagnosis.confidence:.0%}")
     if diagnosis.rivals:
@@ -41,15 +41,20 @@ def story(diagnosis: Diagnosis, control: Control) -> list[str]:
 def _gap(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
     share = f", {1.0 - gap.after / gap.before:.0%} less" if gap.after < gap.before else ""
-    held = f"{len(gap.held_out)} {gap.hold_out}" if gap.hold_out != "mixed" else f"{len(gap.held_out)} parts"
+    records = f"{len(gap.held_out)} record{'s' if len(gap.held_out) != 1 else ''}"
+    held = {"records": records, "mixed": f"{records}, whole or in part"}.get(
+        gap.hold_out, f"{gap.hold_out} of {records}"
+    )
     return (
         f"gap on what no fit has seen ({held}): W_s {number(gap.before)} before, {number(gap.after)} after{share}; "
         f"noise alone gives {number(gap.noise_floor)}"
     )
 
 
-def _parameters(values: Mapping[str, Value], unit: str) -> str:
-    return ", ".join(f"{name} = {_value(value, unit)}" for name, value in values.items())
+def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:
+    values = diagnosis.parameters.get(effect, {})
+    told = ", ".join(f"{name} = {_value(value, unit)}" for name, value in values.items())
+    return f"{told} to either side of x = {diagnosis.zero_m:.4g} m" if effect == "end_stop" else told
 
 
 def _value(value: Value, unit: str) -> str:
@@ -76,7 +81,14 @@ def _next(test: NextTest, unit: str) -> str:
         test.waveform,
         f"{number(test.frequency_Hz)} Hz" if test.frequency_Hz is not None else "",
         f"{number(test.amplitude_m)} m" if test.amplitude_m is not None else "",
+        f"about {test.middle_m:.6g} m" if test.middle_m is not None else "",
         f"at {' and '.join(f'{number(v)} {unit}' for v in voltages)}" if voltages != (None,) else "",
     ]
+    reached = [
+        f"{number(value)} {of}"
+        for value, of in ((test.peak_speed_m_per_s, "m/s"), (test.peak_force_N, "N"))
+        if value is not None
+    ]
+    far = f", up to {' and '.join(reached)}" if reached else ""
     between = f" to tell {' from '.join(test.separates)}" if test.separates else ""
-    return f"next test: {' '.join(part for part in parts if part)}{between}"
+    return f"next test: {' '.join(part for part in parts if part)}{far}{between}"

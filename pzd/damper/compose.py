@@ -42,8 +42,8 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
     Parameters
     ----------
     damper : the damper with its effects
-    motion : (n,) sampled motion; the extension is a parabola inside each step, voltage and
-        temperature go linearly
+    motion : (n,) sampled motion, its displacement as recorded; the extension is a parabola inside each step,
+        voltage and temperature go linearly
     initial_force : force of the oil spring at the first sample [N]
     tolerance : admissible error of a piece, as a share of the force
 
@@ -55,6 +55,7 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
     ------
     ValueError : when the damper needs a voltage or temperature that the motion does not have
     """
+    motion = motion.about(damper.zero_m)
     steps = sampling_steps(motion.time)
     effective = voltage_at_valve(damper, standing(motion.voltage), steps)
     rows = element_rows(damper, effective, standing(motion.temperature))
@@ -83,7 +84,7 @@ def with_parallel(force: Array, parallel: Array | None, motion: Motion) -> Array
     Parameters
     ----------
     force : (n,) of the element [N]
-    beside : (n, m) or (1, m) rows of the parallel effects; None without any
+    parallel : (n, m) or (1, m) rows of the parallel effects; None without any
     motion : (n,) sampled motion
     """
     if parallel is None:

@@ -25,7 +25,7 @@ class Scales:
     speed: float
     """Largest extension speed [m/s]."""
     stroke: float
-    """Largest displacement [m]."""
+    """Largest displacement from the middle of the stroke [m]."""
     acceleration: float
     """Largest acceleration [m/s2]."""
     damping: float
@@ -44,6 +44,8 @@ class Search:
     """Starting values, in that size; every one is tried."""
     logarithmic: bool = False
     """Whether steps are ratios."""
+    within: tuple[float, float] = (-math.inf, math.inf)
+    """Smallest and largest value that is looked at, in that size."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,8 @@ class Effect:
     """Reference numbers: the arguments of the module's `law`, and what it gives."""
     needs: Need | None = None
     """What must move in a test for the effect to be seen at all."""
+    about_zero: bool = False
+    """Whether a fit looks for the zero of the displacement too: the law is another about another zero."""
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name.

@@ -42,6 +42,9 @@ class Damper(Frozen):
     """Parameters of each effect, by the effect's name; see `pzd effects`."""
     reference_temperature_degC: float | None = None
     """T_ref of `temperature_drift`; needed only with that effect."""
+    zero_m: float = 0.0
+    """Recorded displacement from which x in the laws of `end_stop` and `gas_spring` is counted, as a displacement
+    sensor has any zero: the middle of the stroke on the stand. In a car it is the static position."""
 
     @model_validator(mode="after")
     def _known_effects(self) -> Damper:
@@ -54,7 +57,16 @@ class Damper(Frozen):
     def with_effect(self, name: str, values: EffectValues) -> Damper:
         """The same damper with one effect more, or with other values of it."""
         effects = {**self.effects, name: dict(values)}
-        return Damper(base=self.base, effects=effects, reference_temperature_degC=self.reference_temperature_degC)
+        return Damper(
+            base=self.base,
+            effects=effects,
+            reference_temperature_degC=self.reference_temperature_degC,
+            zero_m=self.zero_m,
+        )
+
+    def moved(self, by: float) -> Damper:
+        """The same damper on a stand whose displacement reads more by so much [m]."""
+        return self.model_copy(update={"zero_m": self.zero_m + by})
 
 
 def _check_effect(name: str, values: EffectValues) -> None:

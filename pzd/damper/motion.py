@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -35,3 +35,7 @@ class Motion:
             record.voltage,
             record.temperature,
         )
+
+    def about(self, zero: float) -> Self:
+        """The same motion, its displacement counted from another zero [m]."""
+        return self if zero == 0.0 else replace(self, displacement=self.displacement - zero)

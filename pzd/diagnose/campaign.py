@@ -14,7 +14,7 @@ from pzd.damper.model import Damper
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.data.split import UNTOUCHED, Split
 from pzd.diagnose.noise.input_uncertainty import Expected, expected
-from pzd.diagnose.residual_check import ResidualCheck, judge
+from pzd.diagnose.residual_check import ResidualCheck, check_residual
 from pzd.signals.nuisance import NuisanceConfig
 
 Mask = NDArray[np.bool_]
@@ -32,7 +32,7 @@ class Campaign:
     jobs: int = 1
     """Records that are asked at the same time."""
     _expected: dict[tuple[str, int], Expected] = field(default_factory=dict, repr=False)
-    _judged: dict[str, tuple[ResidualCheck, ...]] = field(default_factory=dict, repr=False)
+    _checks: dict[str, tuple[ResidualCheck, ...]] = field(default_factory=dict, repr=False)
 
     @property
     def seen(self) -> tuple[Mask, ...]:
@@ -51,21 +51,27 @@ class Campaign:
         self._expected.update(zip(((key, i) for i in new), made, strict=True))
         return tuple(self._expected[key, i] for i in numbers)
 
-    def judged(self, damper: Damper) -> tuple[ResidualCheck, ...]:
+    def checks(self, damper: Damper) -> tuple[ResidualCheck, ...]:
         """Every record against a damper, over the samples seen."""
         key = damper.model_dump_json()
-        if key not in self._judged:
-            self._judged[key] = self._against(damper, self.seen)
-        return self._judged[key]
+        if key not in self._checks:
+            self._checks[key] = self._against(damper, self.seen)
+        return self._checks[key]
 
     def untouched(self, damper: Damper) -> tuple[ResidualCheck, ...]:
         """Every record against a damper, over the samples that naming may not see."""
         return self._against(damper, self.in_role(UNTOUCHED))
 
+    def offset(self, damper: Damper) -> float:
+        """By how much the median record lies above what the damper makes of it [N]; naming leaves it to each test."""
+        asked = in_use(self.seen)
+        given = zip(asked, self.expected(damper, asked), strict=True)
+        return float(np.median([np.mean(self.prepared[i].record.force - each.force) for i, each in given]))
+
     def _against(self, damper: Damper, masks: Sequence[Mask]) -> tuple[ResidualCheck, ...]:
         asked = in_use(masks)
         given = [(e, self.prepared[i], masks[i]) for i, e in zip(asked, self.expected(damper, asked), strict=True)]
-        return self._each(lambda each: judge(*each, self.nuisance), given)
+        return self._each(lambda each: check_residual(*each, self.nuisance), given)
 
     def _each(self, function: Callable[[Item], Made], items: Iterable[Item]) -> tuple[Made, ...]:
         with ThreadPoolExecutor(max(self.jobs, 1)) as pool:

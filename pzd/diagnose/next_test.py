@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pzd.artefacts import NextTest
 from pzd.damper.compose import respond
-from pzd.damper.effect import Scales
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.record import Array
+from pzd.diagnose.data.cleaning import Prepared
+from pzd.record import Array, Record
 from pzd.rig.config import Limits
 
 FREQUENCIES = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
-"""Frequencies that are weighed [Hz]."""
+"""Frequencies that are weighed [Hz], and the largest."""
 STROKES = (0.15, 0.3, 0.6, 1.0)
 """Amplitudes that are weighed, as shares of the largest."""
 POINTS = 400
@@ -26,66 +27,117 @@ CYCLES = 2
 """Simulated, the last compared."""
 STEPS_HZ = 4.0
 """Changes of the voltage in the test that steps it, for each cycle."""
+LEAST = 0.02
+"""A test of less amplitude than this share of the largest is not weighed: the resolution of the stroke shows in it."""
+ROUND_OFF = 1e-12
+"""Relative error of a difference of two displacements in double precision, with room."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """What the stand can do."""
+    """What a test may reach."""
 
+    middle: float
+    """Where the motion has its middle, in the displacement as recorded [m]."""
     amplitude: float
-    """Largest amplitude [m]."""
+    """Largest amplitude about it [m]."""
     speed: float
     """Largest speed [m/s]."""
     frequency: float
     """Largest frequency [Hz]."""
-    force: float
-    """Largest force [N]."""
-    voltages: tuple[float, ...]
+    force: tuple[float, float]
+    """Smallest and largest force [N]."""
+    voltages: tuple[float, ...] = ()
     """Voltages to choose from [V]; empty without a control signal."""
 
 
-def reach_of(limits: Limits, scales: Scales, voltages: Sequence[float]) -> Reach:
-    """What the stand can do: the config's limits, and where it gives none, what the records reached.
+def reach_of(limits: Limits, prepared: Sequence[Prepared], voltages: Sequence[float]) -> Reach:
+    """What a test may reach: the config's limits, and where it gives none, what the records of this setting reached.
 
     Parameters
     ----------
-    limits : of the config
-    scales : of what the records reached; the frequency is taken as twice speed over stroke
+    limits : of the config; a stroke is about the middle of what was recorded
+    prepared : the records of the setting
     voltages : of the damper's base rows [V]
     """
-    low, high = limits.voltage_V or (-np.inf, np.inf)
+    records = [p.record for p in prepared]
+    lowest, highest = _range([r.displacement for r in records])
+    force = _range([r.force for r in records])
+    amplitude = 0.5 * (highest - lowest) if limits.stroke_m is None else 0.5 * limits.stroke_m
+    middle = _tidy(0.5 * (lowest + highest), amplitude)
+    if limits.stroke_m is None:
+        amplitude = min(highest - middle, middle - lowest)
     return Reach(
-        scales.stroke if limits.stroke_m is None else 0.5 * limits.stroke_m,
-        limits.speed_m_per_s or scales.speed,
-        limits.frequency_Hz or 2.0 * scales.speed / scales.stroke / (2.0 * np.pi),
-        limits.force_N or np.inf,
-        tuple(v for v in voltages if low <= v <= high),
+        middle,
+        amplitude,
+        limits.speed_m_per_s or max(float(np.max(np.abs(r.velocity))) for r in records),
+        limits.frequency_Hz or max(_frequency(p) for p in prepared),
+        force if limits.force_N is None else (-limits.force_N, limits.force_N),
+        _within(limits.voltage_V or _recorded_voltages(records), voltages),
     )
 
 
-def next_test(rivals: Sequence[tuple[str, Damper]], reach: Reach, temperature: float | None) -> NextTest | None:
+def _range(channels: Sequence[Array]) -> tuple[float, float]:
+    return min(float(np.min(c)) for c in channels), max(float(np.max(c)) for c in channels)
+
+
+def _tidy(middle: float, amplitude: float) -> float:
+    """A middle that can be set: to a digit that is a hundredth of the amplitude's first digit or less."""
+    return round(middle, 3 - math.floor(math.log10(amplitude)))
+
+
+def _frequency(prepared: Prepared) -> float:
+    """Frequency of a record [Hz]; where it does not repeat, that of a sine with its stroke and speed."""
+    if prepared.cycles is not None:
+        return 1.0 / prepared.cycles.period
+    record = prepared.record
+    return float(np.max(np.abs(record.velocity)) / (np.pi * np.ptp(record.displacement)))
+
+
+def _recorded_voltages(records: Sequence[Record]) -> tuple[float, float]:
+    channels = [r.voltage for r in records if r.voltage is not None]
+    return _range(channels) if channels else (-np.inf, np.inf)
+
+
+def _within(limits: tuple[float, float], voltages: Sequence[float]) -> tuple[float, ...]:
+    """The voltages inside the limits; the ends of the limits stand for those beyond."""
+    low, high = limits
+    return tuple(sorted({min(max(v, low), high) for v in voltages}))
+
+
+def next_test(
+    rivals: Sequence[tuple[str, Damper]], reach: Reach, temperature: float | None, offsets: Sequence[float] = ()
+) -> NextTest | None:
     """The test on which the rivals differ most, an offset, a gain and a delay of the test taken off.
 
     Parameters
     ----------
     rivals : name and fitted damper, the best first; it is told apart from each of the others
-    reach : what the stand can do
+    reach : what a test may reach; a test in which any rival would reach more is left out, for any may be the truth
     temperature : at which the test is run [degC]
+    offsets : by which the records lie above each rival's force [N]; none by default
 
     Returns
     -------
-    the test, with the r.m.s. difference that it would show in % of peak; None without two rivals
+    the test, with the r.m.s. difference that it would show in % of peak, and the largest speed and force;
+    None without two rivals, or where each test would reach too much
     """
     if len(rivals) < 2:
         return None
     best: tuple[float, NextTest] | None = None
+    above = np.array([*offsets] or [0.0] * len(rivals))[:, None]
     for plan, motion in _plans(reach, temperature):
-        forces = [respond(damper, motion)[-POINTS:] for _, damper in rivals]
-        if np.max(np.abs(forces)) > reach.force:  # any of them may be the truth
+        forces = np.stack([respond(damper, motion) for _, damper in rivals]) + above
+        if np.min(forces) < reach.force[0] or np.max(forces) > reach.force[1]:
             continue
-        distance = min(_distance(forces[0], other) for other in forces[1:])
+        last = forces[:, -POINTS:]
+        distance = min(_distance(last[0], other) for other in last[1:])
         if best is None or distance > best[0]:
-            best = distance, plan
+            reached = {
+                "peak_speed_m_per_s": float(np.max(np.abs(motion.velocity))),
+                "peak_force_N": float(np.max(np.abs(forces))),
+            }
+            best = distance, plan.model_copy(update=reached)
     if best is None:
         return None
     names = tuple(name for name, _ in rivals)
@@ -100,19 +152,28 @@ def _plans(reach: Reach, temperature: float | None) -> Iterator[tuple[NextTest, 
     voltages: list[float | tuple[float, ...] | None] = [*reach.voltages] or [None]
     if len(reach.voltages) > 1:
         voltages.append((reach.voltages[0], reach.voltages[-1]))
-    for (name, shape, harmonic), f, share, voltage in itertools.product(shapes, FREQUENCIES, STROKES, voltages):
-        amplitude = min(share * reach.amplitude, reach.speed / (2.0 * np.pi * f))
-        if harmonic * f > reach.frequency or amplitude < 0.02 * reach.amplitude:
+    frequencies = sorted({*(f for f in FREQUENCIES if f < reach.frequency), _rounded_down(reach.frequency)})
+    for (name, shape, harmonic), f, share, voltage in itertools.product(shapes, frequencies, STROKES, voltages):
+        amplitude = _rounded_down(min(share * reach.amplitude, reach.speed / (2.0 * np.pi * f)))
+        if harmonic * f > reach.frequency or amplitude < LEAST * reach.amplitude:
             continue
         stepped = isinstance(voltage, tuple)
         plan = NextTest(
             waveform=f"{name}, voltage stepped" if stepped else name,
             frequency_Hz=f,
-            amplitude_m=float(f"{amplitude:.3g}"),
+            amplitude_m=amplitude,
+            middle_m=reach.middle,
             voltage_V=voltage,
             separates=(),
         )
-        yield plan, _motion(shape, f, amplitude, voltage, temperature)
+        motion = _motion(shape, f, amplitude, voltage, temperature)
+        yield plan, replace(motion, displacement=reach.middle + motion.displacement)
+
+
+def _rounded_down(value: float) -> float:
+    """A positive number to three digits, never above it; 0.02 stays 0.02 though a difference gave 0.0199...9."""
+    digits = 2 - math.floor(math.log10(value))
+    return round(math.floor(value * (1.0 + ROUND_OFF) * 10.0**digits) / 10.0**digits, max(digits, 0))
 
 
 def _motion(

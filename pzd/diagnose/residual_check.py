@@ -58,7 +58,7 @@ class ResidualCheck:
         return float(np.max(np.abs(self.prepared.record.force)))
 
 
-def judge(given: Expected, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> ResidualCheck:
+def check_residual(given: Expected, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> ResidualCheck:
     """The record against what a damper makes of it, over the wanted samples past the warm-up."""
     record = prepared.record
     predicted, residual = given.force, record.force - given.force

@@ -42,7 +42,7 @@ def diagnose(
     """
     from pzd.diagnose.base_parameters import base_parameters
     from pzd.diagnose.campaign import Campaign
-    from pzd.diagnose.data.cleaning import prepare
+    from pzd.diagnose.data.cleaning import about, mid_stroke, prepare
     from pzd.diagnose.data.exclusions import whole_records, without
     from pzd.diagnose.data.split import split
     from pzd.diagnose.held_out import held_out_gap
@@ -52,16 +52,22 @@ def diagnose(
     from pzd.diagnose.where import regions
 
     used, cut_off = whole_records(rig, setting)
-    prepared = prepare(used)
+    recorded = prepare(used)
+    zero = mid_stroke(recorded)
+    prepared = about(recorded, zero)
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
     named = select_effects(Campaign(prepared, parts, diagnose.nuisance, jobs), plain, diagnose, jobs)
     evidence = named.first
-    before = evidence.campaign.judged(named.plain.damper)
-    after = evidence.campaign.judged(named.fitted.damper) if named.adopted else before
+    before = evidence.campaign.checks(named.plain.damper)
+    after = evidence.campaign.checks(named.fitted.damper) if named.adopted else before
     decision = decide(named, before, after, diagnose)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
+    reach = reach_of(stand.limits, recorded, voltages)
+    rivals = [(name, damper.moved(zero)) for name, damper in named.rivalling]
+    offsets = [evidence.campaign.offset(damper) for _, damper in named.rivalling]
+    found = named.fitted.damper.moved(zero) if named.adopted else plain
     told = Diagnosis(
         verdict=decision.verdict,
         reason=decision.reason + weak(parts.hold_out) + without(cut_off),
@@ -69,13 +75,12 @@ def diagnose(
         confidence=decision.confidence,
         gap=held_out_gap(named),
         parameters=parameters_of(named),
+        zero_m=found.zero_m,
         ranking=ranking_of(named, evidence),
         rivals=named.rivals,
-        where=() if decision.verdict == "none" else regions(before, control.unit),
-        next_test=next_test(
-            named.rivalling, reach_of(stand.limits, evidence.whole.scales, voltages), evidence.whole.reference
-        ),
+        where=() if decision.verdict == "none" else regions(before, control.unit, zero),
+        next_test=next_test(rivals, reach, evidence.whole.reference, offsets),
     )
     if not named.adopted:
-        return Diagnosed(told, plain, plain, tuple(row for row in identified.rows if row.setting == setting))
-    return Diagnosed(told, named.fitted.damper, plain, base_parameters(named, decision.verdict, setting))
+        return Diagnosed(told, found, plain, tuple(row for row in identified.rows if row.setting == setting))
+    return Diagnosed(told, found, plain, base_parameters(named, decision.verdict, setting))

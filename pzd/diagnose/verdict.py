@@ -41,7 +41,8 @@ def weak(hold_out: str) -> str:
     """What to add where the held-out data come from tests that were also fitted."""
     if hold_out == "records":
         return ""
-    return f"; held out were {hold_out} of tests that were also fitted, which is weak evidence"
+    parts = {"mixed": "some whole tests, and parts"}.get(hold_out, hold_out)
+    return f"; held out were {parts} of tests that were also fitted, which is weak evidence"
 
 
 def decide(

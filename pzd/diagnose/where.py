@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -38,19 +39,20 @@ class GapMap:
     """Axis -> (n,) the region in words that each point belongs to."""
 
 
-def regions(judged: Sequence[ResidualCheck], unit: str) -> tuple[Region, ...]:
+def regions(judged: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> tuple[Region, ...]:
     """The regions in which the gap is denser than elsewhere, most telling first.
 
     Parameters
     ----------
     judged : records against the damper
     unit : of the control signal
+    zero : recorded displacement where that of the judged records is nought [m]
 
     Returns
     -------
     regions in words with their share of the gap; empty where there is no gap above the noise
     """
-    gap = gap_map(judged, unit)
+    gap = gap_map(judged, unit, zero)
     total = float(gap.density.sum())
     if total <= 0.0:
         return ()
@@ -63,14 +65,14 @@ def regions(judged: Sequence[ResidualCheck], unit: str) -> tuple[Region, ...]:
     return tuple(region for _, region in found[:MOST]) or (Region(region="everywhere alike", share_of_gap=1.0),)
 
 
-def gap_map(judged: Sequence[ResidualCheck], unit: str) -> GapMap:
-    """The gap sample by sample, noise's share taken off."""
+def gap_map(judged: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> GapMap:
+    """The gap sample by sample, noise's share taken off; positions are told as recorded."""
     points = [_points(j) for j in judged]
     speed = max(float(np.max(np.abs(p["velocity"]))) for p in points)
     stroke = max(float(np.ptp(p["displacement"])) for p in points)
     labels: dict[str, list[Labels]] = {}
     for j, p in zip(judged, points, strict=True):
-        for axis, words in _labels(j, p, speed, stroke, unit).items():
+        for axis, words in _labels(j, p, speed, stroke, unit, zero).items():
             labels.setdefault(axis, []).append(words)
     return GapMap(
         np.concatenate([p["density"] for p in points]),
@@ -101,12 +103,14 @@ def _points(j: ResidualCheck) -> dict[str, Array]:
     return {**motion, "density": density, "weight": np.full(mean.size, float(count)), "voltage": voltage}
 
 
-def _labels(j: ResidualCheck, p: dict[str, Array], speed: float, stroke: float, unit: str) -> dict[str, Labels]:
+def _labels(
+    j: ResidualCheck, p: dict[str, Array], speed: float, stroke: float, unit: str, zero: float
+) -> dict[str, Labels]:
     v, x, a = p["velocity"], p["displacement"], p["acceleration"]
     fast = _bands(np.abs(v), _round(np.array([0.1, 0.33, 0.67]) * speed), "abs(v)", "m/s")
     found = {
         "velocity": fast,
-        "position": _bands(x, _round(np.array([-0.25, 0.25]) * stroke), "x", "m"),
+        "position": _bands(x + zero, _about(zero, 0.25 * stroke), "x", "m"),
         "direction": np.where(v >= 0.0, "rebound (v > 0)", "compression (v < 0)"),
         "phase": np.where(v * a >= 0.0, "speeding up", "slowing down"),
     }
@@ -129,10 +133,16 @@ def _voltages(voltage: Array, unit: str) -> Labels:
 
 
 def _bands(values: Array, edges: Array, name: str, unit: str) -> Labels:
-    words = [f"{name} < {edges[0]:.2g} {unit}"]
-    words += [f"{low:.2g} < {name} < {high:.2g} {unit}" for low, high in pairwise(edges)]
-    words.append(f"{name} > {edges[-1]:.2g} {unit}")
+    told = [f"{edge:.6g}" for edge in edges]
+    words = [f"{name} < {told[0]} {unit}"]
+    words += [f"{low} < {name} < {high} {unit}" for low, high in pairwise(told)]
+    words.append(f"{name} > {told[-1]} {unit}")
     return np.array(words)[np.searchsorted(edges, values)]
+
+
+def _about(middle: float, distance: float) -> Array:
+    """The edges on either side of a middle, to two figures of their distance from it."""
+    return np.round([middle - distance, middle + distance], 1 - math.floor(math.log10(distance)))
 
 
 def _round(edges: Array) -> Array:

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.artefacts import MeasureRow
+from pzd.artefacts.matching import same_motion
 from pzd.identify.trial import warm_up
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
 from pzd.signals.cycles import Cycles, cycles
 from pzd.signals.reversals import reversals
 from pzd.signals.work import work
-
-SAME_SPEED = 0.05
-"""Tests whose peak speeds differ by less, relative, are at the same speed."""
 
 
 @dataclass(frozen=True)
@@ -128,8 +126,4 @@ def _same_test(a: MeasureRow, b: MeasureRow) -> bool:
     speeds = a.peak_velocity_m_per_s, b.peak_velocity_m_per_s
     strokes = a.amplitude_m, b.amplitude_m
     warm = abs((a.temperature_degC or 0.0) - (b.temperature_degC or 0.0)) <= SAME_TEMPERATURE
-    return a.setting == b.setting and warm and _close(*speeds) and _close(*strokes)
-
-
-def _close(a: float, b: float) -> bool:
-    return abs(a - b) <= SAME_SPEED * max(a, b)
+    return a.setting == b.setting and warm and same_motion(*speeds) and same_motion(*strokes)

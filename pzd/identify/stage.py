@@ -8,13 +8,15 @@ from collections.abc import Sequence
 from pzd.artefacts import Identified, ParameterRow, Rig
 from pzd.identify.config import IdentifyConfig
 from pzd.record import Condition, Record, conditions
+from pzd.schema.progress import Listener, Progress, unheard
+from pzd.schema.wording import supported
 
 Labels = tuple[str | None, float | None, float | None]
 
 log = logging.getLogger(__name__)
 
 
-def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
+def identify(identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener = unheard) -> Identified:
     """The Bingham parameters of every condition of every setting, with intervals and their trust.
 
     Parameters
@@ -22,6 +24,7 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
     identify : how they are found
     rig : the records
     seed : of the evolutionary search
+    progress : hears of every condition that is done
 
     Returns
     -------
@@ -30,18 +33,20 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
     from pzd.identify.measures import measures
 
     constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
-    rows = {_labels(row): row for row in _constant_rows(constant, identify, seed)}
+    rows = {_labels(row): row for row in _constant_rows(constant, identify, seed, progress)}
     rows |= {_labels(row): row for row in _moving_rows(moving, constant, list(rows.values()), identify)}
     return Identified(tuple(rows[labels] for labels in sorted(rows, key=_order)), measures(rig.records))
 
 
-def _constant_rows(found: Sequence[Condition], config: IdentifyConfig, seed: int) -> list[ParameterRow]:
+def _constant_rows(
+    found: Sequence[Condition], config: IdentifyConfig, seed: int, progress: Listener
+) -> list[ParameterRow]:
     from pzd.identify.fit import fit_condition
 
     rows = []
     for index, condition in enumerate(found):
         rows.append(fit_condition(condition, config, seed + index))
-        log.info("%d of %d conditions: %s", index + 1, len(found), _line(rows[-1]))
+        progress(Progress(index + 1, len(found), f"conditions: {_line(rows[-1])}"))
     return rows
 
 
@@ -70,19 +75,22 @@ def _order(labels: Labels) -> tuple[str, float, float]:
 
 
 def _line(row: ParameterRow) -> str:
-    def shown(value: float | None) -> str:
-        return "-" if value is None else f"{value:.4g}"
+    def shown(value: float | None, low: float | None, high: float | None) -> str:
+        if value is None:
+            return "-"
+        return f"{value:.4g}" if low is None or high is None else supported(value, low, high)
 
     place = ", ".join(
         part
         for part in (
             row.setting,
-            None if row.voltage_V is None else f"{row.voltage_V:g}",
-            None if row.temperature_degC is None else f"{row.temperature_degC:g} degC",
+            None if row.voltage_V is None else f"{row.voltage_V:.4g}",
+            None if row.temperature_degC is None else f"{row.temperature_degC:.4g} degC",
         )
         if part
     )
     return (
-        f"{place or 'all records'}: T0 = {shown(row.T0_N)} N, C = {shown(row.C_Ns_per_m)} N s/m,"
-        f" k = {shown(row.k_N_per_m)} N/m, W_s = {row.W_s:.3g}, {row.status}"
+        f"{place or 'all records'}: T0 = {shown(row.T0_N, row.T0_N_low95, row.T0_N_high95)} N,"
+        f" C = {shown(row.C_Ns_per_m, row.C_Ns_per_m_low95, row.C_Ns_per_m_high95)} N s/m,"
+        f" k = {shown(row.k_N_per_m, row.k_N_per_m_low95, row.k_N_per_m_high95)} N/m, W_s = {row.W_s:.3g}, {row.status}"
     )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sys
 
-from pzd.paper.printing import calibration, contested, contradiction
+from pzd.paper.printing import calibration, claims_text, contradiction
 
-TOPICS = {"claims": contested, "calibration": calibration, "contradiction": contradiction}
+TOPICS = {"claims": claims_text, "calibration": calibration, "contradiction": contradiction}
 
 
 def main(arguments: list[str]) -> int:

@@ -17,9 +17,10 @@ from dataclasses import replace
 import numpy as np
 
 from pzd.paper.loop import loop_in
-from pzd.paper.published import AT_ZERO, PEAK, Published, rig_tests, span
+from pzd.paper.published import AT_ZERO, PEAK, rig_tests, span
 from pzd.paper.valve import COLD_DEGC, HOT_DEGC, Valve, peak_force, stand_damper
 from pzd.record import Array
+from pzd.report.reference import Expected
 
 _TOLERANCE = 0.02
 _SHARE_OF_SPAN = 0.8  # where the paper prints several values for a test, the fit keeps this far inside of them
@@ -67,7 +68,7 @@ def _fit_peaks(valve: Valve, power: int) -> Valve:
     return valve_at(least_squares(misses, start).x)
 
 
-def _miss(force: float, row: Published) -> float:
+def _miss(force: float, row: Expected) -> float:
     """How far a peak is from the published one, 1 at the edge of what is admitted."""
     low, high = span(row)
     if low == high:
@@ -82,6 +83,6 @@ def _fit_friction(valve: Valve) -> Valve:
     return replace(valve, friction=cold, friction_fall=math.log(cold / hot) / (HOT_DEGC - COLD_DEGC))
 
 
-def _friction_for(valve: Valve, row: Published) -> float:
-    loaded = loop_in(stand_damper(valve, row.setting or ""), row).at_zero - valve.friction_at(row.temperature_C or 0)
+def _friction_for(valve: Valve, row: Expected) -> float:
+    loaded = loop_in(stand_damper(valve, row.setting or ""), row).at_zero - valve.friction_at(row.temperature_degC or 0)
     return row.number - loaded

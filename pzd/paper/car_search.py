@@ -45,7 +45,7 @@ _IMPLAUSIBLE = 10.0
 _ROUNDING = 1e-3
 """How far rounding may carry a car of the grid beyond what is plausible, as a share."""
 
-Two = tuple[float, float]
+Pair = tuple[float, float]
 Found = Literal["survey", "refined"]
 
 
@@ -74,12 +74,12 @@ class CarRow(Frozen):
         return half_car(self.a1_m, self.a2_m, self.pitch_inertia_kgm2, self.x_K_m)
 
     @property
-    def constant(self) -> Two:
+    def constant(self) -> Pair:
         """Peaks with constant c [m/s2]."""
         return self.constant_a_m_per_s2, self.constant_b_m_per_s2
 
     @property
-    def controlled(self) -> Two:
+    def controlled(self) -> Pair:
         """Controlled peaks [m/s2]."""
         return self.controlled_a_m_per_s2, self.controlled_b_m_per_s2
 
@@ -106,25 +106,25 @@ def plausible(car: HalfCar) -> bool:
     return inside and -a1 <= car.comfort_point <= a2
 
 
-def constant_peaks(car: HalfCar, damping: float = DAMPING) -> Two:
+def constant_peaks(car: HalfCar, damping: float = DAMPING) -> Pair:
     """Largest |a_K| with constant damping at 2.25 and 4.5 Hz, exactly [m/s2]."""
     a, b = (abs(harmonic_response(car, damping, f, AMPLITUDE, SPEED)[1]) for f in FREQUENCIES)
     return a, b
 
 
-def controlled_peaks(car: HalfCar, tie_break: TieBreak, step: float = STEP) -> Two:
+def controlled_peaks(car: HalfCar, tie_break: TieBreak, step: float = STEP) -> Pair:
     """Largest |a_K| under the paper's control at 2.25 and 4.5 Hz, forces ideal within `BOUNDS` [m/s2]."""
     a, b = (settled_peak(car, tie_break, f, AMPLITUDE, SPEED, BOUNDS, step) for f in FREQUENCIES)
     return a, b
 
 
-def miss(constant: Two, controlled: Two) -> float:
+def miss(constant: Pair, controlled: Pair) -> float:
     """How far the worst of the four peaks of Figure 19 is missed, as a share of the paper's."""
     wanted = (*CONSTANT_PEAKS, *CONTROLLED_PEAKS)
     return max(abs(found / target - 1.0) for found, target in zip((*constant, *controlled), wanted, strict=True))
 
 
-def meets_constant(peaks: Two, tolerance: float = TOLERANCE) -> bool:
+def meets_constant(peaks: Pair, tolerance: float = TOLERANCE) -> bool:
     """Whether both peaks with constant c are the paper's within a share."""
     return all(abs(found / target - 1.0) <= tolerance for found, target in zip(peaks, CONSTANT_PEAKS, strict=True))
 
@@ -165,7 +165,7 @@ def neighbours(car: HalfCar, share: float = 0.01) -> Iterator[HalfCar]:
         yield replace(car, comfort_point=car.comfort_point * factor)
 
 
-def judged(car: HalfCar, tie_break: TieBreak, found: Found = "survey") -> CarRow:
+def row_of(car: HalfCar, tie_break: TieBreak, found: Found = "survey") -> CarRow:
     """The peaks of one car under one tie-break, and their spread when each parameter moves by 1 %."""
     constant, controlled = constant_peaks(car), controlled_peaks(car, tie_break)
     spread = np.array([controlled, *(controlled_peaks(other, tie_break) for other in neighbours(car))])

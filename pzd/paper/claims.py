@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pzd.paper.published import AT_ZERO, published, rig_tests, table_damper
+from pzd.paper.published import published, rig_tests, table_damper
 from pzd.paper.valve import peak_speed
+from pzd.report.reference import same_test
 
 _TO_90_PERCENT = math.log(10.0)
 """Time constants that a first-order lag takes to 90 %."""
@@ -51,9 +52,7 @@ def _forces() -> Iterator[Claim]:
         "43 % more force at twice the speed (Figure 6)",
         f"870 -> 1530 N is {_share('F6-2', 'F6-1'):.0f} % up; 1530 -> 870 N is {-_share('F6-1', 'F6-2'):.0f} % down",
     )
-    same = sorted(
-        row.number for row in rig_tests() if row.same_test == published()["F6-2"].same_test and row.quantity != AT_ZERO
-    )
+    same = sorted(row.number for row in rig_tests() if same_test(row, published()["F6-2"]))
     yield Claim(
         "one test, 0 V, 2 Hz, 0.03 m",
         f"three values: {', '.join(f'{value:.0f}' for value in same)} N (Figures 5, 6, 8)",
@@ -157,5 +156,5 @@ def _control() -> Iterator[Claim]:
     yield Claim(
         "4 min -> 9 h (2.25 Hz)",
         f"the peaks fall {_over('F19a-c', 'F19a-ctrl'):.1f} times; for the time that the standard's chart then gives "
-        "see EXPa in 6-report/published.csv",
+        "see EXPa in 6-report/reference.csv",
     )

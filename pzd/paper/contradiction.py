@@ -19,9 +19,10 @@ from pzd.damper.effect import Effect, Scales
 from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
 from pzd.paper.loop import loop_in, loop_of
-from pzd.paper.published import AT_ZERO, LARGE_GAP, PEAK, TABLES, WARM_DEGC, Published, rig_tests, span, table_damper
+from pzd.paper.published import AT_ZERO, LARGE_GAP, PEAK, TABLES, WARM_DEGC, rig_tests, span, table_damper
 from pzd.paper.valve import peak_speed
 from pzd.record import Array
+from pzd.report.reference import Expected
 
 Base = Literal["tables", "stiffness of the tables", "nothing of the tables"]
 BASES: tuple[Base, ...] = ("tables", "stiffness of the tables", "nothing of the tables")
@@ -76,11 +77,11 @@ def misses() -> tuple[Miss, ...]:
     return tuple(_miss_of(row) for row in rig_tests())
 
 
-def _miss_of(row: Published) -> Miss:
+def _miss_of(row: Expected) -> Miss:
     table = next(
         name
         for name, (setting, temperature) in TABLES.items()
-        if setting == row.setting and (temperature > WARM_DEGC) == ((row.temperature_C or 0.0) > WARM_DEGC)
+        if setting == row.setting and (temperature > WARM_DEGC) == ((row.temperature_degC or 0.0) > WARM_DEGC)
     )
     loop = loop_in(Damper(base=table_damper(table)), row)
     if row.quantity == AT_ZERO:
@@ -88,7 +89,7 @@ def _miss_of(row: Published) -> Miss:
     return Miss(row.id, table, row.number, loop.peak, (row.number - loop.peak) / peak_speed(row) ** 2)
 
 
-def condition() -> tuple[Published, ...]:
+def condition() -> tuple[Expected, ...]:
     """The published forces at gap 0.25 mm and 0 V."""
     return tuple(row for row in rig_tests() if row.setting == LARGE_GAP and row.voltage_V == 0.0)
 
@@ -203,7 +204,7 @@ def _misses(base: Base, effect: Effect | None, found: Mapping[str, float]) -> di
     dampers = {warm: _damper(base, effect, found, warm=warm) for warm in (False, True)}
     missed, loops = {}, {}
     for row in condition():
-        warm, frequency = (row.temperature_C or 0.0) > WARM_DEGC, row.frequency_Hz or 0.0
+        warm, frequency = (row.temperature_degC or 0.0) > WARM_DEGC, row.frequency_Hz or 0.0
         if (warm, frequency) not in loops:
             loops[warm, frequency] = loop_of(dampers[warm], frequency, row.amplitude_m or 0.0, None, None, _SAMPLES)
         loop = loops[warm, frequency]
@@ -211,7 +212,7 @@ def _misses(base: Base, effect: Effect | None, found: Mapping[str, float]) -> di
     return missed
 
 
-def _miss(force: float, row: Published) -> float:
+def _miss(force: float, row: Expected) -> float:
     low, high = span(row)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     return (force - middle) / max(half, TOLERANCES[row.quantity] * middle)

@@ -10,21 +10,23 @@ import numpy as np
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.paper.published import Published
 from pzd.record import Array
+from pzd.report.reference import Expected
 
-_SAMPLES = 2000
+SAMPLES = 2000
 """In a cycle, unless asked for otherwise; a multiple of 4."""
-_CYCLES = 2  # the second is settled
+_CYCLES = 2
+"""The second is settled: an oil spring forgets its start with C / k, some 20 ms, a small part of one cycle."""
 
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """One settled cycle; every array is (n,)."""
+    """One closed cycle: the last sample is the first of the next one; every array is (n,)."""
 
     displacement: Array
     velocity: Array
     force: Array
+    time: Array
 
     @property
     def peak(self) -> float:
@@ -33,7 +35,7 @@ class Loop:
 
     @property
     def at_zero(self) -> float:
-        """Mean |F| of both branches at v = 0 [N]."""
+        """Mean |F| of both branches at v = 0 [N], where the cycle is one of `loop_of`."""
         quarter = self.force.size // 4
         return float(0.5 * (abs(self.force[quarter]) + abs(self.force[3 * quarter])))
 
@@ -42,9 +44,9 @@ def loop_of(
     damper: Damper,
     frequency: float,
     amplitude: float,
-    voltage: float | None,
-    temperature: float | None,
-    samples: int = _SAMPLES,
+    voltage: float | None = None,
+    temperature: float | None = None,
+    samples: int = SAMPLES,
 ) -> Loop:
     """The settled loop of a damper under x = A sin(2 pi f t).
 
@@ -56,18 +58,22 @@ def loop_of(
     voltage : constant [V]; None where the damper has none
     temperature : constant [degC]; None where the damper has none
     samples : in a cycle, a multiple of 4
+
+    Returns
+    -------
+    the loop, of samples + 1 points, the time counted from its first
     """
     rate = 2.0 * math.pi * frequency
     time = np.arange(_CYCLES * samples + 1) / (samples * frequency)
     phase = rate * time
     constant = [None if value is None else np.full(time.size, value) for value in (voltage, temperature)]
-    x, v, a = amplitude * np.sin(phase), amplitude * rate * np.cos(phase), -amplitude * rate**2 * np.sin(phase)
-    force = respond(damper, Motion(time, x, v, a, *constant))
-    last = slice((_CYCLES - 1) * samples, -1)
-    return Loop(x[last], v[last], force[last])
+    x, v = amplitude * np.sin(phase), amplitude * rate * np.cos(phase)
+    force = respond(damper, Motion(time, x, v, -rate * rate * x, *constant))
+    last = slice((_CYCLES - 1) * samples, None)
+    return Loop(x[last], v[last], force[last], time[: samples + 1])
 
 
-def loop_in(damper: Damper, row: Published) -> Loop:
+def loop_in(damper: Damper, row: Expected) -> Loop:
     """The settled loop of a damper in the test of a published row.
 
     Raises
@@ -76,4 +82,4 @@ def loop_in(damper: Damper, row: Published) -> Loop:
     """
     if row.frequency_Hz is None or row.amplitude_m is None:
         raise ValueError(f"{row.id} is no test of the damper")
-    return loop_of(damper, row.frequency_Hz, row.amplitude_m, row.voltage_V, row.temperature_C)
+    return loop_of(damper, row.frequency_Hz, row.amplitude_m, row.voltage_V, row.temperature_degC)

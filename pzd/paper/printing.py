@@ -14,6 +14,7 @@ from pzd.paper.loop import loop_in
 from pzd.paper.published import PEAK, rig_tests, span
 from pzd.paper.stand import written
 from pzd.paper.valve import STIFFNESS, least_stiffness, stand_damper
+from pzd.report.reference import same_test
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Verdict:
     reason: str
 
 
-def judged(tried: Sequence[Attempt]) -> Verdict:
+def verdict_on(tried: Sequence[Attempt]) -> Verdict:
     """The verdict on the attempts: named only where one explanation is left.
 
     Parameters
@@ -40,7 +41,8 @@ def judged(tried: Sequence[Attempt]) -> Verdict:
     if len(explanations) == 1:
         return Verdict("named", closing, f"{explanations[0].effect} alone meets the published forces")
     unknowns = min(one.unknowns for one in explanations)
-    numbers = len({row.same_test for row in condition()})
+    forces = condition()
+    numbers = sum(not any(same_test(row, earlier) for earlier in forces[:n]) for n, row in enumerate(forces))
     reason = (
         f"{len(explanations)} of {len(tried)} attempts meet the forces, with {unknowns} unknowns or more for {numbers} "
         "numbers: none of them is put to a test, so no probability can be given to any"
@@ -63,7 +65,7 @@ def _contradiction() -> Iterator[str]:
     yield "An orifice would have to give the last column, rising as the slot closes: at gap 0.15 mm it falls, when hot"
     yield "it is negative. With Tables 2 and 3 the peak at 0 V rises with heat; the measured one falls."
     tried = attempts()
-    verdict = judged(tried)
+    verdict = verdict_on(tried)
     for base in BASES:
         yield f"\nGap 0.25 mm, 0 V, five forces; of the element is kept: {_KEPT[base]}"
         yield from (_line(one) for one in tried if one.base == base)
@@ -107,6 +109,6 @@ def _calibration() -> Iterator[str]:
     yield f"\n{written(valve)}"
 
 
-def contested() -> str:
+def claims_text() -> str:
     """What the paper says, and what its own numbers give."""
     return "\n".join(f"{claim.says}\n    {claim.gives}" for claim in claims())

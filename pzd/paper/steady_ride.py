@@ -1,7 +1,11 @@
 """The paper's controlled ride on a sine, settled, for thousands of cars: ideal forces, fixed step, no records.
 
-The rides of `pzd.simulate` balance energies, cut steps and write histories. A search needs none of
-that: classical Runge-Kutta steps of 1 ms give the same peaks to 0.1 % in a tenth of the time.
+Car, road, bounds and tie-break are those of `pzd.simulate`; only the loop is one of its own. The rides of
+`pzd.simulate` balance energies, cut steps and write histories, which takes six times as long (0.075 against 0.012 s a
+car and tie-break): the survey of 690 rows with eight neighbours each would take half an hour instead of minutes.
+Over every sixtieth row of cars.csv the peaks agree to 1e-4 in the median and 1 % at most, which is also how far those
+of `pzd.simulate` move with its own tolerance (1e-9, 1e-6, fixed steps): where the control jumps from one end of its
+range to the other, a peak is not defined more closely. tests/paper/test_car_search.py holds both against each other.
 """
 
 from __future__ import annotations
@@ -94,7 +98,7 @@ def _peak(
     workspace: Array,
     scratch: Array,
 ) -> float:
-    """Largest |a_K| at the steps from `settle` on; the room (6, 4) holds the state, one to try, and four rates."""
+    """Largest |a_K| at the steps from `settle` on; scratch (6, 4) holds the state, a trial state and four rates."""
     x, trial, rates = scratch[0], scratch[1], scratch[2:]
     peak = 0.0
     for n in range(steps + 1):

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 from pzd.damper.effects.shear_thinning import REFERENCE_SPEED
 from pzd.damper.model import BaseRow, Damper
-from pzd.paper.published import LARGE_GAP, SMALL_GAP, Published, published, rig_tests
+from pzd.paper.published import LARGE_GAP, SMALL_GAP, published, rig_tests
+from pzd.report.reference import Expected
 
 INITIAL_GAPS = {SMALL_GAP: 0.15e-3, LARGE_GAP: 0.25e-3}
 """Width of the slot as the paper sets it [m]."""
@@ -109,16 +110,16 @@ VALVE = Valve(
 """What `calibrate` finds; the dampers of configs/paper.yaml are written from it."""
 
 
-def peak_speed(row: Published) -> float:
+def peak_speed(row: Expected) -> float:
     """Largest speed of a sinusoidal test [m/s]."""
     if row.frequency_Hz is None or row.amplitude_m is None:
         raise ValueError(f"{row.id} is no test of the damper")
     return 2.0 * math.pi * row.frequency_Hz * row.amplitude_m
 
 
-def peak_force(valve: Valve, row: Published) -> float:
+def peak_force(valve: Valve, row: Expected) -> float:
     """Peak force [N] of the test of a published row, the oil spring rigid."""
-    temperature = row.temperature_C or REFERENCE_DEGC
+    temperature = row.temperature_degC or REFERENCE_DEGC
     flow = flow_force(valve, row.setting or "", row.voltage_V or 0.0, temperature, peak_speed(row))
     return valve.friction_at(temperature) + flow
 
@@ -164,7 +165,7 @@ def _coefficient(force: float, speed: float, index: float) -> float:
     return force / (REFERENCE_SPEED * math.pow(speed / REFERENCE_SPEED, index))
 
 
-def _tests(setting: str) -> Iterator[Published]:
+def _tests(setting: str) -> Iterator[Expected]:
     return (row for row in rig_tests() if row.setting == setting)
 
 
@@ -174,7 +175,7 @@ def _voltages(setting: str) -> list[float]:
 
 def _temperatures(setting: str) -> list[float]:
     """The hot row only where the paper tested hot."""
-    hot = any((row.temperature_C or 0.0) == HOT_DEGC for row in _tests(setting))
+    hot = any((row.temperature_degC or 0.0) == HOT_DEGC for row in _tests(setting))
     return [REFERENCE_DEGC, HOT_DEGC] if hot else [REFERENCE_DEGC]
 
 

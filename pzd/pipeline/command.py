@@ -10,10 +10,11 @@ from pathlib import Path
 
 from pzd.artefacts import RecordEntry, Rig
 from pzd.config import RunConfig, setting_in_use, validated
-from pzd.pipeline.bring import Pipeline, Say
+from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
 from pzd.runs import Run
 from pzd.schema.errors import ConfigError
+from pzd.schema.progress import Listener, unheard
 from pzd.schema.yamlfile import Document, read_yaml
 
 
@@ -59,7 +60,9 @@ def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:
     return Opened(document, config, Run.of(path, runs, config.control.signal()))
 
 
-def bring(given: Opened, target: str, *, force: bool, jobs: int, say: Say) -> tuple[str, ...]:
+def execute(
+    given: Opened, target: str, *, force: bool, jobs: int, say: Say, progress: Listener = unheard
+) -> tuple[str, ...]:
     """Bring a run up to date as far as a stage.
 
     Parameters
@@ -69,6 +72,7 @@ def bring(given: Opened, target: str, *, force: bool, jobs: int, say: Say) -> tu
     force : run the target again although it is fresh; with ``run`` every stage
     jobs : processes that a stage may use
     say : takes a line about each stage
+    progress : hears how far a stage has come
 
     Returns
     -------
@@ -82,14 +86,31 @@ def bring(given: Opened, target: str, *, force: bool, jobs: int, say: Say) -> tu
     last = LAST if target == "run" else target
     _right_source(line, last)
     forced = [stage.name for stage in line if target in ("run", stage.name)] if force else []
+    if last == LAST:
+        _check_reference(given)
     with given.placed(), given.run.locked(f"pzd {target}"):
-        return Pipeline(given.config, given.run, line, say, jobs).bring_up_to_date(last, forced)
+        return Pipeline(given.config, given.run, line, say, progress, jobs).execute(last, forced)
+
+
+def _check_reference(given: Opened) -> None:
+    """Refuse a file of expected numbers that is at fault before anything runs, though only the report reads it."""
+    if given.config.report.reference is not None:
+        from pzd.report.reference import file_of, read_reference
+
+        with given.placed():
+            path = file_of(given.config.report.reference, given.run.config.parent)
+        read_reference(path, given.run.control)
 
 
 def _right_source(line: Sequence[Stage], target: str) -> None:
     if target not in [stage.name for stage in line]:
         held = "rig.virtual" if line[0].name == "synthesise" else "rig.files"
         raise ConfigError(f"pzd {target}: the config has {held}, so the command is pzd {line[0].name}")
+
+
+def stale_stages(given: Opened) -> dict[str, str]:
+    """Why the results in a run are not those of the config as it is today, by stage; empty where they are."""
+    return Pipeline(given.config, given.run, stages(given.config), lambda _: None).stale_stages()
 
 
 def preflight(given: Opened) -> tuple[RecordEntry, ...]:
@@ -100,6 +121,7 @@ def preflight(given: Opened) -> tuple[RecordEntry, ...]:
     UserError : what a run would be refused for
     """
     first = stages(given.config)[0]
+    _check_reference(given)
     with given.placed():
         made = Pipeline(given.config, given.run, (first,), lambda _: None).made(first)
         entries = made.entries if isinstance(made, Rig) else ()

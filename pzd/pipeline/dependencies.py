@@ -15,12 +15,14 @@ from pzd.artefacts import RecordEntry, Rig
 from pzd.config import RunConfig, setting_in_use
 from pzd.pipeline.sources import code_hash
 from pzd.pipeline.stages import Stage
-from pzd.runs import Run, file_hash
+from pzd.runs import Run, file_hash, versions
 from pzd.schema.errors import FilesError
 from pzd.schema.jsonfile import read_json_list
 
 _WORDS = {"code": "the code", "marks": "what is not to be trusted"}
 """How a line calls what has a short name."""
+_LIBRARIES = ("numpy", "scipy", "numba")
+"""Whose versions may change the last digits of a result."""
 _NAMED = 3
 """How many changes a line names before it only counts them."""
 
@@ -62,7 +64,7 @@ def dependencies(stage: Stage, config: RunConfig, run: Run, marks: Sequence[str]
 
     Returns
     -------
-    hashes of the values of its config blocks, of the files that it reads and of its code
+    hashes of the values of its config blocks, of the files that it reads, of its code and of the libraries' versions
     """
     found: dict[str, str] = {}
     for name, annotation in stage.takes.items():
@@ -79,7 +81,8 @@ def dependencies(stage: Stage, config: RunConfig, run: Run, marks: Sequence[str]
             found[name] = _hash(config.seed)
     # Every stage's files name the control signal, so it counts whether the stage asks for it or not.
     found |= {path: _hash(value) for path, value in _leaves("control", config.control.model_dump())}
-    return found | {"marks": _hash(list(marks)), "code": code_hash(stage.function.__module__.split(".")[1])}
+    found |= {f"{name} version": _hash(versions()[name]) for name in _LIBRARIES}
+    return found | {"marks": _hash(list(marks)), "code": code_hash(stage.function.__module__)}
 
 
 def key_of(inputs: Mapping[str, str]) -> str:
@@ -119,6 +122,10 @@ def _files_named(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
     named = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
     try:
         files = [file for value in named for file in matching(folder, value)]
+        if expected := values.get("report.reference"):
+            from pzd.report.reference import path_of
+
+            files += [path for path in (path_of(expected, folder),) if path.is_file()]
         return {Path(os.path.relpath(file, folder)).as_posix(): file_hash(file) for file in files}
     except OSError as error:
         raise FilesError(f"{error.filename}: {error.strerror}") from error

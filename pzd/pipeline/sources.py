@@ -1,4 +1,9 @@
-"""The source code that a stage may use, as one hash: edit an equation, and what hangs on it runs again."""
+"""The source code that a stage may use, as one hash: edit an equation, and what hangs on it runs again.
+
+Followed are the imports of the stage's module, wherever they stand in a file, and those of what it
+imports, and so on. Nothing is imported for it, as numba and scipy take a second that a run in which
+all is fresh does not have.
+"""
 
 from __future__ import annotations
 
@@ -11,50 +16,103 @@ from pathlib import Path
 import pzd
 
 PACKAGE = Path(pzd.__file__).parent
-_MENTION = re.compile(rb"\bpzd\.(\w+)")
+_TYPES_ONLY = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t].*\n|\n)+", re.MULTILINE)
+"""Imports for annotations alone, which are not executed."""
+_FROM = re.compile(r"^[ \t]*from (pzd[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+"""An import of names, each of which may be a module; in brackets over several lines."""
+_MENTION = re.compile(r"\bpzd(?:\.\w+)+(\.(?=\{))?")
+"""A dotted name, in an import or in a text that is imported later; a brace behind its last dot stands for any name."""
+_WHOLE_FOLDER = "iter_modules(__path__)"
+"""By this a package finds its members, so that all of its folder counts."""
 
 
 @cache
-def code_hash(part: str, package: Path = PACKAGE) -> str:
-    """Hash of one part of the package, of every part that its code mentions, and so on.
+def code_hash(module: str, package: Path = PACKAGE) -> str:
+    """Hash of a module, of everything that it imports, and so on, with the data that lies beside them.
 
     Parameters
     ----------
-    part : a module or package directly inside `package`, e.g. ``identify``
+    module : full name, e.g. ``pzd.identify.stage``
     package : folder of the package
 
     Returns
     -------
-    SHA-256 over the names and contents of all their files
+    SHA-256 over the names and contents of all the files
     """
     digest = hashlib.sha256()
-    for used in sorted(_used(part, package)):
-        for path in _files(used, package):
-            digest.update(path.relative_to(package).as_posix().encode() + b"\0")
-            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    for path in files_used(module, package):
+        digest.update(path.relative_to(package).as_posix().encode() + b"\0")
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 
 
-def _used(part: str, package: Path) -> set[str]:
-    """A part and all that it reaches through imports; a name in a docstring counts too, which does no harm."""
+def files_used(module: str, package: Path = PACKAGE) -> list[Path]:
+    """Every file that a module may execute or read: modules, and data in the folders of their packages.
+
+    Parameters
+    ----------
+    module : full name
+    package : folder of the package
+    """
+    modules = {path for name in modules_used(module, package) if (path := _file(name, package))}
+    return sorted(modules | {data for folder in {path.parent for path in modules} for data in _data(folder)})
+
+
+def modules_used(module: str, package: Path = PACKAGE) -> set[str]:
+    """Full names of a module and of all that it reaches through imports.
+
+    A name that only a docstring mentions counts too, which does no harm.
+
+    Parameters
+    ----------
+    module : full name
+    package : folder of the package
+    """
     found: set[str] = set()
-    waiting = {part}
+    waiting = {module}
     while waiting:
         found |= waiting
-        mentioned = {name for one in waiting for name in _mentioned(one, package)}
-        waiting = {name for name in mentioned if any(_files(name, package))} - found
+        waiting = {used for name in waiting for used in _used(name, package)} - found
     return found
 
 
 @cache
-def _mentioned(part: str, package: Path) -> frozenset[str]:
-    sources = (path.read_bytes() for path in _files(part, package) if path.suffix == ".py")
-    return frozenset(name.decode() for source in sources for name in _MENTION.findall(source))
+def _used(name: str, package: Path) -> frozenset[str]:
+    """The modules that one module names, and the packages above it, which are imported before it."""
+    path = _file(name, package)
+    if path is None:
+        return frozenset()
+    source = _TYPES_ONLY.sub("", path.read_text(encoding="utf-8"))
+    named = {f"{found[1]}.{one}" for found in _FROM.finditer(source) for one in re.findall(r"\w+", found[2])}
+    for mention in _MENTION.finditer(source):
+        named |= _below(mention[0][:-1], package) if mention[1] else {mention[0]}
+    if _WHOLE_FOLDER in source:
+        named |= _below(name, package)
+    used = {".".join(one.split(".")[: length + 1]) for one in {*named, name} for length in range(one.count(".") + 1)}
+    return frozenset(one for one in used if one != name and _file(one, package))
 
 
-def _files(part: str, package: Path) -> Iterator[Path]:
-    if (package / f"{part}.py").is_file():
-        yield package / f"{part}.py"
-    for path in sorted((package / part).rglob("*")):
-        if path.is_file() and "__pycache__" not in path.parts:
+def _below(name: str, package: Path) -> set[str]:
+    """Every module of a package and of the packages in it."""
+    folder = package.parent.joinpath(*name.split("."))
+    return {
+        ".".join(path.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__")
+        for path in folder.rglob("*.py")
+    }
+
+
+def _file(name: str, package: Path) -> Path | None:
+    """The file of a module or package; None where there is none of that name."""
+    path = package.parent.joinpath(*name.split("."))
+    candidates = (path.with_suffix(".py"), path / "__init__.py")
+    return next((candidate for candidate in candidates if candidate.is_file()), None)
+
+
+def _data(folder: Path) -> Iterator[Path]:
+    """The files of a package that are no modules, also in folders that hold no modules."""
+    for path in folder.iterdir():
+        if path.is_dir():
+            if path.name != "__pycache__" and not any(path.glob("*.py")):
+                yield from _data(path)
+        elif path.suffix != ".py":
             yield path

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import ClassVar, Literal
 
 from pydantic import Field, field_validator
 
@@ -14,6 +15,8 @@ Edition = Literal["ISO 2631-1:1997", "ISO 2631:1978", "Directive 2002/44/EC"]
 class ReportConfig(Frozen):
     """What the comfort report rates the rides by, and what it shows."""
 
+    former_keys: ClassVar[Mapping[str, str]] = {"published": "reference"}
+
     editions: tuple[Edition, ...] = Field(default=("ISO 2631-1:1997", "ISO 2631:1978"), min_length=1)
     """Standards by which the rides are rated. The boundaries of 1978, which the paper used, are an
     unverified transcription of a withdrawn standard, and are always called so."""
@@ -24,8 +27,9 @@ class ReportConfig(Frozen):
     its limits, so none is used unless one is chosen here."""
     records_shown: int = Field(default=3, ge=1, le=12)
     """How many rig records the page shows as measured and simulated force, spread over the voltages."""
-    published: bool = False
-    """Whether published.csv sets the paper's numbers beside those computed here."""
+    reference: str | None = None
+    """Expected numbers that reference.csv sets beside those of the run: a CSV file, or `makowski2021`, the
+    numbers that the paper prints. pzd/report/reference.py says what stands in such a file."""
 
     @field_validator("editions")
     @classmethod

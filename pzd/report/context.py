@@ -19,10 +19,9 @@ from pzd.report.config import ReportConfig
 from pzd.report.ride_comfort import SettledRide
 from pzd.report.wording import amount
 from pzd.simulate.config import SimulateConfig
+from pzd.simulate.plan import PLAIN_SUFFIX
 from pzd.simulate.roads.sine import Sine
 
-PLAIN = "-plain"
-"""Ends the name of a ride on the damper before diagnose."""
 REFERENCE = "constant"
 """The policy that the others are set beside."""
 _OF_A_SINE = 1.5
@@ -175,7 +174,7 @@ class ReportContext:
     def cases(self, road: str, *, plain: bool = False) -> tuple[SummaryRow, ...]:
         """The rides over one road, on the final damper or on the one before diagnose."""
         mine = [row for row in self.rides.summary if row.road == road]
-        return tuple(row for row in mine if row.case.endswith(PLAIN) == plain)
+        return tuple(row for row in mine if row.case.endswith(PLAIN_SUFFIX) == plain)
 
     def reference(self, road: str) -> SummaryRow | None:
         """The ride at constant damping over a road, on plain viscous dampers where there is one."""
@@ -190,7 +189,7 @@ class ReportContext:
 
     def without(self, row: SummaryRow) -> SummaryRow | None:
         """The same ride on the damper before diagnose."""
-        return next((other for other in self.rides.summary if other.case == f"{row.case}{PLAIN}"), None)
+        return next((other for other in self.rides.summary if other.case == f"{row.case}{PLAIN_SUFFIX}"), None)
 
 
 def _fitted(base: BaseRow, rows: Sequence[ParameterRow]) -> ParameterRow | None:

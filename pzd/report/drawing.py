@@ -13,7 +13,7 @@ import numpy as np
 from pzd.record import Array
 from pzd.report.blocks import Picture
 from pzd.report.context import ReportContext
-from pzd.schema.processes import at_once
+from pzd.schema.processes import parallel_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -124,7 +124,7 @@ def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> li
         return tuple(_encoded(panel) for panel in plot.draw(context))
 
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
-        return at_once(drawn, plots, jobs)
+        return parallel_map(drawn, plots, jobs)
 
 
 def _encoded(panel: Panel) -> Picture:

@@ -13,7 +13,7 @@ def loops(context: ReportContext, record: Record, abscissa: Array, quantity: Qua
 
     Parameters
     ----------
-    story : the run
+    context : the run
     record : the record
     abscissa : (n,) what the force is drawn over, displacement in mm
     quantity : what that is

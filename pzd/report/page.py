@@ -18,7 +18,7 @@ def page(context: ReportContext, jobs: int = 1) -> str:
 
     Parameters
     ----------
-    story : the run
+    context : the run
     jobs : pictures drawn at the same time
 
     Returns

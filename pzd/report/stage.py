@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from pathlib import Path
 
 from pzd.artefacts import Diagnosed, Identified, Report, Rides, Rig, Table
 from pzd.quantities import Control
@@ -20,9 +21,10 @@ def report(
     rides: Rides,
     control: Control,
     setting: str | None,
+    folder: Path,
     jobs: int = 1,
 ) -> Report:
-    """Rate every ride by the standards asked for, and tell the whole story on one page.
+    """Rate every ride by the standards asked for, write one page on the whole run, and compare expected numbers.
 
     Parameters
     ----------
@@ -31,18 +33,26 @@ def report(
     rig, identified, diagnosed, table, rides : what the stages before made
     control : the control signal of the valve
     setting : of the rig's settings, the one in use
+    folder : of the config, from which the path of expected numbers counts
     jobs : pictures drawn at the same time
 
     Returns
     -------
-    the comfort rows, the page, and the paper's numbers where the config asks for them
+    the comfort rows, the page, and the numbers beside those expected where the config names any
+
+    Raises
+    ------
+    ConfigError : when there is no such file of expected numbers
+    DataError : when it is at fault, with every place
     """
     from pzd.report.context import ReportContext
     from pzd.report.page import page
-    from pzd.report.published import published_rows
+    from pzd.report.reference import compared, file_of, read_reference
     from pzd.report.ride_comfort import assess, settled
+    from pzd.report.run_numbers import RunNumbers
     from pzd.simulate.roads.sine import Sine
 
+    expected = read_reference(file_of(report.reference, folder), control) if report.reference else None
     log = logging.getLogger(__name__)
     fundamentals = {road.name: road.frequency_Hz for road in simulate.roads if isinstance(road, Sine)}
     rows = {row.case: row for row in rides.summary}
@@ -65,5 +75,5 @@ def report(
         control=control,
         setting=setting,
     )
-    published = published_rows(simulate, identified, rides, comfort) if report.published else None
-    return Report(comfort=comfort, page=page(context, jobs), published=published)
+    found = compared(expected, RunNumbers(identified, rides, comfort, simulate, control)) if expected else None
+    return Report(comfort=comfort, page=page(context, jobs), reference=found)

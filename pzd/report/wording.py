@@ -13,6 +13,9 @@ TIMES = "\u00d7"
 KEPT = "\u00a0"
 """A space at which no line breaks."""
 
+LOST = 0.005
+"""A value of less than this share of its interval's width does not show in the width's second digit."""
+
 _UNITS = {
     "m/s2": "m/s²",
     "m/s3": "m/s³",
@@ -62,6 +65,8 @@ def interval(value: float | None, low: float | None, high: float | None) -> str:
         return DASH
     if low is None or high is None:
         return f"{number(value)} (no interval)"
+    if abs(value) < LOST * (high - low):
+        value = 0.0
     digits = _digits(value, high - low)
     return f"{number(value, digits)} ({_at(low, value, digits)} to {_at(high, value, digits)})"
 

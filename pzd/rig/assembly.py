@@ -30,7 +30,7 @@ from pzd.rig.preflight import findings
 from pzd.rig.stand.config import Planned
 from pzd.rig.stand.recording import Taken, record_of
 from pzd.schema.errors import ConfigError, DataError
-from pzd.schema.processes import at_once
+from pzd.schema.processes import parallel_map
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
@@ -123,7 +123,7 @@ def overview(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:
         test = given()
         return test.record, _entry(test)
 
-    found = at_once(listed, tests, jobs)
+    found = parallel_map(listed, tests, jobs)
     return Rig(tuple(record for record, _ in found), tuple(entry for _, entry in found))
 
 

@@ -129,10 +129,13 @@ class FilesEntry(Frozen):
 
 
 class Limits(Frozen):
-    """What the test stand can do; where nothing is said, what the records reached."""
+    """What the test stand can do; where nothing is said, what the records of a setting reached.
+
+    The next test that a diagnosis proposes lies within these limits, be they wider or narrower than the records.
+    """
 
     stroke_m: float | None = Field(default=None, gt=0.0)
-    """Largest stroke, end to end [m]."""
+    """Largest stroke, end to end, half of it to either side of the middle of the recorded displacements [m]."""
     speed_m_per_s: float | None = Field(default=None, gt=0.0)
     """Largest speed [m/s]."""
     force_N: float | None = Field(default=None, gt=0.0)

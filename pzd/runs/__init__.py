@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pzd.runs.disk import file_hash
-from pzd.runs.folder import CONFIG, Kept, Run
+from pzd.runs.disk import file_hash, versions
+from pzd.runs.folder import CONFIG, StageFolder, Run
 
-__all__ = ["CONFIG", "Kept", "Run", "file_hash"]
+__all__ = ["CONFIG", "StageFolder", "Run", "file_hash", "versions"]

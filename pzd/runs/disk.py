@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -13,18 +14,26 @@ from pathlib import Path
 
 from pzd.schema.errors import FilesError
 
+_SETTLED_NS = 100_000_000
+"""Age from which a file's time of change tells one content from the next: file systems round it to about 10 ms."""
 _LIBRARIES = ("pzd", "numpy", "scipy", "numba", "pandas", "pydantic")
 
 
 def file_hash(path: Path) -> str:
     """SHA-256 of a file's content."""
     status = path.stat()
+    if abs(time.time_ns() - status.st_mtime_ns) < _SETTLED_NS:
+        return _hash(path)
     return _hash_as_of(path, status.st_mtime_ns, status.st_size, status.st_ino)
 
 
 @cache
 def _hash_as_of(path: Path, _changed: int, _size: int, _inode: int) -> str:
     """The hash of a file, computed once as long as the file system says that it is the same."""
+    return _hash(path)
+
+
+def _hash(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

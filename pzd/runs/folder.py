@@ -7,11 +7,11 @@ the next time the run is opened.
 
 from __future__ import annotations
 
+import json
 import os
-import platform
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,22 +20,28 @@ from typing import TypeVar
 from pzd.artefacts import Artefact, Diagnosed, Identified, Manifest, Report, Rides, Rig, Table
 from pzd.quantities import Control
 from pzd.runs.disk import as_files_error, file_hash, sync, sync_folder, versions
-from pzd.schema.errors import ConfigError, DataError, FilesError
+from pzd.runs.hand_edits import carry_over, free_name
+from pzd.runs.leftovers import NEW, OLD, clean_up, hidden, in_the_way
+from pzd.runs.lock import locked
+from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.jsonfile import read_json, write_json
 
 Made = TypeVar("Made", Rig, Identified, Diagnosed, Table, Rides, Report, Artefact)
 
 MANIFEST = "manifest.json"
 CONFIG = "config.yaml"
-_LOCK = ".lock"
-PATIENCE = 2.0
-"""How long to wait for another command on the same run [s]."""
+_CONFIG_HASHES = ".config.sha256"
+"""Hashes of the config as it was written, the last two times: a config with another one was edited by hand."""
+_WRITTEN = ".written.json"
+"""Hashes of what was written into a folder that is no stage and has no manifest."""
+_FOLDERS = (*(kind.folder for kind in (Rig, Identified, Diagnosed, Table, Rides, Report)), "figures")
+"""What a run's folder may hold."""
 _NAMES = Control()
 """Manifests name files and keys as they are, whatever the control is called."""
 
 
 @dataclass(frozen=True)
-class Kept:
+class StageFolder:
     """What stands in a stage's folder, against what its manifest says was written."""
 
     manifest: Manifest | None
@@ -72,6 +78,12 @@ class Run:
                 )
         return run
 
+    def config_of_results(self) -> Path | None:
+        """The config that the results are of, by the manifests; None where there are none."""
+        owners = (self._owner(manifest.parent.name) for manifest in sorted(self.folder.glob(f"*/{MANIFEST}")))
+        owner = next((owner for owner in owners if owner is not None), None)
+        return Path(os.path.relpath(owner)) if owner else None
+
     def _owner(self, stage: str) -> Path | None:
         manifest = self._manifest(stage)
         return (self.folder / manifest.config).resolve() if manifest else None
@@ -87,7 +99,8 @@ class Run:
     def hashes(self, stage: str) -> dict[str, str]:
         """Hash of every file of a stage, by its path in the stage's folder."""
         folder = self.folder / stage
-        files = (path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != MANIFEST)
+        ours = (folder / MANIFEST, folder / _WRITTEN)
+        files = (path for path in sorted(folder.rglob("*")) if path.is_file() and path not in ours)
         with as_files_error(folder):
             return {path.relative_to(folder).as_posix(): file_hash(path) for path in files}
 
@@ -97,13 +110,13 @@ class Run:
         written = manifest.outputs if manifest else {}
         return {name: digest for name, digest in self.hashes(stage).items() if name in written}
 
-    def kept(self, stage: str) -> Kept:
+    def stage_folder(self, stage: str) -> StageFolder:
         """What stands in a stage's folder."""
         manifest = self._manifest(stage)
         if manifest is None:
-            return Kept(None)
+            return StageFolder(None)
         now = self.hashes(stage)
-        return Kept(
+        return StageFolder(
             manifest,
             tuple(name for name in manifest.outputs if name not in now),
             tuple(name for name, digest in manifest.outputs.items() if now.get(name, digest) != digest),
@@ -131,59 +144,27 @@ class Run:
         ------
         FilesError : when another command holds it, or the folder cannot be written
         """
-        from filelock import FileLock, Timeout
-
-        holder = self.folder / ".holder"
-        with as_files_error(self.folder):
-            self.folder.mkdir(parents=True, exist_ok=True)
-            lock = FileLock(self.folder / _LOCK)
-            try:
-                lock.acquire(timeout=PATIENCE)
-            except Timeout:
-                who = holder.read_text(encoding="utf-8") if holder.exists() else "another command"
-                raise FilesError(
-                    f"{self.folder}: {who} is writing here; wait for it, or give --runs another folder"
-                ) from None
-        try:
+        with locked(self.folder, command):
             with as_files_error(self.folder):
-                started = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-                holder.write_text(
-                    f"{command} (process {os.getpid()} on {platform.node()}, since {started})", encoding="utf-8"
-                )
-                self._settle()
+                clean_up(self.folder, _FOLDERS, (CONFIG,))
             yield
-        finally:
-            holder.unlink(missing_ok=True)
-            self._leave_nothing_for_nothing()
-            lock.release()
-
-    def _leave_nothing_for_nothing(self) -> None:
-        """Take the folder away again where a first run came to no result."""
-        if [path.name for path in self.folder.iterdir()] == [_LOCK]:
-            (self.folder / _LOCK).unlink()
-            self.folder.rmdir()
-            with suppress(OSError):
-                self.folder.parent.rmdir()
-
-    def _settle(self) -> None:
-        for leftover in self.folder.glob(".*.new"):
-            shutil.rmtree(leftover)
-        for old in self.folder.glob(".*.old"):
-            stage = self.folder / old.name[1 : -len(".old")]
-            if stage.exists():
-                shutil.rmtree(old)
-            else:
-                old.rename(stage)
 
     def write_config(self, text: str) -> None:
-        """Write the config with every default, unless it stands there already."""
-        path = self.folder / CONFIG
+        """Write the config with every default, unless it stands there already; one edited by hand is laid beside."""
+        path, hashes = self.folder / CONFIG, self.folder / _CONFIG_HASHES
         with as_files_error(path):
             if path.exists() and path.read_bytes() == text.encode():
                 return
-            fresh = self.folder / f".{CONFIG}.new"
+            fresh = hidden(self.folder, CONFIG, NEW)
             fresh.write_text(text, encoding="utf-8", newline="\n")
             sync(fresh)
+            written = hashes.read_text(encoding="utf-8").split() if hashes.exists() else []
+            if path.exists() and (digest := file_hash(path)) not in written:
+                free = free_name(self.folder, CONFIG, digest, {other.name for other in self.folder.iterdir()})
+                if free is not None:
+                    shutil.copy2(path, self.folder / free)
+            # Killed before the rename, the old config still counts as ours; killed behind it, the new one does.
+            hashes.write_text("\n".join([*written[-1:], file_hash(fresh)]) + "\n", encoding="utf-8")
             fresh.replace(path)
 
     def write(
@@ -212,32 +193,25 @@ class Run:
         ------
         FilesError : when the disk does not take it; what was there before still is
         """
-        target = self.folder / artefact.folder
-        fresh = self.folder / f".{artefact.folder}.new"
-        try:
-            with as_files_error(target):
-                fresh.mkdir()
-                if isinstance(artefact, Rig | Rides):
-                    artefact.write(fresh, self.control, jobs)
-                else:
-                    artefact.write(fresh, self.control)
-                manifest = Manifest(
-                    stage=stage,
-                    key=key,
-                    config=Path(os.path.relpath(self.config.resolve(), self.folder.resolve())).as_posix(),
-                    inputs=inputs,
-                    outputs=self.hashes(fresh.name),
-                    versions=versions(),
-                    finished=datetime.now(UTC).isoformat(timespec="seconds"),
-                    seconds=round(seconds, 3),
-                    marks=marks,
-                )
-                write_json(fresh / MANIFEST, manifest, _NAMES)
-                self._carry_over(target, fresh, manifest)
-                sync_folder(fresh)
-                self._swap(target, fresh)
-        finally:
-            shutil.rmtree(fresh, ignore_errors=True)
+        def fill(fresh: Path) -> None:
+            if isinstance(artefact, Rig | Rides):
+                artefact.write(fresh, self.control, jobs)
+            else:
+                artefact.write(fresh, self.control)
+            manifest = Manifest(
+                stage=stage,
+                key=key,
+                config=Path(os.path.relpath(self.config.resolve(), self.folder.resolve())).as_posix(),
+                inputs=inputs,
+                outputs=self.hashes(fresh.name),
+                versions=versions(),
+                finished=datetime.now(UTC).isoformat(timespec="seconds"),
+                seconds=round(seconds, 3),
+                marks=marks,
+            )
+            write_json(fresh / MANIFEST, manifest, _NAMES)
+
+        self._replace(artefact.folder, fill)
 
     def write_extra(self, folder: str, write: Callable[[Path], None]) -> None:
         """Write a folder that is no stage in place of what was there before, whole or not at all.
@@ -251,31 +225,48 @@ class Run:
         ------
         FilesError : when the disk does not take it; what was there before still is
         """
-        target, fresh = self.folder / folder, self.folder / f".{folder}.new"
+        def fill(fresh: Path) -> None:
+            write(fresh)
+            write_json(fresh / _WRITTEN, self.hashes(fresh.name), _NAMES)
+
+        self._replace(folder, fill)
+
+    def _replace(self, name: str, fill: Callable[[Path], None]) -> None:
+        """Fill a folder and put it in place of the one of that name, with what a person left there."""
+        target, fresh = self.folder / name, hidden(self.folder, name, NEW)
+        made = False
         try:
             with as_files_error(target):
+                in_the_way(self.folder, name)
                 fresh.mkdir()
-                write(fresh)
+                made = True
+                fill(fresh)
+                now = self.hashes(fresh.name) | {MANIFEST: "", _WRITTEN: ""}
+                carry_over(target, fresh, self._by_hand(name), self._written(name), now)
                 sync_folder(fresh)
                 self._swap(target, fresh)
         finally:
-            shutil.rmtree(fresh, ignore_errors=True)
+            if made:
+                shutil.rmtree(fresh, ignore_errors=True)
 
-    def _carry_over(self, target: Path, fresh: Path, manifest: Manifest) -> None:
-        """Keep what a person left in the folder: files of their own, and edited ones beside the new."""
-        before = self._manifest(target.name)
-        for name, digest in self.hashes(target.name).items() if before else ():
-            if before is not None and name in before.outputs:
-                by_hand = digest not in (before.outputs[name], manifest.outputs.get(name))
-                goal = fresh / f"{name}.edited"
-            else:
-                by_hand, goal = name not in manifest.outputs, fresh / name
-            if by_hand:
-                goal.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(target / name, goal)
+    def _written(self, name: str) -> dict[str, str]:
+        """Hash of every file that was written into a folder, as it was then; none where nobody can say."""
+        if manifest := self._manifest(name):
+            return manifest.outputs
+        try:
+            written = json.loads((self.folder / name / _WRITTEN).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return written if isinstance(written, dict) else {}
+
+    def _by_hand(self, name: str) -> dict[str, str]:
+        """Hash of every file that a person may have written; a manifest that cannot be read is one."""
+        manifest = self.folder / name / MANIFEST
+        broken = manifest.is_file() and self._manifest(name) is None
+        return self.hashes(name) | ({MANIFEST: file_hash(manifest)} if broken else {})
 
     def _swap(self, target: Path, fresh: Path) -> None:
-        old = self.folder / f".{target.name}.old"
+        old = hidden(self.folder, target.name, OLD)
         if target.exists():
             target.rename(old)
         fresh.rename(target)

@@ -22,6 +22,7 @@ from pydantic import ValidationError
 from pzd.quantities import Control
 from pzd.schema.errors import DataError, at
 from pzd.schema.model import Frozen
+from pzd.schema.nearest import nearest
 from pzd.schema.text import read_text
 from pzd.schema.wording import worded
 
@@ -63,6 +64,69 @@ def read_rows(path: Path, model: type[Row], control: Control) -> tuple[Row, ...]
             faults += [_fault(path, number, detail, control) for detail in error.errors()]
     _refuse(path, faults)
     return tuple(rows)
+
+
+def read_table(
+    path: Path, model: type[Row], control: Control, also: Mapping[str, str] | None = None
+) -> tuple[tuple[int, Row], ...]:
+    """Read rows that a person wrote: columns in any order, and those of fields with a default may be missing.
+
+    An empty cell of a field with a default takes the default; empty lines are passed over.
+
+    Parameters
+    ----------
+    path : the file
+    model : of a row
+    control : the control signal, which names its columns
+    also : other names that columns may carry, with the field that each stands for
+
+    Returns
+    -------
+    each row with the line that it begins in
+
+    Raises
+    ------
+    DataError : when the header or a cell is not what the model asks for, with every place
+    """
+    numbered = _records(path)
+    names = _columns_of(path, numbered[0][1] if numbered else [], model, control, also or {})
+    rows: list[tuple[int, Row]] = []
+    faults: list[str] = []
+    for number, cells in numbered[1:]:
+        if not cells:
+            continue
+        if len(cells) != len(names):
+            faults.append(f"{at(path, number)}: {len(cells)} fields where the header has {len(names)}")
+            continue
+        given = [(n, model.model_fields[n], cell) for n, cell in zip(names, cells, strict=True)]
+        values = {n: _plain(cell, field.annotation) for n, field, cell in given if cell or field.is_required()}
+        try:
+            rows.append((number, model.model_validate(values)))
+        except ValidationError as error:
+            faults += [_fault(path, number, detail, control) for detail in error.errors()]
+    _refuse(path, faults)
+    return tuple(rows)
+
+
+def _columns_of(
+    path: Path, header: Sequence[str], model: type[Row], control: Control, also: Mapping[str, str]
+) -> list[str]:
+    """The field of each column."""
+    known = {control.renamed(name): name for name in model.model_fields}
+    names = [known.get(name) or also.get(name) or "" for name in header]
+    faults = []
+    for place, (given, name) in enumerate(zip(header, names, strict=True)):
+        near = nearest(given, known)
+        hint = f"did you mean {near}?" if near else f"there is {', '.join(known)}"
+        if not name:
+            faults.append(f"{at(path, 1)}: no such column; {hint} (got {given})")
+        elif name in names[:place]:
+            faults.append(f"{at(path, 1)}: the column stands there twice (got {given})")
+    for column, name in known.items():
+        if model.model_fields[name].is_required() and name not in names:
+            faults.append(f"{at(path, 1)}: column {column} is missing (got {','.join(header)})")
+    _refuse(path, faults)
+    return names
 
 
 def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64] | None], control: Control) -> None:

@@ -22,8 +22,17 @@ Model = TypeVar("Model", bound=Frozen)
 
 def write_json(path: Path, content: Frozen | Sequence[Frozen] | Mapping[str, Any], control: Control) -> None:
     """Write a model, a list of models or plain data, keys of the control under its own name."""
-    text = json.dumps(renamed_keys(_plain(content), control), indent=2, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+    path.write_text(json_text(plain(content, control)) + "\n", encoding="utf-8", newline="\n")
+
+
+def json_text(data: Any) -> str:
+    """Plain data as JSON, indented, without a line break at its end."""
+    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def plain(content: Any, control: Control) -> Any:
+    """Models, and lists and mappings of them, as plain data with keys of the control under its own name."""
+    return renamed_keys(_plain(content), control)
 
 
 def read_json(path: Path, model: type[Model], control: Control) -> Model:

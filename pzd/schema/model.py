@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from pydantic import BaseModel, ConfigDict
 
 
@@ -15,3 +18,6 @@ class Frozen(BaseModel):
         allow_inf_nan=False,
         use_attribute_docstrings=True,
     )
+
+    former_keys: ClassVar[Mapping[str, str]] = {}
+    """Keys that a config had once, each with the one that stands in its place: a hint where the old one is written."""

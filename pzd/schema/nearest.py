@@ -7,7 +7,7 @@ import types
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel
+from pzd.schema.model import Frozen
 
 Path = tuple[str | int, ...]
 
@@ -21,15 +21,24 @@ def nearest(given: str, valid: Iterable[str]) -> str | None:
 
 def keys_at(annotation: Any, path: Path, data: Any) -> list[str]:
     """The keys that the model of this annotation takes in the mapping at a path of the data."""
+    return list(dict.fromkeys(key for one in _models_at(annotation, path, data) for key in one.model_fields))
+
+
+def former_keys(annotation: Any, path: Path, data: Any) -> dict[str, str]:
+    """The keys that the model at a path of the data took once, each with the one that stands in its place."""
+    return {old: new for one in _models_at(annotation, path, data) for old, new in one.former_keys.items()}
+
+
+def _models_at(annotation: Any, path: Path, data: Any) -> list[type[Frozen]]:
     candidates = _alternatives(annotation, data)
     for part in path:
         data = _inside(data, part)
         candidates = [deeper for one in candidates for deeper in _alternatives(_under(one, part), data)]
-    return list(dict.fromkeys(key for one in candidates if _is_model(one) for key in one.model_fields))
+    return [one for one in candidates if _is_model(one)]
 
 
 def _is_model(annotation: Any) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+    return isinstance(annotation, type) and issubclass(annotation, Frozen)
 
 
 def _alternatives(annotation: Any, data: Any) -> list[Any]:
@@ -49,7 +58,7 @@ def _members(annotation: Any) -> Iterator[Any]:
         yield annotation
 
 
-def _contradicts(model: type[BaseModel], data: Any) -> bool:
+def _contradicts(model: type[Frozen], data: Any) -> bool:
     if not isinstance(data, Mapping):
         return False
     return any(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
+    from concurrent.futures import Future
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
@@ -16,7 +18,7 @@ _FORKS = sys.platform == "linux"
 """Elsewhere a process would have to import everything anew, which takes longer than what is saved."""
 
 
-def at_once(function: Callable[[Item], Made], items: Sequence[Item], jobs: int) -> list[Made]:
+def parallel_map(function: Callable[[Item], Made], items: Sequence[Item], jobs: int) -> list[Made]:
     """What a function makes of each item, in order, however many processes there are.
 
     Parameters
@@ -33,41 +35,57 @@ def at_once(function: Callable[[Item], Made], items: Sequence[Item], jobs: int) 
     if jobs < 2:
         return [function(item) for item in items]
     import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
 
+    # What a forked process is started with is not pickled: the function may be any, and the items are not copied.
     context = multiprocessing.get_context("fork")
-    others = []
-    for share in range(1, jobs):
-        ours, theirs = context.Pipe(duplex=False)
-        process = context.Process(target=_work, args=(function, items[share::jobs], theirs), daemon=True)
-        process.start()
-        theirs.close()
-        others.append((share, process, ours))
-    made: dict[int, list[Made]] = {}
+    pool = ProcessPoolExecutor(jobs, context, _start_worker, (function, items))
+    finished = False
     try:
-        made[0] = [function(item) for item in items[::jobs]]
-        for share, _, ours in others:
-            made[share] = _received(ours)
+        futures = [pool.submit(_one, place) for place in range(len(items))]
+        made = [_result(future, function, item) for future, item in zip(futures, items, strict=True)]
+        finished = True
     finally:
-        for _, process, ours in others:
-            process.kill()
-            process.join()
-            ours.close()
-    for share, results in made.items():
-        # What failed there fails here again, where its reason can be told; what was killed there is made here.
-        made[share] = results or [function(item) for item in items[share::jobs]]
-    return [made[place % jobs][place // jobs] for place in range(len(items))]
+        pool.shutdown(wait=finished, cancel_futures=True)
+    return made
 
 
-def _work(function: Callable[[Item], Made], items: Sequence[Item], pipe: Connection) -> None:
+def end_with_parent() -> None:
+    """Let this process, a worker of a pool, end without a word when it is interrupted or its parent has ended.
+
+    A parent that is killed tells nobody: its workers would wait for work for ever.
+    """
+    import multiprocessing
+    from threading import Thread
+
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    parent = multiprocessing.parent_process()
+
+    def wait_for_its_end() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    Thread(target=wait_for_its_end, daemon=True).start()
+
+
+def _result(future: Future[Made], function: Callable[[Item], Made], item: Item) -> Made:
+    """What a worker made; where it failed or was killed, the item is done here, where a failure can be told."""
     try:
-        pipe.send([function(item) for item in items])
-    except BaseException:  # noqa: BLE001  # whatever it is, the process that asked does the work itself
-        pipe.send([])
+        return future.result()
+    except Exception:  # noqa: BLE001  # whatever it is, the same call here raises it, with all that belongs to it
+        return function(item)
 
 
-def _received(pipe: Connection) -> list[Made]:
-    try:
-        results: list[Made] = pipe.recv()
-    except EOFError:
-        return []
-    return results
+_work: list[Any] = []
+"""In a worker: the function, and the items."""
+
+
+def _start_worker(function: Callable[[Any], Any], items: Sequence[Any]) -> None:
+    end_with_parent()
+    _work[:] = function, items
+
+
+def _one(place: int) -> Any:
+    function, items = _work
+    return function(items[place])

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from pzd.quantities import Control
 from pzd.schema.errors import UserError
-from pzd.schema.nearest import Path, keys_at, nearest
+from pzd.schema.nearest import Path, former_keys, keys_at, nearest
 from pzd.schema.nodes import Node
 from pzd.schema.wording import worded
 
@@ -115,7 +115,8 @@ def _message(faults: list[_Fault], annotation: Any, root: Node, data: Any, contr
     if kind == "extra_forbidden":
         valid = [control.renamed(key) for key in keys_at(annotation, path[:-1], data)]
         place, got = _key_place(root, path), control.renamed(str(path[-1]))
-        text = _unknown(got, valid)
+        now = former_keys(annotation, path[:-1], data).get(str(path[-1]))
+        text = _unknown(now or got, valid)
     elif "missing" in kind:
         text, got = "is missing", _shown(list(node.value) if isinstance(node.value, Mapping) else [])
     elif kind.startswith("union_tag"):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
+
+MOST_DIGITS = 6
+"""Significant digits of a number, however narrow its interval."""
 
 _WORDS = {
     "float_type": "must be a number",
@@ -17,6 +21,14 @@ _WORDS = {
     "model_type": "must be a mapping",
     "model_attributes_type": "must be a mapping",
 }
+
+
+def supported(value: float, low: float, high: float) -> str:
+    """A number to the second digit of the width of its interval: what is far less than the interval is 0."""
+    width = high - low
+    if not (math.isfinite(width) and width > 0.0):
+        return f"{value:.4g}"
+    return f"{round(value, 1 - math.floor(math.log10(width))) + 0.0:.{MOST_DIGITS}g}"
 
 
 def worded(kind: str, message: str) -> str:

@@ -81,9 +81,9 @@ def effective_voltage(
 
     Parameters
     ----------
-    oil : the damper
+    damper : the damper
     voltage : set by the controller, and held since [V]
-    before, felt_before : behind the lag, and behind lag and play, when it was set [V]
+    before, effective_before : behind the lag, and behind lag and play, when it was set [V]
     elapsed : time since [s]
     """
     late = lagging(damper, voltage, before, elapsed)

@@ -38,7 +38,7 @@ def stored_energy(time: float, y: Array, model: RideModel, control: Array, works
     ----------
     time : [s]
     y : (STATES,) state
-    scene, control, desk : see `scene`
+    model, control, workspace : see `ride_model`
 
     Returns
     -------

@@ -98,9 +98,9 @@ def motion(time: float, y: Array, model: RideModel, control: Array, workspace: A
     ----------
     time : [s]
     y : (STATES,) state
-    scene : what stays the same
+    model : what stays the same
     control : what the controller last set
-    desk : filled with deflections, forces and accelerations
+    workspace : filled with deflections, forces and accelerations
     dy : (STATES,) filled
     """
     car = model.car

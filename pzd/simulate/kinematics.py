@@ -54,8 +54,8 @@ def suspension(time: float, y: Array, car: Vehicle, road_coefficients: RoadCoeff
     ----------
     time : [s]
     y : state
-    car, ground : the half-car and its road
-    desk : see `scene`; filled
+    car, road_coefficients : the half-car and its road
+    workspace : see `ride_model`; filled
     """
     for i in range(2):
         height, slope, curvature = road_at(road_coefficients, car.speed * time - road_coefficients.behind[i])

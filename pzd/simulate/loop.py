@@ -53,8 +53,8 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
     ----------
     time : [s]
     y : (STATES,) state; a valve without lag tightens the oil spring at once, which is booked here
-    scene, control, desk : see `scene`; the control is changed in place
-    room : (STATES,) to work in
+    model, control, workspace : see `ride_model`; the control is changed in place
+    scratch : (STATES,) to work in
     """
     control_spec, car = model.control_spec, model.car
     if control_spec.fidelity == IDEAL and (control_spec.aim != MINIMISE or control_spec.tie != LARGEST):
@@ -174,7 +174,7 @@ def ride(
     Parameters
     ----------
     y : (STATES,) state; changed in place
-    scene, control, desk : see `scene`
+    model, control, workspace : see `ride_model`
     steps, h : number and length of the steps of integration [s]
     tolerance : see `advance`
     per_control, per_output : steps between two acts of the controller, and between two rows of the history

@@ -10,7 +10,7 @@ from pzd.simulate.policies import policies
 from pzd.simulate.policy import Policy
 from pzd.simulate.road import Road
 
-PLAIN = "-plain"
+PLAIN_SUFFIX = "-plain"
 """Appended to the case that rides on the damper before diagnose."""
 
 
@@ -27,7 +27,7 @@ class Case:
     @property
     def name(self) -> str:
         """road-policy-fidelity, with `-plain` appended."""
-        return f"{self.road.name}-{self.policy.name}-{self.fidelity}" + (PLAIN if self.plain else "")
+        return f"{self.road.name}-{self.policy.name}-{self.fidelity}" + (PLAIN_SUFFIX if self.plain else "")
 
 
 def cases(config: SimulateConfig, with_voltage: bool, changed: bool) -> tuple[Case, ...]:

@@ -69,7 +69,7 @@ class Clock:
         )
 
 
-def law_of(config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamper) -> ControlSpec:
+def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamper) -> ControlSpec:
     """Policy, bounds and fidelity of a case as numbers."""
     policy, fidelity = case.policy, _FIDELITIES[case.fidelity]
     bounds = BY_TABLE
@@ -104,7 +104,7 @@ def ride_case(
     config : the block
     case : what to ride
     profile : the road
-    grid, oil : the damper as table and with its dynamics
+    grid, damper : the damper as table and with its dynamics
     ends : whether the table ends where the rig did, so that a ride beyond is refused
 
     Returns
@@ -133,7 +133,11 @@ def ride_case(
         )
     own = damper._replace(scratch=np.zeros_like(damper.scratch))  # rides at the same time work in rooms of their own
     model = RideModel(
-        vehicle(car, speed), road_coefficients(profile, car.wheelbase), law_of(config, case, car, damper), grid, own
+        vehicle(car, speed),
+        road_coefficients(profile, car.wheelbase),
+        control_spec_of(config, case, car, damper),
+        grid,
+        own,
     )
     return ride_of_model(model, clock, config.tolerance, case.name, ends)
 

@@ -47,7 +47,7 @@ def trial(
     ----------
     time, dt : [s]
     y : (STATES,) state
-    scene, control, desk : see `scene`
+    model, control, workspace : see `ride_model`
     stages : (STAGES, STATES) room to work in
     end : (STATES,) filled
 
@@ -119,7 +119,7 @@ def advance(
     ----------
     time, h : start and length of the step [s]
     y : (STATES,) state; changed in place
-    scene, control, desk : see `scene`
+    model, control, workspace : see `ride_model`
     tolerance : largest local error as a share of the motion; infinite for a fixed step
     first : length of the first piece to try [s]
     stages, end : room to work in, (STAGES + 1, STATES) and (STATES,)

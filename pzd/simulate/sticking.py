@@ -44,7 +44,7 @@ def accelerate(car: Vehicle, control: Array, workspace: Array) -> None:
     Parameters
     ----------
     car : the half-car
-    control, desk : see `scene`; forces and accelerations are filled
+    control, workspace : see `ride_model`; forces and accelerations are filled
     """
     w0, w1, cross = car.mobility
     s0, s1 = workspace[SPRINGS, 0], workspace[SPRINGS, 1]

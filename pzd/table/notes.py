@@ -8,11 +8,10 @@ import numpy as np
 
 from pzd.damper.competing_forms import known
 from pzd.damper.model import Damper
+from pzd.quantities import Control
 from pzd.record import Array
 from pzd.table.force import forces, voltages_of
 
-RULE = "the lowest voltage that gives the force is taken"
-"""How a force that several voltages give is resolved; `table_voltage` does so."""
 CARRIED = 1e-9
 """An effect is carried if it moves the table by more than this share of the largest force."""
 FALLS = 1e-6
@@ -51,7 +50,9 @@ def _carried(damper: Damper, name: str, temperatures: tuple[float | None, ...], 
     return False
 
 
-def not_monotone(damper: Damper, temperatures: tuple[float | None, ...], velocity: Array, unit: str) -> tuple[str, ...]:
+def not_monotone(
+    damper: Damper, temperatures: tuple[float | None, ...], velocity: Array, control: Control
+) -> tuple[str, ...]:
     """Where the size of the force falls with rising voltage although on the whole it rises, or the other way round.
 
     Parameters
@@ -59,7 +60,7 @@ def not_monotone(damper: Damper, temperatures: tuple[float | None, ...], velocit
     damper : with its effects
     temperatures : of the table [degC]
     velocity : (n,) of the table, mirrored [m/s]
-    unit : of the control signal
+    control : the control signal, for the words
 
     Returns
     -------
@@ -68,16 +69,17 @@ def not_monotone(damper: Damper, temperatures: tuple[float | None, ...], velocit
     voltages = [u for u in voltages_of(damper) if u is not None]
     half = velocity.size // 2
     found: list[str] = []
+    rule = f"the lowest {control.name} that gives the force is taken"  # as `table_voltage` does
     for temperature in temperatures:
         sides = {}
         for name, branch in (("rebound", velocity[half:]), ("compression", velocity[half - 1 :: -1])):
             size = np.array([np.sign(branch[-1]) * forces(damper, temperature, u, branch) for u in voltages])
-            sides[name] = _lines(voltages, size, np.abs(branch), unit)
+            sides[name] = _lines(voltages, size, np.abs(branch), control.unit)
         place = "" if temperature is None else f"{temperature:g} degC, "
         if sides["rebound"] == sides["compression"]:
-            found += [f"{place}{line}; {RULE}" for line in sides["rebound"]]
+            found += [f"{place}{line}; {rule}" for line in sides["rebound"]]
         else:
-            found += [f"{place}{name}, {line}; {RULE}" for name, lines in sides.items() for line in lines]
+            found += [f"{place}{name}, {line}; {rule}" for name, lines in sides.items() for line in lines]
     return tuple(found)
 
 

@@ -43,7 +43,7 @@ def tabulate(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Contro
         outside=table.outside,
         reached_m_per_s=float(np.nanmax(reach.speeds)),
         lost=lost(damper, nodes.temperatures, nodes.velocities),
-        not_monotone=not_monotone(damper, nodes.temperatures, nodes.velocities, control.unit),
+        not_monotone=not_monotone(damper, nodes.temperatures, nodes.velocities, control),
     )
     for line in notes.not_monotone:
         log.info("table: %s", line)

@@ -145,9 +145,9 @@ def test_what_is_drawn_hangs_on_seed_and_number_alone(small: Small, setup_of: Se
 
 
 def test_an_effect_has_the_size_that_was_drawn(
-    small: Small, setup_of: SetupOf, fresh_seeds: Callable[[int], list[int]]
+    small: Small, setup_of: SetupOf, seeds: Callable[[int], list[int]]
 ) -> None:
-    setup = setup_of(small(f"blind.seed={fresh_seeds(1)[0]}", "blind.kinds.none=0", "blind.cases=12"))
+    setup = setup_of(small(f"blind.seed={seeds(1)[0]}", "blind.kinds.none=0", "blind.cases=12"))
     for planned in plan(setup.blind)[1:12:5]:
         truth, _ = drawn(setup, planned)
         assert truth.sizes[planned.hidden[0]] == pytest.approx(0.05, rel=0.02)

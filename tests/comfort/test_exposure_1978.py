@@ -100,8 +100,8 @@ def test_the_worst_harmonic_governs() -> None:
     assert found.minutes == exposure(0.4, 4.5, "fatigue_decreased_proficiency").minutes
 
 
-def test_bands_share_out_the_whole_mean_square() -> None:
-    ride = np.random.default_rng(5).normal(size=8000)
+def test_bands_share_out_the_whole_mean_square(rng: np.random.Generator) -> None:
+    ride = rng.normal(size=8000)
     nominal = chart().frequency
     bands = third_octaves(ride, RATE, nominal)
     low, high = 10.0 ** (-0.05), 10.0**1.95

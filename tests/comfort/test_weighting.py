@@ -75,9 +75,8 @@ def test_gravity_left_in_is_forgotten() -> None:
     assert np.abs(weighted(np.full(10000, 9.81), rate)[round(8.0 * rate) :]).max() < 1e-5
 
 
-def test_weighting_is_linear_and_shifts_with_time() -> None:
-    draw = np.random.default_rng(11)
-    ride = np.concatenate([np.zeros(500), draw.normal(size=2500)])
+def test_weighting_is_linear_and_shifts_with_time(rng: np.random.Generator) -> None:
+    ride = np.concatenate([np.zeros(500), rng.normal(size=2500)])
     later = np.concatenate([np.zeros(250), ride])[: ride.size]
     once, moved = weighted(ride, 500.0), weighted(later, 500.0)
     assert np.abs(moved[1000:] - once[750:-250]).max() < 1e-2 * np.abs(once).max()

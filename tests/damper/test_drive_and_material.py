@@ -49,8 +49,7 @@ GRID = Damper(
 )
 
 
-def test_a_bilinear_damper_is_met_everywhere_inside_and_held_beyond(fresh_seeds) -> None:
-    rng = np.random.default_rng(fresh_seeds(1)[0])
+def test_a_bilinear_damper_is_met_everywhere_inside_and_held_beyond(rng: np.random.Generator) -> None:
     u, t = rng.uniform(0, 150, 50), rng.uniform(22, 43, 50)
     expected = np.stack([100 + u - t, 2000 + u + 10 * t, 1e5 + 1e3 * u], axis=-1)
     np.testing.assert_allclose(material(GRID, u, t), expected, rtol=1e-12)
@@ -97,8 +96,7 @@ def test_an_edited_law_is_seen_although_the_kernels_are_cached(tmp_path: Path) -
     assert force() == pytest.approx(550.0)
 
 
-def test_time_need_not_be_even() -> None:
-    rng = np.random.default_rng(3)
+def test_time_need_not_be_even(rng: np.random.Generator) -> None:
     uneven = np.sort(rng.uniform(0, 1, 3000))
     omega = 2 * np.pi * 2
     single = Damper(base=(BaseRow(T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e5),))

@@ -207,8 +207,7 @@ def test_a_voltage_that_is_needed_and_not_given_is_said() -> None:
 
 
 @pytest.mark.parametrize("friction", [0.0, 1e-9, 0.05, 3.0])
-def test_a_stick_that_begins_on_its_edge_finds_the_far_edge(friction: float, fresh_seeds) -> None:
-    rng = np.random.default_rng(fresh_seeds(1)[0])
+def test_a_stick_that_begins_on_its_edge_finds_the_far_edge(friction: float, rng: np.random.Generator) -> None:
     weak = Damper(base=(BaseRow(T0_N=friction, C_Ns_per_m=2816.0, k_N_per_m=1.64e5),))
     x = np.cumsum(rng.normal(0.0, 1e-4, 600))
     flat = np.zeros_like(x)

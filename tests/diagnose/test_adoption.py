@@ -1,8 +1,7 @@
-"""Adoption: effects by voltage, two at once, and what is taken back; drawn afresh at every run."""
+"""Adoption: effects by voltage, two at once, and what is taken back."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,11 +17,10 @@ from pzd.diagnose.search.selection import Round, Selection
 from pzd.record import Record
 
 
-def test_parameters_differ_by_voltage_where_the_data_demand_it(fresh_seeds: Callable[[int], list[int]]) -> None:
-    (seed,) = fresh_seeds(1)
+def test_parameters_differ_by_voltage_where_the_data_demand_it(rng: np.random.Generator) -> None:
     thinning = {"n": (0.95, 0.75), "at_voltage_V": TWO}
     damper = damper_of(TWO).with_effect("shear_thinning", thinning)
-    records = sines(damper, np.random.default_rng(seed), TWO, jitter=0.01)
+    records = sines(damper, rng, TWO, jitter=0.01)
     # Forced, so that the claim is about the voltage alone: with one n a relief valve may look better at first.
     found = diagnosed(records, force=("shear_thinning",), most_effects=1)
     told = found.diagnosis
@@ -33,10 +31,10 @@ def test_parameters_differ_by_voltage_where_the_data_demand_it(fresh_seeds: Call
     assert found.damper.effects["shear_thinning"]["at_voltage_V"] == TWO
 
 
-def test_two_effects_that_distort_each_other_are_found(fresh_seeds: Callable[[int], list[int]]) -> None:
-    (seed,) = fresh_seeds(1)
+@pytest.mark.ci
+def test_two_effects_that_distort_each_other_are_found(rng: np.random.Generator) -> None:
     damper = damper_of(TWO, orifice_quadratic={"q": 2500.0}, rounded_yield={"w_s": 0.015})
-    told = diagnosed(sines(damper, np.random.default_rng(seed), TWO, jitter=0.01)).diagnosis
+    told = diagnosed(sines(damper, rng, TWO, jitter=0.01)).diagnosis
     assert set(told.effects) == {"orifice_quadratic", "rounded_yield"}, told.reason
 
 
@@ -55,13 +53,11 @@ def warming(
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("drifts", [True, False])
+@pytest.mark.parametrize("drifts", [pytest.param(True, marks=pytest.mark.ci), False])
 def test_a_drift_is_named_where_the_damper_warms_and_only_if_there_is_one(
     drifts: bool,  # a parameter of the test
-    fresh_seeds: Callable[[int], list[int]],
+    rng: np.random.Generator,
 ) -> None:
-    (seed,) = fresh_seeds(1)
-    rng = np.random.default_rng(seed)
     betas = {"beta_T0": 0.02, "beta_C": 0.015}
     damper = damper_of(TWO).model_copy(update={"reference_temperature_degC": 22.0})
     if drifts:

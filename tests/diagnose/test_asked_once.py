@@ -23,9 +23,9 @@ PLAIN = damper_of(TWO)
 
 
 @pytest.fixture
-def asked(fresh_seeds: Callable[[int], list[int]]) -> Callable[[int], Campaign]:
+def asked(rng: np.random.Generator) -> Callable[[int], Campaign]:
     """The same campaign, so many records at the same time."""
-    prepared = prepare(sines(PLAIN, np.random.default_rng(fresh_seeds(1)[0]), TWO))
+    prepared = prepare(sines(PLAIN, rng, TWO))
 
     def made(jobs: int) -> Campaign:
         return Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig(), jobs)
@@ -35,13 +35,13 @@ def asked(fresh_seeds: Callable[[int], list[int]]) -> Callable[[int], Campaign]:
 
 def test_a_damper_is_judged_once(asked: Callable[[int], Campaign]) -> None:
     campaign = asked(1)
-    assert campaign.judged(PLAIN) is campaign.judged(damper_of(TWO))
-    assert campaign.judged(PLAIN) is not campaign.judged(damper_of(TWO, gas_spring={"k_g": 100.0}))
+    assert campaign.checks(PLAIN) is campaign.checks(damper_of(TWO))
+    assert campaign.checks(PLAIN) is not campaign.checks(damper_of(TWO, gas_spring={"k_g": 100.0}))
 
 
 def test_naming_sees_all_but_the_untouched_samples(asked: Callable[[int], Campaign]) -> None:
     campaign = asked(1)
-    seen = {j.prepared.record.name: j.wanted for j in campaign.judged(PLAIN)}
+    seen = {j.prepared.record.name: j.wanted for j in campaign.checks(PLAIN)}
     held_out = {j.prepared.record.name: j.wanted for j in campaign.untouched(PLAIN)}
     assert held_out
     for prepared, roles in zip(campaign.prepared, campaign.parts.roles, strict=True):
@@ -51,7 +51,7 @@ def test_naming_sees_all_but_the_untouched_samples(asked: Callable[[int], Campai
 
 
 def test_records_judged_at_the_same_time_are_judged_the_same(asked: Callable[[int], Campaign]) -> None:
-    for one, other in zip(asked(1).judged(PLAIN), asked(2).judged(PLAIN), strict=True):
+    for one, other in zip(asked(1).checks(PLAIN), asked(2).checks(PLAIN), strict=True):
         np.testing.assert_array_equal(one.residual, other.residual)
 
 

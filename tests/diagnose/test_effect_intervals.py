@@ -45,8 +45,7 @@ def linear(rng: np.random.Generator, pulled: float) -> tuple[Fitted, float]:
     return Fitted(damper_of(), (), step, split_left, (), jacobian, covariance, unknowns), float(step[3])
 
 
-def share_inside(seed: int, pulled: float, errors: Callable[[Fitted], Array]) -> float:
-    rng = np.random.default_rng(seed)
+def share_inside(rng: np.random.Generator, pulled: float, errors: Callable[[Fitted], Array]) -> float:
     fits = [linear(rng, pulled) for _ in range(DRAWS)]
     return float(
         np.mean([abs(miss) <= LEVEL * errors(fitted)[0] / fitted.unknowns[0].slope(0.0) for fitted, miss in fits])
@@ -57,40 +56,37 @@ def by_noise_alone(fitted: Fitted) -> Array:
     return np.sqrt(np.diag(fitted.covariance)[-1:]) * fitted.unknowns[0].slope(0.0)
 
 
-def test_tests_that_differ_by_noise_alone_disagree_by_one_on_average(fresh_seeds: Callable[[int], list[int]]) -> None:
+def test_tests_that_differ_by_noise_alone_disagree_by_one_on_average(rng: np.random.Generator) -> None:
     # Chi-square of eight degrees of freedom over eight: sd 0.5 a draw, 0.025 of the mean of 400; 4.5 sd.
-    (seed,) = fresh_seeds(1)
-    rng = np.random.default_rng(seed)
     found = [disagreement(linear(rng, 0.0)[0], OF_EFFECT)[0] for _ in range(DRAWS)]
     assert np.mean(found) == pytest.approx(1.0, abs=0.12)
 
 
 def test_ninety_five_in_a_hundred_intervals_hold_the_truth_where_noise_is_all(
-    fresh_seeds: Callable[[int], list[int]],
+    rng: np.random.Generator,
 ) -> None:
     # Binomial, 400 draws at 0.96: sd 0.01.
-    (seed,) = fresh_seeds(1)
-    assert 0.92 <= share_inside(seed, 0.0, standard_errors) <= 0.998
+    assert 0.92 <= share_inside(rng, 0.0, standard_errors) <= 0.998
 
 
 def test_intervals_widen_with_the_disagreement_of_tests_so_that_they_hold_the_truth(
-    fresh_seeds: Callable[[int], list[int]],
+    rng: np.random.Generator,
 ) -> None:
     # Three times the noise between tests: by noise alone 46 of 100 hold it, by the spread of nine tests 92.
-    (seed,) = fresh_seeds(1)
-    assert share_inside(seed, 3.0, by_noise_alone) < 0.6
-    assert share_inside(seed, 3.0, standard_errors) > 0.86
+    assert share_inside(rng, 3.0, by_noise_alone) < 0.6
+    assert share_inside(rng, 3.0, standard_errors) > 0.86
 
 
-def shown_late(delay: float, effects: dict[str, dict[str, float]], test: tuple[float, float, float]) -> Record:
+def shown_late(
+    delay: float, effects: dict[str, dict[str, float]], test: tuple[float, float, float], rng: np.random.Generator
+) -> Record:
     voltage, frequency, amplitude = test
     late = {"sensor_delay": {"tau": effects.get("sensor_delay", {}).get("tau", 0.0) + delay}}
     record = sine(damper_of((voltage,), **{**effects, **late}), voltage, frequency, amplitude,
-                  np.random.default_rng(0), noise=0.0, cycles=5, rate=500.0)  # fmt: skip
+                  rng, noise=0.0, cycles=5, rate=500.0)  # fmt: skip
     record = sliced(
         record, record.time < record.time[-1] - 0.05
     )  # a channel ahead of time has nothing to show at the end
-    rng = np.random.default_rng()
     return replace(record, force=record.force + 1e-4 * np.max(record.force) * rng.standard_normal(record.force.size))
 
 
@@ -108,20 +104,22 @@ FOUR = tuple((U, f, x) for U in (0.0, 150.0) for f, x in ((1.0, 0.015), (2.5, 0.
 
 
 @pytest.mark.parametrize("tau", [4.2e-3, -9e-3])
-def test_a_common_delay_is_known_no_better_than_the_delays_of_the_tests_let_it(tau: float) -> None:
+def test_a_common_delay_is_known_no_better_than_the_delays_of_the_tests_let_it(
+    tau: float, rng: np.random.Generator
+) -> None:
     # Each test has a delay of its own, sd 0.5 ms, and nothing else tells a common one from those.
     effects = {"sensor_delay": {"tau": tau}}
-    evidence, found = fitted_to(tuple(shown_late(0.0, effects, test) for test in FOUR), effects)
+    evidence, found = fitted_to(tuple(shown_late(0.0, effects, test, rng) for test in FOUR), effects)
     count = len(evidence.whole.observations)
     assert found.damper.effects["sensor_delay"]["tau"] == pytest.approx(tau, abs=DELAY / np.sqrt(count))
     by_the_tests = DELAY / np.sqrt(count)
     assert 0.97 * by_the_tests < standard_errors(found)[0] < 1.2 * by_the_tests
 
 
-def test_a_delay_of_the_tests_does_not_pass_for_more_or_less_play() -> None:
+def test_a_delay_of_the_tests_does_not_pass_for_more_or_less_play(rng: np.random.Generator) -> None:
     # To first order a late force lacks its slope; at the corners of free play it lacks more than that.
     effects = {"lash": {"delta": 1.5e-4}}
     shifts = (1.2e-3, -1.2e-3, 1.2e-3, -1.2e-3)
-    late = tuple(shown_late(delay, effects, test) for delay, test in zip(shifts, FOUR, strict=True))
+    late = tuple(shown_late(delay, effects, test, rng) for delay, test in zip(shifts, FOUR, strict=True))
     delta = fitted_to(late, effects)[1].damper.effects["lash"]["delta"]
     assert delta == pytest.approx(1.5e-4, rel=0.015)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -32,21 +31,20 @@ def evidence(records: tuple[Record, ...], damper: Damper) -> Evidence:
     "effects", [{}, {"stribeck_friction": {"F_s": 80.0, "v_s": 0.04}}, {"lash": {"delta": 3e-4}}], ids=str
 )
 def test_the_right_damper_leaves_no_more_than_noise(
-    effects: dict[str, dict[str, float]], fresh_seeds: Callable[[int], list[int]]
+    effects: dict[str, dict[str, float]], rng: np.random.Generator
 ) -> None:
     # Also where dry friction jumps between two samples, which no simulation can know.
-    (seed,) = fresh_seeds(1)
     truth = damper_of(TWO, **effects)
-    whole = evidence(sines(truth, np.random.default_rng(seed), TWO, jitter=0.01), truth).whole
+    whole = evidence(sines(truth, rng, TWO, jitter=0.01), truth).whole
     found = fit(whole, tuple(effects), whole.start_with(truth))
     freedom = found.size - found.searched.size
-    # About a thousand residuals: a standard deviation of 0.045, and noise is estimated from seven differences.
-    assert 0.5 < found.misfit / freedom < 1.3
+    # About a thousand residuals, and noise estimated from seven differences: over 36 draws 0.975, sd 0.058; 4.5 sd.
+    assert 0.71 < found.misfit / freedom < 1.24
 
 
-def test_what_a_wrong_damper_leaves_counts_as_noise_of_every_harmonic() -> None:
+def test_what_a_wrong_damper_leaves_counts_as_noise_of_every_harmonic(rng: np.random.Generator) -> None:
     right = damper_of(TWO, gas_spring={"k_g": 3000.0})
-    records = sines(right, np.random.default_rng(), TWO)
+    records = sines(right, rng, TWO)
     pairs = zip(*(evidence(records, d).whole.observations for d in (damper_of(TWO), right)), strict=True)
     for wrong, known in pairs:
         assert np.all(wrong.weights < known.weights)
@@ -54,34 +52,34 @@ def test_what_a_wrong_damper_leaves_counts_as_noise_of_every_harmonic() -> None:
         assert wrong.weights[quietest] < 0.7 * known.weights[quietest]
 
 
-def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(
-    fresh_seeds: Callable[[int], list[int]],
-) -> None:
+def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(rng: np.random.Generator) -> None:
     # A damper that never slips is a spring: s_F = k s_x at every harmonic that is kept.
-    (seed,) = fresh_seeds(1)
-    rng, k = np.random.default_rng(seed), 2e5
+    k, noise, shares = 2e5, 2e-5, []
     stuck = Damper(base=(BaseRow(voltage_V=0.0, T0_N=1e6, C_Ns_per_m=3000.0, k_N_per_m=k),))
-    record = sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=2e-5, cycles=8)
-    (prepared,) = prepare((record,))
-    run = prepared.cycles
-    assert run is not None
-    variance = expected(stuck, prepared, 0.0).unsure
-    assert isinstance(variance, np.ndarray)
-    single = 2e-5**2 / run.points(record.time) / run.count
-    # Six draws of chi-square with two degrees of freedom, averaged over harmonics 0 to 3, of which one is kept.
-    assert variance[0] == 0.0
-    assert 0.05 < 4.0 * variance[1] / (k**2 * single) < 5.0
+    for _ in range(20):
+        (prepared,) = prepare((sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=noise, cycles=8),))
+        run = prepared.cycles
+        assert run is not None
+        variance = expected(stuck, prepared, 0.0).unsure
+        assert isinstance(variance, np.ndarray)
+        assert variance[0] == 0.0
+        single = noise**2 / run.points(prepared.record.time) / run.count
+        # An average over harmonics 0 to 3, of which one is kept.
+        shares.append(4.0 * variance[1] / (k**2 * single))
+    # Never too sure: of 60 draws the smallest is 0.85. What noise lets through besides makes the median 1.2, sd 0.3.
+    assert min(shares) > 0.7
+    assert 0.9 < np.median(shares) < 1.6
 
 
-def test_the_instant_of_a_standing_voltage_does_not_matter() -> None:
-    (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, np.random.default_rng()),))
+def test_the_instant_of_a_standing_voltage_does_not_matter(rng: np.random.Generator) -> None:
+    (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, rng),))
     assert expected(damper_of(TWO), prepared, 5e-4).timing.shape == (prepared.record.time.size, 0)
 
 
-def test_a_sample_beside_a_jump_is_worth_nothing() -> None:
+def test_a_sample_beside_a_jump_is_worth_nothing(rng: np.random.Generator) -> None:
     truth = damper_of(TWO, stribeck_friction={"F_s": 200.0, "v_s": 0.04})
-    (prepared,) = prepare((sine(truth, 0.0, 1.0, 0.02, np.random.default_rng(), noise=0.002),))
-    made = evidence((prepared.record, sine(truth, 150.0, 1.0, 0.02, np.random.default_rng())), truth)
+    (prepared,) = prepare((sine(truth, 0.0, 1.0, 0.02, rng, noise=0.002),))
+    made = evidence((prepared.record, sine(truth, 150.0, 1.0, 0.02, rng)), truth)
     one = made.whole.observations[0]
     bend = np.abs(np.convolve(one.measured, (1.0, -2.0, 1.0), "same"))
     bend[[0, -1]] = 0.0
@@ -92,16 +90,16 @@ def test_a_sample_beside_a_jump_is_worth_nothing() -> None:
     assert worth[0] < 0.1 * worth[1]
 
 
-def test_samples_beside_a_step_of_the_voltage_are_not_judged() -> None:
-    (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, np.random.default_rng()),))
+def test_samples_beside_a_step_of_the_voltage_are_not_judged(rng: np.random.Generator) -> None:
+    (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, rng),))
     voltage = np.where(np.arange(prepared.record.time.size) < 3000, 0.0, 150.0)
     stepped = replace(prepared, record=replace(prepared.record, voltage=voltage), lead=None, cycles=None)
     assert not counted(stepped)[2999:3001].any()
     assert counted(stepped)[[2998, 3001]].all()
 
 
-def test_the_hardest_tests_of_the_rig_are_fitted() -> None:
-    prepared = prepare(sines(damper_of(), np.random.default_rng(), cycles=4))
+def test_the_hardest_tests_of_the_rig_are_fitted(rng: np.random.Generator) -> None:
+    prepared = prepare(sines(damper_of(), rng, cycles=4))
     roles = split(prepared, None, 2.0).roles
     for channel in ("force", "velocity", "displacement"):
         peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in prepared]

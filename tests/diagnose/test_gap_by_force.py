@@ -18,7 +18,7 @@ BEFORE = (30.0, 100.0)
 """Gap of either, r.m.s. [N]: 30 % of the soft one's peak, 10 % of the hard one's."""
 
 
-def judged(gaps: tuple[float, float]) -> list[Any]:
+def checks(gaps: tuple[float, float]) -> list[Any]:
     """The two tests with such gaps."""
     wanted = np.ones(1000, dtype=np.bool_)
     return [SimpleNamespace(power=g**2, peak=p, wanted=wanted) for g, p in zip(gaps, (SOFT, HARD), strict=True)]
@@ -26,14 +26,14 @@ def judged(gaps: tuple[float, float]) -> list[Any]:
 
 def refused(left: tuple[float, float]) -> str | None:
     """What is said of a candidate that leaves such gaps."""
-    evidence = SimpleNamespace(something_missing=lambda *_: True, campaign=SimpleNamespace(judged=judged))
+    evidence = SimpleNamespace(something_missing=lambda *_: True, campaign=SimpleNamespace(checks=checks))
     before, candidate = SimpleNamespace(damper=BEFORE), SimpleNamespace(fitted=SimpleNamespace(damper=left))
     return leaves_gap(cast("Any", evidence), DiagnoseConfig(), cast("Any", before), cast("Any", candidate))
 
 
 def test_the_gap_counts_by_each_peak_or_by_force() -> None:
-    assert visible_gap(judged(BEFORE)) == pytest.approx(np.sqrt((0.3**2 + 0.1**2) / 2.0))
-    assert gap_in_force(judged(BEFORE)) == pytest.approx(np.sqrt((30.0**2 + 100.0**2) / 2.0))
+    assert visible_gap(checks(BEFORE)) == pytest.approx(np.sqrt((0.3**2 + 0.1**2) / 2.0))
+    assert gap_in_force(checks(BEFORE)) == pytest.approx(np.sqrt((30.0**2 + 100.0**2) / 2.0))
 
 
 @pytest.mark.parametrize("left", [(30.0, 30.0), (20.0, 100.0), (1.0, 1.0)])

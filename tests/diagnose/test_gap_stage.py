@@ -15,7 +15,7 @@ from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import TRAINING, UNTOUCHED, VALIDATION, split
 from pzd.diagnose.noise.input_uncertainty import expected
-from pzd.diagnose.residual_check import judge
+from pzd.diagnose.residual_check import check_residual
 from pzd.diagnose.stage import diagnose
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.stage import identify
@@ -49,8 +49,7 @@ def road(damper: Damper, rng: np.random.Generator, voltage: float, displacement_
     return Record(f"road{voltage:g}", None, fine[keep], seen, v[keep], a[keep], measured, U)
 
 
-def test_a_damper_that_misses_nothing_is_handed_on_with_the_verdict_none() -> None:
-    rng = np.random.default_rng()
+def test_a_damper_that_misses_nothing_is_handed_on_with_the_verdict_none(rng: np.random.Generator) -> None:
     records = sines(damper_of(TWO), rng, TWO, jitter=0.02)
     found = diagnosed(records)
     assert found.diagnosis.verdict == "none"
@@ -62,8 +61,7 @@ def test_a_damper_that_misses_nothing_is_handed_on_with_the_verdict_none() -> No
     assert found.damper == found.plain == base_of(identify(IdentifyConfig(), Rig(records, ()), 1).rows, None)
 
 
-def test_displacement_noise_of_a_tenth_of_a_millimetre_is_no_missing_effect() -> None:
-    rng = np.random.default_rng()
+def test_displacement_noise_of_a_tenth_of_a_millimetre_is_no_missing_effect(rng: np.random.Generator) -> None:
     records = sines(damper_of(TWO), rng, TWO, jitter=0.01, displacement_noise=1e-4)
     assert diagnosed(records).diagnosis.verdict == "none"
 
@@ -75,8 +73,10 @@ def test_displacement_noise_of_a_tenth_of_a_millimetre_is_no_missing_effect() ->
         ({"orifice_quadratic": {"q": 4000.0}}, "abs(v) > 0.25 m/s"),
     ],
 )
-def test_a_missing_effect_is_named_and_told_where_it_acts(effects: dict[str, dict[str, float]], place: str) -> None:
-    found = diagnosed(sines(damper_of(TWO, **effects), np.random.default_rng(), TWO))
+def test_a_missing_effect_is_named_and_told_where_it_acts(
+    rng: np.random.Generator, effects: dict[str, dict[str, float]], place: str
+) -> None:
+    found = diagnosed(sines(damper_of(TWO, **effects), rng, TWO))
     assert found.diagnosis.verdict == "named"
     assert found.diagnosis.effects == tuple(effects)
     assert any(place in region.region for region in found.diagnosis.where)
@@ -86,8 +86,7 @@ def test_a_missing_effect_is_named_and_told_where_it_acts(effects: dict[str, dic
     assert gap.hold_out == "records"
 
 
-def test_a_misfit_at_one_voltage_is_told_there() -> None:
-    rng = np.random.default_rng()
+def test_a_misfit_at_one_voltage_is_told_there(rng: np.random.Generator) -> None:
     records = tuple(
         sine(damper_of(asymmetry={"alpha": 0.15 if U == 100.0 else 0.0}), U, f, 0.03, rng)
         for U in TABLE_2
@@ -98,8 +97,7 @@ def test_a_misfit_at_one_voltage_is_told_there() -> None:
     assert best[0].share_of_gap > 0.9
 
 
-def test_one_sine_a_voltage_holds_out_cycles_and_says_that_this_is_weak() -> None:
-    rng = np.random.default_rng()
+def test_one_sine_a_voltage_holds_out_cycles_and_says_that_this_is_weak(rng: np.random.Generator) -> None:
     found = diagnosed(sines(damper_of(), rng, tests=((2.0, 0.03),))).diagnosis
     assert found.verdict == "none"
     assert found.gap.hold_out == "cycles"
@@ -108,30 +106,29 @@ def test_one_sine_a_voltage_holds_out_cycles_and_says_that_this_is_weak() -> Non
 
 
 @pytest.mark.parametrize("displacement_noise", [0.0, 5e-5])
-def test_roads_without_a_missing_effect_are_within_the_noise(displacement_noise: float) -> None:
-    rng = np.random.default_rng()
+def test_roads_without_a_missing_effect_are_within_the_noise(
+    rng: np.random.Generator, displacement_noise: float
+) -> None:
     found = diagnosed(tuple(road(damper_of(TWO), rng, U, displacement_noise) for U in TWO)).diagnosis
     assert found.verdict == "none"
     assert found.gap.hold_out == "segments"
 
 
-def test_roads_show_what_misses_although_nothing_repeats() -> None:
-    rng = np.random.default_rng()
+def test_roads_show_what_misses_although_nothing_repeats(rng: np.random.Generator) -> None:
     damper = damper_of(TWO, gas_spring={"k_g": 2e4})
     found = diagnosed(tuple(road(damper, rng, U) for U in TWO)).diagnosis
     assert "gas_spring" in found.effects + found.rivals
 
 
-def test_the_same_rig_gives_the_same_diagnosis_and_reads_back(tmp_path: Any) -> None:
-    records = sines(damper_of(TWO), np.random.default_rng(), TWO, tests=((2.0, 0.03),))
+def test_the_same_rig_gives_the_same_diagnosis_and_reads_back(rng: np.random.Generator, tmp_path: Any) -> None:
+    records = sines(damper_of(TWO), rng, TWO, tests=((2.0, 0.03),))
     first, second = diagnosed(records), diagnosed(records)
     assert first.diagnosis == second.diagnosis
     first.write(tmp_path, Control())
     assert Diagnosed.read(tmp_path, Control()).diagnosis == first.diagnosis
 
 
-def test_every_role_has_every_kind_of_test_over_the_conditions() -> None:
-    rng = np.random.default_rng()
+def test_every_role_has_every_kind_of_test_over_the_conditions(rng: np.random.Generator) -> None:
     prepared = prepare(sines(damper_of(), rng, cycles=4))
     parts = split(prepared, None, 2.0)
     whole = [int(roles[0]) for roles in parts.roles]
@@ -149,21 +146,22 @@ def test_every_role_has_every_kind_of_test_over_the_conditions() -> None:
         assert len(set(fitted)) == 2
 
 
-def test_two_records_of_a_condition_hold_one_out_whole() -> None:
-    prepared = prepare(sines(damper_of(TWO), np.random.default_rng(), TWO, tests=((0.5, 0.03), (2.0, 0.03))))
+def test_two_records_of_a_condition_hold_one_out_whole(rng: np.random.Generator) -> None:
+    prepared = prepare(sines(damper_of(TWO), rng, TWO, tests=((0.5, 0.03), (2.0, 0.03))))
     parts = split(prepared, None, 2.0)
     assert parts.hold_out == "records"
     assert sorted(np.unique(roles).tolist() for roles in parts.roles) == [[0, 1], [0, 1], [2], [2]]
 
 
-def test_small_offset_gain_and_delay_are_nuisances_and_large_ones_a_gap() -> None:
-    rng = np.random.default_rng()
+def test_small_offset_gain_and_delay_are_nuisances_and_large_ones_a_gap(rng: np.random.Generator) -> None:
     damper = damper_of([0.0])
     for offset, gain, share in ((0.005, 1.03, 0.05), (0.05, 1.0, 0.5)):
         record = sine(damper, 0.0, 2.0, 0.03, rng, noise=1e-4, offset=offset, gain=gain)
         (prepared,) = prepare([record])
         everything = np.ones(prepared.record.time.size, dtype=np.bool_)
-        judged = judge(expected(damper, prepared, NuisanceConfig().delay_s), prepared, everything, NuisanceConfig())
+        judged = check_residual(
+            expected(damper, prepared, NuisanceConfig().delay_s), prepared, everything, NuisanceConfig()
+        )
         left = float(np.sqrt(np.mean(judged.cleared**2)) / np.sqrt(np.mean(judged.residual**2)))
         assert left < share if offset < 0.01 else left > share
 
@@ -176,8 +174,7 @@ def test_a_nuisance_explains_a_pure_delay() -> None:
     assert np.max(np.abs(explained - late)) < 0.03 * np.max(np.abs(late))
 
 
-def test_cleaned_displacement_keeps_the_corners_of_a_triangle() -> None:
-    rng = np.random.default_rng()
+def test_cleaned_displacement_keeps_the_corners_of_a_triangle(rng: np.random.Generator) -> None:
     t = np.arange(20000) / 1000.0
     harmonics = np.arange(1, 40, 2)
     triangle = 0.02 * sum(np.cos(2 * np.pi * h * t) / h**2 for h in harmonics)

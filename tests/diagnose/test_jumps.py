@@ -8,7 +8,7 @@ from campaign import TABLE_2, damper_of, sine
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.gap import visible_gap
 from pzd.diagnose.noise.input_uncertainty import expected
-from pzd.diagnose.residual_check import judge
+from pzd.diagnose.residual_check import check_residual
 from pzd.signals.jumps import jumps
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -20,20 +20,19 @@ def test_a_step_is_a_jump_of_its_own_size_at_the_two_samples_beside_it() -> None
     assert np.allclose(found[[169, 170]], 500.0, atol=0.01)
 
 
-def test_a_smooth_force_under_noise_has_next_to_no_jumps() -> None:
-    rng = np.random.default_rng()
+def test_a_smooth_force_under_noise_has_next_to_no_jumps(rng: np.random.Generator) -> None:
     time = np.arange(4000) / 1000.0
     found = jumps(1000.0 * np.sin(2 * np.pi * time) + 10.0 * rng.standard_normal(time.size))
     # Gaussian bends exceed six standard deviations once in 500 million samples; the scatter is known to 2 %.
     assert not np.any(found)
 
 
-def test_the_true_damper_with_a_large_jump_at_every_reversal_leaves_no_gap() -> None:
+def test_the_true_damper_with_a_large_jump_at_every_reversal_leaves_no_gap(rng: np.random.Generator) -> None:
     friction = {"F_s": 0.4 * TABLE_2[0.0][0], "v_s": 0.015}
     damper = damper_of((0.0,), stribeck_friction=friction)
-    record = sine(damper, 0.0, 1.03, 0.03, np.random.default_rng(), noise=0.005, rate=500.0)
+    record = sine(damper, 0.0, 1.03, 0.03, rng, noise=0.005, rate=500.0)
     (prepared,) = prepare((record,))
     wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
     with_jump, without = (expected(d, prepared, NuisanceConfig().delay_s) for d in (damper, damper_of((0.0,))))
-    assert visible_gap([judge(with_jump, prepared, wanted, NuisanceConfig())]) < 0.001
-    assert visible_gap([judge(without, prepared, wanted, NuisanceConfig())]) > 0.01
+    assert visible_gap([check_residual(with_jump, prepared, wanted, NuisanceConfig())]) < 0.001
+    assert visible_gap([check_residual(without, prepared, wanted, NuisanceConfig())]) > 0.01

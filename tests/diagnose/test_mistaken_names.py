@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,10 +19,9 @@ LINEAR_TESTS = ((0.5, 0.015), (0.5, 0.03), (2.0, 0.01), (2.0, 0.02))
 
 @pytest.mark.parametrize(("foil", "values"), [("guide_friction", {"F_g": 40.0}), ("cubic_spring", {"k_3": 6e6})])
 def test_a_force_that_is_in_no_library_is_not_named_after_the_effect_next_to_it(
-    form: str, values: dict[str, float], fresh_seeds: Callable[[int], list[int]]
+    form: str, values: dict[str, float], rng: np.random.Generator
 ) -> None:
-    (seed,) = fresh_seeds(1)
-    records = sines(damper_of(TWO).with_effect(form, values), np.random.default_rng(seed), TWO, tests=LINEAR_TESTS)
+    records = sines(damper_of(TWO).with_effect(form, values), rng, TWO, tests=LINEAR_TESTS)
     told = diagnosed(records).diagnosis
     assert told.verdict in ("ambiguous", "unexplained"), told.reason
     assert form not in {*told.effects, *told.rivals}
@@ -31,28 +29,26 @@ def test_a_force_that_is_in_no_library_is_not_named_after_the_effect_next_to_it(
 
 
 def test_an_offset_that_any_test_could_have_is_an_effect_where_every_test_has_it(
-    fresh_seeds: Callable[[int], list[int]],
+    rng: np.random.Generator,
 ) -> None:
-    (seed,) = fresh_seeds(1)
     # 1.5 to 2 % of the peaks at 0 V: three to four standard deviations of one test's own offset.
-    records = sines(damper_of(TWO, preload_offset={"F_0": 14.0}), np.random.default_rng(seed), TWO)
+    records = sines(damper_of(TWO, preload_offset={"F_0": 14.0}), rng, TWO)
     told = diagnosed(records).diagnosis
     assert (told.verdict, told.effects) == ("named", ("preload_offset",)), told.reason
 
 
-def test_a_mean_that_creeps_is_no_gap(fresh_seeds: Callable[[int], list[int]]) -> None:
-    (seed,) = fresh_seeds(1)
+def test_a_mean_that_creeps_is_no_gap(rng: np.random.Generator) -> None:
 
     def creeping(record: Record) -> Record:
         return replace(record, displacement=record.displacement + 1e-3 * record.time / record.time[-1])
 
-    records = sines(damper_of(TWO), np.random.default_rng(seed), TWO, tests=LINEAR_TESTS)
+    records = sines(damper_of(TWO), rng, TWO, tests=LINEAR_TESTS)
     told = diagnosed(tuple(creeping(r) for r in records)).diagnosis
     assert told.verdict == "none", told.reason
 
 
-def test_records_whose_force_is_cut_off_are_left_out_and_named() -> None:
-    records = sines(damper_of(TWO), np.random.default_rng(), TWO, tests=((1.0, 0.02),), cycles=3)
+def test_records_whose_force_is_cut_off_are_left_out_and_named(rng: np.random.Generator) -> None:
+    records = sines(damper_of(TWO), rng, TWO, tests=((1.0, 0.02),), cycles=3)
     cut = Finding(
         check="saturation", where="force, 3 plateaus at 900 N, the first at 1 s", size=0.1, unit="-", follows=""
     )

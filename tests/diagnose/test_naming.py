@@ -1,8 +1,6 @@
-"""Naming: on rigs whose truth is known, drawn afresh at every run."""
+"""Naming: on rigs whose truth is known."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -49,16 +47,16 @@ ENOUGH = 9
 """Of the twelve: at an error rate of 3 % fewer are right in one run of 30,000, at 5 % in one of 4,000."""
 
 
-def test_hidden_effects_are_named_with_their_parameters(fresh_seeds: Callable[[int], list[int]]) -> None:
+@pytest.mark.ci
+def test_hidden_effects_are_named_with_their_parameters(rng: np.random.Generator) -> None:
     right, told = [], []
-    for name, seed in zip(TRUTHS, fresh_seeds(len(TRUTHS)), strict=True):
-        rng = np.random.default_rng(seed)
-        found = diagnosed(sines(damper_of(TWO, **{name: TRUTHS[name]}), rng, TWO, jitter=0.01))
-        told.append((name, seed, found.diagnosis.verdict, found.diagnosis.effects, found.diagnosis.rivals))
+    for name, draw in zip(TRUTHS, rng.spawn(len(TRUTHS)), strict=True):
+        found = diagnosed(sines(damper_of(TWO, **{name: TRUTHS[name]}), draw, TWO, jitter=0.01))
+        told.append((name, found.diagnosis.verdict, found.diagnosis.effects, found.diagnosis.rivals))
         right.append(named_well(name, found))
     assert sum(right) >= ENOUGH, told
     # The truth is hardly ever lost: it stands among what is said in all but two at most.
-    assert sum(name in {*effects, *rivals} for name, _, _, effects, rivals in told) >= len(TRUTHS) - 2, told
+    assert sum(name in {*effects, *rivals} for name, _, effects, rivals in told) >= len(TRUTHS) - 2, told
 
 
 def named_well(name: str, found: Diagnosed) -> bool:
@@ -74,8 +72,9 @@ def named_well(name: str, found: Diagnosed) -> bool:
 
 
 @pytest.mark.parametrize("truth", ["gas_spring", "fluid_inertia"])
-def test_a_spring_and_a_mass_cannot_be_told_apart_on_one_frequency_and_the_next_test_has_another(truth: str) -> None:
-    rng = np.random.default_rng()
+def test_a_spring_and_a_mass_cannot_be_told_apart_on_one_frequency_and_the_next_test_has_another(
+    rng: np.random.Generator, truth: str
+) -> None:
     tests = ((2.0, 0.015), (2.0, 0.03))
     effects = {truth: {"gas_spring": {"k_g": 3000.0}, "fluid_inertia": {"m": 25.0}}[truth]}
     told = diagnosed(sines(damper_of(TWO, **effects), rng, TWO, tests=tests)).diagnosis
@@ -90,13 +89,13 @@ def test_a_spring_and_a_mass_cannot_be_told_apart_on_one_frequency_and_the_next_
     assert told.next_test.distance_percent > 0.5
 
 
-def test_a_spring_that_pushes_away_is_not_called_a_gas_spring() -> None:
-    told = diagnosed(sines(damper_of(TWO, gas_spring={"k_g": -3000.0}), np.random.default_rng(), TWO)).diagnosis
+def test_a_spring_that_pushes_away_is_not_called_a_gas_spring(rng: np.random.Generator) -> None:
+    told = diagnosed(sines(damper_of(TWO, gas_spring={"k_g": -3000.0}), rng, TWO)).diagnosis
     assert told.verdict == "unexplained", told.reason
     assert "no gas_spring has" in told.reason
 
 
-def test_something_that_is_not_in_the_library_is_unexplained() -> None:
+def test_something_that_is_not_in_the_library_is_unexplained(rng: np.random.Generator) -> None:
     def with_flutter(record: Record) -> Record:
         """A force that depends on where the piston stands: damping that doubles towards one end."""
         extra = 1500.0 * record.velocity * np.sin(300.0 * record.displacement) ** 2
@@ -105,19 +104,19 @@ def test_something_that_is_not_in_the_library_is_unexplained() -> None:
             record.force + extra, record.voltage,
         )  # fmt: skip
 
-    records = sines(damper_of(TWO), np.random.default_rng(), TWO)
+    records = sines(damper_of(TWO), rng, TWO)
     told = diagnosed(tuple(with_flutter(r) for r in records)).diagnosis
     assert told.verdict == "unexplained", told.reason
 
 
-def test_a_forbidden_effect_is_never_adopted_and_a_forced_one_always() -> None:
-    records = sines(damper_of(TWO, gas_spring={"k_g": 3000.0}), np.random.default_rng(), TWO)
+def test_a_forbidden_effect_is_never_adopted_and_a_forced_one_always(rng: np.random.Generator) -> None:
+    records = sines(damper_of(TWO, gas_spring={"k_g": 3000.0}), rng, TWO)
     assert "gas_spring" not in diagnosed(records, forbid=("gas_spring",)).damper.effects
     assert "asymmetry" in diagnosed(records, force=("asymmetry",)).damper.effects
 
 
-def test_a_lag_of_the_valve_is_named_from_steps_of_the_voltage() -> None:
-    rng = np.random.default_rng()
+@pytest.mark.ci
+def test_a_lag_of_the_valve_is_named_from_steps_of_the_voltage(rng: np.random.Generator) -> None:
     damper = damper_of(TWO, valve_lag={"tau": 0.02})
     steady = tuple(sine(damper, U, f, 0.02, rng) for U in TWO for f in (0.5, 2.0))
     told = diagnosed((*steady, *(stepped(damper, rng, f) for f in (1.0, 2.3)))).diagnosis

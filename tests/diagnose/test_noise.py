@@ -12,29 +12,28 @@ COLOURS = (0.0, 0.5, 0.9)
 
 
 @pytest.mark.parametrize("colour", COLOURS)
-def test_the_colour_and_variance_of_noise_are_found(colour: float) -> None:
-    found = autoregression([coloured(np.random.default_rng(), 20000, 3.0, colour)])
+def test_the_colour_and_variance_of_noise_are_found(rng: np.random.Generator, colour: float) -> None:
+    found = autoregression([coloured(rng, 20000, 3.0, colour)])
     first = found.coefficients[0] if found.coefficients.size else 0.0
     assert first == pytest.approx(colour, abs=0.05)
     assert found.variance == pytest.approx(9.0, rel=0.25)
     assert found.innovation == pytest.approx(9.0 * (1.0 - colour**2), rel=0.06)
 
 
-def test_whitened_noise_is_white_and_of_unit_variance() -> None:
-    series = coloured(np.random.default_rng(), 20000, 5.0, 0.9)
+def test_whitened_noise_is_white_and_of_unit_variance(rng: np.random.Generator) -> None:
+    series = coloured(rng, 20000, 5.0, 0.9)
     white = autoregression([series]).whitened(series)
     assert np.mean(white**2) == pytest.approx(1.0, rel=0.06)
     assert abs(np.mean(white[1:] * white[:-1])) < 5.0 / np.sqrt(white.size)
 
 
-def test_the_density_sums_to_the_variance() -> None:
-    found = autoregression([coloured(np.random.default_rng(), 5000, 2.0, 0.5)])
+def test_the_density_sums_to_the_variance(rng: np.random.Generator) -> None:
+    found = autoregression([coloured(rng, 5000, 2.0, 0.5)])
     frequency = (np.arange(2000) + 0.5) / 2000
     assert np.mean(found.density(frequency)) == pytest.approx(found.variance, rel=1e-6)
 
 
-def test_what_repeats_and_what_drifts_is_no_noise() -> None:
-    rng = np.random.default_rng()
+def test_what_repeats_and_what_drifts_is_no_noise(rng: np.random.Generator) -> None:
     phase = 2 * np.pi * np.arange(500) / 500
     repeats = 300.0 * np.sin(phase) + 100.0 * np.sign(np.cos(3 * phase))
     drift = np.arange(10)[:, None] * 0.3
@@ -48,8 +47,7 @@ def test_what_repeats_and_what_drifts_is_no_noise() -> None:
 
 
 @pytest.mark.parametrize("colour", COLOURS)
-def test_noise_alone_leaves_no_repeatable_power_on_average(colour: float) -> None:
-    rng = np.random.default_rng()
+def test_noise_alone_leaves_no_repeatable_power_on_average(rng: np.random.Generator, colour: float) -> None:
     powers = [repeatable_power(pure_error(coloured(rng, 4000, 1.0, colour).reshape(8, 500))).sum() for _ in range(60)]
     # Eight cycles hide a little of the colour: over 1500 draws the mean lies 0.3 standard errors (of 60) below zero.
     # With that and a skewness of 0.3, five are passed in one of some 300,000 runs; four were in one of some thousands.
@@ -58,8 +56,9 @@ def test_noise_alone_leaves_no_repeatable_power_on_average(colour: float) -> Non
 
 @pytest.mark.parametrize("colour", [*COLOURS, 0.97])
 @pytest.mark.parametrize(("cycles", "points"), [(2, 500), (3, 200), (10, 60), (8, 500)])
-def test_false_alarms_are_as_rare_as_they_say(colour: float, cycles: int, points: int) -> None:
-    rng = np.random.default_rng()
+def test_false_alarms_are_as_rare_as_they_say(
+    rng: np.random.Generator, colour: float, cycles: int, points: int
+) -> None:
     found = [
         by_harmonics(pure_error(coloured(rng, cycles * points, 1.0, colour).reshape(cycles, points)))
         for _ in range(160)
@@ -72,8 +71,7 @@ def test_false_alarms_are_as_rare_as_they_say(colour: float, cycles: int, points
 
 
 @pytest.mark.parametrize(("colour", "rise"), [(0.0, 0.3), (0.9, 1.0)])
-def test_a_trend_is_seen_and_noise_is_not(colour: float, rise: float) -> None:
-    rng = np.random.default_rng()
+def test_a_trend_is_seen_and_noise_is_not(rng: np.random.Generator, colour: float, rise: float) -> None:
     shape = np.sin(2 * np.pi * np.arange(400) / 400)
     quiet, drifting = [], []
     for _ in range(60):
@@ -84,20 +82,18 @@ def test_a_trend_is_seen_and_noise_is_not(colour: float, rise: float) -> None:
     assert max(p for p in drifting if p is not None) < 1e-4
 
 
-def test_three_cycles_show_no_trend() -> None:
-    assert by_trend(coloured(np.random.default_rng(), 600, 1.0, 0.5).reshape(3, 200)) is None
+def test_three_cycles_show_no_trend(rng: np.random.Generator) -> None:
+    assert by_trend(coloured(rng, 600, 1.0, 0.5).reshape(3, 200)) is None
 
 
-def test_a_repeatable_misfit_below_the_noise_is_found() -> None:
-    rng = np.random.default_rng()
+def test_a_repeatable_misfit_below_the_noise_is_found(rng: np.random.Generator) -> None:
     misfit = 0.5 * np.sin(6 * np.pi * np.arange(500) / 500)
     for _ in range(20):
         error = pure_error(coloured(rng, 5000, 1.0, 0.5).reshape(10, 500) + misfit)
         assert pooled([by_harmonics(error)]) < 1e-4
 
 
-def test_what_every_test_shows_a_little_adds_up() -> None:
-    rng = np.random.default_rng()
+def test_what_every_test_shows_a_little_adds_up(rng: np.random.Generator) -> None:
     found = []
     for _ in range(16):
         misfit = 0.25 * np.sin(6 * np.pi * np.arange(500) / 500 + rng.uniform(0, 6))
@@ -112,5 +108,5 @@ def test_bands_are_octaves_that_leave_no_harmonic_out() -> None:
         assert covered == list(range(last + 1))
 
 
-def test_too_few_differences_are_not_judged() -> None:
-    assert np.all(by_harmonics(pure_error(coloured(np.random.default_rng(), 80, 1.0, 0.9).reshape(2, 40))) == 1.0)
+def test_too_few_differences_are_not_judged(rng: np.random.Generator) -> None:
+    assert np.all(by_harmonics(pure_error(coloured(rng, 80, 1.0, 0.9).reshape(2, 40))) == 1.0)

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import os
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-import pytest
 from numpy.random import Generator
 
 from pzd.damper.compose import respond
@@ -18,12 +14,12 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.objective import Bingham
+from pzd.paper.published import published
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig
 
 RATE = 1000
 OVERSAMPLING = 32
-SHARED = Path(os.environ.get("PZD_SHARED", Path(__file__).parents[3] / "shared"))
 
 TABLE_2 = {0.0: Bingham(301.0, 2720.0, 199e3), 150.0: Bingham(1325.0, 2560.0, 423e3)}
 
@@ -33,17 +29,12 @@ SENSORS_ALIKE = IdentifyConfig(nuisance=NuisanceConfig(offset=0.0, delay_s=0.0, 
 
 def published_rows() -> list[tuple[Bingham, float, float]]:
     """Parameters, frequency [Hz] and amplitude [m] of each row of Tables 1-3 of the paper."""
-    path = SHARED / "paper" / "published.csv"
-    if not path.exists():
-        pytest.skip(f"the paper's numbers are not at {path}")
     rows: dict[str, dict[str, float]] = {}
-    with path.open(newline="") as lines:
-        for line in csv.DictReader(lines):
-            if line["kind"] == "identified":
-                values = rows.setdefault(line["id"].rsplit("-", 1)[0], {})
-                values[line["quantity"]] = float(line["value"])
-                values["frequency"], values["amplitude"] = float(line["frequency_Hz"]), float(line["amplitude_m"])
-    return [(Bingham(r["T0"], r["C"], r["k"]), r["frequency"], r["amplitude"]) for r in rows.values()]
+    for one in published().values():
+        if one.kind == "identified":
+            values = rows.setdefault(one.id.rsplit("-", 1)[0], {})
+            values |= {one.quantity: one.number, "f": one.frequency_Hz or 0.0, "x": one.amplitude_m or 0.0}
+    return [(Bingham(r["T0"], r["C"], r["k"]), r["f"], r["x"]) for r in rows.values()]
 
 
 def sine_test(

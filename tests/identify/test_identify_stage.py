@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +13,7 @@ from pzd.artefacts import Identified, Rig
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.stage import identify
 from pzd.quantities import Control
+from pzd.schema.progress import Progress
 
 
 def rig() -> Rig:
@@ -37,7 +37,7 @@ def test_records_of_one_condition_share_a_row_and_settings_do_not() -> None:
         ("wide", 150.0),
     ]
     assert len(found.measures) == 8
-    assert found.untrusted == ()
+    assert found.untrusted(Control()) == ()
 
 
 def test_a_narrower_group_splits_conditions() -> None:
@@ -61,10 +61,11 @@ def test_the_artefact_reads_back_as_it_was_written(tmp_path) -> None:
     assert read.measures == found.measures
 
 
-def test_progress_is_told_one_line_a_condition(caplog) -> None:
-    with caplog.at_level(logging.INFO, logger="pzd.identify"):
-        identify(IdentifyConfig(), rig(), seed=1)
-    assert [m.split(":")[0] for m in caplog.messages] == [f"{i} of 4 conditions" for i in range(1, 5)]
+def test_progress_is_an_event_for_each_condition() -> None:
+    heard: list[Progress] = []
+    identify(IdentifyConfig(), rig(), seed=1, progress=heard.append)
+    assert [(event.done, event.whole) for event in heard] == [(i, 4) for i in range(1, 5)]
+    assert all(event.what.startswith("conditions: ") for event in heard)
 
 
 def test_the_evolutionary_method_is_chosen_by_name() -> None:

@@ -73,10 +73,10 @@ def test_rounded_time_stamps_are_no_irregular_clock() -> None:
     assert trial_of(replace(record, time=np.round(record.time, 3))).positions is None
 
 
-def test_an_irregular_clock_is_taken_as_it_is() -> None:
+def test_an_irregular_clock_is_taken_as_it_is(rng: np.random.Generator) -> None:
     truth = TABLE_2[0.0]
     record = sine_test(truth, 2.0, 0.03)
-    kept = np.sort(np.random.default_rng(5).permutation(record.time.size)[: int(0.7 * record.time.size)])
+    kept = np.sort(rng.permutation(record.time.size)[: int(0.7 * record.time.size)])
     channels = ("time", "displacement", "velocity", "acceleration", "force")
     thinned = replace(record, **{c: getattr(record, c)[kept] for c in channels})
     trial = trial_of(thinned)

@@ -24,9 +24,9 @@ def row_for(*records: Record) -> ParameterRow:
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_a_slow_small_test_cannot_tell_the_damping(noise) -> None:
+def test_a_slow_small_test_cannot_tell_the_damping(rng: np.random.Generator, noise) -> None:
     record = sine_test(Bingham(400.0, 2500.0, 4e5), 0.2, 0.002, cycles=6)
-    row = row_for(with_noise(record, np.random.default_rng(1), noise, correlation=0.9))
+    row = row_for(with_noise(record, rng, noise, correlation=0.9))
     assert row.C_Ns_per_m is None
     assert row.C_Ns_per_m_low95 is None
     assert row.status.startswith("undetermined: C (")
@@ -48,34 +48,33 @@ def test_a_tare_of_the_load_cell_is_not_explained_by_an_element_that_never_slips
     assert row_for(replace(record, force=record.force + 600.0)).status != "ok"
 
 
-def test_a_damper_without_friction_has_a_friction_of_nothing_and_not_an_unknown_one() -> None:
+def test_a_damper_without_friction_has_a_friction_of_nothing_and_not_an_unknown_one(rng: np.random.Generator) -> None:
     record = sine_test(Bingham(0.0, 2500.0, 4e5), 2.0, 0.02)
-    row = row_for(with_noise(record, np.random.default_rng(2)))
+    row = row_for(with_noise(record, rng))
     assert row.T0_N is not None
     assert row.T0_N_high95 < 0.01 * np.abs(record.force).max()
     assert row.C_Ns_per_m == pytest.approx(2500.0, rel=0.01)
 
 
-def test_a_rigid_oil_spring_is_undetermined_and_the_others_are_not() -> None:
-    row = row_for(with_noise(sine_test(Bingham(400.0, 2500.0, 4e9), 2.0, 0.02), np.random.default_rng(3)))
+def test_a_rigid_oil_spring_is_undetermined_and_the_others_are_not(rng: np.random.Generator) -> None:
+    row = row_for(with_noise(sine_test(Bingham(400.0, 2500.0, 4e9), 2.0, 0.02), rng))
     assert row.k_N_per_m is None
     assert row.status.startswith("undetermined: k (")
     assert pytest.approx(400.0, rel=0.05) == row.T0_N
     assert row.C_Ns_per_m == pytest.approx(2500.0, rel=0.02)
 
 
-def test_displacement_noise_that_hides_the_oil_spring_is_named() -> None:
+def test_displacement_noise_that_hides_the_oil_spring_is_named(rng: np.random.Generator) -> None:
     record = sine_test(Bingham(400.0, 2500.0, 3e7), 2.0, 0.02)
-    rng = np.random.default_rng(4)
     noisy = replace(record, displacement=record.displacement + 1e-5 * rng.standard_normal(record.time.size))
     row = row_for(noisy)
     assert row.k_N_per_m is None
     assert "the displacement's noise is" in row.status
 
 
-def test_displacement_noise_is_measured_and_the_motion_itself_is_not_taken_for_it() -> None:
+def test_displacement_noise_is_measured_and_the_motion_itself_is_not_taken_for_it(rng: np.random.Generator) -> None:
     record = sine_test(TABLE_2[0.0], 2.0, 0.03)
-    noise = 5e-6 * np.random.default_rng(5).standard_normal(record.time.size)
+    noise = 5e-6 * rng.standard_normal(record.time.size)
     assert displacement_noise(record.displacement) < 1e-7
     assert displacement_noise(record.displacement + noise) == pytest.approx(5e-6, rel=0.1)
 
@@ -88,15 +87,14 @@ def test_a_model_that_misses_half_of_the_force_is_weak_throughout() -> None:
     assert "of the force's r.m.s." in row.status
 
 
-@pytest.mark.parametrize("seed", range(60, 66))
-def test_good_tests_are_ok(seed) -> None:
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("draw", range(6))
+def test_good_tests_are_ok(draw, rng: np.random.Generator) -> None:
     _, records = acceptance_test(rng)
     assert row_for(*(with_noise(r, rng) for r in records)).status == "ok"
 
 
-def test_linearly_dependent_slopes_are_invisible() -> None:
-    base = np.random.default_rng(6).standard_normal((100, 2))
+def test_linearly_dependent_slopes_are_invisible(rng: np.random.Generator) -> None:
+    base = rng.standard_normal((100, 2))
     slopes = np.column_stack([base, base @ [1.0, 2.0]])
     np.testing.assert_allclose(visible_shares(slopes, np.ones(3), 100.0), 0.0, atol=1e-7)
     assert np.all(visible_shares(base, np.ones(2), 100.0) > 0.5)

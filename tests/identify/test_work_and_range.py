@@ -59,15 +59,14 @@ def test_dynamic_range_compares_tests_at_the_same_speed_only() -> None:
     assert moving.voltage_V is None
 
 
-def test_noise_averages_out_over_the_cycles() -> None:
+def test_noise_averages_out_over_the_cycles(rng: np.random.Generator) -> None:
     clean = sine_test(TABLE_2[0.0], 2.0, 0.03, cycles=20)
-    noise = 50.0 * np.random.default_rng(1).standard_normal(clean.time.size)
+    noise = 50.0 * rng.standard_normal(clean.time.size)
     (row,), (truth,) = measures([replace(clean, force=clean.force + noise)]), measures([clean])
     assert row.work_per_cycle_J == pytest.approx(truth.work_per_cycle_J, rel=5e-3)
 
 
-def test_a_record_without_cycles_is_measured_as_a_whole() -> None:
-    rng = np.random.default_rng(2)
+def test_a_record_without_cycles_is_measured_as_a_whole(rng: np.random.Generator) -> None:
     time = np.arange(20000) / 1000.0
     speed = np.convolve(rng.standard_normal(20000), np.hanning(400) / 200.0, mode="same")
     displacement = np.cumsum(speed) * 1e-3 * 0.05

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from pzd.artefacts import Diagnosed, Diagnosis, Identified, PublishedRow, Rides, Rig, base_of
+from pzd.artefacts import Diagnosed, Diagnosis, Identified, ReferenceRow, Rides, Rig, base_of
 from pzd.config import RunConfig, load
 from pzd.identify.stage import identify
+from pzd.paper.published import published
 from pzd.quantities import Control
-from pzd.report.published import published_rows
+from pzd.report.reference import compared
 from pzd.report.ride_comfort import assess, settled
+from pzd.report.run_numbers import RunNumbers
 from pzd.rig.stage import synthesise
 from pzd.simulate.stage import simulate
 from pzd.table.stage import tabulate
@@ -41,7 +43,7 @@ def rides(config: RunConfig, rig: Rig, identified: Identified) -> Rides:
 
 
 @pytest.fixture(scope="package")
-def beside(config: RunConfig, identified: Identified, rides: Rides) -> dict[str, PublishedRow]:
+def beside(config: RunConfig, identified: Identified, rides: Rides) -> dict[str, ReferenceRow]:
     rows = {row.case: row for row in rides.summary}
     tones = {road.name: road.frequency_Hz for road in config.simulate.roads}
     comfort = tuple(
@@ -51,4 +53,5 @@ def beside(config: RunConfig, identified: Identified, rides: Rides) -> dict[str,
             settled(ride, rows[ride.case], config.simulate.settle_s, tones[rows[ride.case].road]), config.report
         )
     )
-    return {row.id: row for row in published_rows(config.simulate, identified, rides, comfort)}
+    found = compared(tuple(published().values()), RunNumbers(identified, rides, comfort, config.simulate, Control()))
+    return {row.id: row for row in found}

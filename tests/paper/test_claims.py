@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from pzd.paper.claims import claims
-from pzd.paper.printing import contested
+from pzd.paper.printing import claims_text
 
 GIVEN = {
     "227 N": "2270",
@@ -37,8 +37,8 @@ def test_a_claim_of_the_paper_is_set_beside_its_own_numbers(words: str, number: 
     assert len(found) == 1
 
 
-def test_every_claim_is_told() -> None:
-    text = contested()
+def test_every_claim_is_printed() -> None:
+    text = claims_text()
     assert all(claim.says in text and claim.gives in text for claim in claims())
     assert len(claims()) == len(GIVEN)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pzd.paper.contradiction import Attempt, attempts, excluded, misses
-from pzd.paper.printing import judged
+from pzd.paper.printing import verdict_on
 
 FORCES = {
     "F4-0": 2085,
@@ -76,7 +76,7 @@ def test_without_the_tables_no_effect_is_needed_at_all(tried: dict[tuple[str, st
 
 
 def test_the_verdict_is_ambiguous(tried: dict[tuple[str, str], Attempt]) -> None:
-    verdict = judged(list(tried.values()))
+    verdict = verdict_on(list(tried.values()))
     assert verdict.verdict == "ambiguous"
     assert "orifice_quadratic" not in verdict.closing["stiffness of the tables"]
     assert set(excluded()) == {"piezo_hysteresis", "valve_lag", "temperature_drift"}
@@ -85,5 +85,5 @@ def test_the_verdict_is_ambiguous(tried: dict[tuple[str, str], Attempt]) -> None
 def test_one_explanation_that_is_left_is_named() -> None:
     one = Attempt("tables", "lash", 1, 0.5, "F6-1", {"delta": 1e-3})
     other = Attempt("tables", "gas_spring", 1, 5.0, "F6-1", {"k_g": 1e3})
-    assert judged([one, other]).verdict == "named"
-    assert judged([other]).verdict == "unexplained"
+    assert verdict_on([one, other]).verdict == "named"
+    assert verdict_on([other]).verdict == "unexplained"

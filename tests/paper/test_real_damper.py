@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from pzd.artefacts import Identified, PublishedRow, Rig, base_of
+from pzd.artefacts import Identified, ReferenceRow, Rig, base_of
 from pzd.config import RunConfig
 from pzd.paper.fidelity import SettingRides, rides_on
 from pzd.paper.published import LARGE_GAP, SMALL_GAP
@@ -25,7 +25,7 @@ LEAST_DAMPING = {LARGE_GAP: 3497.0, SMALL_GAP: 16688.0}
 
 
 @pytest.fixture(scope="module")
-def outings(config: RunConfig, rig: Rig, identified: Identified) -> Mapping[str, SettingRides]:
+def rides_by_gap(config: RunConfig, rig: Rig, identified: Identified) -> Mapping[str, SettingRides]:
     real = config.simulate.model_copy(update={"policies": ("comfort",), "fidelities": ("table", "dynamic")})
     found = {}
     for gap in (LARGE_GAP, SMALL_GAP):
@@ -35,25 +35,25 @@ def outings(config: RunConfig, rig: Rig, identified: Identified) -> Mapping[str,
 
 
 @pytest.mark.parametrize(("gap", "fidelity"), PEAKS)
-def test_controlled_peaks_of_a_real_damper(outings: Mapping[str, SettingRides], gap: str, fidelity: str) -> None:
-    rows = [row for row in outings[gap].rides.summary if row.fidelity == fidelity]
+def test_controlled_peaks_of_a_real_damper(rides_by_gap: Mapping[str, SettingRides], gap: str, fidelity: str) -> None:
+    rows = [row for row in rides_by_gap[gap].rides.summary if row.fidelity == fidelity]
     assert [row.peak_abs_aK_m_per_s2 for row in rows] == pytest.approx(PEAKS[gap, fidelity], rel=0.01)
 
 
 @pytest.mark.parametrize("gap", LEAST_DAMPING)
-def test_no_voltage_is_as_soft_as_c_min(outings: Mapping[str, SettingRides], config: RunConfig, gap: str) -> None:
-    assert outings[gap].least_damping == pytest.approx(LEAST_DAMPING[gap], rel=0.01)
-    assert outings[gap].least_damping > 4.0 * config.simulate.c_min_Ns_per_m
+def test_no_voltage_is_as_soft_as_c_min(rides_by_gap: Mapping[str, SettingRides], config: RunConfig, gap: str) -> None:
+    assert rides_by_gap[gap].least_damping == pytest.approx(LEAST_DAMPING[gap], rel=0.01)
+    assert rides_by_gap[gap].least_damping > 4.0 * config.simulate.c_min_Ns_per_m
 
 
 def test_the_smaller_gap_is_harder_than_constant_c(
-    outings: Mapping[str, SettingRides], beside: dict[str, PublishedRow]
+    rides_by_gap: Mapping[str, SettingRides], beside: dict[str, ReferenceRow]
 ) -> None:
     constant = (beside["F19a-c"].computed, beside["F19b-c"].computed)
-    rows = [row for row in outings[SMALL_GAP].rides.summary if row.fidelity == "table"]
+    rows = [row for row in rides_by_gap[SMALL_GAP].rides.summary if row.fidelity == "table"]
     assert all(row.peak_abs_aK_m_per_s2 > peak for row, peak in zip(rows, constant, strict=True) if peak is not None)
 
 
-def test_by_the_table_the_exposure_time_grows_to_minutes_at_most(beside: dict[str, PublishedRow]) -> None:
+def test_by_the_table_the_exposure_time_grows_to_minutes_at_most(beside: dict[str, ReferenceRow]) -> None:
     assert "table 4." in beside["EXPa-ctrl"].note
     assert "table 0 min" in beside["EXPb-ctrl"].note

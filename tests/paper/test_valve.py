@@ -12,9 +12,10 @@ from pzd.config import load
 from pzd.damper.model import Damper
 from pzd.paper.calibration import calibrate
 from pzd.paper.loop import loop_in, loop_of
-from pzd.paper.published import LARGE_GAP, PEAK, SMALL_GAP, Published, published, rig_tests, span
+from pzd.paper.published import LARGE_GAP, PEAK, SMALL_GAP, published, rig_tests, span
 from pzd.paper.stand import written
 from pzd.paper.valve import FULL_STROKE, STIFFNESS, VALVE, Valve, flow_force, least_stiffness, stand_damper
+from pzd.report.reference import Expected
 
 LAMINAR = replace(VALVE, turbulent=0.0, compliance=0.0, zero_error=0.0)
 
@@ -53,7 +54,7 @@ def test_the_full_stroke_of_the_stack_would_raise_the_force_twelve_and_three_and
 
 
 @pytest.mark.parametrize("row", [row for row in rig_tests() if row.quantity == PEAK], ids=lambda row: row.id)
-def test_the_calibrated_peaks_are_the_published_ones(row: Published, valve: Valve) -> None:
+def test_the_calibrated_peaks_are_the_published_ones(row: Expected, valve: Valve) -> None:
     low, high = span(row)
     peak = loop_in(stand_damper(valve, row.setting or ""), row).peak
     assert low * (0.99 if low == high else 1.0) <= peak <= high * (1.01 if low == high else 1.0)
@@ -107,6 +108,7 @@ def test_the_config_runs_the_tests_of_every_published_force(root: Path) -> None:
         for planned in entry.plan()
     }
     wanted = {
-        (r.setting, r.voltage_V, r.temperature_C, f"sine-{r.frequency_Hz:g}Hz-{r.amplitude_m:g}m") for r in rig_tests()
+        (r.setting, r.voltage_V, r.temperature_degC, f"sine-{r.frequency_Hz:g}Hz-{r.amplitude_m:g}m")
+        for r in rig_tests()
     }
     assert wanted <= taken

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -63,11 +64,11 @@ class Run:
     control: Control = VOLTS
     setting: str | None = "gap 0.25 mm"
 
-    def told(self, config: ReportConfig | None = None, jobs: int = 1) -> Report:
+    def told(self, config: ReportConfig | None = None, jobs: int = 1, folder: Path = Path()) -> Report:
         """The report of this run."""
         simulate = SimulateConfig()
         parts = (self.rig, self.identified, self.diagnosed, self.table, self.rides)
-        return report(config or ReportConfig(), simulate, *parts, self.control, self.setting, jobs)
+        return report(config or ReportConfig(), simulate, *parts, self.control, self.setting, folder, jobs)
 
     def with_diagnosis(self, damper: Damper = PLAIN, **changes: object) -> Run:
         """The same run with another verdict."""
@@ -76,13 +77,13 @@ class Run:
 
 
 def record(name: str, frequency: float, amplitude: float, voltage: float | None) -> Record:
-    """A sine on the final damper, four cycles, with a little noise."""
+    """A sine on the final damper, four cycles, with a little of what no model knows."""
     time = np.arange(round(4.0 / frequency * 500.0) + 1) / 500.0
     w = 2.0 * np.pi * frequency
     x, v, a = (amplitude * f for f in (np.sin(w * time), w * np.cos(w * time), -(w**2) * np.sin(w * time)))
     volts, degrees = np.full(time.size, 0.0 if voltage is None else voltage), np.full(time.size, 22.0)
     force = respond(FINAL, Motion(time, x, v, a, volts, degrees))
-    force = force + np.random.default_rng(round(1e4 * frequency * amplitude)).normal(scale=15.0, size=time.size)
+    force = force + 21.0 * np.sin(2.0 * np.pi * 41.3 * time)
     return Record(name, "gap 0.25 mm", time, x, v, a, force, volts if voltage is not None else None, degrees)
 
 
@@ -189,6 +190,9 @@ def diagnosis() -> Diagnosis:
             amplitude_m=0.01,
             voltage_V=150.0,
             separates=("orifice_quadratic", "shear_thinning"),
+            middle_m=0.03135,
+            peak_speed_m_per_s=0.251327,
+            peak_force_N=1512.345,
         ),
     )
 

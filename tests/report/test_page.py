@@ -110,7 +110,8 @@ def test_the_headline_answers_five_questions(read: Reader) -> None:
     assert "1 540 N at 0 V to 2 480 N at 150 V" in head
     assert "Orifice quadratic" in head
     assert "97 %" in head
-    assert "Sine, 4 Hz, amplitude 10 mm, at 150 V" in head
+    assert "Sine, 4 Hz, amplitude 10 mm about 31.35 mm, at 150 V" in head
+    assert "It would reach 0.251 m/s and 1 510 N." in read.text
     assert "2.25 Hz sine: 30 min instead of 0 min; " in head
     # Both rides are over the boundary of comfort from the start: the next one tells them apart.
     assert "; 4.5 Hz sine: 1 h 26 min instead of 6 min (13 times) until fatigue" in head

@@ -131,7 +131,7 @@ def test_a_short_settling_time_is_said(made_ride: Callable[..., Any]) -> None:
 def test_the_report_writes_itself_and_reads_itself_back(told: Report, tmp_path: Path) -> None:
     told.write(tmp_path, Control())
     again = Report.read(tmp_path, Control())
-    assert (again.comfort, again.page, again.published) == (told.comfort, told.page, None)
+    assert (again.comfort, again.page, again.reference) == (told.comfort, told.page, None)
     header = (tmp_path / "comfort.csv").read_text(encoding="utf-8").splitlines()[0]
     assert header == "case,point,edition,measure,value,unit,status"
 

@@ -1,4 +1,4 @@
-"""Fresh seeds for the tests of the virtual stand."""
+"""Seeds for the tests of the virtual stand."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ import pytest
 
 
 @pytest.fixture(params=range(3))
-def seed(fresh_seeds: Callable[[int], list[int]]) -> int:
-    """Three seeds that nobody has chosen, one after the other."""
-    return fresh_seeds(1)[0]
+def seed(seeds: Callable[[int], list[int]]) -> int:
+    """Three seeds, one after the other."""
+    return seeds(1)[0]

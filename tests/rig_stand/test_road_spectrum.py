@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pzd.rig.stand.sensors import draw_for
 from pzd.rig.stand.waveforms import waveforms
 from pzd.signals.iso8608 import classes, height_density, profile
 
@@ -14,7 +16,7 @@ BAND = (0.02, 2.0)
 
 
 def heights(density: float, seed: int, length: float = 2000.0, spacing: float = 0.1) -> np.ndarray:
-    road = profile(density, length, np.random.default_rng(seed), BAND)
+    road = profile(density, length, draw_for(seed, "test"), BAND)
     return road(np.arange(round(length / spacing)) * spacing)[0]
 
 
@@ -62,14 +64,15 @@ def test_a_rougher_class_is_the_same_road_scaled_by_two() -> None:
     np.testing.assert_allclose(heights(classes()["D"], 7), 2.0 * heights(classes()["C"], 7), rtol=1e-9, atol=1e-15)
 
 
-def test_a_wider_band_leaves_the_lines_inside_as_they_were() -> None:
-    narrow = profile(classes()["C"], 100.0, np.random.default_rng(3), (0.05, 1.0))
-    wide = profile(classes()["C"], 100.0, np.random.default_rng(3), (0.02, 2.0))
+def test_a_wider_band_leaves_the_lines_inside_as_they_were(rng: np.random.Generator) -> None:
+    again = deepcopy(rng)
+    narrow = profile(classes()["C"], 100.0, rng, (0.05, 1.0))
+    wide = profile(classes()["C"], 100.0, again, (0.02, 2.0))
     np.testing.assert_array_equal(narrow.coefficients[5:], wide.coefficients[5 : narrow.coefficients.size])
 
 
-def test_slope_and_curvature_are_exact() -> None:
-    road = profile(classes()["C"], 50.0, np.random.default_rng(4), BAND)
+def test_slope_and_curvature_are_exact(rng: np.random.Generator) -> None:
+    road = profile(classes()["C"], 50.0, rng, BAND)
     place, step = np.linspace(0.0, 50.0, 333), 1e-4
     for order in (0, 1):
         slope = (road(place + step)[order] - road(place - step)[order]) / (2.0 * step)
@@ -77,9 +80,9 @@ def test_slope_and_curvature_are_exact() -> None:
         np.testing.assert_allclose(slope, exact, atol=1e-6 * np.abs(exact).max())
 
 
-def test_a_road_too_short_for_its_band_is_refused() -> None:
+def test_a_road_too_short_for_its_band_is_refused(rng: np.random.Generator) -> None:
     with pytest.raises(ValueError, match="no wavenumber between"):
-        profile(classes()["C"], 1.0, np.random.default_rng(1), (0.1, 0.5))
+        profile(classes()["C"], 1.0, rng, (0.1, 0.5))
 
 
 def test_a_damper_that_follows_the_height_meets_the_density_over_the_vehicle_speed(seed: int) -> None:
@@ -87,19 +90,20 @@ def test_a_damper_that_follows_the_height_meets_the_density_over_the_vehicle_spe
     waveform = waveforms()["road"](
         road_class="C", vehicle_speed_km_per_h=72.0, period_s=period, body_frequency_Hz=None, low_Hz=0.5, high_Hz=10.0
     )
-    x = waveform.course(np.random.default_rng(seed), Path())(np.arange(25_000) * period / 25_000)[0]
+    x = waveform.course(draw_for(seed, "test"), Path())(np.arange(25_000) * period / 25_000)[0]
     frequency, density = welch(x, period / 25_000, 500)
     inside = (frequency > 1.0) & (frequency < 9.0)
     exact = height_density(frequency[inside] / speed, classes()["C"]) / speed
     assert np.mean(density[inside] / exact) == pytest.approx(1.0, abs=0.08)
 
 
-def test_a_suspension_deflects_like_the_road_above_its_body_frequency_and_hardly_below() -> None:
+def test_a_suspension_deflects_like_the_road_above_its_body_frequency_and_hardly_below(
+    rng: np.random.Generator,
+) -> None:
+    again = deepcopy(rng)
     sizes = {"low_Hz": 0.1, "high_Hz": 20.0, "period_s": 20.0}
-    height = waveforms()["road"](body_frequency_Hz=None, **sizes).course(np.random.default_rng(2), Path())
-    deflection = waveforms()["road"](body_frequency_Hz=1.4, body_damping=0.3, **sizes).course(
-        np.random.default_rng(2), Path()
-    )
+    height = waveforms()["road"](body_frequency_Hz=None, **sizes).course(rng, Path())
+    deflection = waveforms()["road"](body_frequency_Hz=1.4, body_damping=0.3, **sizes).course(again, Path())
     frequency = np.arange(height.coefficients.size) / 20.0
     passed = np.abs(deflection.coefficients[2:] / height.coefficients[2:])
     assert passed[-1] == pytest.approx(1.0, abs=0.01)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pzd.rig.stand.sensors import draw_for
 from pzd.rig.stand.waveform import Course, Waveform, started
 from pzd.rig.stand.waveforms import waveforms
 from pzd.schema.errors import ConfigError, DataError
@@ -37,7 +38,7 @@ def made(kind: str, **changes: object) -> Waveform:
 
 
 def course(waveform: Waveform, seed: int = 1, folder: Path = Path()) -> Course:
-    return waveform.course(np.random.default_rng(seed), folder)
+    return waveform.course(draw_for(seed, "test"), folder)
 
 
 def one_cycle(waveform: Waveform, points: int = 2**14, seed: int = 1) -> tuple[np.ndarray, ...]:
@@ -72,7 +73,7 @@ def test_motion_repeats_with_all_its_derivatives_after_one_cycle(kind: str, seed
 
 
 def test_sums_on_an_even_grid_equal_the_sums_at_single_places(seed: int) -> None:
-    draw = np.random.default_rng(seed)
+    draw = draw_for(seed, "test")
     motion = FourierSum(2.5, draw.normal(size=40) + 1j * draw.normal(size=40))
     even = -0.7 + np.arange(5000) * 2.5 / 2000
     some = draw.permutation(5000)[:300]

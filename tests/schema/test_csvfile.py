@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -117,9 +116,8 @@ def test_the_control_goes_by_its_own_name(tmp_path: Path) -> None:
     assert "missing: current_A; unknown: voltage_V" in found
 
 
-def test_columns_read_back_with_every_bit(tmp_path: Path, fresh_seeds: Callable[[int], list[int]]) -> None:
-    for seed in fresh_seeds(3):
-        draw = np.random.default_rng(seed)
+def test_columns_read_back_with_every_bit(tmp_path: Path, rng: np.random.Generator) -> None:
+    for draw in rng.spawn(3):
         columns = {name: draw.standard_normal(500) * 10.0 ** draw.integers(-300, 300, 500) for name in HEADER}
         write_columns(tmp_path / "a.csv", columns, CURRENT)
         found = read_columns(tmp_path / "a.csv", HEADER, CURRENT, OPTIONAL)

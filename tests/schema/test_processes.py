@@ -2,23 +2,66 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from pzd.schema.errors import DataError
-from pzd.schema.processes import at_once
+from pzd.schema.processes import parallel_map
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 3, 50])
 @pytest.mark.parametrize("count", [0, 1, 2, 7])
 def test_results_stand_in_order_for_any_number_of_processes(jobs: int, count: int) -> None:
-    assert at_once(lambda number: number**2, range(count), jobs) == [number**2 for number in range(count)]
+    assert parallel_map(lambda number: number**2, range(count), jobs) == [number**2 for number in range(count)]
 
 
 def test_two_processes_work_at_the_same_time() -> None:
-    assert len(set(at_once(lambda _: os.getpid(), range(4), 2))) == 2
+    both = multiprocessing.get_context("fork").Barrier(2, timeout=60.0)  # opens when two have come
+
+    def meet(_: int) -> int:
+        both.wait()
+        return os.getpid()
+
+    assert len(set(parallel_map(meet, range(2), 2)) - {os.getpid()}) == 2
+
+
+def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
+    text = (
+        "import os, time\nfrom pathlib import Path\nfrom pzd.schema.processes import parallel_map\n"
+        "def work(n):\n    Path(f'{n}').write_text(str(os.getpid()))\n    time.sleep(60)\n"
+        "parallel_map(work, range(2), 2)"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen([sys.executable, "-c", text], cwd=tmp_path, env=environment) as parent:
+        until(lambda: all((tmp_path / name).is_file() and (tmp_path / name).read_text() for name in "01"))
+        workers = [int((tmp_path / name).read_text()) for name in "01"]
+        parent.kill()
+    until(lambda: not any(runs(worker) for worker in workers))
+
+
+def until(true: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 30.0  # a busy machine starts Python slowly
+    while not true():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def runs(process: int) -> bool:
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"  # one that has ended and whom nobody waits for
 
 
 @pytest.mark.parametrize("failing", [0, 1])
@@ -29,7 +72,7 @@ def test_what_fails_in_another_process_is_told_as_if_it_failed_here(failing: int
         return number
 
     with pytest.raises(DataError) as caught:
-        at_once(refuse, range(4), 2)
+        parallel_map(refuse, range(4), 2)
     assert caught.value.messages == (f"data/{failing}.csv:3: wrong", "and more")
 
 
@@ -41,4 +84,4 @@ def test_what_was_killed_there_is_made_here() -> None:
             os.kill(os.getpid(), signal.SIGKILL)
         return number
 
-    assert at_once(killed_elsewhere, range(5), 3) == list(range(5))
+    assert parallel_map(killed_elsewhere, range(5), 3) == list(range(5))

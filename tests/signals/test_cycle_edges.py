@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,8 +64,8 @@ def drawn(rng: np.random.Generator, shape: str) -> Test:
 
 
 @pytest.fixture(params=["sine", "sine from rest", "haversine"])
-def tests(request: pytest.FixtureRequest, fresh_seeds: Callable[[int], list[int]]) -> list[Test]:
-    return [drawn(np.random.default_rng(seed), request.param) for seed in fresh_seeds(12)]
+def tests(request: pytest.FixtureRequest, rng: np.random.Generator) -> list[Test]:
+    return [drawn(draw, request.param) for draw in rng.spawn(12)]
 
 
 def test_run_lies_in_the_steady_part(tests: list[Test]) -> None:
@@ -115,10 +114,9 @@ def noisy(force: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return force + 0.005 * np.abs(force).max() * rng.standard_normal(force.size)
 
 
-def test_cycle_in_which_the_oil_spring_is_wound_up_is_left_out(fresh_seeds: Callable[[int], list[int]]) -> None:
+def test_cycle_in_which_the_oil_spring_is_wound_up_is_left_out(rng: np.random.Generator) -> None:
     left_out = 0
-    for seed in fresh_seeds(12):
-        rng = np.random.default_rng(seed)
+    for _ in range(12):
         test = drawn(rng, "sine from rest")
         force = force_of(test.clean, test.time[1] - test.time[0])
         run = cycles(test.time, test.displacement)
@@ -134,9 +132,8 @@ def test_cycle_in_which_the_oil_spring_is_wound_up_is_left_out(fresh_seeds: Call
     assert left_out > 0
 
 
-def test_force_that_repeats_from_the_first_cycle_on_loses_none(fresh_seeds: Callable[[int], list[int]]) -> None:
-    for seed in fresh_seeds(12):
-        rng = np.random.default_rng(seed)
+def test_force_that_repeats_from_the_first_cycle_on_loses_none(rng: np.random.Generator) -> None:
+    for _ in range(12):
         test = drawn(rng, "sine")
         force = noisy(force_of(test.continued, test.time[1] - test.time[0]), rng)
         cut = (test.time >= test.begin + test.period) & (test.time < test.end)

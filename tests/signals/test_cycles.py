@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from scipy.signal import sawtooth
@@ -11,11 +9,6 @@ from scipy.signal import sawtooth
 from pzd.signals.cycles import cycles
 
 TIME = np.arange(10_000) * 1e-3
-
-
-@pytest.fixture
-def rng(fresh_seeds: Callable[[int], list[int]]) -> np.random.Generator:
-    return np.random.default_rng(fresh_seeds(1)[0])
 
 
 def smooth_random(rng: np.random.Generator, count: int, step: float = 1e-3) -> np.ndarray:

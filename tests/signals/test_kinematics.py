@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -15,11 +13,6 @@ Array = NDArray[np.float64]
 
 TIME = np.arange(10_000) * 1e-3
 OMEGA = 2.0 * np.pi * 2.037
-
-
-@pytest.fixture
-def rng(fresh_seeds: Callable[[int], list[int]]) -> np.random.Generator:
-    return np.random.default_rng(fresh_seeds(1)[0])
 
 
 def relative(got: Array, truth: Array) -> float:
@@ -57,16 +50,25 @@ def test_noise_of_a_triangle_is_averaged_away(
     assert relative(np.gradient(np.gradient(shown, TIME), TIME), a) > 5.0 * acceleration
 
 
-def test_drift_and_rest_are_followed(rng: np.random.Generator) -> None:
+def test_drift_is_followed(rng: np.random.Generator) -> None:
     x, v, _ = series(np.array([1.0]), np.array([0.01]))
     drift, rate = -5e-4 * TIME + 1e-3 * np.sin(0.4 * TIME), -5e-4 + 4e-4 * np.cos(0.4 * TIME)
-    shown = x + drift + 5e-6 * rng.standard_normal(x.size)
-    clean = kinematics(TIME, shown, cycles(TIME, shown))
-    assert relative(clean.velocity, v + rate) < 2e-3
+    errors = []
+    for _ in range(5):
+        shown = x + drift + 5e-6 * rng.standard_normal(x.size)
+        errors.append(relative(kinematics(TIME, shown, cycles(TIME, shown)).velocity, v + rate))
+    # Of 150 draws 98 in 100 lie between 0.0011 and 0.0017; in the others a harmonic is kept by chance, up to 0.0040.
+    assert np.median(errors) < 2e-3
+    assert max(errors) < 1e-2
+
+
+def test_rest_is_followed(rng: np.random.Generator) -> None:
+    x, v, _ = series(np.array([1.0]), np.array([0.01]))
     envelope = np.interp(TIME, [2.0, 3.0, 8.0, 9.0], [0.0, 1.0, 1.0, 0.0])
     shown = envelope * x + 5e-6 * rng.standard_normal(x.size)
     clean = kinematics(TIME, shown, cycles(TIME, shown))
-    assert relative(clean.velocity, np.gradient(envelope * x, TIME)) < 0.02
+    # Of 150 draws the largest are 0.005 of the speed while it moves, and 0.013 of its peak while it rests.
+    assert relative(clean.velocity, np.gradient(envelope * x, TIME)) < 0.01
     assert np.abs(clean.velocity[:1800]).max() < 0.02 * v.max()
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,6 +13,7 @@ from simulate_dampers import damper_after_table_2, table_of
 
 from pzd.artefacts import Table
 from pzd.damper.model import Damper
+from pzd.paper.published import published
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.dampers import dynamic_damper_of, grid_of
 from pzd.simulate.outcome import Outcome
@@ -62,7 +62,6 @@ def ride(damper: Damper, table: Table) -> Rider:
 
 
 @pytest.fixture(scope="session")
-def published(shared: Path) -> dict[str, float]:
-    """Published numbers by id."""
-    with (shared / "paper" / "published.csv").open(encoding="utf-8", newline="") as file:
-        return {row["id"]: float(row["value"]) for row in csv.DictReader(file) if row["kind"] != "claim"}
+def printed() -> dict[str, float]:
+    """The numbers that the paper prints, by id."""
+    return {row.id: row.number for row in published().values() if row.kind != "claim"}

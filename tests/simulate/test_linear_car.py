@@ -63,20 +63,20 @@ def test_the_generic_integrator_is_of_fifth_order(ride) -> None:
     assert np.all(orders < 6.5)
 
 
-def test_the_constant_peaks_of_figure_19_are_met_within_5_percent(ride, published) -> None:
+def test_the_constant_peaks_of_figure_19_are_met_within_5_percent(ride, printed) -> None:
     for road, name in enumerate(("F19a-c", "F19b-c")):
         peak = np.max(np.abs(ride("constant", road=road).history[4000:, 3]))
-        assert peak == pytest.approx(published[name], rel=0.05)
+        assert peak == pytest.approx(printed[name], rel=0.05)
 
 
-def test_the_default_ride_is_that_of_the_paper(published) -> None:
+def test_the_default_ride_is_that_of_the_paper(printed) -> None:
     config, car = SimulateConfig(), SimulateConfig().car.car()
-    assert car.mass == published["IN-m"]
-    assert car.stiffnesses == (published["IN-k1"], published["IN-k2"])
-    assert config.constant_damping_Ns_per_m == published["IN-c"]
-    assert (config.c_min_Ns_per_m, config.c_max_Ns_per_m) == (published["IN-cmin"], published["IN-cmax"])
-    assert config.vehicle_speed_km_per_h == published["IN-V"]
-    assert {road.amplitude_m for road in config.roads} == {published["IN-A"]}
+    assert car.mass == printed["IN-m"]
+    assert car.stiffnesses == (printed["IN-k1"], printed["IN-k2"])
+    assert config.constant_damping_Ns_per_m == printed["IN-c"]
+    assert (config.c_min_Ns_per_m, config.c_max_Ns_per_m) == (printed["IN-cmin"], printed["IN-cmax"])
+    assert config.vehicle_speed_km_per_h == printed["IN-V"]
+    assert {road.amplitude_m for road in config.roads} == {printed["IN-A"]}
 
 
 def test_a_car_that_is_the_same_fore_and_aft_pitches_and_heaves_apart() -> None:

@@ -19,9 +19,8 @@ def least_acceleration(a0: float, D: Array, low: Array, high: Array, tie_break: 
     return forces
 
 
-def draws(seed: int, n: int) -> Iterator[tuple[float, Array, Array, Array]]:
+def draws(random: np.random.Generator, n: int) -> Iterator[tuple[float, Array, Array, Array]]:
     """Boxes as suspensions give them (both forces of one sign per axle) and boxes of any kind."""
-    random = np.random.default_rng(seed)
     for i in range(n):
         D = random.normal(size=2) / 600.0
         v = random.normal(size=2) * 0.3
@@ -30,8 +29,8 @@ def draws(seed: int, n: int) -> Iterator[tuple[float, Array, Array, Array]]:
 
 
 @pytest.mark.parametrize("tie_break", TIE_BREAKS)
-def test_no_force_in_the_box_makes_less_acceleration(fresh_seeds, tie_break) -> None:
-    for a0, D, low, high in draws(fresh_seeds(1)[0], 600):
+def test_no_force_in_the_box_makes_less_acceleration(rng: np.random.Generator, tie_break) -> None:
+    for a0, D, low, high in draws(rng, 600):
         forces = least_acceleration(a0, D, low, high, tie_break)
         assert np.all(forces >= low - 1e-9)
         assert np.all(forces <= high + 1e-9)
@@ -40,9 +39,9 @@ def test_no_force_in_the_box_makes_less_acceleration(fresh_seeds, tie_break) -> 
         assert abs(a0 + D @ forces) <= brute + 1e-12
 
 
-def test_tie_breaks_differ_in_the_forces_and_not_in_the_acceleration(fresh_seeds) -> None:
+def test_tie_breaks_differ_in_the_forces_and_not_in_the_acceleration(rng: np.random.Generator) -> None:
     apart = 0
-    for a0, D, low, high in draws(fresh_seeds(1)[0], 600):
+    for a0, D, low, high in draws(rng, 600):
         found = {name: least_acceleration(a0, D, low, high, name) for name in TIE_BREAKS}
         accelerations = [abs(a0 + D @ forces) for forces in found.values()]
         assert np.ptp(accelerations) < 1e-12
@@ -53,8 +52,9 @@ def test_tie_breaks_differ_in_the_forces_and_not_in_the_acceleration(fresh_seeds
     assert apart > 20
 
 
-def test_smallest_and_largest_are_so_among_all_that_reach_the_minimum(fresh_seeds) -> None:
-    for a0, D, low, high in draws(fresh_seeds(1)[0], 300):
+def test_smallest_and_largest_are_so_among_all_that_reach_the_minimum(rng: np.random.Generator) -> None:
+    compared = 0
+    for a0, D, low, high in draws(rng, 300):
         smallest, largest = (least_acceleration(a0, D, low, high, name) for name in ("smallest", "largest"))
         if abs(a0 + D @ smallest) > 1e-12:
             continue
@@ -65,10 +65,12 @@ def test_smallest_and_largest_are_so_among_all_that_reach_the_minimum(fresh_seed
         if norms.size:
             assert np.linalg.norm(smallest) <= norms.min() + 1e-6
             assert np.linalg.norm(largest) >= norms.max() - 1e-6
+            compared += 1
+    assert compared > 30
 
 
-def test_equal_share_is_the_same_share_of_both_ranges(fresh_seeds) -> None:
-    for a0, D, low, high in draws(fresh_seeds(1)[0], 300):
+def test_equal_share_is_the_same_share_of_both_ranges(rng: np.random.Generator) -> None:
+    for a0, D, low, high in draws(rng, 300):
         forces = least_acceleration(a0, D, low, high, "equal_share")
         start, end = np.where(D >= 0.0, low, high), np.where(D >= 0.0, high, low)
         shares = (forces - start) / (end - start)
@@ -76,17 +78,16 @@ def test_equal_share_is_the_same_share_of_both_ranges(fresh_seeds) -> None:
 
 
 @pytest.mark.parametrize("tie_break", ["smallest", "equal_share"])
-def test_the_law_is_continuous_in_speed_and_spring_force(fresh_seeds, tie_break) -> None:
-    random = np.random.default_rng(fresh_seeds(1)[0])
+def test_the_law_is_continuous_in_speed_and_spring_force(rng: np.random.Generator, tie_break) -> None:
     for _ in range(300):
-        D = random.normal(size=2) / 600.0
+        D = rng.normal(size=2) / 600.0
 
         def control_spec(v: Array, a0: float, D: Array = D) -> Array:
             ends = np.stack([750.0 * v, 45000.0 * v])
             return least_acceleration(a0, D, ends.min(axis=0), ends.max(axis=0), tie_break)
 
-        v, a0 = random.normal(size=2) * 0.2, random.normal()
-        step = 1e-7 * random.normal(size=3)
+        v, a0 = rng.normal(size=2) * 0.2, rng.normal()
+        step = 1e-7 * rng.normal(size=3)
         jump = control_spec(v + step[:2], a0 + step[2]) - control_spec(v, a0)
         assert np.max(np.abs(jump)) < 1.0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -36,11 +37,11 @@ def test_every_file_in_the_folder_is_a_road() -> None:
 
 
 @pytest.mark.parametrize("kind", SAMPLES)
-def test_slope_and_curvature_are_the_derivatives_of_the_height(kind, fresh_seeds) -> None:
+def test_slope_and_curvature_are_the_derivatives_of_the_height(kind, rng: np.random.Generator) -> None:
     profile = read({"kind": kind, **SAMPLES[kind]}).roads[0].profile(WAY)
     numbers = road_coefficients(profile, 2.9)
     h = 1e-5
-    for s in np.random.default_rng(fresh_seeds(1)[0]).uniform(0.5, 30.0, 50):
+    for s in rng.uniform(0.5, 30.0, 50):
         (low, *_), (height, slope, curvature), (high, *_) = (road_at(numbers, s + d) for d in (-h, 0.0, h))
         scale = max(abs(slope), 1e-3)
         assert slope == pytest.approx((high - low) / (2.0 * h), abs=1e-5 * scale + 1e-9)
@@ -60,11 +61,11 @@ def test_a_bump_and_a_step_reach_their_heights() -> None:
     assert step.height(np.array([0.0, 9.9, 10.5, 11.1, 50.0])) == pytest.approx([0.0, 0.0, 0.015, 0.03, 0.03], abs=1e-6)
 
 
-def test_a_road_of_a_class_has_its_spectrum_and_follows_the_seed(fresh_seeds) -> None:
+def test_a_road_of_a_class_has_its_spectrum_and_follows_the_seed(seeds: Callable[[int], list[int]]) -> None:
     road = read({"kind": "iso8608", "road_class": "B"}).roads[0]
     place = np.arange(0.0, 4000.0, 0.05)
     powers = []
-    for seed in fresh_seeds(4):
+    for seed in seeds(4):
         height = road.profile(Way(25.0, 4000.0, seed, Path())).height(place)[:-1]
         spectrum = 2.0 * np.abs(np.fft.rfft(height)) ** 2 * 0.05 / len(height)
         n = np.fft.rfftfreq(len(height), 0.05)

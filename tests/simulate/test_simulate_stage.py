@@ -46,7 +46,7 @@ def test_a_case_is_road_policy_fidelity(damper) -> None:
     ]
     assert [r.case for r in rides.rides] == [row.case for row in rides.summary]
     assert all(abs(row.energy_error) < 1e-6 for row in rides.summary)
-    assert rides.untrusted == ()
+    assert rides.untrusted(Control()) == ()
 
 
 def test_the_same_ride_on_the_damper_before_diagnose_stands_beside(damper) -> None:

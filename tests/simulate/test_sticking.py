@@ -11,16 +11,15 @@ from pzd.simulate.sticking import accelerate
 
 
 @pytest.mark.parametrize("sides", [(1.0, -1.0), (0.0, 1.0), (-1.0, 0.0), (0.0, 0.0)])
-def test_the_suspensions_accelerate_as_body_and_road_do(fresh_seeds, sides) -> None:
+def test_the_suspensions_accelerate_as_body_and_road_do(rng: np.random.Generator, sides) -> None:
     """dV/dt = H^T d2X/dt2 - d2xi/dt2 with all forces, and nought where an axle sticks."""
     car = cars()["makowski2021"]
-    random = np.random.default_rng(fresh_seeds(1)[0])
     for _ in range(20):
         acts, scratch = control(0.0), workspace()
         acts[SIDE] = sides
-        scratch[SPRINGS], scratch[FORCE] = random.normal(size=(2, 2)) * 1000.0
-        scratch[LIFT] = random.normal(size=2) * 5.0
-        scratch[INERTANCE] = random.uniform(0.0, 50.0, 2)
+        scratch[SPRINGS], scratch[FORCE] = rng.normal(size=(2, 2)) * 1000.0
+        scratch[LIFT] = rng.normal(size=2) * 5.0
+        scratch[INERTANCE] = rng.uniform(0.0, 50.0, 2)
         before = scratch[FORCE].copy()
         accelerate(vehicle(car, 25.0), acts, scratch)
         body = car.acceleration(scratch[SPRINGS] + scratch[FORCE])

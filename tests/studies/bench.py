@@ -27,7 +27,7 @@ def seconds(*arguments: object, folder: Path) -> float:
 
 def waits(folder: Path) -> Iterator[tuple[str, float, float]]:
     """What is waited for, how long it takes and how long it may take [s]."""
-    yield "pzd --help, best of 5", min(seconds("--help", folder=folder) for _ in range(5)), 0.3
+    yield "pzd --help, best of 5", min(seconds("--help", folder=folder) for _ in range(5)), 0.2
     yield "pzd run, nothing compiled yet", seconds("run", CONFIG, folder=folder), 30.0
     yield "pzd run again, all fresh", seconds("run", CONFIG, folder=folder), 2.0
     yield "pzd run, all anew, kernels compiled", seconds("run", CONFIG, "--runs", "anew", folder=folder), 10.0

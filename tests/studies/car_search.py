@@ -14,7 +14,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from pzd.paper.car_search import CarRow, candidates, constant_peaks, controlled_peaks, judged, miss, refined
+from pzd.paper.car_search import CarRow, candidates, constant_peaks, controlled_peaks, miss, refined, row_of
 from pzd.quantities import Control
 from pzd.schema.csvfile import write_rows
 from pzd.simulate.minimise import TIE_BREAKS
@@ -29,14 +29,14 @@ def survey() -> Iterator[CarRow]:
     for tie_break in TIE_BREAKS:
         misses = []
         for car in cars:
-            row = judged(car, tie_break)
+            row = row_of(car, tie_break)
             misses.append((row.miss, car))
             yield row
         nearest = [car for _, car in sorted(misses, key=lambda item: item[0])[:STARTS]]
         better = {refined(car, tie_break): None for car in nearest}
         best = sorted(better, key=lambda car: miss(constant_peaks(car), controlled_peaks(car, tie_break)))
         for car in best[: STARTS // 2]:
-            row = judged(car, tie_break, "refined")
+            row = row_of(car, tie_break, "refined")
             sys.stdout.write(f"{row.miss:.2%} {row}\n")
             sys.stdout.flush()
             yield row

@@ -42,9 +42,8 @@ def bingham(T: float | None, U: float, v: float) -> float:
     return float(np.copysign(300.0 + 5.0 * U, v) + (3000.0 + 2.0 * U) * v)
 
 
-def test_bilinear_reading_is_exact_for_a_bingham_law() -> None:
+def test_bilinear_reading_is_exact_for_a_bingham_law(rng: np.random.Generator) -> None:
     lookup = Lookup.of(table_of(bingham))
-    rng = np.random.default_rng()
     U, v = rng.uniform(0, 150, 200), rng.uniform(-0.4, 0.4, 200)
     wanted = [bingham(None, a, b) for a, b in zip(U, v, strict=True)]
     np.testing.assert_allclose(lookup.force(U, v), wanted, rtol=1e-12)

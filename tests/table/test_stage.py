@@ -1,16 +1,14 @@
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import pzd
 from pzd.artefacts import Diagnosed, Rig, Table
 from pzd.damper.model import BaseRow, Damper
+from pzd.paper.published import published
 from pzd.quantities import Control
 from pzd.record import Record
 from pzd.table.config import TableConfig
@@ -134,10 +132,9 @@ def test_each_voltage_is_inside_as_far_as_it_was_driven() -> None:
     np.testing.assert_array_equal(lookup.inside([0.0, 50.0, 100.0, 150.0], speed), [True, True, False, False])
 
 
-def test_a_curved_law_is_followed_within_the_tolerance() -> None:
+def test_a_curved_law_is_followed_within_the_tolerance(rng: np.random.Generator) -> None:
     damper = damper_of([2], orifice_quadratic={"q": 4000.0}, stribeck_friction={"F_s": 150.0, "v_s": 0.004})
     lookup = Lookup.of(table_of(damper))
-    rng = np.random.default_rng()
     v = np.concatenate([rng.uniform(0.0, 1.0, 300), rng.uniform(0.0, 0.02, 300)])
     exact = 301.0 + 2720.0 * v + 4000.0 * v**2 + 150.0 * np.exp(-((v / 0.004) ** 2))
     assert np.max(np.abs(lookup.force(0.0, v) - exact)) < 2e-3 * 8000.0
@@ -180,11 +177,8 @@ def test_the_table_is_read_back_as_it_was_written(tmp_path: Any) -> None:
 
 
 def test_published_rows_are_those_tested_here() -> None:
-    path = Path(pzd.__file__).parent / "paper" / "published.csv"
-    if not path.is_file():
-        pytest.skip("pzd/paper/published.csv is absent")
-    with path.open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["quantity"] in {"T0", "C", "k"}]
+    rows = [row for row in published().values() if row.quantity in {"T0", "C", "k"}]
+    assert len(rows) == 3 * sum(len(table) for table in TABLES.values())
     for row in rows:
-        printed = TABLES[int(row["figure_or_table"][-1])][float(row["voltage_V"])]
-        assert float(row["value"]) == printed[("T0", "C", "k").index(row["quantity"])]
+        printed = TABLES[int(row.figure_or_table[-1])][row.voltage_V]
+        assert row.number == printed[("T0", "C", "k").index(row.quantity)]

@@ -22,6 +22,7 @@ EFFECT = Effect(
             Search(lambda s: s.force / s.stroke**3, (0.0,)),
         ),
     ),
+    about_zero=True,
     source="Duffing 1918, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz",
     tests=(({"x": -0.02, "v": 0.0, "a": 0.0, "k_3": 1.0e6}, -8.0),),
 )

@@ -1,6 +1,7 @@
 """Rubber or hydraulic stops near the ends of the stroke.
 
-Law: k_e (|x| - x_e)^2 sign(x) beyond x_e. Range: the last 10-30 % of the stroke.
+Law: k_e (|x| - x_e)^2 sign(x) beyond x_e, x counted from the middle between both stops.
+Range: the last 10-30 % of the stroke.
 """
 
 from __future__ import annotations
@@ -24,9 +25,16 @@ EFFECT = Effect(
             Search(lambda s: s.force / s.stroke**2, (0.5,)),
         ),
         Parameter(
-            "x_e", "m", 0.02, 0.0, 1.0, "displacement at which it begins", Search(lambda s: s.stroke, (0.35, 0.7, 0.9))
+            "x_e",
+            "m",
+            0.02,
+            0.0,
+            1.0,
+            "displacement at which it begins",
+            Search(lambda s: s.stroke, (0.35, 0.7, 0.9), within=(0.3, 0.99)),
         ),
     ),
+    about_zero=True,
     source="quadratic bump stop; Dixon 2007, The Shock Absorber Handbook",
     tests=(
         ({"x": 0.03, "v": 0.0, "a": 0.0, "k_e": 1.0e6, "x_e": 0.02}, 100.0),

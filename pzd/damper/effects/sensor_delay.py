@@ -1,6 +1,7 @@
-"""The force channel comes late: a filter or another converter than that of the displacement.
+"""Force and displacement were recorded at different instants: a filter or another converter in one of them.
 
-Law: F recorded at t - tau; negative where the displacement is the late one. Range: 0.1-5 ms.
+Law: F recorded at t - tau; the force is late where tau is positive, the displacement where it is negative.
+Range: 0.1-5 ms.
 """
 
 from __future__ import annotations

@@ -72,6 +72,29 @@ class Prepared:
         return 0 if self.lead is None else self.lead.time.size - self.record.time.size
 
 
+def mid_stroke(prepared: Sequence[Prepared]) -> float:
+    """Middle between the ends of what all the records reached [m]."""
+    ends = [end(p.record.displacement) for p in prepared for end in (np.min, np.max)]
+    return 0.5 * float(min(ends) + max(ends))
+
+
+def about(prepared: Sequence[Prepared], zero: float) -> tuple[Prepared, ...]:
+    """The same with the displacement counted from another zero [m]."""
+
+    def moved(record: Record) -> Record:
+        return replace(record, displacement=record.displacement - zero)
+
+    return tuple(
+        replace(
+            p,
+            record=moved(p.record),
+            lead=None if p.lead is None else moved(p.lead),
+            draws=tuple(moved(draw) for draw in p.draws),
+        )
+        for p in prepared
+    )
+
+
 def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
     """Every record of one rig, its displacement cleaned."""
     scale = voltage_scale(records)

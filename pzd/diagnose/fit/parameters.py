@@ -11,7 +11,7 @@ import numpy as np
 
 from pzd.damper.competing_forms import known
 from pzd.damper.compose import constant_rows, with_parallel
-from pzd.damper.effect import Parameter, Scales
+from pzd.damper.effect import Parameter, Scales, Search
 from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.fit.likelihood import RecordLikelihood, response
@@ -21,6 +21,16 @@ SOFTEST = 0.1
 """Least C that a search starts from [largest force over largest speed]: identify may leave it undetermined."""
 BOUND = 1e4
 """No scaled parameter is looked for beyond this, nor one with ratio steps below its inverse."""
+ZERO = Parameter(
+    "zero_m",
+    "m",
+    0.0,
+    -1.0,
+    1.0,
+    "zero of the displacement, from the middle of the stroke",
+    Search(lambda s: s.stroke, (0.0,), within=(-0.3, 0.3)),
+)
+"""Looked for once, beside the first effect that depends on it. It lies near the middle of what was recorded."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +49,8 @@ class Unknown:
         low, high = (limit / self.scale for limit in (self.parameter.low, self.parameter.high))
         if self.parameter.search.logarithmic:
             return float(np.log(max(low, 1.0 / BOUND))), float(np.log(min(high, BOUND)))
-        return max(low, -BOUND), min(high, BOUND)
+        least, most = self.parameter.search.within
+        return max(low, least, -BOUND), min(high, most, BOUND)
 
     def value(self, searched: float) -> float:
         """The parameter in its own unit."""
@@ -58,6 +69,8 @@ class Unknown:
 
     def of(self, damper: Damper) -> float:
         """The value [own unit] that a damper has."""
+        if self.parameter is ZERO:
+            return damper.zero_m
         value = damper.effects[self.effect][self.parameter.name]
         return value if isinstance(value, float) else value[self.node or 0]
 
@@ -102,13 +115,17 @@ class Problem:
         return replace(self, observations=moved, base=tuple(_mean_row(rows) for rows in groups))
 
     def unknowns(self, effects: Sequence[str]) -> tuple[Unknown, ...]:
-        """The parameters of some effects, in the order of the search."""
-        return tuple(
-            Unknown(name, parameter, parameter.search.scale(self.scales) or 1.0, node)
-            for name in effects
-            for node in (range(len(self.voltages)) if name in self.varying else (None,))
-            for parameter in known()[name].parameters
-        )
+        """The parameters of some effects, in the order of the search, and the zero behind the first that needs it."""
+        found: list[Unknown] = []
+        for name in effects:
+            nodes = range(len(self.voltages)) if name in self.varying else (None,)
+            found += [self._unknown(name, parameter, node) for node in nodes for parameter in known()[name].parameters]
+            if known()[name].about_zero and all(u.parameter is not ZERO for u in found):
+                found.append(self._unknown(name, ZERO, None))
+        return tuple(found)
+
+    def _unknown(self, effect: str, parameter: Parameter, node: int | None) -> Unknown:
+        return Unknown(effect, parameter, parameter.search.scale(self.scales) or 1.0, node)
 
     def start(self) -> Array:
         """(3 b,) the base rows in the units of the search."""
@@ -129,10 +146,14 @@ class Problem:
         base = searched[:split].reshape(-1, 3)
         values = np.column_stack([np.maximum(base[:, 0], 0.0) * self.scales.force, np.exp(base[:, 1:])])
         effects: dict[str, dict[str, float | tuple[float, ...]]] = {}
+        zero = 0.0
         for unknown, x in zip(unknowns, searched[split:], strict=True):
+            if unknown.parameter is ZERO:
+                zero = unknown.value(float(x))
+                continue
             given, name, value = effects.setdefault(unknown.effect, {}), unknown.parameter.name, unknown.value(float(x))
             given[name] = value if unknown.node is None else (*cast("tuple[float, ...]", given.get(name, ())), value)
-        return Point(values, effects, self)
+        return Point(values, effects, self, zero)
 
 
 def _mean_row(rows: Sequence[BaseRow]) -> BaseRow:
@@ -155,6 +176,8 @@ class Point:
     effects: Mapping[str, Mapping[str, float | tuple[float, ...]]]
     """Lists are by voltage."""
     problem: Problem
+    zero: float = 0.0
+    """Of the displacement [m]."""
 
     def damper(self) -> Damper:
         """The same as a damper."""
@@ -172,6 +195,7 @@ class Point:
             base=rows,
             effects={name: {**values, **self._nodes(name)} for name, values in self.effects.items()},
             reference_temperature_degC=self.problem.reference,
+            zero_m=self.zero,
         )
 
     def _nodes(self, effect: str) -> dict[str, tuple[float, ...]]:
@@ -193,7 +217,7 @@ def simulated(point: Point, observation: RecordLikelihood) -> Array:
         friction, damping, stiffness = point.base[o.place]
         effects = point.at(o.place)
         rows, parallel = constant_rows(friction, damping, stiffness, effects)
-        force = with_parallel(o.element(rows.tobytes()), parallel, o.motion)
+        force = with_parallel(o.element(rows.tobytes()), parallel, o.motion.about(point.zero))
         tau = effects.get("sensor_delay", {}).get("tau", 0.0)
         return o.at_compared(o.delayed(force, tau))
     damper = point.damper()

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from pzd.damper.model import Damper
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.intervals import LEVEL, standard_errors
 from pzd.diagnose.fit.least_squares import Fitted, fit, misfit_of
-from pzd.diagnose.fit.parameters import Problem
+from pzd.diagnose.fit.parameters import ZERO, Problem
 from pzd.diagnose.gap import gap_in_force, visible_gap
 from pzd.diagnose.search.candidates import Candidate
 from pzd.diagnose.search.evidence import Evidence
@@ -18,6 +21,10 @@ ALIKE = 0.1
 """Values within this ratio of one another agree, whatever their intervals."""
 TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, ("valve_lag", "tau"): 1e-3}
 """A common offset [share of the lowest peak], delay or lag [s] that counts as nothing missing."""
+MIDDLE = 0.4
+"""Share of the stroke in which nothing is an end stop: stops act over its last 10 to 30 %, a soft one over the half."""
+ONE_SIDED = 0.1
+"""Share of its force at the other end from which a stop shows at both ends of the stroke."""
 LEAST_CUT = 0.2
 """An effect closes at least this share of the gap (mean square): what is real is not one of many small corrections.
 
@@ -34,6 +41,17 @@ def unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate
         return f"moves the force by less than {100 * config.visible:g} % of peak"
     if trivial(candidate.fitted, candidate.effect, evidence.whole.scales.low_force):
         return "so small that it counts as an offset or a delay of the tests"
+    return no_stop(candidate.fitted.damper, evidence.whole.scales.stroke) if candidate.effect == "end_stop" else None
+
+
+def no_stop(damper: Damper, stroke: float) -> str | None:
+    """Why an end stop is none by where it begins, None where that is near both ends of the stroke (half of it [m])."""
+    begins = np.atleast_1d(damper.effects["end_stop"]["x_e"])
+    further, nearer = (stroke - float(np.max(begins)) + side * abs(damper.zero_m) for side in (1.0, -1.0))
+    if nearer <= 0.0 or nearer**2 < ONE_SIDED * further**2:
+        return "stand-in: acts at one end of the stroke alone"
+    if float(np.min(begins)) - abs(damper.zero_m) < MIDDLE * stroke:
+        return "stand-in: begins in the middle of the stroke, where no end stop does"
     return None
 
 
@@ -41,7 +59,7 @@ def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candi
     """Why a candidate is a stand-in by the gap that it leaves open, None where it closes enough or noise hides it."""
     if not evidence.something_missing(before, config):
         return None
-    judged = [evidence.campaign.judged(fitted.damper) for fitted in (before, candidate.fitted)]
+    judged = [evidence.campaign.checks(fitted.damper) for fitted in (before, candidate.fitted)]
     gaps = [[size(each) for each in judged] for size in (visible_gap, gap_in_force)]
     closed = [left**2 <= (1.0 - LEAST_CUT) * open_before**2 for open_before, left in gaps]
     if any(closed) and all(left <= open_before for open_before, left in gaps):
@@ -100,7 +118,7 @@ def _agree(halves: tuple[Problem, Problem], fits: tuple[Fitted, Fitted], effects
     """
     from scipy.special import chdtri
 
-    values = [[u.of(f.damper) for u in f.unknowns if u.effect in effects] for f in fits]
+    values = [[u.of(f.damper) for u in f.unknowns if u.effect in effects and u.parameter is not ZERO] for f in fits]
     if all(abs(a - b) <= ALIKE * max(abs(a), abs(b)) for a, b in zip(*values, strict=True)):
         return True
     limit = 2.0 * float(chdtri(len(fits[0].unknowns), AGREES))

@@ -103,7 +103,7 @@ def candidates(
     ]
 
     def one(effect: Effect) -> Candidate:
-        unlikely = silent and _hopeless(problem, before, effect)
+        unlikely = silent and _without_promise(problem, before, effect)
         return (_barely if unlikely else candidate)(problem, before, effect)
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
@@ -128,7 +128,7 @@ def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     """
     problem, reached = _for(problem, effect), []
     starts = promising_starts(problem, before, effect)
-    for start in (*starts[:OTHERS], *(_fainter(problem, effect, starts[0], share) for share in FAINTER)):
+    for start in (*starts[:OTHERS], *(_fainter(problem, before, effect, starts[0], share) for share in FAINTER)):
         reached.append(_from(problem, before, effect.name, np.concatenate([_base(problem, before), start]), FIRST))
         if reached[-1].fitted.misfit <= before.misfit + WORSE_THAN_CONTAINED or _switched_off(
             effect, reached[-1].fitted
@@ -144,26 +144,26 @@ def _switched_off(effect: Effect, fitted: Fitted) -> bool:
     return vanishes and bool(fitted.searched[-1] - nearest < AT_EDGE)
 
 
-def _hopeless(problem: Problem, before: Fitted, effect: Effect) -> bool:
+def _without_promise(problem: Problem, before: Fitted, effect: Effect) -> bool:
     """Whether a faint effect of one parameter promises nothing; one of more may act where nobody looks yet."""
     if len(effect.parameters) > 1:
         return False
     frame, _ = np.linalg.qr(before.slopes)
-    starts = _starts(problem, effect)
-    faint = (*starts, *(_fainter(problem, effect, start, FAINT) for start in starts))
+    starts = _starts(problem, before, effect)
+    faint = (*starts, *(_fainter(problem, before, effect, start, FAINT) for start in starts))
     promised = min(_promised(problem, before, effect, start, frame) for start in faint)
     return before.misfit - promised < LEAST_PROMISE
 
 
 def _barely(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     """An effect as faint as it is looked for."""
-    start = _fainter(problem, effect, _starts(problem, effect)[0], FAINTER[-1])
+    start = _fainter(problem, before, effect, _starts(problem, before, effect)[0], FAINTER[-1])
     return _from(problem, before, effect.name, np.concatenate([before.searched, start]), 1)
 
 
-def _fainter(problem: Problem, effect: Effect, start: Array, share: float) -> Array:
+def _fainter(problem: Problem, before: Fitted, effect: Effect, start: Array, share: float) -> Array:
     """Starting values that lie so much nearer to those that switch the effect off."""
-    unknowns = problem.unknowns((effect.name,))
+    unknowns = _new(problem, before, effect)
     return np.array([u.searched(u.fainter(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
 
 
@@ -250,7 +250,7 @@ def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[A
     Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
                                                                 Source: Gauss-Newton step
     """
-    starts = _starts(problem, effect)
+    starts = _starts(problem, before, effect)
     if len(starts) == 1:
         return starts
     frame, _ = np.linalg.qr(before.slopes)
@@ -258,10 +258,15 @@ def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[A
     return [starts[i] for i in np.argsort(promised, kind="stable")]
 
 
-def _starts(problem: Problem, effect: Effect) -> list[Array]:
-    unknowns = problem.unknowns((effect.name,))
+def _starts(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
+    unknowns = _new(problem, before, effect)
     grid = itertools.product(*(u.parameter.search.starts for u in unknowns))
     return [np.array([_searched(u, value) for u, value in zip(unknowns, values, strict=True)]) for values in grid]
+
+
+def _new(problem: Problem, before: Fitted, effect: Effect) -> tuple[Unknown, ...]:
+    """What is looked for with an effect beside those of `before`."""
+    return problem.unknowns((*before.effects, effect.name))[len(before.unknowns) :]
 
 
 def _searched(unknown: Unknown, start: float) -> float:

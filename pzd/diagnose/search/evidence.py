@@ -40,11 +40,11 @@ class Evidence:
 
     def gap(self, fitted: Fitted) -> float:
         """The gap that a fit leaves over all that is seen, as a share of peak."""
-        return visible_gap(self.campaign.judged(fitted.damper))
+        return visible_gap(self.campaign.checks(fitted.damper))
 
     def something_missing(self, fitted: Fitted, config: DiagnoseConfig) -> bool:
         """Whether the fit misses the tests by more than noise and by more than nothing."""
-        likely = probability_of_noise(self.campaign.judged(fitted.damper))
+        likely = probability_of_noise(self.campaign.checks(fitted.damper))
         return likely < config.significance and self.gap(fitted) >= config.negligible
 
     def criterion(self, fitted: Fitted) -> float:

@@ -90,7 +90,11 @@ class _Search:
         """
         if len(self.identified.base) == len(self.evidence.whole.voltages) or self._drifts():
             return
-        whole = self.weighed(self.identified.model_copy(update={"effects": self.current.damper.effects})).whole
+        whole = self.weighed(
+            self.identified.model_copy(
+                update={"effects": self.current.damper.effects, "zero_m": self.current.damper.zero_m}
+            )
+        ).whole
         few, effects, damper = whole.pooled(), self.current.effects, self.current.damper
         rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, few))
         pays = delta_bic(one, rows)
@@ -148,7 +152,7 @@ class _Search:
         """Adopt two effects at once: alone either takes on values that the other distorts."""
         missing = self.evidence.something_missing(self.current, self.config)
         lead = next((c for c in tried if missing and self._too_little(self.evidence, self.current, c) is None), None)
-        found = None if lead is None else self._beside_lead(lead)
+        found = None if lead is None else self._with_second(lead)
         if lead is None or found is None:
             # Once noise explains what is left, the round that adopted something tells more of the others.
             self.rounds += [Round(tried, None)] if tried and (missing or not self.rounds) else []
@@ -158,7 +162,7 @@ class _Search:
         self._adopt(*found)
         return True
 
-    def _beside_lead(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...], frozenset[str]] | None:
+    def _with_second(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...], frozenset[str]] | None:
         """The effect that is supported together with another one, what else was tried beside that, and was refused."""
         evidence = self.weighed(lead.fitted.damper)
         at = fit(evidence.whole, lead.fitted.effects, evidence.whole.start_with(lead.fitted.damper))

@@ -15,6 +15,8 @@ from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
 
 _QUANTITIES = (FRICTION, DAMPING, STIFFNESS)
 _FOLD = 12
+NO_FORCE = 1e-6
+"""A friction of less [N] is none: no load cell shows it, and a fit leaves such numbers where it found none."""
 
 
 def render(context: ReportContext, pictures: Pictures) -> Section:
@@ -66,17 +68,26 @@ def _header(context: ReportContext) -> tuple[str, ...]:
 
 def _row(context: ReportContext, row: ParameterRow | BaseRow) -> tuple[str, ...]:
     fitted = row if isinstance(row, ParameterRow) else None
-    values = (
-        interval(*(getattr(row, f"{q.column}{end}", None) for end in ("", "_low95", "_high95"))) for q in _QUANTITIES
-    )
     return (
         context.voltage(row.voltage_V),
         amount(row.temperature_degC, "degC"),
-        *values,
+        *(_shown(row, q.column) for q in _QUANTITIES),
         number(fitted.W_s if fitted else None),
         amount(fitted.rmse_N if fitted else None, "N"),
         fitted.status if fitted else "edited by hand",
     )
+
+
+def _shown(row: ParameterRow | BaseRow, column: str) -> str:
+    """A parameter with its interval, where it has one."""
+    if isinstance(row, ParameterRow):
+        return interval(*(getattr(row, f"{column}{end}") for end in ("", "_low95", "_high95")))
+    return f"{parameter(getattr(row, column))} (no interval)"
+
+
+def parameter(value: float) -> str:
+    """A parameter that has no interval here; none is as small as a friction that no load cell shows."""
+    return number(value if value >= NO_FORCE else 0.0)
 
 
 def _force(context: ReportContext) -> Sheet:

@@ -10,6 +10,8 @@ from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.wording import DASH, amount, interval, listed, number, percent, sentence, unit_of
 
 _FOLD = 6
+MIDDLE_DIGITS = 6
+"""Of the middle of a test: as it is given, for the amplitude about it leaves nothing of the recorded stroke."""
 
 
 def render(context: ReportContext, pictures: Pictures) -> Section:
@@ -67,9 +69,16 @@ def _parameters(context: ReportContext, diagnosis: Diagnosis) -> Sheet:
         row
         for effect, values in diagnosis.parameters.items()
         for name, value in values.items()
-        for row in _value_rows(context, effect, name, value)
+        for row in _value_rows(context, effect, _measured_from(diagnosis, effect, name), value)
     ]
     return Sheet("What was added", ("effect", "parameter", "value (95 % interval)", "unit"), tuple(rows))
+
+
+def _measured_from(diagnosis: Diagnosis, effect: str, name: str) -> str:
+    """The name of a parameter, with the recorded displacement from which a place is counted."""
+    if (effect, name) != ("end_stop", "x_e"):
+        return name
+    return f"{name} to either side of x = {number(1000.0 * diagnosis.zero_m)} mm"
 
 
 def _value_rows(context: ReportContext, effect: str, name: str, value: Value) -> list[tuple[str, ...]]:
@@ -117,14 +126,28 @@ def next_test(context: ReportContext, test: NextTest | None) -> str:
         if test.distance_percent
         else ""
     )
-    return f"Next test: {rig_test(context, test)}{aim}{far}."
+    return f"Next test: {rig_test(context, test)}{_reached(test)}{aim}{far}."
+
+
+def _reached(test: NextTest) -> str:
+    """The largest speed and force of a test."""
+    reached = [
+        text
+        for value, text in (
+            (test.peak_speed_m_per_s, amount(test.peak_speed_m_per_s, "m/s")),
+            (test.peak_force_N, amount(test.peak_force_N, "N")),
+        )
+        if value is not None
+    ]
+    return f". It would reach {listed(reached)}" if reached else ""
 
 
 def rig_test(context: ReportContext, test: NextTest) -> str:
     """A rig test in a few words."""
     parts = [test.waveform.replace("_", " ")]
     parts += [amount(test.frequency_Hz, "Hz")] if test.frequency_Hz is not None else []
-    parts += [f"amplitude {number(1000.0 * test.amplitude_m)} mm"] if test.amplitude_m is not None else []
+    about = "" if test.middle_m is None else f" about {number(1000.0 * test.middle_m, MIDDLE_DIGITS)} mm"
+    parts += [f"amplitude {number(1000.0 * test.amplitude_m)} mm{about}"] if test.amplitude_m is not None else []
     if test.voltage_V is not None:
         volts = test.voltage_V if isinstance(test.voltage_V, tuple) else (test.voltage_V,)
         parts.append(f"at {' and '.join(context.voltage(v) for v in volts)}")

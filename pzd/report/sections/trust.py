@@ -15,7 +15,7 @@ _MUCH = 0.01
 
 def render(context: ReportContext) -> Section:
     """The sixth section."""
-    marks = (*context.identified.untrusted, *context.rides.untrusted)
+    marks = (*context.identified.untrusted(context.control), *context.rides.untrusted(context.control))
     blocks: list[Block] = []
     if marks:
         blocks += [Paragraph("These results are not to be trusted as they stand:"), Notes(marks, "care")]

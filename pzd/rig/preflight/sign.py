@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
+from pzd.record import Array
 from pzd.rig.files.refusals import reversals, work_done
 from pzd.rig.measured import Measured
 
@@ -32,11 +33,10 @@ def check(test: Measured) -> list[Finding]:
         ]
     if test.run is None:
         return []
-    number = test.run.number(record.time)[1:]
-    # A steady force does no work over a closed cycle, but it does where noise keeps its ends apart.
-    force = record.force - record.force[test.run.inside(record.time)].mean()
-    steps = 0.5 * (force[1:] + force[:-1]) * np.diff(record.displacement)
-    works = np.bincount(number[number >= 0], steps[number >= 0], test.run.count)
+    number = test.run.number(record.time)
+    works = np.array(
+        [_area(record.displacement[number == k], record.force[number == k]) for k in range(test.run.count)]
+    )
     negative = np.flatnonzero(works < -least)
     if negative.size == 0:
         return []
@@ -50,3 +50,12 @@ def check(test: Measured) -> list[Finding]:
             follows="the damper does work on the rig there: check the cell, or leave these cycles out",
         )
     ]
+
+
+def _area(displacement: Array, force: Array) -> float:
+    """Work over one cycle [J], its last sample joined to its first.
+
+    Left open, a small stroke's noise keeps the ends apart, and the force there would seem to do work.
+    """
+    step = np.roll(displacement, -1) - displacement
+    return float(np.sum(0.5 * (force + np.roll(force, -1)) * step))

@@ -53,6 +53,7 @@ def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None
     """
     if frame_stiffness is None:
         return respond(damper, motion, tolerance=TOLERANCE)
+    motion = motion.about(damper.zero_m)
     steps = sampling_steps(motion.time)
     effective = voltage_at_valve(damper, motion.voltage, steps)
     rows = np.array(element_rows(damper, effective, motion.temperature))

@@ -1,0 +1,146 @@
+"""All that the figures are drawn from: the artefacts of a run, and how tests and rows are found in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pzd.artefacts import Identified, MeasureRow, ParameterRow, Rig, SummaryRow, base_of
+from pzd.artefacts.matching import Conditions, matching
+from pzd.config import RunConfig, setting_in_use
+from pzd.paper.fidelity import SettingRides, rides_on
+from pzd.paper.loop import Loop
+from pzd.report.reference import Expected
+from pzd.quantities import Control
+from pzd.record import Array, Record
+from pzd.runs import Run
+from pzd.simulate.config import SimulateConfig
+from pzd.table.config import TableConfig
+
+@dataclass(frozen=True)
+class Sine:
+    """A sine of the stand."""
+
+    frequency: float
+    """[Hz]"""
+    amplitude: float
+    """[m]"""
+
+    def __str__(self) -> str:
+        """In words."""
+        return f"{self.frequency:g} Hz, {self.amplitude:g} m"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Setting, voltage [V] and temperature [degC] of the damper."""
+
+    setting: str
+    voltage: float
+    temperature: float = 22.0
+
+    def __str__(self) -> str:
+        """In words."""
+        return f"{self.setting}, {self.voltage:g} V, {self.temperature:g} °C"
+
+    @property
+    def conditions(self) -> Conditions:
+        """What of a test it states."""
+        return Conditions(self.setting, self.voltage, self.temperature)
+
+
+@dataclass(frozen=True, eq=False)
+class Test:
+    """One test of the rig with its measures."""
+
+    record: Record
+    measure: MeasureRow
+
+    def cycle(self) -> Loop:
+        """The average cycle, closed."""
+        from pzd.signals.cycles import cycles
+
+        record = self.record
+        run = cycles(record.time, record.displacement)
+        if run is None:
+            raise LookupError(f"{record.name} does not repeat")
+        x, v, force = (run.mean(record.time, c) for c in (record.displacement, record.velocity, record.force))
+        points = np.append(np.arange(x.size), 0)
+        return Loop(x[points], v[points], force[points], np.linspace(0.0, run.period, points.size))
+
+    def last(self, count: int) -> slice:
+        """The samples of the last cycles."""
+        period = 1.0 / (self.measure.frequency_Hz or 1.0)
+        return slice(int(np.searchsorted(self.record.time, self.record.time[-1] - count * period)), None)
+
+
+@dataclass(frozen=True, eq=False)
+class FigureData:
+    """A run, as far as its parameters, and what its plain dampers do in the car."""
+
+    rig: Rig
+    identified: Identified
+    rides_of_setting: SettingRides
+    """The plain damper's table in the chosen setting, and the ideal rides."""
+    simulate: SimulateConfig
+    tabulate: TableConfig
+    control: Control
+    setting: str | None
+
+    @classmethod
+    def of(cls, run: Run, config: RunConfig) -> FigureData:
+        """What a run that is up to date as far as its parameters leads to by the paper's own, plain model."""
+        rig, identified = run.read(Rig), run.read(Identified)
+        setting = setting_in_use(config.setting, [entry.setting for entry in rig.entries])
+        ideal = config.simulate.model_copy(update={"policies": None, "fidelities": ("ideal",)})
+        rides_of_setting = rides_on(base_of(identified.rows, setting), setting, rig, ideal, config.table, run.control)
+        return cls(rig, identified, rides_of_setting, config.simulate, config.table, run.control, setting)
+
+    def test(self, condition: Condition, sine: Sine) -> Test:
+        """The test of a condition with a sine.
+
+        Raises
+        ------
+        LookupError : when the rig has none
+        """
+        wanted = replace(condition.conditions, frequency_Hz=sine.frequency, amplitude_m=sine.amplitude)
+        found = matching(self.identified.measures, wanted)
+        if not found:
+            raise LookupError(f"the rig has no test at {condition}, {sine}")
+        return Test(next(record for record in self.rig.records if record.name == found[0].record), found[0])
+
+    def test_of(self, row: Expected) -> Test:
+        """The test in which a published number was measured.
+
+        Raises
+        ------
+        LookupError : when the rig has none
+        """
+        condition = Condition(str(row.setting), row.voltage_V or 0.0, row.temperature_degC or 22.0)
+        return self.test(condition, Sine(row.frequency_Hz or 0.0, row.amplitude_m or 0.0))
+
+    def row(self, condition: Condition) -> ParameterRow:
+        """The identified parameters of a condition.
+
+        Raises
+        ------
+        LookupError : when there are none
+        """
+        found = matching(self.identified.rows, condition.conditions)
+        if not found:
+            raise LookupError(f"the rig has no tests at {condition}")
+        return found[0]
+
+    def ride(self, frequency: float, policy: str, fidelity: str) -> SummaryRow:
+        """The line of a ride over a sine.
+
+        Raises
+        ------
+        LookupError : when the run has none
+        """
+        wanted = f"sine-{frequency:g}Hz-{policy}-{fidelity}"
+        for row in self.rides_of_setting.rides.summary:
+            if row.case == wanted:
+                return row
+        raise LookupError(f"the run has no ride {wanted}")

@@ -1,0 +1,179 @@
+"""Runs the stages that are out of date, as make would, and says of each why it runs or does not."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from pzd.artefacts import Artefact
+from pzd.config import RunConfig
+from pzd.pipeline.dependencies import block_of, changes, dependencies, is_artefact, key_of, setting_of
+from pzd.pipeline.stages import Stage
+from pzd.quantities import Control
+from pzd.runs import Run, StageFolder
+from pzd.schema.errors import UserError
+from pzd.schema.progress import Listener, unheard
+from pzd.schema.yamlfile import yaml_text
+
+Say = Callable[[str], None]
+
+
+@dataclass
+class Pipeline:
+    """One config, its run, and how the command wants it done."""
+
+    config: RunConfig
+    run: Run
+    stages: Sequence[Stage]
+    say: Say
+    """Takes a line about each stage."""
+    progress: Listener = unheard
+    """Hears how far a stage has come."""
+    jobs: int = 1
+    """Processes that a stage may use, where it can use several."""
+    marks: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    """Why the results so far are not to be trusted, by folder."""
+    _in_hand: dict[str, tuple[dict[str, str], Artefact]] = field(default_factory=dict)
+    """Artefacts that were read back, by folder, with the hashes of the files that they were read from."""
+    _compiles: bool = False
+    """Whether the ride's kernels may still have to be compiled, which a second core can do meanwhile."""
+
+    def execute(self, target: str, forced: Sequence[str] = ()) -> tuple[str, ...]:
+        """Run every stage up to the target that is stale.
+
+        Parameters
+        ----------
+        target : name of the last stage
+        forced : stages that run even when they are fresh
+
+        Returns
+        -------
+        the marks of all these stages: why their results are not to be trusted
+
+        Raises
+        ------
+        UserError : what the user can mend; the stage at fault leaves what was there before
+        """
+        wanted = self.stages[: [stage.name for stage in self.stages].index(target) + 1]
+        self._compiles = any(stage.function.__module__ == "pzd.simulate.stage" for stage in wanted)
+        for number, stage in enumerate(wanted):
+            self._execute_stage(stage, force=stage.name in forced)
+            if number == 0:
+                self._after_first(wanted)
+        return tuple(dict.fromkeys(mark for marks in self.marks.values() for mark in marks))
+
+    def _after_first(self, wanted: Sequence[Stage]) -> None:
+        """Now that the records are sound, write the config, and see that it is clear which setting is meant."""
+        self.run.write_config(yaml_text(self.config, self.run.control))
+        if any("setting" in stage.takes for stage in wanted):
+            setting_of(self.config, self.run)
+
+    def _execute_stage(self, stage: Stage, *, force: bool) -> None:
+        inputs = dependencies(stage, self.config, self.run, self._carried(stage, ()))
+        state = self.run.stage_folder(stage.folder)
+        reason = "forced" if force else stale(state, inputs)
+        if reason is None:
+            self.marks[stage.folder] = self._marks_as_it_stands(stage, state)
+            by_hand = f"; edited by hand and kept: {', '.join(state.edited)}" if state.edited else ""
+            self._say(stage, f"fresh: nothing it depends on has changed{by_hand}")
+            return
+        lost = f"; edited by hand, now beside the new as .edited: {', '.join(state.edited)}" if state.edited else ""
+        self._say(stage, f"runs: {reason}{lost}")
+        self._run(stage, inputs)
+
+    def stale_stages(self) -> dict[str, str]:
+        """Why the results of each stage are not what it would make today, by its name; nothing is run or written."""
+        reasons: dict[str, str] = {}
+        results: set[str] = set()
+        for stage in self.stages:
+            state = self.run.stage_folder(stage.folder)
+            if state.manifest:
+                results.add(stage.name)
+            reason = self._why_stale(stage, state) or self._made_from_stale(stage, reasons)
+            if reason is not None:
+                reasons[stage.name] = reason
+        return {name: reason for name, reason in reasons.items() if name in results}
+
+    def _why_stale(self, stage: Stage, state: StageFolder) -> str | None:
+        try:
+            self.marks[stage.folder] = self._marks_as_it_stands(stage, state)
+            return stale(state, dependencies(stage, self.config, self.run, self._carried(stage, ())))
+        except UserError as error:
+            return f"it would be refused: {'; '.join(error.messages)}"
+
+    def _made_from_stale(self, stage: Stage, reasons: Mapping[str, str]) -> str | None:
+        needed = {kind.folder for kind in stage.takes.values() if is_artefact(kind)}
+        makers = [maker.name for maker in self.stages if maker.folder in needed and maker.name in reasons]
+        return f"it is made from {' and '.join(makers)}" if makers else None
+
+    def _run(self, stage: Stage, inputs: dict[str, str]) -> None:
+        if self._compiles:
+            from pzd.simulate.precompile import in_background
+
+            in_background()
+            self._compiles = False
+        begun = time.monotonic()
+        artefact = self.made(stage)
+        marks = self._carried(stage, self._untrusted(artefact))
+        seconds = time.monotonic() - begun
+        self.run.write(stage.name, artefact, inputs, key_of(inputs), marks, seconds, self.jobs)
+        self.marks[stage.folder] = marks
+        self._say(stage, f"done in {seconds:.1f} s: {self.run.folder / stage.folder}")
+
+    def made(self, stage: Stage) -> Artefact:
+        """What a stage makes of its inputs, written nowhere."""
+        return stage.function(**{name: self._argument(name, kind) for name, kind in stage.takes.items()})
+
+    def _argument(self, name: str, annotation: Any) -> Any:
+        """What a parameter of a stage is given; artefacts are read back from their files, never passed on."""
+        if is_artefact(annotation):
+            return self._read_back(annotation)
+        if block := block_of(self.config, annotation):
+            return block[1]
+        if annotation is Control:
+            return self.run.control
+        if name == "setting":
+            return setting_of(self.config, self.run)
+        given = {"seed": self.config.seed, "folder": self.run.config.parent}
+        return (given | {"jobs": self.jobs, "progress": self.progress})[name]
+
+    def _read_back(self, kind: type[Artefact]) -> Artefact:
+        """An artefact as its files have it: read and checked once, and again where they have changed since."""
+        now = self.run.outputs(kind.folder)
+        files, artefact = self._in_hand.get(kind.folder, ({}, None))
+        if artefact is None or files != now:
+            artefact = self.run.read(kind, self.jobs)
+            self._in_hand[kind.folder] = (now, artefact)
+        return artefact
+
+    def _marks_as_it_stands(self, stage: Stage, state: StageFolder) -> tuple[str, ...]:
+        """The marks of the manifest, or of the artefact itself where it was edited, which checks it too."""
+        if state.edited:
+            return self._carried(stage, self._untrusted(self._read_back(stage.makes)))
+        return state.manifest.marks if state.manifest else ()
+
+    def _untrusted(self, artefact: Artefact) -> tuple[str, ...]:
+        """Why an artefact is not to be trusted as it stands, in the units of the config."""
+        reasons = getattr(artefact, "untrusted", None)
+        return reasons(self.run.control) if reasons else ()
+
+    def _carried(self, stage: Stage, own: Sequence[str]) -> tuple[str, ...]:
+        """A stage's own marks behind those of what it was made from."""
+        before = [self.marks.get(kind.folder, ()) for kind in stage.takes.values() if is_artefact(kind)]
+        return tuple(dict.fromkeys([mark for marks in before for mark in marks] + list(own)))
+
+    def _say(self, stage: Stage, line: str) -> None:
+        self.say(f"{stage.name:<10} {line}")
+
+
+def stale(state: StageFolder, inputs: dict[str, str]) -> str | None:
+    """Why a stage must run, in words; None where it need not."""
+    if state.manifest is None:
+        return "no result of it stands here"
+    if state.missing:
+        return f"{', '.join(state.missing)} missing"
+    if state.manifest.key != key_of(inputs):
+        return changes(state.manifest.inputs, inputs) or "its manifest was edited"
+    return None

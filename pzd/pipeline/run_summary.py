@@ -1,0 +1,115 @@
+"""The numbers of a finished run, for the commands that only print them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from pzd.artefacts import (
+    ComfortRow,
+    Diagnosed,
+    Diagnosis,
+    Identified,
+    ParameterRow,
+    Report,
+    Rides,
+    SummaryRow,
+)
+from pzd.config import control_of, validated
+from pzd.pipeline.command import Opened, stale_stages
+from pzd.quantities import Control
+from pzd.runs import CONFIG, Run
+from pzd.schema.csvfile import read_rows
+from pzd.schema.errors import ConfigError, UserError
+from pzd.schema.jsonfile import read_json
+from pzd.schema.yamlfile import read_yaml
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """The numbers of a run; empty or None where a stage has not run."""
+
+    folder: Path
+    control: Control
+    parameters: tuple[ParameterRow, ...]
+    diagnosis: Diagnosis | None
+    summary: tuple[SummaryRow, ...]
+    comfort: tuple[ComfortRow, ...]
+    page: Path | None
+    """The report's page."""
+    marks: tuple[str, ...]
+    """Why the results are not to be trusted."""
+    stale: Mapping[str, str] = field(default_factory=dict)
+    """Why results are not those of the config as it is today, by stage."""
+
+
+def page_of(run: Run) -> Path:
+    """Where the page of a run's report stands."""
+    return run.folder / Report.folder / "report.html"
+
+
+def run_summary(run: Run) -> RunSummary:
+    """The numbers in a run's folder, checked, under the name that the control had when they were written.
+
+    Raises
+    ------
+    ConfigError : when there are none
+    DataError : when a file of it is at fault
+    """
+    manifests = {kind: run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Rides, Report)}
+    there = {kind for kind, manifest in manifests.items() if manifest is not None}
+    if not there:
+        raise ConfigError(f"{run.folder}: no results stand here yet; pzd run {run.config} makes them")
+    at = run.folder
+    control = control_of(read_yaml(at / CONFIG).data) if (at / CONFIG).is_file() else run.control
+    run = replace(run, control=control)
+    diagnosis = at / Diagnosed.folder / "diagnosis.json"
+    comfort = at / Report.folder / "comfort.csv"
+    return RunSummary(
+        at,
+        control,
+        run.read(Identified).rows if Identified in there else (),
+        read_json(diagnosis, Diagnosis, control) if Diagnosed in there else None,
+        read_rows(at / Rides.folder / "summary.csv", SummaryRow, control) if Rides in there else (),
+        read_rows(comfort, ComfortRow, control) if Report in there else (),
+        page_of(run) if Report in there else None,
+        tuple(dict.fromkeys(mark for manifest in manifests.values() if manifest for mark in manifest.marks)),
+    )
+
+
+def summary_with_stale(given: Opened) -> RunSummary:
+    """The numbers of a config's run, with what makes them those of an older config or of other files.
+
+    Raises
+    ------
+    ConfigError : when there are none
+    DataError : when a file of the run is at fault
+    """
+    return replace(run_summary(given.run), stale=stale_stages(given))
+
+
+def summary_of(folder: Path) -> RunSummary:
+    """The numbers in a folder that a run wrote, with what makes them stale against the config that it is of.
+
+    Raises
+    ------
+    ConfigError : when it is no such folder
+    DataError : when a file of it is at fault
+    """
+    written = folder / CONFIG
+    if not written.is_file():
+        raise ConfigError(f"{folder}: no run stands here, it has no {CONFIG}; give a folder like runs/quickstart")
+    run = Run(folder, written, control_of(read_yaml(written).data))
+    return replace(run_summary(run), stale=_stale_by_its_config(run))
+
+
+def _stale_by_its_config(run: Run) -> dict[str, str]:
+    config = run.config_of_results()
+    if config is None or not config.is_file():
+        return {"all": f"their config {config or ''} is missing, so nobody can say whether these are its numbers"}
+    try:
+        document = read_yaml(config)
+        return stale_stages(Opened(document, validated(document), replace(run, config=config)))
+    except UserError as error:
+        return {"all": f"their config would be refused: {'; '.join(error.messages)}"}

@@ -1,0 +1,287 @@
+"""Numbers that somebody expects, and what a run gives in their place.
+
+`report.reference: FILE.csv` names a file with one expected number a row. Its columns stand in any order:
+
+    id          of its own
+    value       the expected number; a text such as `200-250` is repeated and has no ratio
+    unit        of the value: that of the run's number, or one that it can be converted to (`ms`, `kN`, `um`)
+    selector    which number of the run is meant (below); empty where the run has none
+    setting, voltage_V, temperature_degC, frequency_Hz, amplitude_m, record     which test
+    road (or frequency_Hz and amplitude_m), policy, fidelity, case              which ride
+    tolerance   largest difference as a share of the value
+    kind, figure_or_table, quantity, note     for the reader
+
+The first three are needed, the others may be left out. A selector is a name of `pzd.report.selectors.UNITS` or
+arithmetic between other rows, in their units:
+
+    id,setting,voltage_V,frequency_Hz,amplitude_m,selector,value,unit,tolerance
+    peak,soft,0,2,0.03,measures.peak_force_N,1514,N,0.05
+    peak-on,soft,150,2,0.03,measures.peak_force_N,2940,N,0.05
+    rise,,,,,100 * ([peak-on] / [peak] - 1),94,percent,0.1
+
+Two tests are the same as `pzd.artefacts.matching` says. A number of its own as selector (`59.7`) stands for what the
+run cannot compute; reference.csv says so.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
+
+import pzd
+from pzd.artefacts import ReferenceRow
+from pzd.artefacts.matching import Conditions, same_motion
+from pzd.quantities import Control, Quantity
+from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE
+from pzd.report.arithmetic import evaluated, parsed, terms
+from pzd.report.run_numbers import Found, RunNumbers, found_in
+from pzd.report.selectors import PURE, UNITS, Asked
+from pzd.schema.csvfile import read_table
+from pzd.schema.errors import ConfigError, DataError, at
+from pzd.schema.model import Frozen
+from pzd.schema.nearest import nearest
+
+SHIPPED = {"makowski2021": Path(pzd.__file__).parent / "paper" / "published.csv"}
+"""Lists of expected numbers that come with the package, by name."""
+_NAME = re.compile(r"[A-Za-z_]+\.[^\[\]\s]+")
+
+
+class Expected(Frozen):
+    """One expected number, and which number of a run it is expected of."""
+
+    id: str = Field(min_length=1)
+    kind: str = ""
+    """What kind of number it is, e.g. `measured`, `identified`, `claim`: for the reader."""
+    figure_or_table: str = ""
+    """Where it is printed: for the reader."""
+    setting: str | None = None
+    voltage_V: float | None = None
+    temperature_degC: float | None = None
+    frequency_Hz: float | None = None
+    amplitude_m: float | None = None
+    record: str | None = None
+    case: str | None = None
+    road: str | None = None
+    policy: str | None = None
+    fidelity: str | None = None
+    quantity: str = ""
+    """What it is, in words: for the reader."""
+    selector: str = ""
+    value: float | str
+    """A range is text."""
+    unit: str
+    tolerance: float | None = Field(default=None, ge=0.0)
+    """Largest difference as a share of the value."""
+    note: str = ""
+
+    @field_validator("selector")
+    @classmethod
+    def _is_one(cls, selector: str) -> str:
+        if _NAME.fullmatch(selector) and selector not in UNITS:
+            near = nearest(selector, UNITS)
+            hint = f"did you mean {near}?" if near else f"there is {', '.join(UNITS)}"
+            raise ValueError(f"no number of a run is called so; {hint}")
+        if selector and selector not in UNITS:
+            parsed(selector)
+        return selector
+
+    @field_validator("unit")
+    @classmethod
+    def _fits(cls, unit: str, info: ValidationInfo) -> str:
+        selector = info.data.get("selector", "")
+        if selector in UNITS:
+            _factor(selector, unit)
+        return unit
+
+    @property
+    def number(self) -> float:
+        """The value of a row that holds one number.
+
+        Raises
+        ------
+        ValueError : when it is a range
+        """
+        if isinstance(self.value, str):
+            raise ValueError(f"{self.id} is no single number (got {self.value})")  # noqa: TRY004  # a wrong id
+        return self.value
+
+    @property
+    def conditions(self) -> Conditions:
+        """Of the test that it is expected of."""
+        return Conditions(self.setting, self.voltage_V, self.temperature_degC, self.frequency_Hz, self.amplitude_m)
+
+    @property
+    def asked(self) -> Asked:
+        """Which row of the run it is expected of."""
+        return Asked(self.conditions, self.record, self.case, self.road, self.policy, self.fidelity)
+
+
+def _factor(selector: str, unit: str) -> float:
+    """How many of the run's units one of `unit` is.
+
+    Raises
+    ------
+    ValueError : when it measures something else
+    """
+    own = UNITS[selector]
+    if unit == own:
+        return 1.0
+    if own == PURE:
+        raise ValueError(f"{selector} is a pure number; write {PURE}")
+    from pzd.rig.files.units import to_canonical
+
+    return float(to_canonical(np.ones(1), unit, Quantity(selector, "", own, ""))[0])
+
+
+def same_test(a: Expected, b: Expected) -> bool:
+    """Whether two numbers are expected of one quantity of one test: their conditions differ by less than a match may.
+
+    Voltages count as the same within the share of the larger that `pzd.record` gives a condition.
+    """
+    voltages = a.voltage_V or 0.0, b.voltage_V or 0.0
+    temperatures = a.temperature_degC or 0.0, b.temperature_degC or 0.0
+    return (
+        (a.selector, a.setting, a.record) == (b.selector, b.setting, b.record)
+        and abs(voltages[0] - voltages[1]) <= CONSTANT_SHARE * max(map(abs, voltages))
+        and abs(temperatures[0] - temperatures[1]) <= SAME_TEMPERATURE
+        and same_motion(a.frequency_Hz or 0.0, b.frequency_Hz or 0.0)
+        and same_motion(a.amplitude_m or 0.0, b.amplitude_m or 0.0)
+    )
+
+
+def range_of(row: Expected, expected: Iterable[Expected]) -> tuple[float, float]:
+    """Smallest and largest number that are expected of the test of a row."""
+    values = [other.value for other in (row, *expected) if same_test(row, other)]
+    numbers = [value for value in values if not isinstance(value, str)]
+    return (min(numbers), max(numbers)) if numbers else (0.0, 0.0)
+
+
+def path_of(reference: str, folder: Path) -> Path:
+    """Where the file that `report.reference` names should stand."""
+    return SHIPPED.get(reference, folder / reference)
+
+
+def file_of(reference: str, folder: Path) -> Path:
+    """The file that `report.reference` names.
+
+    Parameters
+    ----------
+    reference : a path, or a name of `SHIPPED`
+    folder : from which a path counts
+
+    Raises
+    ------
+    ConfigError : when there is no such file
+    """
+    path = path_of(reference, folder)
+    if not path.is_file():
+        near = nearest(reference, SHIPPED)
+        hint = f"did you mean {near}?" if near else f"a path counts from {folder}, and {', '.join(SHIPPED)} is a name"
+        raise ConfigError(f"report.reference: there is no such file; {hint} (got {reference})")
+    return path
+
+
+def read_reference(path: Path, control: Control) -> tuple[Expected, ...]:
+    """The expected numbers of a file.
+
+    Raises
+    ------
+    DataError : when its header or a row is wrong, with every place
+    """
+    rows = read_table(path, Expected, control, {"temperature_C": "temperature_degC"})
+    faults = [f"{at(path, line)}: {fault}" for line, fault in _faults(rows)]
+    if faults:
+        raise DataError(faults)
+    return tuple(row for _, row in rows)
+
+
+def _faults(rows: Sequence[tuple[int, Expected]]) -> Iterator[tuple[int, str]]:
+    """What is wrong between rows, with the line of it."""
+    by_id: dict[str, Expected] = {}
+    for line, row in rows:
+        if row.id in by_id:
+            yield line, f"id: stands there twice (got {row.id})"
+        by_id[row.id] = row
+    for line, row in rows:
+        for term in terms(row.selector):
+            if term not in by_id:
+                near = nearest(term, by_id)
+                yield line, f"selector: no row has the id{f'; did you mean {near}?' if near else ''} (got {term})"
+            elif by_id[term].selector not in UNITS:
+                yield line, f"selector: the row must name a number of the run itself (got {term})"
+
+
+def compared(expected: Sequence[Expected], run: RunNumbers) -> tuple[ReferenceRow, ...]:
+    """Every expected number beside that of the run, in the order of its file.
+
+    Parameters
+    ----------
+    expected : the numbers
+    run : what was computed
+    """
+    direct = {row.id: _direct(row, run) for row in expected if row.selector in UNITS}
+    rows = []
+    for row in expected:
+        found = direct[row.id] if row.id in direct else _derived(row, direct, {one.id: one.unit for one in expected})
+        rows.append(_beside(row, found, _also_expected(row, expected)))
+    met = sum(row.computed is not None for row in rows)
+    logging.getLogger(__name__).info("%d of %d expected numbers are computed", met, len(rows))
+    return tuple(rows)
+
+
+def _direct(row: Expected, run: RunNumbers) -> Found:
+    """A number of the run in the unit in which it is expected."""
+    found = found_in(run, row.selector, row.asked)
+    value = None if found.value is None else found.value / _factor(row.selector, row.unit)
+    return Found(value, found.note)
+
+
+def _derived(row: Expected, direct: Mapping[str, Found], units: Mapping[str, str]) -> Found:
+    """What arithmetic between other rows gives."""
+    names = terms(row.selector)
+    if not row.selector:
+        return Found(None, "no selector: the run computes no such number")
+    if not names:
+        return Found(evaluated(row.selector, {}), "a number of the reference file itself, not computed by the run")
+    lacking = [f"{name}: {direct[name].note}" for name in names if direct[name].value is None]
+    if lacking:
+        return Found(None, "; ".join(lacking))
+    numbers = {name: direct[name].value or 0.0 for name in names}
+    terms_text = ", ".join(f"{name} {value:.5g} {units[name]}" for name, value in numbers.items())
+    try:
+        return Found(evaluated(row.selector, numbers), f"{row.selector} of {terms_text}")
+    except ZeroDivisionError:
+        return Found(None, f"{row.selector} of {terms_text} divides by 0")
+
+
+def _also_expected(row: Expected, expected: Iterable[Expected]) -> str:
+    """The range of what is expected of the same test, where the file has several numbers for it."""
+    low, high = range_of(row, expected) if row.selector.startswith("measures.") else (0.0, 0.0)
+    return f"{low:g} to {high:g} {row.unit} are expected of this test" if low < high else ""
+
+
+def _beside(row: Expected, found: Found, also: str) -> ReferenceRow:
+    comparable = found.value is not None and not isinstance(row.value, str) and row.value != 0.0
+    ratio = found.value / row.number if found.value is not None and comparable else None
+    parts = (found.note, also, _within(row.tolerance, ratio), f"reference: {row.note}" if row.note else "")
+    return ReferenceRow(
+        id=row.id,
+        kind=row.kind,
+        expected=row.value,
+        computed=found.value,
+        unit=row.unit,
+        ratio=ratio,
+        note="; ".join(part for part in parts if part),
+    )
+
+
+def _within(tolerance: float | None, ratio: float | None) -> str:
+    if tolerance is None or ratio is None:
+        return ""
+    inside = abs(ratio - 1.0) <= tolerance
+    return f"{'within' if inside else 'NOT within'} the tolerance of {tolerance:.3g}: off by {ratio - 1.0:+.3g}"

@@ -1,0 +1,214 @@
+"""Finds one number of a run by its name and by the conditions that say which row is meant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from pzd.artefacts import ComfortRow, Identified, ParameterRow, Rides, SummaryRow
+from pzd.artefacts.matching import matching, undecided
+from pzd.quantities import Control
+from pzd.report.selectors import UNITS, Asked
+from pzd.simulate.config import SimulateConfig
+from pzd.simulate.plan import PLAIN_SUFFIX
+from pzd.simulate.roads.sine import Sine
+
+
+@dataclass(frozen=True)
+class Found:
+    """One number of a run."""
+
+    value: float | None
+    """None where the run does not give it."""
+    note: str
+    """Where it comes from, or why there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunNumbers:
+    """What the numbers of a run are taken from."""
+
+    identified: Identified
+    rides: Rides
+    comfort: tuple[ComfortRow, ...]
+    simulate: SimulateConfig
+    control: Control
+
+
+def found_in(run: RunNumbers, name: str, asked: Asked) -> Found:
+    """One number of a run.
+
+    Parameters
+    ----------
+    run : what it is taken from
+    name : one of `UNITS`
+    asked : which row is meant
+
+    Returns
+    -------
+    the number in the unit of `UNITS`, or why there is none
+
+    Raises
+    ------
+    KeyError : when nothing is called so
+    """
+    file, _, column = name.partition(".")
+    return _FILES[file](run, column, asked)
+
+
+def _measure(run: RunNumbers, column: str, asked: Asked) -> Found:
+    rows = [row for row in run.identified.measures if asked.record in (None, row.record)]
+    met = matching(rows, asked.conditions)
+    if not met:
+        return Found(None, f"the rig has no test at {asked.record or asked.conditions}")
+    if open_columns := undecided(rows, met, asked.conditions):
+        return Found(None, _undecided("tests", [row.record for row in met], open_columns, run.control))
+    row, value = met[0], getattr(met[0], column)
+    power = f", {row.work_per_cycle_J * row.frequency_Hz:.0f} W" if row.frequency_Hz is not None else ""
+    more = f"; alike: {', '.join(other.record for other in met[1:])}" if met[1:] else ""
+    return Found(value, f"test {row.record}{power}{more}" + ("" if value is not None else ": it has none"))
+
+
+def _parameter(run: RunNumbers, column: str, asked: Asked) -> Found:
+    met = matching(run.identified.rows, asked.conditions)
+    if not met:
+        return Found(None, f"nothing was identified at {asked.conditions}")
+    if open_columns := undecided(run.identified.rows, met, asked.conditions):
+        return Found(
+            None, _undecided("conditions", [_label(row, run.control) for row in met], open_columns, run.control)
+        )
+    row, value = met[0], getattr(met[0], column)
+    low, high = getattr(row, f"{column}_low95", None), getattr(row, f"{column}_high95", None)
+    interval = "" if low is None or high is None else f", 95 % {low:.4g} to {high:.4g}"
+    return Found(value, f"identified at {_label(row, run.control)}{interval}, {row.status}")
+
+
+def _label(row: ParameterRow, control: Control) -> str:
+    parts = [row.setting] if row.setting else []
+    parts += [f"{row.voltage_V:.4g} {control.unit}"] if row.voltage_V is not None else []
+    parts += [f"{row.temperature_degC:.4g} degC"] if row.temperature_degC is not None else []
+    return ", ".join(parts) or "the rig"
+
+
+def _undecided(what: str, names: list[str], open_columns: tuple[str, ...], control: Control) -> str:
+    listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    return f"{len(names)} {what} meet this ({listed}): give {', '.join(control.renamed(c) for c in open_columns)}"
+
+
+# ---------------------------------------------------------------- rides
+
+
+def _ride(run: RunNumbers, asked: Asked) -> Found | SummaryRow:
+    """The one ride that is meant, or why there is none."""
+    met = [row for row in run.rides.summary if _is_ride(run, row, asked)]
+    if len(met) == 1:
+        return met[0]
+    if not met:
+        return Found(None, "the run has no such ride")
+    given = {"road": "road", "policy": "policy", "fidelity": "fidelity"}
+    differing = [name for name in given if len({getattr(row, name) for row in met}) > 1]
+    return Found(None, _undecided("rides", [row.case for row in met], tuple(differing) or ("case",), run.control))
+
+
+def _is_ride(run: RunNumbers, row: SummaryRow, asked: Asked) -> bool:
+    if asked.case is not None:
+        return row.case == asked.case
+    names = ((asked.road, row.road), (asked.policy, row.policy), (asked.fidelity, row.fidelity))
+    on_final = not row.case.endswith(PLAIN_SUFFIX)  # the others only where they are asked for by name
+    return on_final and all(wanted in (None, found) for wanted, found in names) and _is_sine(run, row.road, asked)
+
+
+def _is_sine(run: RunNumbers, name: str, asked: Asked) -> bool:
+    road = next((road for road in run.simulate.roads if road.name == name), None)
+    pairs = ((asked.conditions.frequency_Hz, "frequency_Hz"), (asked.conditions.amplitude_m, "amplitude_m"))
+    return all(
+        wanted is None or (isinstance(road, Sine) and math.isclose(getattr(road, field), wanted, rel_tol=1e-9))
+        for wanted, field in pairs
+    )
+
+
+def _beside(run: RunNumbers, ride: SummaryRow, value_of: Callable[[SummaryRow], float | None], unit: str) -> str:
+    """The same ride at the other fidelities."""
+    others = [row for row in run.rides.summary if row.case in _others(run, ride)]
+    values = [(row.fidelity, value_of(row)) for row in others]
+    return "".join(f"; {fidelity} {value:.3g} {unit}" for fidelity, value in values if value is not None)
+
+
+def _others(run: RunNumbers, ride: SummaryRow) -> set[str]:
+    cases = {f"{ride.road}-{ride.policy}-{row.fidelity}" for row in run.rides.summary}
+    return cases - {ride.case}
+
+
+def _summary(run: RunNumbers, column: str, asked: Asked) -> Found:
+    ride = _ride(run, asked)
+    if isinstance(ride, Found):
+        return ride
+    beside = _beside(run, ride, lambda row: getattr(row, column), UNITS[f"summary.{column}"])
+    return Found(getattr(ride, column), f"ride {ride.case}{beside}")
+
+
+def _comfort(run: RunNumbers, measure: str, asked: Asked) -> Found:
+    ride = _ride(run, asked)
+    if isinstance(ride, Found):
+        return ride
+    rows = {row.case: row for row in run.comfort if row.measure == measure}
+    if ride.case not in rows:
+        return Found(None, f"ride {ride.case}: the standard of {measure} is none of report.editions")
+
+    def value_of(row: SummaryRow) -> float | None:
+        return rows[row.case].value if row.case in rows else None
+
+    row, beside = rows[ride.case], _beside(run, ride, value_of, UNITS[f"comfort.{measure}"])
+    return Found(row.value, f"ride {ride.case}{beside}; {row.edition}, {row.status}")
+
+
+# ---------------------------------------------------------------- the step of voltage, and inputs
+
+
+def _response(run: RunNumbers, column: str, asked: Asked) -> Found:
+    signal, _, time = column.partition("_")
+    rising = {row.signal: row for row in run.rides.responses if row.to_voltage_V > row.from_voltage_V}
+    row = rising.get("force" if signal == "force" else "voltage")
+    if row is None or getattr(row, time) is None:
+        return Found(None, "the run has no such response to a step of voltage")
+    step = f"{row.from_voltage_V:g} to {row.to_voltage_V:g} {run.control.unit} at {row.velocity_m_per_s:g} m/s"
+    valve = rising.get("voltage") if signal == "force" else None
+    alone = None if valve is None else getattr(valve, time)
+    beside = "" if alone is None else f"; the valve alone {1000.0 * alone:.3g} ms, an input"
+    return Found(getattr(row, time), f"step from {step}{beside}")
+
+
+def _input(run: RunNumbers, name: str, asked: Asked) -> Found:
+    simulate, car = run.simulate, run.simulate.car.car()
+    amplitudes = _distinct(getattr(road, "amplitude_m", None) for road in simulate.roads)
+    values: Mapping[str, float | None] = {
+        "mass_kg": car.mass,
+        "pitch_inertia_kgm2": car.pitch_inertia,
+        "a1_m": car.distances[0],
+        "a2_m": car.distances[1],
+        "x_K_m": car.comfort_point,
+        "spring_stiffness_1_N_per_m": car.stiffnesses[0],
+        "spring_stiffness_2_N_per_m": car.stiffnesses[1],
+        "constant_damping_Ns_per_m": simulate.constant_damping_Ns_per_m,
+        "c_min_Ns_per_m": simulate.c_min_Ns_per_m,
+        "c_max_Ns_per_m": simulate.c_max_Ns_per_m,
+        "vehicle_speed_km_per_h": simulate.vehicle_speed_km_per_h,
+        "road_amplitude_m": amplitudes[0] if len(amplitudes) == 1 else None,
+    }
+    value = values[name]
+    return Found(value, "input of the run" if value is not None else "the roads of the run have no one amplitude")
+
+
+def _distinct(values: Iterable[float | None]) -> list[float | None]:
+    return list(dict.fromkeys(values))
+
+
+_FILES: Mapping[str, Callable[[RunNumbers, str, Asked], Found]] = {
+    "measures": _measure,
+    "parameters": _parameter,
+    "summary": _summary,
+    "comfort": _comfort,
+    "response": _response,
+    "simulate": _input,
+}
