@@ -65,7 +65,7 @@ def half_widths(parts: Sequence[Part], misfit: Misfit, level: float = 0.95) -> A
     unseen = size == 0.0
     size = np.where(unseen, 1.0, size)
     slopes = [p.slopes / size for p in parts]
-    bread = np.linalg.pinv(sum(s.T @ s for s in slopes), rcond=1e-14, hermitian=True)
+    bread: Array = np.linalg.pinv(np.sum([s.T @ s for s in slopes], axis=0), rcond=1e-14, hermitian=True)
     noise = _noise(parts, slopes, bread)
     sensors = _sensors(parts, slopes, bread, noise)
     samples = sum(p.residuals.size for p in parts)
@@ -171,7 +171,7 @@ def _sensors(parts: Sequence[Part], slopes: Sequence[Array], bread: Array, noise
     if len(parts) < 2:
         return _Estimate(prior, np.full(count, np.inf))
     variance, freedom = prior.copy(), np.full(count, np.inf)
-    whole = sum(g @ g.T for g in given)
+    whole = np.sum([g @ g.T for g in given], axis=0)
     for j in range(count):
         covariance = _disagreement(given, grams, bread, whole, j)
         expected = float(np.trace(covariance))
