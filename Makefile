@@ -57,7 +57,7 @@ bench: $(DEV)  ## Print how long a user waits, beside the limits
 
 .PHONY: coverage-study
 coverage-study: $(DEV)  ## Print how often the intervals of identify hold the truth; some minutes
-	PYTHONPATH=.:tests/identify $(BIN)/python tests/studies/coverage_study.py
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/identify $(BIN)/python tests/studies/coverage_study.py
 
 .PHONY: format
 format: $(DEV)  ## Format the code and mend what ruff can mend

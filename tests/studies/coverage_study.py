@@ -1,6 +1,6 @@
 """How often the 95 % intervals of identify hold the truth: `make coverage-study`.
 
-    PYTHONPATH=.:tests/identify python tests/studies/coverage_study.py [repeats, default 8] [--fresh]
+    PYTHONPATH=.:tests/identify python tests/studies/coverage_study.py [repeats, default 9] [--fresh]
 
 Every draw is a campaign on a damper whose T0, C and k are known (tests/identify/campaigns.py): one or
 several tests that repeat or do not, force noise of 1 % of peak with a correlation of 0, 0.5 or 0.9 from
@@ -31,7 +31,7 @@ from pzd.signals.nuisance import NuisanceConfig
 
 SEED = 20261122
 CORRELATIONS = (0.0, 0.5, 0.9)
-SIZES = (0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
+SIZES = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.05, 0.2)
 ALIKE = NuisanceConfig(offset=0.0, delay_s=0.0, gain=0.0)
 COLUMNS = ("T0_N", "C_Ns_per_m", "k_N_per_m")
 
@@ -111,4 +111,4 @@ def main(repeats: int, *, fresh: bool) -> None:
 
 if __name__ == "__main__":
     numbers = [int(argument) for argument in sys.argv[1:] if argument != "--fresh"]
-    main(numbers[0] if numbers else 8, fresh="--fresh" in sys.argv[1:])
+    main(numbers[0] if numbers else 9, fresh="--fresh" in sys.argv[1:])
