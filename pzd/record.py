@@ -45,6 +45,26 @@ class Record:
         return None if self.temperature is None else float(np.median(self.temperature))
 
 
+def sliced(record: Record, kept: NDArray[np.bool_]) -> Record:
+    """The record's samples where the mask (n,) is set."""
+
+    def cut(channel: Array | None) -> Array | None:
+        return None if channel is None else channel[kept]
+
+    return Record(
+        record.name,
+        record.setting,
+        record.time[kept],
+        record.displacement[kept],
+        record.velocity[kept],
+        record.acceleration[kept],
+        record.force[kept],
+        cut(record.voltage),
+        cut(record.temperature),
+        cut(record.pressure),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Condition:
     """Records of one setting taken at one constant voltage and one temperature."""

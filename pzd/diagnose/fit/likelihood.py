@@ -17,9 +17,9 @@ import numpy as np
 from pzd.damper.compose import integrated_force, respond, sampling_steps, sensors_of, shown_moments
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.noise.between_cycles import PureError
 from pzd.record import Array
 from pzd.signals.autoregression import Autoregression
+from pzd.signals.between_cycles import PureError
 
 SIMULATION_TOLERANCE = 1e-8
 """Of the damper's path, as a share of the force."""
