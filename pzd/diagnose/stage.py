@@ -82,5 +82,5 @@ def diagnose(
         next_test=next_test(rivals, reach, evidence.whole.reference, offsets),
     )
     if not named.adopted:
-        return Diagnosed(told, plain, plain, tuple(row for row in identified.rows if row.setting == setting))
+        return Diagnosed(told, found, plain, tuple(row for row in identified.rows if row.setting == setting))
     return Diagnosed(told, found, plain, base_parameters(named, decision.verdict, setting))

@@ -22,8 +22,6 @@ from pzd.identify.part import Part
 from pzd.record import Array
 from pzd.signals.reversals import reversals
 
-ENOUGH = 8
-"""Degrees of freedom that the scatter between cycles should have: fewer cycles are cut at the turning points."""
 TURNS = 4
 """Half strokes in a stretch of a record that does not repeat: two full cycles outlast the memory of the noise."""
 STRETCHES = (4, 24)
@@ -47,8 +45,8 @@ class _Estimate:
 def half_widths(parts: Sequence[Part], misfit: Misfit, level: float = 0.95) -> Array:
     """Half widths of the two-sided intervals of a least-squares estimate.
 
-    Equation: V = sum_t w' (Z_t + L N_t + M_t) w, w a row of (J'J)^-1, Z_t between cycles, N_t of the sensors,
-    M_t missed; Student's t with the degrees of freedom of Satterthwaite
+    Equation: V = sum_t w' (Z_t + L N_t) w + N m^2 B, w a row of B = (J'J)^-1, Z_t between cycles, N_t of the sensors,
+    m what the parameters may have absorbed; Student's t with the degrees of freedom of Satterthwaite
                                         Source: Liang and Zeger 1986; Satterthwaite 1946; L as in `_sensors`
 
     Parameters
@@ -67,10 +65,11 @@ def half_widths(parts: Sequence[Part], misfit: Misfit, level: float = 0.95) -> A
     unseen = size == 0.0
     size = np.where(unseen, 1.0, size)
     slopes = [p.slopes / size for p in parts]
-    bread = np.linalg.pinv(sum(s.T @ s for s in slopes), rcond=1e-14, hermitian=True)
+    bread: Array = np.linalg.pinv(np.sum([s.T @ s for s in slopes], axis=0), rcond=1e-14, hermitian=True)
     noise = _noise(parts, slopes, bread)
     sensors = _sensors(parts, slopes, bread, noise)
-    missed = np.einsum("pj,pq,qj->j", bread, misfit.scores / np.outer(size, size), bread)
+    samples = sum(p.residuals.size for p in parts)
+    missed = misfit.absorbed**2 * samples * np.diag(bread)
     together = _sum([noise, sensors, _Estimate(missed, np.full(size.size, np.inf))])
     quantile = stdtrit(np.maximum(together.freedom, 1.0), 0.5 + 0.5 * level)
     widths: Array = quantile * np.sqrt(together.variance) / size
@@ -104,29 +103,17 @@ def _noise(parts: Sequence[Part], slopes: Sequence[Array], bread: Array) -> _Est
 
 
 def _between_cycles(part: Part, slopes: Array, bread: Array) -> _Estimate:
-    """What noise makes of the estimate by one record that repeats.
+    """What noise makes of the estimate by one record that repeats: whole cycles, whatever hangs together in one.
 
-    Equation: V = N / N_c n / (n - 1) sum_jg (u_jg - mean_j u_jg)^2, u_jg = w' J_jg' r_jg over stretch g of cycle j
+    Equation: V = N / N_c n / (n - 1) sum_j (u_j - mean u)^2, u_j = w' J_j' r_j over cycle j, N_c samples in n cycles
                                         Source: Liang and Zeger 1986, the score's mean over cycles taken off
     """
     inside = part.number >= 0
     count = int(part.number.max()) + 1
-    pulls = (slopes[inside] @ bread) * part.residuals[inside, None]
-    number, cuts = part.number[inside], _cuts(part, count)
-    time = part.record.time[part.counted][inside]
-    run = part.run
-    stretch = np.zeros(number.size, np.int64) if run is None else (run.phase(time) * cuts).astype(np.int64)
-    sums = np.zeros((count, cuts, len(bread)))
-    np.add.at(sums, (number, np.minimum(stretch, cuts - 1)), pulls)
-    scatter = np.sum((sums - sums.mean(axis=0)) ** 2, axis=0) * count / (count - 1)
-    return _sum([_Estimate(v * part.residuals.size / number.size, np.full(len(bread), count - 1.0)) for v in scatter])
-
-
-def _cuts(part: Part, count: int) -> int:
-    """Stretches of one cycle: as many as degrees of freedom are wanted, and none shorter than a mean half stroke."""
-    inside = part.number >= 0
-    turns = max(len(reversals(part.record.displacement[part.counted][inside])) // count, 1)
-    return int(min(np.ceil(ENOUGH / (count - 1)), turns))
+    pulls = np.zeros((count, len(bread)))
+    np.add.at(pulls, part.number[inside], (slopes[inside] @ bread) * part.residuals[inside, None])
+    scatter = np.sum((pulls - pulls.mean(axis=0)) ** 2, axis=0) * count / (count - 1)
+    return _Estimate(scatter * inside.size / np.count_nonzero(inside), np.full(len(bread), count - 1.0))
 
 
 def _cut(part: Part, slopes: Array) -> list[tuple[Array, Array]]:
@@ -184,7 +171,7 @@ def _sensors(parts: Sequence[Part], slopes: Sequence[Array], bread: Array, noise
     if len(parts) < 2:
         return _Estimate(prior, np.full(count, np.inf))
     variance, freedom = prior.copy(), np.full(count, np.inf)
-    whole = sum(g @ g.T for g in given)
+    whole = np.sum([g @ g.T for g in given], axis=0)
     for j in range(count):
         covariance = _disagreement(given, grams, bread, whole, j)
         expected = float(np.trace(covariance))

@@ -1,10 +1,11 @@
-"""What the Bingham element misses in records that repeat: lack of fit against pure error.
+"""What the Bingham element misses, beyond noise and beyond what the sensors of a test do: lack of fit.
 
-Adjacent cycles differ by noise alone; the average cycle of the residual shows what repeats and is
-missed. What the tests' own offset, gain and delay explain within their priors is none of the
-model's fault and is taken off first, together with the change of T0, C and k that goes with it. In
-a record that repeats nowhere noise and misfit cannot be told apart without a model of either, so
-nothing is said of it here; diagnose looks at it (diagnose/noise/smooth_residual.py).
+Where a record repeats, adjacent cycles differ by noise alone, and the average cycle of the residual
+shows what is missed: lack of fit against pure error. Where it does not, a smooth function of
+motion and force takes up what is missed, and noise is what it leaves. What the tests' own offset,
+gain and delay explain within their priors is none of the model's fault and is taken off first,
+together with the change of T0, C and k that goes with it. Of records whose control signal moves
+nothing is said here, for a lag of the valve looks like any misfit; diagnose looks at them.
 """
 
 from __future__ import annotations
@@ -15,53 +16,76 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.identify.part import Part
-from pzd.record import Array
-from pzd.signals.between_cycles import PureError, pure_error, repeatable_power
+from pzd.record import Array, sliced
+from pzd.signals.between_cycles import pure_error, repeatable_power
 from pzd.signals.jumps import within_a_sample
 from pzd.signals.lack_of_fit import by_harmonics, pooled
 from pzd.signals.nuisance import AT_MOST
+from pzd.signals.smooth_residual import fit_smooth_residual
 
 SIGNIFICANCE = 1e-3
 """Lack of fit is believed when noise alone would show it less often than this; as in diagnose."""
 VISIBLE = 0.0025
 """Smallest misfit that speaks, r.m.s. as a share of peak force: half of the error of a load cell of class 0.5, which
 may as well bend the measured force. As in diagnose."""
+ABSORBED = 2.0
+"""T0, C and k take up more of what the model lacks than they leave: for the effects of the library up to about four
+times what is left, along the parameter that suffers most (C beside a quadratic orifice); twice is half of that, since
+an interval adds another factor of two."""
 
 
 @dataclass(frozen=True, eq=False)
 class Misfit:
-    """What repeats and is missed, over the records of one fit."""
+    """What is missed, over the records of one fit."""
 
     share: float
     """R.m.s. of what is missed as a share of each record's peak force; 0 where noise alone may show it."""
-    scores: Array
-    """(p, p) variance of J' r that it would cause, were its phases chance; 0 where noise alone may show it [N^2]."""
+    force: float
+    """The same in force [N]."""
 
     @property
     def speaks(self) -> bool:
         """Whether the parameters are no longer the damper's."""
         return self.share >= VISIBLE
 
+    @property
+    def absorbed(self) -> float:
+        """R.m.s. force that the parameters may have taken up beside, in error [N]."""
+        return ABSORBED * self.force
+
 
 def misfit_of(parts: Sequence[Part]) -> Misfit:
     """What the model misses in the records of a fit.
 
-    Equation: F = mean_h |c_h|^2 / s_h^2 over octaves of harmonics, pooled over the records
-                                                                    Source: Fisher's variance ratio
+    Equation: p = 2 min over both kinds of record of the probability by noise, pooled over the records
+                            Source: Fisher's variance ratio, in signals/lack_of_fit and smooth_residual; Bonferroni
     """
-    size = parts[0].slopes.shape[1]
-    looked_at = []
+    cycles: list[Array] = []
+    smooth: list[Array] = []
+    power, samples, peaks = [], [], []
     for part, cleared in zip(parts, _cleared(parts), strict=True):
+        if not part.constant:
+            continue
         folded = part.folded(cleared)
-        if folded is not None:
-            looked_at.append((part, pure_error(folded)))
-    nothing = Misfit(0.0, np.zeros((size, size)))
-    if not looked_at or pooled([by_harmonics(error) for _, error in looked_at]) >= SIGNIFICANCE:
-        return nothing
-    samples = np.array([p.residuals.size for p, _ in looked_at], dtype=np.float64)
-    power = np.array([float(repeatable_power(e).sum()) / float(np.max(np.abs(p.force))) ** 2 for p, e in looked_at])
-    share = float(np.sqrt(max(float(samples @ power / samples.sum()), 0.0)))
-    return Misfit(share, np.sum([_scores(p, e) for p, e in looked_at], axis=0))
+        if folded is None:
+            fit = fit_smooth_residual(cleared, sliced(part.record, part.counted), part.force - part.residuals)
+            smooth.append(np.array([fit.probability]))
+            power.append(float(np.mean(fit.explained**2 - fit.spread)))
+        else:
+            error = pure_error(folded)
+            cycles.append(by_harmonics(error))
+            power.append(float(repeatable_power(error).sum()))
+        samples.append(part.residuals.size)
+        peaks.append(float(np.max(np.abs(part.force))))
+    kinds = [kind for kind in (cycles, smooth) if kind]
+    if not kinds or len(kinds) * min(pooled(kind) for kind in kinds) >= SIGNIFICANCE:
+        return Misfit(0.0, 0.0)
+    weights = np.array(samples) / sum(samples)
+    return Misfit(_root(weights @ (np.array(power) / np.array(peaks) ** 2)), _root(weights @ np.array(power)))
+
+
+def _root(square: float) -> float:
+    return float(np.sqrt(max(square, 0.0)))
 
 
 def _cleared(parts: Sequence[Part]) -> list[Array]:
@@ -104,16 +128,3 @@ def _variance(part: Part) -> float:
     folded = part.folded(part.residuals)
     steps = np.diff(part.residuals) if folded is None else np.diff(folded, axis=0)
     return max(float(np.mean(steps**2)) / 2.0, 1e-12 * float(np.max(part.force**2)))
-
-
-def _scores(part: Part, error: PureError) -> Array:
-    """(p, p) variance of J' r by what repeats, with the spectrum that it shows and phases by chance.
-
-    Equation: sum_h J_h J_h* P_h n^2, J_h of the average cycle of the slopes, n samples      Source: Parseval
-    """
-    folded = [part.folded(column) for column in part.slopes.T]
-    means = np.stack([f.mean(axis=0) for f in folded if f is not None], axis=-1)
-    harmonics = (np.fft.rfft(means, axis=0) / len(means))[: error.mean.size]
-    power = np.maximum(repeatable_power(error), 0.0)
-    found: Array = np.real((harmonics * power[:, None]).conj().T @ harmonics) * part.residuals.size**2
-    return found

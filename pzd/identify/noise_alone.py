@@ -1,8 +1,9 @@
-"""Which parameters noise of the residuals' own colour would leave undetermined: covariance by a single record or more.
+"""Whether the data determine a parameter at all: how well, were the residuals nothing but noise of their own colour.
 
-The residuals of a rig record are correlated, so the textbook interval covers far too seldom. An
+The residuals of a rig record are correlated, so the textbook covariance is far too small. An
 autoregression fitted to the residuals of each record gives their covariance Omega, and with it
-the covariance of the ordinary least-squares estimate that the criterion asks for.
+the covariance of the ordinary least-squares estimate that the criterion asks for. What is shown as
+an interval allows for more: see intervals.py.
 """
 
 from __future__ import annotations

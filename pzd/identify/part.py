@@ -30,7 +30,9 @@ class Part:
     nuisances: Array
     """(m, 3) force that one standard deviation of the test's offset, gain and delay makes [N]."""
     run: Cycles | None
-    """The cycles that repeat, None where the motion does not or the voltage moves."""
+    """The cycles that repeat, None where the motion does not or the control signal moves."""
+    constant: bool = True
+    """Whether the control signal stands still."""
 
     @property
     def force(self) -> Array:
@@ -99,6 +101,7 @@ def parts_of(
             slope,
             columns_of(record.force[trial.counted] - left, record.rate, nuisance),
             cycles(record.time, record.displacement) if constant else None,
+            constant,
         )
         for record, trial, left, slope in zip(
             records, trials, np.split(residuals, ends), np.split(slopes, ends), strict=True

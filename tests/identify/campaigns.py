@@ -10,9 +10,10 @@ import numpy as np
 from fresh_truths import autoregressive
 from numpy.random import Generator
 
-from pzd.blind.strengths import RULES, of_size
+from pzd.blind.strengths import of_size
 from pzd.damper.compose import respond
 from pzd.damper.effect import Scales
+from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.identify.objective import Bingham
@@ -163,7 +164,9 @@ def _hiding(rng: Generator, plain: Damper, motions: list[Motion], size: float) -
         changes = [respond(damper, m, 0.0, 1e-6) - f for m, f in zip(coarse, forces, strict=True)]
         return max(float(np.sqrt(2.0 * np.mean(c**2))) / p for c, p in zip(changes, peaks, strict=True))
 
-    return plain.with_effect(name, of_size(RULES[name](rng, scales), changed, size))
+    hiding = library()[name].hidden
+    assert hiding is not None, name
+    return plain.with_effect(name, of_size(hiding(rng, scales), changed, size))
 
 
 def _record(

@@ -72,7 +72,7 @@ def test_the_peak_speed_of_a_sine_with_a_tenth_of_its_size_at_ten_times_its_freq
 def test_a_second_tone_is_no_hum(rng: Generator) -> None:
     """Averaging takes away what is in step with the mains, and nothing else: 30.3 Hz on a slow sine is motion."""
     time = np.arange(0.0, 28.0, 1.0 / RATE)
-    for frequency, repeats in ((50.03, True), (30.3, False), (47.1, False)):
+    for frequency, repeats in ((50.03, True), (30.3, False), (44.9, False)):
         x = AMPLITUDE * np.sin(2.0 * np.pi * FREQUENCY * time) + 1e-4 * np.sin(2.0 * np.pi * frequency * time)
         found = cycles(time, x + 1e-6 * rng.standard_normal(time.size))
         of_the_sine = found is not None and found.frequency == pytest.approx(FREQUENCY, rel=0.01)
