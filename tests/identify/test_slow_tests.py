@@ -69,11 +69,8 @@ def test_the_peak_speed_of_a_sine_with_a_tenth_of_its_size_at_ten_times_its_freq
     assert measured(recorded(time, x, x)).peak_velocity_m_per_s == pytest.approx(2.0 * np.pi * 0.04, rel=0.01)
 
 
-def test_a_second_tone_is_no_hum(rng: Generator) -> None:
-    """Averaging takes away what is in step with the mains, and nothing else: 30.3 Hz on a slow sine is motion."""
+def test_a_second_tone_of_the_size_of_that_hum_is_motion(rng: Generator) -> None:
+    """Averaging takes away what is in step with the mains, and nothing else."""
     time = np.arange(0.0, 28.0, 1.0 / RATE)
-    for frequency, repeats in ((50.03, True), (30.3, False), (44.9, False)):
-        x = AMPLITUDE * np.sin(2.0 * np.pi * FREQUENCY * time) + 1e-4 * np.sin(2.0 * np.pi * frequency * time)
-        found = cycles(time, x + 1e-6 * rng.standard_normal(time.size))
-        of_the_sine = found is not None and found.frequency == pytest.approx(FREQUENCY, rel=0.01)
-        assert of_the_sine == repeats
+    x = AMPLITUDE * np.sin(2.0 * np.pi * FREQUENCY * time) + 1e-4 * np.sin(2.0 * np.pi * 20.1 * time)
+    assert cycles(time, x + 1e-6 * rng.standard_normal(time.size)) is None
