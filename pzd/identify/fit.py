@@ -20,6 +20,7 @@ from pzd.identify.separable import descend, fit_separable
 from pzd.identify.trial import trial_of
 from pzd.identify.trust import Evidence, judge, stationarity, visible_shares
 from pzd.record import Array, Condition, Record
+from pzd.signals.stretches import apart
 
 
 def fit_condition(condition: Condition, config: IdentifyConfig, seed: int) -> ParameterRow:
@@ -31,8 +32,9 @@ def identify_condition(
     condition: Condition, config: IdentifyConfig, seed: int
 ) -> tuple[ParameterRow, AuxiliaryRow | None]:
     """The Bingham parameters of one condition, and what its tests show beside the element."""
-    objective, fit, auxiliary = fit_with_auxiliary(condition.records, config, seed)
-    parts = parts_of(condition.records, objective.trials, (fit.residuals, fit.slopes), config.nuisance)
+    records = [test for record in condition.records for test in apart(record)]
+    objective, fit, auxiliary = fit_with_auxiliary(records, config, seed)
+    parts = parts_of(records, objective.trials, (fit.residuals, fit.slopes), config.nuisance)
     misfit = misfit_of(parts)
     noise = uncertainty(fit.slopes, fit.residuals, objective.lengths).half_widths()
     widths = half_widths(parts, misfit)

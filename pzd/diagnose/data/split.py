@@ -73,8 +73,8 @@ def split(prepared: Sequence[Prepared], voltage_within: float | None, temperatur
         roles[i] = _parted(prepared[i], alone=True)
         kinds.add(_parts(prepared[i]))
     ordered = tuple(roles[i] for i in range(len(prepared)))
-    names = tuple(p.record.name for p, role in zip(prepared, ordered, strict=True) if np.any(role == UNTOUCHED))
-    return Split(ordered, names, kinds.pop() if len(kinds) == 1 else "mixed")
+    names = (p.record.name for p, role in zip(prepared, ordered, strict=True) if np.any(role == UNTOUCHED))
+    return Split(ordered, tuple(dict.fromkeys(names)), kinds.pop() if len(kinds) == 1 else "mixed")
 
 
 def stretches(record: Record, wanted: NDArray[np.bool_]) -> list[Record]:

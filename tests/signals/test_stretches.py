@@ -1,0 +1,85 @@
+"""Two tests in one record without a pause: told from beats, sweeps and growing sines, and treated apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.random import Generator
+
+from pzd.artefacts import Rig
+from pzd.damper.element import element_force
+from pzd.diagnose.data.cleaning import prepare
+from pzd.diagnose.data.split import split
+from pzd.identify.config import IdentifyConfig
+from pzd.identify.stage import identify
+from pzd.record import Array, Record
+from pzd.signals.stretches import apart, steps
+
+TIME = np.arange(12_000) * 1e-3
+TRUTH = (400.0, 2500.0, 4e5)
+
+
+def sine(amplitude: float, hertz: float) -> Array:
+    return np.asarray(amplitude * np.sin(2.0 * np.pi * hertz * TIME))
+
+
+STEPS = {
+    "two speeds": np.where(TIME < 6.0, sine(0.01, 1.0), sine(0.01, 2.0)),
+    "two amplitudes": np.where(TIME < 6.0, sine(0.005, 1.5), sine(0.015, 1.5)),
+    "half a millimetre more": np.where(TIME < 6.0, sine(0.004, 2.0), sine(0.0045, 2.0)),
+}
+NO_STEPS = {
+    "a sine": sine(0.01, 1.7),
+    "a sweep": 0.01 * np.sin(2.0 * np.pi * (0.5 * TIME + 0.1 * TIME**2)),
+    "a beat": sine(0.005, 1.38) + sine(0.005, 1.42),
+    "a quick beat": sine(0.01, 1.0) + sine(0.003, 1.23),
+    "a growing sine": (0.5 + TIME / 12.0) * sine(0.01, 1.5),
+    "two tones": sine(0.01, 1.0) + sine(0.002, 10.03),
+    "one bump more": sine(0.01, 1.0) + 0.003 * np.exp(-(((TIME - 6.0) / 0.3) ** 2)),
+}
+
+
+def record(x: Array, rng: Generator, noise: float = 5.0) -> Record:
+    force = element_force(x, 1e-3, *TRUTH) + noise * rng.standard_normal(x.size)
+    speed = np.gradient(x, 1e-3)
+    return Record("r", None, TIME, x + 2e-6 * rng.standard_normal(x.size), speed, np.gradient(speed, 1e-3), force)
+
+
+@pytest.mark.parametrize("kind", STEPS)
+def test_a_step_of_speed_or_amplitude_parts_two_tests(kind: str, rng: Generator) -> None:
+    before, after = apart(record(STEPS[kind], rng))
+    assert before.name == after.name == "r"
+    assert before.time[0] == TIME[0]
+    assert before.time[-1] == pytest.approx(6.0, abs=1.01)
+    assert after.time[0] == pytest.approx(6.0, abs=1.01)
+    assert after.time[-1] == TIME[-1]
+
+
+@pytest.mark.parametrize("kind", NO_STEPS)
+def test_what_changes_from_cycle_to_cycle_is_one_test(kind: str, rng: Generator) -> None:
+    whole = record(NO_STEPS[kind], rng)
+    assert steps(whole.time, whole.displacement) == ()
+    assert apart(whole) == (whole,)
+
+
+@pytest.mark.parametrize(("kind", "frequencies", "amplitudes"), [
+    ("two speeds", (1.0, 2.0), (0.01, 0.01)),
+    ("two amplitudes", (1.5, 1.5), (0.005, 0.015)),
+])  # fmt: skip
+def test_each_of_two_tests_has_its_measures_and_both_give_the_parameters(
+    kind: str, frequencies: tuple[float, ...], amplitudes: tuple[float, ...], rng: Generator
+) -> None:
+    found = identify(IdentifyConfig(), Rig((record(STEPS[kind], rng),), ()), 1)
+    assert [m.record for m in found.measures] == ["r", "r"]
+    assert [m.frequency_Hz for m in found.measures] == pytest.approx(frequencies, rel=1e-3)
+    assert [m.amplitude_m for m in found.measures] == pytest.approx(amplitudes, rel=1e-2)
+    (row,) = found.rows
+    assert "the model" not in row.status
+    assert (row.T0_N, row.C_Ns_per_m) == pytest.approx(TRUTH[:2], rel=0.02)
+
+
+def test_the_diagnosis_sees_two_tests_that_repeat_and_tells_one_name(rng: Generator) -> None:
+    prepared = prepare([record(STEPS["two speeds"], rng)])
+    assert [p.record.name for p in prepared] == ["r", "r"]
+    assert [p.cycles.frequency for p in prepared if p.cycles] == pytest.approx([1.0, 2.0], rel=1e-3)
+    assert split(prepared, None, 2.0).held_out == ("r",)
