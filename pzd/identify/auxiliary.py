@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pzd.artefacts import AuxiliaryRow
 from pzd.identify.intervals import half_widths
 from pzd.identify.misfit import misfit_of
 from pzd.identify.objective import Fit, Objective
 from pzd.identify.part import parts_of
-from pzd.record import Array, Record
+from pzd.record import SAME_TEMPERATURE, Array, Record
 from pzd.signals.nuisance import NuisanceConfig
 
 WORTH_A_LOOK = 0.0025
@@ -84,12 +85,28 @@ def relieved(objective: Objective, values: Array) -> Objective:
     return Objective(trials, basis)
 
 
+def without(record: Record, beside: Sequence[AuxiliaryRow]) -> Record:
+    """A record less what constant records of its damper showed beside the element, at the nearest temperature.
+
+    Parameters
+    ----------
+    record : whose voltage moves, so that its own force tells friction and gas less well apart
+    beside : of its setting; where there are several at one temperature, their mean is taken off
+    """
+    if not beside:
+        return record
+    own = record.median_temperature() or 0.0
+    apart = [abs((row.temperature_degC or 0.0) - own) for row in beside]
+    near = [row for row, distance in zip(beside, apart, strict=True) if distance <= min(apart) + SAME_TEMPERATURE]
+    forces = [row.F_0_N + row.k_g_N_per_m * (record.displacement - row.zero_m) for row in near]
+    return replace(record, force=record.force - np.mean(forces, axis=0))
+
+
 def remainder(objective: Objective, fit: Fit) -> Array:
     """(2,) what of F_0 and k_g is left in relieved data at an optimum, to be added to what was taken off."""
     columns, _ = columns_of(objective)
     left = objective.measured - objective.simulated(fit.parameters)
-    found: Array = np.linalg.lstsq(columns, left, rcond=None)[0]
-    return found
+    return np.asarray(np.linalg.lstsq(columns, left, rcond=None)[0], dtype=np.float64)
 
 
 def auxiliary_of(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pzd.artefacts import AuxiliaryRow, Identified, ParameterRow, Rig
 from pzd.identify.config import IdentifyConfig
@@ -36,7 +37,8 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener =
     found = _constant_rows(constant, identify, seed, progress)
     rows = {_labels(row): row for row, _ in found}
     beside = {_labels(row): row for _, row in found if row is not None}
-    rows |= {_labels(row): row for row in _moving_rows(moving, constant, list(rows.values()), identify)}
+    known = list(zip(constant, rows.values(), strict=True))
+    rows |= {_labels(row): row for row in _moving_rows(moving, known, list(beside.values()), identify)}
     return Identified(
         tuple(rows[labels] for labels in sorted(rows, key=_order)),
         measures(rig.records),
@@ -66,15 +68,21 @@ def _beside(row: AuxiliaryRow | None) -> str:
 
 
 def _moving_rows(
-    moving: Sequence[Record], constant: Sequence[Condition], known: Sequence[ParameterRow], config: IdentifyConfig
+    moving: Sequence[Record],
+    known: Sequence[tuple[Condition, ParameterRow]],
+    auxiliaries: Sequence[AuxiliaryRow],
+    config: IdentifyConfig,
 ) -> list[ParameterRow]:
+    from pzd.identify.auxiliary import without
     from pzd.identify.moving import fit_moving
 
     rows = []
     for setting in sorted({r.setting for r in moving}, key=lambda s: s or ""):
-        mine = [(c, row) for c, row in zip(constant, known, strict=True) if c.setting == setting]
-        of_setting = [r for r in moving if r.setting == setting]
-        for row in fit_moving(of_setting, [c for c, _ in mine], [row for _, row in mine], config):
+        beside = [row for row in auxiliaries if row.setting == setting]
+        mine = [(c, row) for c, row in known if c.setting == setting]
+        still = [replace(c, records=tuple(without(r, beside) for r in c.records)) for c, _ in mine]
+        of_setting = [without(r, beside) for r in moving if r.setting == setting]
+        for row in fit_moving(of_setting, still, [row for _, row in mine], config):
             rows.append(row)
             log.info("node from records with moving voltage: %s", _line(row))
     return rows

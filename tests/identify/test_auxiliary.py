@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fresh_truths import sine_test, with_noise
+from fresh_truths import TABLE_2, moving_test, sine_test, with_noise
 
 from pzd.artefacts import AuxiliaryRow, Identified, ParameterRow, Rig, base_of
 from pzd.identify.config import IdentifyConfig
@@ -99,3 +99,17 @@ def test_the_plain_damper_handed_on_has_no_gas_and_the_file_tells_it(rng: np.ran
     )
     assert len(lines) == 1
     assert Identified.read(tmp_path, Control()).auxiliary == found.auxiliary
+
+
+def test_records_with_a_moving_voltage_are_freed_of_the_gas_that_the_others_show(rng: np.random.Generator) -> None:
+    """A node that only moving records reach: its friction is that of the damper without gas to within the noise."""
+
+    def charged(record: Record) -> Record:
+        return with_noise(replace(record, force=record.force + 250.0 + 3000.0 * record.displacement), rng, share=0.005)
+
+    still = sine_test(TABLE_2[0.0], 2.0, 0.03, voltage=0.0)
+    moving = moving_test(lambda t: 75.0 + 75.0 * np.sign(np.sin(2.0 * np.pi * 0.23 * t)), seconds=8.0)
+    found = identify(IdentifyConfig(nodes=(0.0, 150.0)), Rig((charged(still), charged(moving)), ()), 1)
+    (high,) = [row for row in found.rows if row.voltage_V == 150.0]
+    assert pytest.approx(TABLE_2[150.0].friction, rel=0.02) == high.T0_N
+    assert high.k_N_per_m == pytest.approx(TABLE_2[150.0].stiffness, rel=0.05)
