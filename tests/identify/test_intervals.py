@@ -91,7 +91,7 @@ def test_what_differs_from_cycle_to_cycle_widens_an_interval_though_no_colour_of
         covered += np.count_nonzero(np.abs(estimate - np.array(truth)) <= widths)
         colour = uncertainty(parts[0].slopes, parts[0].residuals, [parts[0].residuals.size])
         wider.append(widths[1] / colour.half_widths()[1])
-    # The median is 2.2 to 2.3 over draws; of 36 intervals at 0.95 that hang together by three, 28 is four deviations off.
+    # The median is 2.2 to 2.3; of 36 intervals at 0.95 that hang together by three, 28 is four deviations off.
     assert np.median(wider) > 1.8
     assert covered >= 28
 
