@@ -118,3 +118,15 @@ def test_what_is_hidden_is_named_with_its_size(motion: str, effect: str, rng: Ge
     found = diagnosed(records(PLAIN.with_effect(effect, {parameter: size}), MOTIONS[motion], rng))
     assert (found.verdict, found.effects) == ("named", (effect,))
     assert found.parameters[effect][parameter].value == pytest.approx(size, rel=0.05)
+
+
+def two_speeds(t: Array) -> Array:
+    """12 mm at 1 Hz, then without a pause at 2 Hz."""
+    return 0.012 * np.sin(2.0 * np.pi * np.where(t < 0.5 * DURATION, 1.0, 2.0) * t)
+
+
+def test_two_speeds_in_one_record_are_two_tests_of_one_name(rng: Generator) -> None:
+    assert diagnosed(records(PLAIN, two_speeds, rng)).verdict == "none"
+    found = diagnosed(records(PLAIN.with_effect("orifice_quadratic", {"q": 5000.0}), two_speeds, rng))
+    assert (found.verdict, found.effects) == ("named", ("orifice_quadratic",))
+    assert len(set(found.gap.held_out)) == len(found.gap.held_out)
