@@ -25,7 +25,7 @@ def test_the_autoregression_of_the_noise_is_found(rng: np.random.Generator, corr
 
 
 def test_white_noise_gives_the_textbook_covariance(rng: np.random.Generator) -> None:
-    # BIC takes white noise for coloured in about one draw of 200, which is then up to a fifth off: so the median.
+    # BIC now and then takes white noise for coloured, and the variance is off by as much: so the median of five draws.
     slopes = straight_line(4000)
     exact = np.diag(np.linalg.inv(slopes.T @ slopes))
     found = [np.diag(uncertainty(slopes, draw.standard_normal(4000), [4000]).covariance) for draw in rng.spawn(5)]
