@@ -184,6 +184,13 @@ def diagnosis() -> Diagnosis:
         ),
         rivals=(),
         where=(Region(region="abs(v) > 0.25 m/s, 150 V", share_of_gap=0.71),),
+        prediction=Prediction(
+            hold_out="tests",
+            by=(KeptBack(record="r03", voltage=150.0, W_s_plain=0.0123, W_s=0.00091),),
+            W_s_plain=0.0124,
+            W_s=0.00092,
+            left_out_voltages=(LeftOut(voltage=75.0, W_s_plain=0.0222, W_s=0.0111),),
+        ),
         next_test=NextTest(
             waveform="sine",
             frequency_Hz=4.0,

@@ -1,0 +1,316 @@
+"""What a damper predicts of whole tests, and of whole voltages, that were kept back from its fit.
+
+Cross-validation: the tests are dealt into folds, the damper is fitted anew without each fold and predicts the tests in
+it; nothing is fitted to a kept-back test, its own offset, gain and delay included. A test that is alone at its voltage
+is parted, for without it nothing would be known there; that is weak evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.artefacts import KeptBack, LeftOut, Prediction
+from pzd.damper.material import by_voltage
+from pzd.damper.model import Damper
+from pzd.diagnose.campaign import Campaign
+from pzd.diagnose.config import NuisanceConfig
+from pzd.diagnose.data.split import TRAINING, Split
+from pzd.diagnose.fit.least_squares import fit
+from pzd.diagnose.fit.parameters import Problem
+from pzd.diagnose.fit.prediction import counted, predicted_force
+from pzd.diagnose.fit.weights import record_likelihood, unweighted
+from pzd.diagnose.search.evidence import evidence_of
+from pzd.record import Array
+
+FOLDS = 5
+"""Each fold keeps back about a fifth of the tests: enough is left to fit, and the refits stay few."""
+PARTS = 2
+"""Halves of a test that is alone at its voltage: the first predicts the second, and the second the first."""
+WORSE = 2.0
+"""Standard errors of the paired difference over tests from which one damper predicts worse than another."""
+
+HoldOut = Literal["tests", "cycles", "segments", "mixed"]
+Mask = NDArray[np.bool_]
+Folds = tuple[tuple[Mask, ...], ...]
+"""For every fold one mask (n,) a record: the samples that are kept back."""
+
+
+@dataclass(frozen=True, eq=False)
+class Missed:
+    """What a damper misses of kept-back tests, an entry a test, or a part of one that is alone at its voltage."""
+
+    record: tuple[int, ...]
+    """Which record an entry is of."""
+    error: Array
+    """(t,) sum of the squared residual [N^2]."""
+    energy: Array
+    """(t,) sum of the squared force [N^2]."""
+    limit: Array
+    """(t,) sum of squares [N^2] that counts as nothing: so many samples of a visible gap."""
+
+    @property
+    def criterion(self) -> float | None:
+        """W_s pooled over the entries; None without any.
+
+        Equation: sum (F - F_sim)^2 / sum F^2                       Source: Makowski and Knap 2021, eq. (4)
+        """
+        return float(self.error.sum() / self.energy.sum()) if self.record else None
+
+    def of(self, wanted: Sequence[int]) -> Missed:
+        """The entries of some records."""
+        kept = np.isin(self.record, wanted)
+        records = tuple(r for r, k in zip(self.record, kept, strict=True) if k)
+        return Missed(records, self.error[kept], self.energy[kept], self.limit[kept])
+
+
+_NOTHING = Missed((), np.zeros(0), np.zeros(0), np.zeros(0))
+_Refit = Callable[[Sequence[Mask]], "Damper | None"]
+"""The damper fitted to all but what is kept back; None where nothing is left."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """The tests of one setting, dealt into folds."""
+
+    campaign: Campaign
+    """Every sample of it may be fitted."""
+    plain: Damper
+    """As identify found it, with all the tests."""
+    visible: float
+    """A gap (r.m.s.) below this share of a test's peak force counts as nothing."""
+    groups: tuple[tuple[int, ...], ...]
+    """The records of each voltage, and those whose voltage moves."""
+    voltages: tuple[float | None, ...]
+    """Of the groups [V], 0 for a damper without; None where it moves."""
+    folds: Folds
+
+    def plain_missed(self) -> Missed:
+        """What the plain damper misses, fitted without each fold by criterion (4), as identify fits it."""
+        return self._missed(self._by_criterion(self.plain))
+
+    def missed(self, damper: Damper) -> Missed:
+        """What a damper misses, T0, C, k and its effects fitted without each fold, from where they are."""
+        return self._missed(self._by_likelihood(damper))
+
+    def worse(self, one: Missed, other: Missed) -> tuple[float | None, ...]:
+        """The voltages [V] at which one damper predicts worse than another beyond chance; all where the whole is worse.
+
+        Equation: mean d > 2 s_d / sqrt(n), d_i = W_s,i - W_s,i of the other one     Source: paired differences
+        """
+        found = tuple(
+            v for v, group in zip(self.voltages, self.groups, strict=True) if _worse(one.of(group), other.of(group))
+        )
+        return found or (self.voltages if _worse(one, other) else ())
+
+    def between(self) -> tuple[int, ...]:
+        """The groups whose voltage lies between two others."""
+        constant = sorted((v, i) for i, v in enumerate(self.voltages) if v is not None)
+        return tuple(i for _, i in constant[1:-1])
+
+    def told(self, plain: Missed, missed: Missed, damper: Damper | None) -> Prediction | None:
+        """The figures of diagnosis.json; None where no test could be kept back.
+
+        Parameters
+        ----------
+        plain, missed : what the plain damper and the one handed on miss
+        damper : the one handed on where it is not the plain one
+        """
+        whole = plain.criterion, missed.criterion
+        if whole[0] is None or whole[1] is None:
+            return None
+        by, controlled = [], any(row.voltage_V is not None for row in self.plain.base)
+        for voltage, group in zip(self.voltages, self.groups, strict=True):
+            for i in group:
+                simple, handed = plain.of([i]).criterion, missed.of([i]).criterion
+                if simple is not None and handed is not None:
+                    name, at = self.campaign.prepared[i].record.name, voltage if controlled else None
+                    by.append(KeptBack(record=name, voltage=at, W_s_plain=simple, W_s=handed))
+        left_out = [self._left_out(i, damper) for i in self.between()]
+        return Prediction(
+            hold_out=self._hold_out(),
+            by=tuple(sorted(by, key=lambda each: each.record)),
+            W_s_plain=whole[0],
+            W_s=whole[1],
+            left_out_voltages=tuple(each for each in left_out if each is not None),
+        )
+
+    def _hold_out(self) -> HoldOut:
+        kinds = {self._kind(group) for group in self.groups}
+        return kinds.pop() if len(kinds) == 1 else "mixed"
+
+    def _kind(self, group: Sequence[int]) -> HoldOut:
+        if len(group) > 1:
+            return "tests"
+        return "segments" if self.campaign.prepared[group[0]].cycles is None else "cycles"
+
+    def _left_out(self, group: int, damper: Damper | None) -> LeftOut | None:
+        """One voltage predicted from those around it; nothing of which the voltage moves is fitted either."""
+        mine, voltage = self.groups[group], self.voltages[group]
+        moving = {i for v, members in zip(self.voltages, self.groups, strict=True) if v is None for i in members}
+        sizes = [p.record.time.size for p in self.campaign.prepared]
+        without = tuple(np.full(n, i in mine or i in moving) for i, n in enumerate(sizes))
+        asked = tuple(np.full(n, i in mine) for i, n in enumerate(sizes))
+
+        def criterion(fitted: _Refit) -> float | None:
+            found = fitted(without)
+            return None if found is None else self._of_fold(found, asked).criterion
+
+        plain = criterion(self._by_criterion(self.plain))
+        other = plain if damper is None else criterion(self._by_likelihood(damper))
+        if voltage is None or plain is None or other is None:
+            return None
+        return LeftOut(voltage=voltage, W_s_plain=plain, W_s=other)
+
+    def _missed(self, fitted: _Refit) -> Missed:
+        def of_fold(kept_back: Sequence[Mask]) -> Missed:
+            found = fitted(kept_back)
+            return _NOTHING if found is None else self._of_fold(found, self._known(found, kept_back))
+
+        parts = self.campaign.each(of_fold, self.folds)
+        return Missed(
+            tuple(i for part in parts for i in part.record),
+            *(np.concatenate([getattr(part, name) for part in parts]) for name in ("error", "energy", "limit")),
+        )
+
+    def _known(self, damper: Damper, kept_back: Sequence[Mask]) -> list[Mask]:
+        """What is kept back of the voltages for which some test was left to fit."""
+        fitted = {voltage for voltage, _ in by_voltage(damper.base)}
+        lost = {
+            i for v, group in zip(self.voltages, self.groups, strict=True) if v not in {*fitted, None} for i in group
+        }
+        return [np.zeros_like(mask) if i in lost else mask for i, mask in enumerate(kept_back)]
+
+    def _of_fold(self, damper: Damper, kept_back: Sequence[Mask]) -> Missed:
+        records, rows = [], []
+        for i, (p, mask) in enumerate(zip(self.campaign.prepared, kept_back, strict=True)):
+            judged = mask & counted(p)
+            if not judged.any():
+                continue
+            force = p.record.force[judged]
+            residual = force - predicted_force(damper, p)[judged]
+            peak = float(np.max(np.abs(p.record.force)))
+            records.append(i)
+            rows.append((residual @ residual, force @ force, residual.size * (self.visible * peak) ** 2))
+        columns = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+        return Missed(tuple(records), *columns)
+
+    def _by_likelihood(self, damper: Damper) -> _Refit:
+        problem = evidence_of(self.campaign, damper).whole
+        return lambda kept_back: self._fitted(self.campaign, problem, damper, kept_back)
+
+    def _by_criterion(self, damper: Damper) -> _Refit:
+        campaign = replace(self.campaign, nuisance=NuisanceConfig(offset=0.0, delay_s=0.0, gain=0.0))
+        problem = evidence_of(campaign, damper).whole
+        peaks = dict.fromkeys((o.place for o in problem.observations), 0.0)
+        for o in problem.observations:
+            peaks[o.place] = max(peaks[o.place], o.peak)
+
+        def fitted(kept_back: Sequence[Mask]) -> Damper | None:
+            return self._fitted(campaign, problem, damper, kept_back, peaks)
+
+        return fitted
+
+    def _fitted(
+        self,
+        campaign: Campaign,
+        problem: Problem,
+        damper: Damper,
+        kept_back: Sequence[Mask],
+        peaks: Mapping[int, float] | None = None,
+    ) -> Damper | None:
+        """The damper fitted to all but what is kept back, without the base rows that no test is left for.
+
+        None where no test is left at all; with the `peaks` of each condition it is fitted by criterion (4).
+        """
+        known = {o.name: o for o in problem.observations}
+        kept = []
+        for i, (p, mask) in enumerate(zip(campaign.prepared, kept_back, strict=True)):
+            part = known.get(p.record.name)
+            if part is None or mask.all():
+                continue
+            if mask.any():
+                (given,) = campaign.expected(damper, [i])
+                part = record_likelihood(p, ~mask, part.place, given, campaign.nuisance)
+            if part is not None and peaks is not None:
+                part = unweighted(part, int(np.count_nonzero(~mask & counted(p))), peaks[part.place])
+            if part is not None:
+                kept.append(part)
+        if not kept:
+            return None
+        effects = tuple(damper.effects)
+        found = fit(replace(problem, observations=tuple(kept)), effects, problem.start_with(damper)).damper
+        return _shown(found, {o.place for o in kept})
+
+
+def trials_of(campaign: Campaign, plain: Damper, visible: float) -> Trials:
+    """The tests of a campaign dealt into folds: every voltage by itself, so that each fold takes a bit of each.
+
+    Parameters
+    ----------
+    campaign : the records of one setting
+    plain : as identify found it
+    visible : a gap (r.m.s.) below this share of a test's peak force counts as nothing
+    """
+    prepared = campaign.prepared
+    everything = Split(tuple(np.full(p.record.time.size, TRAINING) for p in prepared), (), "records")
+    whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs)
+    nodes = [voltage for voltage, _ in by_voltage(plain.base)]
+    members: dict[int, list[int]] = {}
+    for i, p in enumerate(prepared):
+        own = p.record.median_voltage() or 0.0
+        members.setdefault(int(np.argmin([abs(v - own) for v in nodes])) if p.constant else -1, []).append(i)
+    groups = tuple(tuple(sorted(found, key=lambda i: prepared[i].record.name)) for found in members.values())
+    voltages = tuple(None if node < 0 else nodes[node] for node in members)
+    folds = tuple(tuple(np.zeros(p.record.time.size, dtype=np.bool_) for p in prepared) for _ in range(FOLDS))
+    for turn, group in enumerate(groups):
+        for place, i in enumerate(group):
+            if len(group) > 1:
+                folds[(turn + place) % min(FOLDS, max(len(group), PARTS))][i][:] = True
+            else:
+                for part, mask in enumerate(_halves(campaign, i)):
+                    folds[(turn + part) % FOLDS][i][:] = mask
+    return Trials(whole, plain, visible, groups, voltages, tuple(f for f in folds if any(m.any() for m in f)))
+
+
+def _halves(campaign: Campaign, record: int) -> tuple[Mask, Mask]:
+    """(n,) the first and the second half of a record, by whole cycles where it has two or more."""
+    prepared = campaign.prepared[record]
+    time, run = prepared.record.time, prepared.cycles
+    if run is None or run.count < PARTS:
+        first = np.arange(time.size) < time.size // PARTS
+    else:
+        first = run.number(time) < run.count // PARTS
+    return first, ~first
+
+
+def _worse(one: Missed, other: Missed) -> bool:
+    if not one.record:
+        return False
+    difference = (one.error - other.error) / one.energy
+    error = float(np.std(difference, ddof=1) / np.sqrt(difference.size)) if difference.size > 1 else 0.0
+    seen = float((one.error - other.error).sum()) > float(one.limit.sum())
+    return seen and float(difference.mean()) > WORSE * error
+
+
+def _shown(damper: Damper, places: set[int]) -> Damper:
+    """The damper without the base rows, and the voltages of its effects, for which no test is left."""
+    if -1 in places or len(places) == len(damper.base):
+        return damper
+    rows = tuple(row for i, row in enumerate(damper.base) if i in places)
+    kept = {voltage for voltage, of_it in by_voltage(damper.base) if any(row in rows for row in of_it)}
+    effects = {name: _at(values, kept) for name, values in damper.effects.items()}
+    return damper.model_copy(update={"base": rows, "effects": effects})
+
+
+def _at(values: dict[str, float | tuple[float, ...]], voltages: set[float]) -> dict[str, float | tuple[float, ...]]:
+    """The parameters of an effect without those at other voltages."""
+    nodes = values.get("at_voltage_V")
+    if not isinstance(nodes, tuple):
+        return values
+    kept = [i for i, node in enumerate(nodes) if node in voltages]
+    return {n: tuple(v[i] for i in kept) if isinstance(v, tuple) else v for n, v in values.items()}
