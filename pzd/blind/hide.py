@@ -71,7 +71,7 @@ def drawn(setup: Setup, planned: Planned) -> tuple[Truth, list[Taken]]:
     stand_seed = int(draw.integers(1 << 31))
     share, rho = float(draw.choice(blind.force_noise)), float(draw.choice(blind.noise_rho))
     unsteady = float(np.exp(draw.uniform(*np.log(blind.displacement_noise_m))))
-    warms = bool(draw.random() < blind.warming_share) or "temperature_drift" in planned.hidden
+    warms = bool(draw.random() < blind.warming_share) or planned.needs("temperature")
     wanted = {name: float(np.exp(draw.uniform(*np.log(blind.sizes)))) for name in planned.hidden}
     stand = _stand(setup, campaign, _near(setup.stand.damper, blind.base_spread, draw), warms=warms)
     plain = _clean(stand.model_copy(update={"oversampling": 1}), stand_seed, setup.control)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.damper.drive import effective_voltage
+from pzd.damper.drive import drive_row, effective_voltage
 from pzd.damper.motion import Motion
 from pzd.record import Array
 
@@ -100,8 +100,8 @@ def rubber(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Arr
     Equation: F = (x - P_r[x]) / r, P the play operator of half-width r
     """
     half_width = values["r"] * reached.stroke
-    steps = np.diff(motion.time)
-    follows = effective_voltage(np.ascontiguousarray(motion.displacement), steps, 0.0, half_width)
+    play = drive_row({"piezo_hysteresis": {"r": half_width}})
+    follows = effective_voltage(np.ascontiguousarray(motion.displacement), np.diff(motion.time), play)
     return np.asarray((motion.displacement - follows) / half_width)
 
 

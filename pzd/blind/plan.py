@@ -9,6 +9,7 @@ from typing import Literal, TypeVar
 
 from pzd.blind.config import BlindConfig, TestPlan
 from pzd.blind.outside import FORMS
+from pzd.damper.effect import Need
 from pzd.damper.effects import library
 
 Kind = Literal["single", "pair", "none", "outside"]
@@ -31,6 +32,10 @@ class Planned:
     def id(self) -> str:
         """What its files are called; it tells nothing of the truth."""
         return f"{self.index:05d}"
+
+    def needs(self, what: Need) -> bool:
+        """Whether something hidden shows only where this moves inside a test."""
+        return any(name in library() and library()[name].needs == what for name in self.hidden)
 
 
 def plan(config: BlindConfig) -> tuple[Planned, ...]:

@@ -10,9 +10,10 @@ import numpy as np
 
 from pzd.blind.clean import Clean
 from pzd.blind.outside import FORMS, Reached
-from pzd.blind.strengths import RULES, Values, of_size
+from pzd.blind.strengths import Values, of_size
 from pzd.damper.compose import respond
 from pzd.damper.effect import Scales
+from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.record import Array
@@ -33,11 +34,14 @@ def with_effects(
     """
     scales = _scales(records, plain)
     start = _start_temperature(records)
-    base = plain.model_copy(update={"reference_temperature_degC": start if "temperature_drift" in wanted else None})
+    drifts = any(library()[name].place == "material" for name in wanted)
+    base = plain.model_copy(update={"reference_temperature_degC": start if drifts else None})
     effects: dict[str, Values] = {}
     for name, size in wanted.items():
-        strength = RULES[name](draw, scales)
-        effects[name] = of_size(strength, partial(_size, records, base, name), size)
+        hiding = library()[name].hidden
+        if hiding is None:
+            raise ValueError(f"{name} says not how it is hidden")
+        effects[name] = of_size(hiding(draw, scales), partial(_size, records, base, name), size)
     return Damper(base=plain.base, effects=_plain(effects), reference_temperature_degC=base.reference_temperature_degC)
 
 

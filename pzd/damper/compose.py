@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.competing_forms import known
+from pzd.damper.columns import DRIVE, NEUTRAL, PARALLEL, STROKE_AND_FLOW, Column, acting
+from pzd.damper.competing_forms import module_of
 from pzd.damper.drive import effective_voltage
-from pzd.damper.effects import library
-from pzd.damper.effects.sensor_delay import law as moment
-from pzd.damper.flow import ROW, flow_force
+from pzd.damper.flow import flow_force
+from pzd.damper.kernels import parallel_forces, row_of
+from pzd.damper.laws import arguments, functions
 from pzd.damper.material import base_voltages, material
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.damper.parallel import COLUMNS, parallel_forces
 from pzd.damper.path import march
-from pzd.damper.rows import row_of
+from pzd.damper.values import columns_of, value_of
 
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-9
 """Admissible error of one piece of the path, as a share of the force."""
 
-_FLOW_COLUMNS = tuple(
-    (effect.name, parameter.name)
-    for column in ROW[3:]
-    for effect in library().values()
-    for parameter in effect.parameters
-    if parameter.name == column and effect.place in ("stroke", "flow")
-)
-_NEUTRAL = {(e.name, p.name): p.neutral for e in known().values() for p in e.parameters}
 _EVEN = 1e-6  # of the median sampling interval
 
 
@@ -57,19 +49,19 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
     """
     motion = motion.about(damper.zero_m)
     steps = sampling_steps(motion.time)
-    effective = voltage_at_valve(damper, standing(motion.voltage), steps)
-    rows = element_rows(damper, effective, standing(motion.temperature))
+    effective = voltage_at_valve(damper, constant_value(motion.voltage), steps)
+    rows = element_rows(damper, effective, constant_value(motion.temperature))
     parallel = parallel_rows(damper, effective)
-    force = with_parallel(element_force(rows, motion, steps, initial_force, tolerance), parallel, motion)
-    return recorded(value_of(damper, "sensor_delay", "tau"), motion.time, force)
+    force = with_parallel(integrated_force(rows, motion, steps, initial_force, tolerance), parallel, motion)
+    return recorded(sensors_of(damper), motion.time, force)
 
 
-def element_force(rows: Array, motion: Motion, steps: Array, initial_force: float, tolerance: float) -> Array:
+def integrated_force(rows: Array, motion: Motion, steps: Array, initial_force: float, tolerance: float) -> Array:
     """(n,) force [N] of the element with its stroke and flow effects.
 
     Parameters
     ----------
-    rows : (n, 10) or (1, 10) parameter rows
+    rows : (n, r) or (1, r) parameter rows, see `kernels.Row`
     motion : (n,) sampled motion
     steps : (n - 1,) or (1,) sampling intervals [s]
     initial_force : force of the oil spring at the first sample [N]
@@ -95,15 +87,16 @@ def with_parallel(force: Array, parallel: Array | None, motion: Motion) -> Array
 def constant_rows(
     friction: float, damping: float, stiffness: float, effects: Mapping[str, Mapping[str, float]]
 ) -> tuple[Array, Array | None]:
-    """The (1, 10) and (1, m) rows for `element_force` and `with_beside` where voltage and temperature stand still."""
-    flow = [effects.get(name, {}).get(parameter, _NEUTRAL[name, parameter]) for name, parameter in _FLOW_COLUMNS]
-    row = np.array([[friction, damping, stiffness, *flow]])
-    if not any(name in effects for name, _ in COLUMNS):
-        return row, None
-    return row, np.array([[effects.get(n, {}).get(parameter, _NEUTRAL[n, parameter]) for n, parameter in COLUMNS]])
+    """The (1, r) and (1, m) rows for `integrated_force` and `with_parallel` at constant voltage and temperature."""
+
+    def values(columns: Sequence[Column]) -> list[float]:
+        return [effects.get(name, {}).get(parameter, NEUTRAL[name, parameter]) for name, parameter in columns]
+
+    row = np.array([[friction, damping, stiffness, *values(STROKE_AND_FLOW)]])
+    return row, np.array([values(PARALLEL)]) if any(name in effects for name, _ in PARALLEL) else None
 
 
-def standing(channel: Array | None) -> Array | None:
+def constant_value(channel: Array | None) -> Array | None:
     """(1,) value of a channel that stands still; the channel itself (n,) where it moves, None where it is absent."""
     return channel if channel is None or np.any(channel != channel[0]) else channel[:1]
 
@@ -116,31 +109,70 @@ def sampling_steps(time: Array) -> Array:
 
 
 def voltage_at_valve(damper: Damper, voltage: Array | None, steps: Array) -> Array | None:
-    """(n,) voltage as the valve feels it [V]; None where none is given."""
-    tau, r = value_of(damper, "valve_lag", "tau"), value_of(damper, "piezo_hysteresis", "r")
-    if voltage is None or (tau == 0.0 and r == 0.0):
+    """(n,) voltage as the valve feels it [V]; None where none is given.
+
+    Raises
+    ------
+    ValueError : when a parameter of the drive is given by voltage
+    """
+    row = drive_row_of(damper)
+    if voltage is None or all(value == NEUTRAL[column] for value, column in zip(row, DRIVE, strict=True)):
         return voltage
-    return effective_voltage(voltage, steps, tau, r)
+    return effective_voltage(voltage, steps, row)
+
+
+def drive_row_of(damper: Damper) -> Array:
+    """(d,) the row of a damper's drive.
+
+    Raises
+    ------
+    ValueError : when a parameter of the drive is given by voltage
+    """
+    return np.array([value_of(damper, *column) for column in DRIVE])
 
 
 def element_rows(damper: Damper, effective: Array | None, temperature: Array | float | None) -> Array:
-    """(n, 10) parameter rows of the element with its stroke and flow effects, (1, 10) where nothing moves."""
+    """(n, r) parameter rows of the element with its stroke and flow effects, (1, r) where nothing moves."""
     base = material(damper, effective, temperature)
-    extra = _effect_columns(damper, _FLOW_COLUMNS, effective)
+    extra = columns_of(damper, STROKE_AND_FLOW, effective)
     rows = np.hstack([np.broadcast_to(part, (max(len(base), len(extra)), part.shape[1])) for part in (base, extra)])
     return rows[:1] if np.all(rows == rows[0]) else rows
 
 
 def parallel_rows(damper: Damper, effective: Array | None) -> Array | None:
     """(n, m) or (1, m) rows of the parallel effects; None without any."""
-    return (
-        _effect_columns(damper, COLUMNS, effective) if any(effect in damper.effects for effect, _ in COLUMNS) else None
-    )
+    return columns_of(damper, PARALLEL, effective) if any(name in damper.effects for name, _ in PARALLEL) else None
 
 
-def recorded(tau: float, time: Array, force: Array) -> Array:
-    """(n,) force as a channel delayed by tau [s] shows it [N], linear between samples, held before the first."""
-    return force if tau == 0.0 else np.asarray(np.interp(moment(time, tau), time, force))
+def sensors_of(damper: Damper) -> dict[str, dict[str, float]]:
+    """Parameters of the effects of the sensor that a damper has, by effect and name.
+
+    Raises
+    ------
+    ValueError : when one is given by voltage
+    """
+    return {
+        effect.name: {p.name: value_of(damper, effect.name, p.name) for p in effect.parameters}
+        for effect in acting("sensor")
+        if effect.name in damper.effects
+    }
+
+
+def shown_moments(sensors: Mapping[str, Mapping[str, float]], time: Array) -> Array:
+    """(n,) moments [s] whose force the channel shows at (n,) times [s], behind effects of the sensor."""
+    for effect in acting("sensor"):
+        if effect.name in sensors:
+            law = functions(effect, module_of(effect))["law"]
+            given = {**sensors[effect.name], "time": time}
+            time = np.asarray(law(**{argument: given[argument] for argument in arguments(law)}))
+    return time
+
+
+def recorded(sensors: Mapping[str, Mapping[str, float]], time: Array, force: Array) -> Array:
+    """(n,) force as the channel shows it behind effects of the sensor [N], linear between samples, held at the ends."""
+    if all(value == NEUTRAL[name, key] for name, values in sensors.items() for key, value in values.items()):
+        return force
+    return np.asarray(np.interp(shown_moments(sensors, time), time, force))
 
 
 def steady_force(
@@ -167,10 +199,11 @@ def steady_force(
     )
     v, u = speeds.ravel(), voltages.ravel()
     effective = None if voltage is None else u
-    rows = np.broadcast_to(element_rows(damper, effective, temperature), (v.size, len(ROW)))
+    rows = element_rows(damper, effective, temperature)
+    rows = np.broadcast_to(rows, (v.size, rows.shape[1]))
     side = np.copysign(1.0, v)
     force = np.array([s * flow_force(abs(w), row_of(row), s) for w, s, row in zip(v, side, rows, strict=True)])
-    parallel = _effect_columns(damper, COLUMNS, effective)
+    parallel = columns_of(damper, PARALLEL, effective)
     rest = np.zeros(v.size)
     moving = np.where(v == 0.0, side * np.finfo(np.float64).tiny, v)
     force += parallel_forces(rest, moving, rest, parallel) - parallel_forces(rest, rest, rest, parallel)
@@ -184,13 +217,11 @@ class Nodes:
     voltages: Array
     """(m,) rising nodes [V]; held beyond."""
     rows: Array
-    """(m, 10) parameter rows of the element."""
+    """(m, r) parameter rows of the element."""
     parallel: Array
-    """(m, b) rows of the parallel effects, columns as `beside.COLUMNS`."""
-    tau: float
-    """Time constant of the valve lag [s]."""
-    r: float
-    """Half-width of the play [V]."""
+    """(m, b) rows of the parallel effects, columns as `columns.PARALLEL`."""
+    drive: Array
+    """(d,) row of the drive, columns as `columns.DRIVE`."""
 
 
 def nodes_of(damper: Damper, temperature: float | None) -> Nodes:
@@ -199,40 +230,10 @@ def nodes_of(damper: Damper, temperature: float | None) -> Nodes:
     voltages = np.unique(np.concatenate([base_voltages(damper), *(np.atleast_1d(v) for v in listed)]))
     shape = (voltages.size, -1)
     rows = element_rows(damper, voltages, temperature)
-    parallel = _effect_columns(damper, COLUMNS, voltages)
+    parallel = columns_of(damper, PARALLEL, voltages)
     return Nodes(
         voltages,
         np.broadcast_to(rows, (voltages.size, rows.shape[1])).reshape(shape).copy(),
-        np.broadcast_to(parallel, (voltages.size, parallel.shape[1])).reshape(shape).copy(),
-        value_of(damper, "valve_lag", "tau"),
-        value_of(damper, "piezo_hysteresis", "r"),
+        np.broadcast_to(parallel, (voltages.size, parallel.shape[1])).copy(),
+        drive_row_of(damper),
     )
-
-
-def value_of(damper: Damper, effect: str, parameter: str) -> float:
-    """A parameter that is one number: the damper's, or the neutral one where it lacks the effect.
-
-    Raises
-    ------
-    ValueError : when the damper gives it by voltage
-    """
-    value = damper.effects.get(effect, {}).get(parameter, _NEUTRAL[effect, parameter])
-    if isinstance(value, tuple):
-        raise ValueError(f"{effect}.{parameter} must be one number, not a list by voltage")  # noqa: TRY004  # a wrong value of a config
-    return value
-
-
-def _effect_columns(damper: Damper, columns: tuple[tuple[str, str], ...], effective: Array | None) -> Array:
-    """(n, m) or (1, m) values of effect parameters, by the effective voltage where they are lists."""
-    values = [_column(damper, effect, parameter, effective) for effect, parameter in columns]
-    return np.stack(np.broadcast_arrays(*values), axis=-1)
-
-
-def _column(damper: Damper, effect: str, parameter: str, effective: Array | None) -> Array:
-    given = damper.effects.get(effect, {})
-    value = given.get(parameter, _NEUTRAL[effect, parameter])
-    if not isinstance(value, tuple):
-        return np.array([value])
-    if effective is None:
-        raise ValueError(f"{effect}.{parameter} depends on the voltage, and none is given")
-    return np.asarray(np.interp(effective, np.atleast_1d(given["at_voltage_V"]), np.array(value)))

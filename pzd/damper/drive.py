@@ -1,42 +1,44 @@
-"""The voltage as the valve feels it: the lag of the valve and its supply, then the play of the stack."""
+"""The voltage as the valve feels it: supply, valve and actuator, one behind the other."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pzd.compiled import compiled
-from pzd.damper.effects import piezo_hysteresis, valve_lag
+from pzd.damper.columns import DRIVE, NEUTRAL
+from pzd.damper.kernels import follow_voltage
 
 Array = NDArray[np.float64]
 
-lagged = compiled(valve_lag.law)
-with_play = compiled(piezo_hysteresis.law)
+
+def drive_row(effects: Mapping[str, Mapping[str, float]]) -> Array:
+    """(d,) the row of the drive of some effects, the others switched off."""
+    return np.array([effects.get(name, {}).get(parameter, NEUTRAL[name, parameter]) for name, parameter in DRIVE])
 
 
-def effective_voltage(voltage: Array, steps: Array, tau: float, r: float) -> Array:
+def effective_voltage(voltage: Array, steps: Array, row: Array) -> Array:
     """Voltage as the valve feels it, at rest with the first sample.
 
     Parameters
     ----------
     voltage : (n,) control signal, linear between samples [V]
     steps : (n - 1,) or (1,) sampling intervals [s]
-    tau : time constant of the lag [s]
-    r : half-width of the play [V]
+    row : (d,) parameters of the drive effects, see `drive_row`
 
     Returns
     -------
     (n,) effective voltage [V]
     """
     effective = np.empty_like(voltage)
-    _follow_voltage(voltage, steps, tau, r, effective)
+    _follow(voltage, steps, row, np.full(len(DRIVE), voltage[0]), effective)
     return effective
 
 
 @compiled
-def _follow_voltage(voltage: Array, steps: Array, tau: float, r: float, effective: Array) -> None:
-    late = voltage[0]
-    effective[0] = late
+def _follow(voltage: Array, steps: Array, row: Array, state: Array, effective: Array) -> None:
+    effective[0] = voltage[0]
     for i in range(1, voltage.size):
-        late = lagged(late, voltage[i - 1], voltage[i], steps[min(i - 1, steps.size - 1)], tau)
-        effective[i] = with_play(effective[i - 1], late, r)
+        effective[i] = follow_voltage(voltage[i - 1], voltage[i], steps[min(i - 1, steps.size - 1)], state, row)

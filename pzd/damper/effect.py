@@ -1,11 +1,46 @@
-"""What an effect declares of itself: its place, its parameters, its reference numbers."""
+"""What an effect file declares: place, parameters, how a fit looks for it, how the benchmark hides it, its law.
+
+An effect is one file in `effects/`, called like its effect: `EFFECT`, and the functions of its place. Nothing else
+names it: rows, kernels, stand, fit, table, half-car and benchmark follow from what the files declare. A function takes
+by name what it needs of the quantities of its law and of the effect's own parameters; `laws.py` holds both, and an
+effect that breaks a rule is an ImportError with the file's name. All but `material` and `sensor` are compiled by
+numba: they take and give numbers, and use `math` alone. Effects of one place act by `order`, then by name; with
+every parameter at its neutral value an effect is left out.
+
+drive
+    `law`: voltage felt a step later, the voltage that arrives going linearly from `before` to `now`; `rate`: its rate.
+    What it remembers is the voltage it gave last. Supply, valve and actuator; no force acts back on it.
+material
+    `friction_factor`, `damping_factor`, `stiffness_factor`: factors on T0, C and k by the recorded temperature.
+stroke
+    `law`: the extension of the oil spring, F = k extension, by the elastic deflection x - y and its side (+1 or -1),
+    rising; `inverse`; `slope` where it is not 1. A free play goes below zero on its side, and carries no force there.
+    Whatever is in series with the oil spring and gives by the force alone has its place here: late filling, a
+    compliant frame or mount, a gas volume that is compressed (accumulator, cavitation without its history).
+flow
+    One or more changes of the curve that gives the force by the flow speed w = |dy/dt| >= 0:
+    |F| = yield(w) + viscous(w) + extra(w), and beyond the force that opens a valve a straight line.
+    `direction_factor`: on T0 and C by the sign of F. `yield_force`, `yield_slope`: in place of T0, in proportion to it.
+    `viscous_force`, `viscous_slope`, `viscous_speed`: in place of C w, in proportion to C; speed is the inverse.
+    `extra_force`, `extra_slope`: beside both, 0 at w = 0; `extra_speed`: the flow speed at C w + extra, where there is
+    a closed form. `opens_at`, `slope_beyond`: force from which the slope is another. All rise with w.
+parallel
+    `law`: force beside the element by x, v and a of the piston, `about_zero` where a fit looks for the zero of x too.
+    It has no memory: a further slip branch (k_2, T0_2,
+    C_2) or a Bouc-Wen force has a state of its own, which no place allows yet.
+sensor
+    `law`: the moment whose force the channel shows.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    import numpy as np
 
 Place = Literal["drive", "material", "stroke", "flow", "parallel", "sensor"]
 """Where in the damper something can be missing, in physical order."""
@@ -48,6 +83,29 @@ class Search:
     """Smallest and largest value that is looked at, in that size."""
 
 
+Strength = Callable[[float], dict[str, float]]
+"""Parameters of an effect at a strength between 0 (next to nothing) and 1 (the most)."""
+Hiding = Callable[["np.random.Generator", Scales], Strength]
+"""Draws what else there is to an effect than its strength, on a rig of that size."""
+
+
+def growing(name: str, most: Callable[[Scales], float], *, either: bool = False) -> Hiding:
+    """Hides an effect of one parameter that grows from 0 with the strength.
+
+    Parameters
+    ----------
+    name : of the parameter
+    most : its value at strength 1
+    either : to either side, where the physics has no preference
+    """
+
+    def hiding(draw: np.random.Generator, scales: Scales) -> Strength:
+        end = most(scales) * (float(draw.choice([-1.0, 1.0])) if either else 1.0)
+        return lambda s: {name: end * s}
+
+    return hiding
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One parameter of an effect."""
@@ -85,9 +143,13 @@ class Effect:
     source: str
     """Where the law comes from."""
     tests: tuple[tuple[Mapping[str, float], float], ...]
-    """Reference numbers: the arguments of the module's `law`, and what it gives."""
+    """Reference numbers: the arguments of one of the effect's laws, by name, and what it gives."""
     needs: Need | None = None
     """What must move in a test for the effect to be seen at all."""
+    hidden: Hiding | None = None
+    """How the blind benchmark draws it; None for what it never hides, a competing form."""
+    order: int = 0
+    """Where it acts among the effects of its place: those of a smaller number come first."""
     about_zero: bool = False
     """Whether a fit looks for the zero of the displacement too: the law is another about another zero."""
 

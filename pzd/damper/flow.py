@@ -1,80 +1,86 @@
 """The flow curve: which force drives the oil at which speed, with every flow effect in its place.
 
-Equation: |F| = T0 tanh(w/w_s) + visc(w) + q w^2, visc = C w or C w_r (w/w_r)^n; where it passes
-b = max(F_r, T0) it goes on with slope C_r. w = |dy/dt| >= 0; T0 and C after drive, material and
-asymmetry. The curve rises with w, so w(F) exists; below the breakaway force nothing flows.
-
-Parameters travel as one tuple, in the order of `ROW`.
+Equation: |F| = yield(w) + viscous(w) + extra(w); T0 + C w without effects, with those of the library
+T0 tanh(w/w_s) + C w_r (w/w_r)^n + q w^2; where it passes b = max(F_r, T0) it goes on with slope C_r.
+w = |dy/dt| >= 0; T0 and C after drive, material and direction. The curve rises with w, so w(F) exists;
+below the breakaway force nothing flows.
 """
 
 from __future__ import annotations
 
-import math
-
 from pzd.compiled import compiled
-from pzd.damper.effects import asymmetry, lash, orifice_quadratic, relief_valve, rounded_yield, shear_thinning
-
-Row = tuple[float, ...]
-
-ROW = ("T0", "C", "k", "delta", "q", "n", "F_r", "C_r", "w_s", "alpha")
-"""The places in a parameter row; those after k are the parameters of the stroke and flow effects."""
-T0, C, K, DELTA, Q, N, F_R, C_R, W_S, ALPHA = range(len(ROW))
-
-_friction = compiled(rounded_yield.law)
-_friction_slope = compiled(rounded_yield.slope)
-_viscous = compiled(shear_thinning.law)
-_viscous_slope = compiled(shear_thinning.slope)
-_viscous_speed = compiled(shear_thinning.speed)
-_orifice = compiled(orifice_quadratic.law)
-_orifice_slope = compiled(orifice_quadratic.slope)
-_relief = compiled(relief_valve.law)
-_side = compiled(asymmetry.law)
-spring_extension = compiled(lash.law)
+from pzd.damper import kernels
+from pzd.damper.kernels import T0, C, Row, direction_factor
 
 _NEWTON_STEPS = 60
 _NEWTON_TOLERANCE = 1e-13
 
 
+_friction, _friction_slope, _friction_is_sharp = kernels.yield_force, kernels.yield_slope, kernels.yield_sharp
+_viscous, _viscous_slope, _viscous_speed = kernels.viscous_force, kernels.viscous_slope, kernels.viscous_speed
+_viscous_is_straight = kernels.viscous_straight
+_extra, _extra_slope, _extra_speed, _no_extra = (
+    kernels.extra_force,
+    kernels.extra_slope,
+    kernels.extra_speed,
+    kernels.extra_none,
+)
+_relief = kernels.relief_of
+
+
 @compiled
 def breakaway(p: Row, side: float) -> float:
     """Force [N] below which nothing flows in the direction `side` (+1 rebound, -1 compression)."""
-    return _friction(0.0, p[T0] * _side(side, p[ALPHA]), p[W_S])
+    return _friction(0.0, p[T0] * direction_factor(side, p), p)
 
 
 @compiled
 def relief(p: Row, side: float) -> float:
     """Force [N] beyond which the relief valve carries the rise."""
-    return _relief(p[F_R], p[T0] * _side(side, p[ALPHA]))
+    edge, _ = _relief(p[T0] * direction_factor(side, p), p)
+    return edge
+
+
+@compiled
+def relief_slope(p: Row, side: float) -> float:
+    """Slope of the curve [N s/m] beyond `relief`."""
+    _, slope = _relief(p[T0] * direction_factor(side, p), p)
+    return slope
+
+
+@compiled
+def straight(p: Row) -> bool:
+    """Whether the curve is T0 + C w, the relief valve shut."""
+    return _no_extra(p) and _viscous_is_straight(p) and _friction_is_sharp(p)
 
 
 @compiled
 def viscous_force(w: float, p: Row, side: float) -> float:
     """Viscous force s [N] at a flow speed w >= 0 [m/s]."""
-    return _viscous(w, p[C] * _side(side, p[ALPHA]), p[N])
+    return _viscous(w, p[C] * direction_factor(side, p), p)
 
 
 @compiled
 def viscous_speed(s: float, p: Row, side: float) -> float:
     """Flow speed w [m/s] at a viscous force s >= 0 [N]."""
-    return _viscous_speed(s, p[C] * _side(side, p[ALPHA]), p[N])
+    return _viscous_speed(s, p[C] * direction_factor(side, p), p)
 
 
 @compiled
 def smooth_force_of(s: float, p: Row, side: float) -> float:
     """|F| [N] at a viscous force s >= 0 [N], the relief valve shut."""
     w = viscous_speed(s, p, side)
-    return _friction(w, p[T0] * _side(side, p[ALPHA]), p[W_S]) + s + _orifice(w, p[Q])
+    return _friction(w, p[T0] * direction_factor(side, p), p) + s + _extra(w, p)
 
 
 @compiled
-def smooth_rise(s: float, w: float, p: Row, side: float) -> float:
-    """d|F|/ds >= 1 of `smooth_force_of`, at a viscous force s [N] and its flow speed w [m/s]."""
-    bend = _friction_slope(w, p[T0] * _side(side, p[ALPHA]), p[W_S]) + _orifice_slope(w, p[Q])
+def smooth_rise(w: float, p: Row, side: float) -> float:
+    """d|F|/ds >= 1 of `smooth_force_of` at a flow speed w [m/s]."""
+    factor = direction_factor(side, p)
+    bend = _friction_slope(w, p[T0] * factor, p) + _extra_slope(w, p)
     if bend == 0.0:
         return 1.0
-    if s <= 0.0 and p[N] != 1.0:
-        return 1.0
-    return 1.0 + bend / _viscous_slope(w, p[C] * _side(side, p[ALPHA]), p[N])
+    return 1.0 + bend / _viscous_slope(w, p[C] * factor, p)
 
 
 @compiled
@@ -85,25 +91,25 @@ def smooth_force(w: float, p: Row, side: float) -> float:
 
 @compiled
 def smooth_slope(w: float, p: Row, side: float) -> float:
-    """Slope [N s/m] of `smooth_force`; w > 0 where the fluid thins."""
-    rise = smooth_rise(viscous_force(w, p, side), w, p, side)
-    return rise * _viscous_slope(w, p[C] * _side(side, p[ALPHA]), p[N])
+    """Slope [N s/m] of `smooth_force`; infinite at w = 0 where the fluid thins."""
+    return smooth_rise(w, p, side) * _viscous_slope(w, p[C] * direction_factor(side, p), p)
 
 
 @compiled
 def smooth_speed(force: float, p: Row, side: float, guess: float) -> float:
     """Flow speed [m/s] at a force at or above breakaway [N], the relief valve shut; closed form where there is one."""
-    factor = _side(side, p[ALPHA])
-    if p[W_S] <= 0.0:
+    factor = direction_factor(side, p)
+    if _friction_is_sharp(p):
         over = max(force - p[T0] * factor, 0.0)
-        if p[Q] == 0.0:
-            return _viscous_speed(over, p[C] * factor, p[N])
-        if p[N] == 1.0:
-            viscous = p[C] * factor
-            return 2.0 * over / (viscous + math.sqrt(viscous * viscous + 4.0 * p[Q] * over))
+        if _no_extra(p):
+            return _viscous_speed(over, p[C] * factor, p)
+        if _viscous_is_straight(p):
+            speed = _extra_speed(over, p[C] * factor, p)
+            if speed >= 0.0:
+                return speed
     if force <= 0.0:
         return 0.0
-    low, high = 0.0, _viscous_speed(force, p[C] * factor, p[N])
+    low, high = 0.0, _viscous_speed(force, p[C] * factor, p)
     w = guess if low < guess < high else 0.5 * high
     for _ in range(_NEWTON_STEPS):
         miss = smooth_force(w, p, side) - force
@@ -127,7 +133,7 @@ def flow_force(w: float, p: Row, side: float) -> float:
     limit = relief(p, side)
     if force <= limit:
         return force
-    return limit + p[C_R] * (w - smooth_speed(limit, p, side, w))
+    return limit + relief_slope(p, side) * (w - smooth_speed(limit, p, side, w))
 
 
 @compiled
@@ -135,7 +141,7 @@ def flow_speed(force: float, p: Row, side: float, guess: float) -> float:
     """Flow speed w >= 0 [m/s] that a force >= 0 [N] drives: `flow_force` inverted."""
     limit = relief(p, side)
     if force > limit:
-        return smooth_speed(limit, p, side, guess) + (force - limit) / p[C_R]
+        return smooth_speed(limit, p, side, guess) + (force - limit) / relief_slope(p, side)
     if force <= breakaway(p, side):
         return 0.0
     return smooth_speed(force, p, side, guess)

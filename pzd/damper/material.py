@@ -1,6 +1,6 @@
 """T0, C and k as they are now: interpolated between the damper's base rows, held beyond them.
 
-Over temperature first, at each voltage, then over voltage; `temperature_drift` multiplies.
+Over temperature first, at each voltage, then over voltage; the effects of the material multiply.
 """
 
 from __future__ import annotations
@@ -10,8 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.effects.temperature_drift import law as drift
+from pzd.damper.columns import acting
+from pzd.damper.competing_forms import module_of
+from pzd.damper.laws import arguments, functions
 from pzd.damper.model import BaseRow, Damper
+from pzd.damper.values import column
 
 Array = NDArray[np.float64]
 
@@ -46,7 +49,7 @@ def material(damper: Damper, voltage: Array | float | None, temperature: Array |
     at_nodes = np.stack([_over_temperature(rows, temperature) for _, rows in groups])
     nodes = np.array([node for node, _ in groups])
     values = _over_voltage(nodes, at_nodes, np.atleast_1d(0.0 if voltage is None else voltage))
-    return values * _drift_factors(damper, temperature)
+    return values * _factors(damper, None if voltage is None else np.atleast_1d(voltage), temperature)
 
 
 def by_voltage(rows: Sequence[BaseRow]) -> list[tuple[float, list[BaseRow]]]:
@@ -84,17 +87,21 @@ def _over_voltage(nodes: Array, at_nodes: Array, voltage: Array) -> Array:
     return np.asarray(below + share * (above - below))
 
 
-def _drift_factors(damper: Damper, temperature: Array | float | None) -> Array:
-    values = damper.effects.get("temperature_drift")
-    if values is None or temperature is None:
-        return np.ones((1, 3))
-    betas = [_single(values["beta_T0"]), _single(values["beta_C"])]
-    reference = damper.reference_temperature_degC or 0.0
-    factors = np.ones((np.size(temperature), 3))
-    for column, beta in enumerate(betas):
-        factors[:, column] = drift(temperature, reference, beta)
+_FACTORS = {"friction_factor": 0, "damping_factor": 1, "stiffness_factor": 2}
+"""Laws of the material by the column of T0, C and k that they multiply."""
+
+
+def _factors(damper: Damper, voltage: Array | None, temperature: Array | float | None) -> Array:
+    """(n, 3) or (1, 3) product of the factors of every material effect on T0, C and k."""
+    factors = np.ones((1, 3))
+    for effect in acting("material"):
+        if effect.name not in damper.effects or temperature is None:
+            continue
+        given = {p.name: column(damper, effect.name, p.name, voltage) for p in effect.parameters}
+        given["temperature"] = np.atleast_1d(np.asarray(temperature, dtype=np.float64))
+        given["reference"] = np.array([damper.reference_temperature_degC or 0.0])
+        for name, law in functions(effect, module_of(effect)).items():
+            factor = np.atleast_1d(law(**{argument: given[argument] for argument in arguments(law)}))
+            factors = np.repeat(factors, max(factor.size // len(factors), 1), axis=0)
+            factors[:, _FACTORS[name]] *= factor
     return factors
-
-
-def _single(value: float | tuple[float, ...]) -> float:
-    return value if isinstance(value, float) else value[0]

@@ -41,7 +41,7 @@ class Damper(Frozen):
     effects: dict[str, dict[str, float | tuple[float, ...]]] = Field(default_factory=dict)
     """Parameters of each effect, by the effect's name; see `pzd effects`."""
     reference_temperature_degC: float | None = None
-    """T_ref of `temperature_drift`; needed only with that effect."""
+    """T_ref of the effects of the material, as `temperature_drift`; needed only with one of them."""
     zero_m: float = 0.0
     """Recorded displacement from which x in the laws of `end_stop` and `gas_spring` is counted, as a displacement
     sensor has any zero: the middle of the stroke on the stand. In a car it is the static position."""
@@ -50,8 +50,9 @@ class Damper(Frozen):
     def _known_effects(self) -> Damper:
         for name, values in self.effects.items():
             _check_effect(name, values)
-        if "temperature_drift" in self.effects and self.reference_temperature_degC is None:
-            raise ValueError("temperature_drift needs reference_temperature_degC")
+        for name in self.effects:
+            if known()[name].place == "material" and self.reference_temperature_degC is None:
+                raise ValueError(f"{name} needs reference_temperature_degC")
         return self
 
     def with_effect(self, name: str, values: EffectValues) -> Damper:

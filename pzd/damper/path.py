@@ -2,7 +2,7 @@
 
 Over a step the extension speed u = dx/dt and the parameter row go linearly:
 
-    de/dt = u(t) - side w(|F|),   F = k(t) dead_zone(e),   side = sign(F)
+    de/dt = u(t) - side w(|F|),   F = k(t) s(e),   side = sign(F)
 
 Where a piece of the path leaves its regime, the moment is found by bracketing and the piece is cut.
 """
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from pzd.compiled import compiled
 from pzd.damper.dormand_prince import STAGES
-from pzd.damper.flow import DELTA, T0, C, K, Row, smooth_force, spring_extension
+from pzd.damper.flow import smooth_force
+from pzd.damper.kernels import T0, C, K, Row, interpolate, row_of
 from pzd.damper.pieces import Step, piece, row_in
 from pzd.damper.regimes import (
     SMOOTH,
@@ -27,9 +28,9 @@ from pzd.damper.regimes import (
     over_yield,
     regime_of,
     speed_at,
+    spring_energy,
     spring_force,
 )
-from pzd.damper.rows import interpolate, row_of
 
 Array = NDArray[np.float64]
 
@@ -158,9 +159,15 @@ def _book(
         start, half, end = abs(spring_force(e0, first)), abs(spring_force(em, middle)), abs(spring_force(e1, last))
         state[DISSIPATED] += dt / 6.0 * (start * w0 + 4.0 * half * wm + end * w1)
     if step.moving:
-        s0, s1 = spring_extension(e0, first[DELTA]), spring_extension(e1, last[DELTA])
-        sm = spring_extension(em, middle[DELTA])
-        state[VALVE_WORK] += (last[K] - first[K]) / 12.0 * (s0 * s0 + 4.0 * sm * sm + s1 * s1)
+        state[VALVE_WORK] += (
+            _tightening(e0, first, last) + 4.0 * _tightening(em, first, last) + _tightening(e1, first, last)
+        ) / 6.0
+
+
+@compiled
+def _tightening(e: float, first: Row, last: Row) -> float:
+    """Work [J] of turning one row into another at an elastic deflection [m]."""
+    return spring_energy(e, last, last[K]) - spring_energy(e, first, first[K])
 
 
 def march(
@@ -173,7 +180,7 @@ def march(
     displacement : (n,) extension [m]
     velocity : (n,) extension speed [m/s], whose change bends the displacement inside a step; (1,) for straight
     steps : (n - 1,) or (1,) sampling intervals [s]
-    rows : (n, 10) or (1, 10) parameter rows, linear between samples
+    rows : (n, r) or (1, r) parameter rows, see `kernels.Row`, linear between samples
     initial_force : force of the oil spring at the first sample [N]
     tolerance : admissible error of a piece, as a share of the force
 
@@ -184,6 +191,19 @@ def march(
     force = np.empty(displacement.size)
     _march(displacement, velocity, steps, rows, initial_force, tolerance, np.zeros(STATES), np.empty(STAGES), force)
     return force
+
+
+def deflections(force: Array, rows: Array) -> Array:
+    """(n,) elastic deflection [m] at which the oil spring carries (n,) forces [N], by (n, r) or (1, r) rows."""
+    found = np.empty(force.size)
+    _fill_deflections(force, rows, found)
+    return found
+
+
+@compiled
+def _fill_deflections(force: Array, rows: Array, found: Array) -> None:
+    for i in range(force.size):
+        found[i] = deflection_at(force[i], row_of(rows[min(i, rows.shape[0] - 1)]))
 
 
 @compiled

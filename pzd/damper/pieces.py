@@ -16,21 +16,16 @@ from numpy.typing import NDArray
 from pzd.compiled import compiled
 from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
 from pzd.damper.flow import (
-    C_R,
-    DELTA,
-    W_S,
-    K,
-    N,
-    Q,
-    Row,
     breakaway,
+    relief_slope,
     smooth_force_of,
     smooth_rise,
+    straight,
     viscous_force,
     viscous_speed,
 )
-from pzd.damper.regimes import RELIEF, STICK, speed_at, spring_force
-from pzd.damper.rows import interpolate
+from pzd.damper.kernels import K, Row, interpolate, stroke_law, stroke_moves, stroke_slope, stroke_straight
+from pzd.damper.regimes import RELIEF, STICK, deflection_on, speed_at, spring_force
 
 Array = NDArray[np.float64]
 
@@ -71,22 +66,22 @@ def piece(
         return e + dt * extension_speed(step, at + 0.5 * dt), 0.0, 0.0
     p = row_in(step, at)
     force = abs(spring_force(e, p))
-    if not step.moving and (regime == RELIEF or (p[Q] == 0.0 and p[N] == 1.0 and p[W_S] <= 0.0)):
-        slope = p[C_R] if regime == RELIEF else viscous_force(1.0, p, side)
+    if not step.moving and stroke_straight(p) and (regime == RELIEF or straight(p)):
+        slope = relief_slope(p, side) if regime == RELIEF else viscous_force(1.0, p, side)
         pull = side * extension_speed(step, at)
         end = _straight(force, p[K], slope, p[K] * (pull - w), side * (step.u1 - step.u0) / step.h, dt)
-        return side * (end / p[K] + 0.5 * p[DELTA]), w + (end - force) / slope, 0.0
+        return deflection_on(end, p, side), w + (end - force) / slope, 0.0
     y, error = _runge_kutta(
         force if regime == RELIEF else viscous_force(w, p, side), at, dt, regime, side, step, stages
     )
     p = row_in(step, at + dt)
     if regime == RELIEF:
-        return side * (y / p[K] + 0.5 * p[DELTA]), speed_at(y, p, regime, side, w), abs(error)
+        return deflection_on(y, p, side), speed_at(y, p, regime, side, w), abs(error)
     if y < 0.0:
-        return side * (0.5 * p[DELTA] + (breakaway(p, side) + y) / p[K]), 0.0, abs(error)
+        return deflection_on(breakaway(p, side) + y, p, side), 0.0, abs(error)
     w = viscous_speed(y, p, side)
-    error *= smooth_rise(y, w, p, side)
-    return side * (smooth_force_of(y, p, side) / p[K] + 0.5 * p[DELTA]), w, abs(error)
+    error *= smooth_rise(w, p, side)
+    return deflection_on(smooth_force_of(y, p, side), p, side), w, abs(error)
 
 
 @compiled
@@ -125,16 +120,21 @@ def _runge_kutta(
 def _rate(y: float, at: float, regime: int, side: float, step: Step) -> float:
     """Rate of the integrated variable: of s in SMOOTH, of |F| in RELIEF.
 
-    Equation: d|F|/dt = k (side u - w) + (dk/dt)/k |F|; in SMOOTH less what the moving curve does by itself
+    Equation: d|F|/dt = k s'(e) (side u - w) + (dk/dt)/k |F| + k ds/dt at e; in SMOOTH less what the moving curve
+    does by itself
     """
     p = row_in(step, at)
     pull = side * extension_speed(step, at)
     softening = (step.p1[K] - step.p0[K]) / (step.h * p[K]) if step.moving else 0.0
+    bent = not stroke_straight(p) or (step.moving and stroke_moves(step.p0, step.p1))
     if regime == RELIEF:
-        return p[K] * (pull - speed_at(y, p, regime, side, 0.0)) + softening * y
+        rate = p[K] * (pull - speed_at(y, p, regime, side, 0.0))
+        return (_behind_stroke(rate, y, at, p, side, step) if bent else rate) + softening * y
     s = max(y, 0.0)
     w = viscous_speed(s, p, side)
     rate = p[K] * (pull - w)
+    if bent:
+        rate = _behind_stroke(rate, smooth_force_of(s, p, side), at, p, side, step)
     if step.moving:
         span = _DIFFERENCE * step.h
         ahead, behind = (
@@ -142,4 +142,19 @@ def _rate(y: float, at: float, regime: int, side: float, step: Step) -> float:
             smooth_force_of(s, row_in(step, at - span), side),
         )
         rate += softening * smooth_force_of(s, p, side) - (ahead - behind) / (2.0 * span)
-    return rate / smooth_rise(s, w, p, side)
+    return rate / smooth_rise(w, p, side)
+
+
+@compiled
+def _behind_stroke(rate: float, force: float, at: float, p: Row, side: float, step: Step) -> float:
+    """Rate of |F| [N/s] behind the stroke effects, at a |F| [N] whose rate without them is given.
+
+    Equation: d|F|/dt = s'(e) rate + k ds/dt at constant e
+    """
+    e = deflection_on(force, p, side)
+    rate *= stroke_slope(e, side, p)
+    if step.moving:
+        span = _DIFFERENCE * step.h
+        ahead, behind = stroke_law(e, side, row_in(step, at + span)), stroke_law(e, side, row_in(step, at - span))
+        rate += p[K] * side * (ahead - behind) / (2.0 * span)
+    return rate

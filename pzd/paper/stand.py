@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.damper.compose import value_of
 from pzd.damper.model import BaseRow, Damper
+from pzd.damper.values import value_of
 from pzd.paper.published import LARGE_GAP, SMALL_GAP
 from pzd.paper.valve import Valve, stand_damper
 

@@ -3,9 +3,9 @@
 Car, road, bounds and tie-break are those of `pzd.simulate`; only the loop is one of its own. The rides of
 `pzd.simulate` balance energies, cut steps and write histories, which takes six times as long (0.075 against 0.012 s a
 car and tie-break): the survey of 690 rows with eight neighbours each would take half an hour instead of minutes.
-Over every sixtieth row of cars.csv the peaks agree to 1e-4 in the median and 1 % at most, which is also how far those
-of `pzd.simulate` move with its own tolerance (1e-9, 1e-6, fixed steps): where the control jumps from one end of its
-range to the other, a peak is not defined more closely. tests/paper/test_car_search.py holds both against each other.
+Over every sixtieth row of cars.csv the peaks agree to 1e-4 in the median and 1 % at most (fixed steps or a tolerance
+of 1e-9), which is also how far those of `pzd.simulate` move between these two: where the control jumps from one end of
+its range to the other, a peak is not defined more closely. tests/paper/test_car_search.py holds both against each other.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import ForceRow, Table
+from pzd.damper.columns import DRIVE
 from pzd.damper.compose import nodes_of, steady_force
-from pzd.damper.flow import C, K
+from pzd.damper.kernels import C, K, parallel_force
 from pzd.damper.model import Damper
-from pzd.damper.parallel import parallel_force
 from pzd.record import Array
 from pzd.schema.errors import DataError
 from pzd.simulate.car import HalfCar
@@ -74,10 +74,12 @@ def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -
     nodes = nodes_of(damper, temperature)
     rows = np.array(nodes.rows)
     rows[:, K] = np.minimum(rows[:, K], rows[:, C] / LEAST_RELAXATION)
-    lag = nodes.tau if "valve_lag" in damper.effects else valve
+    drive = np.array(nodes.drive)
+    if "valve_lag" not in damper.effects:
+        drive[DRIVE.index(("valve_lag", "tau"))] = valve
     parallel = np.ascontiguousarray(nodes.parallel)
     alone = not any(_is_parallel(row) for row in parallel)
-    return DynamicDamper(nodes.voltages, rows, parallel, float(lag), float(nodes.r), alone, np.zeros(parallel.shape[1]))
+    return DynamicDamper(nodes.voltages, rows, parallel, drive, alone, np.zeros(parallel.shape[1]))
 
 
 def rubs(dynamic: DynamicDamper) -> bool:

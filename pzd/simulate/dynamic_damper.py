@@ -6,14 +6,15 @@ import math
 from typing import NamedTuple
 
 from pzd.compiled import compiled, laid_in
-from pzd.damper.drive import with_play
-from pzd.damper.flow import DELTA, K, Row, flow_speed, spring_extension
-from pzd.damper.parallel import parallel_force
-from pzd.damper.regimes import spring_force
+from pzd.damper.flow import flow_speed
+from pzd.damper.kernels import K, Row, parallel_force, row_of, stroke_moves, voltage_felt, with_stroke_of
+from pzd.damper.regimes import spring_energy, spring_force
+from pzd.damper.rows import row_at
 from pzd.record import Array
 from pzd.table.kernel import bracket
 
 _TINY = 1e-300  # m/s: a speed that only carries its sign
+_DIFFERENCE = 1e-4  # of an interval of voltage: the parameters are linear in it, the energy of the spring is nearly
 
 
 class DynamicDamper(NamedTuple):
@@ -22,10 +23,7 @@ class DynamicDamper(NamedTuple):
     voltages: Array
     rows: Array
     parallel: Array
-    lag: float
-    """Time constant of the valve [s]."""
-    play: float
-    """Half-width of the piezo's play [V]."""
+    drive: Array
     alone: bool
     """Whether nothing stands beside the element."""
     scratch: Array
@@ -45,7 +43,7 @@ def place(nodes: Array, value: float) -> tuple[int, float]:
 
 @laid_in
 def parallel_at(damper: DynamicDamper, voltage: float, row: Array) -> None:
-    """Fill `row` with the parameters of the parallel effects at a effective voltage: linear between, held beyond."""
+    """Fill `row` with the parameters of the parallel effects at an effective voltage: linear between, held beyond."""
     i, share = place(damper.voltages, voltage)
     for j in range(row.size):
         row[j] = damper.parallel[i, j] + share * (
@@ -62,35 +60,18 @@ def row_slope(voltages: Array, rows: Array, voltage: float, column: int) -> floa
     return float((rows[i + 1, column] - rows[i, column]) / (voltages[i + 1] - voltages[i]))
 
 
-@laid_in
-def lagging(damper: DynamicDamper, voltage: float, before: float, elapsed: float) -> float:
-    """Voltage behind the lag of the valve [V], a time [s] after it was set while the lag stood at `before` [V].
-
-    Equation: tau dUe/dt + Ue = U, U constant      Source: effect `valve_lag`
-    """
-    if damper.lag <= 0.0:
-        return voltage
-    return voltage + (before - voltage) * math.exp(-elapsed / damper.lag)
-
-
 @compiled
-def effective_voltage(
-    damper: DynamicDamper, voltage: float, before: float, effective_before: float, elapsed: float
-) -> tuple[float, float]:
-    """Voltage that the stack shows [V] and its rate [V/s], a time after the voltage was set.
+def effective_voltage(damper: DynamicDamper, voltage: float, kept: Array, elapsed: float) -> tuple[float, float]:
+    """Voltage as the valve feels it [V] and its rate [V/s], a time after the voltage was set.
 
     Parameters
     ----------
     damper : the damper
     voltage : set by the controller, and held since [V]
-    before, effective_before : behind the lag, and behind lag and play, when it was set [V]
+    kept : (d,) voltage behind each drive effect when it was set [V]
     elapsed : time since [s]
     """
-    late = lagging(damper, voltage, before, elapsed)
-    shown = with_play(effective_before, late, damper.play)
-    if damper.lag <= 0.0 or abs(late - shown) < damper.play * (1.0 - 1e-9) or (late - shown) * (voltage - late) < 0.0:
-        return shown, 0.0
-    return shown, (voltage - late) / damper.lag
+    return voltage_felt(voltage, elapsed, kept, damper.drive)
 
 
 @laid_in
@@ -106,23 +87,36 @@ def flowing(e: float, row: Row, guess: float) -> tuple[float, float]:
 
 @compiled
 def stored(e: float, row: Row) -> float:
-    """Energy of the oil spring [J] at its elastic deflection [m]: k s^2 / 2, s behind the lash."""
-    extension = spring_extension(e, row[DELTA])
-    return float(0.5 * row[K] * extension * extension)
+    """Energy of the oil spring [J] at its elastic deflection [m]."""
+    return spring_energy(e, row, row[K])
 
 
 @compiled
 def valve_power(damper: DynamicDamper, e: float, row: Row, voltage: float, rate: float) -> float:
     """Power with which the valve tightens the oil spring [W] while the effective voltage moves at `rate` [V/s].
 
-    Equation: (dk/dt) s^2 / 2 + F (ds/d delta) (d delta/dt)      Source: first law, the state being y
+    Equation: rate dE/dU at constant deflection, E = k integral s de      Source: first law, the state being y
     """
     if rate == 0.0:
         return 0.0
-    extension = spring_extension(e, row[DELTA])
-    power = 0.5 * row_slope(damper.voltages, damper.rows, voltage, K) * extension * extension
-    power -= 0.5 * abs(row[K] * extension) * row_slope(damper.voltages, damper.rows, voltage, DELTA)
-    return power * rate
+    power = spring_energy(e, row, row_slope(damper.voltages, damper.rows, voltage, K))
+    return (power + _stroke_slope(damper, e, row, voltage)) * rate
+
+
+@compiled
+def _stroke_slope(damper: DynamicDamper, e: float, row: Row, voltage: float) -> float:
+    """Derivative of the energy of the oil spring by the effective voltage [J/V], by the stroke effects alone."""
+    nodes = damper.voltages
+    if nodes.size == 1 or voltage <= nodes[0] or voltage >= nodes[-1]:
+        return 0.0
+    i = bracket(nodes, voltage)
+    if not stroke_moves(row_of(damper.rows[i]), row_of(damper.rows[i + 1])):
+        return 0.0
+    low = max(voltage - _DIFFERENCE * (nodes[i + 1] - nodes[i]), nodes[i])
+    high = min(voltage + _DIFFERENCE * (nodes[i + 1] - nodes[i]), nodes[i + 1])
+    ahead = spring_energy(e, with_stroke_of(row, row_at(nodes, damper.rows, high)), row[K])
+    behind = spring_energy(e, with_stroke_of(row, row_at(nodes, damper.rows, low)), row[K])
+    return float((ahead - behind) / (high - low))
 
 
 @laid_in

@@ -8,12 +8,11 @@ from pzd.record import Array
 from pzd.simulate.dynamic_damper import effective_voltage, stored
 from pzd.simulate.kinematics import suspension
 from pzd.simulate.ride_model import (
-    BEFORE,
+    BEHIND,
     BESIDE_WORK,
     DEFLECTION,
     DISSIPATED,
     DYNAMIC,
-    EFFECTIVE,
     HEAVE_RATE,
     OIL_1,
     PITCH_RATE,
@@ -51,7 +50,7 @@ def stored_energy(time: float, y: Array, model: RideModel, control: Array, works
         energy += 0.5 * car.stiffness[i] * workspace[DEFLECTION, i] ** 2
         if model.control_spec.fidelity == DYNAMIC:
             elapsed = time - control[SINCE, 0]
-            voltage, _ = effective_voltage(damper, control[SET, i], control[BEFORE, i], control[EFFECTIVE, i], elapsed)
+            voltage, _ = effective_voltage(damper, control[SET, i], control[BEHIND:, i], elapsed)
             energy += car.dampers[i] * stored(y[OIL_1 + i], row_at(damper.voltages, damper.rows, voltage))
     return float(energy)
 

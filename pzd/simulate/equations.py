@@ -19,14 +19,13 @@ from pzd.simulate.kinematics import suspension
 from pzd.simulate.quasistatic import quasistatic_forces
 from pzd.simulate.ride_model import (
     ACCELERATION,
-    BEFORE,
+    BEHIND,
     BESIDE_WORK,
     BODY,
     COMFORT,
     DEFLECTION,
     DISSIPATED,
     DYNAMIC,
-    EFFECTIVE,
     ELASTIC,
     FLOW,
     FORCE,
@@ -71,7 +70,7 @@ def dynamic_forces(time: float, y: Array, model: RideModel, control: Array, work
     elapsed = time - control[SINCE, 0]
     for i in range(2):
         ratio, n = car.ratio[i], car.dampers[i]
-        voltage, moving = effective_voltage(damper, control[SET, i], control[BEFORE, i], control[EFFECTIVE, i], elapsed)
+        voltage, moving = effective_voltage(damper, control[SET, i], control[BEHIND:, i], elapsed)
         row = row_at(damper.voltages, damper.rows, voltage)
         e = y[OIL_1 + i]
         workspace[OIL_FORCE, i], workspace[FLOW, i] = flowing(e, row, abs(workspace[FLOW, i]))

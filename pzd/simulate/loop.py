@@ -6,19 +6,19 @@ import math
 
 from pzd.compiled import compiled, laid_in
 from pzd.damper.dormand_prince import STAGES
+from pzd.damper.kernels import keep_voltage
 from pzd.damper.rows import row_at
 from pzd.record import Array
 from pzd.simulate.demand import bounds_of, demand, spring_acceleration
-from pzd.simulate.dynamic_damper import effective_voltage, lagging, place, stored
+from pzd.simulate.dynamic_damper import effective_voltage, place, stored
 from pzd.simulate.equations import motion
 from pzd.simulate.minimise import LARGEST, farther_end
 from pzd.simulate.ride_model import (
     ASKED,
-    BEFORE,
+    BEHIND,
     COMFORT,
     DEFLECTION,
     DYNAMIC,
-    EFFECTIVE,
     FORCE,
     HIGH,
     IDEAL,
@@ -99,12 +99,11 @@ def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, oth
 @compiled
 def _set_voltage(time: float, y: Array, model: RideModel, control: Array, axle: int, voltage: float) -> None:
     damper, elapsed = model.damper, time - control[SINCE, 0]
-    was, _ = effective_voltage(damper, control[SET, axle], control[BEFORE, axle], control[EFFECTIVE, axle], elapsed)
-    control[BEFORE, axle] = lagging(damper, control[SET, axle], control[BEFORE, axle], elapsed)
-    control[EFFECTIVE, axle] = was
+    was, _ = effective_voltage(damper, control[SET, axle], control[BEHIND:, axle], elapsed)
+    keep_voltage(control[SET, axle], elapsed, control[BEHIND:, axle], damper.drive)
     control[SET, axle] = voltage
     if model.control_spec.fidelity == DYNAMIC:
-        now, _ = effective_voltage(damper, voltage, control[BEFORE, axle], was, 0.0)
+        now, _ = effective_voltage(damper, voltage, control[BEHIND:, axle], 0.0)
         if now != was:
             e = y[OIL_1 + axle]
             change = stored(e, row_at(damper.voltages, damper.rows, now)) - stored(

@@ -13,16 +13,18 @@ from typing import Literal
 import numpy as np
 
 from pzd.artefacts import Response
-from pzd.damper.compose import respond, steady_force, value_of
+from pzd.damper.competing_forms import known
+from pzd.damper.compose import parallel_rows, respond, steady_force, voltage_at_valve
+from pzd.damper.kernels import parallel_forces
 from pzd.damper.material import base_voltages
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
+from pzd.damper.values import value_of
 from pzd.record import Array
 from pzd.simulate.config import SimulateConfig
 
 SHARES = (0.63, 0.9)
 """Of the whole way."""
-_BY_PLACE = ("gas_spring", "end_stop", "preload_offset")  # forces of the place, not of the speed
 _STEP = 1e-4
 """Sampling interval [s]."""
 _BEFORE, _AFTER = 0.5, 1.0
@@ -61,11 +63,11 @@ def _step(damper: Damper, before: float, after: float, speed: float, temperature
     still = np.zeros_like(time)
     warmth = None if temperature is None else np.full_like(time, temperature)
     motion = Motion(time, speed * time, still + speed, still, voltage, warmth)
-    passing = {name: values for name, values in damper.effects.items() if name not in _BY_PLACE}
+    ends = motion.displacement[[0, -1]]
+    passing = {name: values for name, values in damper.effects.items() if not _stands_at_rest(damper, name, ends)}
     alone = damper.model_copy(update={"effects": passing})
     force = respond(alone, motion)[time >= 0.0]
-    tau = value_of(damper, "valve_lag", "tau")
-    late = [-tau * math.log(1.0 - share) for share in SHARES]
+    late = _voltage_reached(damper, motion)
     first, last = (float(steady_force(damper, u, temperature, speed)) for u in (before, after))
     since = time[time >= 0.0]
     reached = [_when(since, (force - first) / (last - first), share) for share in SHARES]
@@ -81,6 +83,28 @@ def _step(damper: Damper, before: float, after: float, speed: float, temperature
         )
         for signal, times in answers
     ]
+
+
+def _stands_at_rest(damper: Damper, name: str, places: Array) -> bool:
+    """Whether an effect is a force that is there at rest too, at one of (n,) displacements [m]."""
+    if known()[name].place != "parallel":
+        return False
+    alone = parallel_rows(damper.model_copy(update={"effects": {name: damper.effects[name]}}), base_voltages(damper))
+    rest = np.zeros(places.size)
+    return alone is not None and any(np.any(parallel_forces(places, rest, rest, row[np.newaxis])) for row in alone)
+
+
+def _voltage_reached(damper: Damper, motion: Motion) -> list[float | None]:
+    """When the voltage as felt has gone each share of its way [s]; in closed form where the lag is all there is."""
+    drive = {name for name in damper.effects if known()[name].place == "drive"}
+    if drive <= {"valve_lag"}:
+        tau = value_of(damper, "valve_lag", "tau")
+        return [-tau * math.log(1.0 - share) for share in SHARES]
+    felt = voltage_at_valve(damper, motion.voltage, np.array([_STEP]))
+    if felt is None or felt[0] == felt[-1]:
+        return [None for _ in SHARES]
+    progress = (felt - felt[0]) / (felt[-1] - felt[0])
+    return [_when(motion.time[motion.time >= 0.0], progress[motion.time >= 0.0], share) for share in SHARES]
 
 
 def _when(time: Array, progress: Array, share: float) -> float | None:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pzd.damper.columns import acting
 from pzd.record import Array
 from pzd.simulate.car import HalfCar
 from pzd.simulate.dynamic_damper import DynamicDamper
@@ -53,12 +54,12 @@ mass that the dampers add [kg]; of one damper: oil spring [N], flow [m/s], elast
 the element [N], power of the valve [W]; speed on its side of nought, lowest and highest force; acceleration
 of z and phi; acceleration at K (first column); of an axle that sticks, dV/dt away from V = 0, were it to
 slip to either side."""
-ASKED, SET, BEFORE, EFFECTIVE, SIDE, SINCE = range(6)
+ASKED, SET, SIDE, SINCE, BEHIND = range(5)
 TIE_END = SINCE
-"""Rows of the control (6, 2), a column an axle: force asked [N], voltage set [V], and when it was set the
-voltage behind the lag and behind lag and play [V]; side of V = 0 (+1 rebound, -1 compression, 0 sticking);
-when the voltage was set [s] (first column), and the end of the segment of minimisers that `largest`
-takes (TIE_END, second column)."""
+"""Rows of the control (BEHIND + d, 2), a column an axle: force asked [N], voltage set [V]; side of V = 0 (+1 rebound,
+-1 compression, 0 sticking); when the voltage was set [s] (first column), and the end of the segment of minimisers
+that `largest` takes (TIE_END, second column); from BEHIND on the voltages behind the d drive effects, in the order
+in which they act, when the voltage was set [V]."""
 
 Two = tuple[float, float]
 
@@ -158,8 +159,8 @@ def road_coefficients(profile: Profile, wheelbase: float) -> RoadCoefficients:
 
 def control(voltage: float) -> Array:
     """The controller before its first act, the valves at rest at a voltage [V]."""
-    table = np.zeros((6, 2))
-    table[[SET, BEFORE, EFFECTIVE]] = voltage
+    table = np.zeros((BEHIND + len(acting("drive")), 2))
+    table[SET] = table[BEHIND:] = voltage
     table[SIDE] = 1.0
     return table
 

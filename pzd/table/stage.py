@@ -16,7 +16,7 @@ from pzd.table.config import TableConfig
 log = logging.getLogger(__name__)
 
 WARM_STEPS = 5
-"""Temperatures of the table where `temperature_drift` gives the temperature axis."""
+"""Temperatures of the table where an effect of the material, as `temperature_drift`, gives the temperature axis."""
 
 
 def tabulate(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Control, setting: str | None) -> Table:
@@ -53,6 +53,7 @@ def tabulate(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Contro
 
 def _temperatures(table: TableConfig, damper: Damper, records: Sequence[Record]) -> tuple[float | None, ...]:
     """The temperatures of the table: as configured, over the rig's range under drift, else the damper's."""
+    from pzd.damper.competing_forms import known
     from pzd.table.force import temperatures_of
 
     recorded = [r.temperature for r in records if r.temperature is not None]
@@ -60,7 +61,7 @@ def _temperatures(table: TableConfig, damper: Damper, records: Sequence[Record])
         return (None,)
     if table.temperatures_degC is not None:
         return tuple(sorted(set(table.temperatures_degC)))
-    if "temperature_drift" not in damper.effects:
+    if not any(known()[name].place == "material" for name in damper.effects):
         return temperatures_of(damper)
     low, high = min(float(t.min()) for t in recorded), max(float(t.max()) for t in recorded)
     return tuple(float(t) for t in np.unique(np.linspace(low, high, WARM_STEPS)))

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import pzd
+from pzd.damper.columns import STROKE_AND_FLOW
 from pzd.damper.compose import nodes_of, respond
-from pzd.damper.drive import effective_voltage
+from pzd.damper.drive import drive_row, effective_voltage
 from pzd.damper.material import material
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
@@ -24,15 +25,16 @@ TIME = np.arange(0, 1, 1e-3)
 
 def test_the_lag_answers_a_step_as_an_exponential_and_a_ramp_late_by_tau() -> None:
     steps = np.array([1e-3])
-    step = effective_voltage(np.where(TIME > 0, 100.0, 0.0), steps, 0.05, 0.0)
+    lag = drive_row({"valve_lag": {"tau": 0.05}})
+    step = effective_voltage(np.where(TIME > 0, 100.0, 0.0), steps, lag)
     np.testing.assert_allclose(step[200], 100 * (1 - np.exp(-(0.2 - 5e-4) / 0.05)), rtol=1e-5)
-    ramp = effective_voltage(100 * TIME, steps, 0.05, 0.0)
+    ramp = effective_voltage(100 * TIME, steps, lag)
     np.testing.assert_allclose(ramp[-1], 100 * (TIME[-1] - 0.05), rtol=1e-6)
 
 
 def test_the_play_turns_only_after_its_whole_width() -> None:
     triangle = np.interp(TIME, [0, 0.25, 0.5, 1.0], [0, 100, 0, 100])
-    felt = effective_voltage(triangle, np.array([1e-3]), 0.0, 10.0)
+    felt = effective_voltage(triangle, np.array([1e-3]), drive_row({"piezo_hysteresis": {"r": 10.0}}))
     assert felt.max() == pytest.approx(90.0)
     assert felt[400] == pytest.approx(min(90.0, triangle[400] + 10.0))
     assert np.max(np.abs(felt - triangle)) == pytest.approx(10.0)
@@ -65,21 +67,38 @@ def test_drift_is_exponential_about_the_reference() -> None:
     np.testing.assert_allclose(material(warm, None, 42.0), [[100 * np.exp(-0.8), 1000 * np.exp(-0.2), 1e5]])
 
 
+def test_drift_may_differ_by_voltage_and_then_needs_one() -> None:
+    drifting = Damper(
+        base=(BaseRow(T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e5),),
+        effects={"temperature_drift": {"beta_T0": (0.04, 0.02), "beta_C": 0.01, "at_voltage_V": (0.0, 100.0)}},
+        reference_temperature_degC=22.0,
+    )
+    voltage, temperature = np.array([0.0, 50.0, 100.0]), np.array([42.0, 42.0, 32.0])
+    expected = 100 * np.exp([-0.8, -0.6, -0.2])
+    np.testing.assert_allclose(material(drifting, voltage, temperature)[:, 0], expected)
+    np.testing.assert_allclose(material(drifting, voltage, 42.0)[:, 0], 100 * np.exp([-0.8, -0.6, -0.4]))
+    np.testing.assert_allclose(material(drifting, voltage, temperature)[:, 1], 1000 * np.exp([-0.2, -0.2, -0.1]))
+    with pytest.raises(ValueError, match="beta_T0 depends on the voltage, and none is given"):
+        material(drifting, None, 42.0)
+
+
 def test_the_nodes_for_compiled_loops_give_the_same_rows() -> None:
     damper = GRID.with_effect("orifice_quadratic", {"q": (10.0, 30.0), "at_voltage_V": (20.0, 100.0)})
     nodes = nodes_of(damper, 30.0)
     for voltage in (-5.0, 10.0, 60.0, 149.0, 200.0):
         row = row_at(nodes.voltages, nodes.rows, voltage)
         np.testing.assert_allclose(row[:3], material(damper, voltage, 30.0)[0])
-        assert row[4] == pytest.approx(np.interp(voltage, [20.0, 100.0], [10.0, 30.0]))
+        q = row[3 + STROKE_AND_FLOW.index(("orifice_quadratic", "q"))]
+        assert q == pytest.approx(np.interp(voltage, [20.0, 100.0], [10.0, 30.0]))
 
 
 def test_an_edited_law_is_seen_although_the_kernels_are_cached(tmp_path: Path) -> None:
     copy = tmp_path / "pzd"
     shutil.copytree(Path(pzd.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
     program = (
-        "import numpy as np; from pzd.damper.flow import flow_force;"
-        "print(float(flow_force(0.5, (0., 1000., 1e5, 0., 100., 1., np.inf, 1., 0., 0.), 1.0)))"
+        "from pzd.damper.compose import steady_force; from pzd.damper.model import BaseRow, Damper;"
+        "base = (BaseRow(T0_N=0.0, C_Ns_per_m=1000.0, k_N_per_m=1e5),);"
+        "print(float(steady_force(Damper(base=base, effects={'orifice_quadratic': {'q': 100.0}}), None, None, 0.5)))"
     )
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
 

@@ -7,13 +7,14 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from pzd.damper.columns import STROKE_AND_FLOW
 from pzd.damper.compose import TOLERANCE, element_rows, respond, steady_force
 from pzd.damper.element import element_force
+from pzd.damper.kernels import row_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance
 from pzd.damper.pieces import STAGES, Step
-from pzd.damper.rows import row_of
 
 STEP = 1e-3
 TIME = np.arange(600) * STEP
@@ -30,6 +31,7 @@ FLOWS = [
     {"asymmetry": {"alpha": 0.2}},
     {"relief_valve": {"F_r": 900.0, "C_r": 400.0}},
     {"lash": {"delta": 4e-4}},
+    {"lash": {"delta": (2e-4, 9e-4), "at_voltage_V": (0.0, 150.0)}},
     {"lash": {"delta": 4e-4}, "rounded_yield": {"w_s": 0.03}, "orifice_quadratic": {"q": 2000.0}},
     {"shear_thinning": {"n": 0.8}, "relief_valve": {"F_r": 900.0, "C_r": 400.0}, "asymmetry": {"alpha": -0.1}},
 ]
@@ -55,12 +57,15 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
     """dF/dt written out by hand and integrated by LSODA piece by piece, w(F) found by bracketing."""
     values = {name: v for effect in damper.effects.values() for name, v in effect.items()}
     q, n, ws = values.get("q", 0.0), values.get("n", 1.0), values.get("w_s", 0.0)
-    alpha, delta = values.get("alpha", 0.0), values.get("delta", 0.0)
+    alpha, play = values.get("alpha", 0.0), np.broadcast_to(values.get("delta", 0.0), 2)
     F_r, C_r = values.get("F_r", np.inf), values.get("C_r", 1.0)
 
     def parameters(u: float) -> tuple[float, float, float]:
         share = u / 150.0
         return 300 + 1000 * share, 2700 - 200 * share, 2e5 + 2e5 * share
+
+    def delta(u: float) -> float:
+        return play[0] + (play[1] - play[0]) * u / 150.0
 
     def speed(F: float, T0: float, C: float) -> float:
         side = 1 + alpha * np.sign(F)
@@ -77,8 +82,9 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
 
     def rate(t: float, e: np.ndarray, i: int) -> list[float]:
         share = (t - motion.time[i]) / STEP
-        T0, C, k = parameters(motion.voltage[i] + share * (motion.voltage[i + 1] - motion.voltage[i]))
-        F = k * np.sign(e[0]) * max(abs(e[0]) - delta / 2, 0.0)
+        voltage = motion.voltage[i] + share * (motion.voltage[i + 1] - motion.voltage[i])
+        T0, C, k = parameters(voltage)
+        F = k * np.sign(e[0]) * max(abs(e[0]) - delta(voltage) / 2, 0.0)
         half = 0.5 * (motion.velocity[i + 1] - motion.velocity[i])
         u = (motion.displacement[i + 1] - motion.displacement[i]) / STEP + half * (2 * share - 1)
         return [u - np.sign(F) * speed(F, T0, C)]
@@ -87,8 +93,8 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
     for i in range(until - 1):
         run = solve_ivp(rate, motion.time[i : i + 2], [e], "RK45", rtol=1e-9, atol=1e-13, args=(i,), max_step=STEP / 4)
         e = run.y[0, -1]
-        k = parameters(motion.voltage[i + 1])[2]
-        forces.append(k * np.sign(e) * max(abs(e) - delta / 2, 0.0))
+        k, free = parameters(motion.voltage[i + 1])[2], delta(motion.voltage[i + 1]) / 2
+        forces.append(k * np.sign(e) * max(abs(e) - free, 0.0))
     return np.array(forces)
 
 
@@ -165,7 +171,7 @@ def test_energy_goes_into_the_spring_the_oil_and_the_valve_and_nowhere_else(effe
     motion = sine(75 + 70 * np.sin(2 * np.pi * 2.3 * TIME))
     rows = element_rows(with_effects(effects), motion.voltage, None)
     state, stages, stored, work = np.zeros(STATES), np.empty(STAGES), 0.0, 0.0
-    delta = rows[0, 3]
+    play = 3 + STROKE_AND_FLOW.index(("lash", "delta"))
     points, weights = np.polynomial.legendre.leggauss(4)
     for i in range(len(TIME) - 1):
         p0, p1 = row_of(rows[i]), row_of(rows[i + 1])
@@ -177,9 +183,9 @@ def test_energy_goes_into_the_spring_the_oil_and_the_valve_and_nowhere_else(effe
             probe, u = state.copy(), mean + half * (2 * share - 1)
             advance(probe, Step(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, stages, False)
             e = probe[DEFLECTION]
-            work += 0.5 * w * STEP * middle[2] * np.sign(e) * max(abs(e) - delta / 2, 0.0) * u
+            work += 0.5 * w * STEP * middle[2] * np.sign(e) * max(abs(e) - middle[play] / 2, 0.0) * u
         advance(state, Step(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, stages, True)
-    stored = 0.5 * rows[-1, 2] * max(abs(state[DEFLECTION]) - delta / 2, 0.0) ** 2
+    stored = 0.5 * rows[-1, 2] * max(abs(state[DEFLECTION]) - rows[-1, play] / 2, 0.0) ** 2
     assert state[DISSIPATED] > 0.0
     assert abs(stored + state[DISSIPATED] - state[VALVE_WORK] - work) <= 2e-6 * state[DISSIPATED]
 

@@ -6,8 +6,10 @@ better than one of these is not; the fewer parameters of a foil count for it. On
 
 from __future__ import annotations
 
+import importlib
 import pkgutil
 from functools import cache
+from types import ModuleType
 
 from pzd.damper.effect import Effect
 from pzd.damper.effects import effects_in, library
@@ -21,5 +23,18 @@ def competing_forms() -> dict[str, Effect]:
 
 @cache
 def known() -> dict[str, Effect]:
-    """Everything that a damper can be computed with: the library, and the foils."""
+    """Everything that a damper can be computed with: the library, and the foils.
+
+    Raises
+    ------
+    ImportError : when a foil has the name of an effect of the library
+    """
+    for name in competing_forms().keys() & library().keys():
+        raise ImportError(f"{module_of(library()[name]).__file__} and {__path__[0]}/{name}.py both declare {name}")
     return {**library(), **competing_forms()}
+
+
+def module_of(effect: Effect) -> ModuleType:
+    """The file that declares an effect or a foil, imported."""
+    package = "effects" if library().get(effect.name) is effect else "competing_forms"
+    return importlib.import_module(f"pzd.damper.{package}.{effect.name}")

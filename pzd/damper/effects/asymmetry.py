@@ -6,7 +6,7 @@ as hard, alpha 0.3-0.5; a symmetric prototype shows a few percent.
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 EFFECT = Effect(
     name="asymmetry",
@@ -16,10 +16,11 @@ EFFECT = Effect(
         Parameter("alpha", "-", 0.0, -0.95, 0.95, "share by which rebound is harder", Search(lambda _: 1.0, (0.0,))),
     ),
     source="Dixon 2007, The Shock Absorber Handbook",
-    tests=(({"direction": 1.0, "alpha": 0.1}, 1.1), ({"direction": -1.0, "alpha": 0.1}, 0.9)),
+    tests=(({"side": 1.0, "alpha": 0.1}, 1.1), ({"side": -1.0, "alpha": 0.1}, 0.9)),
+    hidden=growing("alpha", lambda _: 0.5, either=True),
 )
 
 
-def law(direction: float, alpha: float) -> float:
+def direction_factor(side: float, alpha: float) -> float:
     """Factor on T0 and C for the sign of the force."""
-    return 1.0 + alpha * direction
+    return 1.0 + alpha * side

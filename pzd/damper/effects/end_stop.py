@@ -8,7 +8,16 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import Effect, Parameter, Search
+import numpy as np
+
+from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
+
+
+def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
+    begins = float(draw.uniform(0.5, 0.85)) * scales.stroke
+    stiffness = scales.force / (scales.stroke - begins) ** 2
+    return lambda s: {"k_e": stiffness * s, "x_e": begins}
+
 
 EFFECT = Effect(
     name="end_stop",
@@ -41,6 +50,7 @@ EFFECT = Effect(
         ({"x": -0.03, "v": 0.0, "a": 0.0, "k_e": 1.0e6, "x_e": 0.02}, -100.0),
         ({"x": 0.01, "v": 0.0, "a": 0.0, "k_e": 1.0e6, "x_e": 0.02}, 0.0),
     ),
+    hidden=_hidden,
 )
 
 

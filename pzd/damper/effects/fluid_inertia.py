@@ -6,7 +6,7 @@ a mass and a spring of the other sign are the same thing.
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 EFFECT = Effect(
     name="fluid_inertia",
@@ -26,6 +26,7 @@ EFFECT = Effect(
     ),
     source="fluid inerter; Swift et al. 2013, Vehicle System Dynamics 51(11)",
     tests=(({"x": 0.01, "v": 1.0, "a": 4.0, "m": 5.0}, 20.0),),
+    hidden=growing("m", lambda s: 0.5 * s.force / s.acceleration),
 )
 
 

@@ -5,7 +5,7 @@ Law: k_g x. Range: monotube dampers 1-5 kN/m; the sign is left free, for the mou
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 EFFECT = Effect(
     name="gas_spring",
@@ -25,6 +25,7 @@ EFFECT = Effect(
     ),
     source="Dixon 2007, The Shock Absorber Handbook",
     tests=(({"x": 0.01, "v": 1.0, "a": 1.0, "k_g": 2000.0}, 20.0),),
+    hidden=growing("k_g", lambda s: 0.5 * s.force / s.stroke),
 )
 
 

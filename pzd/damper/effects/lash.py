@@ -6,7 +6,7 @@ Law: dead zone of whole width delta on the elastic deflection x - y. Range: worn
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 EFFECT = Effect(
     name="lash",
@@ -19,17 +19,18 @@ EFFECT = Effect(
     ),
     source="dead-zone nonlinearity; Slotine and Li 1991, Applied Nonlinear Control",
     tests=(
-        ({"deflection": 0.0004, "delta": 0.001}, 0.0),
-        ({"deflection": -0.0008, "delta": 0.001}, -0.0003),
+        ({"deflection": 0.0004, "side": 1.0, "delta": 0.001}, -0.0001),
+        ({"deflection": -0.0008, "side": -1.0, "delta": 0.001}, -0.0003),
     ),
+    hidden=growing("delta", lambda s: 0.2 * s.stroke),
 )
 
 
-def law(deflection: float, delta: float) -> float:
-    """Extension of the oil spring [m] at an elastic deflection x - y [m]."""
-    free = 0.5 * delta
-    if deflection > free:
-        return deflection - free
-    if deflection < -free:
-        return deflection + free
-    return 0.0
+def law(deflection: float, side: float, delta: float) -> float:
+    """Extension of the oil spring [m] at an elastic deflection x - y [m] on a side; below zero there in the play."""
+    return deflection - side * 0.5 * delta
+
+
+def inverse(extension: float, side: float, delta: float) -> float:
+    """Elastic deflection [m] at an extension of the oil spring [m] on a side: the law inverted."""
+    return extension + side * 0.5 * delta

@@ -5,7 +5,9 @@ Law: + q w^2, w = |dy/dt|. Range: 1-50 % of the peak force of a hydraulic damper
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter, Search
+import math
+
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 EFFECT = Effect(
     name="orifice_quadratic",
@@ -24,14 +26,20 @@ EFFECT = Effect(
     ),
     source="orifice equation dp = rho Q^2 / (2 Cd^2 A^2); Merritt 1967, Hydraulic Control Systems",
     tests=(({"w": 0.3, "q": 1500.0}, 135.0),),
+    hidden=growing("q", lambda s: s.force / s.speed**2),
 )
 
 
-def law(w: float, q: float) -> float:
+def extra_force(w: float, q: float) -> float:
     """Force [N] beside friction and viscous force at a flow speed w >= 0 [m/s]."""
     return q * w * w
 
 
-def slope(w: float, q: float) -> float:
+def extra_slope(w: float, q: float) -> float:
     """Derivative of the law by w [N s/m]."""
     return 2.0 * q * w
+
+
+def extra_speed(force: float, C: float, q: float) -> float:
+    """Flow speed w [m/s] at which C w and the law together take a force >= 0 [N]."""
+    return 2.0 * force / (C + math.sqrt(C * C + 4.0 * q * force))

@@ -6,7 +6,7 @@ so r up to about 10 V on 150 V.
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 EFFECT = Effect(
     name="piezo_hysteresis",
@@ -30,9 +30,17 @@ EFFECT = Effect(
         ({"effective": 20.0, "now": 5.0, "r": 10.0}, 15.0),
     ),
     needs="voltage",
+    order=1,  # the stack follows what valve and supply have delayed
+    hidden=growing("r", lambda s: 0.15 * s.voltage),
 )
 
 
 def law(effective: float, now: float, r: float) -> float:
     """Voltage felt [V] when the voltage arrives at `now` [V]."""
     return max(now - r, min(now + r, effective))
+
+
+def rate(effective: float, now: float, rate: float, r: float) -> float:
+    """Rate of the voltage felt [V/s] while the voltage stands at `now` [V] and moves at `rate` [V/s]."""
+    inside_play = abs(now - effective) < r * (1.0 - 1e-9)  # rounding of the law itself is no play
+    return 0.0 if inside_play or (now - effective) * rate < 0.0 else rate

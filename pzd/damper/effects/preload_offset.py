@@ -5,7 +5,7 @@ Law: F_0. Range: gas-charged dampers 50-300 N.
 
 from __future__ import annotations
 
-from pzd.damper.effect import Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 EFFECT = Effect(
     name="preload_offset",
@@ -18,6 +18,7 @@ EFFECT = Effect(
     ),
     source="Dixon 2007, The Shock Absorber Handbook",
     tests=(({"x": 0.01, "v": 1.0, "a": 1.0, "F_0": 55.0}, 55.0),),
+    hidden=growing("F_0", lambda s: 0.5 * s.force, either=True),
 )
 
 

@@ -8,7 +8,15 @@ from __future__ import annotations
 
 from math import inf
 
-from pzd.damper.effect import Effect, Parameter, Search
+import numpy as np
+
+from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
+
+
+def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
+    beyond = float(draw.uniform(0.2, 0.6)) * scales.damping
+    return lambda s: {"F_r": scales.force * (1.0 - 0.95 * s), "C_r": beyond}
+
 
 EFFECT = Effect(
     name="relief_valve",
@@ -30,9 +38,15 @@ EFFECT = Effect(
     ),
     source="two-stage damper valve; Dixon 2007, The Shock Absorber Handbook",
     tests=(({"F_r": 900.0, "T0": 300.0}, 900.0), ({"F_r": 200.0, "T0": 300.0}, 300.0)),
+    hidden=_hidden,
 )
 
 
-def law(F_r: float, T0: float) -> float:
+def opens_at(F_r: float, T0: float) -> float:
     """Force b [N] beyond which the slope is C_r."""
     return max(F_r, T0)
+
+
+def slope_beyond(C_r: float) -> float:
+    """Slope [N s/m] beyond it."""
+    return C_r

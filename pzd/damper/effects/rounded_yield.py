@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 EFFECT = Effect(
     name="rounded_yield",
@@ -26,15 +26,16 @@ EFFECT = Effect(
     ),
     source="Kwok et al. 2006, J. Sound Vib. 296, hyperbolic-tangent model of a magneto-rheological damper",
     tests=(({"w": 0.01, "T0": 400.0, "w_s": 0.01}, 304.63766238230594), ({"w": 0.0, "T0": 400.0, "w_s": 0.0}, 400.0)),
+    hidden=growing("w_s", lambda s: 0.3 * s.speed),
 )
 
 
-def law(w: float, T0: float, w_s: float) -> float:
+def yield_force(w: float, T0: float, w_s: float) -> float:
     """Friction force [N] at a flow speed w >= 0 [m/s]."""
     return T0 if w_s <= 0.0 else T0 * math.tanh(w / w_s)
 
 
-def slope(w: float, T0: float, w_s: float) -> float:
+def yield_slope(w: float, T0: float, w_s: float) -> float:
     """Derivative of the law by w [N s/m]."""
     if w_s <= 0.0 or w > 20.0 * w_s:
         return 0.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.effect import Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 EFFECT = Effect(
     name="sensor_delay",
@@ -18,6 +18,7 @@ EFFECT = Effect(
     parameters=(Parameter("tau", "s", 0.0, -0.1, 0.1, "delay of the force channel", Search(lambda _: 1.0e-3, (0.0,))),),
     source="pure dead time of a measuring chain",
     tests=(({"time": 1.0, "tau": 0.002}, 0.998),),
+    hidden=growing("tau", lambda _: 0.02, either=True),
 )
 
 

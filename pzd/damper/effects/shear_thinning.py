@@ -6,6 +6,8 @@ multigrade oils and magneto-rheological fluids past yield.
 
 from __future__ import annotations
 
+import math
+
 from pzd.damper.effect import Effect, Parameter, Search
 
 REFERENCE_SPEED = 0.3
@@ -23,24 +25,27 @@ EFFECT = Effect(
         ({"w": 0.3, "C": 2000.0, "n": 0.7}, 600.0),
         ({"w": 0.03, "C": 2000.0, "n": 0.5}, 189.73665961010275),
     ),
+    hidden=lambda draw, scales: lambda s: {"n": 1.0 - 0.6 * s},
 )
 
 
-def law(w: float, C: float, n: float) -> float:
+def viscous_force(w: float, C: float, n: float) -> float:
     """Viscous force [N] at a flow speed w >= 0 [m/s]."""
     if n == 1.0:
         return C * w
     return float(C * REFERENCE_SPEED * (w / REFERENCE_SPEED) ** n)
 
 
-def slope(w: float, C: float, n: float) -> float:
+def viscous_slope(w: float, C: float, n: float) -> float:
     """Derivative of the law by w [N s/m]; unbounded towards w = 0 for n < 1."""
     if n == 1.0:
         return C
+    if w <= 0.0:
+        return math.inf
     return float(C * n * (w / REFERENCE_SPEED) ** (n - 1.0))
 
 
-def speed(viscous: float, C: float, n: float) -> float:
+def viscous_speed(viscous: float, C: float, n: float) -> float:
     """Flow speed w [m/s] that takes a viscous force >= 0 [N]: the law inverted."""
     if n == 1.0:
         return viscous / C

@@ -7,7 +7,15 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import Effect, Parameter, Search
+import numpy as np
+
+from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
+
+
+def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
+    speed = float(np.exp(draw.uniform(np.log(0.03), np.log(0.3)))) * scales.speed
+    return lambda s: {"F_s": 0.5 * scales.force * s, "v_s": speed}
+
 
 EFFECT = Effect(
     name="stribeck_friction",
@@ -33,6 +41,7 @@ EFFECT = Effect(
         ({"x": 0.0, "v": -0.02, "a": 0.0, "F_s": 100.0, "v_s": 0.02}, -36.787944117144235),
         ({"x": 0.0, "v": 0.0, "a": 0.0, "F_s": 100.0, "v_s": 0.02}, 0.0),
     ),
+    hidden=_hidden,
 )
 
 

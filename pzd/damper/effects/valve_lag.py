@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from pzd.damper.effect import Effect, Parameter, Search
+from pzd.damper.effect import Effect, Parameter, Search, growing
 
 EFFECT = Effect(
     name="valve_lag",
@@ -32,6 +32,7 @@ EFFECT = Effect(
         ({"effective": 7.0, "before": 0.0, "now": 100.0, "step": 0.01, "tau": 0.0}, 100.0),
     ),
     needs="voltage",
+    hidden=growing("tau", lambda _: 0.05),
 )
 
 
@@ -39,5 +40,10 @@ def law(effective: float, before: float, now: float, step: float, tau: float) ->
     """Voltage felt [V] a step [s] later, the voltage going linearly from `before` to `now` [V]."""
     if tau <= 0.0:
         return now
-    lag = (now - before) * tau / step
+    lag = (now - before) * tau / step if step > 0.0 else 0.0
     return now - lag + (effective - before + lag) * math.exp(-step / tau)
+
+
+def rate(effective: float, now: float, rate: float, tau: float) -> float:
+    """Rate of the voltage felt [V/s] while the voltage stands at `now` [V] and moves at `rate` [V/s]."""
+    return rate if tau <= 0.0 else (now - effective) / tau

@@ -8,15 +8,14 @@ that is left counts as it should: |r|^2 is minus twice the logarithm of the like
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compose import element_force, respond, sampling_steps, value_of
-from pzd.damper.effects.sensor_delay import law as moment
+from pzd.damper.compose import integrated_force, respond, sampling_steps, sensors_of, shown_moments
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.noise.between_cycles import PureError
@@ -66,11 +65,11 @@ class RecordLikelihood:
 
     @cached_property
     def element(self) -> Callable[[bytes], Array]:
-        """(m,) force [N] of the element by its parameter row, (1, 10) as bytes; effects beside it leave it as it is."""
+        """(m,) force [N] of the element by its parameter row, (1, r) as bytes; effects beside it leave it as it is."""
 
         def marched(row: bytes) -> Array:
             rows = np.frombuffer(row)[np.newaxis]
-            return element_force(rows, self.motion, self.steps, self.begins_with, SIMULATION_TOLERANCE)
+            return integrated_force(rows, self.motion, self.steps, self.begins_with, SIMULATION_TOLERANCE)
 
         return lru_cache(REMEMBERED)(marched)
 
@@ -84,15 +83,24 @@ class RecordLikelihood:
         """(n,) or (n, p) of what was simulated at the samples that are compared."""
         return simulated[self.first :: self.stride][: self.measured.size]
 
-    def delayed(self, simulated: Array, delay: float) -> Array:
-        """(m,) what was simulated as a channel shows it that comes late [s], between the samples by a cubic."""
+    def shown(self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], late: float = 0.0) -> Array:
+        """(m,) what was simulated as a channel shows it, between the samples by a cubic.
+
+        Parameters
+        ----------
+        simulated : (m,) force [N]
+        sensors : effects of the sensor, see `pzd.damper.compose.sensors_of`
+        late : how much later yet the channel shows it [s]
+        """
         from scipy.interpolate import CubicSpline
 
-        if delay == 0.0:
+        if not sensors and late == 0.0:
             return simulated
         begin = self.first if isinstance(self.noise, PureError) else 0
         time = self.motion.time[begin:]
-        shown = np.asarray(moment(time, delay))
+        shown = shown_moments(sensors, time - late)
+        if np.array_equal(shown, time):
+            return simulated
         if begin == 0:
             return np.asarray(CubicSpline(time, simulated)(np.clip(shown, time[0], time[-1])))
         period = time[-1] - time[0] + self.steps[-1]
@@ -164,7 +172,7 @@ def response(observation: RecordLikelihood, damper: Damper) -> Array:
 
 def responses(observation: RecordLikelihood, damper: Damper) -> Callable[[float], Array]:
     """(n,) force that a damper gives at the compared samples [N], by how much later yet a channel shows it [s]."""
-    o, tau = observation, value_of(damper, "sensor_delay", "tau")
-    prompt = damper.model_copy(update={"effects": {n: e for n, e in damper.effects.items() if n != "sensor_delay"}})
+    o, sensors = observation, sensors_of(damper)
+    prompt = damper.model_copy(update={"effects": {n: e for n, e in damper.effects.items() if n not in sensors}})
     force = respond(prompt, o.motion, o.begins_with, SIMULATION_TOLERANCE)
-    return lambda late: o.at_compared(o.delayed(force, tau + late))
+    return lambda late: o.at_compared(o.shown(force, sensors, late))

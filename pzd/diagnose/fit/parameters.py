@@ -213,13 +213,13 @@ class Point:
 def simulated(point: Point, observation: RecordLikelihood) -> Array:
     """(n,) force at the compared samples of an observation [N]."""
     o = observation
-    if o.place >= 0 and "temperature_drift" not in point.effects:
+    if o.place >= 0 and not any(known()[name].place == "material" for name in point.effects):
         friction, damping, stiffness = point.base[o.place]
         effects = point.at(o.place)
         rows, parallel = constant_rows(friction, damping, stiffness, effects)
         force = with_parallel(o.element(rows.tobytes()), parallel, o.motion.about(point.zero))
-        tau = effects.get("sensor_delay", {}).get("tau", 0.0)
-        return o.at_compared(o.delayed(force, tau))
+        sensors = {name: values for name, values in effects.items() if known()[name].place == "sensor"}
+        return o.at_compared(o.shown(force, sensors))
     damper = point.damper()
     if o.place >= 0:
         damper = damper.model_copy(update={"base": damper.base[o.place : o.place + 1]})

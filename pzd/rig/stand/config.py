@@ -271,4 +271,5 @@ def _needs_temperature(damper: Damper) -> str | None:
     """Why a damper cannot be tested without a temperature, None where it can."""
     if len({row.temperature_degC for row in damper.base}) > 1:
         return "the damper has base rows at several temperatures"
-    return "temperature_drift depends on the temperature" if "temperature_drift" in damper.effects else None
+    material = [name for name in damper.effects if known()[name].place == "material"]
+    return f"{material[0]} depends on the temperature" if material else None

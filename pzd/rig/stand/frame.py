@@ -10,30 +10,29 @@ from pzd.damper.compose import (
     recorded,
     respond,
     sampling_steps,
-    value_of,
+    sensors_of,
     voltage_at_valve,
 )
-from pzd.damper.flow import ROW
+from pzd.damper.kernels import K, parallel_forces, row_of, stroke_straight
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.damper.parallel import parallel_forces
-from pzd.damper.path import march
+from pzd.damper.path import deflections, march
 from pzd.record import Array
 
 TOLERANCE = 1e-7
 """Admissible error of one piece of the path, as a share of the force; steps are so short that few pieces reach it."""
 _ROUNDS = 12
-_SETTLED = 1e-10  # change of the parallel force in a round, as a share of the largest force
-_STIFFNESS = ROW.index("k")
+_SETTLED = 1e-10  # change of a force in a round, as a share of the largest force
 
 
 def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None) -> Array:
     """Force that the channel records, the motion being that of the actuator.
 
     The frame and the oil spring are springs in series, so the element is solved exactly with
-    1 / k' = 1 / k + 1 / k_frame; forces beside it are found by rounds, since they act at the
-    damper's own extension. The frame has no mass: its resonance is left out, so a fluid_inertia
-    takes the acceleration of the actuator, and a friction the speed behind the element's force alone.
+    1 / k' = 1 / k + 1 / k_frame. Forces beside it are found by rounds, since they act at the damper's
+    own extension, and so is the rest of a stroke law that bends. The frame has no mass: its resonance
+    is left out, so a fluid_inertia takes the acceleration of the actuator, and a friction the speed
+    behind the element's force alone.
 
     Equation: F = k' (x - F_beside / k_frame - y)           Source: springs in series
 
@@ -56,26 +55,50 @@ def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None
     motion = motion.about(damper.zero_m)
     steps = sampling_steps(motion.time)
     effective = voltage_at_valve(damper, motion.voltage, steps)
-    rows = np.array(element_rows(damper, effective, motion.temperature))
-    rows[:, _STIFFNESS] /= 1.0 + rows[:, _STIFFNESS] / frame_stiffness
-    element = march(motion.displacement, motion.velocity, steps, rows, 0.0, TOLERANCE)
+    own = np.array(element_rows(damper, effective, motion.temperature))
+    rows = own.copy()
+    rows[:, K] /= 1.0 + own[:, K] / frame_stiffness
+    force = march(motion.displacement, motion.velocity, steps, rows, 0.0, TOLERANCE)
     parallel = parallel_rows(damper, effective)
-    force = element if parallel is None else _with_parallel(motion, steps, rows, parallel, element, frame_stiffness)
-    return recorded(value_of(damper, "sensor_delay", "tau"), motion.time, force)
+    if parallel is not None or not all(stroke_straight(row_of(row)) for row in own):
+        force = _by_rounds(motion, steps, own, rows, parallel, force, frame_stiffness)
+    return recorded(sensors_of(damper), motion.time, force)
 
 
-def _with_parallel(
-    motion: Motion, steps: Array, rows: Array, parallel: Array, element: Array, frame_stiffness: float
+def _by_rounds(
+    motion: Motion,
+    steps: Array,
+    own: Array,
+    rows: Array,
+    parallel: Array | None,
+    element: Array,
+    frame_stiffness: float,
 ) -> Array:
-    """(n,) force of the element and of what stands beside it, in rounds from that of the element alone."""
+    """(n,) force of the element and of what stands beside it, in rounds from that of the element alone.
+
+    Parameters
+    ----------
+    motion : (n,) of the actuator
+    steps : sampling intervals [s]
+    own, rows : (n, r) or (1, r) rows of the element, and the same with the spring k' in place of k
+    parallel : rows of the parallel effects; None without any
+    element : (n,) force of the element alone [N]
+    frame_stiffness : k_frame [N/m]
+    """
     velocity = motion.velocity - np.gradient(element, motion.time) / frame_stiffness
-    more = np.zeros(element.size)
+    bent = not all(stroke_straight(row_of(row)) for row in own)
+    more, bend = np.zeros(element.size), np.zeros(element.size)
     for _ in range(_ROUNDS):
-        total = element + more
-        own = motion.displacement - total / frame_stiffness
-        last, more = more, parallel_forces(own, velocity, motion.acceleration, parallel)
-        if np.max(np.abs(more - last)) <= _SETTLED * np.max(np.abs(total)):
+        total, last = element + more, (more, bend)
+        if parallel is not None:
+            at = motion.displacement - total / frame_stiffness
+            more = parallel_forces(at, velocity, motion.acceleration, parallel)
+        if bent:
+            bend = deflections(element, rows) - deflections(element, own) - element / frame_stiffness
+        change = max(np.max(np.abs(more - last[0])), frame_stiffness * np.max(np.abs(bend - last[1])))
+        if change <= _SETTLED * np.max(np.abs(total)):
             break
-        shifted = motion.displacement - more / frame_stiffness
-        element = march(shifted, motion.velocity, steps, rows, 0.0, TOLERANCE)
+        element = march(
+            motion.displacement - more / frame_stiffness + bend, motion.velocity, steps, rows, 0.0, TOLERANCE
+        )
     return np.asarray(element + more)

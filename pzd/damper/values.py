@@ -1,0 +1,49 @@
+"""The numbers of a damper's effects, one each or by the effective voltage; neutral where it lacks an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.columns import NEUTRAL, Column
+from pzd.damper.model import Damper
+
+Array = NDArray[np.float64]
+
+
+def value_of(damper: Damper, effect: str, parameter: str) -> float:
+    """A parameter that is one number: the damper's, or the neutral one where it lacks the effect.
+
+    Raises
+    ------
+    ValueError : when the damper gives it by voltage
+    """
+    value = damper.effects.get(effect, {}).get(parameter, NEUTRAL[effect, parameter])
+    if isinstance(value, tuple):
+        raise ValueError(f"{effect}.{parameter} must be one number, not a list by voltage")  # noqa: TRY004  # a wrong value of a config
+    return value
+
+
+def columns_of(damper: Damper, columns: Sequence[Column], effective: Array | None) -> Array:
+    """(n, m) or (1, m) values of effect parameters, by the effective voltage [V] where they are lists."""
+    if not columns:
+        return np.empty((1, 0))
+    return np.stack(np.broadcast_arrays(*(column(damper, *one, effective) for one in columns)), axis=-1)
+
+
+def column(damper: Damper, effect: str, parameter: str, effective: Array | None) -> Array:
+    """(n,) or (1,) values of one parameter, by the effective voltage [V] where it is a list.
+
+    Raises
+    ------
+    ValueError : when it is a list and no voltage is given
+    """
+    given = damper.effects.get(effect, {})
+    value = given.get(parameter, NEUTRAL[effect, parameter])
+    if not isinstance(value, tuple):
+        return np.array([value])
+    if effective is None:
+        raise ValueError(f"{effect}.{parameter} depends on the voltage, and none is given")
+    return np.asarray(np.interp(effective, np.atleast_1d(given["at_voltage_V"]), np.array(value)))
