@@ -18,7 +18,7 @@ from pzd.diagnose.noise.between_cycles import PureError, pure_error
 from pzd.diagnose.noise.input_uncertainty import Expected
 from pzd.diagnose.noise.jumps import jumps, jumps_in_samples
 from pzd.diagnose.noise.smooth_residual import fit_smooth_residual
-from pzd.identify.trial import warm_up
+from pzd.identify.trial import in_motion
 from pzd.record import Array, Record
 from pzd.signals.autoregression import Autoregression
 
@@ -134,8 +134,8 @@ def _of_samples(
     p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
 ) -> RecordLikelihood | None:
     record, force = p.record, given.force
-    start = max(int(np.argmax(mask)), warm_up(record.displacement))
-    stop = int(mask.size - np.argmax(mask[::-1]))
+    mask = mask & in_motion(record)
+    start, stop = int(np.argmax(mask)), int(mask.size - np.argmax(mask[::-1]))
     if stop - start < 2 * CYCLE_POINTS:
         return None
     noise = fit_smooth_residual(
