@@ -22,6 +22,8 @@ class HandedOn:
     prediction: Prediction | None
     refused: str | None
     """Why the plain damper is handed on although effects fitted the tests; None where it is not."""
+    by_criterion: bool = False
+    """Whether the last fit is by criterion (4), every sample alike: what is left is then no noise to weigh by."""
 
 
 def handed_on(named: Selection, trials: Trials, forced: Sequence[str], unit: str) -> HandedOn:
@@ -38,28 +40,45 @@ def handed_on(named: Selection, trials: Trials, forced: Sequence[str], unit: str
     unit : of the control signal, for the words
     """
     plain = trials.plain_missed()
-    kept, missed, refused = named, plain, None
+    kept, missed, refused, by_criterion = named, plain, None, False
     while kept.adopted:
-        missed = trials.missed(kept.fitted.damper)
+        missed, by_criterion = _best(kept, trials)
         ours = [name for name in kept.adopted if name not in forced]
         worse = trials.worse(missed, plain)
-        harmful = _harmful(kept, trials, missed, ours) or (ours[-1] if worse and ours else None)
+        harmful = _harmful(kept, trials, missed, ours, by_criterion=by_criterion) or (
+            ours[-1] if worse and ours else None
+        )
         if harmful is None:
             break
         if worse and len(kept.adopted) == 1:
             refused = _refused(named, (missed, plain), trials, worse, unit)
         kept = _without(kept, harmful)
     if not kept.adopted:
-        missed = plain
-    told = trials.told(plain, missed, kept.fitted.damper if kept.adopted else None)
-    return HandedOn(kept, told, refused if named.adopted and not kept.adopted else None)
+        return HandedOn(kept, trials.told(plain, plain, None), refused)
+    if by_criterion:
+        whole = trials.fitted_by_criterion(kept.fitted.damper, trials.nothing)
+        kept = replace(kept, fitted=whole or kept.fitted)
+    told = trials.told(plain, missed, kept.fitted.damper, by_criterion=by_criterion)
+    return HandedOn(kept, told, None, by_criterion)
 
 
-def _harmful(named: Selection, trials: Trials, missed: Missed, ours: Sequence[str]) -> str | None:
+def _best(named: Selection, trials: Trials) -> tuple[Missed, bool]:
+    """What the damper misses, and whether it is fitted by criterion (4) since that predicts visibly better.
+
+    The likelihood weighs by noise: the best there is as long as noise is what is left, and misled where a law is.
+    """
+    weighed, alike = trials.missed(named.fitted.damper), trials.missed_by_criterion(named.fitted.damper)
+    return (alike, True) if alike.less_than(weighed) else (weighed, False)
+
+
+def _harmful(
+    named: Selection, trials: Trials, missed: Missed, ours: Sequence[str], *, by_criterion: bool
+) -> str | None:
     """An effect without which the others predict better; a lone one is held against the plain damper instead."""
     if len(named.adopted) == 1:
         return None
-    without = ((name, trials.missed(_without(named, name).fitted.damper)) for name in reversed(ours))
+    asked = trials.missed_by_criterion if by_criterion else trials.missed
+    without = ((name, asked(_without(named, name).fitted.damper)) for name in reversed(ours))
     return next((name for name, other in without if trials.worse(missed, other)), None)
 
 

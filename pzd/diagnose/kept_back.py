@@ -7,7 +7,7 @@ is parted, for without it nothing would be known there; that is weak evidence.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -20,7 +20,7 @@ from pzd.damper.model import Damper
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.data.split import TRAINING, Split
-from pzd.diagnose.fit.least_squares import fit
+from pzd.diagnose.fit.least_squares import MOST_EVALUATIONS, Fitted, fit
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.prediction import counted, predicted_force
 from pzd.diagnose.fit.weights import record_likelihood, unweighted
@@ -31,6 +31,8 @@ FOLDS = 5
 """Each fold keeps back about a fifth of the tests: enough is left to fit, and the refits stay few."""
 PARTS = 2
 """Halves of a test that is alone at its voltage: the first predicts the second, and the second the first."""
+EVALUATIONS = 6
+"""Of a refit without one fold: it begins at the optimum of all tests, and a fifth of them moves that little."""
 WORSE = 2.0
 """Standard errors of the paired difference over tests from which one damper predicts worse than another."""
 
@@ -61,6 +63,10 @@ class Missed:
         """
         return float(self.error.sum() / self.energy.sum()) if self.record else None
 
+    def less_than(self, other: Missed) -> bool:
+        """Whether less is missed than by another damper, all tests together, by what can be seen."""
+        return float((other.error - self.error).sum()) > float(self.limit.sum())
+
     def of(self, wanted: Sequence[int]) -> Missed:
         """The entries of some records."""
         kept = np.isin(self.record, wanted)
@@ -89,6 +95,11 @@ class Trials:
     """Of the groups [V], 0 for a damper without; None where it moves."""
     folds: Folds
 
+    @property
+    def nothing(self) -> tuple[Mask, ...]:
+        """(n,) a record: no sample is kept back."""
+        return tuple(np.zeros(p.record.time.size, dtype=np.bool_) for p in self.campaign.prepared)
+
     def plain_missed(self) -> Missed:
         """What the plain damper misses, fitted without each fold by criterion (4), as identify fits it."""
         return self._missed(self._by_criterion(self.plain))
@@ -96,6 +107,16 @@ class Trials:
     def missed(self, damper: Damper) -> Missed:
         """What a damper misses, T0, C, k and its effects fitted without each fold, from where they are."""
         return self._missed(self._by_likelihood(damper))
+
+    def missed_by_criterion(self, damper: Damper) -> Missed:
+        """What a damper misses, all of it fitted without each fold by criterion (4), as identify fits the plain one."""
+        whole = self.fitted_by_criterion(damper, self.nothing)
+        return self._missed(self._by_criterion(whole.damper if whole else damper))
+
+    def fitted_by_criterion(self, damper: Damper, kept_back: Sequence[Mask]) -> Fitted | None:
+        """A damper, its effects too, fitted by criterion (4) to all but what is kept back; None where nothing is left."""
+        problem = self._unweighted(damper)(kept_back)
+        return None if problem is None else _fit(problem, damper)
 
     def worse(self, one: Missed, other: Missed) -> tuple[float | None, ...]:
         """The voltages [V] at which one damper predicts worse than another beyond chance; all where the whole is worse.
@@ -112,14 +133,18 @@ class Trials:
         constant = sorted((v, i) for i, v in enumerate(self.voltages) if v is not None)
         return tuple(i for _, i in constant[1:-1])
 
-    def told(self, plain: Missed, missed: Missed, damper: Damper | None) -> Prediction | None:
+    def told(
+        self, plain: Missed, missed: Missed, damper: Damper | None, *, by_criterion: bool = False
+    ) -> Prediction | None:
         """The figures of diagnosis.json; None where no test could be kept back.
 
         Parameters
         ----------
         plain, missed : what the plain damper and the one handed on miss
         damper : the one handed on where it is not the plain one
+        by_criterion : whether that is fitted by criterion (4)
         """
+        refit = self._by_criterion if by_criterion else self._by_likelihood
         whole = plain.criterion, missed.criterion
         if whole[0] is None or whole[1] is None:
             return None
@@ -130,7 +155,7 @@ class Trials:
                 if simple is not None and handed is not None:
                     name, at = self.campaign.prepared[i].record.name, voltage if controlled else None
                     by.append(KeptBack(record=name, voltage=at, W_s_plain=simple, W_s=handed))
-        left_out = [self._left_out(i, damper) for i in self.between()]
+        left_out = [self._left_out(i, refit(damper) if damper else None) for i in self.between()]
         return Prediction(
             hold_out=self._hold_out(),
             by=tuple(sorted(by, key=lambda each: each.record)),
@@ -148,7 +173,7 @@ class Trials:
             return "tests"
         return "segments" if self.campaign.prepared[group[0]].cycles is None else "cycles"
 
-    def _left_out(self, group: int, damper: Damper | None) -> LeftOut | None:
+    def _left_out(self, group: int, refit: _Refit | None) -> LeftOut | None:
         """One voltage predicted from those around it; nothing of which the voltage moves is fitted either."""
         mine, voltage = self.groups[group], self.voltages[group]
         moving = {i for v, members in zip(self.voltages, self.groups, strict=True) if v is None for i in members}
@@ -161,7 +186,7 @@ class Trials:
             return None if found is None else self._of_fold(found, asked).criterion
 
         plain = criterion(self._by_criterion(self.plain))
-        other = plain if damper is None else criterion(self._by_likelihood(damper))
+        other = plain if refit is None else criterion(refit)
         if voltage is None or plain is None or other is None:
             return None
         return LeftOut(voltage=voltage, W_s_plain=plain, W_s=other)
@@ -201,32 +226,35 @@ class Trials:
 
     def _by_likelihood(self, damper: Damper) -> _Refit:
         problem = evidence_of(self.campaign, damper).whole
-        return lambda kept_back: self._fitted(self.campaign, problem, damper, kept_back)
+        return lambda kept_back: _refitted(self._without(self.campaign, problem, damper, kept_back), damper)
 
     def _by_criterion(self, damper: Damper) -> _Refit:
+        problem = self._unweighted(damper)
+        return lambda kept_back: _refitted(problem(kept_back), damper)
+
+    def _unweighted(self, damper: Damper) -> Callable[[Sequence[Mask]], Problem | None]:
+        """What is fitted by criterion (4), by what is kept back."""
         campaign = replace(self.campaign, nuisance=NuisanceConfig(offset=0.0, delay_s=0.0, gain=0.0))
         problem = evidence_of(campaign, damper).whole
         peaks = dict.fromkeys((o.place for o in problem.observations), 0.0)
         for o in problem.observations:
             peaks[o.place] = max(peaks[o.place], o.peak)
 
-        def fitted(kept_back: Sequence[Mask]) -> Damper | None:
-            return self._fitted(campaign, problem, damper, kept_back, peaks)
+        def without(kept_back: Sequence[Mask]) -> Problem | None:
+            found = self._without(campaign, problem, damper, kept_back)
+            if found is None:
+                return None
+            named = {p.record.name: ~mask & counted(p) for p, mask in zip(campaign.prepared, kept_back, strict=True)}
+            counts = (int(np.count_nonzero(named[o.name])) for o in found.observations)
+            alike = (unweighted(o, n, peaks[o.place]) for o, n in zip(found.observations, counts, strict=True))
+            return replace(found, observations=tuple(alike))
 
-        return fitted
+        return without
 
-    def _fitted(
-        self,
-        campaign: Campaign,
-        problem: Problem,
-        damper: Damper,
-        kept_back: Sequence[Mask],
-        peaks: Mapping[int, float] | None = None,
-    ) -> Damper | None:
-        """The damper fitted to all but what is kept back, without the base rows that no test is left for.
-
-        None where no test is left at all; with the `peaks` of each condition it is fitted by criterion (4).
-        """
+    def _without(
+        self, campaign: Campaign, problem: Problem, damper: Damper, kept_back: Sequence[Mask]
+    ) -> Problem | None:
+        """The problem without what is kept back; None where nothing is left."""
         known = {o.name: o for o in problem.observations}
         kept = []
         for i, (p, mask) in enumerate(zip(campaign.prepared, kept_back, strict=True)):
@@ -236,15 +264,21 @@ class Trials:
             if mask.any():
                 (given,) = campaign.expected(damper, [i])
                 part = record_likelihood(p, ~mask, part.place, given, campaign.nuisance)
-            if part is not None and peaks is not None:
-                part = unweighted(part, int(np.count_nonzero(~mask & counted(p))), peaks[part.place])
             if part is not None:
                 kept.append(part)
-        if not kept:
-            return None
-        effects = tuple(damper.effects)
-        found = fit(replace(problem, observations=tuple(kept)), effects, problem.start_with(damper)).damper
-        return _shown(found, {o.place for o in kept})
+        return replace(problem, observations=tuple(kept)) if kept else None
+
+
+def _fit(problem: Problem, damper: Damper, evaluations: int = MOST_EVALUATIONS) -> Fitted:
+    """A damper fitted anew from where it is."""
+    return fit(problem, tuple(damper.effects), problem.start_with(damper), evaluations)
+
+
+def _refitted(problem: Problem | None, damper: Damper) -> Damper | None:
+    """A damper fitted anew, without the base rows that no test is left for."""
+    if problem is None:
+        return None
+    return _shown(_fit(problem, damper, EVALUATIONS).damper, {o.place for o in problem.observations})
 
 
 def trials_of(campaign: Campaign, plain: Damper, visible: float) -> Trials:
@@ -293,8 +327,7 @@ def _worse(one: Missed, other: Missed) -> bool:
         return False
     difference = (one.error - other.error) / one.energy
     error = float(np.std(difference, ddof=1) / np.sqrt(difference.size)) if difference.size > 1 else 0.0
-    seen = float((one.error - other.error).sum()) > float(one.limit.sum())
-    return seen and float(difference.mean()) > WORSE * error
+    return other.less_than(one) and float(difference.mean()) > WORSE * error
 
 
 def _shown(damper: Damper, places: set[int]) -> Damper:

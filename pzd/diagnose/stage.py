@@ -60,7 +60,8 @@ def diagnose(
     plain = base_of(identified.rows, setting)
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
     found_by_fit = select_effects(campaign, plain, diagnose, jobs)
-    handed = handed_on(found_by_fit, trials_of(campaign, plain, diagnose.visible), diagnose.force, control.unit)
+    trials = trials_of(campaign, plain, diagnose.visible)
+    handed = handed_on(found_by_fit, trials, diagnose.force, control.unit)
     named = handed.named
     evidence = named.first
     before = evidence.campaign.checks(named.plain.damper)
@@ -77,7 +78,7 @@ def diagnose(
         reason=decision.reason + weak(parts.hold_out) + unpredicted(handed.prediction) + without(cut_off),
         effects=named.adopted,
         confidence=decision.confidence,
-        gap=held_out_gap(named),
+        gap=held_out_gap(named, trials if handed.by_criterion else None),
         parameters=parameters_of(named),
         prediction=handed.prediction,
         zero_m=found.zero_m,

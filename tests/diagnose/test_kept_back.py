@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -144,19 +144,23 @@ class Foretold:
     voltages: tuple[float | None, ...] = TWO
     groups: tuple[tuple[int, ...], ...] = ((0, 1), (2, 3))
     plain: float = 1.0
-    asked: list[frozenset[str]] = field(default_factory=list)
 
     def plain_missed(self) -> float:
         return self.plain
 
     def missed(self, damper: Damper) -> float:
-        self.asked.append(frozenset(damper.effects))
+        return self.by_effects[frozenset(damper.effects)]
+
+    def missed_by_criterion(self, damper: Damper) -> float:
         return self.by_effects[frozenset(damper.effects)]
 
     def worse(self, one: float, other: float) -> tuple[float | None, ...]:
         return (150.0,) if one > other else ()
 
-    def told(self, plain: float, missed: float, damper: Damper | None) -> tuple[float, float, bool]:
+    def told(
+        self, plain: float, missed: float, damper: Damper | None, *, by_criterion: bool = False
+    ) -> tuple[float, float, bool]:
+        assert not by_criterion
         return plain, missed, damper is None
 
 
@@ -165,6 +169,9 @@ class _Figure(float):
 
     def of(self, _: object) -> _Figure:
         return self
+
+    def less_than(self, other: float) -> bool:
+        return self < other
 
     @property
     def criterion(self) -> float:
@@ -211,6 +218,27 @@ def test_what_the_config_asks_for_is_handed_on_whatever_it_does(rng: np.random.G
     found = handed_on(selection(rng, preload_offset={"F_0": 120.0}), cast("Trials", foretold), (A,), "V")
     assert found.named.adopted == (A,)
     assert found.refused is None
+
+
+def bent(rng: np.random.Generator, *, offset: float) -> tuple[Record, ...]:
+    """Tests with an offset that is the same in all, and a friction that no effect of the search explains."""
+    truth = damper_of(TWO, stribeck_friction={"F_s": 300.0, "v_s": 0.1})
+    records = [sine(truth, U, f, x, rng, noise=1e-3, cycles=4) for U in TWO for f, x in TESTS]
+    return tuple(replace(r, force=r.force + offset) for r in records)
+
+
+def test_where_a_law_is_missing_the_last_fit_takes_every_sample_alike(rng: np.random.Generator) -> None:
+    records = bent(rng, offset=100.0)
+    asked = trials(records, damper_of(TWO))
+    damper = damper_of(TWO, preload_offset={"F_0": 100.0})
+    weighed, alike = asked.missed(damper), asked.missed_by_criterion(damper)
+    assert (alike.criterion or 1.0) < (weighed.criterion or 0.0)
+
+
+def test_where_noise_is_what_is_left_the_likelihood_predicts_as_well(rng: np.random.Generator) -> None:
+    damper = damper_of(TWO, preload_offset={"F_0": 100.0})
+    asked = trials(sines(damper, rng, TWO, cycles=4, jitter=0.02), damper_of(TWO))
+    assert not asked.missed_by_criterion(damper).less_than(asked.missed(damper))
 
 
 # ---------------------------------------------------------------- the tests' own offset, gain and delay
