@@ -14,7 +14,7 @@ LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --fork-s
 
 .PHONY: help
 help:  ## Explain the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' Makefile
 
 .PHONY: demo
 demo: $(RUNTIME)  ## Install pzd into .venv, run configs/quickstart.yaml, say where the report lies
@@ -54,6 +54,10 @@ blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the naming
 .PHONY: bench
 bench: $(DEV)  ## Print how long a user waits, beside the limits
 	$(BIN)/python tests/studies/bench.py
+
+.PHONY: coverage-study
+coverage-study: $(DEV)  ## Print how often the intervals of identify hold the truth; some minutes
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/identify $(BIN)/python tests/studies/coverage_study.py
 
 .PHONY: format
 format: $(DEV)  ## Format the code and mend what ruff can mend

@@ -45,6 +45,26 @@ class Record:
         return None if self.temperature is None else float(np.median(self.temperature))
 
 
+def sliced(record: Record, kept: NDArray[np.bool_]) -> Record:
+    """The record's samples where the mask (n,) is set."""
+
+    def cut(channel: Array | None) -> Array | None:
+        return None if channel is None else channel[kept]
+
+    return Record(
+        record.name,
+        record.setting,
+        record.time[kept],
+        record.displacement[kept],
+        record.velocity[kept],
+        record.acceleration[kept],
+        record.force[kept],
+        cut(record.voltage),
+        cut(record.temperature),
+        cut(record.pressure),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Condition:
     """Records of one setting taken at one constant voltage and one temperature."""
@@ -55,9 +75,50 @@ class Condition:
     records: tuple[Record, ...]
 
 
+def glitches(values: Array) -> NDArray[np.int64]:
+    """Rows of up to three samples that jump away from their neighbours and back.
+
+    They stand out of the running median of seven samples by ten robust standard deviations of what stands
+    out of it, by four times the steepest usual step, and by 2 % of the usual range.
+
+    Parameters
+    ----------
+    values : (n,) of any channel
+    """
+    deviation = np.abs(from_neighbours(values))
+    noise = 1.4826 * float(np.median(deviation))
+    steepest = float(np.percentile(np.abs(np.diff(values)), 99.0)) if values.size > 1 else 0.0
+    low, high = np.percentile(values, (0.5, 99.5))
+    least = max(10.0 * noise, 4.0 * steepest, 0.02 * float(high - low), 1e-300)
+    rows: NDArray[np.int64] = np.flatnonzero(deviation > least)
+    return rows
+
+
+def from_neighbours(values: Array) -> Array:
+    """Deviation (n,) from the running median of seven samples; at the ends from that of the samples there are."""
+    half = 3
+    if values.size <= 2 * half:
+        return np.zeros_like(values)
+    padded = np.pad(values, half, mode="reflect")
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1)
+    deviation: Array = values - middle
+    return deviation
+
+
+def without_glitches(values: Array) -> Array:
+    """The samples of a channel that are no glitches of more than 2 % of its usual magnitude."""
+    usual = float(np.median(np.abs(values)))
+    if float(np.ptp(values)) <= CONSTANT_SHARE * usual:
+        return values
+    rows = glitches(values)
+    rows = rows[np.abs(from_neighbours(values)[rows]) > CONSTANT_SHARE * usual]
+    return np.delete(values, rows) if rows.size else values
+
+
 def voltage_scale(records: Iterable[Record]) -> float:
-    """The larger of the rig's voltage span and its largest magnitude [V]; 0 without voltages."""
-    extremes = [(float(r.voltage.min()), float(r.voltage.max())) for r in records if r.voltage is not None]
+    """The larger of the rig's voltage span and its largest magnitude [V], glitches aside; 0 without voltages."""
+    voltages = [without_glitches(record.voltage) for record in records if record.voltage is not None]
+    extremes = [(float(voltage.min()), float(voltage.max())) for voltage in voltages]
     if not extremes:
         return 0.0
     low, high = min(e[0] for e in extremes), max(e[1] for e in extremes)
@@ -65,10 +126,10 @@ def voltage_scale(records: Iterable[Record]) -> float:
 
 
 def is_constant(record: Record, scale: float) -> bool:
-    """Whether the record's voltage stands still: r.m.s. about the median within 2 % of the scale."""
+    """Whether the record's voltage stands still, glitches aside: r.m.s. about the median within 2 % of the scale."""
     if record.voltage is None:
         return True
-    deviation = record.voltage - np.median(record.voltage)
+    deviation = without_glitches(record.voltage) - np.median(record.voltage)
     return bool(np.sqrt(np.mean(deviation**2)) <= CONSTANT_SHARE * scale)
 
 

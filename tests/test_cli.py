@@ -313,6 +313,7 @@ def test_check_says_what_it_found_and_writes_nothing(typed: Terminal, tmp_path: 
         "2 records, 0 findings; the config is in order, nothing was written",
     ]
     assert typed("check", "first.yaml", "--set", "setting=gap") == 2
+    assert typed.out == ["a: 3 cycles at 1 Hz", "b: 3 cycles at 1 Hz"]  # the preflight of all, whatever the setting
     assert files_below(tmp_path) == before
 
 

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 import yaml
 from listings import missing
+from scipy.special import ndtri
 
 from pzd.cli.app import status
 from pzd.config import load
@@ -140,18 +141,19 @@ def test_the_quick_commands_of_the_readme_run_one_after_the_other(
 
 
 @pytest.fixture
-def own_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> Path:
+def own_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with the rig files that the pages speak of: one hides a pause of the logger, one a spike.
 
     The damper is the plain element, with T0 of 300 N at 0 V and 1300 N at 150 V.
     """
     (tmp_path / "data").mkdir()
+    spread = np.arange(1, 6001) ** 2 * (np.sqrt(5.0) - 1.0) / 2.0 % 1.0  # evenly spread: pages show the same numbers
     for frequency, amplitude in ((1, 30.0), (2, 15.0)):
         for voltage, friction in ((0, 300.0), (150, 1300.0)):
             time = np.arange(6000) / 1000
             position = amplitude * np.sin(2 * np.pi * frequency * time)
             force = element_force(position / 1000, 0.001, friction, 3000.0, 4e5)
-            load = -np.round(force + rng.normal(0.0, 5.0, time.size)) / 1000
+            load = -np.round(force + 5.0 * ndtri(spread)) / 1000
             keep = np.ones(time.size, dtype=bool)
             if (frequency, voltage) == (1, 0):
                 keep[2001:2020] = False

@@ -8,8 +8,10 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
+from pzd.artefacts.identified import ParameterRow
 from pzd.damper.model import Damper
 from pzd.quantities import Control
+from pzd.schema.csvfile import read_rows, write_rows
 from pzd.schema.jsonfile import read_json, write_json
 from pzd.schema.model import Frozen
 from pzd.schema.yamlfile import read_yaml_model, write_yaml_model
@@ -132,6 +134,8 @@ class Diagnosed:
     damper: Damper
     plain: Damper
     """The damper before diagnose."""
+    parameters: tuple[ParameterRow, ...] = ()
+    """T0, C and k of the damper with their intervals; empty where nobody fitted them."""
 
     @classmethod
     def undiagnosed(cls, damper: Damper, plain: Damper | None = None) -> Self:
@@ -152,10 +156,11 @@ class Diagnosed:
         return cls(nothing, damper, plain or damper)
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write diagnosis.json, damper.yaml and plain.yaml."""
+        """Write diagnosis.json, damper.yaml, plain.yaml and parameters.csv."""
         write_json(folder / "diagnosis.json", self.diagnosis, control)
         write_yaml_model(folder / "damper.yaml", self.damper, control)
         write_yaml_model(folder / "plain.yaml", self.plain, control)
+        write_rows(folder / "parameters.csv", ParameterRow, self.parameters, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
@@ -164,4 +169,5 @@ class Diagnosed:
             read_json(folder / "diagnosis.json", Diagnosis, control),
             read_yaml_model(folder / "damper.yaml", Damper, control),
             read_yaml_model(folder / "plain.yaml", Damper, control),
+            read_rows(folder / "parameters.csv", ParameterRow, control),
         )

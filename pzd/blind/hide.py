@@ -14,7 +14,6 @@ from pzd.blind.plan import Planned
 from pzd.blind.sizes import Outside, sizes, with_effects
 from pzd.blind.visible import gap_after_refit
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnose.config import NuisanceConfig
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control
 from pzd.record import Array
 from pzd.rig.stand.config import DisplacementNoise, ForceNoise, Jitter, Noise, VirtualEntry
@@ -22,6 +21,7 @@ from pzd.rig.stand.frame import force_in_frame
 from pzd.rig.stand.recording import Taken, take
 from pzd.schema.csvfile import write_columns
 from pzd.schema.jsonfile import write_json
+from pzd.signals.nuisance import NuisanceConfig
 
 
 @dataclass(frozen=True)

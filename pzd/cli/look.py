@@ -30,7 +30,7 @@ def check(
     verbose: Verbose = False,
 ) -> int:
     """Check config and rig records; write nothing."""
-    from pzd.pipeline.command import opened, preflight
+    from pzd.pipeline.command import check_setting, opened, preflight
     from pzd.schema.jsonfile import plain
 
     output = Output(quiet=quiet, verbose=verbose)
@@ -38,9 +38,11 @@ def check(
     entries = preflight(given)
     if as_json:
         output.say_json(plain({"config": config.as_posix(), "records": entries}, given.run.control))
+        check_setting(given, entries)
         return DONE
     for entry in entries:
         output.say(*_entry(entry))
+    check_setting(given, entries)
     found = sum(len(entry.findings) for entry in entries)
     output.say(f"{len(entries)} records, {found} findings; the config is in order, nothing was written")
     return DONE

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.model import Damper
-from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.data.split import UNTOUCHED, Split
 from pzd.diagnose.noise.input_uncertainty import Expected, expected
 from pzd.diagnose.residual_check import ResidualCheck, check_residual
+from pzd.signals.nuisance import NuisanceConfig
 
 Mask = NDArray[np.bool_]
 Item = TypeVar("Item")

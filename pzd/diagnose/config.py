@@ -6,17 +6,7 @@ from pydantic import Field, field_validator
 
 from pzd.damper.effects import library
 from pzd.schema.model import Frozen
-
-
-class NuisanceConfig(Frozen):
-    """What may differ from test to test without being an effect: standard deviations, zero mean."""
-
-    offset: float = Field(default=0.005, ge=0.0)
-    """Offset of the force, as a share of the test's peak force."""
-    delay_s: float = Field(default=0.0005, ge=0.0)
-    """Delay of the force."""
-    gain: float = Field(default=0.02, ge=0.0)
-    """Gain of the force, as a share of it."""
+from pzd.signals.nuisance import NuisanceConfig
 
 
 class DiagnoseConfig(Frozen):

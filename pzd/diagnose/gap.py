@@ -8,9 +8,9 @@ import numpy as np
 
 from pzd.artefacts import Gap
 from pzd.diagnose.data.split import Split
-from pzd.diagnose.lack_of_fit import pooled
 from pzd.diagnose.residual_check import ResidualCheck
 from pzd.record import Array
+from pzd.signals.lack_of_fit import pooled
 
 BLOCKS = 8
 """Parts in which the scatter of the gap is read off a record that does not repeat."""

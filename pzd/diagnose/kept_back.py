@@ -18,7 +18,6 @@ from pzd.artefacts import KeptBack, LeftOut, Prediction
 from pzd.damper.material import by_voltage
 from pzd.damper.model import Damper
 from pzd.diagnose.campaign import Campaign
-from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.data.split import TRAINING, Split
 from pzd.diagnose.fit.least_squares import MOST_EVALUATIONS, Fitted, fit
 from pzd.diagnose.fit.parameters import Problem
@@ -26,6 +25,7 @@ from pzd.diagnose.fit.prediction import counted, predicted_force
 from pzd.diagnose.fit.weights import record_likelihood, unweighted
 from pzd.diagnose.search.evidence import evidence_of
 from pzd.record import Array
+from pzd.signals.nuisance import NuisanceConfig
 
 FOLDS = 5
 """Each fold keeps back about a fifth of the tests: enough is left to fit, and the refits stay few."""

@@ -7,16 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.prediction import counted
-from pzd.diagnose.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
-from pzd.diagnose.noise.between_cycles import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.diagnose.noise.input_uncertainty import Expected
-from pzd.diagnose.noise.jumps import jumps, jumps_in_cycles, within_a_sample
-from pzd.diagnose.noise.smooth_residual import fit_smooth_residual
-from pzd.diagnose.noise.test_effects import nuisance
-from pzd.record import Array
+from pzd.record import Array, sliced
+from pzd.signals.between_cycles import PureError, harmonics_of, pure_error, repeatable_power
+from pzd.signals.jumps import jumps, jumps_in_cycles, within_a_sample
+from pzd.signals.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
+from pzd.signals.nuisance import NuisanceConfig, nuisance
+from pzd.signals.smooth_residual import fit_smooth_residual
 
 BELIEVED = 1e-4
 """A change from cycle to cycle counts in the gap where noise alone would show it less often than this."""
@@ -98,8 +97,6 @@ def _repeating(
 
 
 def _not_repeating(prepared: Prepared, mask: Mask, residual: Array, slack: Array, predicted: Array) -> ResidualCheck:
-    from pzd.diagnose.data.cleaning import sliced
-
     fit = fit_smooth_residual((residual - slack)[mask], sliced(prepared.record, mask), predicted[mask])
     left = (residual - slack)[mask] - fit.explained
     variance = min(fit.noise.variance, float(np.mean(left**2)) + float(np.mean(fit.spread)))
@@ -116,8 +113,7 @@ def _folded(prepared: Prepared, residual: Array, mask: Mask) -> Array | None:
     if run is None:
         return None
     time = prepared.record.time
-    number = run.number(time)
-    whole = [j for j in range(run.count) if np.all(mask[number == j])]
+    whole = run.whole(time, mask)
     return run.fold(time, residual)[whole] if len(whole) >= 2 else None
 
 

@@ -40,6 +40,7 @@ def diagnose(
     -------
     the verdict, and the damper with what was adopted; unchanged where nothing was
     """
+    from pzd.diagnose.base_parameters import base_parameters
     from pzd.diagnose.campaign import Campaign
     from pzd.diagnose.data.cleaning import about, mid_stroke, prepare
     from pzd.diagnose.data.exclusions import whole_records, without
@@ -87,4 +88,6 @@ def diagnose(
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),
         next_test=next_test(rivals, reach, evidence.whole.reference, offsets),
     )
-    return Diagnosed(told, found, plain)
+    if not named.adopted:
+        return Diagnosed(told, found, plain, tuple(row for row in identified.rows if row.setting == setting))
+    return Diagnosed(told, found, plain, base_parameters(named, decision.verdict, setting))

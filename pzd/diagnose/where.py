@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import Region
-from pzd.diagnose.noise.between_cycles import repeatable_power
 from pzd.diagnose.residual_check import ResidualCheck
 from pzd.record import Array
+from pzd.signals.between_cycles import repeatable_power
 
 Labels = NDArray[np.str_]
 

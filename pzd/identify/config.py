@@ -8,6 +8,7 @@ from pydantic import Field
 
 from pzd.record import SAME_TEMPERATURE
 from pzd.schema.model import Frozen
+from pzd.signals.nuisance import NuisanceConfig
 
 
 class GroupConfig(Frozen):
@@ -42,5 +43,7 @@ class IdentifyConfig(Frozen):
     """Voltages (or other control values) at which records with moving voltage are fitted, parameters being
     piecewise linear in between; empty for the constant voltages, or where there are fewer than two, the levels
     that the voltage dwells on."""
+    nuisance: NuisanceConfig = NuisanceConfig()
+    """What may differ from test to test, which intervals allow for; `diagnose.nuisance` judges the gap by its own."""
     evolutionary: EvolutionaryConfig = EvolutionaryConfig()
     """Settings of `method: evolutionary`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pzd.identify.misfit import Misfit
 from pzd.identify.objective import Bingham, Objective
 from pzd.identify.trust import MISFIT, SPRING_TO_NOISE, STATIONARY, Evidence, displacement_noise, friction_scale
 from pzd.record import Array
@@ -20,7 +21,9 @@ def scales_of(parameters: Bingham, measured: Array) -> Array:
     return np.array([friction_scale(parameters.friction, measured), parameters.damping, parameters.stiffness])
 
 
-def evidence_of(objective: Objective, parameters: Bingham, criterion: float, facts: Array) -> list[Evidence]:
+def evidence_of(
+    objective: Objective, parameters: Bingham, criterion: float, facts: Array, misfit: Misfit
+) -> list[Evidence]:
     """What the data say of T0, C and k.
 
     Parameters
@@ -28,21 +31,29 @@ def evidence_of(objective: Objective, parameters: Bingham, criterion: float, fac
     objective : the data
     parameters : the optimum
     criterion : W_s there
-    facts : (4, 3) scale, half width of the 95 % interval, visible share, and cosine of stationarity of each
+    facts : (5, 3) scale, half widths of the 95 % interval by noise alone and altogether, visible share, and cosine
+        of stationarity of each
+    misfit : what the model misses
     """
-    scales, widths, visible, cosines = facts.tolist()
+    scales, noise, widths, visible, cosines = facts.tolist()
     unsettled = _unsettled(objective, parameters, cosines)
     vetoes = [
         f"at a bound of the search{_tare(objective)}" if bounded else "the search did not converge" if moving else None
         for bounded, moving in zip(objective.at_bounds(parameters), unsettled, strict=True)
     ]
     vetoes[2] = vetoes[2] or _blurred(objective, parameters)
-    left = float(np.sqrt(criterion))
-    doubt = f"the model leaves {left:.0%} of the force's r.m.s." if left > MISFIT else None
+    doubt = _doubt(float(np.sqrt(criterion)), misfit)
     return [
-        Evidence(name, scale, width, share, veto, doubt)
-        for name, scale, width, share, veto in zip(NAMES, scales, widths, visible, vetoes, strict=True)
+        Evidence(name, scale, by_noise, width, share, veto, doubt)
+        for name, scale, by_noise, width, share, veto in zip(NAMES, scales, noise, widths, visible, vetoes, strict=True)
     ]
+
+
+def _doubt(left: float, misfit: Misfit) -> str | None:
+    """Why the parameters are weak however narrow their intervals: the model lacks something."""
+    missed = f"the model misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's"
+    much = f"the model leaves {left:.0%} of the force's r.m.s."
+    return "; ".join(words for words, true in ((missed, misfit.speaks), (much, left > MISFIT)) if true) or None
 
 
 def _unsettled(objective: Objective, parameters: Bingham, cosines: list[float]) -> list[bool]:

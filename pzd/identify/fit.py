@@ -10,8 +10,11 @@ from pzd.artefacts import ParameterRow
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.determination import evidence_of, scales_of
 from pzd.identify.evolutionary import fit_evolutionary
-from pzd.identify.intervals import uncertainty
+from pzd.identify.intervals import half_widths
+from pzd.identify.misfit import misfit_of
+from pzd.identify.noise_alone import uncertainty
 from pzd.identify.objective import Bingham, Fit, Objective
+from pzd.identify.part import parts_of
 from pzd.identify.separable import fit_separable
 from pzd.identify.trial import trial_of
 from pzd.identify.trust import Evidence, judge, stationarity, visible_shares
@@ -21,7 +24,10 @@ from pzd.record import Array, Condition, Record
 def fit_condition(condition: Condition, config: IdentifyConfig, seed: int) -> ParameterRow:
     """The Bingham parameters of one condition, pooled over its records."""
     objective, fit = fit_records(condition.records, config, seed)
-    widths = uncertainty(fit.slopes, fit.residuals, objective.lengths).half_widths()
+    parts = parts_of(condition.records, objective.trials, (fit.residuals, fit.slopes), config.nuisance)
+    misfit = misfit_of(parts)
+    noise = uncertainty(fit.slopes, fit.residuals, objective.lengths).half_widths()
+    widths = half_widths(parts, misfit)
     scales = scales_of(fit.parameters, objective.measured)
     visible = visible_shares(fit.slopes, scales, objective.energy)
     cosines = stationarity(fit.slopes, fit.residuals, objective.energy)
@@ -29,7 +35,9 @@ def fit_condition(condition: Condition, config: IdentifyConfig, seed: int) -> Pa
         (condition.setting, condition.voltage, condition.temperature),
         fit.parameters,
         widths,
-        evidence_of(objective, fit.parameters, fit.criterion, np.stack([scales, widths, visible, cosines])),
+        evidence_of(
+            objective, fit.parameters, fit.criterion, np.stack([scales, noise, widths, visible, cosines]), misfit
+        ),
         (objective.measured, fit.residuals),
     )
 

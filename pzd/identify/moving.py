@@ -19,14 +19,18 @@ from pzd.artefacts import ParameterRow
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.determination import evidence_of, scales_of
 from pzd.identify.fit import row_of
-from pzd.identify.intervals import uncertainty
+from pzd.identify.intervals import half_widths
+from pzd.identify.misfit import misfit_of
 from pzd.identify.nodes import nodes_of
+from pzd.identify.noise_alone import uncertainty
 from pzd.identify.objective import Bingham, Objective, from_search, search_slopes, to_search
+from pzd.identify.part import parts_of
 from pzd.identify.piecewise import MovingObjective, voltage_of
 from pzd.identify.separable import TOLERANCE, fit_separable
 from pzd.identify.trial import Trial, trial_of
 from pzd.identify.trust import stationarity, visible_shares
 from pzd.record import CONSTANT_SHARE, Array, Condition, Record, conditions, voltage_scale
+from pzd.signals.nuisance import NuisanceConfig
 
 Known = tuple[Condition, ParameterRow]
 
@@ -109,7 +113,7 @@ def _fit_band(
     setting = records[0].setting
     temperatures = {int(np.argmin(np.abs(nodes - (c.voltage or 0.0)))): c.temperature for c, _ in known}
     labels = [(setting, float(nodes[i]), temperatures.get(i, temperature)) for i in objective.free]
-    return _rows(objective, free, labels)
+    return _rows(objective, free, labels, config.nuisance)
 
 
 def _at_samples(record: Record) -> Trial:
@@ -178,13 +182,22 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
 
 
 def _rows(
-    objective: MovingObjective, free: list[Bingham], labels: list[tuple[str | None, float, float | None]]
+    objective: MovingObjective,
+    free: list[Bingham],
+    labels: list[tuple[str | None, float, float | None]],
+    nuisance: NuisanceConfig,
 ) -> list[ParameterRow]:
-    """One row a free node, judged on the samples that the node touches."""
+    """One row a free node, judged on the samples that the node touches.
+
+    Where the voltage moves nothing repeats, so that no lack of fit is judged.
+    """
     residuals = objective.residuals(free)
     slopes = objective.slopes(free, residuals)
-    widths = uncertainty(slopes, residuals, objective.plain.lengths).half_widths().reshape(-1, 3)
     plain = objective.plain
+    parts = parts_of(objective.records, plain.trials, (residuals, slopes), nuisance, constant=False)
+    misfit = misfit_of(parts)
+    noise = uncertainty(slopes, residuals, plain.lengths).half_widths().reshape(-1, 3)
+    widths = half_widths(parts, misfit).reshape(-1, 3)
     scales = np.stack([scales_of(p, plain.measured) for p in free])
     visible = visible_shares(slopes, scales.ravel(), plain.energy).reshape(-1, 3)
     cosines = stationarity(slopes, residuals, plain.energy).reshape(-1, 3)
@@ -194,7 +207,7 @@ def _rows(
         here = touched[:, i] if np.any(touched[:, i]) else slice(None)
         measured, left = plain.measured[here], residuals[here]
         energy = float(measured @ measured)
-        facts = np.stack([scales[i], widths[i], visible[i] * np.sqrt(plain.energy / energy), cosines[i]])
-        evidence = evidence_of(plain, parameters, float(left @ left) / energy, facts)
+        facts = np.stack([scales[i], noise[i], widths[i], visible[i] * np.sqrt(plain.energy / energy), cosines[i]])
+        evidence = evidence_of(plain, parameters, float(left @ left) / energy, facts, misfit)
         rows.append(row_of(labels[i], parameters, widths[i], evidence, (measured, left)))
     return rows

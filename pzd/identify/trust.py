@@ -12,8 +12,8 @@ from pzd.record import Array
 SENSOR_ERROR = 0.005
 """A systematic force error of this share of r.m.s. is always possible: load cells are of class 0.5 at best."""
 UNDETERMINED_SHARE = 0.5
-"""A parameter is undetermined when its 95 % half width, or the shift that the sensor error may cause, exceeds
-this share of it."""
+"""A parameter is undetermined when its 95 % half width by noise alone, or the shift that the sensor error may cause,
+exceeds this share of it. What the sensors or a misfit add makes it weak: the data still have a value for it."""
 WEAK_WIDTH = 0.1
 """A parameter is weak when its 95 % half width exceeds this share of it."""
 WEAK_SHIFT = 0.2
@@ -48,8 +48,10 @@ class Evidence:
     name: str
     scale: float
     """What its uncertainty is measured against [its unit]."""
+    noise: float
+    """Half width of the 95 % interval that noise of the residuals' colour alone gives it [its unit]."""
     half_width: float
-    """Half width of its 95 % interval [its unit]."""
+    """Half width of its 95 % interval, sensors and misfit allowed for [its unit]."""
     visible: float
     """R.m.s. of the force that changes with it by one scale and that no other parameter makes up, over the r.m.s."""
     veto: str | None = None
@@ -65,17 +67,19 @@ class Evidence:
             return "the force does not depend on it, or another parameter makes it up"
         if self.shift > UNDETERMINED_SHARE:
             return f"a force error of {SENSOR_ERROR:.1%} may shift it by {_percent(self.shift)}"
-        if not self.half_width <= UNDETERMINED_SHARE * self.scale:
-            return f"95 % interval of +-{_percent(self.half_width / self.scale)}"
+        if not self.noise <= UNDETERMINED_SHARE * self.scale:
+            return f"95 % interval of +-{_percent(self.noise / self.scale)} by noise alone"
         return None
 
     def weak(self) -> str | None:
         """Why it is weak, None where it is not."""
+        if self.doubt:
+            return self.doubt
         if self.half_width > WEAK_WIDTH * self.scale:
             return f"95 % interval of +-{_percent(self.half_width / self.scale)}"
         if self.shift > WEAK_SHIFT:
             return f"a force error of {SENSOR_ERROR:.1%} may shift it by {_percent(self.shift)}"
-        return self.doubt
+        return None
 
     @property
     def shift(self) -> float:
@@ -148,7 +152,8 @@ def _clause(word: str, names: Sequence[str], reasons: Sequence[str | None]) -> s
     named = [(n, r) for n, r in zip(names, reasons, strict=True) if r]
     if not named:
         return ""
-    detail = named[0][1] if len(named) == 1 else "; ".join(f"{n}: {r}" for n, r in named)
+    alike = len({reason for _, reason in named}) == 1
+    detail = named[0][1] if alike else "; ".join(f"{n}: {r}" for n, r in named)
     return f"{word}: {', '.join(n for n, _ in named)} ({detail})"
 
 

@@ -5,7 +5,8 @@ Car, road, bounds and tie-break are those of `pzd.simulate`; only the loop is on
 car and tie-break): the survey of 690 rows with eight neighbours each would take half an hour instead of minutes.
 Over every sixtieth row of cars.csv the peaks agree to 1e-4 in the median and 1 % at most (fixed steps or a tolerance
 of 1e-9), which is also how far those of `pzd.simulate` move between these two: where the control jumps from one end of
-its range to the other, a peak is not defined more closely. tests/paper/test_car_search.py holds both against each other.
+its range to the other, a peak is not defined more closely. tests/paper/test_car_search.py holds both against each
+other.
 """
 
 from __future__ import annotations

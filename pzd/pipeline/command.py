@@ -124,6 +124,15 @@ def preflight(given: Opened) -> tuple[RecordEntry, ...]:
     _check_reference(given)
     with given.placed():
         made = Pipeline(given.config, given.run, (first,), lambda _: None).made(first)
-        entries = made.entries if isinstance(made, Rig) else ()
+    return made.entries if isinstance(made, Rig) else ()
+
+
+def check_setting(given: Opened, entries: Sequence[RecordEntry]) -> None:
+    """Check that the config says which setting of the rig's records the stages from diagnose on are about.
+
+    Raises
+    ------
+    ConfigError : when there are several and it does not, or none is the one it says
+    """
+    with given.placed():
         setting_in_use(given.config.setting, [entry.setting for entry in entries])
-    return entries

@@ -12,6 +12,7 @@ import numpy as np
 
 from pzd.artefacts import ComfortRow, Diagnosed, Identified, ParameterRow, RecordEntry, Rides, Rig, SummaryRow, Table
 from pzd.damper.competing_forms import competing_forms
+from pzd.damper.model import BaseRow
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.report.config import ReportConfig
@@ -67,6 +68,13 @@ class ReportContext:
     def parameters(self) -> tuple[ParameterRow, ...]:
         """The identified rows of the chosen setting."""
         return tuple(row for row in self.identified.rows if row.setting == self.chosen)
+
+    @cached_property
+    def final(self) -> tuple[ParameterRow | BaseRow, ...]:
+        """T0, C and k of the damper that everything behind uses; without intervals where somebody edited them since."""
+        if not self.extended:
+            return self.parameters
+        return tuple(_fitted(base, self.diagnosed.parameters) or base for base in self.diagnosed.damper.base)
 
     @cached_property
     def sampled(self) -> tuple[Record, ...]:
@@ -182,6 +190,16 @@ class ReportContext:
     def without(self, row: SummaryRow) -> SummaryRow | None:
         """The same ride on the damper before diagnose."""
         return next((other for other in self.rides.summary if other.case == f"{row.case}{PLAIN_SUFFIX}"), None)
+
+
+def _fitted(base: BaseRow, rows: Sequence[ParameterRow]) -> ParameterRow | None:
+    """The row that was fitted with a base row, None where that has other values now."""
+    for row in rows:
+        pairs = [(getattr(row, column), getattr(base, column)) for column in ("T0_N", "C_Ns_per_m", "k_N_per_m")]
+        here = (row.voltage_V, row.temperature_degC) == (base.voltage_V, base.temperature_degC)
+        if here and all(known is None or known == value for known, value in pairs):
+            return row
+    return None
 
 
 def effect_in_words(name: str) -> str:

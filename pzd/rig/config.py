@@ -19,6 +19,19 @@ def _text(value: object) -> object:
     return value
 
 
+def _filled_in(what: str) -> BeforeValidator:
+    """Refuses the empty value that `pzd init` leaves where only a person knows the answer."""
+
+    def checked(value: object) -> object:
+        if value is None:
+            raise ValueError(f"is empty; fill in {what}")
+        return value
+
+    return BeforeValidator(checked)
+
+
+Header = Annotated[str, _filled_in("the header of its column in the files")]
+Unit = Annotated[str, _filled_in("its unit in the files, e.g. s, mm, kN, V, degC")]
 WithUnit = Annotated[str, BeforeValidator(_text)]
 """A number with its unit, like `100 V`."""
 
@@ -31,7 +44,7 @@ class Fixture(Frozen):
     stiffness_N_per_m: float | None = Field(default=None, gt=0.0)
     """Stiffness of frame and joints: F/k is taken out of the displacement."""
     tare_N: float = 0.0
-    """Force that the cell shows without a damper: taken out of the force."""
+    """Force that the cell shows without a damper, in its own direction: taken out before `sign` turns the force."""
 
 
 class Split(Frozen):
@@ -62,9 +75,10 @@ class FilesEntry(Frozen):
 
     path: str = Field(min_length=1)
     """Path or glob pattern (`*`, `?`, `**`), relative to the folder of this config."""
-    columns: dict[str, str] = Field(default={})
-    """Quantity -> header in the file, e.g. `{time: t, force: Load}`; what is not named has its canonical header."""
-    units: dict[str, str] = Field(default={})
+    columns: dict[str, Header] = Field(default={})
+    """Quantity -> header in the file, e.g. `{time: t, force: Load}`; what is not named has its canonical header.
+    An empty header (`{voltage: ''}`) leaves a column out."""
+    units: dict[str, Unit] = Field(default={})
     """Quantity -> unit in the file (`mm`, `kN`, `degF`), or what one recorded unit stands for (`980.665 N`).
     For time also a format of date and time (`%m/%d/%Y %H:%M:%S.%f`)."""
     constants: dict[str, WithUnit] = Field(default={})

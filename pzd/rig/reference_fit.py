@@ -13,7 +13,7 @@ import numpy as np
 
 from pzd.damper.element import element_force
 from pzd.record import Array
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 from pzd.signals.cycles import Cycles
 from pzd.signals.kinematics import drift_of
 

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pzd.artefacts import Rig
 from pzd.quantities import Control
-from pzd.rig.config import RigConfig
+from pzd.rig.config import Limits, RigConfig
 from pzd.schema.errors import ConfigError
+
+if TYPE_CHECKING:
+    from pzd.rig.preflight import Measured
+    from pzd.rig.stand.config import Planned
+    from pzd.rig.stand.recording import Taken
 
 log = logging.getLogger(__name__)
 
@@ -30,11 +37,12 @@ def ingest(rig: RigConfig, control: Control, folder: Path, jobs: int = 1) -> Rig
     DataError : when a file cannot be believed; every such file is listed
     FilesError : when a file cannot be read
     """
-    from pzd.rig.assembly import measured
+    from pzd.rig.files.reading import read
+    from pzd.rig.preflight import examined
 
     if rig.files is None:
         raise ConfigError("rig: this config has a virtual stand and no files; use synthesise (got rig.virtual)")
-    found = measured(rig.files, rig.limits, control, folder, jobs)
+    found = examined(read(rig.files, rig.limits, control, folder), jobs)
     log.info("read %d tests", len(found.records))
     return found
 
@@ -54,12 +62,27 @@ def synthesise(rig: RigConfig, seed: int, control: Control, folder: Path, jobs: 
     ------
     ConfigError : when the config has measured files instead, or two records would have one name
     """
-    from pzd.rig.assembly import made, overview
+    from pzd.rig.preflight import examined
     from pzd.rig.stand.recording import taker
 
     if rig.virtual is None:
         raise ConfigError("rig: this config has measured files and no virtual stand; use ingest (got rig.files)")
     takers = [(entry, taker(entry, seed, folder)) for entry in rig.virtual]
-    tests = [partial(made, take, planned, rig.limits) for entry, take in takers for planned in entry.plan(control)]
+    tests = [
+        partial(_taken, take, planned, rig.limits, control) for entry, take in takers for planned in entry.plan(control)
+    ]
     log.info("taking %d records", len(tests))
-    return overview(tests, jobs)
+    return examined(tests, jobs)
+
+
+def _taken(take: Callable[[Planned], Taken], planned: Planned, limits: Limits, control: Control) -> Measured:
+    """A record of the virtual stand, with its cycles and clean motion."""
+    from pzd.rig.preflight import Measured
+    from pzd.rig.stand.recording import record_of
+    from pzd.signals.cycles import cycles
+    from pzd.signals.kinematics import kinematics
+
+    taken = take(planned)
+    run = cycles(taken.time, taken.displacement)
+    clean = kinematics(taken.time, taken.displacement, run)
+    return Measured(record_of(taken, clean), run, clean, limits, control=control)

@@ -64,6 +64,11 @@ class Cycles:
         index = np.floor((time - self.start) / self.period + 1e-9).astype(np.int64)
         return np.where(self.inside(time), index, -1)
 
+    def whole(self, time: Array, wanted: NDArray[np.bool_]) -> list[int]:
+        """Indices of the cycles all of whose samples are wanted, (n,)."""
+        number = self.number(time)
+        return [j for j in range(self.count) if np.all(wanted[number == j])]
+
     def points(self, time: Array) -> int:
         """Samples in one cycle, rounded down: the length of a folded cycle."""
         return max(int(np.floor(self.period / float(np.median(np.diff(time))) + 1e-6)), 4)

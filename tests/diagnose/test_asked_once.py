@@ -10,13 +10,13 @@ from campaign import damper_of, sines
 
 from pzd.damper.compose import constant_rows, respond
 from pzd.diagnose.campaign import Campaign
-from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import UNTOUCHED, split
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
 from pzd.diagnose.fit.parameters import simulated
 from pzd.diagnose.search.evidence import evidence_of
+from pzd.signals.nuisance import NuisanceConfig
 
 TWO = (0.0, 150.0)
 PLAIN = damper_of(TWO)

@@ -11,18 +11,20 @@ from campaign import damper_of, sine
 
 from pzd.damper.effects import library
 from pzd.diagnose.campaign import Campaign
-from pzd.diagnose.config import NuisanceConfig
-from pzd.diagnose.data.cleaning import prepare, sliced
+from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import split
-from pzd.diagnose.fit.intervals import LEVEL, disagreement, standard_errors
+from pzd.diagnose.fit.intervals import LEVEL, base_half_widths, disagreement, standard_errors
 from pzd.diagnose.fit.least_squares import Fitted, fit
 from pzd.diagnose.fit.parameters import Unknown
 from pzd.diagnose.search.evidence import Evidence, evidence_of
-from pzd.record import Array, Record
+from pzd.record import Array, Record, sliced
+from pzd.signals.nuisance import NuisanceConfig
 
 DRAWS = 400
 TESTS = 9
 DELAY = NuisanceConfig().delay_s
+OF_EFFECT = slice(3, 4)
+"""Of what `linear` searches, the effect's parameter."""
 
 
 def linear(rng: np.random.Generator, pulled: float) -> tuple[Fitted, float]:
@@ -56,7 +58,8 @@ def by_noise_alone(fitted: Fitted) -> Array:
 
 def test_tests_that_differ_by_noise_alone_disagree_by_one_on_average(rng: np.random.Generator) -> None:
     # Chi-square of eight degrees of freedom over eight: sd 0.5 a draw, 0.025 of the mean of 400; 4.5 sd.
-    assert np.mean([disagreement(linear(rng, 0.0)[0])[0] for _ in range(DRAWS)]) == pytest.approx(1.0, abs=0.12)
+    found = [disagreement(linear(rng, 0.0)[0], OF_EFFECT)[0] for _ in range(DRAWS)]
+    assert np.mean(found) == pytest.approx(1.0, abs=0.12)
 
 
 def test_ninety_five_in_a_hundred_intervals_hold_the_truth_where_noise_is_all(
@@ -111,6 +114,20 @@ def test_a_common_delay_is_known_no_better_than_the_delays_of_the_tests_let_it(
     assert found.damper.effects["sensor_delay"]["tau"] == pytest.approx(tau, abs=DELAY / np.sqrt(count))
     by_the_tests = DELAY / np.sqrt(count)
     assert 0.97 * by_the_tests < standard_errors(found)[0] < 1.2 * by_the_tests
+
+
+def test_t0_c_and_k_beside_an_effect_have_intervals_that_hold_them(rng: np.random.Generator) -> None:
+    effects = {"orifice_quadratic": {"q": 1500.0}}
+    evidence, found = fitted_to(tuple(shown_late(0.0, effects, test, rng) for test in FOUR), effects)
+    widths = base_half_widths(found, evidence.whole.scales.force)
+    fitted, true = (
+        np.array([(r.T0_N, r.C_Ns_per_m, r.k_N_per_m) for r in damper.base])
+        for damper in (found.damper, damper_of((0.0, 150.0)))
+    )
+    assert np.all(np.abs(fitted - true) <= widths)
+    assert np.all(widths < 0.1 * true)
+    # Two tests at each voltage know neither T0 nor C better than the gain of a load cell.
+    assert np.all(widths[:, :2] > LEVEL * NuisanceConfig().gain / np.sqrt(2.0) * 0.5 * true[:, :2])
 
 
 def test_a_delay_of_the_tests_does_not_pass_for_more_or_less_play(rng: np.random.Generator) -> None:

@@ -10,7 +10,6 @@ from campaign import damper_of, sine, sines
 
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.campaign import Campaign
-from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import TRAINING, split
 from pzd.diagnose.fit.least_squares import fit
@@ -18,6 +17,7 @@ from pzd.diagnose.fit.prediction import counted
 from pzd.diagnose.noise.input_uncertainty import expected
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.record import Record
+from pzd.signals.nuisance import NuisanceConfig
 
 TWO = (0.0, 150.0)
 

@@ -11,11 +11,10 @@ from pzd.artefacts import Diagnosed, Rig, base_of
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.config import DiagnoseConfig, NuisanceConfig
+from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import TRAINING, UNTOUCHED, VALIDATION, split
 from pzd.diagnose.noise.input_uncertainty import expected
-from pzd.diagnose.noise.test_effects import nuisance
 from pzd.diagnose.residual_check import check_residual
 from pzd.diagnose.stage import diagnose
 from pzd.identify.config import IdentifyConfig
@@ -23,6 +22,7 @@ from pzd.identify.stage import identify
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.rig.config import FilesEntry, RigConfig
+from pzd.signals.nuisance import NuisanceConfig, nuisance
 
 TWO = (0.0, 150.0)
 STAND = RigConfig(files=(FilesEntry(path="*.csv"),))
@@ -116,8 +116,12 @@ def test_roads_without_a_missing_effect_are_within_the_noise(
 
 def test_roads_show_what_misses_although_nothing_repeats(rng: np.random.Generator) -> None:
     damper = damper_of(TWO, gas_spring={"k_g": 2e4})
-    found = diagnosed(tuple(road(damper, rng, U) for U in TWO)).diagnosis
-    assert "gas_spring" in found.effects + found.rivals
+    found = diagnosed(tuple(road(damper, rng, U) for U in TWO))
+    assert "gas_spring" in found.diagnosis.effects + found.diagnosis.rivals
+    if found.diagnosis.effects:
+        base = found.damper.base
+        assert [(r.voltage_V, r.C_Ns_per_m) for r in found.parameters] == [(b.voltage_V, b.C_Ns_per_m) for b in base]
+        assert all(r.C_Ns_per_m_low95 < r.C_Ns_per_m < r.C_Ns_per_m_high95 for r in found.parameters)
 
 
 def test_the_same_rig_gives_the_same_diagnosis_and_reads_back(rng: np.random.Generator, tmp_path: Any) -> None:
@@ -125,7 +129,10 @@ def test_the_same_rig_gives_the_same_diagnosis_and_reads_back(rng: np.random.Gen
     first, second = diagnosed(records), diagnosed(records)
     assert first.diagnosis == second.diagnosis
     first.write(tmp_path, Control())
-    assert Diagnosed.read(tmp_path, Control()).diagnosis == first.diagnosis
+    again = Diagnosed.read(tmp_path, Control())
+    assert again.diagnosis == first.diagnosis
+    assert again.parameters == first.parameters
+    assert [r.voltage_V for r in again.parameters] == [r.voltage_V for r in first.plain.base]
 
 
 def test_every_role_has_every_kind_of_test_over_the_conditions(rng: np.random.Generator) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from campaign import TABLE_2, damper_of, sine
 
-from pzd.diagnose.config import NuisanceConfig
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.gap import visible_gap
 from pzd.diagnose.noise.input_uncertainty import expected
-from pzd.diagnose.noise.jumps import jumps
 from pzd.diagnose.residual_check import check_residual
+from pzd.signals.jumps import jumps
+from pzd.signals.nuisance import NuisanceConfig
 
 
 def test_a_step_is_a_jump_of_its_own_size_at_the_two_samples_beside_it() -> None:

@@ -12,11 +12,11 @@ from campaign import TABLE_2, damper_of, sine, sines
 from pzd.artefacts import Diagnosed, Prediction, Rig
 from pzd.damper.model import Damper
 from pzd.diagnose.campaign import Campaign
-from pzd.diagnose.config import DiagnoseConfig, NuisanceConfig
+from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import split
 from pzd.diagnose.fit.least_squares import fit
-from pzd.diagnose.fit.likelihood import AT_MOST, RecordLikelihood, response
+from pzd.diagnose.fit.likelihood import RecordLikelihood, response
 from pzd.diagnose.handed_on import handed_on
 from pzd.diagnose.kept_back import Missed, Trials, trials_of
 from pzd.diagnose.search.evidence import Evidence, evidence_of
@@ -28,6 +28,7 @@ from pzd.identify.stage import identify
 from pzd.quantities import Control
 from pzd.record import Record
 from pzd.rig.config import FilesEntry, RigConfig
+from pzd.signals.nuisance import AT_MOST, NuisanceConfig
 
 TWO = (0.0, 150.0)
 TESTS = ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03))

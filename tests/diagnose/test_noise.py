@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from campaign import coloured
 
-from pzd.diagnose.lack_of_fit import bands, by_harmonics, by_trend, pooled
-from pzd.diagnose.noise.between_cycles import pure_error, repeatable_power
 from pzd.signals.autoregression import autoregression
+from pzd.signals.between_cycles import pure_error, repeatable_power
+from pzd.signals.lack_of_fit import bands, by_harmonics, by_trend, pooled
 
 COLOURS = (0.0, 0.5, 0.9)
 

@@ -12,14 +12,19 @@ from pzd.damper.compose import respond
 from pzd.damper.element import element_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.identify.config import IdentifyConfig
 from pzd.identify.objective import Bingham
 from pzd.paper.published import published
 from pzd.record import Array, Record
+from pzd.signals.nuisance import NuisanceConfig
 
 RATE = 1000
 OVERSAMPLING = 32
 
 TABLE_2 = {0.0: Bingham(301.0, 2720.0, 199e3), 150.0: Bingham(1325.0, 2560.0, 423e3)}
+
+SENSORS_ALIKE = IdentifyConfig(nuisance=NuisanceConfig(offset=0.0, delay_s=0.0, gain=0.0))
+"""For tests whose sensors do not differ: what is left to an interval is noise."""
 
 
 def published_rows() -> list[tuple[Bingham, float, float]]:

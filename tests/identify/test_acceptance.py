@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from fresh_truths import acceptance_test, published_rows, sine_test, with_noise
+from fresh_truths import SENSORS_ALIKE, acceptance_test, published_rows, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
-from pzd.identify.config import EvolutionaryConfig, IdentifyConfig
+from pzd.identify.config import EvolutionaryConfig
 from pzd.identify.evolutionary import fit_evolutionary, search
 from pzd.identify.fit import fit_condition
 from pzd.identify.objective import Objective
@@ -21,7 +21,7 @@ NAMES = ("T0_N", "C_Ns_per_m", "k_N_per_m")
 
 
 def row_for(records: Sequence[Record]) -> ParameterRow:
-    return fit_condition(Condition(None, 0.0, None, tuple(records)), IdentifyConfig(), seed=1)
+    return fit_condition(Condition(None, 0.0, None, tuple(records)), SENSORS_ALIKE, seed=1)
 
 
 @pytest.mark.parametrize("index", range(len(published_rows())))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fresh_truths import TABLE_2, acceptance_test, sine_test, with_noise
+from fresh_truths import SENSORS_ALIKE, TABLE_2, acceptance_test, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
 from pzd.identify.config import EvolutionaryConfig, IdentifyConfig
@@ -17,10 +17,11 @@ from pzd.identify.separable import fit_separable
 from pzd.identify.trial import trial_of
 from pzd.identify.trust import Evidence, displacement_noise, judge, visible_shares
 from pzd.record import Condition, Record
+from pzd.signals.nuisance import NuisanceConfig
 
 
-def row_for(*records: Record) -> ParameterRow:
-    return fit_condition(Condition(None, None, None, records), IdentifyConfig(), seed=1)
+def row_for(*records: Record, config: IdentifyConfig | None = None) -> ParameterRow:
+    return fit_condition(Condition(None, None, None, records), config or IdentifyConfig(), seed=1)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
@@ -90,7 +91,17 @@ def test_a_model_that_misses_half_of_the_force_is_weak_throughout() -> None:
 @pytest.mark.parametrize("draw", range(6))
 def test_good_tests_are_ok(draw, rng: np.random.Generator) -> None:
     _, records = acceptance_test(rng)
-    assert row_for(*(with_noise(r, rng) for r in records)).status == "ok"
+    assert row_for(*(with_noise(r, rng) for r in records), config=SENSORS_ALIKE).status == "ok"
+
+
+def test_what_the_sensors_leave_open_is_weak_and_never_undetermined() -> None:
+    # Friction over damping: a gain of 20 % between two tests says nothing of C, and yet noise alone would.
+    records = [sine_test(TABLE_2[150.0], f, 0.02, rate=500) for f in (0.5, 1.0)]
+    noisy = [with_noise(r, np.random.default_rng(8), 0.002) for r in records]
+    row = row_for(*noisy, config=IdentifyConfig(nuisance=NuisanceConfig(gain=0.2)))
+    assert row.status.startswith("weak: ")
+    assert row.C_Ns_per_m == pytest.approx(TABLE_2[150.0].damping, rel=0.02)
+    assert row.C_Ns_per_m_high95 > 1.5 * row.C_Ns_per_m
 
 
 def test_linearly_dependent_slopes_are_invisible(rng: np.random.Generator) -> None:
@@ -103,10 +114,10 @@ def test_linearly_dependent_slopes_are_invisible(rng: np.random.Generator) -> No
 def test_undetermined_and_weak_stand_in_one_status() -> None:
     trust = judge(
         [
-            Evidence("T0", 100.0, 1.0, 0.3),
-            Evidence("C", 1000.0, 600.0, 0.3),
-            Evidence("k", 1e5, 2e4, 0.3),
+            Evidence("T0", 100.0, 1.0, 1.0, 0.3),
+            Evidence("C", 1000.0, 600.0, 600.0, 0.3),
+            Evidence("k", 1e5, 2e4, 2e4, 0.3),
         ]
     )
     assert trust.determined == (True, False, True)
-    assert trust.status == "undetermined: C (95 % interval of +-60 %); weak: k (95 % interval of +-20 %)"
+    assert trust.status == "undetermined: C (95 % interval of +-60 % by noise alone); weak: k (95 % interval of +-20 %)"

@@ -1,13 +1,20 @@
-"""`pzd init` on what is no rig file: refused in one line a file."""
+"""`pzd init`: what it writes is read back as it was meant; what is no rig file is refused in one line."""
 
 from __future__ import annotations
 
+import re
+from datetime import datetime, timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
+from written_files import FORCE, TIME, X
 
+from pzd.artefacts import Rig
+from pzd.config import load
 from pzd.rig.files.guess import guessed
-from pzd.schema.errors import DataError
+from pzd.rig.stage import ingest
+from pzd.schema.errors import ConfigError, DataError
 
 NO_RIG_FILES = {
     "a letter": ("Dear Sir,\n\nthe damper, as agreed, works.\nYours\n", "letter.csv:"),
@@ -33,3 +40,101 @@ def test_every_such_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(DataError) as caught:
         guessed([tmp_path / "one.csv", tmp_path / "two.csv"])
     assert len(caught.value.messages) == 2
+
+
+# ---------------------------------------------------------------- what init writes, check reads
+
+
+def stored(path: Path, head: list[str], columns: list[list[str]], separator: str, encoding: str = "utf-8") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = [separator.join(row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join([*head, *rows]) + "\n", encoding=encoding)
+    return path
+
+
+def numbers(values: object, decimal: str = ".") -> list[str]:
+    return [f"{value:.9g}".replace(".", decimal) for value in values]  # type: ignore[attr-defined]  # an array
+
+
+def read_back(folder: Path, files: list[Path], filled: dict[str, str] | None = None) -> Rig:
+    """The rig as the guessed config reads it, its empty places filled in."""
+    text = "\n".join(guessed(files))
+    for name, value in (filled or {}).items():
+        text = re.sub(rf"^( +{name}:)   # fill in.*$", rf"\1 {value}", text, flags=re.MULTILINE)
+    assert "fill in" not in text, text
+    (folder / "guess.yaml").write_text(text, encoding="utf-8")
+    config = load(folder / "guess.yaml")
+    return ingest(config.rig, config.control.signal(), folder)
+
+
+MM, KN = X * 1e3, FORCE / 1e3
+FILES: dict[str, tuple[list[str], str, str, str]] = {
+    "blanks": (["Time[s] Disp[mm] Force[kN]"], " ", ".", "utf-8"),
+    "german": (["Zeit [s];Weg [mm];Kraft [kN]"], ";", ",", "latin-1"),
+    "german units row": (["Prüfling 7", "", "Zeit;Weg;Kraft", "s;mm;kN"], ";", ",", "latin-1"),
+    "french": (["temps (s)\tcourse (mm)\teffort (kN)"], "\t", ",", "utf-8"),
+    "spanish": (["tiempo [s],carrera [mm],fuerza [kN]"], ",", ".", "utf-8"),
+    "underscores": (["time_s,pos_mm,load_kN"], ",", ".", "utf-8"),
+    "slashes": (["Zeit / s;Weg / mm;Kraft / kN"], ";", ".", "utf-8"),
+    "utf-16": (["Time [s],Stroke [mm],Load [kN]"], ",", ".", "utf-16"),
+}
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_guess_needs_nothing_filled_in_where_the_headers_say_all(tmp_path: Path, kind: str) -> None:
+    head, separator, decimal, encoding = FILES[kind]
+    columns = [numbers(values, decimal) for values in (TIME, MM, KN)]
+    path = stored(tmp_path / "a.txt", head, columns, separator, encoding)
+    (record,) = read_back(tmp_path, [path]).records
+    assert np.abs(record.displacement - X).max() < 1e-9
+    assert np.abs(record.force - FORCE).max() < 1e-5
+
+
+def test_one_header_is_one_quantity_and_engineering_units_go_before_volts(tmp_path: Path) -> None:
+    heads = "Time (s),Load (V),Stroke (V),Load (N),Stroke (mm),Temp (C),Coil current (A)"
+    volts = [numbers(values) for values in (TIME, FORCE / 500.0, X * 100.0, FORCE, MM, 0 * X + 22.5, 0 * X + 0.5)]
+    path = stored(tmp_path / "a.csv", [heads], volts, ",")
+    text = "\n".join(guessed([path]))
+    named = re.findall(r"^        (\w+): (.*)$", text.partition("columns:")[2].partition("units:")[0], re.MULTILINE)
+    assert dict(named) == {
+        "time": "Time (s)",
+        "displacement": "Stroke (mm)",
+        "force": "Load (N)",
+        "temperature": "Temp (C)",
+        "current": "Coil current (A)",
+    }
+    assert "temperature: degC" in text
+    (entry,) = read_back(tmp_path, [path]).entries
+    assert (entry.temperature_degC, entry.voltage_V) == (22.5, 0.5)
+
+
+def test_what_stays_open_is_an_empty_value_that_the_check_asks_for(tmp_path: Path) -> None:
+    path = stored(tmp_path / "a.csv", ["t,pos,Channel 3"], [numbers(values) for values in (TIME, MM, FORCE)], ",")
+    (tmp_path / "guess.yaml").write_text("\n".join(guessed([path])), encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load(tmp_path / "guess.yaml")
+    said = "\n".join(caught.value.messages)
+    assert "rig.files.0.columns.force: is empty; fill in the header of its column" in said
+    assert "rig.files.0.units.time: is empty; fill in its unit" in said
+    assert "guess.yaml:" in said
+
+
+def test_instants_are_read_by_the_format_of_the_first_row(tmp_path: Path) -> None:
+    for number, form in enumerate(("%Y-%m-%dT%H:%M:%S.%f", "%d.%m.%Y %H:%M:%S.%f", "%H:%M:%S.%f")):
+        stamps = [(datetime(2024, 3, 25, 10, 59, 59) + timedelta(seconds=t)).strftime(form) for t in TIME.tolist()]  # noqa: DTZ001  # a logger knows no zone
+        path = stored(
+            tmp_path / f"{number}.csv", ["Zeit,Weg [mm],Kraft [N]"], [stamps, numbers(MM), numbers(FORCE)], ","
+        )
+        assert np.abs(read_back(tmp_path, [path]).records[0].time - TIME).max() < 1e-6
+
+
+def test_names_of_files_tell_the_control_and_the_work_the_sign(tmp_path: Path) -> None:
+    columns = [numbers(values) for values in (TIME, X, -FORCE)]
+    for volts in (0, 75, 150):
+        stored(tmp_path / "data" / f"sine_2Hz_{volts}V.csv", ["time_s,displacement_m,force_N"], columns, ",")
+    files = sorted((tmp_path / "data").glob("*.csv"))
+    text = guessed(files)
+    assert sum("path:" in line for line in text) == 1
+    rig = read_back(tmp_path, files)
+    assert sorted(entry.voltage_V or 0.0 for entry in rig.entries) == [0.0, 75.0, 150.0]
+    assert np.abs(rig.records[0].force - FORCE).max() < 1e-5

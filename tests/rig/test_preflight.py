@@ -14,8 +14,7 @@ from pzd.artefacts import Finding
 from pzd.damper.element import element_force
 from pzd.record import Record
 from pzd.rig.config import Limits
-from pzd.rig.measured import Measured
-from pzd.rig.preflight import checks, findings
+from pzd.rig.preflight import Measured, checks, findings
 from pzd.signals.cycles import Cycles, cycles
 from pzd.signals.kinematics import kinematics
 
@@ -250,10 +249,20 @@ def test_noise_of_a_small_stroke_feeds_no_energy_in_wherever_its_cycles_are_cut(
         assert checks()["sign"].check(Measured(one, run, clean, NO_LIMITS)) == []
 
 
+def two_tests(one: Record) -> Record:
+    """A record that goes on with half the amplitude."""
+    time = np.concatenate((one.time, one.time + one.time[-1] + one.time[1]))
+    x = np.concatenate((one.displacement, 0.5 * one.displacement))
+    return replace(one, time=time, displacement=x, force=np.tile(one.force, 2))
+
+
 FAULTS: dict[str, Callable[[Record], Record]] = {
     "cycle_count": lambda one: cut(one, 2.2),
     "delay": lambda one: replace(one, force=np.roll(one.force, 12)),
     "hum": lambda one: replace(one, force=one.force + 0.1 * np.ptp(one.force) * np.sin(100.0 * np.pi * one.time)),
+    "jumps": lambda one: replace(
+        one, displacement=np.where(np.arange(one.time.size) < 4000, 0.0, 0.02) + one.displacement
+    ),
     "offset": lambda one: replace(one, force=one.force + 0.2 * np.ptp(one.force)),
     "reach": lambda one: one,  # the limits of the stand are what changes
     "recorded_velocity": lambda one: one,  # and here the velocity
@@ -264,6 +273,7 @@ FAULTS: dict[str, Callable[[Record], Record]] = {
     "saturation": lambda one: replace(one, force=np.minimum(one.force, 0.5 * one.force.max())),
     "scale": lambda one: replace(one, force=1e-4 * one.force),
     "sign": lambda one: replace(one, force=-one.force),
+    "steps": two_tests,
     "spikes": lambda one: replace(one, force=one.force + 3.0 * np.ptp(one.force) * (np.arange(one.time.size) == 4000)),
 }
 """What each check looks for, done to a clean record."""

@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.diagnose.noise.between_cycles import pure_error
-from pzd.record import Array, Record, is_constant, voltage_scale
+from pzd.record import Array, Record, is_constant, sliced, voltage_scale
+from pzd.signals.between_cycles import pure_error
 from pzd.signals.cycles import Cycles, cycles, drift, settled
 
 Motion = tuple[Array, Array, Array]
@@ -121,26 +121,6 @@ def _prepared(record: Record, constant: bool) -> Prepared:
     early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
     lead = _led_in(cleaned, early, motion(early))
     return Prepared(cleaned, run, lead, constant, _drawn(lead, average))
-
-
-def sliced(record: Record, kept: NDArray[np.bool_]) -> Record:
-    """The record's samples where the mask (n,) is set."""
-
-    def cut(channel: Array | None) -> Array | None:
-        return None if channel is None else channel[kept]
-
-    return Record(
-        record.name,
-        record.setting,
-        record.time[kept],
-        record.displacement[kept],
-        record.velocity[kept],
-        record.acceleration[kept],
-        record.force[kept],
-        cut(record.voltage),
-        cut(record.temperature),
-        cut(record.pressure),
-    )
 
 
 def _moved(record: Record, motion: Motion) -> Record:

@@ -14,8 +14,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.diagnose.data.cleaning import Prepared, sliced
-from pzd.record import Array, Record, conditions
+from pzd.diagnose.data.cleaning import Prepared
+from pzd.record import Array, Record, conditions, sliced
 
 TRAINING, VALIDATION, UNTOUCHED = 0, 1, 2
 """Fitted to; looked at to choose; seen by nothing but the final figures."""

@@ -18,15 +18,13 @@ from numpy.typing import NDArray
 from pzd.damper.compose import integrated_force, respond, sampling_steps, sensors_of, shown_moments
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.noise.between_cycles import PureError
 from pzd.record import Array
 from pzd.signals.autoregression import Autoregression
+from pzd.signals.between_cycles import PureError
+from pzd.signals.nuisance import AT_MOST
 
 SIMULATION_TOLERANCE = 1e-8
 """Of the damper's path, as a share of the force."""
-AT_MOST = 3.5
-"""Offset, gain and delay of a test go at most so many standard deviations: chance goes further in one of two thousand;
-more is physics, or a finding."""
 REMEMBERED = 12
 """Element forces kept, enough for one column of slopes each of two fits at the same time."""
 

@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.config import NuisanceConfig
-from pzd.diagnose.data.cleaning import Prepared, sliced
+from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.likelihood import RecordLikelihood, responses
 from pzd.diagnose.fit.prediction import motion_of, warms
-from pzd.diagnose.noise.between_cycles import PureError, pure_error
 from pzd.diagnose.noise.input_uncertainty import Expected
-from pzd.diagnose.noise.jumps import jumps, jumps_in_samples
-from pzd.diagnose.noise.smooth_residual import fit_smooth_residual
 from pzd.identify.trial import in_motion
-from pzd.record import Array, Record
+from pzd.record import Array, Record, sliced
 from pzd.signals.autoregression import Autoregression
+from pzd.signals.between_cycles import PureError, pure_error
+from pzd.signals.jumps import jumps, jumps_in_samples
+from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.smooth_residual import fit_smooth_residual
 
 RESOLUTION = 3e-4
 """No force is believed to be known better than this share of the record's peak (r.m.s.)."""

@@ -16,8 +16,8 @@ from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.prediction import PREDICTION_TOLERANCE, motion_of, predicted_force
-from pzd.diagnose.noise.between_cycles import harmonics_of
 from pzd.record import Array, Record
+from pzd.signals.between_cycles import harmonics_of
 
 BETWEEN_SAMPLES = 0.5
 """Standard deviation of the instant of the voltage [samples]."""

@@ -1,10 +1,11 @@
-"""T0, C and k over the voltage with their intervals."""
+"""T0, C and k of the final damper over the voltage, with their intervals."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from pzd.artefacts import ParameterRow
+from pzd.damper.model import BaseRow
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS
 from pzd.report.context import ReportContext
 from pzd.report.drawing import Panel, Plot, axes, legend, shades
@@ -13,14 +14,14 @@ from pzd.report.wording import amount, unit_of
 
 def draw(context: ReportContext) -> Iterator[Panel]:
     """One panel a parameter; nothing where there are fewer than two voltages."""
-    if len({row.voltage_V for row in context.parameters if row.voltage_V is not None}) < 2:
+    if len({row.voltage_V for row in context.final if row.voltage_V is not None}) < 2:
         return
-    temperatures = sorted({row.temperature_degC for row in context.parameters}, key=lambda t: t or 0.0)
-    voltages = [row.voltage_V for row in context.parameters if row.voltage_V is not None]
+    temperatures = sorted({row.temperature_degC for row in context.final}, key=lambda t: t or 0.0)
+    voltages = [row.voltage_V for row in context.final if row.voltage_V is not None]
     for quantity in (FRICTION, DAMPING, STIFFNESS):
         figure, ax = axes(2.6, key=int(len(temperatures) > 1))
         for temperature, colour in zip(temperatures, shades(len(temperatures)), strict=True):
-            rows = [row for row in context.parameters if row.temperature_degC == temperature]
+            rows = [row for row in context.final if row.temperature_degC == temperature]
             known = sorted(
                 (row.voltage_V, *_bounds(row, quantity.column))
                 for row in rows
@@ -47,10 +48,10 @@ def draw(context: ReportContext) -> Iterator[Panel]:
         )
 
 
-def _bounds(row: ParameterRow, column: str) -> tuple[float, float, float]:
+def _bounds(row: ParameterRow | BaseRow, column: str) -> tuple[float, float, float]:
     """Value and lengths of its whiskers, in thousands."""
     value = float(getattr(row, column))
-    low, high = getattr(row, f"{column}_low95"), getattr(row, f"{column}_high95")
+    low, high = (getattr(row, f"{column}_{end}", None) for end in ("low95", "high95"))
     below = max(value - float(low), 0.0) if low is not None else 0.0
     above = max(float(high) - value, 0.0) if high is not None else 0.0
     return value / 1000.0, below / 1000.0, above / 1000.0

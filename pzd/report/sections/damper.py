@@ -6,6 +6,7 @@ import numpy as np
 
 from pzd.artefacts import ParameterRow
 from pzd.damper.competing_forms import known
+from pzd.damper.model import BaseRow
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS, VOLTAGE
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
 from pzd.report.context import ReportContext, effect_in_words
@@ -21,7 +22,7 @@ NO_FORCE = 1e-6
 def render(context: ReportContext, pictures: Pictures) -> Section:
     """The fourth section."""
     blocks: list[Block] = [Paragraph(_intro(context)), _parameters(context)]
-    blocks += [_completed(context)] if context.extended else []
+    blocks += [_alone(context)] if context.extended else []
     blocks += galleries(pictures["damper"])
     blocks += [_force(context)] if context.table.force else []
     notes = context.table.notes
@@ -42,51 +43,51 @@ def _intro(context: ReportContext) -> str:
     laws = [f"{effect_in_words(name)}, {known()[name].law}" for name in effects]
     beside = f" What was missing stands beside it: {listed(laws)}." if laws else ""
     return (
-        "Dry friction T0, damping C and oil spring k of the Bingham element alone, with 95 % intervals. A value that "
-        f"the data do not determine is left out, and the status says so.{beside}"
+        "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. These allow for "
+        "noise and for a gain, offset and delay of the sensors that differ from test to test. A value that the data do "
+        f"not determine is left out, and the status says so.{beside}"
     )
 
 
 def _parameters(context: ReportContext) -> Sheet:
+    """T0, C and k of the damper that everything behind uses."""
+    title = "T0, C and k beside what was missing" if context.extended else "T0, C and k of the Bingham element alone"
+    return Sheet(title, _header(context), tuple(_row(context, row) for row in context.final))
+
+
+def _alone(context: ReportContext) -> Sheet:
+    """T0, C and k of the simple model: alone they also stand in for what it lacks."""
+    title = "The simple model: T0, C and k of the Bingham element alone, standing in for what was missing"
+    return Sheet(title, _header(context), tuple(_row(context, row) for row in context.parameters), folded=True)
+
+
+def _header(context: ReportContext) -> tuple[str, ...]:
     units = [f"{q.symbol} [{unit_of(q.unit)}]" for q in _QUANTITIES]
-    header = (context.control.name, "temperature", *units, "W_s", "r.m.s. error", "status")
-    return Sheet(
-        "Identified parameters of the Bingham element alone",
-        header,
-        tuple(_row(context, row) for row in context.parameters),
-        False,
+    return (context.control.name, "temperature", *units, "W_s", "r.m.s. error", "status")
+
+
+def _row(context: ReportContext, row: ParameterRow | BaseRow) -> tuple[str, ...]:
+    fitted = row if isinstance(row, ParameterRow) else None
+    return (
+        context.voltage(row.voltage_V),
+        amount(row.temperature_degC, "degC"),
+        *(_shown(row, q.column) for q in _QUANTITIES),
+        number(fitted.W_s if fitted else None),
+        amount(fitted.rmse_N if fitted else None, "N"),
+        fitted.status if fitted else "edited by hand",
     )
 
 
-def _completed(context: ReportContext) -> Sheet:
-    """T0, C and k beside what was added: alone they also stood in for it."""
-    units = [f"{q.symbol} [{unit_of(q.unit)}]" for q in _QUANTITIES]
-    rows = tuple(
-        (
-            context.voltage(row.voltage_V),
-            amount(row.temperature_degC, "degC"),
-            *(parameter(getattr(row, q.column)) for q in _QUANTITIES),
-        )
-        for row in context.diagnosed.damper.base
-    )
-    return Sheet("With what was missing", (context.control.name, "temperature", *units), rows)
+def _shown(row: ParameterRow | BaseRow, column: str) -> str:
+    """A parameter with its interval, where it has one."""
+    if isinstance(row, ParameterRow):
+        return interval(*(getattr(row, f"{column}{end}") for end in ("", "_low95", "_high95")))
+    return f"{parameter(getattr(row, column))} (no interval)"
 
 
 def parameter(value: float) -> str:
     """A parameter that has no interval here; none is as small as a friction that no load cell shows."""
     return number(value if value >= NO_FORCE else 0.0)
-
-
-def _row(context: ReportContext, row: ParameterRow) -> tuple[str, ...]:
-    values = (interval(*(getattr(row, f"{q.column}{end}") for end in ("", "_low95", "_high95"))) for q in _QUANTITIES)
-    return (
-        context.voltage(row.voltage_V),
-        amount(row.temperature_degC, "degC"),
-        *values,
-        number(row.W_s),
-        amount(row.rmse_N, "N"),
-        row.status,
-    )
 
 
 def _force(context: ReportContext) -> Sheet:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.artefacts import ENERGY_LIMIT
+from pzd.artefacts import ENERGY_LIMIT, ParameterRow
 from pzd.comfort import iso2631_1978
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
 from pzd.report.context import ReportContext
@@ -31,9 +31,9 @@ def render(context: ReportContext) -> Section:
 
 
 def _cares(context: ReportContext) -> Iterator[str]:
-    weak = [row for row in context.parameters if row.status.startswith("weak")]
+    weak = [row for row in context.final if isinstance(row, ParameterRow) and row.status.startswith("weak")]
     if weak:
-        yield f"{len(weak)} of {len(context.parameters)} conditions hold a parameter that the data determine weakly"
+        yield f"{len(weak)} of {len(context.final)} conditions hold a parameter that the data determine weakly"
     if context.diagnosed.diagnosis.verdict == "unexplained":
         yield "part of the measured force is repeatable and not explained; the rides carry that gap"
     if context.diagnosed.diagnosis.verdict == "ambiguous":

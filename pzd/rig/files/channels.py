@@ -1,205 +1,180 @@
-"""What an entry of the config says about each quantity: where it stands, its unit, its sign."""
+"""The columns of a sheet as channels in SI: which column is which quantity, its unit, its sign."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TypeVar
 
-from pzd.quantities import CHANNELS, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
-from pzd.rig.config import FilesEntry
+import numpy as np
+
+from pzd.artefacts import Finding
+from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Quantity
+from pzd.record import Array
+from pzd.rig.files.layout import LABELS, NEEDED, ChannelSpec, Layout
 from pzd.rig.files.sheet import Sheet
-from pzd.rig.files.units import UnitError, constant, in_header
-from pzd.schema.errors import ConfigError, DataError, at
+from pzd.rig.files.units import UnitError, in_header, to_canonical
+from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.nearest import nearest
 
-Value = TypeVar("Value")
-Values = dict[Quantity, tuple[float, ...]]
-"""Values that no column holds: one for the file, or one for each test in it."""
+COMPRESSION = re.compile(r"compr|druckkraft|einfed|einschub", re.IGNORECASE)
+"""Words of a header that counts compression positive."""
+OPTIONAL = (VELOCITY, ACCELERATION, VOLTAGE, TEMPERATURE, PRESSURE)
+"""Quantities whose column may be wholly empty, which counts as absent."""
 
-NEEDED = (TIME, DISPLACEMENT, FORCE)
-"""Quantities that a file must have."""
-LABELS = (VOLTAGE, TEMPERATURE, PRESSURE)
-"""Quantities that a constant or the file's name may give."""
-ALSO_READ = {TEMPERATURE: "temperature_C"}
-"""Other headers that are read without being named."""
+
+HALF_DAY = 43200.0
+"""Twelve hours [s]."""
+_DATES = ("%d", "%j", "%x", "%c", "%D", "%F")
+"""Codes of a format that tells one day from the next."""
+ROUNDING = 1e-9
+"""A control signal, temperature or pressure that varies by less, relative to itself or to one unit, is constant."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """The channels of one file, in SI and degC; where cells are at fault, of them the clock alone, as recorded."""
+
+    values: dict[Quantity, Array]
+    """Canonical quantity -> (rows,); the control signal under `VOLTAGE`."""
+    faults: tuple[str, ...] = ()
+    """Cells that are bad or empty, each with its line."""
+    remarks: tuple[Finding, ...] = ()
+    """What the file itself says otherwise than the config."""
 
 
 @dataclass(frozen=True)
-class Source:
-    """Where one quantity stands in a file."""
+class _Source:
+    """Where one quantity stands in a sheet."""
 
-    quantity: Quantity
-    """The canonical quantity; the control signal stands under `VOLTAGE`."""
+    spec: ChannelSpec
     column: int
     unit: str
-    sign: int
+
+    @property
+    def dated(self) -> bool:
+        """Whether the cells are dates and times."""
+        return self.spec.dated or (self.spec.quantity is TIME and "%S" in self.unit)
 
 
-def own(quantity: Quantity, control: Control) -> Quantity:
-    """The quantity as this rig calls it: the control signal under its own name and unit."""
-    return control.quantity if quantity is VOLTAGE else quantity
+def channels(sheet: Sheet, layout: Layout) -> Channels:
+    """The channels that a sheet holds.
 
-
-def check_keys(entry: FilesEntry, place: str, control: Control) -> None:
-    """Check that every key of an entry names a quantity, and that no two say the same.
+    Parameters
+    ----------
+    sheet : the file as its reader gives it
+    layout : what the config says about each quantity
 
     Raises
     ------
-    ConfigError : with every wrong key
+    DataError : when a column is missing or stands there twice, or a cell is no date
+    ConfigError : when nothing says the unit of a column, or the unit is none of the quantity
     """
+    found = _sources(sheet, layout)
+    bad = [fault for source in found for fault in sheet.faults.get(source.column, [])]
+    if bad:
+        return Channels(_clock(sheet, found), tuple(bad))
+    values = {source.spec.quantity: _instants(sheet, source) for source in found if source.dated}
     faults: list[str] = []
-    for field, allowed in (("columns", CHANNELS), ("units", CHANNELS), ("sign", CHANNELS), ("constants", LABELS)):
-        given: Mapping[str, object] = getattr(entry, field)
-        faults += _wrong(f"{place}.{field}", given, allowed, control)
-    groups = re.compile(entry.pattern).groupindex if entry.pattern else {}
-    faults += _wrong(f"{place}.pattern", [g for g in groups if g != "setting"], LABELS, control)
-    a_test = entry.split.constants if entry.split else {}
-    faults += _wrong(f"{place}.split.constants", a_test, LABELS, control)
-    said_by: dict[str, Iterable[str]] = {
-        "columns": entry.columns,
-        "constants": entry.constants,
-        "split.constants": a_test,
-        "pattern": groups,
-    }
-    for quantity in LABELS:
-        ways = [field for field, keys in said_by.items() if _named(keys, quantity, control)]
-        if len(ways) > 1:
-            faults.append(f"{place}: {own(quantity, control).name}: said twice, under {' and '.join(ways)}")
-    if "setting" in groups and entry.setting is not None:
-        faults.append(f"{place}: setting: said twice, under setting and pattern")
-    if faults:
-        raise ConfigError(faults)
+    for source in found:
+        if source.dated:
+            continue
+        cells = sheet.numbers[source.column]
+        empty = np.flatnonzero(np.isnan(cells))
+        if empty.size == cells.size and source.spec.quantity in OPTIONAL:
+            continue
+        if empty.size:
+            more = f" ({empty.size} such cells)" if empty.size > 1 else ""
+            faults.append(f"{sheet.place(int(empty[0]))}: {sheet.header[source.column]}: empty cell{more}")
+            continue
+        try:
+            channel = source.spec.sign * to_canonical(cells, source.unit, source.spec.own)
+        except UnitError as fault:
+            raise ConfigError(f"{layout.place}.units: {fault} (in {sheet.path})") from None
+        values[source.spec.quantity] = _steady(channel) if source.spec.quantity in LABELS else channel
+    return Channels(_clock(sheet, found), tuple(faults)) if faults else Channels(values, remarks=_remarks(sheet, found))
 
 
-def of(given: Mapping[str, Value], quantity: Quantity, control: Control) -> Value | None:
-    """What a mapping of the config says about a quantity, by its name or, for the control, by either name."""
-    own_name = own(quantity, control).name
-    return given.get(own_name, given.get(quantity.name))
+def _remarks(sheet: Sheet, found: list[_Source]) -> tuple[Finding, ...]:
+    """Headers that name another unit or another sign than the one the channel was read with."""
+    remarks: list[Finding] = []
+    for source in found:
+        spec, header = source.spec, sheet.header[source.column]
+        ratio = _unit_of_header_over_ours(source, sheet)
+        if abs(ratio - 1.0) > 1e-9:
+            remarks.append(
+                Finding(
+                    check="units",
+                    where=f"{spec.own.name}, whose header is {header!r}; the config says {source.unit}",
+                    size=ratio,
+                    unit="-",
+                    follows="the config was taken; by the header the channel would be this many times as large",
+                )
+            )
+        if spec.quantity in (DISPLACEMENT, FORCE) and not spec.sign_said and COMPRESSION.search(header):
+            remarks.append(
+                Finding(
+                    check="sign",
+                    where=f"{spec.own.name}, whose header is {header!r}",
+                    size=float(spec.sign),
+                    unit="-",
+                    follows=f"extension is positive: say sign: {{{spec.own.name}: -1}}, or 1 if it is so already",
+                )
+            )
+    return tuple(remarks)
 
 
-def sources(sheet: Sheet, entry: FilesEntry, place: str, control: Control) -> tuple[Source, ...]:
-    """The columns that a file has for each quantity.
+def _unit_of_header_over_ours(source: _Source, sheet: Sheet) -> float:
+    """How many times as large a channel would be by the unit that its header names; 1 where that says nothing."""
+    spec, header = source.spec, sheet.header[source.column]
+    told = spec.own.unit if header in spec.canonical_headers else in_header(header, spec.own)
+    if spec.unit is None or told is None or source.dated or spec.quantity is TEMPERATURE:
+        return 1.0
+    try:
+        theirs, ours = (float(to_canonical(np.ones(1), unit, spec.own)[0]) for unit in (told, source.unit))
+    except UnitError:
+        return 1.0
+    return theirs / ours
 
-    Raises
-    ------
-    DataError : when a column is missing or stands there twice
-    ConfigError : when nothing says the unit of a column
-    """
-    found: list[Source] = []
+
+def _steady(channel: Array) -> Array:
+    """A channel that varies by no more than rounding as the constant that it is."""
+    middle = float(np.median(channel))
+    constant = np.ptp(channel) <= ROUNDING * max(1.0, abs(middle))
+    return np.full_like(channel, middle) if constant else channel
+
+
+def _sources(sheet: Sheet, layout: Layout) -> list[_Source]:
+    found: list[_Source] = []
     data_faults: list[str] = []
     config_faults: list[str] = []
-    for quantity in CHANNELS:
-        named = of(entry.columns, quantity, control)
-        columns = _columns(sheet, named, quantity, control)
+    for spec in layout.channels:
+        columns = [index for index, head in enumerate(sheet.header) if head in spec.headers]
         if len(columns) > 1:
             heads = " and ".join(sheet.header[c] for c in columns)
-            data_faults.append(f"{_top(sheet)}: {own(quantity, control).name}: duplicate column ({heads})")
+            data_faults.append(f"{sheet.top}: {spec.own.name}: duplicate column ({heads})")
         elif columns:
-            unit = _unit(sheet, columns[0], entry, own(quantity, control), control)
+            unit = _unit(sheet, columns[0], spec)
             if unit is None:
-                config_faults.append(_no_unit(sheet, columns[0], place, own(quantity, control)))
+                config_faults.append(_no_unit(sheet, columns[0], layout.place, spec.own))
             else:
-                found.append(Source(quantity, columns[0], unit, of(entry.sign, quantity, control) or 1))
-        elif named is not None or quantity in NEEDED:
-            data_faults.append(_missing(sheet, named, own(quantity, control), place))
+                found.append(_Source(spec, columns[0], unit))
+        elif spec.named or spec.quantity in NEEDED:
+            data_faults.append(_missing(sheet, spec, layout.place))
     if config_faults:
         raise ConfigError(config_faults)
     if data_faults:
         raise DataError(data_faults)
-    return tuple(found)
+    return found
 
 
-def said(entry: FilesEntry, place: str, control: Control, path: Path) -> tuple[Values, str | None]:
-    """Values that constants and the file's name give (one, or one a test), and the setting.
-
-    Raises
-    ------
-    ConfigError : when a value has no unit or a wrong one, or the name does not match the pattern
-    """
-    faults: list[str] = []
-    values: Values = {}
-    setting = entry.setting
-    for quantity in LABELS:
-        given = of(entry.constants, quantity, control)
-        if given is not None:
-            values[quantity] = (_constant(given, quantity, control, f"{place}.constants", faults),)
-        many = of(entry.split.constants, quantity, control) if entry.split else None
-        if many is not None:
-            values[quantity] = tuple(_constant(t, quantity, control, f"{place}.split.constants", faults) for t in many)
-    if entry.pattern is not None:
-        match = re.search(entry.pattern, path.stem) or re.search(entry.pattern, path.name)
-        if match is None:
-            faults.append(f"{place}.pattern: the file's name does not match {entry.pattern!r} (got {path.name})")
-        else:
-            groups = match.groupdict()
-            setting = groups.pop("setting", None) or setting
-            values |= _from_name(groups, entry, place, control, path, faults)
-    if faults:
-        raise ConfigError(faults)
-    return values, setting
-
-
-def _from_name(
-    groups: dict[str, str | None], entry: FilesEntry, place: str, control: Control, path: Path, faults: list[str]
-) -> Values:
-    values: Values = {}
-    for quantity in LABELS:
-        text = of(groups, quantity, control)
-        unit = of(entry.units, quantity, control)
-        if text is None:
-            continue
-        if unit is None:
-            mine = own(quantity, control)
-            faults.append(f"{place}.units: {mine.name}: the file's name has no unit; say {mine.name}: {mine.unit}")
-            continue
-        number = text.replace("x", ".").replace(",", ".")
-        values[quantity] = (_constant(f"{number} {unit}", quantity, control, f"{place}.pattern: {path.name}", faults),)
-    return values
-
-
-def _named(keys: Iterable[str], quantity: Quantity, control: Control) -> bool:
-    return own(quantity, control).name in keys or quantity.name in keys
-
-
-def _constant(text: str, quantity: Quantity, control: Control, place: str, faults: list[str]) -> float:
-    try:
-        return constant(text, own(quantity, control))
-    except UnitError as fault:
-        faults.append(f"{place}: {fault} (got {text!r})")
-        return 0.0
-
-
-def _wrong(place: str, given: Iterable[str], allowed: tuple[Quantity, ...], control: Control) -> list[str]:
-    names = list(dict.fromkeys([own(q, control).name for q in allowed] + [q.name for q in allowed]))
-    faults = []
-    for key in given:
-        if key not in names:
-            near = nearest(key, names)
-            hint = f"did you mean {near}?" if near else f"one of {', '.join(names)} is needed"
-            faults.append(f"{place}: {key}: {hint} (got {key!r})")
-    if VOLTAGE.name in given and control.name in given and control.name != VOLTAGE.name:
-        faults.append(f"{place}: {control.name}: the control signal is named twice (also as {VOLTAGE.name})")
-    return faults
-
-
-def _columns(sheet: Sheet, named: str | None, quantity: Quantity, control: Control) -> list[int]:
-    heads = [named.strip()] if named is not None else [own(quantity, control).column, ALSO_READ.get(quantity)]
-    return [index for index, head in enumerate(sheet.header) if head in heads]
-
-
-def _unit(sheet: Sheet, column: int, entry: FilesEntry, quantity: Quantity, control: Control) -> str | None:
+def _unit(sheet: Sheet, column: int, spec: ChannelSpec) -> str | None:
     """The unit that the config says, then the file's own row of units, then its header."""
-    canonical = VOLTAGE if quantity == control.quantity else quantity
-    given = of(entry.units, canonical, control)
-    if given is not None:
-        return given
+    if spec.unit is not None:
+        return spec.unit
     if sheet.units is not None and sheet.units[column]:
         return sheet.units[column].strip("[]() ")
     header = sheet.header[column]
-    return quantity.unit if header in (quantity.column, ALSO_READ.get(quantity)) else in_header(header, quantity)
+    return spec.own.unit if header in spec.canonical_headers else in_header(header, spec.own)
 
 
 def _no_unit(sheet: Sheet, column: int, place: str, quantity: Quantity) -> str:
@@ -209,12 +184,36 @@ def _no_unit(sheet: Sheet, column: int, place: str, quantity: Quantity) -> str:
     )
 
 
-def _missing(sheet: Sheet, named: str | None, quantity: Quantity, place: str) -> str:
-    wanted = named or quantity.column
-    near = nearest(wanted, sheet.header) or next((h for h in sheet.header if quantity.name in h.lower()), None)
-    hint = f"; is it {near!r}? then say {place}.columns: {{{quantity.name}: {near}}}" if near else ""
-    return f"{_top(sheet)}: missing column {wanted}{hint} (got {', '.join(sheet.header)})"
+def _missing(sheet: Sheet, spec: ChannelSpec, place: str) -> str:
+    name, wanted = spec.own.name, spec.named or spec.own.column
+    near = nearest(wanted, sheet.header) or next((h for h in sheet.header if name in h.lower()), None)
+    hint = f"; is it {near!r}? then say {place}.columns: {{{name}: {near}}}" if near else ""
+    return f"{sheet.top}: missing column {wanted}{hint} (got {', '.join(sheet.header)})"
 
 
-def _top(sheet: Sheet) -> str:
-    return at(sheet.path, sheet.header_line)
+def _clock(sheet: Sheet, found: list[_Source]) -> dict[Quantity, Array]:
+    """The clock as it stands in the file; nothing where it holds dates or bad cells."""
+    (clock,) = (source for source in found if source.spec.quantity is TIME)
+    return {} if clock.dated or clock.column in sheet.faults else {TIME: sheet.numbers[clock.column]}
+
+
+def _instants(sheet: Sheet, source: _Source) -> Array:
+    """Dates and times as seconds since the first."""
+    import pandas as pd
+
+    cells = sheet.texts[source.column]
+    instants = pd.to_datetime(pd.Series(cells), format=source.unit, errors="coerce")
+    bad = np.flatnonzero(instants.isna().to_numpy())
+    if bad.size:
+        row = int(bad[0])
+        more = f" ({bad.size} such cells)" if bad.size > 1 else ""
+        raise DataError(
+            f"{sheet.place(row)}: {sheet.header[source.column]}: "
+            f"no date and time like {source.unit}{more} (got {cells[row]!r})"
+        )
+    seconds = np.asarray((instants - instants[0]).dt.total_seconds(), dtype=np.float64)
+    if any(code in source.unit for code in _DATES):
+        return seconds
+    # A clock without a date begins anew at midnight, one of twelve hours without am and pm at noon too.
+    turn = HALF_DAY if "%I" in source.unit and "%p" not in source.unit else 2.0 * HALF_DAY
+    return seconds + turn * np.concatenate(([0.0], np.cumsum(np.diff(seconds) < -0.5 * turn)))

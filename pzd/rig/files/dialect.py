@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection
 from pathlib import Path
 
@@ -12,6 +13,22 @@ from pzd.schema.errors import DataError, FilesError, at
 
 SEPARATORS = (",", ";", "\t")
 """Separators that are recognised from the header line."""
+KINDS = (
+    (b"PK\x03\x04", "an Excel file", "xl/workbook"),
+    (b"PK\x03\x04", "a zip archive", ""),
+    (b"\xd0\xcf\x11\xe0", "an old Excel file", ""),
+    (b"MATLAB 5.0", "a MATLAB file", ""),
+    (b"\x89HDF", "an HDF5 file (or a MATLAB file of version 7.3)", ""),
+    (b"TDSm", "a TDMS file", ""),
+    (b"MDF ", "an MDF file", ""),
+    (b"PAR1", "a Parquet file", ""),
+    (b"\x1f\x8b", "a gzip archive", ""),
+    (b"%PDF", "a PDF file", ""),
+    (b"<?xml", "an XML file", ""),
+    (b"<html", "an HTML page", ""),
+    (b"<!DOCTYPE", "an HTML page", ""),
+)
+"""How files begin that are no tables of text, what they are, and what else they hold."""
 BLANKS = " "
 """Stands for any run of blanks."""
 
@@ -22,12 +39,15 @@ def text_of(path: Path, encoding: str) -> str:
     Raises
     ------
     FilesError : when the file cannot be read
-    DataError : when it is no text of this encoding
+    DataError : when it is no text of this encoding, or a file of another kind, by its content
     """
     try:
         raw = path.read_bytes()
     except OSError as error:
         raise FilesError(f"{at(path)}: cannot be read ({error.strerror})") from None
+    kind = kind_of(raw)
+    if kind:
+        raise DataError(f"{at(path)}: this is {kind}; export the table as CSV or other delimited text")
     try:
         text = raw.decode("utf-8-sig" if encoding.lower().replace("_", "-") in ("utf-8", "utf8") else encoding)
     except UnicodeError as error:
@@ -38,6 +58,21 @@ def text_of(path: Path, encoding: str) -> str:
     if "\0" in text:
         raise DataError(f"{at(path, text[: text.index(chr(0))].count(chr(10)) + 1)}: not a text file (a zero byte)")
     return text
+
+
+def kind_of(raw: bytes) -> str | None:
+    """What a file is that is no table of text, by its content whatever its name; None where it may be one."""
+    for magic, kind, holds in KINDS:
+        if raw.startswith(magic) and (not holds or holds.encode() in raw):
+            return kind
+    start = raw[:100].lstrip()
+    if start.startswith((b"{", b"[")):
+        try:
+            json.loads(raw)
+        except ValueError:
+            return None
+        return "a JSON file"
+    return None
 
 
 def without_blank_end(text: str) -> str:

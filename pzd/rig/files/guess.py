@@ -1,50 +1,58 @@
-"""Guesses, from the headers of rig files, the entries of a config that read them."""
+"""Guesses, from rig files, the entries of a config that read them; what only a person knows stays empty."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 
-from pzd.quantities import (
-    ACCELERATION,
-    CHANNELS,
-    DISPLACEMENT,
-    FORCE,
-    PRESSURE,
-    TEMPERATURE,
-    TIME,
-    VELOCITY,
-    VOLTAGE,
-    Control,
-    Quantity,
-)
+from pzd.quantities import CHANNELS, DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
+from pzd.record import Array
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.channels import ALSO_READ, NEEDED, own
 from pzd.rig.files.formats import reader
-from pzd.rig.files.units import UnitError, in_header, to_canonical
+from pzd.rig.files.headers import assigned, control_of, is_canonical, unit_of
+from pzd.rig.files.layout import NEEDED, own_quantity
+from pzd.rig.files.sheet import Wanted
+from pzd.rig.files.sniffing import Dialect, sniffed
 from pzd.schema.errors import DataError, at
 from pzd.schema.scalars import written
-
-_LOOKS_LIKE = {
-    TIME: r"^t$|\btime",
-    DISPLACEMENT: r"^[xs]$|disp|pos|stroke|travel|weg",
-    VELOCITY: r"^v$|vel|speed",
-    ACCELERATION: r"^a$|acc",
-    FORCE: r"^f$|force|load|kraft",
-    TEMPERATURE: r"temp",
-    PRESSURE: r"^p$|press",
-}
-"""What headers of each quantity look like, a unit in brackets taken off."""
-_CONTROLS = {Control(): r"^u$|volt|spannung", Control("current", "A"): r"^i$|current|strom"}
-"""What the header of the control signal looks like."""
+from pzd.signals.work import work
 
 _SHOWN = 6
 """Headers that a refusal shows."""
+_NAMES = {
+    "voltage": re.compile(r"(?<![A-Za-z0-9])([0-9]+(?:[.x,][0-9]+)?)(mV|kV|V)(?![A-Za-z])"),
+    "current": re.compile(r"(?<![A-Za-z0-9])([0-9]+(?:[.x,][0-9]+)?)(mA|A)(?![A-Za-z])"),
+    "temperature": re.compile(r"(?<![A-Za-z0-9])([0-9]+(?:[.x,][0-9]+)?)(degC|C)(?![A-Za-z])"),
+}
+"""How a file's name tells what no column holds: 150V, 0x5A, 22degC."""
+_DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y")
+_TIMES = ("%H:%M:%S.%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
+FORMATS = (
+    *(f"{date}{between}{time}" for date in _DATES for between in "T " for time in (*_TIMES, "%H:%M:%S.%f%z")),
+    *_TIMES,
+)
+"""Formats of date and time that are tried on the first row."""
 
-Header = tuple[str, ...]
+
+@dataclass(frozen=True)
+class _File:
+    """A rig file as it was sniffed."""
+
+    path: Path
+    dialect: Dialect
+    columns: tuple[tuple[Quantity, str], ...]
+
+    @property
+    def layout(self) -> tuple[object, ...]:
+        """What two files must share to be read by one entry."""
+        d = self.dialect
+        kind = [_date_format(cell) for cell in d.first]
+        return d.header, d.units, d.separator, d.decimal, d.skip, d.encoding, tuple(kind)
 
 
 def guessed(files: Sequence[Path]) -> list[str]:
@@ -63,83 +71,158 @@ def guessed(files: Sequence[Path]) -> list[str]:
     DataError : when a file is no table of a rig's channels, a line a file
     UserError : when a file cannot be read
     """
-    by_header: dict[Header, list[Path]] = {}
+    found: list[_File] = []
     faults: list[str] = []
     for path in files:
         try:
-            by_header.setdefault(_header(path), []).append(path)
+            found.append(_file(path))
         except DataError as error:
             faults.append(f"{error.messages[0]}; init reads tables with a line of headers on top")
     if faults:
         raise DataError(faults)
-    control = _control([column for header in by_header for column in header])
+    control = control_of([header for file in found for header in file.dialect.header])
+    if control == Control() and not any(VOLTAGE in dict(file.columns) for file in found):
+        control = Control("current", "A") if _told_by_names(found, "current") else control
     lines = ["# Guessed from the headers: check every line. Paths are relative to this file."]
     if control != Control():
         lines.append(f"control: {{name: {control.name}, unit: {control.unit}}}")
     lines += ["rig:", "  files:"]
-    for header, paths in by_header.items():
-        for pattern in _patterns(paths):
-            lines += [f"    - path: {written(pattern)}", *(f"      {line}" for line in _entry(header, control))]
+    groups: dict[tuple[object, ...], list[_File]] = {}
+    for file in found:
+        groups.setdefault(file.layout, []).append(file)
+    for group in groups.values():
+        for pattern, members in _patterns(group):
+            lines += [f"    - path: {written(pattern)}", *(f"      {line}" for line in _entry(members, control))]
     return lines
 
 
-def _header(path: Path) -> Header:
-    sheet = reader(path, None, "rig.files")(path, FilesEntry(path=str(path)), [q.column for q in CHANNELS])
-    if not any(_column(sheet.header, quantity, _control(sheet.header)) for quantity in CHANNELS):
-        shown = ", ".join(sheet.header[:_SHOWN]) + (", ..." if len(sheet.header) > _SHOWN else "")
-        raise DataError(f"{at(path, sheet.header_line)}: no header names time, displacement or force (got {shown})")
-    return sheet.header
+def _file(path: Path) -> _File:
+    dialect = sniffed(path)
+    if dialect is None:
+        canonical = Wanted(known=frozenset(q.column for q in CHANNELS))
+        sheet = reader(path, "text", "rig.files")(path, FilesEntry(path=str(path)), canonical)
+        dialect = Dialect(
+            "utf-8", ",", ".", (sheet.header_line or 1) - 1, sheet.header, None, ("",) * len(sheet.header)
+        )
+    columns = assigned(dialect.header, dialect.units, control_of(dialect.header))
+    if not columns:
+        shown = ", ".join(dialect.header[:_SHOWN]) + (", ..." if len(dialect.header) > _SHOWN else "")
+        raise DataError(f"{at(path, dialect.header_line)}: no header names time, displacement or force (got {shown})")
+    return _File(path, dialect, tuple(columns.items()))
 
 
-def _control(columns: Sequence[str]) -> Control:
-    """The control signal that the headers show; a voltage where they show none."""
-    shown = [c for c, pattern in _CONTROLS.items() if any(re.search(pattern, _bare(column)) for column in columns)]
-    return next(iter(shown), Control())
-
-
-def _patterns(paths: Sequence[Path]) -> list[str]:
+def _patterns(files: Sequence[_File]) -> list[tuple[str, Sequence[_File]]]:
     """One pattern for all the files where one matches exactly these, else every file by itself."""
+    paths = [file.path for file in files]
     folders, endings = {path.parent for path in paths}, {path.suffix for path in paths}
     if len(paths) > 1 and len(folders) == len(endings) == 1:
         folder, pattern = paths[0].parent, f"*{paths[0].suffix}"
         if set(folder.glob(pattern)) == set(paths):
-            return [(folder / pattern).as_posix()]
-    return [path.as_posix() for path in paths]
+            return [((folder / pattern).as_posix(), files)]
+    return [(file.path.as_posix(), [file]) for file in files]
 
 
-def _entry(header: Header, control: Control) -> Iterator[str]:
-    found = {q: _column(header, q, control) for q in CHANNELS}
-    named = {own(q, control): c for q, c in found.items() if c is not None and not _canonical(c, q, control)}
-    lost = [q for q in NEEDED if found[q] is None]
+def _entry(files: Sequence[_File], control: Control) -> Iterator[str]:
+    dialect = files[0].dialect
+    yield from _dialect_keys(dialect)
+    columns = assigned(dialect.header, dialect.units, control)
+    named = {own_quantity(q, control): c for q, c in columns.items() if not is_canonical(c, q, control)}
+    lost = [q for q in NEEDED if q not in columns]
     if named or lost:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
-        yield from (f"  {q.name}:   # fill in: one of {', '.join(header)}" for q in lost)
-    unitless = [(q, column) for q, column in named.items() if not _says_unit(column, q)]
-    if unitless:
+        yield from (f"  {q.name}:   # fill in: one of {', '.join(dialect.header)}" for q in lost)
+    told = {name: pattern for name in _absent(columns, control) if (pattern := _told_by_names(files, name))}
+    units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, (_, unit) in told.items())]
+    if units:
         yield "units:"
-        yield from (f"  {q.name}:   # fill in: {column} names no unit, e.g. {q.unit}" for q, column in unitless)
+        yield from units
+    if told:
+        yield f"pattern: '{'.*'.join(pattern for pattern, _ in told.values())}'    # from the files' names"
+    if not lost and any(_turned(file, columns) for file in files):
+        yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
 
 
-def _column(header: Header, quantity: Quantity, control: Control) -> str | None:
-    pattern = _CONTROLS[control] if quantity is VOLTAGE else _LOOKS_LIKE[quantity]
-    canonical = [column for column in header if _canonical(column, quantity, control)]
-    alike = [column for column in header if re.search(pattern, _bare(column))]
-    taken = [column for column in alike if not any(_canonical(column, other, control) for other in CHANNELS)]
-    return next(iter(canonical or taken), None)
+def _dialect_keys(dialect: Dialect) -> Iterator[str]:
+    if dialect.encoding != "utf-8":
+        yield f"encoding: {dialect.encoding}"
+    if dialect.skip:
+        yield f"skip: {dialect.skip}"
+    if dialect.separator == " ":
+        yield 'separator: " "'
+    if dialect.decimal == "," and any("," in cell for cell in dialect.first):
+        yield "decimal: ','"
+    if dialect.units is not None:
+        yield "units_row: true"
 
 
-def _canonical(column: str, quantity: Quantity, control: Control) -> bool:
-    return column in (own(quantity, control).column, ALSO_READ.get(quantity))
+def _units(named: dict[Quantity, str], dialect: Dialect) -> Iterator[str]:
+    """The units that the header and the row of units do not say as they are read."""
+    for quantity, column in named.items():
+        index = dialect.header.index(column)
+        below = dialect.units[index] if dialect.units else None
+        unit = unit_of(column, below, quantity)
+        dated = _date_format(dialect.first[index]) if quantity is TIME else None
+        if dated is not None:
+            yield f"  time: '{dated}'"
+        elif unit is None:
+            yield f"  {quantity.name}:   # fill in: {column} names no unit, e.g. {quantity.unit}"
+        elif not _read_alike(column, below, unit):
+            yield f"  {quantity.name}: {written(unit)}"
 
 
-def _says_unit(column: str, quantity: Quantity) -> bool:
-    unit = in_header(column, quantity)
+def _read_alike(column: str, below: str | None, unit: str) -> bool:
+    """Whether the reader sees the same unit by itself: in the row of units, or in brackets at the header's end."""
+    if below and below.strip("[]() "):
+        return below.strip("[]() ") == unit
+    return re.search(rf"[\[(]\s*{re.escape(unit)}\s*[\])]\s*$", column) is not None
+
+
+def _absent(columns: dict[Quantity, str], control: Control) -> list[str]:
+    """The labels that no column holds."""
+    labels = ((VOLTAGE, control.name), (TEMPERATURE, TEMPERATURE.name))
+    return [name for quantity, name in labels if quantity not in columns and name in _NAMES]
+
+
+def _told_by_names(files: Sequence[_File], name: str) -> tuple[str, str] | None:
+    """The pattern that finds a quantity in the name of every file, and its unit; None where one does not tell it."""
+    matches = [_NAMES[name].search(file.path.stem) for file in files]
+    units = {match[2] for match in matches if match}
+    if not all(matches) or len(units) != 1:
+        return None
+    (unit,) = units
+    return f"(?P<{name}>[0-9.x]+){unit}(?![A-Za-z])", {"C": "degC"}.get(unit, unit)
+
+
+def _date_format(cell: str) -> str | None:
+    for form in FORMATS:
+        try:
+            datetime.strptime(cell, form)  # noqa: DTZ007  # only whether it can be read; no instant is kept
+        except ValueError:
+            continue
+        return form
+    return None
+
+
+def _turned(file: _File, columns: dict[Quantity, str]) -> bool:
+    """Whether the work of a file is negative as its numbers stand, whatever their units."""
+    dialect = file.dialect
+    entry = FilesEntry(
+        path=str(file.path),
+        separator=dialect.separator,
+        decimal=dialect.decimal,
+        skip=dialect.skip,
+        units_row=dialect.units is not None,
+        encoding=dialect.encoding,
+    )
+    heads = frozenset((columns[DISPLACEMENT], columns[FORCE]))
     try:
-        return unit is not None and to_canonical(np.zeros(1), unit, quantity) is not None
-    except UnitError:
+        sheet = reader(file.path, "text", "rig.files")(file.path, entry, Wanted(heads, numbers=heads))
+    except DataError:
         return False
-
-
-def _bare(column: str) -> str:
-    return re.sub(r"[\[(].*", "", column).strip().lower()
+    numbers: list[Array] = [
+        sheet.numbers.get(sheet.header.index(columns[quantity]), np.empty(0)) for quantity in (DISPLACEMENT, FORCE)
+    ]
+    x, force = numbers
+    known = x.size == force.size > 2 and bool(np.isfinite(x).all() and np.isfinite(force).all())
+    return known and work(x, force) < 0.0 and work(x, force - force.mean()) < 0.0

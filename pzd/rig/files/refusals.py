@@ -5,36 +5,59 @@ Everything milder is a finding of the preflight.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, TIME, VELOCITY
 from pzd.record import Array
-from pzd.rig.files.reading import Test, standstills
+from pzd.rig.files.layout import Layout
+from pzd.rig.files.splitting import Test
+from pzd.schema.errors import DataError
+from pzd.signals.reversals import REVERSAL_SHARE, reversals
 
 LONGEST_STROKE = 1.0
 """Largest stroke, end to end [m]; more is most often millimetres read as metres."""
 HIGHEST_SPEED = 10.0
 """Largest speed [m/s]."""
+STRETCH = 20
+"""Steps of the clock whose median is one rate."""
+OTHER_RATE = 1.5
+"""Ratio of two rates from which they are two; lost samples and jitter stay below over a stretch."""
+SLOWEST_STEP = 0.05
+"""Step of the clock [s] from which it may be in milliseconds: stands take 20 samples a second and more,"""
+CREEPING = 5e-3
+"""where the motion is no quicker than this [m/s], so that a thousand times as quick it is a test still."""
 LEAST_REVERSALS = 2
-REVERSAL_SHARE = 0.1
-"""A reversal counts where the motion then goes back by more than this share of the range."""
+"""Fewer turns of the motion are no test of a damper."""
 
 
-def faults(test: Test) -> list[str]:
-    """Why the motion and the channels of a test cannot be believed, each with file and line.
+def refuse(tests: Sequence[Test], layout: Layout) -> None:
+    """Refuse a file one of whose tests cannot be believed, whatever its fixture.
 
     Parameters
     ----------
-    test : one test in SI, as recorded
+    tests : the tests of the file in SI, as recorded
+    layout : what the config says about each quantity
 
-    Returns
-    -------
-    one line a fault, empty where there is none
+    Raises
+    ------
+    DataError : with what is wrong with the first such test, each with file and line
     """
+    for test in tests:
+        found = _faults(test, layout)
+        if found:
+            raise DataError(found)
+
+
+def _faults(test: Test, layout: Layout) -> list[str]:
+    if test.faults:
+        readable = test.whole and TIME in test.channels
+        return [*test.faults, *(_standstills(test) if readable else [])]
     time, x, force = test.channels[TIME], test.channels[DISPLACEMENT], test.channels[FORCE]
     if time.size < 2:
         return [f"{test.place(0)}: only one data row"]
-    backwards = standstills(time, test.place)
+    backwards = _standstills(test)
     still = [
         f"{test.place(0)}: {quantity.name} is constant over the whole test (got {values[0]:.6g} {quantity.unit})"
         for quantity, values in ((DISPLACEMENT, x), (FORCE, force))
@@ -42,7 +65,50 @@ def faults(test: Test) -> list[str]:
     ]
     if backwards or still:
         return backwards + still
-    return _too_large(test) + _too_few(test, x)
+    return _too_large(test) + _too_few(test, x) + _two_rates(test) + _milliseconds(test, layout)
+
+
+def _standstills(test: Test) -> list[str]:
+    """Where the clock stands still or goes back, in a line; empty where it goes on. NaN is another's fault."""
+    time = test.channels[TIME]
+    backwards = np.flatnonzero(np.diff(time) <= 0.0)
+    if not backwards.size:
+        return []
+    row = int(backwards[0]) + 1
+    more = f", and {backwards.size - 1} more such rows" if backwards.size > 1 else ""
+    return [f"{test.place(row)}: time does not increase: {time[row]:.9g} s after {time[row - 1]:.9g} s{more}"]
+
+
+def _two_rates(test: Test) -> list[str]:
+    """A clock that goes on at another rate: neither rate is the record's."""
+    time = test.channels[TIME]
+    steps = np.diff(time)
+    if steps.size < 2 * STRETCH:
+        return []
+    blocks = np.median(steps[: steps.size // STRETCH * STRETCH].reshape(-1, STRETCH), axis=1)
+    for row in np.flatnonzero(np.abs(np.log(blocks[1:] / blocks[:-1])) > np.log(OTHER_RATE)):
+        before, after = blocks[max(row - 1, 0) : row + 1], blocks[row + 1 : row + 4]
+        old, new = float(np.median(before)), float(np.median(after))
+        if after.size < 2 or max(old, new) < OTHER_RATE * min(old, new) or np.ptp(after[1:]) > 0.1 * new:
+            continue
+        near = slice(row * STRETCH, (row + 2) * STRETCH)
+        turn = int(np.argmax(np.abs(np.log(steps[near] / old)) > 0.5 * np.log(OTHER_RATE))) + near.start
+        rates = f"the clock goes on at {1.0 / new:.4g} Hz here, at {1.0 / old:.4g} Hz before"
+        remedy = "cut the file here, e.g. with split: {gap_s: ...} at a pause, or resample it"
+        return [f"{test.place(int(turn) + 1)}: {rates}; a record has one rate: {remedy}"]
+    return []
+
+
+def _milliseconds(test: Test, layout: Layout) -> list[str]:
+    """A clock in steps of seconds beside a motion that creeps, unless the config itself says its unit."""
+    time, x = test.channels[TIME], test.channels[DISPLACEMENT]
+    said = any(spec.quantity is TIME and spec.unit is not None for spec in layout.channels)
+    step, speed = float(np.median(np.diff(time))), float(np.abs(_slope(time, x)).max())
+    if said or step < SLOWEST_STEP or speed > CREEPING:
+        return []
+    what = f"the clock goes in steps of {step:.4g} s while the motion reaches {1e3 * speed:.3g} mm/s"
+    remedy = "are these milliseconds? say units: {time: ms}, or units: {time: s} if they are seconds"
+    return [f"{test.place(0)}: {what}; {remedy}"]
 
 
 def _too_large(test: Test) -> list[str]:
@@ -85,59 +151,8 @@ def _despiked(x: Array) -> Array:
 
 
 def _too_few(test: Test, x: Array) -> list[str]:
-    count = reversals(x)
+    count = len(reversals(x))
     if count >= LEAST_REVERSALS:
         return []
     wanted = f"{LEAST_REVERSALS} reversals larger than {REVERSAL_SHARE:.0%} of its range"
     return [f"{test.place(0)}: the displacement needs {wanted} (got {count})"]
-
-
-def reversals(x: Array) -> int:
-    """Number of turning points after which the motion goes back by more than 10 % of its range."""
-    threshold = REVERSAL_SHARE * float(np.ptp(x))
-    count, direction, extreme, low, high = 0, 0, float(x[0]), float(x[0]), float(x[0])
-    for value in _extremes(x):
-        if direction == 0:
-            low, high = min(low, value), max(high, value)
-            if high - low > threshold:
-                direction, extreme = (1, high) if value == high else (-1, low)
-        elif (value - extreme) * direction > 0.0:
-            extreme = value
-        elif (extreme - value) * direction > threshold:
-            count, direction, extreme = count + 1, -direction, value
-    return count
-
-
-def _extremes(x: Array) -> list[float]:
-    """Turning points of the samples, thinned to the extremes of short blocks in long records."""
-    block = max(x.size // 20_000, 1)
-    if block > 1:
-        whole = x[: x.size // block * block].reshape(-1, block)
-        order = np.sort(np.stack((whole.argmin(axis=1), whole.argmax(axis=1)), axis=1), axis=1)
-        x = np.concatenate((np.take_along_axis(whole, order, axis=1).ravel(), x[whole.size :]))
-    turns: list[float] = x.tolist()
-    return turns
-
-
-def sign_faults(test: Test, x: Array, force: Array) -> list[str]:
-    """Negative work of the whole test, unless only a steady force over a net displacement makes it negative.
-
-    Parameters
-    ----------
-    test : the test, for its place
-    x : (n,) displacement of the damper [m]
-    force : (n,) force of the damper, tare and inertia of a known fixture taken out [N]
-    """
-    work, without_mean = work_done(x, force), work_done(x, force - force.mean())
-    if work >= 0.0 or without_mean >= 0.0:
-        return []
-    what = f"the damper does work on the rig over the whole test, {work:.4g} J"
-    return [f"{test.place(0)}: {what}: force or displacement has the wrong sign; say sign: {{force: -1}}"]
-
-
-def work_done(x: Array, force: Array) -> float:
-    """Work that the rig does on the damper over a record [J].
-
-    Equation: W = integral of F dx                    Source: definition, by the trapezoidal rule
-    """
-    return float(0.5 * np.sum((force[1:] + force[:-1]) * np.diff(x)))

@@ -1,17 +1,73 @@
 """What a test engineer would ask of a record before trusting it, one file a check.
 
-A check is `check(test) -> list[Finding]`. Nothing here changes a record.
+A check is `check(test) -> list[Finding]`; one that compares records has `compared(entries) -> entries` as well.
+Nothing here changes a record.
 """
 
 from __future__ import annotations
 
 import pkgutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib import import_module
 from types import ModuleType
 
-from pzd.artefacts import Finding
-from pzd.rig.measured import Measured
+import numpy as np
+
+from pzd.artefacts import Finding, RecordEntry, Rig
+from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
+from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
+from pzd.rig.config import Limits
+from pzd.schema.processes import parallel_map
+from pzd.signals.cycles import Cycles
+from pzd.signals.kinematics import Kinematics
+from pzd.signals.reversals import reversals
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """One record, its cycles and clean motion, and what a known fixture took out of it."""
+
+    record: Record
+    run: Cycles | None
+    clean: Kinematics
+    limits: Limits
+    removed: str | None = None
+    control: Control = field(default_factory=Control)
+    """The control signal, recorded as the voltage."""
+    remarks: tuple[Finding, ...] = ()
+    """What the file itself says otherwise than the config."""
+
+    def channels(self) -> tuple[Channel, ...]:
+        """Every recorded channel but the clock: what is sensed of the motion first, then what labels the record."""
+        record, signal = self.record, self.control.quantity
+        labels = (
+            (signal.name, signal.unit, record.voltage, 0.0),
+            (TEMPERATURE.name, TEMPERATURE.unit, record.temperature, SAME_TEMPERATURE),
+            (PRESSURE.name, PRESSURE.unit, record.pressure, 0.0),
+        )
+        return (
+            Channel(FORCE.name, FORCE.unit, record.force),
+            Channel(DISPLACEMENT.name, DISPLACEMENT.unit, record.displacement),
+            *(
+                Channel(name, unit, values, max(least, CONSTANT_SHARE * float(np.median(np.abs(values)))))
+                for name, unit, values, least in labels
+                if values is not None and np.ptp(values) > 0.0
+            ),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One recorded channel that is not one constant."""
+
+    name: str
+    unit: str
+    values: Array
+    """(n,)"""
+    least: float | None = None
+    """Of a control signal, temperature or pressure: what is less is no other condition; None for x and F."""
 
 
 @lru_cache(maxsize=1)
@@ -21,5 +77,39 @@ def checks() -> dict[str, ModuleType]:
 
 
 def findings(test: Measured) -> tuple[Finding, ...]:
-    """What every check found in one record, in the order of the checks' names."""
-    return tuple(finding for module in checks().values() for finding in module.check(test))
+    """What the file remarks, and what every check found in one record, in the order of the checks' names."""
+    return (*test.remarks, *(finding for module in checks().values() for finding in module.check(test)))
+
+
+def examined(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:
+    """The artefact of the rig: every record, and an entry about each with what the checks found.
+
+    Parameters
+    ----------
+    tests : each makes one record
+    jobs : records made and examined at the same time
+    """
+
+    def listed(given: Callable[[], Measured]) -> tuple[Record, RecordEntry]:
+        test = given()
+        return test.record, _entry(test)
+
+    found = parallel_map(listed, tests, jobs)
+    entries = tuple(entry for _, entry in found)
+    for module in checks().values():
+        entries = module.compared(entries) if hasattr(module, "compared") else entries
+    return Rig(tuple(record for record, _ in found), entries)
+
+
+def _entry(test: Measured) -> RecordEntry:
+    record = test.record
+    return RecordEntry(
+        name=record.name,
+        setting=record.setting,
+        voltage_V=record.median_voltage(),
+        temperature_degC=record.median_temperature(),
+        rate_Hz=record.rate,
+        cycles=float(test.run.count) if test.run else 0.5 * len(reversals(record.displacement)),
+        findings=findings(test),
+        removed=test.removed,
+    )

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pzd.artefacts import Finding
-from pzd.rig.files.refusals import reversals
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
+from pzd.signals.reversals import reversals
 
 ENOUGH = 3.0
 """Cycles from which their scatter says something about the noise."""
@@ -12,7 +12,7 @@ ENOUGH = 3.0
 
 def check(test: Measured) -> list[Finding]:
     """Fewer than three cycles, counted by reversals larger than 10 % of the stroke."""
-    count = 0.5 * reversals(test.record.displacement)
+    count = 0.5 * len(reversals(test.record.displacement))
     if count >= ENOUGH:
         return []
     return [

@@ -6,13 +6,17 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.record import is_constant, voltage_scale
-from pzd.rig.measured import Measured
-from pzd.rig.reference_fit import VISIBLE, fit_reference, fitted
+from pzd.rig.preflight import Measured
+from pzd.rig.reference_fit import VISIBLE, Piece, fit_reference, fitted
 
 LEAST_DELAY = 1e-3
 """Smallest delay that is said [s]; what is less is within the nuisances of a diagnosis."""
 EXPLAINS = 0.25
 """The delay has to leave less than this share of the squares that the element without it leaves."""
+AS_WELL = 2.0
+"""A rigid damper without any delay explains the force as well where it leaves less than this times as much."""
+SIGMOIDS = (0.01, 0.03, 0.1, 0.3)
+"""Where the friction of a rigid damper is rounded off, as a share of its top speed."""
 LONGEST = 0.03
 """Largest delay looked for [s], or a twentieth of the cycle where that is less."""
 TRIES = 31
@@ -30,6 +34,8 @@ def check(test: Measured) -> list[Finding]:
     found = abs(delay) >= max(LEAST_DELAY, 0.5 * part.step) and best.force not in (0, TRIES - 1)
     if not found or undelayed.left < VISIBLE or best.left > EXPLAINS * undelayed.left:
         return []
+    if _left_by_rigid(part) < AS_WELL * best.left:
+        return []
     return [
         Finding(
             check="delay",
@@ -39,3 +45,20 @@ def check(test: Measured) -> list[Finding]:
             follows=f"it takes {1.0 - best.left / undelayed.left:.0%} of what a Bingham element leaves; not corrected",
         )
     ]
+
+
+def _left_by_rigid(part: Piece) -> float:
+    """Share of the force's squares about its mean that a rigid damper with sigmoid friction leaves, undelayed.
+
+    Equation: F = F_0 + c x + m a + C v + C_a abs(v) + q v abs(v) + sum of T_i tanh(v / v_i)    Source: least squares
+    """
+    x, force = part.displacement, part.force_later(np.zeros(1))[0]
+    v = np.gradient(x)
+    if part.closed:
+        v = 0.5 * (np.roll(x, -1) - np.roll(x, 1))
+    top = float(np.percentile(np.abs(v), 99.0)) or 1.0
+    rounded = [np.tanh(v / (share * top)) for share in SIGMOIDS]
+    columns = [np.ones(x.size), x - x.mean(), np.gradient(v), v, np.abs(v), v * np.abs(v), *rounded]
+    design = np.stack([column / (np.linalg.norm(column) or 1.0) for column in columns], axis=1)
+    rest = force - design @ np.linalg.lstsq(design, force, rcond=None)[0]
+    return float(np.sum(rest**2) / max(np.sum((force - force.mean()) ** 2), 1e-300))

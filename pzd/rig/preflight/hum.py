@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.record import Array
-from pzd.rig.measured import Measured
+from pzd.record import Array, is_constant, voltage_scale
+from pzd.rig.preflight import Measured
 
 MAINS = (50.0, 60.0)
 LINES_OFF = 0.2
@@ -15,26 +15,31 @@ STANDS_OUT = 3.0
 """The line is this many times as large as anything in its neighbourhood."""
 SHARE = 0.002
 """Smallest amplitude that is said, as a share of half the range."""
+LABEL_SHARE = 50.0
+"""A control signal, temperature or pressure hums where the line is a tenth of what makes another condition."""
 LEAST_RATE = 2.5
 """Sampling rate over the frequency of the mains from which it can be seen."""
 
 
 def check(test: Measured) -> list[Finding]:
-    """A line at 50 or 60 Hz in force or displacement that stands out of its neighbourhood."""
+    """A line at 50 or 60 Hz in a channel that stands out of its neighbourhood."""
     found: list[Finding] = []
-    for name, unit, values in (("force", "N", test.record.force), ("displacement", "m", test.record.displacement)):
-        least = SHARE * 0.5 * float(np.ptp(values))
-        left = _left_by_cycles(test, values)
+    moving = not is_constant(test.record, voltage_scale([test.record]))
+    for channel in test.channels():
+        if channel.name == test.control.name and moving:
+            continue  # a stepped signal has lines of its own
+        least = SHARE * (0.5 * float(np.ptp(channel.values)) + LABEL_SHARE * (channel.least or 0.0))
+        left = _left_by_cycles(test, channel.values)
         for mains in (m for m in MAINS if test.record.rate >= LEAST_RATE * m):
-            amplitude = _line(values, test.record.rate, mains, test.run.frequency if test.run else 0.0)
+            amplitude = _line(channel.values, test.record.rate, mains, test.run.frequency if test.run else 0.0)
             amplitude = amplitude or _line(left, test.record.rate, mains, 0.0)
             if amplitude > least:
                 found.append(
                     Finding(
                         check="hum",
-                        where=f"{name}, the whole record, at {mains:g} Hz",
+                        where=f"{channel.name}, the whole record, at {mains:g} Hz",
                         size=amplitude,
-                        unit=unit,
+                        unit=channel.unit,
                         follows="amplitude of the mains in this channel; it may be taken for a gap of the model",
                     )
                 )

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from pzd.artefacts import Finding
-from pzd.rig.measured import Measured
+from pzd.artefacts import Finding, RecordEntry
+from pzd.rig.preflight import Measured
 from pzd.rig.reference_fit import fit_reference, unit_force
 
 SHARE = 0.04
 """Offset that is said, as a share of half the force's range."""
+FOLLOWS = "a tare (fixture: {tare_N: ...} takes it out), a preload, or rebound unlike compression"
+ALIKE = 0.3
+"""Offsets that differ by less than this share of the usual one are alike: friction at rest moves them so far."""
+LEAST_RECORDS = 3
+"""Records from which there is a usual offset."""
 SLIPS = 0.02
 """Least share of the samples at which the element must slip, either way.
 
@@ -43,6 +48,39 @@ def check(test: Measured) -> list[Finding]:
             where=f"force, {share:+.1%} of half its range",
             size=offset,
             unit="N",
-            follows="a tare (fixture: {tare_N: ...} takes it out), a preload, or rebound unlike compression",
+            follows=FOLLOWS,
         )
     ]
+
+
+def compared(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
+    """The same entries, in which the offset of a record is compared with those of the other records of its setting.
+
+    A preload or a gas force is the damper's: the same in every record. A tare may change from file to file, and a
+    force and a displacement that are both turned over show the offset with the other sign.
+    """
+    offsets = {entry.name: _offset(entry) for entry in entries}
+    return tuple(
+        _compared(entry, [offsets[o.name] for o in entries if o.setting == entry.setting]) for entry in entries
+    )
+
+
+def _offset(entry: RecordEntry) -> float:
+    return next((finding.size for finding in entry.findings if finding.check == "offset"), 0.0)
+
+
+def _compared(entry: RecordEntry, offsets: list[float]) -> RecordEntry:
+    mine = _offset(entry)
+    usual = float(np.median(offsets))
+    if mine == 0.0 or len(offsets) < LEAST_RECORDS:
+        return entry
+    if np.ptp(offsets) <= ALIKE * abs(usual):
+        follows = f"{FOLLOWS}; alike in all {len(offsets)} records of this setting, as a preload or a gas force is"
+    elif usual and abs(mine + usual) <= ALIKE * abs(usual):
+        follows = f"{usual:+.4g} N is usual in this setting: force and displacement are both turned over here (sign)"
+    elif abs(mine - usual) > ALIKE * abs(usual):
+        follows = f"{usual:+.4g} N is usual in this setting: a tare that changed; take it out of these files (fixture)"
+    else:
+        return entry
+    findings = [f.model_copy(update={"follows": follows}) if f.check == "offset" else f for f in entry.findings]
+    return entry.model_copy(update={"findings": tuple(findings)})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 from pzd.signals.period import moving
 
 RESTS = 0.1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 
 GAIN = 0.03
 """Deviation of the ratio of both speeds from one that is said."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 
 SHARE = 0.005
 """R.m.s. of the noise, as a share of the stroke, that is said."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 
 LOST = 1.5
 """A step longer than this many median steps has lost samples."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pzd.artefacts import Finding
 from pzd.record import Array
-from pzd.rig.measured import Measured
+from pzd.rig.preflight import Measured
 
 Rows = NDArray[np.intp]
 
@@ -16,12 +16,16 @@ LONGEST_PEAK = 4
 STEEP = 20.0
 """A plateau is entered steeply where three samples before it lie this many digitisation steps away."""
 LEAST_PLATEAUS = 2
+BENT = 0.1
+"""A control signal that bends at fewer of its samples than this share is a programme of straight lines."""
 
 
 def check(test: Measured) -> list[Finding]:
-    """Plateaus of equal samples at the extremes of force and displacement, entered steeply."""
+    """Plateaus of equal samples at the extremes of a channel, entered steeply."""
     found: list[Finding] = []
-    for name, unit, values in (("force", "N", test.record.force), ("displacement", "m", test.record.displacement)):
+    for name, unit, values in ((channel.name, channel.unit, channel.values) for channel in test.channels()):
+        if name == test.control.name and _programmed(values):
+            continue
         for side, signed in (("top", values), ("bottom", -values)):
             starts, lengths = _plateaus(signed)
             if starts.size >= LEAST_PLATEAUS:
@@ -36,6 +40,12 @@ def check(test: Measured) -> list[Finding]:
                     )
                 )
     return found
+
+
+def _programmed(values: Array) -> bool:
+    """Whether a control signal moves in straight lines, steps and ramps: then it is held, not cut off."""
+    bends = np.abs(np.diff(values, 2))
+    return bool(np.mean(bends > 1e-9 * float(np.ptp(values))) < BENT)
 
 
 def _plateaus(values: Array) -> tuple[Rows, Rows]:

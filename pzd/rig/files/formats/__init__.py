@@ -6,17 +6,17 @@ A reader whose library is an extra imports it inside `read`.
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.sheet import Sheet
+from pzd.rig.files.sheet import Sheet, Wanted
 from pzd.schema.errors import ConfigError
 
-Reader = Callable[[Path, FilesEntry, Collection[str]], Sheet]
+Reader = Callable[[Path, FilesEntry, Wanted], Sheet]
 
 TEXT = "text"
 """The format of files whose ending no other format claims."""

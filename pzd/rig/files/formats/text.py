@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,9 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.record import Array
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import BLANKS, after_lines, field_counts, fields_of, separator_of, text_of, without_blank_end
-from pzd.rig.files.sheet import Array
+from pzd.rig.files.sheet import Sheet, Wanted
 from pzd.schema.errors import DataError, at
 
 if TYPE_CHECKING:
@@ -31,13 +31,11 @@ MOST_FAULTS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class TextSheet:
-    """A text file whose lines all have as many fields as the header."""
+class _Table:
+    """The data lines of a text file, which all have as many fields as the header."""
 
     path: Path
     header: tuple[str, ...]
-    header_line: int | None
-    units: tuple[str, ...] | None
     body: str
     """The data lines, fields separated by `separator`, nothing quoted."""
     lines: NDArray[np.int64]
@@ -45,34 +43,19 @@ class TextSheet:
     separator: str
     decimal: str
 
-    @property
-    def rows(self) -> int:
-        """Number of data rows."""
-        return int(self.lines.size)
-
-    def line(self, row: int) -> int:
-        """Line of a data row in the file."""
-        return int(self.lines[row])
-
-    def numbers(self, columns: list[int]) -> dict[int, Array]:
-        """Columns (rows,) of numbers; an empty cell is NaN."""
+    def numbers(self, columns: list[int]) -> tuple[dict[int, Array], dict[int, list[str]]]:
+        """Columns (rows,) of numbers, an empty cell NaN; and the faults of those that hold other cells."""
         try:
             frame = self._parsed(columns, "float64")
             values = {column: frame[column].to_numpy() for column in columns}
+            faults: dict[int, list[str]] = {}
         except (ValueError, OverflowError):
-            values = {}
-            faults: list[str] = []
-            for column in columns:
-                try:
-                    values[column] = self._cell_by_cell(column)
-                except DataError as error:
-                    faults += error.messages
-            if faults:
-                raise DataError(faults) from None
-        infinite = [fault for column in columns for fault in self._infinite(column, values[column])]
-        if infinite:
-            raise DataError(infinite)
-        return values
+            self._refuse_repeated_header(columns)
+            read = {column: self._cell_by_cell(column) for column in columns}
+            values = {column: cells for column, cells in read.items() if not isinstance(cells, list)}
+            faults = {column: cells for column, cells in read.items() if isinstance(cells, list)}
+        infinite = {column: self._infinite(column, cells) for column, cells in values.items()}
+        return values, faults | {column: found for column, found in infinite.items() if found}
 
     def texts(self, column: int) -> list[str]:
         """The cells of one column, stripped; empty where a line ends before it."""
@@ -98,8 +81,19 @@ class TextSheet:
             engine="c",
         )
 
-    def _cell_by_cell(self, column: int) -> Array:
-        """The slow way, which knows the place of every bad cell."""
+    def _refuse_repeated_header(self, columns: list[int]) -> None:
+        """Say so where the header stands among the data: a logger that was started again wrote on."""
+        again = [row for row, cell in enumerate(self.texts(columns[0])) if cell == self.header[columns[0]]]
+        again = again if all(self.texts(c)[row] == self.header[c] for row in again[:1] for c in columns) else []
+        if again:
+            more = f" and {len(again) - 1} more times below" if len(again) > 1 else ""
+            raise DataError(
+                f"{at(self.path, int(self.lines[again[0]]))}: the header stands here again{more}: another recording "
+                "begins; write each into a file of its own"
+            )
+
+    def _cell_by_cell(self, column: int) -> Array | list[str]:
+        """The slow way, which knows the place of every bad cell; the faults where there are such."""
         cells = self.texts(column)
         values = np.full(len(cells), np.nan)
         bad: list[int] = []
@@ -110,9 +104,7 @@ class TextSheet:
                 bad.append(row)
         if bad:
             hint = "; for decimal commas say decimal: ','" if any("," in cells[row] for row in bad) else ""
-            raise DataError(
-                self._listed(column, bad, [f"a number is needed (got {cells[row]!r}){hint}" for row in bad])
-            )
+            return self._listed(column, bad, [f"a number is needed (got {cells[row]!r}){hint}" for row in bad])
         return values
 
     def _infinite(self, column: int, values: Array) -> list[str]:
@@ -121,7 +113,7 @@ class TextSheet:
 
     def _listed(self, column: int, rows: list[int], messages: list[str]) -> list[str]:
         name = self.header[column]
-        shown = [f"{at(self.path, self.line(r))}: {name}: {m}" for r, m in zip(rows, messages, strict=True)][
+        shown = [f"{at(self.path, int(self.lines[r]))}: {name}: {m}" for r, m in zip(rows, messages, strict=True)][
             :MOST_FAULTS
         ]
         return shown + (
@@ -129,14 +121,14 @@ class TextSheet:
         )
 
 
-def read(path: Path, entry: FilesEntry, wanted: Collection[str]) -> TextSheet:
-    """Read a text file as far as its headers, and check the number of fields in every line.
+def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
+    """Read the wanted columns of a text file, the number of fields in every line checked.
 
     Parameters
     ----------
     path : the file
     entry : how it is to be read
-    wanted : headers that are looked for; they tell the separator
+    wanted : the columns to read
 
     Raises
     ------
@@ -149,22 +141,22 @@ def read(path: Path, entry: FilesEntry, wanted: Collection[str]) -> TextSheet:
     return _quoted(path, entry, wanted, text[skipped:])
 
 
-def _plain(path: Path, entry: FilesEntry, wanted: Collection[str], text: str) -> TextSheet:
+def _plain(path: Path, entry: FilesEntry, wanted: Wanted, text: str) -> Sheet:
     """A file without quotes and comments: its body is parsed as it stands."""
     above = (entry.header is None) + entry.units_row
     start = after_lines(text, above)
     top = text[:start].split("\n")[:above]
     first = top[0] if top else text[: after_lines(text, 1)].rstrip("\n")
-    separator = entry.separator or separator_of(first, wanted, entry.decimal)
+    separator = entry.separator or separator_of(first, wanted.known, entry.decimal)
     body = text[start:]
     count = body.count("\n") + 1 if body else 0
     lines = np.arange(count) + entry.skip + above + 1
     heads = [fields_of(line, separator) for line in top]
     fields = field_counts(body, separator) if body else np.empty(0, dtype=np.int64)
-    return _checked(path, entry, heads, body, lines, fields, separator)
+    return _sheet(path, entry, wanted, heads, body, lines, fields, separator)
 
 
-def _quoted(path: Path, entry: FilesEntry, wanted: Collection[str], text: str) -> TextSheet:
+def _quoted(path: Path, entry: FilesEntry, wanted: Wanted, text: str) -> Sheet:
     """A file with quotes or comments: taken apart by the csv module and put together without them."""
     numbered = [
         (number, line)
@@ -174,7 +166,7 @@ def _quoted(path: Path, entry: FilesEntry, wanted: Collection[str], text: str) -
     while numbered and not numbered[-1][1].strip():
         numbered.pop()
     first = numbered[0][1] if numbered else ""
-    separator = entry.separator or separator_of(first, wanted, entry.decimal)
+    separator = entry.separator or separator_of(first, wanted.known, entry.decimal)
     if separator == BLANKS:
         rows = [line.split() for _, line in numbered]
     else:
@@ -183,18 +175,20 @@ def _quoted(path: Path, entry: FilesEntry, wanted: Collection[str], text: str) -
     body = "\n".join("\x1f".join(cell.replace("\x1f", " ") for cell in row) for row in rows[above:])
     lines = np.array([number for number, _ in numbered[above:]], dtype=np.int64)
     fields = np.array([len(row) for row in rows[above:]], dtype=np.int64)
-    return _checked(path, entry, [[c.strip() for c in row] for row in rows[:above]], body, lines, fields, "\x1f")
+    heads = [[cell.strip() for cell in row] for row in rows[:above]]
+    return _sheet(path, entry, wanted, heads, body, lines, fields, "\x1f")
 
 
-def _checked(
+def _sheet(
     path: Path,
     entry: FilesEntry,
+    wanted: Wanted,
     heads: list[list[str]],
     body: str,
     lines: NDArray[np.int64],
     fields: NDArray[np.int64],
     separator: str,
-) -> TextSheet:
+) -> Sheet:
     header = list(entry.header) if entry.header is not None else (heads[0] if heads else [])
     header_line = None if entry.header is not None else int(lines[0]) - len(heads) if lines.size else entry.skip + 1
     if not any(header):
@@ -207,7 +201,11 @@ def _checked(
     units = tuple(heads[-1]) if entry.units_row else None
     if units is not None and len(units) != len(header):
         raise DataError(f"{at(path, int(lines[0]) - 1)}: {len(units)} units for {len(header)} columns")
-    return TextSheet(path, tuple(header), header_line, units, body, lines, separator, entry.decimal)
+    table = _Table(path, tuple(header), body, lines, separator, entry.decimal)
+    dated = [i for i, head in enumerate(header) if "%S" in head or (units is not None and "%S" in units[i])]
+    numbers, faults = table.numbers([i for i, head in enumerate(header) if head in wanted.numbers and i not in dated])
+    texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
+    return Sheet(path, tuple(header), header_line, units, int(lines.size), lines, numbers, texts, faults)
 
 
 def _uneven(

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pzd.diagnose.noise.between_cycles import PureError, harmonics_of, pure_error
 from pzd.record import Array
+from pzd.signals.between_cycles import PureError, harmonics_of, pure_error
 
 TREND_CYCLES = 4
 """Fewest cycles on which a trend is judged."""

@@ -4,13 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from pzd.diagnose.config import NuisanceConfig
 from pzd.record import Array
+from pzd.schema.model import Frozen
 
 AT_MOST = 3.5
 """Offset, gain, delay and the instant of the voltage explain at most so many standard deviations of a test: chance
 goes further in one of two thousand; more is a gap. What all tests share shows in the fits, whatever this allows."""
+
+
+class NuisanceConfig(Frozen):
+    """What may differ from test to test without being an effect: standard deviations, zero mean."""
+
+    offset: float = Field(default=0.005, ge=0.0)
+    """Offset of the force, as a share of the test's peak force."""
+    delay_s: float = Field(default=0.0005, ge=0.0)
+    """Delay of the force."""
+    gain: float = Field(default=0.02, ge=0.0)
+    """Gain of the force, as a share of it."""
 
 
 def nuisance(

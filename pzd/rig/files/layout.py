@@ -1,0 +1,230 @@
+"""What an entry of the config says about each quantity: its header, unit and sign, or its value.
+
+Known before any file is opened: the reader is told which columns to read, `channels` takes them from there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from pzd.quantities import CHANNELS, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
+from pzd.rig.config import FilesEntry
+from pzd.rig.files.sheet import Wanted
+from pzd.rig.files.units import UnitError, constant
+from pzd.schema.errors import ConfigError
+from pzd.schema.nearest import nearest
+
+Value = TypeVar("Value")
+Values = dict[Quantity, tuple[float, ...]]
+"""Values that no column holds: one for the file, or one for each test in it."""
+
+NEEDED = (TIME, DISPLACEMENT, FORCE)
+"""Quantities that a file must have."""
+LABELS = (VOLTAGE, TEMPERATURE, PRESSURE)
+"""Quantities that a constant or the file's name may give."""
+ALSO_READ = {TEMPERATURE: "temperature_C"}
+"""Other headers that are read without being named."""
+
+
+@dataclass(frozen=True)
+class ChannelSpec:
+    """What the config says about one quantity."""
+
+    quantity: Quantity
+    """The canonical quantity; the control signal stands under `VOLTAGE`."""
+    own: Quantity
+    """The quantity as this rig calls it: the control signal under its own name and unit."""
+    named: str | None
+    """The header that the config names; empty where no column is to be read."""
+    unit: str | None
+    """The unit that the config names; for time also a format of date and time."""
+    sign: int
+
+    canonical_headers: tuple[str, ...]
+    """Headers that are read without being named; their unit is known."""
+    headers: tuple[str, ...]
+    """Headers that this quantity may have in a file."""
+    sign_said: bool
+    """Whether the config names a sign, be it 1."""
+    dated: bool
+    """Whether the config says that the cells are dates and times."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """An entry of the config as one specification a quantity."""
+
+    entry: FilesEntry
+    place: str
+    """Where the entry stands in the config."""
+    control: Control
+    channels: tuple[ChannelSpec, ...]
+    """One a canonical quantity, in the order of `CHANNELS`."""
+
+    def wanted(self) -> Wanted:
+        """The columns that a reader is asked for."""
+        split = self.entry.split
+        texts = {header for spec in self.channels if spec.dated for header in spec.headers}
+        texts |= {header for header in (split.column, split.event) if header} if split else set()
+        known = {header for spec in self.channels for header in spec.canonical_headers}
+        return Wanted(
+            known=frozenset(known | set(self.entry.columns.values())),
+            numbers=frozenset(h for spec in self.channels if not spec.dated for h in spec.headers),
+            texts=frozenset(texts),
+        )
+
+    def values(self, path: Path) -> tuple[Values, str | None]:
+        """Values that constants and the file's name give (one, or one a test), and the setting.
+
+        Raises
+        ------
+        ConfigError : when a value has no unit or a wrong one, or the name does not match the pattern
+        """
+        faults: list[str] = []
+        values: Values = {}
+        entry, place, setting = self.entry, self.place, self.entry.setting
+        for spec in self._labels():
+            given = _of(entry.constants, spec.own, spec.quantity)
+            if given is not None:
+                values[spec.quantity] = (_constant(given, spec, f"{place}.constants", faults),)
+            many = _of(entry.split.constants, spec.own, spec.quantity) if entry.split else None
+            if many is not None:
+                at_place = f"{place}.split.constants"
+                values[spec.quantity] = tuple(_constant(text, spec, at_place, faults) for text in many)
+        if entry.pattern is not None:
+            match = re.search(entry.pattern, path.stem) or re.search(entry.pattern, path.name)
+            if match is None:
+                faults.append(f"{place}.pattern: the file's name does not match {entry.pattern!r} (got {path.name})")
+            else:
+                faults += self._misfits(path.stem if re.search(entry.pattern, path.stem) else path.name, path)
+                groups = match.groupdict()
+                setting = groups.pop("setting", None) or setting
+                values |= self._from_name(groups, path, faults)
+        if faults:
+            raise ConfigError(faults)
+        return values, setting
+
+    def _labels(self) -> list[ChannelSpec]:
+        return [spec for spec in self.channels if spec.quantity in LABELS]
+
+    def _misfits(self, name: str, path: Path) -> list[str]:
+        """Where the pattern fits the file's name in several places, or leaves out a minus."""
+        found = list(re.finditer(self.entry.pattern or "", name))
+        values = list(dict.fromkeys(", ".join(filter(None, match.groups())) for match in found))
+        if len(values) > 1:
+            places = f"{len(values)} places ({' and '.join(values)})"
+            remedy = f"add what stands around the right one (got {path.name})"
+            return [f"{self.place}.pattern: the file's name fits in {places}; {remedy}"]
+        starts = [found[0].start(group) for group in found[0].re.groupindex if group != "setting"]
+        left_out = [
+            at for at in starts if at > 0 and name[at - 1] == "-" and not name[max(at - 2, 0) : at - 1].isalnum()
+        ]
+        if not left_out:
+            return []
+        return [f"{self.place}.pattern: the minus in front of a number is left out; write -? (got {path.name})"]
+
+    def _from_name(self, groups: dict[str, str | None], path: Path, faults: list[str]) -> Values:
+        values: Values = {}
+        for spec in self._labels():
+            text, own = _of(groups, spec.own, spec.quantity), spec.own
+            if text is None:
+                continue
+            if spec.unit is None:
+                faults.append(
+                    f"{self.place}.units: {own.name}: the file's name has no unit; say {own.name}: {own.unit}"
+                )
+                continue
+            number = text.replace("x", ".").replace(",", ".")
+            at_place = f"{self.place}.pattern: {path.name}"
+            values[spec.quantity] = (_constant(f"{number} {spec.unit}", spec, at_place, faults),)
+        return values
+
+
+def layouts(entries: Sequence[FilesEntry], control: Control) -> tuple[Layout, ...]:
+    """The layout of every entry of `rig.files`, each checked: its keys name quantities, no two say the same.
+
+    Raises
+    ------
+    ConfigError : with every wrong key of an entry
+    """
+    return tuple(_layout(entry, f"rig.files.{number}", control) for number, entry in enumerate(entries))
+
+
+def own_quantity(quantity: Quantity, control: Control) -> Quantity:
+    """The quantity as this rig calls it: the control signal under its own name and unit."""
+    return control.quantity if quantity is VOLTAGE else quantity
+
+
+def _layout(entry: FilesEntry, place: str, control: Control) -> Layout:
+    layout = Layout(entry, place, control, tuple(_spec(quantity, entry, control) for quantity in CHANNELS))
+    faults = _faults(layout)
+    if faults:
+        raise ConfigError(faults)
+    return layout
+
+
+def _spec(quantity: Quantity, entry: FilesEntry, control: Control) -> ChannelSpec:
+    own = own_quantity(quantity, control)
+    named, unit = _of(entry.columns, own, quantity), _of(entry.units, own, quantity)
+    also = ALSO_READ.get(quantity)
+    canonical = (own.column,) if also is None else (own.column, also)
+    headers = canonical if named is None else (named.strip(),) if named.strip() else ()
+    dated = quantity is TIME and unit is not None and "%" in unit
+    sign = _of(entry.sign, own, quantity)
+    return ChannelSpec(quantity, own, named, unit, sign or 1, canonical, headers, sign is not None, dated)
+
+
+def _faults(layout: Layout) -> list[str]:
+    entry, place, control = layout.entry, layout.place, layout.control
+    faults: list[str] = []
+    for field, allowed in (("columns", CHANNELS), ("units", CHANNELS), ("sign", CHANNELS), ("constants", LABELS)):
+        given: Mapping[str, object] = getattr(entry, field)
+        faults += _wrong(f"{place}.{field}", given, allowed, control)
+    groups = re.compile(entry.pattern).groupindex if entry.pattern else {}
+    faults += _wrong(f"{place}.pattern", [g for g in groups if g != "setting"], LABELS, control)
+    a_test = entry.split.constants if entry.split else {}
+    faults += _wrong(f"{place}.split.constants", a_test, LABELS, control)
+    said_by: dict[str, Iterable[str]] = {
+        "columns": entry.columns,
+        "constants": entry.constants,
+        "split.constants": a_test,
+        "pattern": groups,
+    }
+    for spec in layout.channels:
+        ways = [field for field, keys in said_by.items() if spec.own.name in keys or spec.quantity.name in keys]
+        ways = [field for field in ways if field != "columns" or spec.headers]
+        if spec.quantity in LABELS and len(ways) > 1:
+            faults.append(f"{place}: {spec.own.name}: said twice, under {' and '.join(ways)}")
+    if "setting" in groups and entry.setting is not None:
+        faults.append(f"{place}: setting: said twice, under setting and pattern")
+    return faults
+
+
+def _of(given: Mapping[str, Value], own: Quantity, quantity: Quantity) -> Value | None:
+    """What a mapping of the config says about a quantity, by its name or, for the control, by either name."""
+    return given.get(own.name, given.get(quantity.name))
+
+
+def _constant(text: str, spec: ChannelSpec, place: str, faults: list[str]) -> float:
+    try:
+        return constant(text, spec.own)
+    except UnitError as fault:
+        faults.append(f"{place}: {fault} (got {text!r})")
+        return 0.0
+
+
+def _wrong(place: str, given: Iterable[str], allowed: tuple[Quantity, ...], control: Control) -> list[str]:
+    names = list(dict.fromkeys([own_quantity(q, control).name for q in allowed] + [q.name for q in allowed]))
+    faults = []
+    for key in given:
+        if key not in names:
+            near = nearest(key, names)
+            hint = f"did you mean {near}?" if near else f"one of {', '.join(names)} is needed"
+            faults.append(f"{place}: {key}: {hint} (got {key!r})")
+    if VOLTAGE.name in given and control.name in given and control.name != VOLTAGE.name:
+        faults.append(f"{place}: {control.name}: the control signal is named twice (also as {VOLTAGE.name})")
+    return faults

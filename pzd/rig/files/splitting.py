@@ -1,0 +1,128 @@
+"""The channels of one file as its tests, cut where the config says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.artefacts import Finding
+from pzd.quantities import FORCE, TIME, Quantity
+from pzd.record import Array
+from pzd.rig.config import Split
+from pzd.rig.files.channels import Channels
+from pzd.rig.files.layout import ChannelSpec, Layout, Values
+from pzd.rig.files.sheet import Sheet
+from pzd.schema.errors import ConfigError, DataError
+
+
+@dataclass(frozen=True, eq=False)
+class Test:
+    """One test of one file, in SI and degC; every channel is (n,)."""
+
+    __test__ = False
+
+    number: int | None
+    """Which test of the file, None where it holds one."""
+    setting: str | None
+    channels: dict[Quantity, Array]
+    """By canonical quantity; the control signal under `VOLTAGE`."""
+    sheet: Sheet
+    first: int = 0
+    """Row of the sheet at which the test begins."""
+    remarks: tuple[Finding, ...] = ()
+    """What the file itself says otherwise than the config."""
+    faults: tuple[str, ...] = ()
+    """Cells that are bad or empty; then the test is the whole file, uncut."""
+    force_sign: int = 1
+    """What the force of the cell was multiplied by."""
+    whole: bool = True
+    """Whether the file is meant to be one test, in which the clock must go on."""
+
+    def place(self, row: int) -> str:
+        """File and line of one sample."""
+        return self.sheet.place(self.first + row)
+
+
+def split_into_tests(
+    channels: Channels, sheet: Sheet, layout: Layout, values: Values, setting: str | None
+) -> tuple[Test, ...]:
+    """Every test of one file, with the values that no column holds.
+
+    Raises
+    ------
+    ConfigError : when there are more or fewer values than tests, or a column holds what the config gives as well
+    DataError : when the column that cuts the file is missing or doubled
+    """
+    split, place = layout.entry.split, layout.place
+    twice = [
+        f"{place}: {spec.own.name}: stands in column {_header(sheet, spec)} of {sheet.path} and under "
+        f"{_given_under(layout, spec)} as well; leave that out, or say columns: {{{spec.own.name}: ''}} to leave "
+        "the column out"
+        for spec in layout.channels
+        if spec.quantity in channels.values and spec.quantity in values
+    ]
+    if twice:
+        raise ConfigError(twice)
+    if channels.faults:
+        return (Test(None, setting, channels.values, sheet, faults=channels.faults, whole=split is None),)
+    starts = [0] if split is None else _starts(sheet, split, channels.values[TIME], place)
+    bounds = list(zip(starts, [*starts[1:], sheet.rows], strict=True))
+    faults = [
+        f"{place}.split.constants: {spec.own.name}: {len(values[spec.quantity])} values for {len(bounds)} tests "
+        f"in {sheet.path}"
+        for spec in layout.channels
+        if len(values.get(spec.quantity, (0.0,))) not in (1, len(bounds))
+    ]
+    if faults:
+        raise ConfigError(faults)
+    return tuple(
+        Test(
+            index + 1 if len(bounds) > 1 else None,
+            setting,
+            _piece(channels.values, values, index, first, last),
+            sheet,
+            first,
+            channels.remarks,
+            force_sign=next(spec.sign for spec in layout.channels if spec.quantity is FORCE),
+            whole=split is None,
+        )
+        for index, (first, last) in enumerate(bounds)
+    )
+
+
+def _header(sheet: Sheet, spec: ChannelSpec) -> str:
+    return repr(next(head for head in sheet.header if head in spec.headers))
+
+
+def _given_under(layout: Layout, spec: ChannelSpec) -> str:
+    """The key of the config that gives the value of a quantity."""
+    entry, names = layout.entry, {spec.own.name, spec.quantity.name}
+    if names & set(entry.constants):
+        return "constants"
+    return "split.constants" if entry.split and names & set(entry.split.constants) else "pattern"
+
+
+def _starts(sheet: Sheet, split: Split, time: Array, place: str) -> list[int]:
+    """First rows of the tests."""
+    if split.gap_s is not None:
+        jump = np.diff(time)
+        new = (jump > split.gap_s) | (jump < 0.0)
+        return [0, *(int(row) + 1 for row in np.flatnonzero(new))]
+    header = split.column or split.event or ""
+    if sheet.header.count(header) != 1:
+        raise DataError(f"{sheet.top}: {place}.split: no single column {header!r}")
+    cells = np.array(sheet.texts[sheet.header.index(header)])
+    if split.column is not None:
+        begins: NDArray[np.bool_] = cells[1:] != cells[:-1]
+    else:
+        begins = np.char.find(cells[1:], split.begins or "") >= 0
+    return [0, *(int(row) + 1 for row in np.flatnonzero(begins))]
+
+
+def _piece(channels: dict[Quantity, Array], values: Values, index: int, first: int, last: int) -> dict[Quantity, Array]:
+    piece = {quantity: column[first:last] for quantity, column in channels.items()}
+    for quantity, given in values.items():
+        piece[quantity] = np.full(last - first, given[index if len(given) > 1 else 0])
+    return piece

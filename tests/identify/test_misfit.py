@@ -1,0 +1,90 @@
+"""What repeats and the Bingham element misses is told from noise and from what the sensors of a test do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from campaigns import ROWS, campaign
+from fresh_truths import sine_test, with_noise
+
+from pzd.artefacts import ParameterRow
+from pzd.identify.config import IdentifyConfig
+from pzd.identify.fit import fit_condition, fit_records
+from pzd.identify.misfit import VISIBLE, Misfit, misfit_of
+from pzd.identify.part import parts_of
+from pzd.record import Condition, Record
+
+QUICKSTART = ((1.0, 0.01), (1.0, 0.03), (2.0, 0.01), (2.0, 0.03))
+ORIFICE = 2500.0
+
+
+def sines(*, hidden: float, noise: float) -> list[Record]:
+    """The sines of configs/quickstart.yaml at 0 V, with so much of a quadratic orifice [N s2/m2] beside the element."""
+    rng = np.random.default_rng(1)
+    records = [sine_test(ROWS[0], f, x, cycles=6, rate=500, name=f"{f}-{x}") for f, x in QUICKSTART]
+    return [
+        with_noise(replace(r, force=r.force + hidden * r.velocity * np.abs(r.velocity)), rng, noise, 0.5)
+        for r in records
+    ]
+
+
+def row_for(records: list[Record]) -> ParameterRow:
+    return fit_condition(Condition(None, 0.0, None, tuple(records)), IdentifyConfig(), seed=1)
+
+
+def misfit_for(records: tuple[Record, ...]) -> Misfit:
+    config = IdentifyConfig()
+    objective, fit = fit_records(records, config, seed=1)
+    return misfit_of(parts_of(records, objective.trials, (fit.residuals, fit.slopes), config.nuisance))
+
+
+def test_a_hidden_orifice_makes_the_parameters_the_model_s_and_not_the_damper_s() -> None:
+    row = row_for(sines(hidden=ORIFICE, noise=0.005))
+    assert row.C_Ns_per_m > 1.2 * ROWS[0].damping
+    assert row.status.startswith("weak: T0, C, k (the model misses ")
+    assert row.status.endswith("of peak: the parameters are the model's, not the damper's)")
+
+
+def test_without_it_they_are_the_damper_s() -> None:
+    assert row_for(sines(hidden=0.0, noise=0.005)).status == "ok"
+    assert misfit_for(tuple(sines(hidden=0.0, noise=0.005))).share == 0.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_gain_offset_and_delay_within_their_priors_are_no_misfit(seed) -> None:
+    _, records = campaign(np.random.default_rng(100 + seed), "five tests", correlation=0.9)
+    assert not misfit_for(records).speaks
+
+
+def test_noise_alone_seldom_speaks() -> None:
+    draws = [
+        campaign(np.random.default_rng(seed), "two sines", correlation=0.9, noise=0.05)[1]
+        for seed in np.random.SeedSequence(21).spawn(20)
+    ]
+    assert sum(misfit_for(records).share > 0.0 for records in draws) <= 1
+
+
+def test_a_misfit_that_the_class_of_the_load_cell_may_cause_does_not_speak() -> None:
+    small = misfit_for(tuple(sines(hidden=0.1 * ORIFICE, noise=0.0005)))
+    assert 0.0 < small.share < VISIBLE
+    assert not small.speaks
+    assert row_for(sines(hidden=0.1 * ORIFICE, noise=0.0005)).status == "ok"
+
+
+@pytest.mark.parametrize("kind", ["one sine", "one random"])
+def test_what_is_hidden_is_seen_whether_the_motion_repeats_or_not(kind) -> None:
+    speaks = [
+        misfit_for(campaign(np.random.default_rng(seed), kind, hidden=0.2)[1]).speaks
+        for seed in np.random.SeedSequence(22).spawn(8)
+    ]
+    assert sum(speaks) >= 7
+
+
+def test_a_motion_that_does_not_repeat_is_no_misfit() -> None:
+    speaks = [
+        misfit_for(campaign(np.random.default_rng(seed), "one random", correlation=0.9)[1]).speaks
+        for seed in np.random.SeedSequence(23).spawn(10)
+    ]
+    assert not any(speaks)

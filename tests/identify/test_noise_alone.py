@@ -1,0 +1,67 @@
+"""What noise of the residuals' own colour leaves of a parameter: the measure of what is undetermined."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from fresh_truths import autoregressive
+
+from pzd.identify.noise_alone import uncertainty
+from pzd.record import Array
+from pzd.signals.autoregression import autoregression
+
+
+def straight_line(count: int) -> Array:
+    return np.column_stack([np.ones(count), np.sin(2.0 * np.pi * np.arange(count) / 250.0)])
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9, -0.6])
+def test_the_autoregression_of_the_noise_is_found(rng: np.random.Generator, correlation) -> None:
+    noise = autoregressive(rng, 20000, correlation)
+    found = autoregression([noise])
+    coefficient = found.coefficients[0] if found.coefficients.size else 0.0
+    assert coefficient == pytest.approx(correlation, abs=0.03)
+    assert found.innovation == pytest.approx(1.0 - correlation**2, rel=0.04)
+
+
+def test_white_noise_gives_the_textbook_covariance(rng: np.random.Generator) -> None:
+    slopes, noise = straight_line(4000), rng.standard_normal(4000)
+    found = uncertainty(slopes, noise, [4000])
+    np.testing.assert_allclose(np.diag(found.covariance), np.diag(np.linalg.inv(slopes.T @ slopes)), rtol=0.12)
+
+
+def test_the_mean_of_correlated_noise_has_its_long_run_variance(rng: np.random.Generator) -> None:
+    correlation, count = 0.9, 20000
+    found = uncertainty(np.ones((count, 1)), autoregressive(rng, count, correlation), [count])
+    exact = (1.0 + correlation) / (1.0 - correlation) / count
+    assert found.covariance[0, 0] == pytest.approx(exact, rel=0.15)
+    assert found.degrees_of_freedom == pytest.approx(count * (1 - correlation**2) / (1 + correlation**2), rel=0.15)
+
+
+def test_few_samples_widen_the_interval(rng: np.random.Generator) -> None:
+    few = uncertainty(np.ones((8, 1)), rng.standard_normal(8), [8])
+    assert few.half_widths()[0] > 1.15 * 1.96 * np.sqrt(few.covariance[0, 0])
+
+
+def test_a_parameter_that_does_nothing_has_no_interval(rng: np.random.Generator) -> None:
+    slopes = np.column_stack([np.ones(100), np.zeros(100)])
+    widths = uncertainty(slopes, rng.standard_normal(100), [100]).half_widths()
+    assert np.isfinite(widths[0])
+    assert np.isinf(widths[1])
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
+def test_intervals_cover_the_truth_where_the_textbook_fails(correlation, rng: np.random.Generator) -> None:
+    slopes = straight_line(1500)
+    projection = np.linalg.pinv(slopes)
+    textbook = 1.96 * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    held, naive = 0, 0
+    for _ in range(200):
+        noise = autoregressive(rng, 1500, correlation)
+        estimate = projection @ noise
+        residuals = noise - slopes @ estimate
+        held += np.count_nonzero(np.abs(estimate) <= uncertainty(slopes, residuals, [700, 800]).half_widths())
+        naive += np.count_nonzero(np.abs(estimate) <= textbook * np.std(residuals))
+    assert 0.92 <= held / 400 <= 0.98
+    if correlation == 0.9:
+        assert naive / 400 < 0.6

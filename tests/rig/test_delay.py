@@ -1,0 +1,39 @@
+"""A delay is found where there is one, and a damper without the oil spring is not taken for a late sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pzd.record import Array, Record
+from pzd.rig.config import Limits
+from pzd.rig.preflight import Measured, checks
+from pzd.signals.cycles import cycles
+from pzd.signals.kinematics import kinematics
+
+TIME = np.arange(8000) * 1e-3
+
+
+def measured(x: Array, force: Array) -> Measured:
+    run = cycles(TIME, x)
+    clean = kinematics(TIME, x, run)
+    return Measured(Record("a", None, TIME, x, clean.velocity, clean.acceleration, force), run, clean, Limits())
+
+
+def random_motion(rng: np.random.Generator) -> Array:
+    hertz = np.fft.rfftfreq(2 * TIME.size, 1e-3)
+    spectrum = rng.standard_normal(hertz.size) * np.exp(2j * np.pi * rng.random(hertz.size)) / np.maximum(hertz, 0.3)
+    x = np.fft.irfft(np.where((hertz > 0.3) & (hertz < 12.0), spectrum, 0.0), 2 * TIME.size)[: TIME.size]
+    return np.asarray(0.012 * x / np.abs(x).max())
+
+
+@pytest.mark.parametrize("rounded_at", [0.005, 0.01, 0.02, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("motion", ["1 Hz", "2 Hz", "5 Hz", "random"])
+def test_a_rigid_damper_with_sigmoid_friction_is_not_late(
+    motion: str, rounded_at: float, rng: np.random.Generator
+) -> None:
+    x = random_motion(rng) if motion == "random" else 0.01 * np.sin(2.0 * np.pi * float(motion[0]) * TIME)
+    v = np.gradient(x, TIME)
+    for noise in (0.0, 5.0):
+        force = 900.0 * v + 200.0 * np.tanh(v / rounded_at) + noise * rng.standard_normal(TIME.size)
+        assert checks()["delay"].check(measured(x, force)) == []

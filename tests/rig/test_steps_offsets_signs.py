@@ -1,0 +1,98 @@
+"""What shows only beside other stretches or other files: two tests in one record, a changed tare, a turned channel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from written_files import lines, refused, run, write
+
+from pzd.record import Array
+
+TIME = np.arange(12_000) * 1e-3
+
+
+def damper(x: Array, gas: float = 0.0) -> Array:
+    v = np.gradient(x, TIME)
+    return np.asarray(900.0 * v + 200.0 * np.tanh(v / 0.005) + gas + 0.02 * gas / 0.01 * -x)
+
+
+def stored(folder: Path, name: str, x: Array, force: Array) -> None:
+    write(folder / f"{name}.csv", lines({"time_s": TIME, "displacement_m": x, "force_N": force}))
+
+
+def sine(amplitude: float, hertz: float) -> Array:
+    return np.asarray(amplitude * np.sin(2.0 * np.pi * hertz * TIME))
+
+
+STEPS = {
+    "two speeds": np.where(TIME < 6.0, sine(0.01, 1.0), sine(0.01, 2.0)),
+    "two amplitudes": np.where(TIME < 6.0, sine(0.005, 1.5), sine(0.015, 1.5)),
+    "half a millimetre more": np.where(TIME < 6.0, sine(0.004, 2.0), sine(0.0045, 2.0)),
+}
+NO_STEPS = {
+    "a sine": sine(0.01, 1.7),
+    "a sweep": 0.01 * np.sin(2.0 * np.pi * (0.5 * TIME + 0.1 * TIME**2)),
+    "a beat": sine(0.005, 1.38) + sine(0.005, 1.42),
+    "a quick beat": sine(0.01, 1.0) + sine(0.003, 1.23),
+    "a growing sine": (0.5 + TIME / 12.0) * sine(0.01, 1.5),
+    "two tones": sine(0.01, 1.0) + sine(0.002, 10.03),
+    "one bump more": sine(0.01, 1.0) + 0.003 * np.exp(-(((TIME - 6.0) / 0.3) ** 2)),
+}
+
+
+@pytest.mark.parametrize("kind", STEPS)
+def test_two_tests_in_one_record_are_said_with_how_to_split_them(tmp_path: Path, kind: str) -> None:
+    stored(tmp_path, "a", STEPS[kind], damper(STEPS[kind]))
+    (finding,) = [f for f in run(tmp_path).entries[0].findings if f.check == "steps"]
+    assert "split: {column" in finding.follows
+    boundary = float(finding.where.split("until ")[1].split(" s")[0])
+    assert boundary == pytest.approx(6.0, abs=1.0)
+
+
+@pytest.mark.parametrize("kind", NO_STEPS)
+def test_beats_sweeps_growing_sines_and_tones_are_no_steps(tmp_path: Path, kind: str) -> None:
+    stored(tmp_path, "a", NO_STEPS[kind], damper(NO_STEPS[kind]))
+    assert "steps" not in {finding.check for finding in run(tmp_path).entries[0].findings}
+
+
+def offsets(folder: Path, levels: list[float]) -> list[str]:
+    for number, level in enumerate(levels):
+        x = sine(0.008 + 0.001 * number, 1.5)
+        stored(folder, f"{number}", x, damper(x) + level)
+    found = [[f for f in entry.findings if f.check == "offset"] for entry in run(folder).entries]
+    return [findings[0].follows if findings else "" for findings in found]
+
+
+def test_an_offset_alike_in_all_files_is_a_preload_and_one_that_changes_a_tare(tmp_path: Path) -> None:
+    assert all("as a preload or a gas force is" in said for said in offsets(tmp_path / "gas", [-150.0] * 4))
+    said = offsets(tmp_path / "tare", [0.0, 0.0, 0.0, 120.0])
+    assert said[:3] == ["", "", ""]
+    assert "a tare that changed" in said[3]
+
+
+def test_a_file_with_force_and_displacement_both_turned_over_is_said(tmp_path: Path) -> None:
+    said = offsets(tmp_path, [-150.0, -150.0, -150.0, 150.0])
+    assert "both turned over here" in said[3]
+
+
+def test_which_channel_is_turned_over_is_told_by_the_gas_force_the_other_files_and_the_header(tmp_path: Path) -> None:
+    x = sine(0.01, 1.5)
+    force = damper(x, gas=-200.0)
+    stored(tmp_path / "gas", "a", x, -force)
+    assert "force has the wrong sign, since the mean force of +200" in refused(tmp_path / "gas")[0]
+    assert "say sign: {force: -1}" in refused(tmp_path / "gas")[0]
+    stored(tmp_path / "gas", "a", -x, force)
+    assert "say sign: {displacement: -1}" in refused(tmp_path / "gas")[0]
+    for turned, channel in (((x, -force - 100.0), "force"), ((-x, force + 100.0), "displacement")):
+        stored(tmp_path / channel, "a", x, force + 100.0)
+        stored(tmp_path / channel, "b", *turned)
+        (said,) = refused(tmp_path / channel)
+        assert "b.csv:2" in said
+        assert f"{channel} has the wrong sign" in said
+        assert "in the files whose work is right" in said
+    plain = damper(x)
+    write(tmp_path / "head" / "a.csv", lines({"time_s": TIME, "Einfederung [mm]": -1e3 * x, "force_N": plain}))
+    entry = {"path": "a.csv", "columns": {"displacement": "Einfederung [mm]"}}
+    assert "displacement has the wrong sign, since its header" in refused(tmp_path / "head", entry)[0]
