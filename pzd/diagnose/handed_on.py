@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from pzd.artefacts import Prediction
 from pzd.diagnose.fit.least_squares import fit
-from pzd.diagnose.kept_back import Missed, Trials
+from pzd.diagnose.kept_back import Trials
+from pzd.diagnose.missed import Missed
 from pzd.diagnose.search.evidence import evidence_of
 from pzd.diagnose.search.selection import Selection
 

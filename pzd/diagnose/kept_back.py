@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.artefacts import KeptBack, LeftOut, Prediction
 from pzd.damper.material import by_voltage
@@ -23,57 +22,14 @@ from pzd.diagnose.fit.least_squares import MOST_EVALUATIONS, Fitted, fit
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.prediction import counted, predicted_force
 from pzd.diagnose.fit.weights import record_likelihood, unweighted
+from pzd.diagnose.folds import Mask, deal
+from pzd.diagnose.missed import Missed, worse
 from pzd.diagnose.search.evidence import evidence_of
-from pzd.record import Array
 from pzd.signals.nuisance import NuisanceConfig
 
-FOLDS = 5
-"""Each fold keeps back about a fifth of the tests: enough is left to fit, and the refits stay few."""
-PARTS = 2
-"""Halves of a test that is alone at its voltage: the first predicts the second, and the second the first."""
 EVALUATIONS = 6
 """Of a refit without one fold: it begins at the optimum of all tests, and a fifth of them moves that little."""
-WORSE = 2.0
-"""Standard errors of the paired difference over tests from which one damper predicts worse than another."""
-
 HoldOut = Literal["tests", "cycles", "segments", "mixed"]
-Mask = NDArray[np.bool_]
-Folds = tuple[tuple[Mask, ...], ...]
-"""For every fold one mask (n,) a record: the samples that are kept back."""
-
-
-@dataclass(frozen=True, eq=False)
-class Missed:
-    """What a damper misses of kept-back tests, an entry a test, or a part of one that is alone at its voltage."""
-
-    record: tuple[int, ...]
-    """Which record an entry is of."""
-    error: Array
-    """(t,) sum of the squared residual [N^2]."""
-    energy: Array
-    """(t,) sum of the squared force [N^2]."""
-    limit: Array
-    """(t,) sum of squares [N^2] that counts as nothing: so many samples of a visible gap."""
-
-    @property
-    def criterion(self) -> float | None:
-        """W_s pooled over the entries; None without any.
-
-        Equation: sum (F - F_sim)^2 / sum F^2                       Source: Makowski and Knap 2021, eq. (4)
-        """
-        return float(self.error.sum() / self.energy.sum()) if self.record else None
-
-    def less_than(self, other: Missed) -> bool:
-        """Whether less is missed than by another damper, all tests together, by what can be seen."""
-        return float((other.error - self.error).sum()) > float(self.limit.sum())
-
-    def of(self, wanted: Sequence[int]) -> Missed:
-        """The entries of some records."""
-        kept = np.isin(self.record, wanted)
-        records = tuple(r for r, k in zip(self.record, kept, strict=True) if k)
-        return Missed(records, self.error[kept], self.energy[kept], self.limit[kept])
-
-
 _NOTHING = Missed((), np.zeros(0), np.zeros(0), np.zeros(0))
 _Refit = Callable[[Sequence[Mask]], "Damper | None"]
 """The damper fitted to all but what is kept back; None where nothing is left."""
@@ -93,7 +49,7 @@ class Trials:
     """The records of each voltage, and those whose voltage moves."""
     voltages: tuple[float | None, ...]
     """Of the groups [V], 0 for a damper without; None where it moves."""
-    folds: Folds
+    folds: tuple[tuple[Mask, ...], ...]
 
     @property
     def nothing(self) -> tuple[Mask, ...]:
@@ -114,19 +70,16 @@ class Trials:
         return self._missed(self._by_criterion(whole.damper if whole else damper))
 
     def fitted_by_criterion(self, damper: Damper, kept_back: Sequence[Mask]) -> Fitted | None:
-        """A damper, its effects too, fitted by criterion (4) to all but what is kept back; None where nothing is left."""
+        """A damper, its effects too, fitted by criterion (4) to all but what is kept back; None where none is left."""
         problem = self._unweighted(damper)(kept_back)
         return None if problem is None else _fit(problem, damper)
 
     def worse(self, one: Missed, other: Missed) -> tuple[float | None, ...]:
-        """The voltages [V] at which one damper predicts worse than another beyond chance; all where the whole is worse.
-
-        Equation: mean d > 2 s_d / sqrt(n), d_i = W_s,i - W_s,i of the other one     Source: paired differences
-        """
+        """The voltages [V] at which one damper predicts worse than another; all where only the whole shows it."""
         found = tuple(
-            v for v, group in zip(self.voltages, self.groups, strict=True) if _worse(one.of(group), other.of(group))
+            v for v, group in zip(self.voltages, self.groups, strict=True) if worse(one.of(group), other.of(group))
         )
-        return found or (self.voltages if _worse(one, other) else ())
+        return found or (self.voltages if worse(one, other) else ())
 
     def between(self) -> tuple[int, ...]:
         """The groups whose voltage lies between two others."""
@@ -293,41 +246,8 @@ def trials_of(campaign: Campaign, plain: Damper, visible: float) -> Trials:
     prepared = campaign.prepared
     everything = Split(tuple(np.full(p.record.time.size, TRAINING) for p in prepared), (), "records")
     whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs)
-    nodes = [voltage for voltage, _ in by_voltage(plain.base)]
-    members: dict[int, list[int]] = {}
-    for i, p in enumerate(prepared):
-        own = p.record.median_voltage() or 0.0
-        members.setdefault(int(np.argmin([abs(v - own) for v in nodes])) if p.constant else -1, []).append(i)
-    groups = tuple(tuple(sorted(found, key=lambda i: prepared[i].record.name)) for found in members.values())
-    voltages = tuple(None if node < 0 else nodes[node] for node in members)
-    folds = tuple(tuple(np.zeros(p.record.time.size, dtype=np.bool_) for p in prepared) for _ in range(FOLDS))
-    for turn, group in enumerate(groups):
-        for place, i in enumerate(group):
-            if len(group) > 1:
-                folds[(turn + place) % min(FOLDS, max(len(group), PARTS))][i][:] = True
-            else:
-                for part, mask in enumerate(_halves(campaign, i)):
-                    folds[(turn + part) % FOLDS][i][:] = mask
-    return Trials(whole, plain, visible, groups, voltages, tuple(f for f in folds if any(m.any() for m in f)))
-
-
-def _halves(campaign: Campaign, record: int) -> tuple[Mask, Mask]:
-    """(n,) the first and the second half of a record, by whole cycles where it has two or more."""
-    prepared = campaign.prepared[record]
-    time, run = prepared.record.time, prepared.cycles
-    if run is None or run.count < PARTS:
-        first = np.arange(time.size) < time.size // PARTS
-    else:
-        first = run.number(time) < run.count // PARTS
-    return first, ~first
-
-
-def _worse(one: Missed, other: Missed) -> bool:
-    if not one.record:
-        return False
-    difference = (one.error - other.error) / one.energy
-    error = float(np.std(difference, ddof=1) / np.sqrt(difference.size)) if difference.size > 1 else 0.0
-    return other.less_than(one) and float(difference.mean()) > WORSE * error
+    dealt = deal(prepared, plain)
+    return Trials(whole, plain, visible, dealt.groups, dealt.voltages, dealt.folds)
 
 
 def _shown(damper: Damper, places: set[int]) -> Damper:

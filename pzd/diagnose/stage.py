@@ -60,9 +60,8 @@ def diagnose(
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
-    found_by_fit = select_effects(campaign, plain, diagnose, jobs)
     trials = trials_of(campaign, plain, diagnose.visible)
-    handed = handed_on(found_by_fit, trials, diagnose.force, control.unit)
+    handed = handed_on(select_effects(campaign, plain, diagnose, jobs), trials, diagnose.force, control.unit)
     named = handed.named
     evidence = named.first
     before = evidence.campaign.checks(named.plain.damper)

@@ -18,7 +18,8 @@ from pzd.diagnose.data.split import split
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.fit.likelihood import RecordLikelihood, response
 from pzd.diagnose.handed_on import handed_on
-from pzd.diagnose.kept_back import Missed, Trials, trials_of
+from pzd.diagnose.kept_back import Trials, trials_of
+from pzd.diagnose.missed import Missed
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.diagnose.search.selection import Selection
 from pzd.diagnose.stage import diagnose
