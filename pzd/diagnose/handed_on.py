@@ -56,9 +56,9 @@ def handed_on(named: Selection, trials: Trials, forced: Sequence[str], unit: str
         kept = _without(kept, harmful)
     if not kept.adopted:
         return HandedOn(kept, trials.told(plain, plain, None), refused)
-    if by_criterion:
-        whole = trials.fitted_by_criterion(kept.fitted.damper, trials.nothing)
-        kept = replace(kept, fitted=whole or kept.fitted)
+    found = trials.fitted_by_criterion(kept.fitted.damper, trials.nothing) if by_criterion else None
+    if found is not None:
+        kept = replace(kept, fitted=found[1], last=replace(kept.last, whole=found[0]))
     told = trials.told(plain, missed, kept.fitted.damper, by_criterion=by_criterion)
     return HandedOn(kept, told, None, by_criterion)
 
@@ -66,9 +66,13 @@ def handed_on(named: Selection, trials: Trials, forced: Sequence[str], unit: str
 def _best(named: Selection, trials: Trials) -> tuple[Missed, bool]:
     """What the damper misses, and whether it is fitted by criterion (4) since that predicts visibly better.
 
-    The likelihood weighs by noise: the best there is as long as noise is what is left, and misled where a law is.
+    The likelihood weighs by noise: the best there is as long as noise is what is left, and misled where a law is
+    missing, which the gap shows.
     """
-    weighed, alike = trials.missed(named.fitted.damper), trials.missed_by_criterion(named.fitted.damper)
+    weighed = trials.missed(named.fitted.damper)
+    if named.last.gap(named.fitted) < trials.visible:
+        return weighed, False
+    alike = trials.missed_by_criterion(named.fitted.damper)
     return (alike, True) if alike.less_than(weighed) else (weighed, False)
 
 

@@ -23,12 +23,9 @@ def held_out_gap(named: Selection, trials: Trials | None = None) -> Gap:
     before = gap_of(campaign.untouched(plain), campaign.parts)
     if not named.adopted:
         return before
-    adopted = None
-    if trials is not None:
-        seen_later = [~mask for mask in campaign.in_role(TRAINING)]
-        adopted = trials.fitted_by_criterion(named.fitted.damper, seen_later)
-    if adopted is None:
-        training = named.last.halves[0]
-        adopted = fit(training, named.adopted, training.start_with(named.fitted.damper))
+    seen_later = [~mask for mask in campaign.in_role(TRAINING)]
+    found = None if trials is None else trials.fitted_by_criterion(named.fitted.damper, seen_later)
+    training = named.last.halves[0]
+    adopted = found[1] if found else fit(training, named.adopted, training.start_with(named.fitted.damper))
     after = gap_of(campaign.untouched(adopted.damper), campaign.parts)
     return after.model_copy(update={"before": before.before})

@@ -67,12 +67,15 @@ class Trials:
     def missed_by_criterion(self, damper: Damper) -> Missed:
         """What a damper misses, all of it fitted without each fold by criterion (4), as identify fits the plain one."""
         whole = self.fitted_by_criterion(damper, self.nothing)
-        return self._missed(self._by_criterion(whole.damper if whole else damper))
+        return self._missed(self._by_criterion(whole[1].damper if whole else damper))
 
-    def fitted_by_criterion(self, damper: Damper, kept_back: Sequence[Mask]) -> Fitted | None:
-        """A damper, its effects too, fitted by criterion (4) to all but what is kept back; None where none is left."""
+    def fitted_by_criterion(self, damper: Damper, kept_back: Sequence[Mask]) -> tuple[Problem, Fitted] | None:
+        """A damper, its effects too, fitted by criterion (4) to all but what is kept back, and to what it is fitted.
+
+        None where nothing is left.
+        """
         problem = self._unweighted(damper)(kept_back)
-        return None if problem is None else _fit(problem, damper)
+        return None if problem is None else (problem, _fit(problem, damper))
 
     def worse(self, one: Missed, other: Missed) -> tuple[float | None, ...]:
         """The voltages [V] at which one damper predicts worse than another; all where only the whole shows it."""

@@ -146,6 +146,7 @@ class Foretold:
     voltages: tuple[float | None, ...] = TWO
     groups: tuple[tuple[int, ...], ...] = ((0, 1), (2, 3))
     plain: float = 1.0
+    visible: float = 0.0025
 
     def plain_missed(self) -> float:
         return self.plain
@@ -241,6 +242,21 @@ def test_where_noise_is_what_is_left_the_likelihood_predicts_as_well(rng: np.ran
     damper = damper_of(TWO, preload_offset={"F_0": 100.0})
     asked = trials(sines(damper, rng, TWO, cycles=4, jitter=0.02), damper_of(TWO))
     assert not asked.missed_by_criterion(damper).less_than(asked.missed(damper))
+
+
+def test_the_fit_that_is_handed_on_goes_with_what_it_was_fitted_to(rng: np.random.Generator) -> None:
+    records = bent(rng, offset=100.0)
+    damper = damper_of(TWO, preload_offset={"F_0": 100.0})
+    campaign = campaign_of(records)
+    evidence = evidence_of(campaign, damper)
+    plain = fit(evidence.whole, (), evidence.whole.start())
+    named = Selection(plain, fit(evidence.whole, (A,), evidence.whole.start_with(damper)), (), {}, evidence, evidence)
+    found = handed_on(named, trials_of(campaign, damper_of(TWO), 0.0025), (), "V")
+    assert found.named.adopted == (A,)
+    assert found.by_criterion
+    compared = zip(found.named.last.whole.observations, found.named.fitted.simulated, strict=True)
+    assert all(o.measured.size == force.size for o, force in compared)
+    assert len(found.named.fitted.simulated) == len(records)
 
 
 # ---------------------------------------------------------------- the tests' own offset, gain and delay
