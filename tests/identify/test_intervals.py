@@ -46,33 +46,30 @@ def relative_widths(records: Sequence[Record], config: IdentifyConfig) -> Array:
     return half_widths(parts, misfit_of(parts)) / estimate
 
 
-def test_intervals_hold_the_truth_under_correlated_noise() -> None:
+def test_intervals_hold_the_truth_under_correlated_noise(rng: np.random.Generator) -> None:
     # Binomial, 120 at 0.95: sd 2 %; the three of one draw hang together, so that 8 % below are seldom chance.
     found = 0
-    for seed in np.random.SeedSequence(10).spawn(40):
-        rng = np.random.default_rng(seed)
-        truth, records = campaign(rng, "two sines", correlation=0.9, sensors=SENSORS_ALIKE.nuisance)
+    for draw in rng.spawn(40):
+        truth, records = campaign(draw, "two sines", correlation=0.9, sensors=SENSORS_ALIKE.nuisance)
         found += held(row_for(records), truth)
     assert found >= 0.87 * 120
 
 
-def test_intervals_hold_the_truth_where_nothing_repeats() -> None:
+def test_intervals_hold_the_truth_where_nothing_repeats(rng: np.random.Generator) -> None:
     found = 0
-    for seed in np.random.SeedSequence(11).spawn(24):
-        rng = np.random.default_rng(seed)
-        truth, records = campaign(rng, "one random", correlation=0.9, sensors=SENSORS_ALIKE.nuisance)
+    for draw in rng.spawn(24):
+        truth, records = campaign(draw, "one random", correlation=0.9, sensors=SENSORS_ALIKE.nuisance)
         found += held(row_for(records), truth)
     assert found >= 0.87 * 72
 
 
-def test_intervals_hold_the_truth_where_sensors_differ_and_a_little_is_hidden() -> None:
+def test_intervals_hold_the_truth_where_sensors_differ_and_a_little_is_hidden(rng: np.random.Generator) -> None:
     # Noise alone gave intervals of a tenth of the width, which held the truth in one case of five.
     found = ok = 0
-    for seed in np.random.SeedSequence(12).spawn(60):
-        rng = np.random.default_rng(seed)
-        kind = str(rng.choice(["one sine", "two sines", "one random"]))
-        hidden = float(rng.choice([0.0, 0.005, 0.01]))
-        truth, records = campaign(rng, kind, correlation=float(rng.choice([0.0, 0.5, 0.9])), hidden=hidden)
+    for draw in rng.spawn(60):
+        kind = str(draw.choice(["one sine", "two sines", "one random"]))
+        hidden = float(draw.choice([0.0, 0.005, 0.01]))
+        truth, records = campaign(draw, kind, correlation=float(draw.choice([0.0, 0.5, 0.9])), hidden=hidden)
         row = row_for(records, IdentifyConfig())
         if row.status == "ok":
             ok += 1
@@ -81,35 +78,37 @@ def test_intervals_hold_the_truth_where_sensors_differ_and_a_little_is_hidden() 
     assert 0.87 <= found / (3 * ok) <= 0.995
 
 
-def test_what_differs_from_cycle_to_cycle_widens_an_interval_though_no_colour_of_noise_shows_it() -> None:
-    # Every cycle has a gain of its own, by 5 %; the colour of the residual knows of no cycles.
-    truth, covered, by_colour = TABLE_2[0.0], 0, 0
-    for seed in np.random.SeedSequence(13).spawn(25):
-        rng = np.random.default_rng(seed)
+def test_what_differs_from_cycle_to_cycle_widens_an_interval_though_no_colour_of_noise_shows_it(
+    rng: np.random.Generator,
+) -> None:
+    # Every cycle has a gain of its own, by 5 %, which is a C of its own; the colour of the residual knows of no cycles.
+    truth, covered, wider = TABLE_2[0.0], 0, []
+    for draw in rng.spawn(12):
         record = sine_test(truth, 2.0, 0.03, cycles=CYCLES + 2, rate=500)
-        gain = 1.0 + 0.05 * rng.standard_normal(CYCLES + 3)[(record.time * 2.0).astype(int)]
+        gain = 1.0 + 0.05 * draw.standard_normal(CYCLES + 3)[(record.time * 2.0).astype(int)]
         parts, estimate = parts_for([replace(record, force=gain * record.force)], SENSORS_ALIKE)
-        miss = np.abs(estimate - np.array(truth))
-        covered += np.count_nonzero(miss <= half_widths(parts, misfit_of(parts)))
+        widths = half_widths(parts, misfit_of(parts))
+        covered += np.count_nonzero(np.abs(estimate - np.array(truth)) <= widths)
         colour = uncertainty(parts[0].slopes, parts[0].residuals, [parts[0].residuals.size])
-        by_colour += np.count_nonzero(miss <= colour.half_widths())
-    assert covered >= 0.9 * 75 > by_colour
+        wider.append(widths[1] / colour.half_widths()[1])
+    # The median is 2.2 to 2.3; of 36 intervals at 0.95 that hang together by three, 28 is four deviations off.
+    assert np.median(wider) > 1.8
+    assert covered >= 28
 
 
-def test_one_test_knows_no_parameter_better_than_its_load_cell_s_gain() -> None:
-    record = with_noise(sine_test(TABLE_2[0.0], 2.0, 0.03, rate=500), np.random.default_rng(14), 0.001)
+def test_one_test_knows_no_parameter_better_than_its_load_cell_s_gain(rng: np.random.Generator) -> None:
+    record = with_noise(sine_test(TABLE_2[0.0], 2.0, 0.03, rate=500), rng, 0.001)
     config = IdentifyConfig(nuisance=NuisanceConfig(offset=0.0, delay_s=0.0, gain=0.02))
     np.testing.assert_allclose(relative_widths([record], config), 1.96 * 0.02, rtol=0.02)
 
 
-def test_a_delay_from_test_to_test_leaves_the_stiffness_open() -> None:
-    record = with_noise(sine_test(TABLE_2[0.0], 2.0, 0.03, rate=500), np.random.default_rng(15), 0.001)
+def test_a_delay_from_test_to_test_leaves_the_stiffness_open(rng: np.random.Generator) -> None:
+    record = with_noise(sine_test(TABLE_2[0.0], 2.0, 0.03, rate=500), rng, 0.001)
     without, late = (IdentifyConfig(nuisance=NuisanceConfig(offset=0.0, gain=0.0, delay_s=d)) for d in (0.0, 5e-4))
     assert relative_widths([record], late)[2] > 5.0 * relative_widths([record], without)[2]
 
 
-def test_tests_that_disagree_widen_the_interval_and_tests_that_agree_narrow_it() -> None:
-    rng = np.random.default_rng(16)
+def test_tests_that_disagree_widen_the_interval_and_tests_that_agree_narrow_it(rng: np.random.Generator) -> None:
     tests = [sine_test(TABLE_2[0.0], f, x, rate=500, name=f"{f}") for f, x in ((1.0, 0.02), (1.5, 0.03), (2.0, 0.03))]
     noisy = [with_noise(t, rng, 0.002) for t in tests]
     apart = [replace(r, force=g * r.force) for r, g in zip(noisy, (1.08, 0.92, 1.08), strict=True)]
@@ -127,8 +126,7 @@ def relative_widths_by_priors(records: Sequence[Record]) -> Array:
     return np.asarray(1.96 * np.sqrt(sum(np.sum(p**2, axis=1) for p in pulls)) / estimate)
 
 
-def test_few_cycles_leave_more_open_than_their_number_says() -> None:
-    rng = np.random.default_rng(17)
+def test_few_cycles_leave_more_open_than_their_number_says(rng: np.random.Generator) -> None:
     long = with_noise(sine_test(TABLE_2[0.0], 2.0, 0.03, cycles=20.5, rate=500), rng, 0.02)
     short = replace(
         long, **{c: getattr(long, c)[:650] for c in ("time", "displacement", "velocity", "acceleration", "force")}
@@ -137,8 +135,8 @@ def test_few_cycles_leave_more_open_than_their_number_says() -> None:
     assert np.median(relative_widths([short], SENSORS_ALIKE) / relative_widths([long], SENSORS_ALIKE)) > np.sqrt(10.0)
 
 
-def test_a_misfit_too_small_to_speak_widens_the_interval() -> None:
-    records = [with_noise(sine_test(TABLE_2[0.0], 2.0, 0.02, rate=500), np.random.default_rng(19), 0.002)]
+def test_a_misfit_too_small_to_speak_widens_the_interval(rng: np.random.Generator) -> None:
+    records = [with_noise(sine_test(TABLE_2[0.0], 2.0, 0.02, rate=500), rng, 0.002)]
     bent = [replace(r, force=r.force + 300.0 * r.velocity * np.abs(r.velocity)) for r in records]
     parts, _ = parts_for(bent, IdentifyConfig())
     misfit = misfit_of(parts)
@@ -155,8 +153,8 @@ def test_a_parameter_that_does_nothing_has_no_interval() -> None:
 
 
 @pytest.mark.parametrize("kind", ["one sine", "five tests", "one random"])
-def test_the_estimate_is_what_it_was_whatever_its_interval(kind) -> None:
-    _, records = campaign(np.random.default_rng(18), kind, hidden=0.1)
+def test_the_estimate_is_what_it_was_whatever_its_interval(kind, rng: np.random.Generator) -> None:
+    _, records = campaign(rng, kind, hidden=0.1)
     _, fit = fit_records(records, IdentifyConfig(), seed=1)
     row = row_for(records, IdentifyConfig())
     assert tuple(getattr(row, c) for c in COLUMNS) == tuple(fit.parameters)

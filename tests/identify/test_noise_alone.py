@@ -25,17 +25,24 @@ def test_the_autoregression_of_the_noise_is_found(rng: np.random.Generator, corr
 
 
 def test_white_noise_gives_the_textbook_covariance(rng: np.random.Generator) -> None:
-    slopes, noise = straight_line(4000), rng.standard_normal(4000)
-    found = uncertainty(slopes, noise, [4000])
-    np.testing.assert_allclose(np.diag(found.covariance), np.diag(np.linalg.inv(slopes.T @ slopes)), rtol=0.12)
+    # BIC now and then takes white noise for coloured, and the variance is off by as much: so the median of five draws.
+    slopes = straight_line(4000)
+    exact = np.diag(np.linalg.inv(slopes.T @ slopes))
+    found = [np.diag(uncertainty(slopes, draw.standard_normal(4000), [4000]).covariance) for draw in rng.spawn(5)]
+    np.testing.assert_allclose(np.median(found, axis=0), exact, rtol=0.12)
+    np.testing.assert_allclose(found, np.tile(exact, (5, 1)), rtol=0.4)
 
 
 def test_the_mean_of_correlated_noise_has_its_long_run_variance(rng: np.random.Generator) -> None:
     correlation, count = 0.9, 20000
-    found = uncertainty(np.ones((count, 1)), autoregressive(rng, count, correlation), [count])
+    # As above: the median of five, since BIC now and then takes an order too many.
+    found = [
+        uncertainty(np.ones((count, 1)), autoregressive(draw, count, correlation), [count]) for draw in rng.spawn(5)
+    ]
     exact = (1.0 + correlation) / (1.0 - correlation) / count
-    assert found.covariance[0, 0] == pytest.approx(exact, rel=0.15)
-    assert found.degrees_of_freedom == pytest.approx(count * (1 - correlation**2) / (1 + correlation**2), rel=0.15)
+    assert np.median([f.covariance[0, 0] for f in found]) == pytest.approx(exact, rel=0.15)
+    freedom = count * (1 - correlation**2) / (1 + correlation**2)
+    assert np.median([f.degrees_of_freedom for f in found]) == pytest.approx(freedom, rel=0.15)
 
 
 def test_few_samples_widen_the_interval(rng: np.random.Generator) -> None:

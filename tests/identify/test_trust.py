@@ -94,10 +94,10 @@ def test_good_tests_are_ok(draw, rng: np.random.Generator) -> None:
     assert row_for(*(with_noise(r, rng) for r in records), config=SENSORS_ALIKE).status == "ok"
 
 
-def test_what_the_sensors_leave_open_is_weak_and_never_undetermined() -> None:
+def test_what_the_sensors_leave_open_is_weak_and_never_undetermined(rng: np.random.Generator) -> None:
     # Friction over damping: a gain of 20 % between two tests says nothing of C, and yet noise alone would.
     records = [sine_test(TABLE_2[150.0], f, 0.02, rate=500) for f in (0.5, 1.0)]
-    noisy = [with_noise(r, np.random.default_rng(8), 0.002) for r in records]
+    noisy = [with_noise(r, rng, 0.002) for r in records]
     row = row_for(*noisy, config=IdentifyConfig(nuisance=NuisanceConfig(gain=0.2)))
     assert row.status.startswith("weak: ")
     assert row.C_Ns_per_m == pytest.approx(TABLE_2[150.0].damping, rel=0.02)
