@@ -20,7 +20,7 @@ import pytest
 import yaml
 from stand_ins import NAMES, UNDETERMINED, project
 
-from pzd.artefacts import Diagnosis, Gap, NextTest, Ranked, Region, Value
+from pzd.artefacts import Diagnosis, Gap, KeptBack, LeftOut, NextTest, Prediction, Ranked, Region, Value
 from pzd.cli.app import status
 from pzd.cli.output import Output
 from pzd.cli.story import story
@@ -584,6 +584,25 @@ def diagnosis() -> Diagnosis:
             peak_force_N=1512.345,
         ),
     )
+
+
+def test_the_story_tells_every_kept_back_test_where_it_is_asked_to() -> None:
+    kept_back = Prediction(
+        hold_out="tests",
+        by=(KeptBack(record="r03", voltage=100.0, W_s_plain=0.012, W_s=0.003),),
+        W_s_plain=0.011,
+        W_s=0.004,
+        left_out_voltages=(LeftOut(voltage=50.0, W_s_plain=0.02, W_s=0.01),),
+    )
+    predicted = diagnosis().model_copy(update={"prediction": kept_back})
+    whole = "prediction of whole tests kept back: W_s 0.011 plain, 0.004 as handed on"
+    each = [
+        "kept back: r03 at 100 V, W_s 0.012 plain, 0.003 as handed on",
+        "left out: 50 V, between its neighbours W_s 0.02 plain, 0.01 as handed on",
+    ]
+    plain = story(diagnosis(), Control())
+    assert story(predicted, Control()) == [*plain[:3], whole, *plain[3:]]
+    assert story(predicted, Control(), every_test=True) == [*plain[:3], whole, *each, *plain[3:]]
 
 
 def test_the_story_of_a_diagnosis_in_ten_lines() -> None:

@@ -5,7 +5,18 @@ itself into its stage's folder and reads itself back, checked, with file and lin
 wrong. `control` renames the columns of the control signal.
 """
 
-from pzd.artefacts.diagnosed import Diagnosed, Diagnosis, Gap, NextTest, Ranked, Region, Value
+from pzd.artefacts.diagnosed import (
+    Diagnosed,
+    Diagnosis,
+    Gap,
+    KeptBack,
+    LeftOut,
+    NextTest,
+    Prediction,
+    Ranked,
+    Region,
+    Value,
+)
 from pzd.artefacts.identified import FALLBACK, AuxiliaryRow, Identified, MeasureRow, ParameterRow, base_of
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
@@ -31,10 +42,13 @@ __all__ = [
     "Gap",
     "Identified",
     "InverseRow",
+    "KeptBack",
+    "LeftOut",
     "Manifest",
     "MeasureRow",
     "NextTest",
     "ParameterRow",
+    "Prediction",
     "Ranked",
     "RecordEntry",
     "ReferenceRow",

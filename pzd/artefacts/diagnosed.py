@@ -29,6 +29,36 @@ class Gap(Frozen):
     hold_out: Literal["records", "cycles", "segments", "mixed"]
 
 
+class KeptBack(Frozen):
+    """One test that was kept back, predicted by dampers that were fitted without it."""
+
+    record: str
+    voltage: float | None
+    """None where it moves, or where the damper has none."""
+    W_s_plain: float
+    W_s: float
+
+
+class LeftOut(Frozen):
+    """One voltage that was left out, predicted by interpolation between its neighbours."""
+
+    voltage: float
+    W_s_plain: float
+    W_s: float
+
+
+class Prediction(Frozen):
+    """What the damper handed on predicts of kept-back tests, beside the plain one; nothing is fitted to them."""
+
+    hold_out: Literal["tests", "cycles", "segments", "mixed"]
+    """Whole tests; halves of one, by cycles or segments, where it is alone at its voltage; or some of either."""
+    by: tuple[KeptBack, ...]
+    W_s_plain: float
+    W_s: float
+    left_out_voltages: tuple[LeftOut, ...]
+    """Every voltage between two others."""
+
+
 class Value(Frozen):
     """A parameter of an adopted effect with its 95 % interval; lists beside at_voltage_V."""
 
@@ -88,6 +118,8 @@ class Diagnosis(Frozen):
     rivals: tuple[str, ...]
     where: tuple[Region, ...]
     next_test: NextTest | None
+    prediction: Prediction | None = None
+    """What decides over handing on an effect; None where no test could be kept back, which `reason` tells."""
     zero_m: float = 0.0
     """Recorded displacement from which the parameters of an effect count x, such as x_e of `end_stop`."""
 

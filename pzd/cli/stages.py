@@ -24,21 +24,21 @@ _COMMANDS = {
 }
 
 
-def _page(run: Run) -> list[str]:
+def _page(run: Run, **_: bool) -> list[str]:
     from pzd.pipeline.run_summary import page_of
 
     return [f"report: {page_of(run)}"]
 
 
-def _story(run: Run) -> list[str]:
+def _story(run: Run, *, verbose: bool) -> list[str]:
     from pzd.cli.story import story
     from pzd.pipeline.run_summary import run_summary
 
     found = run_summary(run).diagnosis
-    return story(found, run.control) if found else []
+    return story(found, run.control, every_test=verbose) if found else []
 
 
-_AT_THE_END: dict[str, Callable[[Run], list[str]]] = {"run": _page, "report": _page, "diagnose": _story}
+_AT_THE_END: dict[str, Callable[..., list[str]]] = {"run": _page, "report": _page, "diagnose": _story}
 """What a command says once its stages are up to date."""
 
 
@@ -58,7 +58,7 @@ def _command(name: str, summary: str) -> Callable[..., int]:
         given = opened(config, runs, overrides or ())
         marks = execute(given, name, force=force, jobs=jobs, say=output.say, progress=output.progress)
         if name in _AT_THE_END:
-            output.say(*_AT_THE_END[name](given.run))
+            output.say(*_AT_THE_END[name](given.run, verbose=verbose))
         complain(f"not to be trusted: {mark}" for mark in marks)
         return UNTRUSTED if marks else DONE
 

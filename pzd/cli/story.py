@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.artefacts import Diagnosis, NextTest, Value
+from pzd.artefacts import Diagnosis, NextTest, Prediction, Value
 from pzd.cli.layout import interval, number
 from pzd.quantities import Control
 
@@ -18,14 +18,23 @@ _MOST = 3
 """How many places and candidates are told."""
 
 
-def story(diagnosis: Diagnosis, control: Control) -> list[str]:
-    """What is missing, where, how sure that is, what it was worth, and what to test next."""
+def story(diagnosis: Diagnosis, control: Control, *, every_test: bool = False) -> list[str]:
+    """What is missing, where, how sure that is, what it was worth, and what to test next.
+
+    Parameters
+    ----------
+    diagnosis : what is told
+    control : the control signal, for its unit
+    every_test : whether the prediction of each kept-back test and each voltage left out is told too
+    """
     unit = control.unit
     lines = [
         f"verdict: {diagnosis.verdict}, {_VERDICTS[diagnosis.verdict]}",
         f"reason: {diagnosis.reason}",
         _gap(diagnosis),
     ]
+    if diagnosis.prediction:
+        lines += _prediction(diagnosis.prediction, unit, every_test=every_test)
     lines += [f"where: {where.region}, {where.share_of_gap:.0%} of the gap" for where in diagnosis.where[:_MOST]]
     lines += [f"adopted: {name}, {_parameters(diagnosis, name, unit)}" for name in diagnosis.effects]
     if diagnosis.confidence is not None:
@@ -49,6 +58,19 @@ def _gap(diagnosis: Diagnosis) -> str:
         f"gap on what no fit has seen ({held}): W_s {number(gap.before)} before, {number(gap.after)} after{share}; "
         f"noise alone gives {number(gap.noise_floor)}"
     )
+
+
+def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[str]:
+    kept_back = {"tests": "whole tests", "mixed": "whole tests, or halves"}.get(found.hold_out, f"{found.hold_out}")
+    yield f"prediction of {kept_back} kept back: W_s {number(found.W_s_plain)} plain, {number(found.W_s)} as handed on"
+    if not every_test:
+        return
+    for each in found.by:
+        at = "" if each.voltage is None else f" at {number(each.voltage)} {unit}"
+        yield f"kept back: {each.record}{at}, W_s {number(each.W_s_plain)} plain, {number(each.W_s)} as handed on"
+    for left in found.left_out_voltages:
+        figures = f"W_s {number(left.W_s_plain)} plain, {number(left.W_s)} as handed on"
+        yield f"left out: {number(left.voltage)} {unit}, between its neighbours {figures}"
 
 
 def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:

@@ -47,7 +47,7 @@ class Campaign:
         """What the damper makes of some of the records."""
         key = damper.model_dump_json()
         new = [i for i in numbers if (key, i) not in self._expected]
-        made = self._each(lambda i: expected(damper, self.prepared[i], self.nuisance.delay_s), new)
+        made = self.each(lambda i: expected(damper, self.prepared[i], self.nuisance.delay_s), new)
         self._expected.update(zip(((key, i) for i in new), made, strict=True))
         return tuple(self._expected[key, i] for i in numbers)
 
@@ -71,9 +71,10 @@ class Campaign:
     def _against(self, damper: Damper, masks: Sequence[Mask]) -> tuple[ResidualCheck, ...]:
         asked = in_use(masks)
         given = [(e, self.prepared[i], masks[i]) for i, e in zip(asked, self.expected(damper, asked), strict=True)]
-        return self._each(lambda each: check_residual(*each, self.nuisance), given)
+        return self.each(lambda each: check_residual(*each, self.nuisance), given)
 
-    def _each(self, function: Callable[[Item], Made], items: Iterable[Item]) -> tuple[Made, ...]:
+    def each(self, function: Callable[[Item], Made], items: Iterable[Item]) -> tuple[Made, ...]:
+        """What a function makes of every item, as many at the same time as the campaign asks."""
         with ThreadPoolExecutor(max(self.jobs, 1)) as pool:
             return tuple(pool.map(function, items))
 

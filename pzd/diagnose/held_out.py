@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from pzd.artefacts import Gap
+from pzd.diagnose.data.split import TRAINING
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.gap import gap_of
+from pzd.diagnose.kept_back import Trials
 from pzd.diagnose.search.selection import Selection
 
 
-def held_out_gap(named: Selection) -> Gap:
+def held_out_gap(named: Selection, trials: Trials | None = None) -> Gap:
     """Criterion (4) on the untouched samples, nuisances at their prior mean, before and after alike.
 
     Parameters
     ----------
     named : what was adopted, and the evidence whose first half trains
+    trials : the tests, where the damper handed on is fitted by criterion (4); None where it is by likelihood
     """
     campaign, training = named.first.campaign, named.first.halves[0]
     plain = fit(training, (), training.start()).damper
     before = gap_of(campaign.untouched(plain), campaign.parts)
     if not named.adopted:
         return before
+    seen_later = [~mask for mask in campaign.in_role(TRAINING)]
+    found = None if trials is None else trials.fitted_by_criterion(named.fitted.damper, seen_later)
     training = named.last.halves[0]
-    adopted = fit(training, named.adopted, training.start_with(named.fitted.damper)).damper
-    after = gap_of(campaign.untouched(adopted), campaign.parts)
+    adopted = found[1] if found else fit(training, named.adopted, training.start_with(named.fitted.damper))
+    after = gap_of(campaign.untouched(adopted.damper), campaign.parts)
     return after.model_copy(update={"before": before.before})

@@ -45,10 +45,12 @@ def diagnose(
     from pzd.diagnose.data.cleaning import about, mid_stroke, prepare
     from pzd.diagnose.data.exclusions import whole_records, without
     from pzd.diagnose.data.split import split
+    from pzd.diagnose.handed_on import handed_on
     from pzd.diagnose.held_out import held_out_gap
+    from pzd.diagnose.kept_back import trials_of
     from pzd.diagnose.next_test import next_test, reach_of
     from pzd.diagnose.search.forward_selection import select_effects
-    from pzd.diagnose.verdict import decide, parameters_of, ranking_of, weak
+    from pzd.diagnose.verdict import decide, parameters_of, ranking_of, refused, unpredicted, weak
     from pzd.diagnose.where import regions
 
     used, cut_off = whole_records(rig, setting)
@@ -57,11 +59,14 @@ def diagnose(
     prepared = about(recorded, zero)
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
-    named = select_effects(Campaign(prepared, parts, diagnose.nuisance, jobs), plain, diagnose, jobs)
+    campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
+    trials = trials_of(campaign, plain, diagnose.visible)
+    handed = handed_on(select_effects(campaign, plain, diagnose, jobs), trials, diagnose.force, control.unit)
+    named = handed.named
     evidence = named.first
     before = evidence.campaign.checks(named.plain.damper)
     after = evidence.campaign.checks(named.fitted.damper) if named.adopted else before
-    decision = decide(named, before, after, diagnose)
+    decision = refused(handed.refused) if handed.refused else decide(named, before, after, diagnose)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
     reach = reach_of(stand.limits, recorded, voltages)
@@ -70,11 +75,12 @@ def diagnose(
     found = named.fitted.damper.moved(zero) if named.adopted else plain
     told = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + weak(parts.hold_out) + without(cut_off),
+        reason=decision.reason + weak(parts.hold_out) + unpredicted(handed.prediction) + without(cut_off),
         effects=named.adopted,
         confidence=decision.confidence,
-        gap=held_out_gap(named),
+        gap=held_out_gap(named, trials if handed.by_criterion else None),
         parameters=parameters_of(named),
+        prediction=handed.prediction,
         zero_m=found.zero_m,
         ranking=ranking_of(named, evidence),
         rivals=named.rivals,

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pzd.artefacts import Ranked, Value
+from pzd.artefacts import Prediction, Ranked, Value
 from pzd.damper.competing_forms import known
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library
@@ -43,6 +43,16 @@ def weak(hold_out: str) -> str:
         return ""
     parts = {"mixed": "some whole tests, and parts"}.get(hold_out, hold_out)
     return f"; held out were {parts} of tests that were also fitted, which is weak evidence"
+
+
+def unpredicted(prediction: Prediction | None) -> str:
+    """What to add where no test could be kept back."""
+    return "" if prediction else "; there is too little to keep a test back, so that nothing shows what this predicts"
+
+
+def refused(reason: str) -> Decision:
+    """The verdict where what fits the tests does not predict others: something is missing, and it has no name."""
+    return Decision("unexplained", reason, None)
 
 
 def decide(

@@ -1,9 +1,10 @@
-"""A record made ready for fitting: displacement on a fine grid, force to be met, warm-up left out.
+"""A record made ready for fitting: displacement on a fine grid, force to be met, warm-up and rest left out.
 
 The exact element takes the displacement as linear between samples. A sine sampled at 1 kHz and
 read that way biases k by 0.04 %, so the displacement is first laid on a finer grid by a cubic
 spline. The force at the first sample is unknown to the model (it depends on what went before):
-simulation starts from the measured force, and a warm-up is left out of the criterion.
+simulation starts from the measured force, and a warm-up is left out of the
+criterion; so is the rest behind the motion.
 """
 
 from __future__ import annotations
@@ -15,12 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array, Record
+from pzd.signals.period import moving
 from pzd.signals.reversals import REVERSAL_SHARE, reversals
 
 FINE_RATE = 4000.0
 """The fine grid has at least this rate [Hz]."""
 FINE_ANGLE = 1.0 / 256.0
 """The fine step is at most this share of 1/omega of the fastest half cycle."""
+RELAXES = 0.05
+"""After the motion has ended the oil relaxes for some time constants C/k, of 3 to 15 ms, and shows k in it [s]."""
 FINEST = 64
 """Largest factor between the fine grid and the samples."""
 
@@ -53,7 +57,7 @@ class Trial:
 
 
 def trial_of(record: Record) -> Trial:
-    """The record made ready for fitting, its warm-up left out."""
+    """The record made ready for fitting, its warm-up and the rest after it left out."""
     time, factor, positions = _fine_time(record)
     return Trial(
         record.name,
@@ -61,9 +65,20 @@ def trial_of(record: Record) -> Trial:
         float((time[-1] - time[0]) / (time.size - 1)),
         factor,
         record.force,
-        np.arange(record.time.size) >= warm_up(record.displacement),
+        in_motion(record),
         positions,
     )
+
+
+def in_motion(record: Record) -> NDArray[np.bool_]:
+    """(n,) whether a sample says something of T0, C and k: past the warm-up, and until the motion ends for good.
+
+    Afterwards the element is stuck at whatever force it had, and what a real damper does then, creep and the zero of
+    the load cell, would be fitted as if it were friction. A hold between two motions counts.
+    """
+    order, (_, last) = np.arange(record.time.size), moving(record.displacement)
+    counted: NDArray[np.bool_] = (order >= warm_up(record.displacement)) & (order <= last + RELAXES * record.rate)
+    return counted
 
 
 def warm_up(displacement: Array) -> int:

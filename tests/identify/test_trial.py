@@ -9,9 +9,10 @@ import pytest
 from fresh_truths import TABLE_2, sine_test
 
 from pzd.damper.element import element_force
-from pzd.identify.objective import Objective
+from pzd.identify.objective import Bingham, Objective
 from pzd.identify.separable import fit_separable
 from pzd.identify.trial import trial_of, upsampling_factor, warm_up
+from pzd.record import Array, Record
 from pzd.signals.reversals import reversals
 
 
@@ -37,6 +38,41 @@ def test_the_warm_up_ends_after_the_first_turn_also_when_the_record_begins_at_re
 
 def test_a_record_that_never_turns_still_counts_half_of_its_samples() -> None:
     assert warm_up(np.linspace(0.0, 0.1, 100)) == 50
+
+
+def at_rest_after(record: Record, seconds: float, truth: Bingham, creep: float) -> Record:
+    """The record with a rest behind its motion, where the oil relaxes and then the seals creep."""
+    since = np.arange(1, int(seconds * record.rate) + 1) / record.rate
+    relaxing = (record.force[-1] - truth.friction) * np.exp(-since * truth.stiffness / truth.damping)
+    resting = truth.friction + relaxing - creep * (1.0 - np.exp(-since))
+    held, still = np.full(since.size, record.displacement[-1]), np.zeros(since.size)
+    behind = (record.time[-1] + since, held, still, still, resting)
+    return Record("resting", None, *(np.concatenate(pair) for pair in zip(_channels(record), behind, strict=True)))
+
+
+def _channels(record: Record) -> tuple[Array, ...]:
+    return record.time, record.displacement, record.velocity, record.acceleration, record.force
+
+
+def test_rest_after_the_motion_does_not_move_the_fit() -> None:
+    truth = TABLE_2[0.0]
+    record = sine_test(truth, 2.0, 0.03, cycles=3)
+    resting = at_rest_after(record, 3.0, truth, 0.5 * truth.friction)
+    counted = trial_of(resting).counted
+    assert not counted[resting.time > record.time[-1] + 0.1].any()
+    assert counted[(resting.time > 0.5) & (resting.time <= record.time[-1])].all()
+    np.testing.assert_allclose(fit_separable(Objective((trial_of(resting),))).parameters, truth, rtol=0.01)
+
+
+def test_a_hold_between_two_motions_counts() -> None:
+    truth = TABLE_2[0.0]
+    record = sine_test(truth, 2.0, 0.03, cycles=3)
+    resting = at_rest_after(record, 1.0, truth, 0.0)
+    later = replace(record, time=record.time + resting.time[-1] + 1.0 / record.rate)
+    twice = Record(
+        "twice", None, *(np.concatenate(pair) for pair in zip(*map(_channels, (resting, later)), strict=True))
+    )
+    assert trial_of(twice).counted[resting.time.size // 2 :][: resting.time.size // 2].all()
 
 
 @pytest.mark.parametrize("phase", [0.0, 1.0, 1.4, 2.5, 4.0, 5.5])

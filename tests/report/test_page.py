@@ -143,6 +143,13 @@ def test_parameters_edited_by_hand_have_no_interval(run: Any, words_only: None) 
     assert "474 (469 to 480)" not in text
 
 
+def test_the_prediction_of_every_kept_back_test_stands_in_a_table(read: Reader) -> None:
+    _, _, table = read.text.partition("What was kept back from the fit (whole tests)")
+    for cells in (("r03", "150 V", "0.0123", "0.00091"), ("all tests at 75 V", "left out", "0.0222", "0.0111")):
+        for cell in cells:
+            assert cell in table
+
+
 def test_with_and_without_the_missing_effect_stand_side_by_side(read: Reader) -> None:
     assert "With and without the missing effect" in read.text
 

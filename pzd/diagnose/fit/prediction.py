@@ -11,7 +11,7 @@ from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.data.cleaning import Prepared
-from pzd.identify.trial import warm_up
+from pzd.identify.trial import in_motion
 from pzd.record import Array, Record
 from pzd.signals.reversals import reversals
 
@@ -86,14 +86,17 @@ def _held(channel: Array | None) -> Array | None:
 
 
 def counted(prepared: Prepared) -> NDArray[np.bool_]:
-    """(n,) whether the prediction depends neither on how the record began nor on when exactly a voltage stepped."""
+    """(n,) whether the prediction depends neither on how the record began nor on when exactly a voltage stepped.
+
+    And whether something moves, or has just come to rest.
+    """
     size = prepared.record.time.size
     if prepared.lead is not None:
         return np.ones(size, dtype=np.bool_)
     ends = int(ENDS * size)
     order = np.arange(size)
-    begun = (order >= max(warm_up(prepared.record.displacement), ends)) & (order < size - ends)
-    return begun & ~_stepping(prepared.record.voltage, size)
+    inside = (order >= ends) & (order < size - ends)
+    return inside & in_motion(prepared.record) & ~_stepping(prepared.record.voltage, size)
 
 
 def _stepping(voltage: Array | None, size: int) -> NDArray[np.bool_]:

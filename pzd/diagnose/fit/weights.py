@@ -14,7 +14,7 @@ from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.likelihood import RecordLikelihood, responses
 from pzd.diagnose.fit.prediction import motion_of, warms
 from pzd.diagnose.noise.input_uncertainty import Expected
-from pzd.identify.trial import warm_up
+from pzd.identify.trial import in_motion
 from pzd.record import Array, Record, sliced
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError, pure_error
@@ -26,13 +26,13 @@ RESOLUTION = 3e-4
 """No force is believed to be known better than this share of the record's peak (r.m.s.)."""
 INSTANT = 1e-6
 """Delay by which the slope of a force over time is taken [s]."""
-LATEST = 3.0
-"""At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope."""
 DISCREPANCY = 0.3
 """Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
 fitted: a model that still lacks something must not be bent to where the noise happens to be smallest."""
 MOST_HARMONICS = 80
 """Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart."""
+UNWEIGHTED = 0.05
+"""What a plain element leaves [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k."""
 CYCLE_POINTS = 256
 """A cycle is simulated on at least this many points."""
 MOST_POINTS = 2048
@@ -88,6 +88,7 @@ def _of_cycles(
         weights,
         np.zeros((2 * weights.size - 1, 0)),
         np.zeros(0),
+        np.zeros((2 * weights.size - 1, 0)),
     )
     return with_nuisances(bare, given.damper, nuisance)
 
@@ -133,8 +134,8 @@ def _of_samples(
     p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
 ) -> RecordLikelihood | None:
     record, force = p.record, given.force
-    start = max(int(np.argmax(mask)), warm_up(record.displacement))
-    stop = int(mask.size - np.argmax(mask[::-1]))
+    mask = mask & in_motion(record)
+    start, stop = int(np.argmax(mask)), int(mask.size - np.argmax(mask[::-1]))
     if stop - start < 2 * CYCLE_POINTS:
         return None
     noise = fit_smooth_residual(
@@ -158,6 +159,7 @@ def _of_samples(
         np.zeros(0),
         np.zeros((stop - start - noise.coefficients.size, 0)),
         np.zeros(0),
+        np.zeros((stop - start - noise.coefficients.size, 0)),
     )
     return with_nuisances(bare, given.damper, nuisance, given.timing[start:stop])
 
@@ -171,10 +173,10 @@ def _part(record: Record, start: int, stop: int) -> Record:
 def with_nuisances(
     bare: RecordLikelihood, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
 ) -> RecordLikelihood:
-    """The observation with the test's own offset, gain and delay, jumps and instants of the voltage integrated out.
+    """The observation with the test's own offset, gain and delay, jumps and instants of the voltage beside its noise.
 
-    Equation: r' = (I + V V')^(-1/2) r, V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise
-                                                    Source: Gaussian prior, marginal likelihood
+    Equation: r' = (I + V V')^(-1/2) r, V = [jumps, s_t dF/dt_U]; A = (I + V V')^(-1/2) [-s_d dF/dt, s_o peak, s_g F],
+              all in units of noise                         Source: Gaussian prior, marginal and truncated likelihood
 
     A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
     that, F(t - d) - F + d dF/dt, is taken off the measured force.
@@ -182,20 +184,43 @@ def with_nuisances(
     shown = responses(bare, damper)
     force, averaged = shown(0.0), isinstance(bare.noise, PureError)
     late = (shown(INSTANT) - force) / INSTANT
-    columns = np.column_stack(
+    chance = np.column_stack(
         [
-            nuisance.delay_s * late,
-            np.full(force.size, nuisance.offset * bare.peak),
-            nuisance.gain * force,
             _neighbours_of(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
             *([] if timing is None else [timing]),
         ]
     )
-    left, size, right = np.linalg.svd(bare.in_noise(columns), full_matrices=False)
-    likeliest = right[:, 0] @ (size / (1.0 + size**2) * (left.T @ bare.in_noise(bare.measured - force)))
-    delay = nuisance.delay_s * float(np.clip(likeliest, -LATEST, LATEST))
-    measured = bare.measured - (shown(delay) - force - delay * late)
-    return replace(bare, measured=measured, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
+    frame, size, _ = np.linalg.svd(bare.in_noise(chance), full_matrices=False)
+    beside = replace(bare, frame=frame, shrink=1.0 / np.sqrt(1.0 + size**2))
+    own = np.column_stack(
+        [nuisance.delay_s * late, np.full(force.size, nuisance.offset * bare.peak), nuisance.gain * force]
+    )
+    whole = replace(beside, own=beside.in_noise(own))
+    delay = nuisance.delay_s * float(whole.left(force).residual[-own.shape[1]])
+    return replace(whole, measured=bare.measured - (shown(delay) - force - delay * late))
+
+
+def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLikelihood:
+    """The observation as criterion (4) takes it: every sample alike, and nothing left to the test's own nuisances.
+
+    Equation: |r|^2 = n mean (F - F_sim)^2 / s^2, s alike in all tests of one condition
+                                                    Source: Makowski and Knap 2021, eq. (4); Parseval
+
+    Parameters
+    ----------
+    weighed : the record as the likelihood takes it
+    samples : that it counts for
+    peak : largest force of its condition [N]
+    """
+    scale = UNWEIGHTED * peak
+    if isinstance(weighed.noise, Autoregression):
+        white = Autoregression(np.zeros(0), scale**2)
+        none = np.zeros((weighed.measured.size, 0))
+        return replace(weighed, noise=white, frame=none, shrink=np.zeros(0), own=none)
+    weights = np.full(weighed.weights.size, np.sqrt(2.0 * samples) / scale)
+    weights[0] /= np.sqrt(2.0)
+    none = np.zeros((2 * weights.size - 1, 0))
+    return replace(weighed, weights=weights, frame=none, shrink=np.zeros(0), own=none)
 
 
 def _neighbours_of(bends: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pzd.artefacts import Diagnosis, NextTest, Ranked, Value
+from pzd.artefacts import Diagnosis, NextTest, Prediction, Ranked, Value
 from pzd.damper.competing_forms import known
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
 from pzd.report.context import ReportContext, effect_in_words, effects_in_words
@@ -25,6 +25,8 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     blocks += [*galleries(pictures["missing"])]
     if diagnosis.parameters:
         blocks.append(_parameters(context, diagnosis))
+    if diagnosis.prediction:
+        blocks.append(_prediction(context, diagnosis.prediction))
     if diagnosis.ranking:
         blocks.append(_ranking(diagnosis))
     blocks.append(Notes((next_test(context, diagnosis.next_test),)))
@@ -62,6 +64,33 @@ def _gap(diagnosis: Diagnosis) -> str:
         "mixed": "Some whole records and some parts of records were held out.",
     }
     return f"{text} {weak[gap.hold_out]}"
+
+
+def _prediction(context: ReportContext, found: Prediction) -> Sheet:
+    """W_s of every kept-back test and of every voltage left out, by the plain damper and the one handed on."""
+    tests = [
+        (
+            each.record,
+            DASH if each.voltage is None else context.voltage(each.voltage),
+            number(each.W_s_plain),
+            number(each.W_s),
+        )
+        for each in found.by
+    ]
+    left_out = [
+        (f"all tests at {context.voltage(each.voltage)}", "left out", number(each.W_s_plain), number(each.W_s))
+        for each in found.left_out_voltages
+    ]
+    whole = ("all of them", DASH, number(found.W_s_plain), number(found.W_s))
+    how = {"tests": "whole tests", "mixed": "whole tests, halves of those that are alone"}.get(
+        found.hold_out, f"halves of a test, by {found.hold_out}, which is weak"
+    )
+    return Sheet(
+        f"What was kept back from the fit ({how}), and how it is predicted",
+        ("kept back", context.control.name, "W_s, simple model", "W_s, as handed on"),
+        (whole, *tests, *left_out),
+        folded=len(tests) > _FOLD,
+    )
 
 
 def _parameters(context: ReportContext, diagnosis: Diagnosis) -> Sheet:

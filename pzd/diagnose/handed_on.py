@@ -1,0 +1,127 @@
+"""Which of the adopted effects are handed on: those with which the damper predicts kept-back tests no worse."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pzd.artefacts import Prediction
+from pzd.diagnose.fit.least_squares import fit
+from pzd.diagnose.kept_back import Trials
+from pzd.diagnose.missed import Missed
+from pzd.diagnose.search.evidence import evidence_of
+from pzd.diagnose.search.selection import Selection
+
+HARMFUL = "the damper predicts kept-back tests worse with it"
+
+
+@dataclass(frozen=True, eq=False)
+class HandedOn:
+    """What was adopted and does no harm, and what it predicts."""
+
+    named: Selection
+    prediction: Prediction | None
+    refused: str | None
+    """Why the plain damper is handed on although effects fitted the tests; None where it is not."""
+    by_criterion: bool = False
+    """Whether the last fit is by criterion (4), every sample alike: what is left is then no noise to weigh by."""
+
+
+def handed_on(named: Selection, trials: Trials, forced: Sequence[str], unit: str) -> HandedOn:
+    """Take back what makes the prediction of kept-back tests worse, until the damper does no harm or is the plain one.
+
+    An effect goes without which the damper predicts better; and the last adopted one for as long as the plain damper,
+    as identify finds it without the kept-back tests, predicts better at any voltage.
+
+    Parameters
+    ----------
+    named : what was adopted
+    trials : the tests, dealt into folds
+    forced : effects that the config asks for, whatever they do
+    unit : of the control signal, for the words
+    """
+    plain = trials.plain_missed()
+    kept, missed, refused, by_criterion = named, plain, None, False
+    while kept.adopted:
+        missed, by_criterion = _best(kept, trials)
+        ours = [name for name in kept.adopted if name not in forced]
+        worse = trials.worse(missed, plain)
+        harmful = _harmful(kept, trials, missed, ours, by_criterion=by_criterion) or (
+            ours[-1] if worse and ours else None
+        )
+        if harmful is None:
+            break
+        if worse and len(kept.adopted) == 1:
+            refused = _refused(named, (missed, plain), trials, worse, unit)
+        kept = _without(kept, harmful)
+    if not kept.adopted:
+        return HandedOn(kept, trials.told(plain, plain, None), refused)
+    found = trials.fitted_by_criterion(kept.fitted.damper, trials.nothing) if by_criterion else None
+    if found is not None:
+        kept = replace(kept, fitted=found[1], last=replace(kept.last, whole=found[0]))
+    told = trials.told(plain, missed, kept.fitted.damper, by_criterion=by_criterion)
+    return HandedOn(kept, told, None, by_criterion)
+
+
+def _best(named: Selection, trials: Trials) -> tuple[Missed, bool]:
+    """What the damper misses, and whether it is fitted by criterion (4) since that predicts visibly better.
+
+    The likelihood weighs by noise: the best there is as long as noise is what is left, and misled where a law is
+    missing, which the gap shows.
+    """
+    weighed = trials.missed(named.fitted.damper)
+    if named.last.gap(named.fitted) < trials.visible:
+        return weighed, False
+    alike = trials.missed_by_criterion(named.fitted.damper)
+    return (alike, True) if alike.less_than(weighed) else (weighed, False)
+
+
+def _harmful(
+    named: Selection, trials: Trials, missed: Missed, ours: Sequence[str], *, by_criterion: bool
+) -> str | None:
+    """An effect without which the others predict better; a lone one is held against the plain damper instead."""
+    if len(named.adopted) == 1:
+        return None
+    asked = trials.missed_by_criterion if by_criterion else trials.missed
+    without = ((name, asked(_without(named, name).fitted.damper)) for name in reversed(ours))
+    return next((name for name, other in without if trials.worse(missed, other)), None)
+
+
+def _without(named: Selection, effect: str) -> Selection:
+    """The selection with one effect taken back, the rest fitted anew."""
+    damper = named.fitted.damper
+    effects = {name: values for name, values in damper.effects.items() if name != effect}
+    if not effects:
+        return replace(named, fitted=named.plain, last=named.first, competitions=(), reasons=_told(named, effect))
+    fewer = damper.model_copy(update={"effects": effects})
+    last = evidence_of(named.last.campaign, fewer)
+    return replace(
+        named,
+        fitted=fit(last.whole, tuple(effects), last.whole.start_with(fewer)),
+        last=last,
+        competitions=tuple(c for c in named.competitions if c.effect != effect),
+        reasons=_told(named, effect),
+    )
+
+
+def _told(named: Selection, effect: str) -> dict[str, str]:
+    return {**named.reasons, effect: HARMFUL}
+
+
+def _refused(
+    named: Selection, missed: tuple[Missed, Missed], trials: Trials, worse: Sequence[float | None], unit: str
+) -> str:
+    """Why nothing that was adopted is handed on, with the figures where it is worst."""
+    groups = dict(zip(trials.voltages, trials.groups, strict=True))
+
+    def figures(voltage: float | None) -> tuple[float, float]:
+        adopted, plain = (each.of(groups[voltage]).criterion or 0.0 for each in missed)
+        return adopted, plain
+
+    worst = max(worse, key=lambda voltage: figures(voltage)[0] - figures(voltage)[1])
+    adopted, plain = figures(worst)
+    at = "" if worst is None or len(groups) == 1 else f" at {worst:.4g} {unit}"
+    return (
+        f"{' and '.join(named.adopted)} would fit the tests, but kept-back ones are predicted worse than by the plain "
+        f"damper (W_s {adopted:.2g} against {plain:.2g}{at}), which is handed on"
+    )

@@ -1,0 +1,272 @@
+"""What a damper predicts of whole tests, and of whole voltages, that were kept back from its fit.
+
+Cross-validation: the tests are dealt into folds, the damper is fitted anew without each fold and predicts the tests in
+it; nothing is fitted to a kept-back test, its own offset, gain and delay included. A test that is alone at its voltage
+is parted, for without it nothing would be known there; that is weak evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from pzd.artefacts import KeptBack, LeftOut, Prediction
+from pzd.damper.material import by_voltage
+from pzd.damper.model import Damper
+from pzd.diagnose.campaign import Campaign
+from pzd.diagnose.data.split import TRAINING, Split
+from pzd.diagnose.fit.least_squares import MOST_EVALUATIONS, Fitted, fit
+from pzd.diagnose.fit.parameters import Problem
+from pzd.diagnose.fit.prediction import counted, predicted_force
+from pzd.diagnose.fit.weights import record_likelihood, unweighted
+from pzd.diagnose.folds import Mask, deal
+from pzd.diagnose.missed import Missed, worse
+from pzd.diagnose.search.evidence import evidence_of
+from pzd.signals.nuisance import NuisanceConfig
+
+EVALUATIONS = 6
+"""Of a refit without one fold: it begins at the optimum of all tests, and a fifth of them moves that little."""
+HoldOut = Literal["tests", "cycles", "segments", "mixed"]
+_NOTHING = Missed((), np.zeros(0), np.zeros(0), np.zeros(0))
+_Refit = Callable[[Sequence[Mask]], "Damper | None"]
+"""The damper fitted to all but what is kept back; None where nothing is left."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """The tests of one setting, dealt into folds."""
+
+    campaign: Campaign
+    """Every sample of it may be fitted."""
+    plain: Damper
+    """As identify found it, with all the tests."""
+    visible: float
+    """A gap (r.m.s.) below this share of a test's peak force counts as nothing."""
+    groups: tuple[tuple[int, ...], ...]
+    """The records of each voltage, and those whose voltage moves."""
+    voltages: tuple[float | None, ...]
+    """Of the groups [V], 0 for a damper without; None where it moves."""
+    folds: tuple[tuple[Mask, ...], ...]
+
+    @property
+    def nothing(self) -> tuple[Mask, ...]:
+        """(n,) a record: no sample is kept back."""
+        return tuple(np.zeros(p.record.time.size, dtype=np.bool_) for p in self.campaign.prepared)
+
+    def plain_missed(self) -> Missed:
+        """What the plain damper misses, fitted without each fold by criterion (4), as identify fits it."""
+        return self._missed(self._by_criterion(self.plain))
+
+    def missed(self, damper: Damper) -> Missed:
+        """What a damper misses, T0, C, k and its effects fitted without each fold, from where they are."""
+        return self._missed(self._by_likelihood(damper))
+
+    def missed_by_criterion(self, damper: Damper) -> Missed:
+        """What a damper misses, all of it fitted without each fold by criterion (4), as identify fits the plain one."""
+        whole = self.fitted_by_criterion(damper, self.nothing)
+        return self._missed(self._by_criterion(whole[1].damper if whole else damper))
+
+    def fitted_by_criterion(self, damper: Damper, kept_back: Sequence[Mask]) -> tuple[Problem, Fitted] | None:
+        """A damper, its effects too, fitted by criterion (4) to all but what is kept back, and to what it is fitted.
+
+        None where nothing is left.
+        """
+        problem = self._unweighted(damper)(kept_back)
+        return None if problem is None else (problem, _fit(problem, damper))
+
+    def worse(self, one: Missed, other: Missed) -> tuple[float | None, ...]:
+        """The voltages [V] at which one damper predicts worse than another; all where only the whole shows it."""
+        found = tuple(
+            v for v, group in zip(self.voltages, self.groups, strict=True) if worse(one.of(group), other.of(group))
+        )
+        return found or (self.voltages if worse(one, other) else ())
+
+    def between(self) -> tuple[int, ...]:
+        """The groups whose voltage lies between two others."""
+        constant = sorted((v, i) for i, v in enumerate(self.voltages) if v is not None)
+        return tuple(i for _, i in constant[1:-1])
+
+    def told(
+        self, plain: Missed, missed: Missed, damper: Damper | None, *, by_criterion: bool = False
+    ) -> Prediction | None:
+        """The figures of diagnosis.json; None where no test could be kept back.
+
+        Parameters
+        ----------
+        plain, missed : what the plain damper and the one handed on miss
+        damper : the one handed on where it is not the plain one
+        by_criterion : whether that is fitted by criterion (4)
+        """
+        refit = self._by_criterion if by_criterion else self._by_likelihood
+        whole = plain.criterion, missed.criterion
+        if whole[0] is None or whole[1] is None:
+            return None
+        by, controlled = [], any(row.voltage_V is not None for row in self.plain.base)
+        for voltage, group in zip(self.voltages, self.groups, strict=True):
+            for i in group:
+                simple, handed = plain.of([i]).criterion, missed.of([i]).criterion
+                if simple is not None and handed is not None:
+                    name, at = self.campaign.prepared[i].record.name, voltage if controlled else None
+                    by.append(KeptBack(record=name, voltage=at, W_s_plain=simple, W_s=handed))
+        left_out = [self._left_out(i, refit(damper) if damper else None) for i in self.between()]
+        return Prediction(
+            hold_out=self._hold_out(),
+            by=tuple(sorted(by, key=lambda each: each.record)),
+            W_s_plain=whole[0],
+            W_s=whole[1],
+            left_out_voltages=tuple(each for each in left_out if each is not None),
+        )
+
+    def _hold_out(self) -> HoldOut:
+        kinds = {self._kind(group) for group in self.groups}
+        return kinds.pop() if len(kinds) == 1 else "mixed"
+
+    def _kind(self, group: Sequence[int]) -> HoldOut:
+        if len(group) > 1:
+            return "tests"
+        return "segments" if self.campaign.prepared[group[0]].cycles is None else "cycles"
+
+    def _left_out(self, group: int, refit: _Refit | None) -> LeftOut | None:
+        """One voltage predicted from those around it; nothing of which the voltage moves is fitted either."""
+        mine, voltage = self.groups[group], self.voltages[group]
+        moving = {i for v, members in zip(self.voltages, self.groups, strict=True) if v is None for i in members}
+        sizes = [p.record.time.size for p in self.campaign.prepared]
+        without = tuple(np.full(n, i in mine or i in moving) for i, n in enumerate(sizes))
+        asked = tuple(np.full(n, i in mine) for i, n in enumerate(sizes))
+
+        def criterion(fitted: _Refit) -> float | None:
+            found = fitted(without)
+            return None if found is None else self._of_fold(found, asked).criterion
+
+        plain = criterion(self._by_criterion(self.plain))
+        other = plain if refit is None else criterion(refit)
+        if voltage is None or plain is None or other is None:
+            return None
+        return LeftOut(voltage=voltage, W_s_plain=plain, W_s=other)
+
+    def _missed(self, fitted: _Refit) -> Missed:
+        def of_fold(kept_back: Sequence[Mask]) -> Missed:
+            found = fitted(kept_back)
+            return _NOTHING if found is None else self._of_fold(found, self._known(found, kept_back))
+
+        parts = self.campaign.each(of_fold, self.folds)
+        return Missed(
+            tuple(i for part in parts for i in part.record),
+            *(np.concatenate([getattr(part, name) for part in parts]) for name in ("error", "energy", "limit")),
+        )
+
+    def _known(self, damper: Damper, kept_back: Sequence[Mask]) -> list[Mask]:
+        """What is kept back of the voltages for which some test was left to fit."""
+        fitted = {voltage for voltage, _ in by_voltage(damper.base)}
+        lost = {
+            i for v, group in zip(self.voltages, self.groups, strict=True) if v not in {*fitted, None} for i in group
+        }
+        return [np.zeros_like(mask) if i in lost else mask for i, mask in enumerate(kept_back)]
+
+    def _of_fold(self, damper: Damper, kept_back: Sequence[Mask]) -> Missed:
+        records, rows = [], []
+        for i, (p, mask) in enumerate(zip(self.campaign.prepared, kept_back, strict=True)):
+            judged = mask & counted(p)
+            if not judged.any():
+                continue
+            force = p.record.force[judged]
+            residual = force - predicted_force(damper, p)[judged]
+            peak = float(np.max(np.abs(p.record.force)))
+            records.append(i)
+            rows.append((residual @ residual, force @ force, residual.size * (self.visible * peak) ** 2))
+        columns = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+        return Missed(tuple(records), *columns)
+
+    def _by_likelihood(self, damper: Damper) -> _Refit:
+        problem = evidence_of(self.campaign, damper).whole
+        return lambda kept_back: _refitted(self._without(self.campaign, problem, damper, kept_back), damper)
+
+    def _by_criterion(self, damper: Damper) -> _Refit:
+        problem = self._unweighted(damper)
+        return lambda kept_back: _refitted(problem(kept_back), damper)
+
+    def _unweighted(self, damper: Damper) -> Callable[[Sequence[Mask]], Problem | None]:
+        """What is fitted by criterion (4), by what is kept back."""
+        campaign = replace(self.campaign, nuisance=NuisanceConfig(offset=0.0, delay_s=0.0, gain=0.0))
+        problem = evidence_of(campaign, damper).whole
+        peaks = dict.fromkeys((o.place for o in problem.observations), 0.0)
+        for o in problem.observations:
+            peaks[o.place] = max(peaks[o.place], o.peak)
+
+        def without(kept_back: Sequence[Mask]) -> Problem | None:
+            found = self._without(campaign, problem, damper, kept_back)
+            if found is None:
+                return None
+            named = {p.record.name: ~mask & counted(p) for p, mask in zip(campaign.prepared, kept_back, strict=True)}
+            counts = (int(np.count_nonzero(named[o.name])) for o in found.observations)
+            alike = (unweighted(o, n, peaks[o.place]) for o, n in zip(found.observations, counts, strict=True))
+            return replace(found, observations=tuple(alike))
+
+        return without
+
+    def _without(
+        self, campaign: Campaign, problem: Problem, damper: Damper, kept_back: Sequence[Mask]
+    ) -> Problem | None:
+        """The problem without what is kept back; None where nothing is left."""
+        known = {o.name: o for o in problem.observations}
+        kept = []
+        for i, (p, mask) in enumerate(zip(campaign.prepared, kept_back, strict=True)):
+            part = known.get(p.record.name)
+            if part is None or mask.all():
+                continue
+            if mask.any():
+                (given,) = campaign.expected(damper, [i])
+                part = record_likelihood(p, ~mask, part.place, given, campaign.nuisance)
+            if part is not None:
+                kept.append(part)
+        return replace(problem, observations=tuple(kept)) if kept else None
+
+
+def _fit(problem: Problem, damper: Damper, evaluations: int = MOST_EVALUATIONS) -> Fitted:
+    """A damper fitted anew from where it is."""
+    return fit(problem, tuple(damper.effects), problem.start_with(damper), evaluations)
+
+
+def _refitted(problem: Problem | None, damper: Damper) -> Damper | None:
+    """A damper fitted anew, without the base rows that no test is left for."""
+    if problem is None:
+        return None
+    return _shown(_fit(problem, damper, EVALUATIONS).damper, {o.place for o in problem.observations})
+
+
+def trials_of(campaign: Campaign, plain: Damper, visible: float) -> Trials:
+    """The tests of a campaign dealt into folds: every voltage by itself, so that each fold takes a bit of each.
+
+    Parameters
+    ----------
+    campaign : the records of one setting
+    plain : as identify found it
+    visible : a gap (r.m.s.) below this share of a test's peak force counts as nothing
+    """
+    prepared = campaign.prepared
+    everything = Split(tuple(np.full(p.record.time.size, TRAINING) for p in prepared), (), "records")
+    whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs)
+    dealt = deal(prepared, plain)
+    return Trials(whole, plain, visible, dealt.groups, dealt.voltages, dealt.folds)
+
+
+def _shown(damper: Damper, places: set[int]) -> Damper:
+    """The damper without the base rows, and the voltages of its effects, for which no test is left."""
+    if -1 in places or len(places) == len(damper.base):
+        return damper
+    rows = tuple(row for i, row in enumerate(damper.base) if i in places)
+    kept = {voltage for voltage, of_it in by_voltage(damper.base) if any(row in rows for row in of_it)}
+    effects = {name: _at(values, kept) for name, values in damper.effects.items()}
+    return damper.model_copy(update={"base": rows, "effects": effects})
+
+
+def _at(values: dict[str, float | tuple[float, ...]], voltages: set[float]) -> dict[str, float | tuple[float, ...]]:
+    """The parameters of an effect without those at other voltages."""
+    nodes = values.get("at_voltage_V")
+    if not isinstance(nodes, tuple):
+        return values
+    kept = [i for i, node in enumerate(nodes) if node in voltages]
+    return {n: tuple(v[i] for i in kept) if isinstance(v, tuple) else v for n, v in values.items()}

@@ -1,0 +1,57 @@
+"""What a damper misses of kept-back tests, and whether another one misses less beyond chance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.record import Array
+
+WORSE = 2.0
+"""Standard errors of the paired difference over tests from which one damper predicts worse than another."""
+
+
+@dataclass(frozen=True, eq=False)
+class Missed:
+    """What a damper misses of kept-back tests, an entry a test, or a part of one that is alone at its voltage."""
+
+    record: tuple[int, ...]
+    """Which record an entry is of."""
+    error: Array
+    """(t,) sum of the squared residual [N^2]."""
+    energy: Array
+    """(t,) sum of the squared force [N^2]."""
+    limit: Array
+    """(t,) sum of squares [N^2] that counts as nothing: so many samples of a visible gap."""
+
+    @property
+    def criterion(self) -> float | None:
+        """W_s pooled over the entries; None without any.
+
+        Equation: sum (F - F_sim)^2 / sum F^2                       Source: Makowski and Knap 2021, eq. (4)
+        """
+        return float(self.error.sum() / self.energy.sum()) if self.record else None
+
+    def less_than(self, other: Missed) -> bool:
+        """Whether less is missed than by another damper, all tests together, by what can be seen."""
+        return float((other.error - self.error).sum()) > float(self.limit.sum())
+
+    def of(self, wanted: Sequence[int]) -> Missed:
+        """The entries of some records."""
+        kept = np.isin(self.record, wanted)
+        records = tuple(r for r, k in zip(self.record, kept, strict=True) if k)
+        return Missed(records, self.error[kept], self.energy[kept], self.limit[kept])
+
+
+def worse(one: Missed, other: Missed) -> bool:
+    """Whether one damper predicts worse than another: visibly, and beyond chance.
+
+    Equation: mean d > 2 s_d / sqrt(n), d_i = W_s,i - W_s,i of the other one     Source: paired differences
+    """
+    if not one.record:
+        return False
+    difference = (one.error - other.error) / one.energy
+    error = float(np.std(difference, ddof=1) / np.sqrt(difference.size)) if difference.size > 1 else 0.0
+    return other.less_than(one) and float(difference.mean()) > WORSE * error

@@ -1,0 +1,300 @@
+"""What is handed on predicts whole tests that no fit has seen, or it is not handed on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+import pytest
+from campaign import TABLE_2, damper_of, sine, sines
+
+from pzd.artefacts import Diagnosed, Prediction, Rig
+from pzd.damper.model import Damper
+from pzd.diagnose.campaign import Campaign
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.data.cleaning import prepare
+from pzd.diagnose.data.split import split
+from pzd.diagnose.fit.least_squares import fit
+from pzd.diagnose.fit.likelihood import RecordLikelihood, response
+from pzd.diagnose.handed_on import handed_on
+from pzd.diagnose.kept_back import Trials, trials_of
+from pzd.diagnose.missed import Missed
+from pzd.diagnose.search.evidence import Evidence, evidence_of
+from pzd.diagnose.search.selection import Selection
+from pzd.diagnose.stage import diagnose
+from pzd.diagnose.verdict import unpredicted
+from pzd.identify.config import IdentifyConfig
+from pzd.identify.stage import identify
+from pzd.quantities import Control
+from pzd.record import Record
+from pzd.rig.config import FilesEntry, RigConfig
+from pzd.signals.nuisance import AT_MOST, NuisanceConfig
+
+TWO = (0.0, 150.0)
+TESTS = ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03))
+OTHER_TESTS = ((0.5, 0.02), (1.0, 0.03), (2.0, 0.03))
+
+
+def campaign_of(records: tuple[Record, ...]) -> Campaign:
+    prepared = prepare(records)
+    return Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig())
+
+
+def trials(records: tuple[Record, ...], plain: Damper) -> Trials:
+    return trials_of(campaign_of(records), plain, DiagnoseConfig().visible)
+
+
+def told(records: tuple[Record, ...], plain: Damper, damper: Damper) -> Prediction:
+    asked = trials(records, plain)
+    found = asked.told(asked.plain_missed(), asked.missed(damper), damper)
+    assert found is not None
+    return found
+
+
+def diagnosed(records: tuple[Record, ...]) -> Diagnosed:
+    stand, rig = RigConfig(files=(FilesEntry(path="*.csv"),)), Rig(records, ())
+    identified = identify(IdentifyConfig(), rig, 1)
+    return diagnose(DiagnoseConfig(), IdentifyConfig(), stand, rig, identified, Control(), None, 1)
+
+
+def test_nothing_is_fitted_to_a_kept_back_test(rng: np.random.Generator) -> None:
+    records = [sine(damper_of(TWO), U, f, x, rng, noise=1e-3, cycles=4) for U in TWO for f, x in TESTS]
+    records[2] = replace(records[2], force=1.05 * records[2].force)
+    found = told(tuple(records), damper_of(TWO), damper_of(TWO))
+    (odd,) = (each for each in found.by if each.record == records[2].name)
+    # A gain of 5 % of one test is within the priors of nuisances, and here it is missed all the same; the other tests
+    # of its voltage were each fitted beside it, and bend a little.
+    for missed in (odd.W_s_plain, odd.W_s):
+        assert missed == pytest.approx((0.05 / 1.05) ** 2, rel=0.1)
+    assert found.hold_out == "tests"
+    assert sorted(each.record for each in found.by) == sorted(r.name for r in records)
+
+
+def test_what_is_missing_is_worth_naming_on_tests_that_were_kept_back(rng: np.random.Generator) -> None:
+    truth = damper_of(TWO, preload_offset={"F_0": 120.0})
+    found = told(sines(truth, rng, TWO, cycles=4), damper_of(TWO), truth)
+    assert found.W_s < 0.2 * found.W_s_plain
+    assert all(each.W_s < each.W_s_plain for each in found.by)
+
+
+def test_voltages_between_others_are_left_out_one_at_a_time(rng: np.random.Generator) -> None:
+    damper = damper_of()
+    found = told(sines(damper, rng, tests=OTHER_TESTS, cycles=4), damper, damper).left_out_voltages
+    assert [each.voltage for each in found] == [50.0, 100.0]
+    for each in found:
+        rows = {row.voltage_V: row for row in damper.base}
+        below, mine, above = (rows[U].T0_N for U in (each.voltage - 50.0, each.voltage, each.voltage + 50.0))
+        # The piezo's friction bends over the voltage, so that the line between its neighbours misses it by so much.
+        share = abs(0.5 * (below + above) - mine) / (mine + rows[each.voltage].C_Ns_per_m * 0.3)
+        assert 0.2 * share**2 < each.W_s < 5.0 * share**2
+
+
+@pytest.mark.parametrize("tests", [OTHER_TESTS[:1], OTHER_TESTS])
+def test_a_test_alone_at_its_voltage_keeps_back_its_cycles(
+    rng: np.random.Generator, tests: tuple[tuple[float, float], ...]
+) -> None:
+    records = sines(damper_of(TWO), rng, (0.0,), tests=tests, cycles=4) + sines(
+        damper_of(TWO), rng, (150.0,), tests=((2.0, 0.03),), cycles=4
+    )
+    found = told(records, damper_of(TWO), damper_of(TWO))
+    assert found.hold_out == ("cycles" if len(tests) == 1 else "mixed")
+    assert len(found.by) == len(records)
+
+
+def test_too_little_to_keep_a_test_back_is_told(rng: np.random.Generator) -> None:
+    damper = damper_of((0.0,))
+    asked = trials((sine(damper, 0.0, 1.0, 0.03, rng, cycles=1, rate=1000.0),), damper)
+    assert asked.told(asked.plain_missed(), asked.missed(damper), damper) is None
+    assert "too little to keep a test back" in unpredicted(None)
+
+
+def test_with_nothing_adopted_the_plain_damper_is_what_predicts(rng: np.random.Generator) -> None:
+    found = diagnosed(sines(damper_of(TWO), rng, TWO, cycles=4)).diagnosis
+    assert found.effects == ()
+    assert found.prediction is not None
+    assert found.prediction.W_s == found.prediction.W_s_plain
+    assert all(each.W_s == each.W_s_plain for each in found.prediction.by)
+
+
+# ---------------------------------------------------------------- what does harm is not handed on
+
+
+def test_worse_is_beyond_two_standard_errors_at_any_voltage(rng: np.random.Generator) -> None:
+    asked = trials(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
+    records = tuple(range(8))
+    plain = Missed(records, np.full(8, 1.0), np.full(8, 100.0), np.full(8, 1e-3))
+    alike = replace(plain, error=1.0 + 0.1 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0]))
+    at_one = replace(plain, error=np.array([0.1, 0.2, 0.1, 0.2, 1.2, 1.3, 1.2, 1.3]))
+    assert asked.worse(alike, plain) == ()
+    assert asked.worse(at_one, plain) == (150.0,)
+    assert asked.worse(plain, at_one) == (0.0,)
+
+
+def test_worse_by_less_than_can_be_seen_is_not_worse(rng: np.random.Generator) -> None:
+    asked = trials(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
+    plain = Missed(tuple(range(8)), np.full(8, 1.0), np.full(8, 100.0), np.full(8, 1e-2))
+    assert asked.worse(replace(plain, error=plain.error + 5e-3), plain) == ()
+    assert asked.worse(replace(plain, error=plain.error + 2e-2), plain) == TWO
+
+
+@dataclass
+class Foretold:
+    """Stands for the tests of a campaign: by effects, what a damper misses at two voltages."""
+
+    by_effects: dict[frozenset[str], float]
+    voltages: tuple[float | None, ...] = TWO
+    groups: tuple[tuple[int, ...], ...] = ((0, 1), (2, 3))
+    plain: float = 1.0
+    visible: float = 0.0025
+
+    def plain_missed(self) -> float:
+        return self.plain
+
+    def missed(self, damper: Damper) -> float:
+        return self.by_effects[frozenset(damper.effects)]
+
+    def missed_by_criterion(self, damper: Damper) -> float:
+        return self.by_effects[frozenset(damper.effects)]
+
+    def worse(self, one: float, other: float) -> tuple[float | None, ...]:
+        return (150.0,) if one > other else ()
+
+    def told(
+        self, plain: float, missed: float, damper: Damper | None, *, by_criterion: bool = False
+    ) -> tuple[float, float, bool]:
+        assert not by_criterion
+        return plain, missed, damper is None
+
+
+class _Figure(float):
+    """What is missed, alike at every voltage."""
+
+    def of(self, _: object) -> _Figure:
+        return self
+
+    def less_than(self, other: float) -> bool:
+        return self < other
+
+    @property
+    def criterion(self) -> float:
+        return float(self)
+
+
+def selection(rng: np.random.Generator, **effects: dict[str, float]) -> Selection:
+    campaign = campaign_of(sines(damper_of(TWO, **effects), rng, TWO, tests=OTHER_TESTS, cycles=2))
+    evidence: Evidence = evidence_of(campaign, damper_of(TWO, **effects))
+    plain = fit(evidence.whole, (), evidence.whole.start())
+    whole = fit(evidence.whole, tuple(effects), evidence.whole.start_with(damper_of(TWO, **effects)))
+    return Selection(plain, whole, (), dict.fromkeys(effects, "adopted"), evidence, evidence)
+
+
+A, B = "preload_offset", "asymmetry"
+
+
+@pytest.mark.parametrize(
+    ("both", "only_a", "kept"),
+    [(0.2, 0.5, (A, B)), (0.6, 0.5, (A,)), (1.5, 1.2, ())],
+    ids=["both predict", "the second harms", "neither predicts"],
+)
+def test_effects_that_harm_the_prediction_are_taken_back(
+    rng: np.random.Generator, both: float, only_a: float, kept: tuple[str, ...]
+) -> None:
+    foretold = Foretold(
+        {frozenset((A, B)): _Figure(both), frozenset((A,)): _Figure(only_a), frozenset((B,)): _Figure(2.0)},
+        plain=_Figure(1.0),
+    )
+    named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
+    found = handed_on(named, cast("Trials", foretold), (), "V")
+    assert found.named.adopted == kept
+    assert cast("tuple[float, float, bool]", found.prediction)[2] == (not kept)
+    assert all("worse" in found.named.reasons[name] for name in {A, B} - set(kept))
+    if kept:
+        assert found.refused is None
+    else:
+        assert found.refused is not None
+        assert "W_s 1.2 against 1 at 150 V" in found.refused
+
+
+def test_what_the_config_asks_for_is_handed_on_whatever_it_does(rng: np.random.Generator) -> None:
+    foretold = Foretold({frozenset((A,)): _Figure(2.0)}, plain=_Figure(1.0))
+    found = handed_on(selection(rng, preload_offset={"F_0": 120.0}), cast("Trials", foretold), (A,), "V")
+    assert found.named.adopted == (A,)
+    assert found.refused is None
+
+
+def bent(rng: np.random.Generator, *, offset: float) -> tuple[Record, ...]:
+    """Tests with an offset that is the same in all, and a friction that no effect of the search explains."""
+    truth = damper_of(TWO, stribeck_friction={"F_s": 300.0, "v_s": 0.1})
+    records = [sine(truth, U, f, x, rng, noise=1e-3, cycles=4) for U in TWO for f, x in TESTS]
+    return tuple(replace(r, force=r.force + offset) for r in records)
+
+
+def test_where_a_law_is_missing_the_last_fit_takes_every_sample_alike(rng: np.random.Generator) -> None:
+    records = bent(rng, offset=100.0)
+    asked = trials(records, damper_of(TWO))
+    damper = damper_of(TWO, preload_offset={"F_0": 100.0})
+    weighed, alike = asked.missed(damper), asked.missed_by_criterion(damper)
+    assert (alike.criterion or 1.0) < (weighed.criterion or 0.0)
+
+
+def test_where_noise_is_what_is_left_the_likelihood_predicts_as_well(rng: np.random.Generator) -> None:
+    damper = damper_of(TWO, preload_offset={"F_0": 100.0})
+    asked = trials(sines(damper, rng, TWO, cycles=4, jitter=0.02), damper_of(TWO))
+    assert not asked.missed_by_criterion(damper).less_than(asked.missed(damper))
+
+
+def test_the_fit_that_is_handed_on_goes_with_what_it_was_fitted_to(rng: np.random.Generator) -> None:
+    records = bent(rng, offset=100.0)
+    damper = damper_of(TWO, preload_offset={"F_0": 100.0})
+    campaign = campaign_of(records)
+    evidence = evidence_of(campaign, damper)
+    plain = fit(evidence.whole, (), evidence.whole.start())
+    named = Selection(plain, fit(evidence.whole, (A,), evidence.whole.start_with(damper)), (), {}, evidence, evidence)
+    found = handed_on(named, trials_of(campaign, damper_of(TWO), 0.0025), (), "V")
+    assert found.named.adopted == (A,)
+    assert found.by_criterion
+    compared = zip(found.named.last.whole.observations, found.named.fitted.simulated, strict=True)
+    assert all(o.measured.size == force.size for o, force in compared)
+    assert len(found.named.fitted.simulated) == len(records)
+
+
+# ---------------------------------------------------------------- the tests' own offset, gain and delay
+
+
+def late_by(seconds: float, rng: np.random.Generator) -> tuple[RecordLikelihood, Damper]:
+    damper = damper_of((0.0,), sensor_delay={"tau": seconds})
+    plain = damper_of((0.0,))
+    (one,) = evidence_of(campaign_of((sine(damper, 0.0, 2.0, 0.03, rng, noise=1e-3),)), plain).whole.observations
+    return one, plain
+
+
+def test_a_test_is_late_by_no_more_than_its_prior_lets_it(rng: np.random.Generator) -> None:
+    sd = NuisanceConfig().delay_s
+    left = {share: late_by(share * sd, rng) for share in (1.0, 10.0)}
+    within, beyond = (one.left(response(one, plain)) for one, plain in left.values())
+    own = within.free.size
+    assert within.residual[-own] == pytest.approx(1.0, abs=0.2)
+    assert beyond.residual[-own] == AT_MOST
+    assert not beyond.free[0]
+    # What it may not explain stays: it cost as little before as the squares of ten standard deviations.
+    assert within.residual @ within.residual < 2.0 * within.residual.size
+    assert beyond.residual @ beyond.residual > 100.0 + 2.0 * beyond.residual.size
+
+
+@pytest.mark.parametrize("share", [1.0, 10.0])
+def test_slopes_follow_the_likeliest_nuisances(rng: np.random.Generator, share: float) -> None:
+    one, plain = late_by(share * NuisanceConfig().delay_s, rng)
+    force = response(one, plain)
+    change = 1e-3 * force[:, None] * np.linspace(-1.0, 1.0, force.size)[:, None] ** 2
+    moved = one.left(force - change[:, 0]).residual - one.left(force).residual
+    assert one.left(force).slopes(change)[:, 0] == pytest.approx(moved, abs=1e-3 * float(np.max(np.abs(moved))))
+
+
+def test_every_voltage_of_the_campaign_is_dealt_into_folds(rng: np.random.Generator) -> None:
+    asked = trials(sines(damper_of(), rng, tests=OTHER_TESTS, cycles=2), damper_of())
+    assert asked.voltages == tuple(TABLE_2)
+    for i, prepared in enumerate(asked.campaign.prepared):
+        kept_back = np.stack([fold[i] for fold in asked.folds])
+        assert np.all(kept_back.sum(axis=0) == 1), prepared.record.name
+        assert kept_back.any(axis=1).sum() == 1
