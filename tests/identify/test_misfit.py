@@ -11,9 +11,12 @@ from fresh_truths import sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
 from pzd.identify.config import IdentifyConfig
-from pzd.identify.fit import fit_condition, fit_records
+from pzd.identify.fit import fit_condition
 from pzd.identify.misfit import VISIBLE, Misfit, misfit_of
+from pzd.identify.objective import Objective
 from pzd.identify.part import parts_of
+from pzd.identify.separable import fit_separable
+from pzd.identify.trial import trial_of
 from pzd.record import Condition, Record
 
 QUICKSTART = ((1.0, 0.01), (1.0, 0.03), (2.0, 0.01), (2.0, 0.03))
@@ -34,9 +37,10 @@ def row_for(records: list[Record]) -> ParameterRow:
 
 
 def misfit_for(records: tuple[Record, ...]) -> Misfit:
-    config = IdentifyConfig()
-    objective, fit = fit_records(records, config, seed=1)
-    return misfit_of(parts_of(records, objective.trials, (fit.residuals, fit.slopes), config.nuisance))
+    """What the element alone misses, nothing carried beside it."""
+    objective = Objective(tuple(trial_of(record) for record in records))
+    fit = fit_separable(objective)
+    return misfit_of(parts_of(records, objective.trials, (fit.residuals, fit.slopes), IdentifyConfig().nuisance))
 
 
 def test_a_hidden_orifice_makes_the_parameters_the_model_s_and_not_the_damper_s(rng: np.random.Generator) -> None:
