@@ -33,7 +33,7 @@ check: $(DEV)  ## Check style (ruff), format (ruff) and types (mypy --strict)
 
 .PHONY: ci
 ci: check  ## What a merge must pass besides `make test`: check, every config, the wheel installed elsewhere
-	$(BIN)/python -m pytest -m ci --durations 10
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m ci --durations 10
 
 .PHONY: coverage
 coverage: $(DEV)  ## As `make test`, and print how many lines and branches of each module it runs; takes longer

@@ -25,7 +25,7 @@ from pzd.diagnose.fit.weights import record_likelihood, unweighted
 from pzd.diagnose.folds import Mask, deal
 from pzd.diagnose.missed import Missed, worse
 from pzd.diagnose.search.evidence import evidence_of
-from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.nuisance import NuisanceConfig, columns_of
 
 EVALUATIONS = 6
 """Of a refit without one fold: it begins at the optimum of all tests, and a fifth of them moves that little."""
@@ -166,6 +166,15 @@ class Trials:
         }
         return [np.zeros_like(mask) if i in lost else mask for i, mask in enumerate(kept_back)]
 
+    @property
+    def _alone(self) -> frozenset[int]:
+        """The tests that are alone at their voltage.
+
+        Either half has the offset, gain and delay of the other, which T0, C and k of that voltage take up and an
+        effect that all voltages share does not: what these may come to by their priors says nothing.
+        """
+        return frozenset(group[0] for group in self.groups if len(group) == 1)
+
     def _of_fold(self, damper: Damper, kept_back: Sequence[Mask]) -> Missed:
         records, rows = [], []
         for i, (p, mask) in enumerate(zip(self.campaign.prepared, kept_back, strict=True)):
@@ -175,8 +184,11 @@ class Trials:
             force = p.record.force[judged]
             residual = force - predicted_force(damper, p)[judged]
             peak = float(np.max(np.abs(p.record.force)))
+            limit = residual.size * (self.visible * peak) ** 2
+            if i in self._alone:
+                limit += float(np.sum(columns_of(force, p.record.rate, self.campaign.nuisance) ** 2))
             records.append(i)
-            rows.append((residual @ residual, force @ force, residual.size * (self.visible * peak) ** 2))
+            rows.append((residual @ residual, force @ force, limit))
         columns = np.array(rows, dtype=np.float64).reshape(-1, 3).T
         return Missed(tuple(records), *columns)
 

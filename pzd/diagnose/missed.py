@@ -24,7 +24,8 @@ class Missed:
     energy: Array
     """(t,) sum of the squared force [N^2]."""
     limit: Array
-    """(t,) sum of squares [N^2] that counts as nothing: so many samples of a visible gap."""
+    """(t,) sum of squares [N^2] that counts as nothing: so many samples of a visible gap, and beside them what offset,
+    gain and delay of a test may come to where its other half was fitted."""
 
     @property
     def criterion(self) -> float | None:
