@@ -272,7 +272,7 @@ def late_by(seconds: float, rng: np.random.Generator) -> tuple[RecordLikelihood,
 def test_a_test_is_late_by_no_more_than_its_prior_lets_it(rng: np.random.Generator) -> None:
     sd = NuisanceConfig().delay_s
     left = {share: late_by(share * sd, rng) for share in (1.0, 10.0)}
-    within, beyond = (one.left(response(one, plain)) for one, plain in left.values())
+    within, beyond = (one.left(response(one, plain), AT_MOST) for one, plain in left.values())
     own = within.free.size
     assert within.residual[-own] == pytest.approx(1.0, abs=0.2)
     assert beyond.residual[-own] == AT_MOST

@@ -21,7 +21,6 @@ from pzd.damper.motion import Motion
 from pzd.record import Array
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError
-from pzd.signals.nuisance import AT_MOST
 
 SIMULATION_TOLERANCE = 1e-8
 """Of the damper's path, as a share of the force."""
@@ -111,11 +110,16 @@ class RecordLikelihood:
         flat = self._scaled(values)
         return flat - self.frame @ ((1.0 - self.shrink).reshape(-1, *([1] * (flat.ndim - 1))) * (self.frame.T @ flat))
 
-    def left(self, force: Array) -> Left:
-        """What a simulated force (n,) leaves of the measured one beside the likeliest offset, gain and delay."""
+    def left(self, force: Array, limit: float = np.inf) -> Left:
+        """What a simulated force (n,) leaves of the measured one beside the likeliest offset, gain and delay.
+
+        `limit` caps each of them, in standard deviations of its prior. The search goes without a cap: with one its
+        squares have kinks, between which it crawls where the noise is small. What is handed on is held to kept-back
+        tests, to which nothing is fitted.
+        """
         residual = self.in_noise(self.measured - force)
         normal = self.own.T @ self.own + np.eye(self.own.shape[1])
-        likeliest, free = _within(normal, self.own.T @ residual, AT_MOST)
+        likeliest, free = _within(normal, self.own.T @ residual, limit)
         return Left(self, np.concatenate([residual - self.own @ likeliest, likeliest]), free)
 
     def _scaled(self, values: Array) -> Array:
@@ -130,7 +134,7 @@ class RecordLikelihood:
 class Left:
     """What a simulated force leaves of the measured one, and how far the test's own offset, gain and delay had to go.
 
-    Equation: |r|^2 = min_b |r_0 - A b|^2 + |b|^2, |b_i| <= 3.5      Source: Gaussian prior, truncated
+    Equation: |r|^2 = min_b |r_0 - A b|^2 + |b|^2, |b_i| <= limit     Source: Gaussian prior, truncated
     """
 
     of: RecordLikelihood
