@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pzd.diagnose.thresholds import PREDICTS_WORSE
 from pzd.record import Array
-
-WORSE = 2.0
-"""Standard errors of the paired difference over tests from which one damper predicts worse than another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,4 +53,4 @@ def worse(one: Missed, other: Missed) -> bool:
         return False
     difference = (one.error - other.error) / one.energy
     error = float(np.std(difference, ddof=1) / np.sqrt(difference.size)) if difference.size > 1 else 0.0
-    return other.less_than(one) and float(difference.mean()) > WORSE * error
+    return other.less_than(one) and float(difference.mean()) > PREDICTS_WORSE * error

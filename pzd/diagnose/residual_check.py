@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.prediction import counted
 from pzd.diagnose.noise.input_uncertainty import Expected
+from pzd.diagnose.thresholds import CYCLE_CHANGE_SIGNIFICANCE
 from pzd.record import Array, sliced
 from pzd.signals.between_cycles import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.signals.jumps import jumps, jumps_in_cycles, within_a_sample
 from pzd.signals.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
 from pzd.signals.nuisance import NuisanceConfig, nuisance
 from pzd.signals.smooth_residual import fit_smooth_residual
-
-BELIEVED = 1e-4
-"""A change from cycle to cycle counts in the gap where noise alone would show it less often than this."""
 
 Mask = NDArray[np.bool_]
 
@@ -89,7 +87,7 @@ def _repeating(
     if trend is not None:
         probability["trend"] = np.array([trend])
     power = float(repeatable_power(error).sum())
-    if trend is not None and trend < BELIEVED:
+    if trend is not None and trend < CYCLE_CHANGE_SIGNIFICANCE:
         power += _trend_power(folded, error)
     return ResidualCheck(
         prepared, mask, residual, slack, error.sample_variance, power, probability, error, folded, None

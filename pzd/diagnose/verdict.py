@@ -19,13 +19,9 @@ from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.residual_check import ResidualCheck
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection, against_nature
+from pzd.diagnose.thresholds import CONTRADICTS, OUTSIDE_LIBRARY
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
-
-CONTRADICTS = 2.0
-"""A remainder of so many times what is visible contradicts that these effects are all, whatever they closed."""
-OUTSIDE = 0.03
-"""Share of cases in which what is missing is not in the library and yet one of its effects fits within the noise."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +112,7 @@ def confidence_of(named: Selection) -> float:
     Equation: w_i = exp(-BIC_i / 2) / sum_j exp(-BIC_j / 2), times what the library leaves out
                                                     Source: Kass and Raftery 1995, J. Am. Stat. Assoc. 90, eq. (9)
     """
-    weight = 1.0 - OUTSIDE
+    weight = 1.0 - OUTSIDE_LIBRARY
     for step in named.rounds:
         if step.chosen in named.adopted:
             best = next(c.delta_bic for c in step.tried if c.effect == step.chosen)

@@ -14,23 +14,14 @@ from pzd.diagnose.fit.parameters import ZERO, Problem
 from pzd.diagnose.gap import gap_in_force, visible_gap
 from pzd.diagnose.search.candidates import Candidate
 from pzd.diagnose.search.evidence import Evidence
-
-AGREES = 0.001
-"""Halves of the tests disagree about a parameter when chance would let them so seldom."""
-ALIKE = 0.1
-"""Values within this ratio of one another agree, whatever their intervals."""
-TRIVIAL = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, ("valve_lag", "tau"): 1e-3}
-"""A common offset [share of the lowest peak], delay or lag [s] that counts as nothing missing."""
-MIDDLE = 0.4
-"""Share of the stroke in which nothing is an end stop: stops act over its last 10 to 30 %, a soft one over the half."""
-ONE_SIDED = 0.1
-"""Share of its force at the other end from which a stop shows at both ends of the stroke."""
-LEAST_CUT = 0.2
-"""An effect closes at least this share of the gap (mean square): what is real is not one of many small corrections.
-
-Each test counts by its own peak, or all by their force: soft conditions may keep a gap of another kind. By neither does
-it widen.
-"""
+from pzd.diagnose.thresholds import (
+    HALVES_ALIKE,
+    HALVES_SIGNIFICANCE,
+    LEAST_CLOSED,
+    STOP_BEGINS,
+    STOP_OTHER_SIDE,
+    TRIVIAL_SIZE,
+)
 
 
 def unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate) -> str | None:
@@ -48,9 +39,9 @@ def no_stop(damper: Damper, stroke: float) -> str | None:
     """Why an end stop is none by where it begins, None where that is near both ends of the stroke (half of it [m])."""
     begins = np.atleast_1d(damper.effects["end_stop"]["x_e"])
     further, nearer = (stroke - float(np.max(begins)) + side * abs(damper.zero_m) for side in (1.0, -1.0))
-    if nearer <= 0.0 or nearer**2 < ONE_SIDED * further**2:
+    if nearer <= 0.0 or nearer**2 < STOP_OTHER_SIDE * further**2:
         return "stand-in: acts at one end of the stroke alone"
-    if float(np.min(begins)) - abs(damper.zero_m) < MIDDLE * stroke:
+    if float(np.min(begins)) - abs(damper.zero_m) < STOP_BEGINS * stroke:
         return "stand-in: begins in the middle of the stroke, where no end stop does"
     return None
 
@@ -61,10 +52,10 @@ def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candi
         return None
     judged = [evidence.campaign.checks(fitted.damper) for fitted in (before, candidate.fitted)]
     gaps = [[size(each) for each in judged] for size in (visible_gap, gap_in_force)]
-    closed = [left**2 <= (1.0 - LEAST_CUT) * open_before**2 for open_before, left in gaps]
+    closed = [left**2 <= (1.0 - LEAST_CLOSED) * open_before**2 for open_before, left in gaps]
     if any(closed) and all(left <= open_before for open_before, left in gaps):
         return None
-    return f"stand-in: closes less than {LEAST_CUT:.0%} of the gap, or widens it"
+    return f"stand-in: closes less than {LEAST_CLOSED:.0%} of the gap, or widens it"
 
 
 def closes(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate: Candidate) -> bool:
@@ -77,7 +68,7 @@ def trivial(fitted: Fitted, effect: str, force: float) -> bool:
     errors = standard_errors(fitted)
     sizes = []
     for unknown, error in zip(fitted.unknowns, errors, strict=True):
-        limit = TRIVIAL.get((unknown.effect, unknown.parameter.name))
+        limit = TRIVIAL_SIZE.get((unknown.effect, unknown.parameter.name))
         if unknown.effect == effect and limit is not None:
             unit = limit * (force if unknown.parameter.unit == "N" else 1.0)
             sizes.append((abs(unknown.of(fitted.damper)) - LEVEL * error) / unit)
@@ -119,9 +110,9 @@ def _agree(halves: tuple[Problem, Problem], fits: tuple[Fitted, Fitted], effects
     from scipy.special import chdtri
 
     values = [[u.of(f.damper) for u in f.unknowns if u.effect in effects and u.parameter is not ZERO] for f in fits]
-    if all(abs(a - b) <= ALIKE * max(abs(a), abs(b)) for a, b in zip(*values, strict=True)):
+    if all(abs(a - b) <= HALVES_ALIKE * max(abs(a), abs(b)) for a, b in zip(*values, strict=True)):
         return True
-    limit = 2.0 * float(chdtri(len(fits[0].unknowns), AGREES))
+    limit = 2.0 * float(chdtri(len(fits[0].unknowns), HALVES_SIGNIFICANCE))
     for half, own, other in ((halves[0], fits[0], fits[1]), (halves[1], fits[1], fits[0])):
         spread = max(1.0, own.misfit / max(own.size - own.searched.size, 1))
         if misfit_of(half, other.damper) - own.misfit <= limit * spread:

@@ -15,31 +15,22 @@ from pzd.damper.effects import library
 from pzd.diagnose.fit.least_squares import DIFFERENCE, MOST_EVALUATIONS, Fitted, fit
 from pzd.diagnose.fit.parameters import Problem, Unknown, simulated
 from pzd.diagnose.fit.prediction import WARMS, ends
+from pzd.diagnose.thresholds import (
+    AT_EDGE,
+    FAINT,
+    FAINTER_STARTS,
+    FIRST_EVALUATIONS,
+    LEAST_PROMISE,
+    MOST_EVALUATIONS_OF_BEST,
+    MOVING_VOLTAGE,
+    STARTS_TRIED,
+    WORSE_THAN_CONTAINED,
+    WORTH_SEARCHING,
+)
 from pzd.record import Array
 
-MOST_EVALUATIONS_OF_BEST = 100
-"""Evaluations after which even a converged optimum is left as it is."""
-FIRST = 6
-"""Evaluations after which the candidates are compared for the first time; the better ones go on."""
-OTHERS = 2
-"""Starting values tried before fainter ones."""
-FAINTER = (0.3, 0.1, 0.03, 0.01)
-"""Shares of the way from no effect to the most promising starting values."""
-FAINT = 0.1
-"""Share of the way at which an effect that noise nearly hides is linearised."""
-LEAST_PROMISE = 15.0
-"""An effect that promises to lower the misfit by less is not searched for where noise explains what is left: it
-pays from twice that on."""
-WORTH_SEARCHING = 0.5
-"""A candidate that pays less than this share of what the best pays is not searched on."""
-WORSE_THAN_CONTAINED = 1.0
-"""A model that holds another one is worse than it by more [in squares of noise] only where its search got stuck."""
-AT_EDGE = 0.01
-"""A searched variable that ends so near to a limit ends at it."""
 VARIES = ("stroke", "flow", "parallel")
 """Places of effects whose parameters may differ by voltage."""
-MOVES = 0.02
-"""A channel moves in a test if its range there exceeds this share of the rig's scale."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +52,7 @@ def seen_in(problem: Problem, effect: Effect) -> bool:
     if effect.needs == "voltage":
         return any(
             o.motion.voltage is not None
-            and float(np.ptp(o.motion.voltage)) > MOVES * (problem.scales.voltage or np.inf)
+            and float(np.ptp(o.motion.voltage)) > MOVING_VOLTAGE * (problem.scales.voltage or np.inf)
             for o in problem.observations
         )
     if effect.needs == "temperature":
@@ -128,8 +119,13 @@ def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     """
     problem, reached = _for(problem, effect), []
     starts = promising_starts(problem, before, effect)
-    for start in (*starts[:OTHERS], *(_fainter(problem, before, effect, starts[0], share) for share in FAINTER)):
-        reached.append(_from(problem, before, effect.name, np.concatenate([_base(problem, before), start]), FIRST))
+    for start in (
+        *starts[:STARTS_TRIED],
+        *(_fainter(problem, before, effect, starts[0], share) for share in FAINTER_STARTS),
+    ):
+        reached.append(
+            _from(problem, before, effect.name, np.concatenate([_base(problem, before), start]), FIRST_EVALUATIONS)
+        )
         if reached[-1].fitted.misfit <= before.misfit + WORSE_THAN_CONTAINED or _switched_off(
             effect, reached[-1].fitted
         ):
@@ -157,7 +153,7 @@ def _without_promise(problem: Problem, before: Fitted, effect: Effect) -> bool:
 
 def _barely(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     """An effect as faint as it is looked for."""
-    start = _fainter(problem, before, effect, _starts(problem, before, effect)[0], FAINTER[-1])
+    start = _fainter(problem, before, effect, _starts(problem, before, effect)[0], FAINTER_STARTS[-1])
     return _from(problem, before, effect.name, np.concatenate([before.searched, start]), 1)
 
 

@@ -20,12 +20,10 @@ from pzd.diagnose.fit.likelihood import RecordLikelihood
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.weights import record_likelihood
 from pzd.diagnose.gap import probability_of_noise, visible_gap
+from pzd.diagnose.thresholds import MOST_TIME_CONSTANTS
 from pzd.record import Array, voltage_scale
 
 Mask = NDArray[np.bool_]
-
-PER_SAMPLE = 3.0
-"""Time constants C/k of an element that fit into one sample at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +90,7 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
     if reference is None:
         recorded = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
         reference = float(np.median(recorded)) if recorded else None
-    fastest = PER_SAMPLE * max(p.record.rate for p in prepared)
+    fastest = MOST_TIME_CONSTANTS * max(p.record.rate for p in prepared)
     varying = frozenset(name for name, values in damper.effects.items() if "at_voltage_V" in values)
     problems = [
         Problem(part, damper.base, scales, fastest, reference, varying)

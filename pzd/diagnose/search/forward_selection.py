@@ -28,13 +28,9 @@ from pzd.diagnose.search.candidates import (
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.diagnose.search.reweighting import at_rest
 from pzd.diagnose.search.selection import Competition, Round, Selection, against_nature
+from pzd.diagnose.thresholds import NEARLY_AS_GOOD, WIDER
 
 log = logging.getLogger(__name__)
-
-WIDER = 1.1
-"""An optimum that widens the gap by more than this factor over where its search began is not gone to."""
-CLOSE = 0.95
-"""Candidates that pay at least this share of what the chosen one pays are searched to the end like it."""
 
 
 def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, jobs: int = 1) -> Selection:
@@ -236,7 +232,7 @@ class _Search:
 
 def _ended(problem: Problem, before: Fitted, chosen: Candidate, tried: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """The candidates of a step, those nearly as good as the one chosen searched to the end as it was."""
-    near = CLOSE * chosen.delta_bic
+    near = NEARLY_AS_GOOD * chosen.delta_bic
     return tuple(
         converged(problem, before, c) if c.effect != chosen.effect and c.delta_bic < near else c for c in tried
     )

@@ -10,11 +10,7 @@ from pzd.damper.model import Damper
 from pzd.diagnose.fit.intervals import standard_errors
 from pzd.diagnose.fit.least_squares import Fitted, fit
 from pzd.diagnose.search.evidence import Evidence
-
-SETTLED = 0.2
-"""A parameter that moves by less than this share of its standard error stays where it is."""
-MOST_ROUNDS = 5
-"""Times that the tests are weighed anew, at most."""
+from pzd.diagnose.thresholds import AT_REST, MOST_REWEIGHTINGS
 
 
 def at_rest(weighed: Callable[[Damper], Evidence], evidence: Evidence, current: Fitted) -> tuple[Evidence, Fitted]:
@@ -28,10 +24,10 @@ def at_rest(weighed: Callable[[Damper], Evidence], evidence: Evidence, current: 
     evidence : by which the optimum was found
     current : the optimum with the effects adopted
     """
-    for _ in range(MOST_ROUNDS if current.effects else 0):
+    for _ in range(MOST_REWEIGHTINGS if current.effects else 0):
         before, evidence = current, weighed(current.damper)
         current = fit(evidence.whole, before.effects, evidence.whole.start_with(before.damper))
         moved = [abs(u.of(current.damper) - u.of(before.damper)) for u in before.unknowns]
-        if np.all(moved <= SETTLED * standard_errors(current)):
+        if np.all(moved <= AT_REST * standard_errors(current)):
             break
     return evidence, current

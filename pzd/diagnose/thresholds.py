@@ -1,0 +1,124 @@
+"""Every fixed threshold by which an effect is tried, adopted, refused or removed, and a verdict reached.
+
+The thresholds that a user may change are fields of `DiagnoseConfig` with defaults of their own: `significance`,
+`visible`, `negligible`, `unexplained_share`, `adopt_bic`, `rival_bic` and `most_effects`. These here are fixed. Each
+says what it decides, then why it has this value. "Benchmark" is `pzd blind` on configs/blind.yaml: 1500 cases
+with a hidden effect, with none, or with one that is not in the library. "Not tuned" is a round number that no case
+is known to depend on.
+"""
+
+from __future__ import annotations
+
+# Which effects are tried, and how far each is searched (search/candidates.py)
+
+MOVING_VOLTAGE = 0.02
+"""A voltage moves in a test if its range there exceeds this share of the rig's scale.
+
+Reason: the share that the records themselves are parted by, see `CONSTANT_SHARE` in `pzd/record.py`."""
+FIRST_EVALUATIONS = 6
+"""Evaluations after which the candidates are compared for the first time; the better ones go on.
+
+Reason: time. What is still far from its optimum then is kept by the room that `WORTH_SEARCHING` leaves; not tuned."""
+WORTH_SEARCHING = 0.5
+"""A candidate that pays less than this share of what the best pays is not searched on.
+
+Reason: time; not tuned."""
+MOST_EVALUATIONS_OF_BEST = 100
+"""Evaluations after which even a converged optimum is left as it is.
+
+Reason: five times those of any other fit; not tuned."""
+NEARLY_AS_GOOD = 0.95
+"""Candidates that pay at least this share of what the chosen one pays are searched to the end like it.
+
+Reason: two effects that explain alike have to be compared at their optima, or the one searched longer wins."""
+STARTS_TRIED = 2
+"""Starting values tried before fainter ones.
+
+Reason: time. The starts are sorted by what a linearised step promises; not tuned."""
+FAINTER_STARTS = (0.3, 0.1, 0.03, 0.01)
+"""Shares of the way from no effect to the most promising starting values, tried where the search got stuck.
+
+Reason: in half decades down to a hundredth, below which an effect at its usual size is not visible."""
+WORSE_THAN_CONTAINED = 1.0
+"""A model that holds another one is worse than it by more [in squares of noise] only where its search got stuck.
+
+Reason: at its optimum it is never worse; one square of noise is far below what `adopt_bic` asks for."""
+AT_EDGE = 0.01
+"""A searched variable that ends so near to a limit ends at it.
+
+Reason: 1 % of a parameter that is searched by its logarithm; not tuned."""
+FAINT = 0.1
+"""Share of the way to its starting values at which an effect that noise nearly hides is linearised.
+
+Reason: there a law is still nearly linear in its parameter; the starting values themselves are tried beside it."""
+LEAST_PROMISE = 15.0
+"""An effect that promises to lower the misfit by less is not searched for where noise explains what is left.
+
+Reason: to pay it must lower the misfit by -`adopt_bic` + ln n, twice this; a linearised promise is not exact."""
+
+MOST_TIME_CONSTANTS = 3.0
+"""Time constants C/k of an element that fit into one sample at most; a faster element is not looked for.
+
+Reason: after three the element is at rest but for 5 %, so that samples cannot tell it from a faster one."""
+
+# When an effect is adopted or refused (search/acceptance.py)
+
+LEAST_CLOSED = 0.2
+"""An effect closes at least this share of the gap (mean square), each test counted by its own peak or all by force.
+
+Reason: what is real is not one of many small corrections. Tests of small force may keep a gap of another kind, as
+those at 0 A of configs/utfpr.yaml do, and would hide what the others show: hence the two counts."""
+TRIVIAL_SIZE = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, ("valve_lag", "tau"): 1e-3}
+"""A common offset [share of the lowest peak], delay or lag [s] below which it counts as nothing missing.
+
+Reason: twice the prior of a test's own offset and delay (`NuisanceConfig`): what is smaller may be the rig's."""
+STOP_BEGINS = 0.4
+"""No end stop begins within this share of the half stroke about its middle.
+
+Reason: stops act over the last 10 to 30 % of the stroke, a soft rubber one over half of it."""
+STOP_OTHER_SIDE = 0.1
+"""Share of its force at one end of the stroke that a stop has to reach at the other end.
+
+Reason: a stop at one end alone cannot be told from a stroke that is recorded off its middle; not tuned."""
+HALVES_SIGNIFICANCE = 0.001
+"""Halves of the tests disagree about a parameter where chance alone would let them so seldom.
+
+Reason: the level of `significance`; the limit on the misfit is twice the quantile of chi-square, for two halves."""
+HALVES_ALIKE = 0.1
+"""Values from either half within this ratio of one another agree, whatever their intervals.
+
+Reason: the intervals of quiet tests are narrower than what the gains of a rig make of a parameter; not tuned."""
+
+# When an optimum or an effect is given up again (search/forward_selection.py, search/reweighting.py, missed.py)
+
+WIDER = 1.1
+"""An optimum that widens the gap by more than this factor over where its search began is not gone to.
+
+Reason: weights by noise may bend a fit away from the force; up to 10 % is the play of rounding. Not tuned."""
+AT_REST = 0.2
+"""A parameter that moves by less than this share of its standard error stays where it is.
+
+Reason: it widens an interval by 2 % (root of 1 + 0.2^2), less than anything the intervals promise."""
+MOST_REWEIGHTINGS = 5
+"""Times that the tests are weighed anew at the end, at most.
+
+Reason: time; what swings between two optima would never end."""
+PREDICTS_WORSE = 2.0
+"""Standard errors of the paired difference over tests from which one damper predicts worse than another.
+
+Reason: the customary 95 %."""
+
+# What the verdict adds (verdict.py, residual_check.py)
+
+CYCLE_CHANGE_SIGNIFICANCE = 1e-4
+"""A change from cycle to cycle counts in the gap where noise alone would show it less often than this.
+
+Reason: a tenth of `significance`, since every test is asked; not tuned."""
+CONTRADICTS = 2.0
+"""A remainder of so many times `visible` contradicts that these effects are all, whatever they closed.
+
+Reason: a large effect may close all but a tenth of the gap, and the tenth be as large as a second one; not tuned."""
+OUTSIDE_LIBRARY = 0.03
+"""Share of cases in which what is missing is not in the library and yet one of its effects fits within the noise.
+
+Reason: benchmark: with it 97.0 % were stated and 97.6 % hit in 710 cases of the highest confidence."""
