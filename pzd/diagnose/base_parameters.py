@@ -19,10 +19,10 @@ DOUBTS: dict[Verdict, str] = {
 }
 """Why no row is `ok` under a verdict."""
 SHOWN = 1.0
-"""Share of the force that a parameter moves, for the judge: what the tests do not show has a wide interval here."""
+"""Share of the force that a parameter moves, for its status: what the tests do not show has a wide interval here."""
 
 
-def base_parameters(named: Selection, verdict: Verdict, setting: str | None) -> tuple[ParameterRow, ...]:
+def base_parameters(selection: Selection, verdict: Verdict, setting: str | None) -> tuple[ParameterRow, ...]:
     """T0, C and k beside the effects adopted, judged by their intervals as those of identify are.
 
     An interval allows for noise, for the sensors' priors, and for how far the tests disagree; it
@@ -30,11 +30,11 @@ def base_parameters(named: Selection, verdict: Verdict, setting: str | None) -> 
 
     Parameters
     ----------
-    named : what was adopted
+    selection : what was adopted
     verdict : what was decided
     setting : of the rig's settings, the one in use
     """
-    fitted, whole = named.fitted, named.last.whole
+    fitted, whole = selection.fitted, selection.last.whole
     compared = [(o.place, o.measured, f) for o, f in zip(whole.observations, fitted.simulated, strict=True)]
     rows = []
     for place, (row, widths) in enumerate(

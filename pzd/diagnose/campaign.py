@@ -1,4 +1,4 @@
-"""The tests of one setting, and what they say of a damper; each damper is asked about once."""
+"""The records of one setting, and how a damper compares with them; each damper is simulated once."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pzd.damper.model import Damper
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.data.split import UNTOUCHED, Split
-from pzd.diagnose.noise.input_uncertainty import Expected, expected
+from pzd.diagnose.fit.input_uncertainty import Expected, expected
 from pzd.diagnose.residual_check import ResidualCheck, check_residual
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -24,19 +24,19 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """The records of one setting, and which of their samples naming may see."""
+    """The records of one setting, and which of their samples the search for missing effects may see."""
 
     prepared: tuple[Prepared, ...]
     parts: Split
     nuisance: NuisanceConfig
     jobs: int = 1
-    """Records that are asked at the same time."""
+    """Records that are simulated at the same time."""
     _expected: dict[tuple[str, int], Expected] = field(default_factory=dict, repr=False)
     _checks: dict[str, tuple[ResidualCheck, ...]] = field(default_factory=dict, repr=False)
 
     @property
     def seen(self) -> tuple[Mask, ...]:
-        """(n,) the samples of each record that naming may look at."""
+        """(n,) the samples of each record that the search for missing effects may see."""
         return tuple(roles != UNTOUCHED for roles in self.parts.roles)
 
     def in_role(self, role: int) -> tuple[Mask, ...]:
@@ -59,11 +59,11 @@ class Campaign:
         return self._checks[key]
 
     def untouched(self, damper: Damper) -> tuple[ResidualCheck, ...]:
-        """Every record against a damper, over the samples that naming may not see."""
+        """Every record against a damper, over the samples that the search may not see."""
         return self._against(damper, self.in_role(UNTOUCHED))
 
     def offset(self, damper: Damper) -> float:
-        """By how much the median record lies above what the damper makes of it [N]; naming leaves it to each test."""
+        """By how much the median record lies above what the damper makes of it [N]; no effect has to explain it."""
         asked = in_use(self.seen)
         given = zip(asked, self.expected(damper, asked), strict=True)
         return float(np.median([np.mean(self.prepared[i].record.force - each.force) for i, each in given]))
@@ -74,7 +74,7 @@ class Campaign:
         return self.each(lambda each: check_residual(*each, self.nuisance), given)
 
     def each(self, function: Callable[[Item], Made], items: Iterable[Item]) -> tuple[Made, ...]:
-        """What a function makes of every item, as many at the same time as the campaign asks."""
+        """What a function makes of every item, `jobs` of them at the same time."""
         with ThreadPoolExecutor(max(self.jobs, 1)) as pool:
             return tuple(pool.map(function, items))
 

@@ -10,7 +10,7 @@ from pzd.signals.nuisance import NuisanceConfig
 
 
 class DiagnoseConfig(Frozen):
-    """When simulation and measurement count as disagreeing, and when an effect is believed."""
+    """When simulation and measurement count as disagreeing, and when an effect is adopted."""
 
     significance: float = Field(default=1e-3, gt=0.0, lt=1.0)
     """A gap is believed when noise alone would show it less often than this."""

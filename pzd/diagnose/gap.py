@@ -39,8 +39,8 @@ def gap_of(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
     )
 
 
-def floor_of(judged: ResidualCheck) -> float:
-    """What noise and the test's own nuisances leave of one record, summed over the judged samples [N^2].
+def floor_of(check: ResidualCheck) -> float:
+    """What noise and the test's own nuisances leave of one record, summed over the checked samples [N^2].
 
     The nuisances count with what they take away, at most: beside a jump they move the residual without
     making it smaller. Noise is the scatter between cycles or about a smooth residual, at most what the
@@ -48,39 +48,39 @@ def floor_of(judged: ResidualCheck) -> float:
 
     Equation: sum min(s^2, mean c^2) + min(sum n^2, sum r^2 - sum c^2), c = r - n, n the nuisances
     """
-    residual, cleared = judged.residual[judged.wanted], judged.cleared[judged.wanted]
-    nuisances = judged.nuisances[judged.wanted]
+    residual, cleared = check.residual[check.wanted], check.cleared[check.wanted]
+    nuisances = check.nuisances[check.wanted]
     before, after = float(residual @ residual), float(cleared @ cleared)
     taken = min(max(before - after, 0.0), float(nuisances @ nuisances))
-    return min(judged.variance * residual.size, after, before) + taken
+    return min(check.variance * residual.size, after, before) + taken
 
 
-def _by_block(judged: ResidualCheck, values: Array) -> Array:
-    """Sums of (n,) values over the judged samples of each cycle, or of each of a few blocks."""
-    kept = values[judged.wanted]
-    run = judged.prepared.cycles
+def _by_block(check: ResidualCheck, values: Array) -> Array:
+    """Sums of (n,) values over the checked samples of each cycle, or of each of a few blocks."""
+    kept = values[check.wanted]
+    run = check.prepared.cycles
     if run is None:
         return np.array([part.sum() for part in np.array_split(kept, min(BLOCKS, max(kept.size, 1)))])
-    number = run.number(judged.prepared.record.time)[judged.wanted]
+    number = run.number(check.prepared.record.time)[check.wanted]
     return np.array([kept[number == j].sum() for j in np.unique(number)])
 
 
-def probability_of_noise(judged: Sequence[ResidualCheck]) -> float:
+def probability_of_noise(checks: Sequence[ResidualCheck]) -> float:
     """Probability that noise alone looks so in any kind of test (Bonferroni over the kinds)."""
-    kinds = {kind for j in judged for kind in j.probability}
-    return min(1.0, *(len(kinds) * pooled([j.probability[k] for j in judged if k in j.probability]) for k in kinds))
+    kinds = {kind for c in checks for kind in c.probability}
+    return min(1.0, *(len(kinds) * pooled([c.probability[k] for c in checks if k in c.probability]) for k in kinds))
 
 
-def visible_gap(judged: Sequence[ResidualCheck]) -> float:
+def visible_gap(checks: Sequence[ResidualCheck]) -> float:
     """R.m.s. of the gap above the noise as a share of each record's peak force, pooled over the samples."""
-    return _pooled(judged, [j.power / j.peak**2 for j in judged])
+    return _pooled(checks, [c.power / c.peak**2 for c in checks])
 
 
-def gap_in_force(judged: Sequence[ResidualCheck]) -> float:
+def gap_in_force(checks: Sequence[ResidualCheck]) -> float:
     """R.m.s. of the gap above the noise [N], pooled over the samples: the tests of large force count most."""
-    return _pooled(judged, [j.power for j in judged])
+    return _pooled(checks, [c.power for c in checks])
 
 
-def _pooled(judged: Sequence[ResidualCheck], squares: Sequence[float]) -> float:
-    samples = np.array([np.count_nonzero(j.wanted) for j in judged], dtype=np.float64)
+def _pooled(checks: Sequence[ResidualCheck], squares: Sequence[float]) -> float:
+    samples = np.array([np.count_nonzero(c.wanted) for c in checks], dtype=np.float64)
     return float(np.sqrt(max(float(samples @ np.array(squares) / samples.sum()), 0.0)))

@@ -19,7 +19,7 @@ HARMFUL = "the damper predicts kept-back tests worse with it"
 class HandedOn:
     """What was adopted and does no harm, and what it predicts."""
 
-    named: Selection
+    selection: Selection
     prediction: Prediction | None
     refused: str | None
     """Why the plain damper is handed on although effects fitted the tests; None where it is not."""
@@ -27,7 +27,7 @@ class HandedOn:
     """Whether the last fit is by criterion (4), every sample alike: what is left is then no noise to weigh by."""
 
 
-def handed_on(named: Selection, trials: Trials, forced: Sequence[str], unit: str) -> HandedOn:
+def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit: str) -> HandedOn:
     """Take back what makes the prediction of kept-back tests worse, until the damper does no harm or is the plain one.
 
     An effect goes without which the damper predicts better; and the last adopted one for as long as the plain damper,
@@ -35,13 +35,13 @@ def handed_on(named: Selection, trials: Trials, forced: Sequence[str], unit: str
 
     Parameters
     ----------
-    named : what was adopted
+    selection : what was adopted
     trials : the tests, dealt into folds
     forced : effects that the config asks for, whatever they do
     unit : of the control signal, for the words
     """
     plain = trials.plain_missed()
-    kept, missed, refused, by_criterion = named, plain, None, False
+    kept, missed, refused, by_criterion = selection, plain, None, False
     while kept.adopted:
         missed, by_criterion = _best(kept, trials)
         ours = [name for name in kept.adopted if name not in forced]
@@ -52,64 +52,70 @@ def handed_on(named: Selection, trials: Trials, forced: Sequence[str], unit: str
         if harmful is None:
             break
         if worse and len(kept.adopted) == 1:
-            refused = _refused(named, (missed, plain), trials, worse, unit)
+            refused = _refused(selection, (missed, plain), trials, worse, unit)
         kept = _without(kept, harmful)
     if not kept.adopted:
         return HandedOn(kept, trials.told(plain, plain, None), refused)
     found = trials.fitted_by_criterion(kept.fitted.damper, trials.nothing) if by_criterion else None
     if found is not None:
         kept = replace(kept, fitted=found[1], last=replace(kept.last, whole=found[0]))
-    told = trials.told(plain, missed, kept.fitted.damper, by_criterion=by_criterion)
-    return HandedOn(kept, told, None, by_criterion)
+    prediction = trials.told(plain, missed, kept.fitted.damper, by_criterion=by_criterion)
+    return HandedOn(kept, prediction, None, by_criterion)
 
 
-def _best(named: Selection, trials: Trials) -> tuple[Missed, bool]:
+def _best(selection: Selection, trials: Trials) -> tuple[Missed, bool]:
     """What the damper misses, and whether it is fitted by criterion (4) since that predicts visibly better.
 
     The likelihood weighs by noise: the best there is as long as noise is what is left, and misled where a law is
     missing, which the gap shows.
     """
-    weighed = trials.missed(named.fitted.damper)
-    if named.last.gap(named.fitted) < trials.visible:
+    weighed = trials.missed(selection.fitted.damper)
+    if selection.last.gap(selection.fitted) < trials.visible:
         return weighed, False
-    alike = trials.missed_by_criterion(named.fitted.damper)
+    alike = trials.missed_by_criterion(selection.fitted.damper)
     return (alike, True) if alike.less_than(weighed) else (weighed, False)
 
 
 def _harmful(
-    named: Selection, trials: Trials, missed: Missed, ours: Sequence[str], *, by_criterion: bool
+    selection: Selection, trials: Trials, missed: Missed, ours: Sequence[str], *, by_criterion: bool
 ) -> str | None:
     """An effect without which the others predict better; a lone one is held against the plain damper instead."""
-    if len(named.adopted) == 1:
+    if len(selection.adopted) == 1:
         return None
     asked = trials.missed_by_criterion if by_criterion else trials.missed
-    without = ((name, asked(_without(named, name).fitted.damper)) for name in reversed(ours))
+    without = ((name, asked(_without(selection, name).fitted.damper)) for name in reversed(ours))
     return next((name for name, other in without if trials.worse(missed, other)), None)
 
 
-def _without(named: Selection, effect: str) -> Selection:
+def _without(selection: Selection, effect: str) -> Selection:
     """The selection with one effect taken back, the rest fitted anew."""
-    damper = named.fitted.damper
+    damper = selection.fitted.damper
     effects = {name: values for name, values in damper.effects.items() if name != effect}
     if not effects:
-        return replace(named, fitted=named.plain, last=named.first, competitions=(), reasons=_told(named, effect))
+        return replace(
+            selection,
+            fitted=selection.plain,
+            last=selection.first,
+            competitions=(),
+            reasons=_reasons_without(selection, effect),
+        )
     fewer = damper.model_copy(update={"effects": effects})
-    last = evidence_of(named.last.campaign, fewer)
+    last = evidence_of(selection.last.campaign, fewer)
     return replace(
-        named,
+        selection,
         fitted=fit(last.whole, tuple(effects), last.whole.start_with(fewer)),
         last=last,
-        competitions=tuple(c for c in named.competitions if c.effect != effect),
-        reasons=_told(named, effect),
+        competitions=tuple(c for c in selection.competitions if c.effect != effect),
+        reasons=_reasons_without(selection, effect),
     )
 
 
-def _told(named: Selection, effect: str) -> dict[str, str]:
-    return {**named.reasons, effect: HARMFUL}
+def _reasons_without(selection: Selection, effect: str) -> dict[str, str]:
+    return {**selection.reasons, effect: HARMFUL}
 
 
 def _refused(
-    named: Selection, missed: tuple[Missed, Missed], trials: Trials, worse: Sequence[float | None], unit: str
+    selection: Selection, missed: tuple[Missed, Missed], trials: Trials, worse: Sequence[float | None], unit: str
 ) -> str:
     """Why nothing that was adopted is handed on, with the figures where it is worst."""
     groups = dict(zip(trials.voltages, trials.groups, strict=True))
@@ -122,6 +128,6 @@ def _refused(
     adopted, plain = figures(worst)
     at = "" if worst is None or len(groups) == 1 else f" at {worst:.4g} {unit}"
     return (
-        f"{' and '.join(named.adopted)} would fit the tests, but kept-back ones are predicted worse than by the plain "
-        f"damper (W_s {adopted:.2g} against {plain:.2g}{at}), which is handed on"
+        f"{' and '.join(selection.adopted)} would fit the tests, but kept-back ones are predicted worse than by the "
+        f"plain damper (W_s {adopted:.2g} against {plain:.2g}{at}), which is handed on"
     )

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.diagnose.data.cleaning import Prepared
+from pzd.diagnose.fit.input_uncertainty import Expected
 from pzd.diagnose.fit.prediction import counted
-from pzd.diagnose.noise.input_uncertainty import Expected
 from pzd.diagnose.thresholds import CYCLE_CHANGE_SIGNIFICANCE
 from pzd.record import Array, sliced
 from pzd.signals.between_cycles import PureError, harmonics_of, pure_error, repeatable_power
@@ -27,7 +27,7 @@ class ResidualCheck:
 
     prepared: Prepared
     wanted: Mask
-    """(n,) the samples that were judged."""
+    """(n,) the samples that were checked."""
     residual: Array
     """(n,) measured less predicted force [N]."""
     nuisances: Array
@@ -43,7 +43,7 @@ class ResidualCheck:
     folded: Array | None
     """(cycles, points) residual less nuisances, where cycles repeat [N]."""
     explained: Array | None
-    """(n,) square of what a rich smooth model explains of it, noise's share taken off, where nothing repeats [N^2]."""
+    """(n,) square of what the smooth model explains of it, noise's share taken off, where nothing repeats [N^2]."""
 
     @property
     def cleared(self) -> Array:
@@ -68,7 +68,7 @@ def check_residual(given: Expected, prepared: Prepared, wanted: Mask, config: Nu
     slack += np.where(mask & ~calm, within_a_sample(record.force - slack, predicted), 0.0)
     folded = _folded(prepared, residual - slack, mask)
     if folded is not None:
-        return _repeating(prepared, mask, residual, slack, folded, given.unsure)
+        return _repeating(prepared, mask, residual, slack, folded, given.displacement_variance)
     return _not_repeating(prepared, mask, residual, slack, predicted)
 
 
@@ -79,9 +79,9 @@ def _jumps(prepared: Prepared) -> Array:
 
 
 def _repeating(
-    prepared: Prepared, mask: Mask, residual: Array, slack: Array, folded: Array, unsure: Array | float
+    prepared: Prepared, mask: Mask, residual: Array, slack: Array, folded: Array, by_displacement: Array | float
 ) -> ResidualCheck:
-    error = replace(pure_error(folded), shared=unsure)
+    error = replace(pure_error(folded), shared=by_displacement)
     trend = by_trend(folded)
     probability = {"harmonics": by_harmonics(error)}
     if trend is not None:

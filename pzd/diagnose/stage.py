@@ -53,8 +53,8 @@ def diagnose(
     from pzd.diagnose.verdict import decide, parameters_of, ranking_of, refused, unpredicted, weak
     from pzd.diagnose.where import regions
 
-    used, cut_off = whole_records(rig, setting)
-    recorded = prepare(used)
+    records, cut_off = whole_records(rig, setting)
+    recorded = prepare(records)
     zero = mid_stroke(recorded)
     prepared = about(recorded, zero)
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
@@ -62,31 +62,31 @@ def diagnose(
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
     trials = trials_of(campaign, plain, diagnose.visible)
     handed = handed_on(select_effects(campaign, plain, diagnose, jobs), trials, diagnose.force, control.unit)
-    named = handed.named
-    evidence = named.first
-    before = evidence.campaign.checks(named.plain.damper)
-    after = evidence.campaign.checks(named.fitted.damper) if named.adopted else before
-    decision = refused(handed.refused) if handed.refused else decide(named, before, after, diagnose)
+    selection = handed.selection
+    evidence = selection.first
+    before = evidence.campaign.checks(selection.plain.damper)
+    after = evidence.campaign.checks(selection.fitted.damper) if selection.adopted else before
+    decision = refused(handed.refused) if handed.refused else decide(selection, before, after, diagnose)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
     reach = reach_of(stand.limits, recorded, voltages)
-    rivals = [(name, damper.moved(zero)) for name, damper in named.rivalling]
-    offsets = [evidence.campaign.offset(damper) for _, damper in named.rivalling]
-    found = named.fitted.damper.moved(zero) if named.adopted else plain
-    told = Diagnosis(
+    rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
+    offsets = [evidence.campaign.offset(damper) for _, damper in selection.rivalling]
+    found = selection.fitted.damper.moved(zero) if selection.adopted else plain
+    diagnosis = Diagnosis(
         verdict=decision.verdict,
         reason=decision.reason + weak(parts.hold_out) + unpredicted(handed.prediction) + without(cut_off),
-        effects=named.adopted,
+        effects=selection.adopted,
         confidence=decision.confidence,
-        gap=held_out_gap(named, trials if handed.by_criterion else None),
-        parameters=parameters_of(named),
+        gap=held_out_gap(selection, trials if handed.by_criterion else None),
+        parameters=parameters_of(selection),
         prediction=handed.prediction,
         zero_m=found.zero_m,
-        ranking=ranking_of(named, evidence),
-        rivals=named.rivals,
+        ranking=ranking_of(selection, evidence),
+        rivals=selection.rivals,
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),
         next_test=next_test(rivals, reach, evidence.whole.reference, offsets),
     )
-    if not named.adopted:
-        return Diagnosed(told, found, plain, tuple(row for row in identified.rows if row.setting == setting))
-    return Diagnosed(told, found, plain, base_parameters(named, decision.verdict, setting))
+    if not selection.adopted:
+        return Diagnosed(diagnosis, found, plain, tuple(row for row in identified.rows if row.setting == setting))
+    return Diagnosed(diagnosis, found, plain, base_parameters(selection, decision.verdict, setting))

@@ -52,37 +52,41 @@ def refused(reason: str) -> Decision:
 
 
 def decide(
-    named: Selection, before: Sequence[ResidualCheck], after: Sequence[ResidualCheck], config: DiagnoseConfig
+    selection: Selection, before: Sequence[ResidualCheck], after: Sequence[ResidualCheck], config: DiagnoseConfig
 ) -> Decision:
     """The verdict on what was adopted, from what is left of the gap.
 
     Parameters
     ----------
-    named : what was adopted
+    selection : what was adopted
     before, after : every record seen against the plain damper and against the adopted one
     config : thresholds
     """
     sizes = visible_gap(before), visible_gap(after)
     chances = probability_of_noise(before), probability_of_noise(after)
-    if not named.adopted:
+    if not selection.adopted:
         return _nothing_adopted(sizes[0], chances[0], config)
-    told = f"{' and '.join(named.adopted)}: the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
+    change = (
+        f"{' and '.join(selection.adopted)}: the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
+    )
     if chances[1] < config.significance and _remains(sizes, config):
-        words = f"{told}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
+        words = f"{change}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
         return Decision("unexplained", words, None)
-    odd = against_nature(named.fitted.damper)
-    if odd and not named.rivals:
-        words = f"{told}; but with a value that no {' and no '.join(odd)} has, so that it is something that looks alike"
+    odd = against_nature(selection.fitted.damper)
+    if odd and not selection.rivals:
+        words = (
+            f"{change}; but with a value that no {' and no '.join(odd)} has, so that it is something that looks alike"
+        )
         return Decision("unexplained", words, None)
-    better = [f for f in named.competitions if f.behind < -config.rival_bic]
+    better = [f for f in selection.competitions if f.behind < -config.rival_bic]
     if better:
         others = [f"{known()[f.form].law}, which is not in the library, does better than {f.effect}" for f in better]
-        return Decision("unexplained", f"{told}; but {' and '.join(others)}", None)
-    if named.rivals or named.competitions:
-        others = [*named.rivals, *(f"{known()[f.form].law} (not in the library)" for f in named.competitions)]
-        words = f"{told}; {', '.join(others)} would do as well on these tests"
-        return Decision("ambiguous", words, confidence_of(named))
-    return Decision("named", f"{told}; what is left is within the noise or negligible", confidence_of(named))
+        return Decision("unexplained", f"{change}; but {' and '.join(others)}", None)
+    if selection.rivals or selection.competitions:
+        others = [*selection.rivals, *(f"{known()[f.form].law} (not in the library)" for f in selection.competitions)]
+        words = f"{change}; {', '.join(others)} would do as well on these tests"
+        return Decision("ambiguous", words, confidence_of(selection))
+    return Decision("named", f"{change}; what is left is within the noise or negligible", confidence_of(selection))
 
 
 def _remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
@@ -92,13 +96,13 @@ def _remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
 
 
 def _nothing_adopted(size: float, chance: float, config: DiagnoseConfig) -> Decision:
-    told = f"a gap of {_percent(size)} of peak force (r.m.s. above the noise)"
+    gap = f"a gap of {_percent(size)} of peak force (r.m.s. above the noise)"
     if chance >= config.significance:
-        return Decision("none", f"{told} that noise alone shows with probability {chance:.2g}: within the noise", None)
+        return Decision("none", f"{gap} that noise alone shows with probability {chance:.2g}: within the noise", None)
     if size < config.visible:
         limit = _percent(config.visible)
-        return Decision("none", f"{told}, repeatable but smaller than {limit} of peak: counts as nothing missing", None)
-    words = f"{told} that repeats (probability by noise alone {max(chance, 1e-300):.1g}); no effect of the library fits"
+        return Decision("none", f"{gap}, repeatable but smaller than {limit} of peak: counts as nothing missing", None)
+    words = f"{gap} that repeats (probability by noise alone {max(chance, 1e-300):.1g}); no effect of the library fits"
     return Decision("unexplained", words, None)
 
 
@@ -106,54 +110,54 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %"
 
 
-def confidence_of(named: Selection) -> float:
+def confidence_of(selection: Selection) -> float:
     """Posterior weight of the effects adopted among all that were tried, by their Bayesian criteria.
 
     Equation: w_i = exp(-BIC_i / 2) / sum_j exp(-BIC_j / 2), times what the library leaves out
                                                     Source: Kass and Raftery 1995, J. Am. Stat. Assoc. 90, eq. (9)
     """
     weight = 1.0 - OUTSIDE_LIBRARY
-    for step in named.rounds:
-        if step.chosen in named.adopted:
+    for step in selection.rounds:
+        if step.chosen in selection.adopted:
             best = next(c.delta_bic for c in step.tried if c.effect == step.chosen)
             others = [c.delta_bic - best for c in step.contenders]
             weight /= sum(float(np.exp(-0.5 * other)) for other in others)
-    for competitions in named.competitions:
+    for competitions in selection.competitions:
         weight /= 1.0 + float(np.exp(-0.5 * competitions.behind))
     return round(weight, 3)
 
 
-def ranking_of(named: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
+def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
     """Every candidate in the round that decided on it, best first; what was adopted leads.
 
     `gap_after` is criterion (4) on the samples seen, the tests' nuisances left in.
     """
     rows: dict[str, Ranked] = {}
-    for step in named.rounds:
+    for step in selection.rounds:
         for c in step.tried:
-            if step.tried is not named.deciding(c.effect):
+            if step.tried is not selection.deciding(c.effect):
                 continue
-            reason = named.reasons.get(c.effect, "does not pay" if c.delta_bic > 0.0 else "explains less")
+            reason = selection.reasons.get(c.effect, "does not pay" if c.delta_bic > 0.0 else "explains less")
             rows[c.effect] = Ranked(
                 effect=c.effect,
                 gap_after=evidence.criterion(c.fitted),
                 delta_bic=round(c.delta_bic, 3),
-                **_as_fitted(named.fitted.damper if c.effect in named.adopted else c.fitted.damper, c.effect),
-                reason="rival" if c.effect in named.rivals else reason,
+                **_as_fitted(selection.fitted.damper if c.effect in selection.adopted else c.fitted.damper, c.effect),
+                reason="rival" if c.effect in selection.rivals else reason,
             )
-    return tuple(sorted(rows.values(), key=lambda r: (r.effect not in named.adopted, r.delta_bic)))
+    return tuple(sorted(rows.values(), key=lambda r: (r.effect not in selection.adopted, r.delta_bic)))
 
 
-def parameters_of(named: Selection) -> dict[str, dict[str, Value]]:
+def parameters_of(selection: Selection) -> dict[str, dict[str, Value]]:
     """The parameters of what was adopted, with 95 % intervals."""
-    damper, errors = named.fitted.damper, standard_errors(named.fitted)
+    damper, errors = selection.fitted.damper, standard_errors(selection.fitted)
     found: dict[str, dict[str, Value]] = {}
     for name, values in damper.effects.items():
         nodes = values.get("at_voltage_V")
         for parameter in library()[name].parameters:
             mine = [
                 (u.of(damper), float(error))
-                for u, error in zip(named.fitted.unknowns, errors, strict=True)
+                for u, error in zip(selection.fitted.unknowns, errors, strict=True)
                 if (u.effect, u.parameter.name) == (name, parameter.name)
             ]
             found.setdefault(name, {})[parameter.name] = _value(mine, parameter, nodes)

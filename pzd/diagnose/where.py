@@ -18,18 +18,18 @@ from pzd.signals.between_cycles import repeatable_power
 Labels = NDArray[np.str_]
 
 DENSER = 1.25
-"""A region is told when it holds so many times more of the gap than of the samples."""
+"""A region is reported when it holds so many times more of the gap than of the samples."""
 LEAST_SHARE = 0.15
-"""A region is told when it holds at least this share of the gap."""
-THIRD = 0.5
-"""A third of the run is told from this share on: single cycles are noisy."""
-MOST = 10
-"""Regions told."""
+"""A region is reported when it holds at least this share of the gap."""
+LEAST_SHARE_OF_THIRD = 0.5
+"""A third of the run is reported from this share on: single cycles are noisy."""
+MOST_REGIONS = 10
+"""Regions reported, at most: what fits in one table of the report."""
 
 
 @dataclass(frozen=True, eq=False)
 class GapMap:
-    """Every judged sample (or point of an average cycle) of all records, with its part of the gap."""
+    """Every checked sample (or point of an average cycle) of all records, with its part of the gap."""
 
     density: Array
     """(n,) square of the residual less what noise gives; sums to the gap [N^2]."""
@@ -39,45 +39,45 @@ class GapMap:
     """Axis -> (n,) the region in words that each point belongs to."""
 
 
-def regions(judged: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> tuple[Region, ...]:
+def regions(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> tuple[Region, ...]:
     """The regions in which the gap is denser than elsewhere, most telling first.
 
     Parameters
     ----------
-    judged : records against the damper
+    checks : records against the damper
     unit : of the control signal
-    zero : recorded displacement where that of the judged records is nought [m]
+    zero : recorded displacement where that of `checks` is zero [m]
 
     Returns
     -------
     regions in words with their share of the gap; empty where there is no gap above the noise
     """
-    gap = gap_map(judged, unit, zero)
+    gap = gap_map(checks, unit, zero)
     total = float(gap.density.sum())
     if total <= 0.0:
         return ()
     found: list[tuple[float, Region]] = []
     for labels in gap.labels.values():
         found += _denser(labels, gap.density, gap.weight)
-    found += _frequencies(judged)
-    found += _thirds(judged)
+    found += _frequencies(checks)
+    found += _thirds(checks)
     found.sort(key=lambda item: -item[0])
-    return tuple(region for _, region in found[:MOST]) or (Region(region="everywhere alike", share_of_gap=1.0),)
+    return tuple(region for _, region in found[:MOST_REGIONS]) or (Region(region="everywhere alike", share_of_gap=1.0),)
 
 
-def gap_map(judged: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> GapMap:
-    """The gap sample by sample, noise's share taken off; positions are told as recorded."""
-    points = [_points(j) for j in judged]
+def gap_map(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> GapMap:
+    """The gap sample by sample, noise's share taken off; positions are as recorded."""
+    points = [_points(j) for j in checks]
     speed = max(float(np.max(np.abs(p["velocity"]))) for p in points)
     stroke = max(float(np.ptp(p["displacement"])) for p in points)
     labels: dict[str, list[Labels]] = {}
-    for j, p in zip(judged, points, strict=True):
+    for j, p in zip(checks, points, strict=True):
         for axis, words in _labels(j, p, speed, stroke, unit, zero).items():
             labels.setdefault(axis, []).append(words)
     return GapMap(
         np.concatenate([p["density"] for p in points]),
         np.concatenate([p["weight"] for p in points]),
-        {axis: np.concatenate(words) for axis, words in labels.items() if len(words) == len(judged)},
+        {axis: np.concatenate(words) for axis, words in labels.items() if len(words) == len(checks)},
     )
 
 
@@ -133,10 +133,10 @@ def _voltages(voltage: Array, unit: str) -> Labels:
 
 
 def _bands(values: Array, edges: Array, name: str, unit: str) -> Labels:
-    told = [f"{edge:.6g}" for edge in edges]
-    words = [f"{name} < {told[0]} {unit}"]
-    words += [f"{low} < {name} < {high} {unit}" for low, high in pairwise(told)]
-    words.append(f"{name} > {told[-1]} {unit}")
+    numbers = [f"{edge:.6g}" for edge in edges]
+    words = [f"{name} < {numbers[0]} {unit}"]
+    words += [f"{low} < {name} < {high} {unit}" for low, high in pairwise(numbers)]
+    words.append(f"{name} > {numbers[-1]} {unit}")
     return np.array(words)[np.searchsorted(edges, values)]
 
 
@@ -168,10 +168,10 @@ def _described(shares: Iterable[tuple[str, float, float]]) -> list[tuple[float, 
     ]
 
 
-def _frequencies(judged: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
+def _frequencies(checks: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
     """The octaves of frequency that hold most of the repeatable gap; an offset is one of its own."""
     power: dict[str, float] = {}
-    for j in judged:
+    for j in checks:
         if j.error is None or j.prepared.cycles is None:
             continue
         words = [_octave(h * j.prepared.cycles.frequency) for h in range(j.error.mean.size)]
@@ -191,16 +191,16 @@ def _octave(frequency: float) -> str:
     return f"{2.0**octave:g} to {2.0 ** (octave + 1):g} Hz in the force"
 
 
-def _thirds(judged: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
+def _thirds(checks: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
     """The third of the run in which the gap is larger."""
     names = ("first third of the run", "middle third of the run", "last third of the run")
     shares, samples = np.zeros(3), np.zeros(3)
-    for j in judged:
+    for j in checks:
         kept = np.flatnonzero(j.wanted)
         for third, part in enumerate(np.array_split(kept, 3)):
             shares[third] += float(np.sum(j.cleared[part] ** 2)) - part.size * j.variance
             samples[third] += part.size
     if shares.sum() <= 0.0:
         return []
-    told = _described(zip(names, shares / shares.sum(), samples / samples.sum(), strict=True))
-    return [item for item in told if item[1].share_of_gap >= THIRD]
+    found = _described(zip(names, shares / shares.sum(), samples / samples.sum(), strict=True))
+    return [item for item in found if item[1].share_of_gap >= LEAST_SHARE_OF_THIRD]

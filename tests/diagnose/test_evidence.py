@@ -12,9 +12,9 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import TRAINING, split
+from pzd.diagnose.fit.input_uncertainty import expected
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.fit.prediction import counted
-from pzd.diagnose.noise.input_uncertainty import expected
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.record import Record
 from pzd.signals.nuisance import NuisanceConfig
@@ -60,7 +60,7 @@ def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(rn
         (prepared,) = prepare((sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=noise, cycles=8),))
         run = prepared.cycles
         assert run is not None
-        variance = expected(stuck, prepared, 0.0).unsure
+        variance = expected(stuck, prepared, 0.0).displacement_variance
         assert isinstance(variance, np.ndarray)
         assert variance[0] == 0.0
         single = noise**2 / run.points(prepared.record.time) / run.count

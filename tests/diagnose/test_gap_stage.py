@@ -14,7 +14,7 @@ from pzd.damper.motion import Motion
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import TRAINING, UNTOUCHED, VALIDATION, split
-from pzd.diagnose.noise.input_uncertainty import expected
+from pzd.diagnose.fit.input_uncertainty import expected
 from pzd.diagnose.residual_check import check_residual
 from pzd.diagnose.stage import diagnose
 from pzd.identify.config import IdentifyConfig

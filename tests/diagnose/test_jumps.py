@@ -6,8 +6,8 @@ import numpy as np
 from campaign import TABLE_2, damper_of, sine
 
 from pzd.diagnose.data.cleaning import prepare
+from pzd.diagnose.fit.input_uncertainty import expected
 from pzd.diagnose.gap import visible_gap
-from pzd.diagnose.noise.input_uncertainty import expected
 from pzd.diagnose.residual_check import check_residual
 from pzd.signals.jumps import jumps
 from pzd.signals.nuisance import NuisanceConfig

@@ -206,9 +206,9 @@ def test_effects_that_harm_the_prediction_are_taken_back(
     )
     named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
     found = handed_on(named, cast("Trials", foretold), (), "V")
-    assert found.named.adopted == kept
+    assert found.selection.adopted == kept
     assert cast("tuple[float, float, bool]", found.prediction)[2] == (not kept)
-    assert all("worse" in found.named.reasons[name] for name in {A, B} - set(kept))
+    assert all("worse" in found.selection.reasons[name] for name in {A, B} - set(kept))
     if kept:
         assert found.refused is None
     else:
@@ -219,7 +219,7 @@ def test_effects_that_harm_the_prediction_are_taken_back(
 def test_what_the_config_asks_for_is_handed_on_whatever_it_does(rng: np.random.Generator) -> None:
     foretold = Foretold({frozenset((A,)): _Figure(2.0)}, plain=_Figure(1.0))
     found = handed_on(selection(rng, preload_offset={"F_0": 120.0}), cast("Trials", foretold), (A,), "V")
-    assert found.named.adopted == (A,)
+    assert found.selection.adopted == (A,)
     assert found.refused is None
 
 
@@ -252,11 +252,11 @@ def test_the_fit_that_is_handed_on_goes_with_what_it_was_fitted_to(rng: np.rando
     plain = fit(evidence.whole, (), evidence.whole.start())
     named = Selection(plain, fit(evidence.whole, (A,), evidence.whole.start_with(damper)), (), {}, evidence, evidence)
     found = handed_on(named, trials_of(campaign, damper_of(TWO), 0.0025), (), "V")
-    assert found.named.adopted == (A,)
+    assert found.selection.adopted == (A,)
     assert found.by_criterion
-    compared = zip(found.named.last.whole.observations, found.named.fitted.simulated, strict=True)
+    compared = zip(found.selection.last.whole.observations, found.selection.fitted.simulated, strict=True)
     assert all(o.measured.size == force.size for o, force in compared)
-    assert len(found.named.fitted.simulated) == len(records)
+    assert len(found.selection.fitted.simulated) == len(records)
 
 
 # ---------------------------------------------------------------- the tests' own offset, gain and delay

@@ -9,8 +9,8 @@ from campaign import damper_of, sine
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import Split
+from pzd.diagnose.fit.input_uncertainty import expected
 from pzd.diagnose.gap import gap_of
-from pzd.diagnose.noise.input_uncertainty import expected
 from pzd.diagnose.residual_check import ResidualCheck, check_residual
 from pzd.signals.nuisance import NuisanceConfig
 

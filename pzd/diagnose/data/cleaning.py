@@ -1,4 +1,4 @@
-"""Records made ready for judging: displacement freed of its noise without a fixed corner.
+"""Records made ready for the diagnosis: displacement freed of its noise, without a filter of fixed corner.
 
 Noise of the displacement goes through a stiff oil spring into the force, and a second derivative
 makes it look like inertia. Where the motion repeats, cycles are averaged and only harmonics well

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.data.cleaning import Prepared
+from pzd.diagnose.fit.input_uncertainty import Expected
 from pzd.diagnose.fit.likelihood import RecordLikelihood, responses
 from pzd.diagnose.fit.prediction import motion_of, warms
-from pzd.diagnose.noise.input_uncertainty import Expected
 from pzd.identify.trial import in_motion
 from pzd.record import Array, Record, sliced
 from pzd.signals.autoregression import Autoregression
@@ -75,7 +75,7 @@ def _of_cycles(
     peak = float(np.max(np.abs(cycle)))
     average = _resampled(simulated.mean(axis=0), points)
     left = DISCREPANCY * _left_by(cycle, average, error.sample_variance / len(counted))
-    floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size + given.unsure
+    floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size + given.displacement_variance
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
     bare = RecordLikelihood(

@@ -1,4 +1,4 @@
-"""Whether the data support an effect by itself, or it merely stands in for something else."""
+"""Whether the data support an effect by itself, or it is spurious: an effect that stands in for another cause."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candi
     """Why a candidate is a stand-in by the gap that it leaves open, None where it closes enough or noise hides it."""
     if not evidence.something_missing(before, config):
         return None
-    judged = [evidence.campaign.checks(fitted.damper) for fitted in (before, candidate.fitted)]
-    gaps = [[size(each) for each in judged] for size in (visible_gap, gap_in_force)]
+    checks = [evidence.campaign.checks(fitted.damper) for fitted in (before, candidate.fitted)]
+    gaps = [[size(each) for each in checks] for size in (visible_gap, gap_in_force)]
     closed = [left**2 <= (1.0 - LEAST_CLOSED) * open_before**2 for open_before, left in gaps]
     if any(closed) and all(left <= open_before for open_before, left in gaps):
         return None

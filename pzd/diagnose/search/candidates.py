@@ -1,4 +1,4 @@
-"""Every effect of the library tried on the observations, one at a time, beside those already adopted."""
+"""Every effect of the library fitted to the data, one at a time, together with those already adopted."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Candidate:
 
 
 def seen_in(problem: Problem, effect: Effect) -> bool:
-    """Whether something moves in some test that the effect needs to be seen at all."""
+    """Whether the voltage or temperature moves in some test, for an effect that shows only where it does."""
     if effect.needs == "voltage":
         return any(
             o.motion.voltage is not None
@@ -164,7 +164,7 @@ def _fainter(problem: Problem, before: Fitted, effect: Effect, start: Array, sha
 
 
 def best_competing_form(problem: Problem, before: Fitted) -> Candidate:
-    """The foil that explains most, fitted as a candidate is."""
+    """The competing form (a law outside the library) that explains most, fitted as a candidate is."""
     tried = (converged(problem, before, candidate(problem, before, form)) for form in competing_forms().values())
     return min(tried, key=lambda c: c.delta_bic)
 

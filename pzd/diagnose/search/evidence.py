@@ -1,4 +1,4 @@
-"""The observations that naming works with: all samples seen, and their two halves."""
+"""The data that the selection of effects works with: all samples seen, and their two halves."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What the tests of one setting say, ready for fitting."""
+    """The tests of one setting as least-squares problems: all that is seen, and either half of it."""
 
     campaign: Campaign
     whole: Problem

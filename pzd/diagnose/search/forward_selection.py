@@ -60,7 +60,7 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
 
 @dataclass(eq=False)
 class _Search:
-    """Where the adoption of effects stands."""
+    """State of the forward selection: the current fit, the rounds so far, and why each effect was adopted or not."""
 
     config: DiagnoseConfig
     weighed: Callable[[Damper], Evidence]
@@ -209,7 +209,7 @@ class _Search:
         return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
 
     def competitions(self) -> tuple[Competition, ...]:
-        """The foils that would do as well as an effect adopted, in its place."""
+        """The competing forms that would do as well as an effect adopted, in its place."""
         found = []
         for name in self.current.effects[len(self.config.force) :]:
             without = self._without(name)

@@ -1,4 +1,4 @@
-"""The last step of naming: parameters that hang no longer on the damper by which the tests were weighed."""
+"""Iteratively reweighted fits, until the parameters no longer depend on the damper that the weights came from."""
 
 from __future__ import annotations
 

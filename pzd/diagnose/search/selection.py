@@ -1,4 +1,4 @@
-"""What naming found: the effects adopted, what was tried for each, and what would have done as well."""
+"""The outcome of the search: the effects adopted, what was tried for each, and what would have done as well."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Competition:
     form: str
     with_form: Damper
     behind: float
-    """Bayesian criterion with the foil less that with the effect; negative where the foil does better."""
+    """Bayesian criterion with that form less that with the effect; negative where the form does better."""
 
     @property
     def dampers(self) -> tuple[tuple[str, Damper], ...]:

@@ -32,7 +32,7 @@ class Expected:
     damper: Damper
     force: Array
     """(n,) that it gives [N]."""
-    unsure: Array | float
+    displacement_variance: Array | float
     """(H + 1,) variance |.|^2 of the harmonics of its average cycle by the displacement [N^2]; 0 where none repeats."""
     timing: Array
     """(n, 1) change of the force by one standard deviation of the voltage's instant [N]; (n, 0) where it stands."""
