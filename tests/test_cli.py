@@ -22,8 +22,8 @@ from stand_ins import NAMES, UNDETERMINED, project
 
 from pzd.artefacts import Diagnosis, Gap, KeptBack, LeftOut, NextTest, Prediction, Ranked, Region, Value
 from pzd.cli.app import status
+from pzd.cli.diagnosis import diagnosis_lines
 from pzd.cli.output import Output
-from pzd.cli.story import story
 from pzd.config import load
 from pzd.damper.effects import library
 from pzd.quantities import Control
@@ -600,13 +600,13 @@ def test_the_story_tells_every_kept_back_test_where_it_is_asked_to() -> None:
         "kept back: r03 at 100 V, W_s 0.012 plain, 0.003 as handed on",
         "left out: 50 V, between its neighbours W_s 0.02 plain, 0.01 as handed on",
     ]
-    plain = story(diagnosis(), Control())
-    assert story(predicted, Control()) == [*plain[:3], whole, *plain[3:]]
-    assert story(predicted, Control(), every_test=True) == [*plain[:3], whole, *each, *plain[3:]]
+    plain = diagnosis_lines(diagnosis(), Control())
+    assert diagnosis_lines(predicted, Control()) == [*plain[:3], whole, *plain[3:]]
+    assert diagnosis_lines(predicted, Control(), every_test=True) == [*plain[:3], whole, *each, *plain[3:]]
 
 
 def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
-    assert story(diagnosis(), Control()) == [
+    assert diagnosis_lines(diagnosis(), Control()) == [
         "verdict: named, one answer fits, and no other does",
         "reason: only orifice_quadratic closes the gap",
         "gap on what no fit has seen (2 records): W_s 0.0121 before, 0.0009 after, 93% less; noise alone gives 0.0008",
@@ -624,7 +624,7 @@ def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
 
 def test_a_parameter_that_moves_with_the_voltage_is_told_at_each() -> None:
     value = Value(value=(1.0, 2.0), low95=(0.9, 1.9), high95=(1.1, 2.1), unit="N", at_voltage_V=(0.0, 150.0))
-    told = story(
+    told = diagnosis_lines(
         diagnosis().model_copy(update={"parameters": {"orifice_quadratic": {"q": value}}}), Control("current", "A")
     )
     assert "adopted: orifice_quadratic, q = 1 N at 0 A; 2 N at 150 A" in told

@@ -19,7 +19,7 @@ from pzd.config import load
 from pzd.damper.effects import library
 from pzd.pipeline.command import execute, opened, stale_stages
 from pzd.pipeline.execution import Pipeline
-from pzd.pipeline.sources import PACKAGE, _file, _used, code_hash, modules_used
+from pzd.pipeline.sources import PACKAGE, _file, _imports_of, code_hash, modules_used
 from pzd.pipeline.stages import Stage, stages
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
@@ -205,7 +205,7 @@ def edited(path: Path | None) -> None:
     with path.open("a") as file:
         file.write("# edited\n")
     code_hash.cache_clear()
-    _used.cache_clear()
+    _imports_of.cache_clear()
 
 
 def test_a_comment_in_what_no_stage_imports_reruns_nothing(bench: Bench, copied: Path) -> None:
@@ -300,7 +300,7 @@ def test_no_import_is_missed() -> None:
         name = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
         imports = set(executed_imports(ast.parse(path.read_text(encoding="utf-8"))))
         modules = {one if _file(one, PACKAGE) else one.rpartition(".")[0] for one in imports if one.startswith("pzd.")}
-        assert modules - {name, "pzd"} <= _used(name, PACKAGE), name
+        assert modules - {name, "pzd"} <= _imports_of(name, PACKAGE), name
 
 
 def test_a_stage_hangs_on_the_equations_of_the_damper_and_not_on_what_stands_above_it() -> None:

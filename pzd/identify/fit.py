@@ -23,11 +23,6 @@ from pzd.record import Array, Condition, Record
 from pzd.signals.stretches import apart
 
 
-def fit_condition(condition: Condition, config: IdentifyConfig, seed: int) -> ParameterRow:
-    """The Bingham parameters of one condition, pooled over its records."""
-    return identify_condition(condition, config, seed)[0]
-
-
 def identify_condition(
     condition: Condition, config: IdentifyConfig, seed: int
 ) -> tuple[ParameterRow, AuxiliaryRow | None]:
@@ -52,11 +47,6 @@ def identify_condition(
         (objective.measured, fit.residuals),
     )
     return row, None if auxiliary is None else _auxiliary_row(labels, auxiliary)
-
-
-def fit_records(records: Sequence[Record], config: IdentifyConfig, seed: int) -> tuple[Objective, Fit]:
-    """The optimum of criterion (4) over the records, by the method that the config names."""
-    return fit_with_auxiliary(records, config, seed)[:2]
 
 
 def fit_with_auxiliary(

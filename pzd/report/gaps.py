@@ -48,7 +48,7 @@ def criterion(measured: Array, simulated: Array) -> float:
 
 
 def of_record(context: ReportContext, record: Record) -> tuple[float, float]:
-    """W_s of a record before and after diagnose, past what hangs on how it began."""
+    """W_s of a record before and after diagnose, without the samples that depend on how it began."""
     part = _begun(record)
     before, after = (criterion(record.force[part], force[part]) for force in context.simulated(record))
     return before, after
