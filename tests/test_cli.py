@@ -18,9 +18,9 @@ from typing import Any
 
 import pytest
 import yaml
-from stand_ins import NAMES, UNDETERMINED, project
+from stub_stages import NAMES, NEXT_TEST, UNDETERMINED, project
 
-from pzd.artefacts import Diagnosis, Gap, KeptBack, LeftOut, NextTest, Prediction, Ranked, Region, Value
+from pzd.artefacts import Diagnosis, Gap, KeptBack, LeftOut, Prediction, Ranked, Region, Value
 from pzd.cli.app import status
 from pzd.cli.diagnosis import diagnosis_lines
 from pzd.cli.output import Output
@@ -573,16 +573,7 @@ def diagnosis() -> Diagnosis:
         ),
         rivals=("shear_thinning",),
         where=(Region(region="abs(v) > 0.25 m/s, 150 V", share_of_gap=0.71),),
-        next_test=NextTest(
-            waveform="sine",
-            frequency_Hz=4.0,
-            amplitude_m=0.01,
-            voltage_V=150.0,
-            separates=("orifice_quadratic", "shear_thinning"),
-            middle_m=0.03135,
-            peak_speed_m_per_s=0.251327,
-            peak_force_N=1512.345,
-        ),
+        next_test=NEXT_TEST,
     )
 
 
@@ -746,7 +737,7 @@ SLOW = """
 import sys, time
 from concurrent.futures import ThreadPoolExecutor
 sys.path[:0] = [{here!r}, {root!r}]
-import stand_ins
+import stub_stages
 from pzd.artefacts import Identified, Rig
 from pzd.identify.config import IdentifyConfig
 from pzd.pipeline import command
@@ -760,7 +751,7 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
 
 identify.__module__ = "pzd.identify.stage"
 command.stages = lambda config: tuple(
-    Stage("identify", identify) if stage.name == "identify" else stage for stage in stand_ins.stages(config)
+    Stage("identify", identify) if stage.name == "identify" else stage for stage in stub_stages.stages(config)
 )
 sys.argv = ["pzd", "run", "first.yaml"]
 from pzd.cli import main

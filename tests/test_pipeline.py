@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
-import stand_ins
-from stand_ins import NAMES, UNDETERMINED, project
+import stub_stages
+from stub_stages import NAMES, UNDETERMINED, project
 
 from pzd.artefacts import Identified, Manifest, Rig
 from pzd.cli import start
@@ -546,7 +546,7 @@ def test_the_wrong_source_is_named_with_the_right_one(bench: Bench, target: str,
 
 
 def test_a_stage_declares_itself_by_its_signature() -> None:
-    stage = Stage("identify", stand_ins.identify)
+    stage = Stage("identify", stub_stages.identify)
     assert list(stage.takes) == ["identify", "rig", "seed"]
     assert stage.makes is Identified
     assert stage.folder == "2-identify"
@@ -555,7 +555,7 @@ def test_a_stage_declares_itself_by_its_signature() -> None:
 def test_a_stage_that_asks_for_it_can_say_how_far_it_is(bench: Bench) -> None:
     def slow(rig: RigConfig, control: Control, folder: Path, progress: Listener = unheard) -> Rig:
         progress(Progress(1, 2, "files"))
-        return stand_ins.ingest(rig, control, folder)
+        return stub_stages.ingest(rig, control, folder)
 
     heard: list[Progress] = []
     given = opened(bench.config, bench.runs)

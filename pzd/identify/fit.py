@@ -20,6 +20,7 @@ from pzd.identify.separable import descend, fit_separable
 from pzd.identify.trial import trial_of
 from pzd.identify.trust import Evidence, judge, stationarity, visible_shares
 from pzd.record import Array, Condition, Record
+from pzd.signals.criterion import criterion
 from pzd.signals.stretches import apart
 
 
@@ -138,7 +139,7 @@ def row_of(
         k_N_per_m=stiffness[0],
         k_N_per_m_low95=stiffness[1],
         k_N_per_m_high95=stiffness[2],
-        W_s=float(residuals @ residuals / (measured @ measured)),
+        W_s=criterion(residuals, measured),
         rmse_N=float(np.sqrt(np.mean(residuals**2))),
         status=trust.status,
     )
