@@ -73,6 +73,6 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     return cast("Callable[P, R]", _MACHINE_CODE()(function))
 
 
-def laid_in(function: Callable[P, R]) -> Callable[P, R]:
-    """The same, laid into each compiled caller: for short functions that are called once or twice."""
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """The same, inlined into each compiled caller: for short functions that are called once or twice."""
     return cast("Callable[P, R]", _MACHINE_CODE(inline="always")(function))

@@ -26,7 +26,7 @@ from pzd.rig.config import RigConfig
 from pzd.runs import versions
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.jsonfile import read_json
-from pzd.schema.progress import Listener, Progress, unheard
+from pzd.schema.progress import Listener, Progress, no_listener
 
 
 class Bench:
@@ -553,7 +553,7 @@ def test_a_stage_declares_itself_by_its_signature() -> None:
 
 
 def test_a_stage_that_asks_for_it_can_say_how_far_it_is(bench: Bench) -> None:
-    def slow(rig: RigConfig, control: Control, folder: Path, progress: Listener = unheard) -> Rig:
+    def slow(rig: RigConfig, control: Control, folder: Path, progress: Listener = no_listener) -> Rig:
         progress(Progress(1, 2, "files"))
         return stub_stages.ingest(rig, control, folder)
 

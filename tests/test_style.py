@@ -29,6 +29,28 @@ LONG_FUNCTION, LONG_MODULE = 60, 300
 LONG_WITH_REASON: dict[str, str] = {}
 """Function or module as `long_ones` names it, and why it is better left whole; each shows as a warning."""
 
+PRIVATE_WORDS = frozenset(
+    (
+        *("at_once", "beside", "believable", "bring", "coarse", "desk", "felt", "foil", "foiled", "foils", "ground"),
+        *(
+            "hopeless",
+            "judge",
+            "judged",
+            "named",
+            "naming",
+            "near",
+            "nought",
+            "observation",
+            "oil",
+            "outing",
+            "patient",
+        ),
+        *("rich", "room", "scene", "settling", "stand_in", "standing", "story", "stuck", "tell", "telling"),
+        *("there", "told", "unsure", "used", "weighing"),
+    )
+)
+"""Names that modules, classes, functions and constants once had and that said nothing to anybody else."""
+
 SOURCE_OF_DRAWS = ROOT / "tests" / "conftest.py"
 GENERATOR = re.compile(
     r"\bdefault_rng\b|\bRandomState\b|\bSeedSequence\b|\bnp\.random\.(?!Generator\b)\w+"
@@ -84,6 +106,34 @@ def test_nothing_is_left_unfinished() -> None:
         if isinstance(node, ast.Name) and node.id == NotImplementedError.__name__
     ]
     assert found == []
+
+
+def names_in(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and name, in small letters with underscores, of a module, its classes, functions and constants."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    yield 1, path.stem
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef):
+            yield node.lineno, re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", node.name).lower().strip("_")
+    for statement in tree.body:
+        targets = getattr(statement, "targets", [getattr(statement, "target", None)])
+        yield from ((t.lineno, t.id.lower().strip("_")) for t in targets if isinstance(t, ast.Name))
+
+
+def test_no_name_is_a_private_word() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{line}: {name}"
+        for path in MODULES
+        for line, name in names_in(path)
+        if name in PRIVATE_WORDS
+    ]
+    assert found == []
+
+
+def test_a_private_word_is_found_as_module_class_function_and_constant(tmp_path: Path) -> None:
+    module = tmp_path / "story.py"
+    module.write_text("NEAR = 1\n_TOLD: int = 2\nclass StandIn:\n    def judged(self): ...\n", encoding="utf-8")
+    assert {name for _, name in names_in(module)} & PRIVATE_WORDS == {"story", "near", "told", "stand_in", "judged"}
 
 
 def written_lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:

@@ -16,14 +16,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pzd.blind.case import Places, Scored
+from pzd.blind.diagnosis import Methods, diagnose_case
 from pzd.blind.hide import Setup, hide
-from pzd.blind.mark import mark
 from pzd.blind.plan import Planned, plan
-from pzd.blind.seek import Methods, seek
+from pzd.blind.scoring import score_case
 from pzd.schema.errors import DataError
 from pzd.schema.jsonfile import read_json
 from pzd.schema.processes import end_with_parent
-from pzd.schema.progress import Listener, Progress, unheard
+from pzd.schema.progress import Listener, Progress, no_listener
 
 log = logging.getLogger(__name__)
 
@@ -50,7 +50,7 @@ class Benchmark:
     """Hash of everything that a case depends on but its number: cases with another one are done again."""
     pool: Callable[[int], Executor] = processes
     """Makes a pool of so many workers."""
-    progress: Listener = unheard
+    progress: Listener = no_listener
     """Hears of every case that is done."""
 
     def run(self, jobs: int, *, afresh: bool = False) -> tuple[Scored, ...]:
@@ -91,7 +91,7 @@ class Benchmark:
         found: dict[str, Scored] = {}
 
         def kept(case: Planned) -> None:
-            found[case.id] = mark(
+            found[case.id] = score_case(
                 self.places, case.id, self.made_from, self.setup.control, keep_files=self.setup.blind.keep_files
             )
             left = (time.monotonic() - begun) / len(found) * (len(waiting) - len(found))
@@ -103,7 +103,7 @@ class Benchmark:
             _in_turn(
                 waiting,
                 lambda case: drawing.submit(hide, self.setup, case, self.places),
-                lambda case: seeking.submit(seek, self.methods, self.places.case(case.id)),
+                lambda case: seeking.submit(diagnose_case, self.methods, self.places.case(case.id)),
                 kept,
                 jobs,
             )

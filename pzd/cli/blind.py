@@ -28,7 +28,7 @@ def blind(
 ) -> int:
     """Hide effects in virtual rigs, diagnose them, and score what is named."""
     from pzd.blind.benchmark import Benchmark, folder_of
-    from pzd.blind.seek import Methods
+    from pzd.blind.diagnosis import Methods
     from pzd.blind.summary import write
     from pzd.pipeline.command import opened
 

@@ -31,13 +31,13 @@ def check(
 ) -> int:
     """Check config and rig records; write nothing."""
     from pzd.pipeline.command import check_setting, opened, preflight
-    from pzd.schema.jsonfile import plain
+    from pzd.schema.jsonfile import plain_data
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
     entries = preflight(given)
     if as_json:
-        output.say_json(plain({"config": config.as_posix(), "records": entries}, given.run.control))
+        output.say_json(plain_data({"config": config.as_posix(), "records": entries}, given.run.control))
         check_setting(given, entries)
         return DONE
     for entry in entries:

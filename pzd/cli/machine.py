@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def run_as_data(run: RunSummary) -> dict[str, Any]:
     """The numbers of a run as plain data, the control under its own name."""
-    from pzd.schema.jsonfile import plain
+    from pzd.schema.jsonfile import plain_data
 
     numbers = {
         "run": run.folder.as_posix(),
@@ -25,7 +25,7 @@ def run_as_data(run: RunSummary) -> dict[str, Any]:
         "comfort": run.comfort,
         "report": run.page.as_posix() if run.page else None,
     }
-    data: dict[str, Any] = plain(numbers, run.control)
+    data: dict[str, Any] = plain_data(numbers, run.control)
     return data
 
 

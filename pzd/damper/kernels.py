@@ -96,19 +96,19 @@ def _rows() -> Iterator[str]:
 def _drive() -> Iterator[str]:
     """Each effect takes what the one before gives; `state` is what each gave last."""
     effects = acting("drive")
-    step, felt, kept = [], [], []
+    step, after, kept = [], [], []
     for i, effect in enumerate(effects):
         own = f"state[{i}]"
         law = _guarded(effect, f"given = {_call(effect, 'law', effective=own, before='late', now='now', step='step')}")
         rate = _guarded(effect, f"moving = {_call(effect, 'rate', effective='given', now='now', rate='moving')}")
         step += ["given = now", *law, f"late, now, {own} = {own}, given, given"]
-        at_once = _call(effect, "law", effective=own, before="late", now="late", step="0.0")
-        jump = [f"late = {at_once}"] if any("before" in _takes(other, "law") for other in effects[i + 1 :]) else []
-        felt += ["given = now", *law, *rate, *(_guarded(effect, *jump) if jump else []), "now = given"]
+        immediate = _call(effect, "law", effective=own, before="late", now="late", step="0.0")
+        jump = [f"late = {immediate}"] if any("before" in _takes(other, "law") for other in effects[i + 1 :]) else []
+        after += ["given = now", *law, *rate, *(_guarded(effect, *jump) if jump else []), "now = given"]
         kept += ["given = now", *law, *(_guarded(effect, *jump) if jump else []), f"now, {own} = given, given"]
     yield from _function("follow_voltage(before, now, step, state, p)", "late = before", *step, "return now")
     head = "late, now, moving = voltage, voltage, 0.0"
-    yield from _function("voltage_felt(voltage, step, state, p)", head, *felt, "return now, moving")
+    yield from _function("effective_voltage_after(voltage, step, state, p)", head, *after, "return now, moving")
     yield from _function("keep_voltage(voltage, step, state, p)", "late, now = voltage, voltage", *kept)
 
 
@@ -239,14 +239,14 @@ stroke_moves: Callable[[Row, Row], bool] = _MODULE.stroke_moves
 """Whether two rows differ in a parameter of a stroke effect."""
 
 follow_voltage: Callable[[float, float, float, Array, Array], float] = _MODULE.follow_voltage
-"""Voltage felt [V] when the signal has gone linearly from `before` to `now` [V] in a step [s]; (d,) voltages behind
-each drive effect [V], changed in place, and the row of the drive."""
-voltage_felt: Callable[[float, float, Array, Array], tuple[float, float]] = _MODULE.voltage_felt
-"""Voltage felt [V] and its rate [V/s] a time [s] after a voltage [V] was set; (d,) voltages behind each drive effect
-when it was set [V], and the row of the drive."""
+"""Effective voltage [V] when the signal has gone linearly from `before` to `now` [V] in a step [s]; (d,) voltages
+behind each drive effect [V], changed in place, and the row of the drive."""
+effective_voltage_after: Callable[[float, float, Array, Array], tuple[float, float]] = _MODULE.effective_voltage_after
+"""Effective voltage [V] and its rate [V/s] a time [s] after a voltage [V] was set; (d,) voltages behind each drive
+effect when it was set [V], and the row of the drive."""
 
 keep_voltage: Callable[[float, float, Array, Array], None] = _MODULE.keep_voltage
-"""Bring the (d,) voltages behind each drive effect [V] to a time [s] after a voltage [V] was set."""
+"""Advance the (d,) voltages behind each drive effect [V] to a time [s] after a voltage [V] was set."""
 
 stroke_law: Callable[[float, float, Row], float] = _MODULE.stroke_law
 """Extension of the oil spring [m] at an elastic deflection [m] on a side; below zero inside a free play."""

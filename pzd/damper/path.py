@@ -43,7 +43,7 @@ _MOST_BRACKETS = 60
 _FALSE_POSITIONS = 12  # then bisection, which cannot creep
 _ON_EDGE = 1e-13  # of the force
 _OFF_EDGE = 1e-6  # of a piece
-_AT_ONCE = 1e-13  # of a piece; not zero, so that the side it leaves to is seen
+_SHORTEST_PIECE = 1e-13  # of a piece; not zero, so that the side it leaves to is seen
 _SAME_FORCE = 1e-11  # of the force; a saved flow speed that gives it within this is kept
 
 
@@ -119,7 +119,7 @@ def _crossing(
         end, _, _ = piece(e, w, at, low, regime, side, step, stages)
         below = _miss(end, row_in(step, at + low), regime, side)
         if below >= 0.0:
-            return _AT_ONCE * dt
+            return _SHORTEST_PIECE * dt
     for i in range(_MOST_BRACKETS):
         middle = (low * above - high * below) / (above - below)
         if i > _FALSE_POSITIONS or not low < middle < high:

@@ -55,11 +55,11 @@ def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit:
             refused = _refused(selection, (missed, plain), trials, worse, unit)
         kept = _without(kept, harmful)
     if not kept.adopted:
-        return HandedOn(kept, trials.told(plain, plain, None), refused)
+        return HandedOn(kept, trials.prediction(plain, plain, None), refused)
     found = trials.fitted_by_criterion(kept.fitted.damper, trials.nothing) if by_criterion else None
     if found is not None:
         kept = replace(kept, fitted=found[1], last=replace(kept.last, whole=found[0]))
-    prediction = trials.told(plain, missed, kept.fitted.damper, by_criterion=by_criterion)
+    prediction = trials.prediction(plain, missed, kept.fitted.damper, by_criterion=by_criterion)
     return HandedOn(kept, prediction, None, by_criterion)
 
 

@@ -89,7 +89,7 @@ class Trials:
         constant = sorted((v, i) for i, v in enumerate(self.voltages) if v is not None)
         return tuple(i for _, i in constant[1:-1])
 
-    def told(
+    def prediction(
         self, plain: Missed, missed: Missed, damper: Damper | None, *, by_criterion: bool = False
     ) -> Prediction | None:
         """The figures of diagnosis.json; None where no test could be kept back.
@@ -178,11 +178,11 @@ class Trials:
     def _of_fold(self, damper: Damper, kept_back: Sequence[Mask]) -> Missed:
         records, rows = [], []
         for i, (p, mask) in enumerate(zip(self.campaign.prepared, kept_back, strict=True)):
-            judged = mask & counted(p)
-            if not judged.any():
+            kept = mask & counted(p)
+            if not kept.any():
                 continue
-            force = p.record.force[judged]
-            residual = force - predicted_force(damper, p)[judged]
+            force = p.record.force[kept]
+            residual = force - predicted_force(damper, p)[kept]
             peak = float(np.max(np.abs(p.record.force)))
             limit = residual.size * (self.visible * peak) ** 2
             if i in self._alone:

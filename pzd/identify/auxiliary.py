@@ -1,4 +1,4 @@
-"""What stands beside the element in a gas-charged damper: a constant force and a gas spring, carried along.
+"""Auxiliary forces beside the element in a gas-charged damper: a constant force and a gas spring, fitted with it.
 
 Gas pushes the rod out at every control signal. A Bingham element that has to make up for it gets a
 wrong friction and a wrong spring. Both forces are linear in their coefficients, so these are solved
@@ -50,7 +50,7 @@ def columns_of(objective: Objective) -> tuple[Array, float]:
     return np.column_stack([np.ones(x.size), x]), middle
 
 
-def worth_a_look(objective: Objective, fit: Fit) -> bool:
+def worth_fitting(objective: Objective, fit: Fit) -> bool:
     """Whether the auxiliaries would, to first order, explain more than a load cell may be wrong by."""
     columns, _ = columns_of(objective)
     slopes = fit.slopes / np.maximum(np.linalg.norm(fit.slopes, axis=0), np.finfo(float).tiny)
@@ -85,19 +85,19 @@ def relieved(objective: Objective, values: Array) -> Objective:
     return Objective(trials, basis)
 
 
-def without(record: Record, beside: Sequence[AuxiliaryRow]) -> Record:
+def without(record: Record, auxiliaries: Sequence[AuxiliaryRow]) -> Record:
     """A record less what constant records of its damper showed beside the element, at the nearest temperature.
 
     Parameters
     ----------
     record : whose voltage moves, so that its own force tells friction and gas less well apart
-    beside : of its setting; where there are several at one temperature, their mean is taken off
+    auxiliaries : of its setting; where there are several at one temperature, their mean is taken off
     """
-    if not beside:
+    if not auxiliaries:
         return record
     own = record.median_temperature() or 0.0
-    apart = [abs((row.temperature_degC or 0.0) - own) for row in beside]
-    near = [row for row, distance in zip(beside, apart, strict=True) if distance <= min(apart) + SAME_TEMPERATURE]
+    apart = [abs((row.temperature_degC or 0.0) - own) for row in auxiliaries]
+    near = [row for row, distance in zip(auxiliaries, apart, strict=True) if distance <= min(apart) + SAME_TEMPERATURE]
     forces = [row.F_0_N + row.k_g_N_per_m * (record.displacement - row.zero_m) for row in near]
     return replace(record, force=record.force - np.mean(forces, axis=0))
 

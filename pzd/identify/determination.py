@@ -53,7 +53,7 @@ def _doubt(left: float, misfit: Misfit) -> str | None:
     """Why the parameters are weak however narrow their intervals: the model lacks something."""
     missed = f"the model misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's"
     much = f"the model leaves {left:.0%} of the force's r.m.s."
-    return "; ".join(words for words, true in ((missed, misfit.speaks), (much, left > MISFIT)) if true) or None
+    return "; ".join(words for words, true in ((missed, misfit.is_large), (much, left > MISFIT)) if true) or None
 
 
 def _unsettled(objective: Objective, parameters: Bingham, cosines: list[float]) -> list[bool]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pzd.artefacts import AuxiliaryRow, ParameterRow
-from pzd.identify.auxiliary import Auxiliary, auxiliary_of, relieved, remainder, rough_values, worth_a_look
+from pzd.identify.auxiliary import Auxiliary, auxiliary_of, relieved, remainder, rough_values, worth_fitting
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.determination import evidence_of, scales_of
 from pzd.identify.evolutionary import fit_evolutionary
@@ -18,17 +18,17 @@ from pzd.identify.objective import Bingham, Fit, Objective
 from pzd.identify.part import parts_of
 from pzd.identify.separable import descend, fit_separable
 from pzd.identify.trial import trial_of
-from pzd.identify.trust import Evidence, judge, stationarity, visible_shares
+from pzd.identify.trust import Evidence, stationarity, trust_of, visible_shares
 from pzd.record import Array, Condition, Record
 from pzd.signals.criterion import criterion
-from pzd.signals.stretches import apart
+from pzd.signals.stretches import separate_tests
 
 
 def identify_condition(
     condition: Condition, config: IdentifyConfig, seed: int
 ) -> tuple[ParameterRow, AuxiliaryRow | None]:
     """The Bingham parameters of one condition, and what its tests show beside the element."""
-    records = [test for record in condition.records for test in apart(record)]
+    records = [test for record in condition.records for test in separate_tests(record)]
     objective, fit, auxiliary = fit_with_auxiliary(records, config, seed)
     parts = parts_of(records, objective.trials, (fit.residuals, fit.slopes), config.nuisance)
     misfit = misfit_of(parts)
@@ -67,7 +67,7 @@ def fit_with_auxiliary(
     """
     whole = Objective(tuple(trial_of(r) for r in records))
     plain = _optimum(whole, config, seed)
-    if not worth_a_look(whole, plain):
+    if not worth_fitting(whole, plain):
         return whole, plain, None
     values = rough_values(whole)
     objective = relieved(whole, values)
@@ -118,7 +118,7 @@ def row_of(
     evidence : on T0, C and k
     fitted : (N,) measured force and (N,) residuals of the samples that the row was fitted to
     """
-    trust = judge(evidence)
+    trust = trust_of(evidence)
     friction, damping, stiffness = (
         _bounds(value, float(width), known, natural)
         for value, width, known, natural in zip(

@@ -13,7 +13,7 @@ from pzd.identify.trial import warm_up
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
 from pzd.signals.cycles import Cycles, cycles
 from pzd.signals.reversals import reversals
-from pzd.signals.stretches import apart
+from pzd.signals.stretches import separate_tests
 from pzd.signals.work import work
 
 WINDOW = 16
@@ -42,7 +42,7 @@ def measures(records: Sequence[Record]) -> tuple[MeasureRow, ...]:
     """The measures of every test, in the records' order; several tests in one record have a row each, of its name."""
     scale = voltage_scale(records)
     still = [(record, is_constant(record, scale)) for record in records]
-    rows = [_row(test, constant) for r, constant in still for test in (apart(r) if constant else (r,))]
+    rows = [_row(test, constant) for r, constant in still for test in (separate_tests(r) if constant else (r,))]
     return tuple(row.model_copy(update={"dynamic_range": _dynamic_range(row, rows)}) for row in rows)
 
 

@@ -44,8 +44,8 @@ class Misfit:
     """The same in force [N]."""
 
     @property
-    def speaks(self) -> bool:
-        """Whether the parameters are no longer the damper's."""
+    def is_large(self) -> bool:
+        """Whether so much is missed that T0, C and k are no longer the damper's."""
         return self.share >= VISIBLE
 
     @property

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pzd.artefacts import AuxiliaryRow, Identified, ParameterRow, Rig
 from pzd.identify.config import IdentifyConfig
 from pzd.record import Condition, Record, conditions
-from pzd.schema.progress import Listener, Progress, unheard
+from pzd.schema.progress import Listener, Progress, no_listener
 from pzd.schema.wording import supported
 
 Labels = tuple[str | None, float | None, float | None]
@@ -17,7 +17,7 @@ Labels = tuple[str | None, float | None, float | None]
 log = logging.getLogger(__name__)
 
 
-def identify(identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener = unheard) -> Identified:
+def identify(identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener = no_listener) -> Identified:
     """The Bingham parameters of every condition of every setting, with intervals and their trust.
 
     Parameters
@@ -36,13 +36,13 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener =
     constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
     found = _constant_rows(constant, identify, seed, progress)
     rows = {_labels(row): row for row, _ in found}
-    beside = {_labels(row): row for _, row in found if row is not None}
+    auxiliary = {_labels(row): row for _, row in found if row is not None}
     known = list(zip(constant, rows.values(), strict=True))
-    rows |= {_labels(row): row for row in _moving_rows(moving, known, list(beside.values()), identify)}
+    rows |= {_labels(row): row for row in _moving_rows(moving, known, list(auxiliary.values()), identify)}
     return Identified(
         tuple(rows[labels] for labels in sorted(rows, key=_order)),
         measures(rig.records),
-        tuple(beside[labels] for labels in sorted(beside, key=_order)),
+        tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_order)),
     )
 
 
@@ -53,13 +53,13 @@ def _constant_rows(
 
     rows = []
     for index, condition in enumerate(found):
-        row, beside = identify_condition(condition, config, seed + index)
-        rows.append((row, beside))
-        progress(Progress(index + 1, len(found), f"conditions: {_line(row)}{_beside(beside)}"))
+        row, auxiliary = identify_condition(condition, config, seed + index)
+        rows.append((row, auxiliary))
+        progress(Progress(index + 1, len(found), f"conditions: {_line(row)}{_auxiliary_text(auxiliary)}"))
     return rows
 
 
-def _beside(row: AuxiliaryRow | None) -> str:
+def _auxiliary_text(row: AuxiliaryRow | None) -> str:
     if row is None:
         return ""
     force = supported(row.F_0_N, row.F_0_N_low95, row.F_0_N_high95)
@@ -78,10 +78,10 @@ def _moving_rows(
 
     rows = []
     for setting in sorted({r.setting for r in moving}, key=lambda s: s or ""):
-        beside = [row for row in auxiliaries if row.setting == setting]
+        auxiliary = [row for row in auxiliaries if row.setting == setting]
         mine = [(c, row) for c, row in known if c.setting == setting]
-        still = [replace(c, records=tuple(without(r, beside) for r in c.records)) for c, _ in mine]
-        of_setting = [without(r, beside) for r in moving if r.setting == setting]
+        still = [replace(c, records=tuple(without(r, auxiliary) for r in c.records)) for c, _ in mine]
+        of_setting = [without(r, auxiliary) for r in moving if r.setting == setting]
         for row in fit_moving(of_setting, still, [row for _, row in mine], config):
             rows.append(row)
             log.info("node from records with moving voltage: %s", _line(row))

@@ -14,7 +14,7 @@ from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
 from pzd.runs import Run
 from pzd.schema.errors import ConfigError
-from pzd.schema.progress import Listener, unheard
+from pzd.schema.progress import Listener, no_listener
 from pzd.schema.yamlfile import Document, read_yaml
 
 
@@ -61,7 +61,7 @@ def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:
 
 
 def execute(
-    given: Opened, target: str, *, force: bool, jobs: int, say: Say, progress: Listener = unheard
+    given: Opened, target: str, *, force: bool, jobs: int, say: Say, progress: Listener = no_listener
 ) -> tuple[str, ...]:
     """Run every stage that is out of date, as far as a target.
 

@@ -14,7 +14,7 @@ from pzd.pipeline.stages import Stage
 from pzd.quantities import Control
 from pzd.runs import Run, StageFolder
 from pzd.schema.errors import UserError
-from pzd.schema.progress import Listener, unheard
+from pzd.schema.progress import Listener, no_listener
 from pzd.schema.yamlfile import yaml_text
 
 Say = Callable[[str], None]
@@ -29,7 +29,7 @@ class Pipeline:
     stages: Sequence[Stage]
     say: Say
     """Takes a line about each stage."""
-    progress: Listener = unheard
+    progress: Listener = no_listener
     """Hears how far a stage has come."""
     jobs: int = 1
     """Processes that a stage may use, where it can use several."""

@@ -91,24 +91,24 @@ def _next(context: ReportContext) -> Card:
 
 def _comfort(context: ReportContext) -> Card:
     pairs = [(road, context.reference(road), context.controlled(road)) for road in context.roads]
-    told = [(context.road(road), a, rows) for road, a, rows in pairs if a is not None and rows]
+    compared = [(context.road(road), a, rows) for road, a, rows in pairs if a is not None and rows]
     gain = "What does the passenger gain?"
-    if not told:
+    if not compared:
         return Card(gain, "Not compared", "No ride at constant damping stands beside another.")
-    _, reference, rows = told[0]
+    _, reference, rows = compared[0]
     beside = f"{_capital(policy_in_words(rows[0]))}, beside {policy_in_words(reference)}."
-    levels = "; ".join(f"{road}: {_levels(context, a, b[0])}" for road, a, b in told)
+    levels = "; ".join(f"{road}: {_levels(context, a, b[0])}" for road, a, b in compared)
     if iso2631_1978.EDITION not in context.config.editions:
         return Card(gain, levels, f"Acceleration a_w. {beside}")
-    longer = "; ".join(f"{road}: {times(context, a, b[0])}" for road, a, b in told)
+    longer = "; ".join(f"{road}: {times(context, a, b[0])}" for road, a, b in compared)
     source = f"Within reduced comfort, if nothing else is said, {iso2631_1978.EDITION} ({iso2631_1978.TRUST})."
-    detail = f"{beside} {source} Acceleration a_w: {levels}.{_ideal(context, told)}"
+    detail = f"{beside} {source} Acceleration a_w: {levels}.{_ideal(context, compared)}"
     return Card("How much longer can a passenger sit?", longer, detail)
 
 
-def _ideal(context: ReportContext, told: list[tuple[str, SummaryRow, tuple[SummaryRow, ...]]]) -> str:
+def _ideal(context: ReportContext, compared: list[tuple[str, SummaryRow, tuple[SummaryRow, ...]]]) -> str:
     """What control would reach if every demanded force were there at once."""
-    found = [(road, a, row) for road, a, rows in told for row in rows[1:] if row.fidelity == "ideal"]
+    found = [(road, a, row) for road, a, rows in compared for row in rows[1:] if row.fidelity == "ideal"]
     texts = "; ".join(f"{road}: {times(context, a, row)}" for road, a, row in found)
     return f" With ideal dampers: {texts}." if texts else ""
 

@@ -59,7 +59,7 @@ def read_rows(path: Path, model: type[Row], control: Control) -> tuple[Row, ...]
             continue
         fields = zip(model.model_fields.items(), cells, strict=True)
         try:
-            rows.append(model.model_validate({n: _plain(cell, field.annotation) for (n, field), cell in fields}))
+            rows.append(model.model_validate({n: _typed(cell, field.annotation) for (n, field), cell in fields}))
         except ValidationError as error:
             faults += [_fault(path, number, detail, control) for detail in error.errors()]
     _refuse(path, faults)
@@ -99,7 +99,7 @@ def read_table(
             faults.append(f"{at(path, number)}: {len(cells)} fields where the header has {len(names)}")
             continue
         given = [(n, model.model_fields[n], cell) for n, cell in zip(names, cells, strict=True)]
-        values = {n: _plain(cell, field.annotation) for n, field, cell in given if cell or field.is_required()}
+        values = {n: _typed(cell, field.annotation) for n, field, cell in given if cell or field.is_required()}
         try:
             rows.append((number, model.model_validate(values)))
         except ValidationError as error:
@@ -271,7 +271,7 @@ def _cell(value: Any) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def _plain(cell: str, annotation: Any) -> str | float | None:
+def _typed(cell: str, annotation: Any) -> str | float | None:
     """What a cell stands for: nothing, a number where the field takes one, else its text."""
     kinds = {annotation, *get_args(annotation)}
     if not cell:

@@ -22,7 +22,7 @@ Model = TypeVar("Model", bound=Frozen)
 
 def write_json(path: Path, content: Frozen | Sequence[Frozen] | Mapping[str, Any], control: Control) -> None:
     """Write a model, a list of models or plain data, keys of the control under its own name."""
-    path.write_text(json_text(plain(content, control)) + "\n", encoding="utf-8", newline="\n")
+    path.write_text(json_text(plain_data(content, control)) + "\n", encoding="utf-8", newline="\n")
 
 
 def json_text(data: Any) -> str:
@@ -30,9 +30,9 @@ def json_text(data: Any) -> str:
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def plain(content: Any, control: Control) -> Any:
+def plain_data(content: Any, control: Control) -> Any:
     """Models, and lists and mappings of them, as plain data with keys of the control under its own name."""
-    return renamed_keys(_plain(content), control)
+    return renamed_keys(_built_in_types(content), control)
 
 
 def read_json(path: Path, model: type[Model], control: Control) -> Model:
@@ -57,12 +57,12 @@ def read_json_list(path: Path, model: type[Model], control: Control) -> tuple[Mo
     return found
 
 
-def _plain(content: Any) -> Any:
+def _built_in_types(content: Any) -> Any:
     if isinstance(content, Frozen):
         return content.model_dump(mode="json")
     if isinstance(content, Mapping):
-        return {key: _plain(value) for key, value in content.items()}
-    return [_plain(value) for value in content] if isinstance(content, list | tuple) else content
+        return {key: _built_in_types(value) for key, value in content.items()}
+    return [_built_in_types(value) for value in content] if isinstance(content, list | tuple) else content
 
 
 def _read(path: Path, annotation: Any, control: Control) -> Any:

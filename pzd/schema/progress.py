@@ -24,5 +24,5 @@ Listener = Callable[[Progress], None]
 """Is called with every event, in the thread that does the work."""
 
 
-def unheard(_: Progress) -> None:
-    """Where nobody wants to know."""
+def no_listener(_: Progress) -> None:
+    """Does nothing: for a stage whose progress nobody follows."""

@@ -60,7 +60,7 @@ def steps(time: Array, displacement: Array) -> tuple[tuple[Stretch, Stretch], ..
     )
 
 
-def apart(record: Record) -> tuple[Record, ...]:
+def separate_tests(record: Record) -> tuple[Record, ...]:
     """The tests that one record holds, each under its name; the record itself where it holds one.
 
     The first begins and the last ends with the record; what lies between two stretches belongs to neither.

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pzd.compiled import laid_in
+from pzd.compiled import inlined
 from pzd.record import Array
 from pzd.table.kernel import table_range
 
 
-@laid_in
+@inlined
 def coefficient_bounds(velocity: float, c_min: float, c_max: float) -> tuple[float, float]:
     """Lowest and highest force between two damping coefficients.
 
@@ -27,7 +27,7 @@ def coefficient_bounds(velocity: float, c_min: float, c_max: float) -> tuple[flo
     return c_max * velocity, c_min * velocity
 
 
-@laid_in
+@inlined
 def table_bounds(
     velocity: float, motion_ratio: float, dampers: float, speeds: Array, rebound: Array, compression: Array
 ) -> tuple[float, float]:

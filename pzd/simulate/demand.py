@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pzd.compiled import compiled, laid_in
+from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.admissible import coefficient_bounds, table_bounds
 from pzd.simulate.minimise import least_acceleration_forces
@@ -27,7 +27,7 @@ from pzd.simulate.ride_model import (
 )
 
 
-@laid_in
+@inlined
 def one_sided(velocity: float, side: float) -> float:
     """The velocity held on the side of zero that an axle is on (+1, -1); the sign bit of 0 carries the side."""
     return math.copysign(max(side * velocity, 0.0), side)
@@ -45,7 +45,7 @@ def bounds_of(
     return -math.inf, math.inf
 
 
-@laid_in
+@inlined
 def feedback_force(gains: Array, y: Array, workspace: Array) -> float:
     """Force of one axle that is proportional to what a policy senses: gains (8,) on `SENSED` [N]."""
     force = gains[4] * y[HEAVE] + gains[5] * y[PITCH] + gains[6] * y[HEAVE_RATE] + gains[7] * y[PITCH_RATE]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from pzd.compiled import compiled, laid_in
+from pzd.compiled import compiled, inlined
 from pzd.damper.flow import flow_speed
-from pzd.damper.kernels import K, Row, parallel_force, row_of, stroke_moves, voltage_felt, with_stroke_of
+from pzd.damper.kernels import K, Row, effective_voltage_after, parallel_force, row_of, stroke_moves, with_stroke_of
 from pzd.damper.regimes import spring_energy, spring_force
 from pzd.damper.rows import row_at
 from pzd.record import Array
@@ -30,7 +30,7 @@ class DynamicDamper(NamedTuple):
     """A row of parallel effects to work in."""
 
 
-@laid_in
+@inlined
 def place(nodes: Array, value: float) -> tuple[int, float]:
     """Interval of rising nodes that holds a value, and the share of it that lies below; held beyond the ends."""
     if nodes.size == 1 or value <= nodes[0]:
@@ -41,7 +41,7 @@ def place(nodes: Array, value: float) -> tuple[int, float]:
     return i, (value - nodes[i]) / (nodes[i + 1] - nodes[i])
 
 
-@laid_in
+@inlined
 def parallel_at(damper: DynamicDamper, voltage: float, row: Array) -> None:
     """Fill `row` with the parameters of the parallel effects at an effective voltage: linear between, held beyond."""
     i, share = place(damper.voltages, voltage)
@@ -51,7 +51,7 @@ def parallel_at(damper: DynamicDamper, voltage: float, row: Array) -> None:
         )
 
 
-@laid_in
+@inlined
 def row_slope(voltages: Array, rows: Array, voltage: float, column: int) -> float:
     """Derivative of one parameter by the effective voltage."""
     if voltages.size == 1 or voltage <= voltages[0] or voltage >= voltages[-1]:
@@ -71,10 +71,10 @@ def effective_voltage(damper: DynamicDamper, voltage: float, kept: Array, elapse
     kept : (d,) voltage behind each drive effect when it was set [V]
     elapsed : time since [s]
     """
-    return voltage_felt(voltage, elapsed, kept, damper.drive)
+    return effective_voltage_after(voltage, elapsed, kept, damper.drive)
 
 
-@laid_in
+@inlined
 def flowing(e: float, row: Row, guess: float) -> tuple[float, float]:
     """Force of the oil spring [N] at its elastic deflection [m], and the speed at which the oil flows [m/s].
 
@@ -119,14 +119,14 @@ def _stroke_slope(damper: DynamicDamper, e: float, row: Row, voltage: float) -> 
     return float((ahead - behind) / (high - low))
 
 
-@laid_in
+@inlined
 def rubbing_force(v: float, row: Array) -> float:
     """Friction beside the element [N] at a speed [m/s]; the sign bit of 0 picks the side."""
     moving = math.copysign(_TINY, v) if v == 0.0 else v
     return float(parallel_force(0.0, moving, 0.0, row) - parallel_force(0.0, 0.0, 0.0, row))
 
 
-@laid_in
+@inlined
 def elastic_force(x: float, row: Array) -> float:
     """Force beside the element [N] at an extension [m] from where the car stands: it gives its work back.
 
@@ -135,7 +135,7 @@ def elastic_force(x: float, row: Array) -> float:
     return float(parallel_force(x, 0.0, 0.0, row) - parallel_force(0.0, 0.0, 0.0, row))
 
 
-@laid_in
+@inlined
 def inertance(row: Array) -> float:
     """Force beside the element for each acceleration [kg]."""
     return float(parallel_force(0.0, 0.0, 1.0, row) - parallel_force(0.0, 0.0, 0.0, row))

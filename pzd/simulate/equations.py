@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pzd.compiled import compiled, laid_in
+from pzd.compiled import compiled, inlined
 from pzd.damper.rows import row_at
 from pzd.record import Array
 from pzd.simulate.demand import one_sided
@@ -54,7 +54,7 @@ from pzd.simulate.ride_model import (
 from pzd.simulate.sticking import accelerate
 
 
-@laid_in
+@inlined
 def body_acceleration(car: Vehicle, load0: float, load1: float) -> tuple[float, float]:
     """Acceleration of z [m/s2] and phi [rad/s2] under the forces S + T of the axles [N].
 
@@ -132,7 +132,7 @@ def _act(time: float, y: Array, model: RideModel, control: Array, workspace: Arr
     accelerate(model.car, control, workspace)
 
 
-@laid_in
+@inlined
 def _try_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Fill how each sticking axle would be pushed away from V = 0, were it to slip to the one or the other side."""
     for i in range(2):
@@ -144,7 +144,7 @@ def _try_sides(time: float, y: Array, model: RideModel, control: Array, workspac
             control[SIDE, i] = 0.0
 
 
-@laid_in
+@inlined
 def _book_damper(model: RideModel, workspace: Array, axle: int, dy: Array) -> None:
     """Book the powers of the dampers of one axle, and the motion of its oil."""
     n, speed = model.car.dampers[axle], model.car.ratio[axle] * workspace[RATE, axle]

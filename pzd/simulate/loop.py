@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pzd.compiled import compiled, laid_in
+from pzd.compiled import compiled, inlined
 from pzd.damper.dormand_prince import STAGES
 from pzd.damper.kernels import keep_voltage
 from pzd.damper.rows import row_at
@@ -81,7 +81,7 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
             choose_side(i, time, y, model, control, workspace, scratch)
 
 
-@laid_in
+@inlined
 def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, otherwise: float) -> float:
     """The voltage that gives a force of the axle within its bounds; a rounding beyond them is let pass."""
     grid, car = model.grid, model.car
@@ -112,7 +112,7 @@ def _set_voltage(time: float, y: Array, model: RideModel, control: Array, axle: 
             y[VALVE_WORK] += model.car.dampers[axle] * change
 
 
-@laid_in
+@inlined
 def beyond_reach(model: RideModel, control: Array, workspace: Array) -> bool:
     """Whether a damper moves faster than the rig did at its voltage; `ideal` has none, so at the best one."""
     grid, car = model.grid, model.car
@@ -128,7 +128,7 @@ def beyond_reach(model: RideModel, control: Array, workspace: Array) -> bool:
     return False
 
 
-@laid_in
+@inlined
 def _note(time: float, y: Array, model: RideModel, control: Array, workspace: Array, row: Array) -> None:
     """Fill one row of the history."""
     row[0], row[1], row[2], row[3] = time, y[0], y[1], workspace[COMFORT, 0]
@@ -141,7 +141,7 @@ def _note(time: float, y: Array, model: RideModel, control: Array, workspace: Ar
         row[9 + 6 * i] = control[SET, i]
 
 
-@laid_in
+@inlined
 def _tally(workspace: Array, tally: Array) -> None:
     """Take one step into peaks and sums."""
     tally[SAMPLES] += 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pzd.compiled import compiled, laid_in
+from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.demand import bounds_of, demand, feedback_force, one_sided, spring_acceleration
 from pzd.simulate.ride_model import (
@@ -60,7 +60,7 @@ def quasistatic_forces(y: Array, model: RideModel, control: Array, workspace: Ar
     demand(control_spec, model.car, y, workspace, int(control[TIE_END, 1]))
 
 
-@laid_in
+@inlined
 def _force_outside_sticking(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Fill the force of the free axle where the other sticks: the policy knows that the stuck one answers."""
     control_spec, car = model.control_spec, model.car

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from pzd.compiled import compiled, laid_in
+from pzd.compiled import compiled, inlined
 from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
 from pzd.record import Array
 from pzd.simulate.equations import motion
@@ -35,7 +35,7 @@ _SHARP = 1e-13  # of the step: how closely the moment is found at which an axle 
 _MOST_CUTS = 50
 
 
-@laid_in
+@inlined
 def trial(
     time: float, dt: float, y: Array, model: RideModel, control: Array, workspace: Array, stages: Array, end: Array
 ) -> float:
@@ -88,7 +88,7 @@ def choose_side(
         control[SIDE, axle] = -1.0
 
 
-@laid_in
+@inlined
 def leaver(control: Array, workspace: Array) -> int:
     """The first axle that has left its side of V = 0 or its stick, by the workspace as it is; -1 where none has."""
     for i in range(2):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pzd.compiled import laid_in
+from pzd.compiled import inlined
 from pzd.record import Array
 from pzd.simulate.ride_model import ACCELERATION, FORCE, INERTANCE, LIFT, SIDE, SPRINGS, Vehicle
 
 
-@laid_in
+@inlined
 def holding_force(car: Vehicle, axle: int, load: float, lift: float, other: float) -> float:
     """Damper force that keeps the deflection of an axle still, dV_i/dt = 0.
 
@@ -28,13 +28,13 @@ def holding_force(car: Vehicle, axle: int, load: float, lift: float, other: floa
     return -(lift + car.mobility[2] * other) / car.mobility[axle] - load
 
 
-@laid_in
+@inlined
 def holding_share(car: Vehicle, axle: int) -> float:
     """How much the holding force of an axle changes with the other axle's force: dT_i/dT_j."""
     return -car.mobility[2] / car.mobility[axle]
 
 
-@laid_in
+@inlined
 def accelerate(car: Vehicle, control: Array, workspace: Array) -> None:
     """Fill dV/dt of both axles, and complete the damper forces by what holds a sticking axle and by inertia.
 
@@ -68,7 +68,7 @@ def accelerate(car: Vehicle, control: Array, workspace: Array) -> None:
         workspace[FORCE, i] += workspace[INERTANCE, i] * workspace[ACCELERATION, i]
 
 
-@laid_in
+@inlined
 def _accelerate_one(car: Vehicle, free: int, workspace: Array) -> None:
     """The same where one axle is free and the other sticks."""
     stuck, cross = 1 - free, car.mobility[2]

@@ -10,8 +10,8 @@ import pytest
 
 from pzd.blind.benchmark import Benchmark
 from pzd.blind.case import Places, Scored
+from pzd.blind.diagnosis import Methods
 from pzd.blind.hide import Setup
-from pzd.blind.seek import Methods
 from pzd.config import RunConfig, load
 
 SMALL = """

@@ -23,9 +23,9 @@ from pzd.blind.benchmark import Benchmark, processes
 from pzd.blind.case import Places, Scored
 from pzd.blind.clean import Clean
 from pzd.blind.cuts import gap_cut, gap_cut_of_truth
+from pzd.blind.diagnosis import COST, diagnose_case
 from pzd.blind.hide import Setup, drawn, hide
 from pzd.blind.plan import plan
-from pzd.blind.seek import COST, seek
 from pzd.cli.app import status
 from pzd.config import RunConfig
 from pzd.damper.compose import respond
@@ -114,7 +114,7 @@ def test_the_diagnosis_is_given_a_folder_without_the_truth(
     assert hidden["effects"] == list(planned.hidden)
 
     places.truth(planned.id).parent.rename(tmp_path / "elsewhere")
-    seek(benchmark_of(config, tmp_path).methods, given)
+    diagnose_case(benchmark_of(config, tmp_path).methods, given)
     assert json.loads((given / COST).read_text(encoding="utf-8"))["failure"] is None
     assert (given / "diagnosis.json").exists()
 
@@ -127,7 +127,7 @@ def test_a_failed_diagnosis_is_a_case_with_its_message(
     hide(setup_of(config), planned, places)
     for path in places.rig(planned.id).iterdir():
         path.write_text("time_s,force_N\n0,1\n", encoding="utf-8")
-    seek(benchmark_of(config, tmp_path).methods, places.case(planned.id))
+    diagnose_case(benchmark_of(config, tmp_path).methods, places.case(planned.id))
     cost = json.loads((places.case(planned.id) / COST).read_text(encoding="utf-8"))
     assert "DataError" in cost["failure"] or "ConfigError" in cost["failure"]
 

@@ -45,9 +45,9 @@ def trials(records: tuple[Record, ...], plain: Damper) -> Trials:
     return trials_of(campaign_of(records), plain, DiagnoseConfig().visible)
 
 
-def told(records: tuple[Record, ...], plain: Damper, damper: Damper) -> Prediction:
+def predicted(records: tuple[Record, ...], plain: Damper, damper: Damper) -> Prediction:
     asked = trials(records, plain)
-    found = asked.told(asked.plain_missed(), asked.missed(damper), damper)
+    found = asked.prediction(asked.plain_missed(), asked.missed(damper), damper)
     assert found is not None
     return found
 
@@ -61,7 +61,7 @@ def diagnosed(records: tuple[Record, ...]) -> Diagnosed:
 def test_nothing_is_fitted_to_a_kept_back_test(rng: np.random.Generator) -> None:
     records = [sine(damper_of(TWO), U, f, x, rng, noise=1e-3, cycles=4) for U in TWO for f, x in TESTS]
     records[2] = replace(records[2], force=1.05 * records[2].force)
-    found = told(tuple(records), damper_of(TWO), damper_of(TWO))
+    found = predicted(tuple(records), damper_of(TWO), damper_of(TWO))
     (odd,) = (each for each in found.by if each.record == records[2].name)
     # A gain of 5 % of one test is within the priors of nuisances, and here it is missed all the same; the other tests
     # of its voltage were each fitted beside it, and bend a little.
@@ -73,14 +73,14 @@ def test_nothing_is_fitted_to_a_kept_back_test(rng: np.random.Generator) -> None
 
 def test_what_is_missing_is_worth_naming_on_tests_that_were_kept_back(rng: np.random.Generator) -> None:
     truth = damper_of(TWO, preload_offset={"F_0": 120.0})
-    found = told(sines(truth, rng, TWO, cycles=4), damper_of(TWO), truth)
+    found = predicted(sines(truth, rng, TWO, cycles=4), damper_of(TWO), truth)
     assert found.W_s < 0.2 * found.W_s_plain
     assert all(each.W_s < each.W_s_plain for each in found.by)
 
 
 def test_voltages_between_others_are_left_out_one_at_a_time(rng: np.random.Generator) -> None:
     damper = damper_of()
-    found = told(sines(damper, rng, tests=OTHER_TESTS, cycles=4), damper, damper).left_out_voltages
+    found = predicted(sines(damper, rng, tests=OTHER_TESTS, cycles=4), damper, damper).left_out_voltages
     assert [each.voltage for each in found] == [50.0, 100.0]
     for each in found:
         rows = {row.voltage_V: row for row in damper.base}
@@ -97,7 +97,7 @@ def test_a_test_alone_at_its_voltage_keeps_back_its_cycles(
     records = sines(damper_of(TWO), rng, (0.0,), tests=tests, cycles=4) + sines(
         damper_of(TWO), rng, (150.0,), tests=((2.0, 0.03),), cycles=4
     )
-    found = told(records, damper_of(TWO), damper_of(TWO))
+    found = predicted(records, damper_of(TWO), damper_of(TWO))
     assert found.hold_out == ("cycles" if len(tests) == 1 else "mixed")
     assert len(found.by) == len(records)
 
@@ -105,7 +105,7 @@ def test_a_test_alone_at_its_voltage_keeps_back_its_cycles(
 def test_too_little_to_keep_a_test_back_is_told(rng: np.random.Generator) -> None:
     damper = damper_of((0.0,))
     asked = trials((sine(damper, 0.0, 1.0, 0.03, rng, cycles=1, rate=1000.0),), damper)
-    assert asked.told(asked.plain_missed(), asked.missed(damper), damper) is None
+    assert asked.prediction(asked.plain_missed(), asked.missed(damper), damper) is None
     assert "too little to keep a test back" in unpredicted(None)
 
 
@@ -139,7 +139,7 @@ def test_worse_by_less_than_can_be_seen_is_not_worse(rng: np.random.Generator) -
 
 
 @dataclass
-class Foretold:
+class FixedPredictions:
     """Stands for the tests of a campaign: by effects, what a damper misses at two voltages."""
 
     by_effects: dict[frozenset[str], float]
@@ -160,7 +160,7 @@ class Foretold:
     def worse(self, one: float, other: float) -> tuple[float | None, ...]:
         return (150.0,) if one > other else ()
 
-    def told(
+    def prediction(
         self, plain: float, missed: float, damper: Damper | None, *, by_criterion: bool = False
     ) -> tuple[float, float, bool]:
         assert not by_criterion
@@ -200,12 +200,12 @@ A, B = "preload_offset", "asymmetry"
 def test_effects_that_harm_the_prediction_are_taken_back(
     rng: np.random.Generator, both: float, only_a: float, kept: tuple[str, ...]
 ) -> None:
-    foretold = Foretold(
+    fixed = FixedPredictions(
         {frozenset((A, B)): _Figure(both), frozenset((A,)): _Figure(only_a), frozenset((B,)): _Figure(2.0)},
         plain=_Figure(1.0),
     )
     named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
-    found = handed_on(named, cast("Trials", foretold), (), "V")
+    found = handed_on(named, cast("Trials", fixed), (), "V")
     assert found.selection.adopted == kept
     assert cast("tuple[float, float, bool]", found.prediction)[2] == (not kept)
     assert all("worse" in found.selection.reasons[name] for name in {A, B} - set(kept))
@@ -217,8 +217,8 @@ def test_effects_that_harm_the_prediction_are_taken_back(
 
 
 def test_what_the_config_asks_for_is_handed_on_whatever_it_does(rng: np.random.Generator) -> None:
-    foretold = Foretold({frozenset((A,)): _Figure(2.0)}, plain=_Figure(1.0))
-    found = handed_on(selection(rng, preload_offset={"F_0": 120.0}), cast("Trials", foretold), (A,), "V")
+    fixed = FixedPredictions({frozenset((A,)): _Figure(2.0)}, plain=_Figure(1.0))
+    found = handed_on(selection(rng, preload_offset={"F_0": 120.0}), cast("Trials", fixed), (A,), "V")
     assert found.selection.adopted == (A,)
     assert found.refused is None
 

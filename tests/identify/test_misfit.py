@@ -56,7 +56,7 @@ def test_without_it_they_are_the_damper_s(rng: np.random.Generator) -> None:
 
 
 def test_gain_offset_and_delay_within_their_priors_are_no_misfit(rng: np.random.Generator) -> None:
-    spoken = [misfit_for(campaign(draw, "five tests", correlation=0.9)[1]).speaks for draw in rng.spawn(5)]
+    spoken = [misfit_for(campaign(draw, "five tests", correlation=0.9)[1]).is_large for draw in rng.spawn(5)]
     assert not any(spoken)
 
 
@@ -68,16 +68,16 @@ def test_noise_alone_seldom_speaks(rng: np.random.Generator) -> None:
 def test_a_misfit_that_the_class_of_the_load_cell_may_cause_does_not_speak(rng: np.random.Generator) -> None:
     small = misfit_for(tuple(sines(hidden=0.1 * ORIFICE, noise=0.0005, rng=rng)))
     assert 0.0 < small.share < VISIBLE
-    assert not small.speaks
+    assert not small.is_large
     assert row_for(sines(hidden=0.1 * ORIFICE, noise=0.0005, rng=rng)).status == "ok"
 
 
 @pytest.mark.parametrize("kind", ["one sine", "one random"])
 def test_what_is_hidden_is_seen_whether_the_motion_repeats_or_not(kind, rng: np.random.Generator) -> None:
-    speaks = [misfit_for(campaign(draw, kind, hidden=0.2)[1]).speaks for draw in rng.spawn(8)]
+    speaks = [misfit_for(campaign(draw, kind, hidden=0.2)[1]).is_large for draw in rng.spawn(8)]
     assert sum(speaks) >= 7
 
 
 def test_a_motion_that_does_not_repeat_is_no_misfit(rng: np.random.Generator) -> None:
-    speaks = [misfit_for(campaign(draw, "one random", correlation=0.9)[1]).speaks for draw in rng.spawn(10)]
+    speaks = [misfit_for(campaign(draw, "one random", correlation=0.9)[1]).is_large for draw in rng.spawn(10)]
     assert not any(speaks)

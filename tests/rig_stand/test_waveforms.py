@@ -161,7 +161,7 @@ def test_file_motion_passes_through_its_samples(folder: Path) -> None:
 def test_file_motion_is_approached_from_rest_without_a_jump(folder: Path) -> None:
     waveform = made("file")
     motion = course(waveform, folder=folder)
-    start = motion(np.array([-waveform.settling]))
+    start = motion(np.array([-waveform.settling_time]))
     assert abs(start[1][0]) < 1e-12
     assert abs(start[2][0]) < 1e-12
     before, after = motion(np.array([-1e-9])), motion(np.array([1e-9]))
@@ -180,7 +180,7 @@ def test_a_missing_or_backward_file_is_the_users_fault(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", REPEATING)
 def test_a_test_starts_from_rest_and_is_untouched_when_recording_begins(kind: str) -> None:
     waveform = made(kind)
-    lead = waveform.settling
+    lead = waveform.settling_time
     plain, soft = course(waveform), started(course(waveform), lead)
     for value in soft(np.array([-lead])):
         assert value[0] == 0.0

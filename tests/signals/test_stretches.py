@@ -14,7 +14,7 @@ from pzd.diagnose.data.split import split
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.stage import identify
 from pzd.record import Array, Record
-from pzd.signals.stretches import apart, steps
+from pzd.signals.stretches import separate_tests, steps
 
 TRUTH = (400.0, 2500.0, 4e5)
 
@@ -27,7 +27,7 @@ def record(x: Array, rng: Generator, noise: float = 5.0) -> Record:
 
 @pytest.mark.parametrize("kind", STEPS)
 def test_a_step_of_speed_or_amplitude_parts_two_tests(kind: str, rng: Generator) -> None:
-    before, after = apart(record(STEPS[kind], rng))
+    before, after = separate_tests(record(STEPS[kind], rng))
     assert before.name == after.name == "r"
     assert before.time[0] == TIME[0]
     assert before.time[-1] == pytest.approx(6.0, abs=1.01)
@@ -39,7 +39,7 @@ def test_a_step_of_speed_or_amplitude_parts_two_tests(kind: str, rng: Generator)
 def test_what_changes_from_cycle_to_cycle_is_one_test(kind: str, rng: Generator) -> None:
     whole = record(NO_STEPS[kind], rng)
     assert steps(whole.time, whole.displacement) == ()
-    assert apart(whole) == (whole,)
+    assert separate_tests(whole) == (whole,)
 
 
 @pytest.mark.parametrize(("kind", "frequencies", "amplitudes"), [

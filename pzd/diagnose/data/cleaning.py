@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pzd.record import Array, Record, is_constant, sliced, voltage_scale
 from pzd.signals.between_cycles import pure_error
 from pzd.signals.cycles import Cycles, cycles, drift, settled
-from pzd.signals.stretches import apart
+from pzd.signals.stretches import separate_tests
 
 Motion = tuple[Array, Array, Array]
 """Displacement, velocity and acceleration, each (n,)."""
@@ -100,7 +100,9 @@ def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
     """Every record of one rig, its displacement cleaned; several tests in one record are as many, of its name."""
     scale = voltage_scale(records)
     still = [(record, is_constant(record, scale)) for record in records]
-    return tuple(_prepared(test, constant) for r, constant in still for test in (apart(r) if constant else (r,)))
+    return tuple(
+        _prepared(test, constant) for r, constant in still for test in (separate_tests(r) if constant else (r,))
+    )
 
 
 def _prepared(record: Record, constant: bool) -> Prepared:

@@ -26,7 +26,7 @@ from pzd.diagnose.search.candidates import (
     moved_by,
 )
 from pzd.diagnose.search.evidence import Evidence, evidence_of
-from pzd.diagnose.search.reweighting import at_rest
+from pzd.diagnose.search.reweighting import reweighted
 from pzd.diagnose.search.selection import Competition, Round, Selection, against_nature
 from pzd.diagnose.thresholds import NEARLY_AS_GOOD, WIDER
 
@@ -195,7 +195,7 @@ class _Search:
 
     def rest(self) -> None:
         """Weigh and fit in turn until no parameter moves, unless that widens the gap."""
-        evidence, current = at_rest(self.weighed, self.evidence, self.current)
+        evidence, current = reweighted(self.weighed, self.evidence, self.current)
         if self._gap(current) <= max(WIDER * self._gap(self.current), self.config.negligible):
             self.evidence, self.current = evidence, current
 

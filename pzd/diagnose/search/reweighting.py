@@ -13,7 +13,7 @@ from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.thresholds import AT_REST, MOST_REWEIGHTINGS
 
 
-def at_rest(weighed: Callable[[Damper], Evidence], evidence: Evidence, current: Fitted) -> tuple[Evidence, Fitted]:
+def reweighted(weighed: Callable[[Damper], Evidence], evidence: Evidence, current: Fitted) -> tuple[Evidence, Fitted]:
     """The evidence weighed by what an optimum leaves and the optimum by that evidence, in turn until neither moves.
 
     The delay of a test acts along the slope of the force that the damper gives, and shifts its corners.

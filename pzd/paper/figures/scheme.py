@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.paper.figures.canvas import INK, SOFT, sheet
 
-OIL = "#cfe3f1"
+OIL_COLOUR = "#cfe3f1"
 _HALF = 0.16
 """Half the width of springs and dashpots [in]."""
 _COILS = 6

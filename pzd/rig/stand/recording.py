@@ -146,7 +146,7 @@ def _drive(entry: VirtualEntry, test: StandTest, seed: int, folder: Path) -> _Dr
     waveform = test.waveform
     count = round(_duration(test, folder) * entry.rate_Hz)
     fine = entry.rate_Hz * entry.oversampling
-    lead = math.ceil(waveform.settling * entry.rate_Hz) * entry.oversampling
+    lead = math.ceil(waveform.settling_time * entry.rate_Hz) * entry.oversampling
     time = np.arange(-lead, count * entry.oversampling + 1) / fine
     course = waveform.course(draw_for(seed, "motion", waveform.name), folder)
     return _Drive(test, Motion(time, *started(course, lead / fine)(time)), lead, count / entry.rate_Hz)

@@ -34,6 +34,6 @@ class Lines(Waveform):
         return self.period_s
 
     @property
-    def settling(self) -> float:
+    def settling_time(self) -> float:
         """Two turns at the lowest frequency, or a second."""
         return two_turns(self.low_Hz)

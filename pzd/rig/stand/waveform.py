@@ -42,7 +42,7 @@ class Waveform(Frozen):
         """After which the motion repeats, or ends where it does not repeat [s]."""
 
     @property
-    def settling(self) -> float:
+    def settling_time(self) -> float:
         """How long the motion has to go on before the damper has forgotten its start [s]."""
         return 1.0
 

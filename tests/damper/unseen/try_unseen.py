@@ -16,9 +16,9 @@ from scipy.integrate import solve_ivp
 
 from pzd.artefacts import Diagnosed, ForceRow, Table, TableNotes
 from pzd.blind.case import Places
+from pzd.blind.diagnosis import COST, Methods, diagnose_case
 from pzd.blind.hide import Setup, hide
 from pzd.blind.plan import Planned, hideable
-from pzd.blind.seek import COST, Methods, seek
 from pzd.config import load
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.effects import library
@@ -197,7 +197,7 @@ def named(name: str) -> dict[str, object]:
         places, planned = Places(Path(folder)), Planned(0, "single", "all", (name,))
         hide(setup, planned, places)
         methods = Methods(config.identify, config.diagnose, config.rig.limits, setup.control, config.seed)
-        seek(methods, places.case(planned.id))
+        diagnose_case(methods, places.case(planned.id))
         truth = json.loads(places.truth(planned.id).read_text(encoding="utf-8"))
         cost = json.loads((places.case(planned.id) / COST).read_text(encoding="utf-8"))
         diagnosis = json.loads((places.case(planned.id) / "diagnosis.json").read_text(encoding="utf-8"))

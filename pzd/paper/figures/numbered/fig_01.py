@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.figure import Drawing, PaperFigure
-from pzd.paper.figures.scheme import OIL, Pen
+from pzd.paper.figures.scheme import OIL_COLOUR, Pen
 
 
 def draw(data: FigureData) -> Iterator[Drawing]:
@@ -25,17 +25,17 @@ def draw(data: FigureData) -> Iterator[Drawing]:
 
 def _damper(pen: Pen) -> None:
     pen.text(0.35, 3.7, "(a)")
-    pen.box(0.6, 0.7, 2.6, 0.9, OIL)
+    pen.box(0.6, 0.7, 2.6, 0.9, OIL_COLOUR)
     pen.box(1.7, 0.7, 0.25, 0.9)
     pen.line((1.95, 1.15), (4.0, 1.15), 2.5)
     pen.arrow((3.6, 0.85), (4.1, 0.85))
     pen.arrow((3.5, 0.85), (3.0, 0.85))
     for x in (0.85, 2.95):
-        pen.box(x - 0.08, 1.6, 0.16, 0.6, OIL)
-    pen.box(0.77, 2.2, 0.9, 0.16, OIL)
-    pen.box(2.13, 2.2, 0.9, 0.16, OIL)
+        pen.box(x - 0.08, 1.6, 0.16, 0.6, OIL_COLOUR)
+    pen.box(0.77, 2.2, 0.9, 0.16, OIL_COLOUR)
+    pen.box(2.13, 2.2, 0.9, 0.16, OIL_COLOUR)
     pen.box(1.62, 2.0, 0.56, 0.56)
-    pen.box(1.83, 2.0, 0.14, 0.3, OIL)
+    pen.box(1.83, 2.0, 0.14, 0.3, OIL_COLOUR)
     pen.box(1.72, 2.56, 0.36, 0.75, "#f6e3c5")
     pen.box(1.82, 3.31, 0.16, 0.3)
     for number, at, to in (
@@ -52,9 +52,9 @@ def _damper(pen: Pen) -> None:
 def _valve(pen: Pen) -> None:
     pen.text(4.75, 3.7, "(b)")
     pen.box(5.0, 0.6, 3.4, 1.5)
-    pen.box(5.0, 1.0, 1.2, 0.4, OIL)
-    pen.box(7.2, 1.0, 1.2, 0.4, OIL)
-    pen.box(6.2, 1.0, 1.0, 0.16, OIL)
+    pen.box(5.0, 1.0, 1.2, 0.4, OIL_COLOUR)
+    pen.box(7.2, 1.0, 1.2, 0.4, OIL_COLOUR)
+    pen.box(6.2, 1.0, 1.0, 0.16, OIL_COLOUR)
     pen.box(6.35, 1.16, 0.7, 1.2)
     pen.box(6.45, 2.36, 0.5, 1.1, "#f6e3c5")
     pen.line((6.3, 3.46), (7.1, 3.46), 3.0)

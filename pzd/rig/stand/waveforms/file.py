@@ -47,7 +47,7 @@ class FileMotion(Waveform):
             inside = np.clip(at_time, 0.0, time[-1] - time[0])
             x, v, a = spline(inside), slope(inside), bend(inside)
             before = at_time < 0.0
-            x[before], v[before], a[before] = _approach(at_time[before], *first, self.settling)
+            x[before], v[before], a[before] = _approach(at_time[before], *first, self.settling_time)
             return x, v, a
 
         return motion

@@ -53,7 +53,7 @@ class Sweep(Waveform):
         return max(round(mean * self.period_s), 1) / mean
 
     @property
-    def settling(self) -> float:
+    def settling_time(self) -> float:
         """Two turns at the lowest frequency, or a second."""
         return two_turns(self.low_Hz)
 

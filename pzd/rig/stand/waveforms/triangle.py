@@ -43,7 +43,7 @@ class Triangle(Waveform):
         return 1.0 / self.frequency_Hz
 
     @property
-    def settling(self) -> float:
+    def settling_time(self) -> float:
         """Two cycles, or a second."""
         return two_turns(self.frequency_Hz)
 

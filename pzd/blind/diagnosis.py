@@ -30,7 +30,7 @@ class Methods:
     """Of the evolutionary search, where identify uses it."""
 
 
-def seek(methods: Methods, folder: Path) -> None:
+def diagnose_case(methods: Methods, folder: Path) -> None:
     """Run ingest, identify and diagnose on the files of `folder`/rig, and write the diagnosis into `folder`.
 
     What goes wrong is written down as the case's failure.

@@ -1,4 +1,4 @@
-"""Scores a case: opens the truth beside the diagnosis."""
+"""The score of a case: its diagnosis compared with the truth that was hidden."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pzd.artefacts import Diagnosed, Diagnosis
 from pzd.blind.case import Cost, Places, Scored, Truth
 from pzd.blind.clean import Clean, read_clean
 from pzd.blind.cuts import gap_cut, gap_cut_of_truth
-from pzd.blind.seek import COST
+from pzd.blind.diagnosis import COST
 from pzd.quantities import Control
 from pzd.schema.jsonfile import read_json, write_json
 
@@ -19,7 +19,7 @@ SMALL_DELAY = 1e-3
 """So does a sensor_delay shorter than this [s]."""
 
 
-def mark(places: Places, name: str, made_from: str, control: Control, *, keep_files: bool) -> Scored:
+def score_case(places: Places, name: str, made_from: str, control: Control, *, keep_files: bool) -> Scored:
     """Score a diagnosed case and keep the score for good.
 
     Parameters
