@@ -48,11 +48,11 @@ figures: $(RUNTIME)  ## Draw the figures of the paper into runs/paper/figures
 	$(BIN)/pzd figures configs/paper.yaml
 
 .PHONY: blind
-blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the naming can be trusted; about an hour
+blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the verdicts can be trusted; about an hour
 	$(BIN)/pzd blind configs/blind.yaml
 
 .PHONY: bench
-bench: $(DEV)  ## Print how long a user waits, beside the limits
+bench: $(DEV)  ## Print how long a user waits, and the limits
 	$(BIN)/python tests/studies/bench.py
 
 .PHONY: coverage-study

@@ -71,7 +71,7 @@ def test_a_first_run_makes_every_stage_in_order(bench: Bench) -> None:
     folders = ["1-rig", "2-identify", "3-diagnose", "4-table", "5-simulate", "6-report"]
     assert sorted(path.name for path in bench.run.iterdir() if path.is_dir()) == folders
     assert (bench.run / "config.yaml").is_file()
-    assert bench.said("identify") == "identify   runs: no result of it stands here"
+    assert bench.said("identify") == "identify   runs: it has no result yet"
 
 
 def test_a_second_run_does_nothing_and_says_why_in_a_line_a_stage(bench: Bench) -> None:

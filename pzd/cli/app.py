@@ -21,7 +21,7 @@ _USAGE_ERROR: type[Exception] = next(kind for kind in typer.BadParameter.__mro__
 
 app = typer.Typer(
     name="pzd",
-    help="Says what a controlled damper does: rig files in, comfort report out.",
+    help="Turn the records of a damper test rig into a model of the damper and a comfort report.",
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     add_completion=True,
@@ -54,7 +54,7 @@ Version = Annotated[
 
 @app.callback(invoke_without_command=True)
 def _bare(context: typer.Context, version: Version = False) -> None:
-    """Say what a controlled damper does: rig files in, comfort report out."""
+    """Turn the records of a damper test rig into a model of the damper and a comfort report."""
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 

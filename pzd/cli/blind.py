@@ -26,7 +26,7 @@ def blind(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
-    """Hide effects in virtual rigs, diagnose them, and score what is named."""
+    """Hide effects in virtual rigs, diagnose them, score the verdicts."""
     from pzd.blind.benchmark import Benchmark, folder_of
     from pzd.blind.diagnosis import Methods
     from pzd.blind.summary import write

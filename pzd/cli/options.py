@@ -21,11 +21,11 @@ Set = Annotated[
         show_default=False,
     ),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Run the stage although it is fresh; with run, every stage.")]
+Force = Annotated[bool, typer.Option("--force", help="Run the stage even if it is fresh; with run, every stage.")]
 Jobs = Annotated[int, typer.Option("--jobs", metavar="N", min=1, help="Threads or processes that a stage may use.")]
 CORES = os.cpu_count() or 1
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
-Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print what the stages say, and tracebacks.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print what the stages report, and tracebacks.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for other programs.")]
 
 RUNS = Path("runs")

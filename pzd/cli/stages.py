@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from pzd.runs import Run
 
 _COMMANDS = {
-    "run": "Every stage: rig records in, comfort report out.",
-    "synthesise": "Test the virtual damper of the config.",
+    "run": "Run every stage, from rig records to the comfort report.",
+    "synthesise": "Record the tests of the virtual rig of the config.",
     "ingest": "Read the rig files of the config, and check them.",
     "identify": "Find the Bingham parameters of every condition.",
     "diagnose": "Find what the model misses, and print the verdict.",
     "table": "Tabulate force over voltage and speed.",
-    "simulate": "Drive the half-car on the damper.",
+    "simulate": "Compute the rides of the half-car on the damper.",
     "report": "Rate the rides by comfort, and write the page.",
 }
 

@@ -171,7 +171,7 @@ class Pipeline:
 def stale(state: StageFolder, inputs: dict[str, str]) -> str | None:
     """Why a stage must run, in words; None where it need not."""
     if state.manifest is None:
-        return "no result of it stands here"
+        return "it has no result yet"
     if state.missing:
         return f"{', '.join(state.missing)} missing"
     if state.manifest.key != key_of(inputs):

@@ -60,7 +60,7 @@ def run_summary(run: Run) -> RunSummary:
     manifests = {kind: run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Rides, Report)}
     there = {kind for kind, manifest in manifests.items() if manifest is not None}
     if not there:
-        raise ConfigError(f"{run.folder}: no results stand here yet; pzd run {run.config} makes them")
+        raise ConfigError(f"{run.folder}: there are no results yet; pzd run {run.config} makes them")
     at = run.folder
     control = control_of(read_yaml(at / CONFIG).data) if (at / CONFIG).is_file() else run.control
     run = replace(run, control=control)
@@ -99,7 +99,7 @@ def summary_of(folder: Path) -> RunSummary:
     """
     written = folder / CONFIG
     if not written.is_file():
-        raise ConfigError(f"{folder}: no run stands here, it has no {CONFIG}; give a folder like runs/quickstart")
+        raise ConfigError(f"{folder}: this folder holds no run, it has no {CONFIG}; give a folder like runs/quickstart")
     run = Run(folder, written, control_of(read_yaml(written).data))
     return replace(run_summary(run), stale=_stale_by_its_config(run))
 

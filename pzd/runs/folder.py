@@ -73,7 +73,7 @@ class Run:
             owner = run._owner(manifest.parent.name)
             if owner is not None and owner.exists() and owner != config.resolve():
                 raise ConfigError(
-                    f"{run.folder}: the results of {owner} stand here, and {config.resolve()} has the same stem; "
+                    f"{run.folder}: this folder holds the results of {owner}, and {config.resolve()} has the same stem; "
                     "rename one of them or give --runs another folder"
                 )
         return run

@@ -165,7 +165,7 @@ class _Composer:
             if not isinstance(key, str):
                 self.fault(event, path, f"a key must be text; put it in quotes (got {name or 'no text'})")
             elif key in found:
-                self.fault(event, (*path, key), f"the key stands here a second time (first at {found[key].place})")
+                self.fault(event, (*path, key), f"the key is given a second time (first at {found[key].place})")
             found[name] = Entry(self.place(event), self.node(next(self.events), (*path, name), depth))
         return found
 

@@ -129,7 +129,8 @@ def _put(node: Node, path: list[str], value: Node, name: str) -> Node:
     key, rest = path[0], path[1:]
     if isinstance(node.value, tuple):
         if not (key.isdecimal() and int(key) < len(node.value)):
-            raise ConfigError(f"{name}: a list of {len(node.value)} stands here, its items are 0, 1, ... (got {key})")
+            size = f"{len(node.value)} item{'s' * (len(node.value) != 1)}"
+            raise ConfigError(f"{name}: the list here has {size}, counted from 0 (got {key})")
         items = list(node.value)
         items[int(key)] = _put(items[int(key)], rest, value, name)
         return collection(tuple(items), node.place)

@@ -68,7 +68,7 @@ def test_faults_carry_line_and_column_of_the_value(tmp_path: Path) -> None:
 
 def test_a_key_that_stands_twice_is_refused(tmp_path: Path) -> None:
     found = faults(tmp_path / "r.json", '{"tests": [{"name": "a",\n "name": "b"}]}')
-    assert found == ["r.json:2:2: tests.0.name: the key stands here a second time (first at r.json:1:13)"]
+    assert found == ["r.json:2:2: tests.0.name: the key is given a second time (first at r.json:1:13)"]
 
 
 def test_the_control_under_another_name_is_refused(tmp_path: Path) -> None:
