@@ -281,9 +281,8 @@ def _promised(problem: Problem, before: Fitted, effect: Effect, start: Array, fr
     residuals, slopes = [], []
     for o in problem.observations:
         forces = [simulated(point, o) for point in points]
-        at_start = o.left(forces[0])
-        residuals.append(at_start.residual)
-        slopes.append(at_start.slopes(np.stack([forces[0] - f for f in forces[1:]], axis=-1) / DIFFERENCE))
+        residuals.append(o.in_noise(o.measured - forces[0]))
+        slopes.append(o.in_noise(np.stack([forces[0] - f for f in forces[1:]], axis=-1) / DIFFERENCE))
     r, columns = np.concatenate(residuals), np.concatenate(slopes)
     r, columns = r - frame @ (frame.T @ r), columns - frame @ (frame.T @ columns)
     size = np.linalg.norm(columns, axis=0)
