@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from pzd.artefacts import Prediction
+from pzd.diagnose.added_by_prediction import with_predictive_effects
+from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.kept_back import Trials
 from pzd.diagnose.missed import Missed
@@ -20,11 +22,21 @@ class HandedOn:
     """What was adopted and does no harm, and what it predicts."""
 
     selection: Selection
-    prediction: Prediction | None
+    plain: Missed
+    """What the plain damper misses of kept-back tests."""
+    missed: Missed
+    """What the damper handed on misses of them."""
     refused: str | None
     """Why the plain damper is handed on although effects fitted the tests; None where it is not."""
     by_criterion: bool = False
     """Whether the last fit is by criterion (4), every sample alike: what is left is then no noise to weigh by."""
+    added: tuple[str, ...] = ()
+    """Which effects were added for what the damper predicts with them, and for nothing else."""
+
+    def prediction(self, trials: Trials) -> Prediction | None:
+        """What is predicted of kept-back tests and voltages, for diagnosis.json; None where nothing could be."""
+        damper = self.selection.fitted.damper if self.selection.adopted else None
+        return trials.told(self.plain, self.missed, damper, by_criterion=self.by_criterion)
 
 
 def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit: str) -> HandedOn:
@@ -55,12 +67,28 @@ def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit:
             refused = _refused(selection, (missed, plain), trials, worse, unit)
         kept = _without(kept, harmful)
     if not kept.adopted:
-        return HandedOn(kept, trials.told(plain, plain, None), refused)
+        return HandedOn(kept, plain, plain, refused)
     found = trials.fitted_by_criterion(kept.fitted.damper, trials.nothing) if by_criterion else None
     if found is not None:
         kept = replace(kept, fitted=found[1], last=replace(kept.last, whole=found[0]))
-    prediction = trials.told(plain, missed, kept.fitted.damper, by_criterion=by_criterion)
-    return HandedOn(kept, prediction, None, by_criterion)
+    return HandedOn(kept, plain, missed, None, by_criterion)
+
+
+def with_additions(handed: HandedOn, trials: Trials, config: DiagnoseConfig) -> HandedOn:
+    """The same with the effects that improve the prediction of kept-back tests, where a gap has no name.
+
+    Parameters
+    ----------
+    handed : what does no harm
+    trials : the tests, dealt into folds
+    config : how many effects there may be, which are forbidden, what is visible
+    """
+    more = with_predictive_effects(handed.selection, handed.missed, trials, config)
+    if more is None:
+        return handed
+    return replace(
+        handed, selection=more.selection, missed=more.missed, refused=None, by_criterion=True, added=more.effects
+    )
 
 
 def _best(selection: Selection, trials: Trials) -> tuple[Missed, bool]:

@@ -140,6 +140,16 @@ def _switched_off(effect: Effect, fitted: Fitted) -> bool:
     return vanishes and bool(fitted.searched[-1] - nearest < AT_EDGE)
 
 
+def most_promising(problem: Problem, before: Fitted, effects: Sequence[Effect], count: int) -> list[Effect]:
+    """The effects from whose starting values one linearised step promises the smallest misfits, best first."""
+    frame, _ = np.linalg.qr(before.slopes)
+    promised = [
+        min(_promised(problem, before, effect, start, frame) for start in _starts(problem, before, effect))
+        for effect in effects
+    ]
+    return [effects[i] for i in np.argsort(promised, kind="stable")[:count]]
+
+
 def _without_promise(problem: Problem, before: Fitted, effect: Effect) -> bool:
     """Whether a faint effect of one parameter promises nothing; one of more may act where nobody looks yet."""
     if len(effect.parameters) > 1:
