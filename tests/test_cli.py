@@ -18,12 +18,12 @@ from typing import Any
 
 import pytest
 import yaml
-from stand_ins import NAMES, UNDETERMINED, project
+from stub_stages import NAMES, NEXT_TEST, UNDETERMINED, project
 
-from pzd.artefacts import Diagnosis, Gap, KeptBack, LeftOut, NextTest, Prediction, Ranked, Region, Value
+from pzd.artefacts import Diagnosis, Gap, KeptBack, LeftOut, Prediction, Ranked, Region, Value
 from pzd.cli.app import status
+from pzd.cli.diagnosis import diagnosis_lines
 from pzd.cli.output import Output
-from pzd.cli.story import story
 from pzd.config import load
 from pzd.damper.effects import library
 from pzd.quantities import Control
@@ -573,16 +573,7 @@ def diagnosis() -> Diagnosis:
         ),
         rivals=("shear_thinning",),
         where=(Region(region="abs(v) > 0.25 m/s, 150 V", share_of_gap=0.71),),
-        next_test=NextTest(
-            waveform="sine",
-            frequency_Hz=4.0,
-            amplitude_m=0.01,
-            voltage_V=150.0,
-            separates=("orifice_quadratic", "shear_thinning"),
-            middle_m=0.03135,
-            peak_speed_m_per_s=0.251327,
-            peak_force_N=1512.345,
-        ),
+        next_test=NEXT_TEST,
     )
 
 
@@ -600,13 +591,13 @@ def test_the_story_tells_every_kept_back_test_where_it_is_asked_to() -> None:
         "kept back: r03 at 100 V, W_s 0.012 plain, 0.003 as handed on",
         "left out: 50 V, between its neighbours W_s 0.02 plain, 0.01 as handed on",
     ]
-    plain = story(diagnosis(), Control())
-    assert story(predicted, Control()) == [*plain[:3], whole, *plain[3:]]
-    assert story(predicted, Control(), every_test=True) == [*plain[:3], whole, *each, *plain[3:]]
+    plain = diagnosis_lines(diagnosis(), Control())
+    assert diagnosis_lines(predicted, Control()) == [*plain[:3], whole, *plain[3:]]
+    assert diagnosis_lines(predicted, Control(), every_test=True) == [*plain[:3], whole, *each, *plain[3:]]
 
 
 def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
-    assert story(diagnosis(), Control()) == [
+    assert diagnosis_lines(diagnosis(), Control()) == [
         "verdict: named, one answer fits, and no other does",
         "reason: only orifice_quadratic closes the gap",
         "gap on what no fit has seen (2 records): W_s 0.0121 before, 0.0009 after, 93% less; noise alone gives 0.0008",
@@ -624,7 +615,7 @@ def test_the_story_of_a_diagnosis_in_ten_lines() -> None:
 
 def test_a_parameter_that_moves_with_the_voltage_is_told_at_each() -> None:
     value = Value(value=(1.0, 2.0), low95=(0.9, 1.9), high95=(1.1, 2.1), unit="N", at_voltage_V=(0.0, 150.0))
-    told = story(
+    told = diagnosis_lines(
         diagnosis().model_copy(update={"parameters": {"orifice_quadratic": {"q": value}}}), Control("current", "A")
     )
     assert "adopted: orifice_quadratic, q = 1 N at 0 A; 2 N at 150 A" in told
@@ -746,7 +737,7 @@ SLOW = """
 import sys, time
 from concurrent.futures import ThreadPoolExecutor
 sys.path[:0] = [{here!r}, {root!r}]
-import stand_ins
+import stub_stages
 from pzd.artefacts import Identified, Rig
 from pzd.identify.config import IdentifyConfig
 from pzd.pipeline import command
@@ -760,7 +751,7 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
 
 identify.__module__ = "pzd.identify.stage"
 command.stages = lambda config: tuple(
-    Stage("identify", identify) if stage.name == "identify" else stage for stage in stand_ins.stages(config)
+    Stage("identify", identify) if stage.name == "identify" else stage for stage in stub_stages.stages(config)
 )
 sys.argv = ["pzd", "run", "first.yaml"]
 from pzd.cli import main

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
-import stand_ins
-from stand_ins import NAMES, UNDETERMINED, project
+import stub_stages
+from stub_stages import NAMES, UNDETERMINED, project
 
 from pzd.artefacts import Identified, Manifest, Rig
 from pzd.cli import start
@@ -19,7 +19,7 @@ from pzd.config import load
 from pzd.damper.effects import library
 from pzd.pipeline.command import execute, opened, stale_stages
 from pzd.pipeline.execution import Pipeline
-from pzd.pipeline.sources import PACKAGE, _file, _used, code_hash, modules_used
+from pzd.pipeline.sources import PACKAGE, _file, _imports_of, code_hash, modules_used
 from pzd.pipeline.stages import Stage, stages
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
@@ -205,7 +205,7 @@ def edited(path: Path | None) -> None:
     with path.open("a") as file:
         file.write("# edited\n")
     code_hash.cache_clear()
-    _used.cache_clear()
+    _imports_of.cache_clear()
 
 
 def test_a_comment_in_what_no_stage_imports_reruns_nothing(bench: Bench, copied: Path) -> None:
@@ -300,7 +300,7 @@ def test_no_import_is_missed() -> None:
         name = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
         imports = set(executed_imports(ast.parse(path.read_text(encoding="utf-8"))))
         modules = {one if _file(one, PACKAGE) else one.rpartition(".")[0] for one in imports if one.startswith("pzd.")}
-        assert modules - {name, "pzd"} <= _used(name, PACKAGE), name
+        assert modules - {name, "pzd"} <= _imports_of(name, PACKAGE), name
 
 
 def test_a_stage_hangs_on_the_equations_of_the_damper_and_not_on_what_stands_above_it() -> None:
@@ -546,7 +546,7 @@ def test_the_wrong_source_is_named_with_the_right_one(bench: Bench, target: str,
 
 
 def test_a_stage_declares_itself_by_its_signature() -> None:
-    stage = Stage("identify", stand_ins.identify)
+    stage = Stage("identify", stub_stages.identify)
     assert list(stage.takes) == ["identify", "rig", "seed"]
     assert stage.makes is Identified
     assert stage.folder == "2-identify"
@@ -555,7 +555,7 @@ def test_a_stage_declares_itself_by_its_signature() -> None:
 def test_a_stage_that_asks_for_it_can_say_how_far_it_is(bench: Bench) -> None:
     def slow(rig: RigConfig, control: Control, folder: Path, progress: Listener = unheard) -> Rig:
         progress(Progress(1, 2, "files"))
-        return stand_ins.ingest(rig, control, folder)
+        return stub_stages.ingest(rig, control, folder)
 
     heard: list[Progress] = []
     given = opened(bench.config, bench.runs)

@@ -18,7 +18,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule, run_state_machine_as_test
-from stand_ins import NAMES, project
+from stub_stages import NAMES, project
 
 from pzd.artefacts import Manifest
 from pzd.pipeline.command import execute, opened

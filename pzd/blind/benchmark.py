@@ -47,7 +47,7 @@ class Benchmark:
     methods: Methods
     places: Places
     made_from: str
-    """Hash of everything that a case hangs on but its number: cases with another one are done again."""
+    """Hash of everything that a case depends on but its number: cases with another one are done again."""
     pool: Callable[[int], Executor] = processes
     """Makes a pool of so many workers."""
     progress: Listener = unheard

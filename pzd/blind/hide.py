@@ -73,7 +73,7 @@ def drawn(setup: Setup, planned: Planned) -> tuple[Truth, list[Taken]]:
     unsteady = float(np.exp(draw.uniform(*np.log(blind.displacement_noise_m))))
     warms = bool(draw.random() < blind.warming_share) or planned.needs("temperature")
     wanted = {name: float(np.exp(draw.uniform(*np.log(blind.sizes)))) for name in planned.hidden}
-    stand = _stand(setup, campaign, _near(setup.stand.damper, blind.base_spread, draw), warms=warms)
+    stand = _stand(setup, campaign, _scattered(setup.stand.damper, blind.base_spread, draw), warms=warms)
     plain = _clean(stand.model_copy(update={"oversampling": 1}), stand_seed, setup.control)
     if planned.kind == "outside":
         hidden = Outside.drawn(planned.hidden[0], wanted[planned.hidden[0]], plain, draw)
@@ -105,7 +105,7 @@ def drawn(setup: Setup, planned: Planned) -> tuple[Truth, list[Taken]]:
     ), records
 
 
-def _near(damper: Damper, spread: float, draw: np.random.Generator) -> Damper:
+def _scattered(damper: Damper, spread: float, draw: np.random.Generator) -> Damper:
     """The damper with T0, C and k of every row scaled, half by factors of the case and half by the row's own."""
     common = draw.uniform(-0.5, 0.5, 3)
     rows = []

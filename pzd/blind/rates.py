@@ -34,8 +34,8 @@ class Rate:
     @classmethod
     def of(cls, cases: Iterable[Scored], hit: Test) -> Rate:
         """How many of the cases pass a test."""
-        told = [hit(case) for case in cases]
-        return cls(sum(told), len(told))
+        hits = [hit(case) for case in cases]
+        return cls(sum(hits), len(hits))
 
     @property
     def share(self) -> float | None:

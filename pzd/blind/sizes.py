@@ -42,10 +42,12 @@ def with_effects(
         if hiding is None:
             raise ValueError(f"{name} says not how it is hidden")
         effects[name] = of_size(hiding(draw, scales), partial(_size, records, base, name), size)
-    return Damper(base=plain.base, effects=_plain(effects), reference_temperature_degC=base.reference_temperature_degC)
+    return Damper(
+        base=plain.base, effects=_as_dicts(effects), reference_temperature_degC=base.reference_temperature_degC
+    )
 
 
-def _plain(effects: Mapping[str, Values]) -> dict[str, dict[str, float | tuple[float, ...]]]:
+def _as_dicts(effects: Mapping[str, Values]) -> dict[str, dict[str, float | tuple[float, ...]]]:
     return {name: dict(values) for name, values in effects.items()}
 
 

@@ -65,7 +65,7 @@ def _rows(damper: Damper, x: Array) -> Damper:
 
 
 class _Part:
-    """One record in the search, and which of the searched variables it hangs on."""
+    """One record in the search, and which of the searched variables it depends on."""
 
     def __init__(self, record: Clean, damper: Damper) -> None:
         self.record = record

@@ -63,7 +63,7 @@ def _setup(config: RunConfig) -> Setup:
 
 
 def _made_from(config: RunConfig) -> str:
-    """Hash of the config's blocks and of the code that a case hangs on."""
+    """Hash of the config's blocks and of the code that a case depends on."""
     from pzd.pipeline.sources import code_hash
 
     of_the_run = {"blind": {"cases", "keep_files", "tuned_on", "tuning"}}

@@ -66,7 +66,7 @@ def show(
 
     A stage whose numbers are of an older config, of other files or of other code is called stale, with the reason.
     """
-    from pzd.cli.story import story
+    from pzd.cli.diagnosis import diagnosis_lines
     from pzd.pipeline.command import opened
     from pzd.pipeline.run_summary import summary_with_stale
 
@@ -77,7 +77,11 @@ def show(
         return DONE
     output.say(f"run: {found.folder}", *stale_lines(found))
     _section(output, "parameters", _parameters(found))
-    _section(output, "diagnosis", [[line] for line in story(found.diagnosis, found.control)] if found.diagnosis else [])
+    _section(
+        output,
+        "diagnosis",
+        [[line] for line in diagnosis_lines(found.diagnosis, found.control)] if found.diagnosis else [],
+    )
     _section(output, "rides", _rides(found))
     _section(output, "comfort", _comfort(found))
     output.say(*(f"not to be trusted: {mark}" for mark in found.marks))

@@ -1,4 +1,4 @@
-"""The commands that bring a run up to date: all of it, or as far as one stage."""
+"""The commands that run stages: all of them, or as far as one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _COMMANDS = {
     "synthesise": "Test the virtual damper of the config.",
     "ingest": "Read the rig files of the config, and check them.",
     "identify": "Find the Bingham parameters of every condition.",
-    "diagnose": "Find what the model misses, and tell the story.",
+    "diagnose": "Find what the model misses, and print the verdict.",
     "table": "Tabulate force over voltage and speed.",
     "simulate": "Drive the half-car on the damper.",
     "report": "Rate the rides by comfort, and write the page.",
@@ -30,15 +30,15 @@ def _page(run: Run, **_: bool) -> list[str]:
     return [f"report: {page_of(run)}"]
 
 
-def _story(run: Run, *, verbose: bool) -> list[str]:
-    from pzd.cli.story import story
+def _diagnosis(run: Run, *, verbose: bool) -> list[str]:
+    from pzd.cli.diagnosis import diagnosis_lines
     from pzd.pipeline.run_summary import run_summary
 
     found = run_summary(run).diagnosis
-    return story(found, run.control, every_test=verbose) if found else []
+    return diagnosis_lines(found, run.control, every_test=verbose) if found else []
 
 
-_AT_THE_END: dict[str, Callable[..., list[str]]] = {"run": _page, "report": _page, "diagnose": _story}
+_AT_THE_END: dict[str, Callable[..., list[str]]] = {"run": _page, "report": _page, "diagnose": _diagnosis}
 """What a command says once its stages are up to date."""
 
 

@@ -12,7 +12,7 @@ from pzd.record import Array
 _MEMORY_S = 20.0
 """The 0.4 Hz high-pass forgets as exp(-1.8 t): after 20 s nothing is left that could wrap round."""
 _RAMP_S = 1.0
-"""The last value runs out over this time: a drop to nought would ring at the Nyquist frequency."""
+"""The last value runs out over this time: a drop to zero would ring at the Nyquist frequency."""
 
 
 @dataclass(frozen=True)

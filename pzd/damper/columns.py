@@ -10,7 +10,7 @@ Column = tuple[str, str]
 
 
 def acting(place: Place) -> tuple[Effect, ...]:
-    """The effects and foils of a place in the order in which they act."""
+    """The effects and competing forms of a place in the order in which they act."""
     return tuple(sorted((e for e in known().values() if e.place == place), key=lambda e: (e.order, e.name)))
 
 

@@ -8,7 +8,7 @@ numba: they take and give numbers, and use `math` alone. Effects of one place ac
 every parameter at its neutral value an effect is left out.
 
 drive
-    `law`: voltage felt a step later, the voltage that arrives going linearly from `before` to `now`; `rate`: its rate.
+    `law`: effective voltage a step later, the incoming one going linearly from `before` to `now`; `rate`: its rate.
     What it remembers is the voltage it gave last. Supply, valve and actuator; no force acts back on it.
 material
     `friction_factor`, `damping_factor`, `stiffness_factor`: factors on T0, C and k by the recorded temperature.

@@ -20,12 +20,8 @@ from pzd.identify.separable import descend, fit_separable
 from pzd.identify.trial import trial_of
 from pzd.identify.trust import Evidence, judge, stationarity, visible_shares
 from pzd.record import Array, Condition, Record
+from pzd.signals.criterion import criterion
 from pzd.signals.stretches import apart
-
-
-def fit_condition(condition: Condition, config: IdentifyConfig, seed: int) -> ParameterRow:
-    """The Bingham parameters of one condition, pooled over its records."""
-    return identify_condition(condition, config, seed)[0]
 
 
 def identify_condition(
@@ -52,11 +48,6 @@ def identify_condition(
         (objective.measured, fit.residuals),
     )
     return row, None if auxiliary is None else _auxiliary_row(labels, auxiliary)
-
-
-def fit_records(records: Sequence[Record], config: IdentifyConfig, seed: int) -> tuple[Objective, Fit]:
-    """The optimum of criterion (4) over the records, by the method that the config names."""
-    return fit_with_auxiliary(records, config, seed)[:2]
 
 
 def fit_with_auxiliary(
@@ -148,7 +139,7 @@ def row_of(
         k_N_per_m=stiffness[0],
         k_N_per_m_low95=stiffness[1],
         k_N_per_m_high95=stiffness[2],
-        W_s=float(residuals @ residuals / (measured @ measured)),
+        W_s=criterion(residuals, measured),
         rmse_N=float(np.sqrt(np.mean(residuals**2))),
         status=trust.status,
     )

@@ -30,6 +30,7 @@ from pzd.identify.separable import TOLERANCE, fit_separable
 from pzd.identify.trial import Trial, trial_of
 from pzd.identify.trust import stationarity, visible_shares
 from pzd.record import CONSTANT_SHARE, Array, Condition, Record, conditions, voltage_scale
+from pzd.signals.criterion import criterion
 from pzd.signals.nuisance import NuisanceConfig
 
 Known = tuple[Condition, ParameterRow]
@@ -208,6 +209,6 @@ def _rows(
         measured, left = plain.measured[here], residuals[here]
         energy = float(measured @ measured)
         facts = np.stack([scales[i], noise[i], widths[i], visible[i] * np.sqrt(plain.energy / energy), cosines[i]])
-        evidence = evidence_of(plain, parameters, float(left @ left) / energy, facts, misfit)
+        evidence = evidence_of(plain, parameters, criterion(left, measured), facts, misfit)
         rows.append(row_of(labels[i], parameters, widths[i], evidence, (measured, left)))
     return rows

@@ -184,7 +184,7 @@ def _fit(base: Base, effect: Effect | None, start: Mapping[str, float]) -> Attem
 
     def misses_at(scaled: Array) -> Array:
         found = values(np.clip(scaled * sizes, low, high) / sizes)
-        return np.array(list(_misses(base, effect, found).values()))
+        return np.array(list(_misses(effect, found).values()))
 
     low, high = np.array([u.low for u in unknowns]), np.array([u.high for u in unknowns])
     best = np.array([u.start for u in unknowns]) / sizes
@@ -194,14 +194,14 @@ def _fit(base: Base, effect: Effect | None, start: Mapping[str, float]) -> Attem
         best = least_squares(
             misses_at, inside, bounds=limits, diff_step=[1e-5] * len(unknowns), ftol=1e-6, xtol=1e-6, max_nfev=40
         ).x
-    found = _misses(base, effect, values(best))
+    found = _misses(effect, values(best))
     worst = max(found, key=lambda name: abs(found[name]))
     return Attempt(base, effect.name if effect else NO_EFFECT, len(unknowns), abs(found[worst]), worst, values(best))
 
 
-def _misses(base: Base, effect: Effect | None, found: Mapping[str, float]) -> dict[str, float]:
+def _misses(effect: Effect | None, found: Mapping[str, float]) -> dict[str, float]:
     """Miss of each of the published forces, 1 at the edge of what is admitted."""
-    dampers = {warm: _damper(base, effect, found, warm=warm) for warm in (False, True)}
+    dampers = {warm: _damper(effect, found, warm=warm) for warm in (False, True)}
     missed, loops = {}, {}
     for row in condition():
         warm, frequency = (row.temperature_degC or 0.0) > WARM_DEGC, row.frequency_Hz or 0.0
@@ -218,7 +218,7 @@ def _miss(force: float, row: Expected) -> float:
     return (force - middle) / max(half, TOLERANCES[row.quantity] * middle)
 
 
-def _damper(base: Base, effect: Effect | None, found: Mapping[str, float], *, warm: bool) -> Damper:
+def _damper(effect: Effect | None, found: Mapping[str, float], *, warm: bool) -> Damper:
     table = table_damper("Table 3" if warm else "Table 2")[0]
     suffix = "hot" if warm else "cold"
     row = BaseRow(

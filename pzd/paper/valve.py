@@ -22,8 +22,6 @@ REFERENCE_DEGC, COLD_DEGC, HOT_DEGC = 22.0, 23.0, 43.0
 """Temperatures of Figures 4 to 6, and of the two curves of Figures 8 and 9 [degC]."""
 STIFFNESS = 2.0e6
 """Oil spring of the stand [N/m]: 2.6 times the bound that the published forces set from below (`least_stiffness`)."""
-FULL_STROKE = 85e-6
-"""Free stroke of the stack at 150 V by its maker (STROKE) [m]."""
 
 
 @dataclass(frozen=True)

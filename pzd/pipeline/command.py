@@ -1,4 +1,4 @@
-"""What a command does with a config: bring its stages up to date, or check it."""
+"""What a command does with a config: run its stages as far as asked, or check it."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:
 def execute(
     given: Opened, target: str, *, force: bool, jobs: int, say: Say, progress: Listener = unheard
 ) -> tuple[str, ...]:
-    """Bring a run up to date as far as a stage.
+    """Run every stage that is out of date, as far as a target.
 
     Parameters
     ----------

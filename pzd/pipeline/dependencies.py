@@ -23,7 +23,7 @@ _WORDS = {"code": "the code", "marks": "what is not to be trusted"}
 """How a line calls what has a short name."""
 _LIBRARIES = ("numpy", "scipy", "numba")
 """Whose versions may change the last digits of a result."""
-_NAMED = 3
+_MOST_CHANGES = 3
 """How many changes a line names before it only counts them."""
 
 
@@ -74,7 +74,7 @@ def dependencies(stage: Stage, config: RunConfig, run: Run, marks: Sequence[str]
             values = dict(_leaves(block[0], block[1].model_dump(mode="json")))
             found |= {path: _hash(value) for path, value in values.items()}
             if "folder" in stage.takes:
-                found |= _files_named(values, run.config.parent)
+                found |= _file_hashes(values, run.config.parent)
         elif name == "setting":
             found[name] = _hash(setting_of(config, run))
         elif name == "seed":
@@ -97,9 +97,11 @@ def changes(before: Mapping[str, str], now: Mapping[str, str]) -> str:
         if before.get(name) != now.get(name):
             change = "is new" if name not in before else "is gone" if name not in now else "has changed"
             by_place.setdefault(name.rpartition("/")[0] or name, []).append(f"{_WORDS.get(name, name)} {change}")
-    told = [one[0] if len(one) == 1 else f"{len(one)} files of {place} have changed" for place, one in by_place.items()]
-    more = len(told) - _NAMED
-    return ", ".join(told[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+    lines = [
+        one[0] if len(one) == 1 else f"{len(one)} files of {place} have changed" for place, one in by_place.items()
+    ]
+    more = len(lines) - _MOST_CHANGES
+    return ", ".join(lines[:_MOST_CHANGES]) + (f" and {more} more" if more > 0 else "")
 
 
 def _hash(value: Any) -> str:
@@ -115,13 +117,13 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
         yield from _leaves(f"{path}.{key}", below)
 
 
-def _files_named(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
+def _file_hashes(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
     """Hashes of the files beside the config that its values name; absent ones are the stage's to refuse."""
     from pzd.rig.files.listing import matching
 
-    named = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
+    paths = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
     try:
-        files = [file for value in named for file in matching(folder, value)]
+        files = [file for value in paths for file in matching(folder, value)]
         if expected := values.get("report.reference"):
             from pzd.report.reference import path_of
 

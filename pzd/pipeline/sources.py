@@ -1,4 +1,4 @@
-"""The source code that a stage may use, as one hash: edit an equation, and what hangs on it runs again.
+"""The source code that a stage may use, as one hash: edit an equation, and what depends on it runs again.
 
 Followed are the imports of the stage's module, wherever they stand in a file, and those of what it
 imports, and so on. Nothing is imported for it, as numba and scipy take a second that a run in which
@@ -72,24 +72,26 @@ def modules_used(module: str, package: Path = PACKAGE) -> set[str]:
     waiting = {module}
     while waiting:
         found |= waiting
-        waiting = {used for name in waiting for used in _used(name, package)} - found
+        waiting = {imported for name in waiting for imported in _imports_of(name, package)} - found
     return found
 
 
 @cache
-def _used(name: str, package: Path) -> frozenset[str]:
+def _imports_of(name: str, package: Path) -> frozenset[str]:
     """The modules that one module names, and the packages above it, which are imported before it."""
     path = _file(name, package)
     if path is None:
         return frozenset()
     source = _TYPES_ONLY.sub("", path.read_text(encoding="utf-8"))
-    named = {f"{found[1]}.{one}" for found in _FROM.finditer(source) for one in re.findall(r"\w+", found[2])}
+    mentioned = {f"{found[1]}.{one}" for found in _FROM.finditer(source) for one in re.findall(r"\w+", found[2])}
     for mention in _MENTION.finditer(source):
-        named |= _below(mention[0][:-1], package) if mention[1] else {mention[0]}
+        mentioned |= _below(mention[0][:-1], package) if mention[1] else {mention[0]}
     if _WHOLE_FOLDER in source:
-        named |= _below(name, package)
-    used = {".".join(one.split(".")[: length + 1]) for one in {*named, name} for length in range(one.count(".") + 1)}
-    return frozenset(one for one in used if one != name and _file(one, package))
+        mentioned |= _below(name, package)
+    imported = {
+        ".".join(one.split(".")[: length + 1]) for one in {*mentioned, name} for length in range(one.count(".") + 1)
+    }
+    return frozenset(one for one in imported if one != name and _file(one, package))
 
 
 def _below(name: str, package: Path) -> set[str]:

@@ -1,1 +1,1 @@
-"""What the passengers feel, and one page that tells the whole story."""
+"""The comfort of every ride, and one page on the whole run."""

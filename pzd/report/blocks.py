@@ -65,7 +65,7 @@ Block = Paragraph | Notes | Sheet | Gallery
 
 @dataclass(frozen=True)
 class Section:
-    """One step of the story."""
+    """One section of the page: a title and its blocks."""
 
     anchor: str
     title: str

@@ -78,7 +78,7 @@ class ReportContext:
 
     @cached_property
     def sampled(self) -> tuple[Record, ...]:
-        """Records for maps: all of the setting, or every so manyth where they are too many to simulate at leisure."""
+        """Records for maps: all of the setting, or every n-th where there are too many to simulate in a short time."""
         total = sum(record.time.size for record in self.records)
         return self.records[:: max(math.ceil(total / _MOST_SAMPLES), 1)]
 

@@ -1,4 +1,4 @@
-"""How pictures look, and how they become text that is the same at every run."""
+"""Colours and style of the report's plots, and their encoding as text that is the same at every run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 Place = Literal["model", "missing", "damper", "passenger"]
 
 MEASURED = "#4d4d4d"
-PLAIN = "#d55e00"
+BASELINE = "#d55e00"
+"""What something better is compared with: the simple model, the gap before, constant damping."""
 FINAL = "#0072b2"
 GRID = "#e3e6ea"
 INK = "#1f2933"
@@ -137,7 +138,7 @@ def _encoded(panel: Panel) -> Picture:
 
 
 def thinned(*columns: Array) -> tuple[Array, ...]:
-    """Every so manyth sample of arrays of one length, so that a curve is no longer than the eye can follow."""
+    """Every n-th sample of arrays of one length, n so large that a curve has few enough points to be drawn."""
     step = max(int(np.ceil(columns[0].size / _MOST_POINTS)), 1)
     return tuple(column[::step] for column in columns)
 

@@ -9,6 +9,7 @@ import numpy as np
 from pzd.identify.trial import warm_up
 from pzd.record import Array, Record, is_constant, voltage_scale
 from pzd.report.context import ReportContext
+from pzd.signals.criterion import criterion
 
 _BINS = 14
 """Classes of velocity in the map."""
@@ -31,26 +32,11 @@ class GapMap:
     """(rows, n) final damper"""
 
 
-def criterion(measured: Array, simulated: Array) -> float:
-    """How badly a simulated force misses the measured one.
-
-    Equation: W_s = sum (F - F_sim)^2 / sum F^2          Source: Makowski and Knap 2021, eq. (4)
-
-    Parameters
-    ----------
-    measured, simulated : (n,) [N]
-
-    Returns
-    -------
-    W_s, a pure number
-    """
-    return float(np.sum((measured - simulated) ** 2) / np.sum(measured**2))
-
-
 def of_record(context: ReportContext, record: Record) -> tuple[float, float]:
-    """W_s of a record before and after diagnose, past what hangs on how it began."""
+    """W_s of a record before and after diagnose, without the samples that depend on how it began."""
     part = _begun(record)
-    before, after = (criterion(record.force[part], force[part]) for force in context.simulated(record))
+    measured = record.force[part]
+    before, after = (criterion(measured - force[part], measured) for force in context.simulated(record))
     return before, after
 
 

@@ -1,4 +1,4 @@
-"""The story in five lines."""
+"""The five lines on top of the page: damper, missing effect, confidence, next test, comfort."""
 
 from __future__ import annotations
 

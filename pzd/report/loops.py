@@ -5,7 +5,7 @@ from __future__ import annotations
 from pzd.quantities import DISPLACEMENT, Quantity
 from pzd.record import Array, Record
 from pzd.report.context import ReportContext
-from pzd.report.drawing import FINAL, MEASURED, PLAIN, Panel, axes, legend, thinned
+from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, axes, legend, thinned
 
 
 def loops(context: ReportContext, record: Record, abscissa: Array, quantity: Quantity, title: str) -> Panel:
@@ -28,7 +28,7 @@ def loops(context: ReportContext, record: Record, abscissa: Array, quantity: Qua
     x, measured, plain, final = thinned(abscissa[part], record.force[part], before[part], after[part])
     figure, ax = axes()
     ax.plot(x, measured / 1000.0, ".", color=MEASURED, markersize=2.4, label="measured")
-    ax.plot(x, plain / 1000.0, color=PLAIN, linestyle="--", label="simple model")
+    ax.plot(x, plain / 1000.0, color=BASELINE, linestyle="--", label="simple model")
     if context.extended:
         ax.plot(x, final / 1000.0, color=FINAL, label="with what was missing")
     unit = "mm" if quantity == DISPLACEMENT else quantity.unit

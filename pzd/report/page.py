@@ -1,4 +1,4 @@
-"""report.html: the blocks of the story in one file that asks nothing of the net and runs no script."""
+"""report.html: all sections in one file that asks nothing of the net and runs no script."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def page(context: ReportContext, jobs: int = 1) -> str:
 
     Returns
     -------
-    HTML, the same for the same story
+    HTML, the same for the same sections
     """
     drawn = _drawn(context, jobs)
     sections = (

@@ -205,7 +205,7 @@ def _faults(rows: Sequence[tuple[int, Expected]]) -> Iterator[tuple[int, str]]:
     by_id: dict[str, Expected] = {}
     for line, row in rows:
         if row.id in by_id:
-            yield line, f"id: stands there twice (got {row.id})"
+            yield line, f"id: occurs twice (got {row.id})"
         by_id[row.id] = row
     for line, row in rows:
         for term in terms(row.selector):
@@ -228,7 +228,7 @@ def compared(expected: Sequence[Expected], run: RunNumbers) -> tuple[ReferenceRo
     rows = []
     for row in expected:
         found = direct[row.id] if row.id in direct else _derived(row, direct, {one.id: one.unit for one in expected})
-        rows.append(_beside(row, found, _also_expected(row, expected)))
+        rows.append(_compared_row(row, found, _also_expected(row, expected)))
     met = sum(row.computed is not None for row in rows)
     logging.getLogger(__name__).info("%d of %d expected numbers are computed", met, len(rows))
     return tuple(rows)
@@ -265,7 +265,7 @@ def _also_expected(row: Expected, expected: Iterable[Expected]) -> str:
     return f"{low:g} to {high:g} {row.unit} are expected of this test" if low < high else ""
 
 
-def _beside(row: Expected, found: Found, also: str) -> ReferenceRow:
+def _compared_row(row: Expected, found: Found, also: str) -> ReferenceRow:
     comparable = found.value is not None and not isinstance(row.value, str) and row.value != 0.0
     ratio = found.value / row.number if found.value is not None and comparable else None
     parts = (found.note, also, _within(row.tolerance, ratio), f"reference: {row.note}" if row.note else "")

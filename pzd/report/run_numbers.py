@@ -128,8 +128,10 @@ def _is_sine(run: RunNumbers, name: str, asked: Asked) -> bool:
     )
 
 
-def _beside(run: RunNumbers, ride: SummaryRow, value_of: Callable[[SummaryRow], float | None], unit: str) -> str:
-    """The same ride at the other fidelities."""
+def _other_fidelities(
+    run: RunNumbers, ride: SummaryRow, value_of: Callable[[SummaryRow], float | None], unit: str
+) -> str:
+    """The same number of the ride at the other fidelities, in words."""
     others = [row for row in run.rides.summary if row.case in _others(run, ride)]
     values = [(row.fidelity, value_of(row)) for row in others]
     return "".join(f"; {fidelity} {value:.3g} {unit}" for fidelity, value in values if value is not None)
@@ -144,8 +146,8 @@ def _summary(run: RunNumbers, column: str, asked: Asked) -> Found:
     ride = _ride(run, asked)
     if isinstance(ride, Found):
         return ride
-    beside = _beside(run, ride, lambda row: getattr(row, column), UNITS[f"summary.{column}"])
-    return Found(getattr(ride, column), f"ride {ride.case}{beside}")
+    others = _other_fidelities(run, ride, lambda row: getattr(row, column), UNITS[f"summary.{column}"])
+    return Found(getattr(ride, column), f"ride {ride.case}{others}")
 
 
 def _comfort(run: RunNumbers, measure: str, asked: Asked) -> Found:
@@ -159,8 +161,8 @@ def _comfort(run: RunNumbers, measure: str, asked: Asked) -> Found:
     def value_of(row: SummaryRow) -> float | None:
         return rows[row.case].value if row.case in rows else None
 
-    row, beside = rows[ride.case], _beside(run, ride, value_of, UNITS[f"comfort.{measure}"])
-    return Found(row.value, f"ride {ride.case}{beside}; {row.edition}, {row.status}")
+    row, others = rows[ride.case], _other_fidelities(run, ride, value_of, UNITS[f"comfort.{measure}"])
+    return Found(row.value, f"ride {ride.case}{others}; {row.edition}, {row.status}")
 
 
 # ---------------------------------------------------------------- the step of voltage, and inputs

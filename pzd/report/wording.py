@@ -43,11 +43,11 @@ def number(value: float | None, digits: int = 3) -> str:
     magnitude = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
     if magnitude >= 6 or magnitude < -4:
         power = str(magnitude).translate(_SUPERSCRIPT)
-        return f"{_plain(value / 10.0**magnitude, digits - 1)}{KEPT}{TIMES}{KEPT}10{power}"
-    return _plain(round(value, digits - 1 - magnitude), max(digits - 1 - magnitude, 0))
+        return f"{_decimal(value / 10.0**magnitude, digits - 1)}{KEPT}{TIMES}{KEPT}10{power}"
+    return _decimal(round(value, digits - 1 - magnitude), max(digits - 1 - magnitude, 0))
 
 
-def _plain(value: float, places: int) -> str:
+def _decimal(value: float, places: int) -> str:
     text = f"{value:,.{places}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     return text.replace(",", THIN).replace("-", MINUS)

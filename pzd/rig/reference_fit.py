@@ -1,4 +1,4 @@
-"""A fit_reference Bingham element fitted coarsely: what the preflight holds a record against.
+"""A Bingham element fitted coarsely to a record: the reference that the checks of the preflight compare it with.
 
 Fine enough to tell an offset or a delay from the damper's own hysteresis, far too coarse to identify.
 """
@@ -29,7 +29,7 @@ _ZOOMS = 4
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """What is looked at of a record: its average cycle, or its beginning."""
+    """The part of a record that the reference is fitted to: its average cycle, or its beginning."""
 
     step: float
     """Interval of the samples [s]."""
@@ -43,14 +43,14 @@ class Piece:
 
 @dataclass(frozen=True)
 class ReferenceFit:
-    """The element that leaves least of any of the forces that it was held against."""
+    """The element of least squares, and what it leaves of the force that it fits best."""
 
     left: float
     """Share of the force's squares about its mean that is left."""
     left_without: float
     """The same without the element: what offset, spring and inertia leave by themselves."""
     force: int
-    """Which of the forces."""
+    """Index of the force that it fits best."""
     friction_extension: float
     """T0 / k [m]."""
     lag: float
@@ -63,7 +63,7 @@ class ReferenceFit:
 
 @lru_cache(maxsize=1)
 def fit_reference(test: Measured) -> tuple[Piece, ReferenceFit]:
-    """What is looked at of a record, and the element that fits it as it stands; kept for the checks that share it."""
+    """Part of a record and the element that fits its force undelayed; remembered for the checks that share it."""
     part = piece(test)
     return part, fitted(part, part.force_later(np.zeros(1)))
 
@@ -100,7 +100,7 @@ def _average_cycle(test: Measured, run: Cycles) -> Piece:
 
 
 def fitted(part: Piece, forces: Array) -> ReferenceFit:
-    """The Bingham element that leaves least of any of the forces, unexplained offset, spring and inertia.
+    """The Bingham element of least squares over several forces, beside a free offset, spring and inertia.
 
     Parameters
     ----------
@@ -136,14 +136,14 @@ def unit_force(part: Piece, friction_extension: float, lag: float) -> Array:
 
 
 def _free_terms(x: Array) -> Array:
-    """Orthonormal columns (n, 3) of what may stand unexplained the element: offset, spring, inertia."""
+    """Orthonormal columns (n, 3) of what is free beside the element: offset, spring, inertia."""
     bend = np.gradient(np.gradient(x))
     result: Array = np.linalg.qr(np.stack([np.ones(x.size), x, bend], axis=1))[0]
     return result
 
 
 def _unexplained_share(forces: Array, free: Array) -> Array:
-    """Share (m,) of each force's squares about its mean that what stands unexplained the element leaves."""
+    """Share (m,) of each force's squares about its mean that offset, spring and inertia leave without the element."""
     rest = forces - (forces @ free) @ free.T
     about_mean = forces - forces.mean(axis=1, keepdims=True)
     result: Array = np.sum(rest**2, axis=1) / np.maximum(np.sum(about_mean**2, axis=1), 1e-300)
@@ -151,7 +151,7 @@ def _unexplained_share(forces: Array, free: Array) -> Array:
 
 
 def _unit(forces: Array, free: Array) -> Array:
-    """Rows without what stands unexplained the element, of unit length."""
+    """Rows without their offset, spring and inertia, of unit length."""
     rest = forces - (forces @ free) @ free.T
     result: Array = rest / np.maximum(np.linalg.norm(rest, axis=1, keepdims=True), 1e-300)
     return result

@@ -34,7 +34,7 @@ def ingest(rig: RigConfig, control: Control, folder: Path, jobs: int = 1) -> Rig
     Raises
     ------
     ConfigError : when the config does not describe the files
-    DataError : when a file cannot be believed; every such file is listed
+    DataError : when a file cannot be used; every such file is listed
     FilesError : when a file cannot be read
     """
     from pzd.rig.files.reading import read

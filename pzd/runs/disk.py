@@ -40,7 +40,7 @@ def _hash(path: Path) -> str:
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of Python, of pzd and of the libraries that its numbers hang on."""
+    """Versions of Python, of pzd and of the libraries that its numbers depend on."""
     found = {"python": platform.python_version()}
     for name in _LIBRARIES:
         try:

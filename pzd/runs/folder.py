@@ -150,7 +150,7 @@ class Run:
             yield
 
     def write_config(self, text: str) -> None:
-        """Write the config with every default, unless it stands there already; one edited by hand is laid beside."""
+        """Write the config with every default, unless it is there already; one edited by hand is kept under a name of its own."""
         path, hashes = self.folder / CONFIG, self.folder / _CONFIG_HASHES
         with as_files_error(path):
             if path.exists() and path.read_bytes() == text.encode():

@@ -13,7 +13,7 @@ from pzd.schema.errors import FilesError
 NEW = ".new"
 """Ending of what is being written; it is renamed once it is whole."""
 OLD = ".old"
-"""Ending of what stands there until the new is in its place."""
+"""Ending of the old folder until the new one is in its place."""
 
 log = logging.getLogger(__name__)
 

@@ -121,7 +121,7 @@ def _columns_of(
         if not name:
             faults.append(f"{at(path, 1)}: no such column; {hint} (got {given})")
         elif name in names[:place]:
-            faults.append(f"{at(path, 1)}: the column stands there twice (got {given})")
+            faults.append(f"{at(path, 1)}: the column occurs twice (got {given})")
     for column, name in known.items():
         if model.model_fields[name].is_required() and name not in names:
             faults.append(f"{at(path, 1)}: column {column} is missing (got {','.join(header)})")

@@ -23,7 +23,7 @@ class ConfigError(UserError):
 
 
 class DataError(UserError):
-    """Rig files or artefacts that cannot be believed."""
+    """Rig files or artefacts that cannot be used."""
 
     exit_code = 3
 

@@ -52,11 +52,6 @@ class PureError:
         """(H + 1,) variance of the coefficient of the average cycle [N^2]."""
         return self.single / self.count + self.shared
 
-    @property
-    def mean_variance(self) -> float:
-        """Variance of one sample of the average cycle by noise [N^2]."""
-        return self.sample_variance / self.count
-
 
 def harmonics_of(points: int) -> int:
     """Number H of harmonics up to the band limit of a cycle of that many samples."""

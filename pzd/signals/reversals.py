@@ -1,4 +1,4 @@
-"""Where a motion turns."""
+"""The samples at which a motion reverses."""
 
 from __future__ import annotations
 

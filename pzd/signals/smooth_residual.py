@@ -1,4 +1,4 @@
-"""Noise and misfit where nothing repeats: against a rich smooth model of the residual.
+"""Noise and misfit of a record that does not repeat: a smooth model of its residual is misfit, the rest noise.
 
 Whatever the damper misses is a function of motion, force, voltage and time; a model with many smooth
 functions of them takes it up, and what is left is noise. Whether the model takes up more than noise
@@ -28,7 +28,7 @@ SAMPLES_PER_TERM = 20
 
 @dataclass(frozen=True, eq=False)
 class SmoothResidual:
-    """A residual parted into what a rich smooth model explains and noise."""
+    """A residual parted into what a smooth model of many terms explains, and noise."""
 
     explained: Array
     """(n,) [N]."""

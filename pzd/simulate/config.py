@@ -60,7 +60,7 @@ class CarBlock(Frozen):
     @classmethod
     def _positive(cls, pair: Pair | None) -> Pair | None:
         if pair is not None and min(pair) <= 0.0:
-            raise ValueError(f"both must be above nought (got {pair[0]:g}, {pair[1]:g})")
+            raise ValueError(f"both must be above zero (got {pair[0]:g}, {pair[1]:g})")
         return pair
 
     def car(self) -> HalfCar:

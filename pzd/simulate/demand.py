@@ -29,7 +29,7 @@ from pzd.simulate.ride_model import (
 
 @laid_in
 def one_sided(velocity: float, side: float) -> float:
-    """The velocity held on the side of nought that an axle is on (+1, -1); the sign bit of 0 carries the side."""
+    """The velocity held on the side of zero that an axle is on (+1, -1); the sign bit of 0 carries the side."""
     return math.copysign(max(side * velocity, 0.0), side)
 
 
@@ -68,7 +68,7 @@ def spring_acceleration(car: Vehicle, deflection: Array) -> float:
 
 @compiled
 def demand(control_spec: ControlSpec, car: Vehicle, y: Array, workspace: Array, branch: int) -> None:
-    """Fill the desk's forces with what the policy asks of both axles within the desk's bounds [N]."""
+    """Fill the workspace's forces with what the policy asks of both axles within the workspace's bounds [N]."""
     if control_spec.aim == MINIMISE:
         a0 = spring_acceleration(car, workspace[DEFLECTION])
         least_acceleration_forces(

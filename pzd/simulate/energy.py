@@ -9,12 +9,12 @@ from pzd.simulate.dynamic_damper import effective_voltage, stored
 from pzd.simulate.kinematics import suspension
 from pzd.simulate.ride_model import (
     BEHIND,
-    BESIDE_WORK,
     DEFLECTION,
     DISSIPATED,
     DYNAMIC,
     HEAVE_RATE,
     OIL_1,
+    PARALLEL_WORK,
     PITCH_RATE,
     ROAD_WORK,
     SET,
@@ -67,7 +67,7 @@ def balance_error(change: float, y: Array) -> float:
 
     Returns
     -------
-    share; nought for a ride in which nothing moves
+    share; zero for a ride in which nothing moves
     """
-    left = change + y[BESIDE_WORK] + y[DISSIPATED] - y[ROAD_WORK] - y[VALVE_WORK]
+    left = change + y[PARALLEL_WORK] + y[DISSIPATED] - y[ROAD_WORK] - y[VALVE_WORK]
     return float(left / max(y[DISSIPATED], NOTHING)) if abs(left) > NOTHING else 0.0

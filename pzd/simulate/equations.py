@@ -20,7 +20,6 @@ from pzd.simulate.quasistatic import quasistatic_forces
 from pzd.simulate.ride_model import (
     ACCELERATION,
     BEHIND,
-    BESIDE_WORK,
     BODY,
     COMFORT,
     DEFLECTION,
@@ -34,6 +33,7 @@ from pzd.simulate.ride_model import (
     INERTANCE,
     OIL_1,
     OIL_FORCE,
+    PARALLEL_WORK,
     PITCH,
     PITCH_RATE,
     RATE,
@@ -65,7 +65,7 @@ def body_acceleration(car: Vehicle, load0: float, load1: float) -> tuple[float, 
 
 @compiled
 def dynamic_forces(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
-    """Fill the desk's forces from the state of the oil, and what each damper does with its energy."""
+    """Fill the workspace's forces from the state of the oil, and what each damper does with its energy."""
     car, damper = model.car, model.damper
     elapsed = time - control[SINCE, 0]
     for i in range(2):
@@ -152,4 +152,4 @@ def _book_damper(model: RideModel, workspace: Array, axle: int, dy: Array) -> No
     dy[OIL_1 + axle] = speed - workspace[FLOW, axle]
     dy[DISSIPATED] += n * (workspace[OIL_FORCE, axle] * workspace[FLOW, axle] + workspace[RUBBING, axle] * speed)
     dy[VALVE_WORK] += n * workspace[VALVE, axle]
-    dy[BESIDE_WORK] += n * speed * workspace[ELASTIC, axle] + inertia
+    dy[PARALLEL_WORK] += n * speed * workspace[ELASTIC, axle] + inertia

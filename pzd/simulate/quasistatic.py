@@ -12,10 +12,10 @@ from pzd.simulate.ride_model import (
     LIFT,
     LOW,
     MINIMISE,
-    NEAR,
     RATE,
     SET,
     SIDE,
+    SIDED_RATE,
     SPRINGS,
     TABLE,
     TIE_END,
@@ -40,13 +40,13 @@ def tabled(car: Vehicle, grid: TableArrays, axle: int, voltage: float, velocity:
 
 @compiled
 def quasistatic_forces(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
-    """Fill the desk's forces for axles that slip; one that sticks is left to what holds it."""
+    """Fill the workspace's forces for axles that slip; one that sticks is left to what holds it."""
     control_spec = model.control_spec
     for i in range(2):
         velocity = workspace[RATE, i]
         if control_spec.jumps and control[SIDE, i] != 0.0:
             velocity = one_sided(velocity, control[SIDE, i])
-        workspace[NEAR, i] = velocity
+        workspace[SIDED_RATE, i] = velocity
         if control_spec.fidelity == TABLE:
             workspace[FORCE, i] = tabled(model.car, model.grid, i, control[SET, i], velocity)
         else:

@@ -95,15 +95,15 @@ def _stands_at_rest(damper: Damper, name: str, places: Array) -> bool:
 
 
 def _voltage_reached(damper: Damper, motion: Motion) -> list[float | None]:
-    """When the voltage as felt has gone each share of its way [s]; in closed form where the lag is all there is."""
+    """When the effective voltage has gone each share of its way [s]; in closed form where the lag is all there is."""
     drive = {name for name in damper.effects if known()[name].place == "drive"}
     if drive <= {"valve_lag"}:
         tau = value_of(damper, "valve_lag", "tau")
         return [-tau * math.log(1.0 - share) for share in SHARES]
-    felt = voltage_at_valve(damper, motion.voltage, np.array([_STEP]))
-    if felt is None or felt[0] == felt[-1]:
+    effective = voltage_at_valve(damper, motion.voltage, np.array([_STEP]))
+    if effective is None or effective[0] == effective[-1]:
         return [None for _ in SHARES]
-    progress = (felt - felt[0]) / (felt[-1] - felt[0])
+    progress = (effective - effective[0]) / (effective[-1] - effective[0])
     return [_when(motion.time[motion.time >= 0.0], progress[motion.time >= 0.0], share) for share in SHARES]
 
 

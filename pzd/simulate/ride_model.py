@@ -12,7 +12,7 @@ from pzd.simulate.car import HalfCar
 from pzd.simulate.dynamic_damper import DynamicDamper
 from pzd.simulate.profile import Profile
 
-HEAVE, PITCH, HEAVE_RATE, PITCH_RATE, OIL_1, OIL_2, DISSIPATED, ROAD_WORK, VALVE_WORK, BESIDE_WORK = range(10)
+HEAVE, PITCH, HEAVE_RATE, PITCH_RATE, OIL_1, OIL_2, DISSIPATED, ROAD_WORK, VALVE_WORK, PARALLEL_WORK = range(10)
 """The state: the body, the elastic deflection of the oil at each axle, and the energies, each by itself."""
 STATES = 10
 IDEAL, TABLE, DYNAMIC = range(3)
@@ -39,7 +39,7 @@ SENSED = 8
     ELASTIC,
     RUBBING,
     VALVE,
-    NEAR,
+    SIDED_RATE,
     LOW,
     HIGH,
     BODY,
@@ -48,10 +48,11 @@ SENSED = 8
     COMPRESSION_PUSH,
 ) = range(20)
 WORKSPACE_ROWS = 20
-"""Rows of the desk (DESK_ROWS, 2), a column an axle: what the equations of motion leave to be read off. Deflection U
-[m], its rate V [m/s], speed and acceleration of the road, spring force S and damper force T [N], dV/dt,
+"""Rows of the workspace (WORKSPACE_ROWS, 2), a column an axle: intermediate results of the equations of motion.
+
+Deflection U [m], its rate V [m/s], speed and acceleration of the road, spring force S and damper force T [N], dV/dt,
 mass that the dampers add [kg]; of one damper: oil spring [N], flow [m/s], elastic and rubbing force beside
-the element [N], power of the valve [W]; speed on its side of nought, lowest and highest force; acceleration
+the element [N], power of the valve [W]; speed on its side of zero, lowest and highest force; acceleration
 of z and phi; acceleration at K (first column); of an axle that sticks, dV/dt away from V = 0, were it to
 slip to either side."""
 ASKED, SET, SIDE, SINCE, BEHIND = range(5)
@@ -114,7 +115,7 @@ class ControlSpec(NamedTuple):
     voltage: float
     """Of the aim `VOLTAGE` [V], and where the valves stand at the start."""
     jumps: bool
-    """Whether the force jumps where the suspension speed crosses nought, so that an axle can stick."""
+    """Whether the force jumps where the suspension speed crosses zero, so that an axle can stick."""
     gains: Array
     """(2, SENSED) of the aim `FEEDBACK`."""
 

@@ -29,7 +29,7 @@ from pzd.simulate.ride_model import (
 SCALES = np.array([1e-2, 1e-2, 1e-1, 1e-1, 1e-3, 1e-3, 10.0, 10.0, 10.0, 10.0])
 """A motion of ordinary size, below which the error is absolute: m, rad, m/s, rad/s, m, J."""
 
-_CROSSED = 1e-9  # m/s on the other side of nought
+_CROSSED = 1e-9  # m/s on the other side of zero
 _SMALLEST = 1e-6  # of the step: what is taken whatever the error
 _SHARP = 1e-13  # of the step: how closely the moment is found at which an axle turns round or sticks
 _MOST_CUTS = 50
@@ -39,7 +39,7 @@ _MOST_CUTS = 50
 def trial(
     time: float, dt: float, y: Array, model: RideModel, control: Array, workspace: Array, stages: Array, end: Array
 ) -> float:
-    """Fill `end` with the state after dt; the desk is left as it is there.
+    """Fill `end` with the state after dt; the workspace is left as it is there.
 
     Source: Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2
 
@@ -90,7 +90,7 @@ def choose_side(
 
 @laid_in
 def leaver(control: Array, workspace: Array) -> int:
-    """The first axle that has left its side of V = 0 or its stick, as the desk stands; -1 where none has."""
+    """The first axle that has left its side of V = 0 or its stick, by the workspace as it is; -1 where none has."""
     for i in range(2):
         side = control[SIDE, i]
         if side == 0.0 and max(workspace[REBOUND_PUSH, i], workspace[COMPRESSION_PUSH, i]) > 0.0:

@@ -22,7 +22,7 @@ class Unevenness(Road):
     height_m: float = 0.05
     """How high it rises; negative for a hole or a fall."""
     length_m: float = Field(default=1.0, gt=0.0)
-    """Length along the road: the wheels never leave it, so this cannot be nought."""
+    """Length along the road: the wheels never leave it, so this cannot be zero."""
     start_m: float = Field(default=10.0, ge=0.0)
     """Where it begins."""
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pzd.artefacts import Diagnosed, Value
-from pzd.cli.story import story
+from pzd.cli.diagnosis import diagnosis_lines
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
@@ -103,14 +103,14 @@ def test_the_damper_handed_on_gives_the_recorded_force_in_the_recorded_displacem
 def test_stops_that_do_not_lie_evenly_about_what_was_recorded_are_found_where_they_are(
     rng: np.random.Generator,
 ) -> None:
-    """Tests to 30 mm one way and to 24 mm the other, between stops that begin 18 mm from nought."""
+    """Tests to 30 mm one way and to 24 mm the other, between stops that begin 18 mm from zero."""
     damper = damper_of(TWO, end_stop=STOPS)
     found = diagnosed(tuple(off_middle(damper, U, f, a, 0.003, rng) for U in TWO for f in (0.5, 2.0)
                             for a in (0.02, 0.027)))  # fmt: skip
     assert "end_stop" in found.diagnosis.effects, found.diagnosis.reason
     assert number(found, "end_stop", "x_e") == pytest.approx(0.018, rel=0.05)
     assert found.diagnosis.zero_m == pytest.approx(0.0, abs=5e-4)
-    told = next(line for line in story(found.diagnosis, Control()) if line.startswith("adopted: end_stop"))
+    told = next(line for line in diagnosis_lines(found.diagnosis, Control()) if line.startswith("adopted: end_stop"))
     assert " to either side of x = " in told
 
 

@@ -11,7 +11,7 @@ from fresh_truths import SENSORS_ALIKE, acceptance_test, published_rows, sine_te
 from pzd.artefacts import ParameterRow
 from pzd.identify.config import EvolutionaryConfig
 from pzd.identify.evolutionary import fit_evolutionary, search
-from pzd.identify.fit import fit_condition
+from pzd.identify.fit import identify_condition
 from pzd.identify.objective import Objective
 from pzd.identify.separable import fit_separable
 from pzd.identify.trial import trial_of
@@ -21,7 +21,7 @@ NAMES = ("T0_N", "C_Ns_per_m", "k_N_per_m")
 
 
 def row_for(records: Sequence[Record]) -> ParameterRow:
-    return fit_condition(Condition(None, 0.0, None, tuple(records)), SENSORS_ALIKE, seed=1)
+    return identify_condition(Condition(None, 0.0, None, tuple(records)), SENSORS_ALIKE, seed=1)[0]
 
 
 @pytest.mark.parametrize("index", range(len(published_rows())))

@@ -11,7 +11,7 @@ from fresh_truths import TABLE_2, moving_test, sine_test, with_noise
 
 from pzd.artefacts import AuxiliaryRow, Identified, ParameterRow, Rig, base_of
 from pzd.identify.config import IdentifyConfig
-from pzd.identify.fit import fit_records, identify_condition
+from pzd.identify.fit import fit_with_auxiliary, identify_condition
 from pzd.identify.objective import Bingham
 from pzd.identify.separable import fit_separable
 from pzd.identify.stage import identify
@@ -82,7 +82,7 @@ def test_a_damper_without_gas_is_fitted_by_the_element_alone(truth: Bingham, rng
     """The numbers are those of the element to the last digit, whatever noise and sensors of class 0.5 do."""
     for _ in range(3):
         records = on_the_rig(truth, rng)
-        objective, fit = fit_records(records, IdentifyConfig(), seed=1)
+        objective, fit, _ = fit_with_auxiliary(records, IdentifyConfig(), seed=1)
         assert identified(records)[1] is None
         assert objective.basis is None
         assert fit.parameters == fit_separable(objective).parameters

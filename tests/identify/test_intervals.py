@@ -12,7 +12,7 @@ from fresh_truths import SENSORS_ALIKE, TABLE_2, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
 from pzd.identify.config import IdentifyConfig
-from pzd.identify.fit import fit_condition, fit_records
+from pzd.identify.fit import fit_with_auxiliary, identify_condition
 from pzd.identify.intervals import half_widths
 from pzd.identify.misfit import VISIBLE, Misfit, misfit_of
 from pzd.identify.noise_alone import uncertainty
@@ -25,7 +25,7 @@ COLUMNS = ("T0_N", "C_Ns_per_m", "k_N_per_m")
 
 
 def row_for(records: Sequence[Record], config: IdentifyConfig = SENSORS_ALIKE) -> ParameterRow:
-    return fit_condition(Condition(None, 0.0, None, tuple(records)), config, seed=1)
+    return identify_condition(Condition(None, 0.0, None, tuple(records)), config, seed=1)[0]
 
 
 def held(row: ParameterRow, truth: Bingham) -> int:
@@ -37,7 +37,7 @@ def held(row: ParameterRow, truth: Bingham) -> int:
 
 def parts_for(records: Sequence[Record], config: IdentifyConfig) -> tuple[tuple[Part, ...], Array]:
     """The parts of a fit, and its estimate."""
-    objective, fit = fit_records(records, config, seed=1)
+    objective, fit, _ = fit_with_auxiliary(records, config, seed=1)
     return parts_of(records, objective.trials, (fit.residuals, fit.slopes), config.nuisance), np.array(fit.parameters)
 
 
@@ -155,6 +155,6 @@ def test_a_parameter_that_does_nothing_has_no_interval() -> None:
 @pytest.mark.parametrize("kind", ["one sine", "five tests", "one random"])
 def test_the_estimate_is_what_it_was_whatever_its_interval(kind, rng: np.random.Generator) -> None:
     _, records = campaign(rng, kind, hidden=0.1)
-    _, fit = fit_records(records, IdentifyConfig(), seed=1)
+    _, fit, _ = fit_with_auxiliary(records, IdentifyConfig(), seed=1)
     row = row_for(records, IdentifyConfig())
     assert tuple(getattr(row, c) for c in COLUMNS) == tuple(fit.parameters)

@@ -11,7 +11,7 @@ from fresh_truths import sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
 from pzd.identify.config import IdentifyConfig
-from pzd.identify.fit import fit_condition
+from pzd.identify.fit import identify_condition
 from pzd.identify.misfit import VISIBLE, Misfit, misfit_of
 from pzd.identify.objective import Objective
 from pzd.identify.part import parts_of
@@ -33,7 +33,7 @@ def sines(*, hidden: float, noise: float, rng: np.random.Generator) -> list[Reco
 
 
 def row_for(records: list[Record]) -> ParameterRow:
-    return fit_condition(Condition(None, 0.0, None, tuple(records)), IdentifyConfig(), seed=1)
+    return identify_condition(Condition(None, 0.0, None, tuple(records)), IdentifyConfig(), seed=1)[0]
 
 
 def misfit_for(records: tuple[Record, ...]) -> Misfit:

@@ -11,7 +11,7 @@ from fresh_truths import SENSORS_ALIKE, TABLE_2, acceptance_test, sine_test, wit
 from pzd.artefacts import ParameterRow
 from pzd.identify.config import EvolutionaryConfig, IdentifyConfig
 from pzd.identify.evolutionary import fit_evolutionary
-from pzd.identify.fit import fit_condition
+from pzd.identify.fit import identify_condition
 from pzd.identify.objective import Bingham, Objective
 from pzd.identify.separable import fit_separable
 from pzd.identify.trial import trial_of
@@ -21,7 +21,7 @@ from pzd.signals.nuisance import NuisanceConfig
 
 
 def row_for(*records: Record, config: IdentifyConfig | None = None) -> ParameterRow:
-    return fit_condition(Condition(None, None, None, records), config or IdentifyConfig(), seed=1)
+    return identify_condition(Condition(None, None, None, records), config or IdentifyConfig(), seed=1)[0]
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stub_stages import NEXT_TEST
 
 from pzd.artefacts import (
     Diagnosed,
@@ -19,7 +20,6 @@ from pzd.artefacts import (
     KeptBack,
     LeftOut,
     MeasureRow,
-    NextTest,
     ParameterRow,
     Prediction,
     Ranked,
@@ -194,16 +194,7 @@ def diagnosis() -> Diagnosis:
             W_s=0.00092,
             left_out_voltages=(LeftOut(voltage=75.0, W_s_plain=0.0222, W_s=0.0111),),
         ),
-        next_test=NextTest(
-            waveform="sine",
-            frequency_Hz=4.0,
-            amplitude_m=0.01,
-            voltage_V=150.0,
-            separates=("orifice_quadratic", "shear_thinning"),
-            middle_m=0.03135,
-            peak_speed_m_per_s=0.251327,
-            peak_force_N=1512.345,
-        ),
+        next_test=NEXT_TEST,
     )
 
 

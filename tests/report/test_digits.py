@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pzd.artefacts import Gap, Identified, ParameterRow
+from pzd.cli.diagnosis import diagnosis_lines
 from pzd.cli.layout import interval
-from pzd.cli.story import story
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.verdict import weak
 from pzd.quantities import Control
@@ -55,7 +55,7 @@ def test_a_number_has_the_digits_that_its_interval_supports() -> None:
     assert interval(5.0, 5.0, 5.0) == "5 (5 to 5)"
 
 
-def test_a_friction_of_nothing_is_nought_on_the_page() -> None:
+def test_a_friction_of_nothing_is_zero_on_the_page() -> None:
     assert wording.interval(6.3e-25, 0.0, 12.4) == "0 (0 to 12.4)"
     assert wording.interval(6.3, 0.0, 12.4) == "6.3 (0 to 12.4)"
     assert parameter(6.3e-25) == "0"
@@ -80,7 +80,7 @@ def test_what_was_held_out_is_told_in_words() -> None:
 )
 def test_the_story_says_of_how_many_records_something_was_held_out(kind: str, told: str) -> None:
     gap = Gap.model_validate({**diagnosis().gap.model_dump(), "hold_out": kind})
-    lines = story(diagnosis().model_copy(update={"gap": gap}), Control())
+    lines = diagnosis_lines(diagnosis().model_copy(update={"gap": gap}), Control())
     assert told in lines[2]
 
 

@@ -182,7 +182,7 @@ def test_two_tests_are_one_only_while_a_match_would_take_either() -> None:
     [
         ("id,value\na,1\n", "lab.csv:1: column unit is missing (got id,value)"),
         ("id,value,unit,tolerence\na,1,N,0.1\n", "lab.csv:1: no such column; did you mean tolerance? (got tolerence)"),
-        ("id,id,value,unit\na,a,1,N\n", "lab.csv:1: the column stands there twice (got id)"),
+        ("id,id,value,unit\na,a,1,N\n", "lab.csv:1: the column occurs twice (got id)"),
         ("id,value,unit\na,1\n", "lab.csv:2: 2 fields where the header has 3"),
         ("id,value,unit,tolerance\na,1,N,wide\n", "lab.csv:2: tolerance: must be a number (got 'wide')"),
         ("id,value,unit,tolerance\na,1,N,-1\n", "lab.csv:2: tolerance: must be greater than or equal to 0 (got -1)"),
@@ -207,7 +207,7 @@ def test_two_tests_are_one_only_while_a_match_would_take_either() -> None:
             "id,selector,value,unit\na,,1,kg\nb,2 * [a],1,kg\n",
             "lab.csv:3: selector: the row must name a number of the run itself (got a)",
         ),
-        ("id,value,unit\na,1,N\n\na,1,N\n", "lab.csv:4: id: stands there twice (got a)"),
+        ("id,value,unit\na,1,N\n\na,1,N\n", "lab.csv:4: id: occurs twice (got a)"),
     ],
 )
 def test_a_mistake_in_the_file_is_refused_with_its_line(tmp_path: Path, text: str, message: str) -> None:

@@ -14,7 +14,7 @@ def test_no_module_of_the_room_is_entered_from_a_later_one(root: Path, capsys: p
     assert spec.loader is not None
     study = module_from_spec(spec)
     spec.loader.exec_module(study)
-    study.main()
+    study.main("rig")
     said = capsys.readouterr().out
     assert said.endswith(", 0 returns\n"), said
     assert len(said.splitlines()) > 10

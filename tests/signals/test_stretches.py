@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.random import Generator
+from stepped_motions import NO_STEPS, STEPS, TIME
 
 from pzd.artefacts import Rig
 from pzd.damper.element import element_force
@@ -15,28 +16,7 @@ from pzd.identify.stage import identify
 from pzd.record import Array, Record
 from pzd.signals.stretches import apart, steps
 
-TIME = np.arange(12_000) * 1e-3
 TRUTH = (400.0, 2500.0, 4e5)
-
-
-def sine(amplitude: float, hertz: float) -> Array:
-    return np.asarray(amplitude * np.sin(2.0 * np.pi * hertz * TIME))
-
-
-STEPS = {
-    "two speeds": np.where(TIME < 6.0, sine(0.01, 1.0), sine(0.01, 2.0)),
-    "two amplitudes": np.where(TIME < 6.0, sine(0.005, 1.5), sine(0.015, 1.5)),
-    "half a millimetre more": np.where(TIME < 6.0, sine(0.004, 2.0), sine(0.0045, 2.0)),
-}
-NO_STEPS = {
-    "a sine": sine(0.01, 1.7),
-    "a sweep": 0.01 * np.sin(2.0 * np.pi * (0.5 * TIME + 0.1 * TIME**2)),
-    "a beat": sine(0.005, 1.38) + sine(0.005, 1.42),
-    "a quick beat": sine(0.01, 1.0) + sine(0.003, 1.23),
-    "a growing sine": (0.5 + TIME / 12.0) * sine(0.01, 1.5),
-    "two tones": sine(0.01, 1.0) + sine(0.002, 10.03),
-    "one bump more": sine(0.01, 1.0) + 0.003 * np.exp(-(((TIME - 6.0) / 0.3) ** 2)),
-}
 
 
 def record(x: Array, rng: Generator, noise: float = 5.0) -> Record:

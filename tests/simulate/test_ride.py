@@ -72,7 +72,7 @@ def test_no_damper_feeds_energy_in(ride, policy, fidelity) -> None:
     history = ride(policy, fidelity, **SHORT).history
     for axle in (0, 6):
         power = history[:, DAMPER + axle] * history[:, RATE + axle]
-        assert power.min() > -1e-4  # W; the speed of a sticking axle is nought within rounding
+        assert power.min() > -1e-4  # W; the speed of a sticking axle is zero within rounding
 
 
 def test_what_a_dynamic_damper_gives_back_is_what_it_stored_and_what_the_valve_put_in(ride) -> None:

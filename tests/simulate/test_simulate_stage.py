@@ -151,7 +151,7 @@ def test_with_an_instant_valve_the_force_takes_the_time_of_the_oil_spring(damper
     [
         ({"policies": ["comfy"]}, "no policy is called comfy; there are comfort, constant"),
         ({"car": {"model": "fiat"}}, "no car is called fiat; there are makowski2021"),
-        ({"car": {"motion_ratio": [1.0, 0.0]}}, "above nought"),
+        ({"car": {"motion_ratio": [1.0, 0.0]}}, "above zero"),
         ({"control_period_s": 0.0015}, "whole number of integration_step_s"),
         ({"c_max_Ns_per_m": 1.0}, "at least c_min"),
         ({"settle_s": 1.0}, "shorter than duration_s"),

@@ -12,7 +12,7 @@ from pzd.simulate.sticking import accelerate
 
 @pytest.mark.parametrize("sides", [(1.0, -1.0), (0.0, 1.0), (-1.0, 0.0), (0.0, 0.0)])
 def test_the_suspensions_accelerate_as_body_and_road_do(rng: np.random.Generator, sides) -> None:
-    """dV/dt = H^T d2X/dt2 - d2xi/dt2 with all forces, and nought where an axle sticks."""
+    """dV/dt = H^T d2X/dt2 - d2xi/dt2 with all forces, and zero where an axle sticks."""
     car = cars()["makowski2021"]
     for _ in range(20):
         acts, scratch = control(0.0), workspace()

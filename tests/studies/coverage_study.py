@@ -24,7 +24,7 @@ from campaigns import KINDS, SENSORS, campaign
 
 from pzd.artefacts import ParameterRow
 from pzd.identify.config import IdentifyConfig
-from pzd.identify.fit import fit_condition
+from pzd.identify.fit import identify_condition
 from pzd.identify.objective import Bingham
 from pzd.record import Condition
 from pzd.signals.nuisance import NuisanceConfig
@@ -54,7 +54,7 @@ def drawn(seed: np.random.SeedSequence, kind: str, correlation: float, size: flo
     """One campaign."""
     rng = np.random.default_rng(seed)
     truth, records = campaign(rng, kind, correlation=correlation, hidden=size, sensors=sensors)
-    row = fit_condition(Condition(None, 0.0, None, records), IdentifyConfig(), seed=1)
+    row = identify_condition(Condition(None, 0.0, None, records), IdentifyConfig(), seed=1)[0]
     return Draw(kind, correlation, size, row.status == "ok", "misses" in row.status, holds(row, truth))
 
 

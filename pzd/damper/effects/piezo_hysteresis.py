@@ -36,11 +36,11 @@ EFFECT = Effect(
 
 
 def law(effective: float, now: float, r: float) -> float:
-    """Voltage felt [V] when the voltage arrives at `now` [V]."""
+    """Effective voltage [V] when the voltage arrives at `now` [V]."""
     return max(now - r, min(now + r, effective))
 
 
 def rate(effective: float, now: float, rate: float, r: float) -> float:
-    """Rate of the voltage felt [V/s] while the voltage stands at `now` [V] and moves at `rate` [V/s]."""
+    """Rate of the effective voltage [V/s] while the voltage stands at `now` [V] and moves at `rate` [V/s]."""
     inside_play = abs(now - effective) < r * (1.0 - 1e-9)  # rounding of the law itself is no play
     return 0.0 if inside_play or (now - effective) * rate < 0.0 else rate

@@ -37,7 +37,7 @@ EFFECT = Effect(
 
 
 def law(effective: float, before: float, now: float, step: float, tau: float) -> float:
-    """Voltage felt [V] a step [s] later, the voltage going linearly from `before` to `now` [V]."""
+    """Effective voltage [V] a step [s] later, the voltage going linearly from `before` to `now` [V]."""
     if tau <= 0.0:
         return now
     lag = (now - before) * tau / step if step > 0.0 else 0.0
@@ -45,5 +45,5 @@ def law(effective: float, before: float, now: float, step: float, tau: float) ->
 
 
 def rate(effective: float, now: float, rate: float, tau: float) -> float:
-    """Rate of the voltage felt [V/s] while the voltage stands at `now` [V] and moves at `rate` [V/s]."""
+    """Rate of the effective voltage [V/s] while the voltage stands at `now` [V] and moves at `rate` [V/s]."""
     return rate if tau <= 0.0 else (now - effective) / tau

@@ -22,6 +22,7 @@ from pzd.diagnose.fit.weights import record_likelihood
 from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.thresholds import MOST_TIME_CONSTANTS
 from pzd.record import Array, voltage_scale
+from pzd.signals.criterion import criterion
 
 Mask = NDArray[np.bool_]
 
@@ -46,13 +47,9 @@ class Evidence:
         return likely < config.significance and self.gap(fitted) >= config.negligible
 
     def criterion(self, fitted: Fitted) -> float:
-        """W_s over the compared samples of all that is seen.
-
-        Equation: sum (F - F_sim)^2 / sum F^2                       Source: Makowski and Knap 2021, eq. (4)
-        """
-        pairs = list(zip(self.whole.observations, fitted.simulated, strict=True))
-        missed = sum(float(np.sum((o.measured - force) ** 2)) for o, force in pairs)
-        return missed / sum(float(np.sum(o.measured**2)) for o, _ in pairs)
+        """W_s over the compared samples of all that is seen."""
+        measured = np.concatenate([o.measured for o in self.whole.observations])
+        return criterion(measured - np.concatenate(fitted.simulated), measured)
 
     def choosing(self, weights: Evidence) -> Problem:
         """The tests that choose, with the base rows of this evidence and the weights of another one."""

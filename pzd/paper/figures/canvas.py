@@ -6,13 +6,13 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from pzd.report.drawing import FINAL, INK, MEASURED, PLAIN, STYLE
+from pzd.report.drawing import FINAL, INK, MEASURED, BASELINE, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = (FINAL, "#009e73", "#e69f00", PLAIN)
+COLOURS = (FINAL, "#009e73", "#e69f00", BASELINE)
 """Of Okabe and Ito (2008), in the order of the curves."""
 SOFT = "#9aa5b1"
 PAPER_STYLE: Mapping[str, object] = {
@@ -26,7 +26,7 @@ NUMBERS_OF_OTHERS = {"linestyle": (0, (4, 2)), "linewidth": 1.1}
 """How curves from the paper's own numbers are drawn."""
 DISPLACEMENT, VELOCITY, FORCE = "displacement x [m]", "velocity v [m/s]", "force F [N]"
 
-__all__ = ["COLOURS", "FINAL", "INK", "MEASURED", "PLAIN", "SOFT"]
+__all__ = ["COLOURS", "FINAL", "INK", "MEASURED", "BASELINE", "SOFT"]
 
 
 def panels(width: float = 8.4, height: float = 3.7, ratios: Sequence[float] = (1.0, 1.0)) -> tuple[Figure, list[Axes]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.paper.figures.canvas import COLOURS, INK, PLAIN, SOFT, key, panels
+from pzd.paper.figures.canvas import COLOURS, INK, BASELINE, SOFT, key, panels
 from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.figure import Drawing
 from pzd.paper.car_search import CONTROLLED_PEAKS, CarRow, closest, stored
@@ -25,7 +25,7 @@ def survey(data: FigureData) -> Drawing:
         _spread(ax, cars, SOFT, 0.7, "plausible cars, spread for 1 %")
         ax.plot([c.controlled[0] for c in cars], [c.controlled[1] for c in cars], ".", color=colour, markersize=3.5)
         _spread(ax, [best], INK, 1.0, "closest", 1.6)
-        ax.plot(*CONTROLLED_PEAKS, "o", color=PLAIN, markersize=11, markerfacecolor="none", label="paper", zorder=4)
+        ax.plot(*CONTROLLED_PEAKS, "o", color=BASELINE, markersize=11, markerfacecolor="none", label="paper", zorder=4)
         ax.set_title(f"{ax.get_title(loc='left')} {tie_break}", loc="left", fontsize=9.5)
         ax.set_xlabel("controlled peak at 2.25 Hz [m/s²]")
         ax.set_ylabel("controlled peak at 4.5 Hz [m/s²]")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from pzd.artefacts import Ride, SummaryRow, base_of
-from pzd.paper.figures.canvas import COLOURS, PLAIN, SOFT, panels
+from pzd.paper.figures.canvas import COLOURS, BASELINE, SOFT, panels
 from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.figure import Drawing
 from pzd.paper.car_search import (
@@ -96,7 +96,7 @@ def _ideal(data: FigureData) -> list[Bar]:
             _time(exposure(peak / 2.0**0.5, frequency, _BOUNDARY))
             for peak, frequency in zip(peaks, FREQUENCIES, strict=True)
         )
-        bars.append(Bar(f"constant c = {damping:g} N s/m", PLAIN, peaks, times))
+        bars.append(Bar(f"constant c = {damping:g} N s/m", BASELINE, peaks, times))
     rows = [data.ride(frequency, "comfort", "ideal") for frequency in FREQUENCIES]
     return [*bars, _bar(data, "control, ideal", COLOURS[0], data.rides_of_setting.rides.rides, rows)]
 

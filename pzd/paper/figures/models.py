@@ -6,9 +6,9 @@ from pzd.artefacts import ParameterRow
 from pzd.damper.model import BaseRow
 from pzd.paper.figures.canvas import COLOURS, NUMBERS_OF_OTHERS
 from pzd.paper.figures.sources import Condition, FigureData, Sine
-from pzd.paper.figures.figure import Drawing
+from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.figures.planes import Curve, both_planes, element, identified, loop
-from pzd.paper.published import TABLES, table_damper
+from pzd.paper.published import LARGE_GAP, TABLES, table_damper
 
 
 def tabulated(condition: Condition) -> BaseRow:
@@ -55,6 +55,27 @@ def modelled(part: str, data: FigureData, labels: dict[str, Condition], sine: Si
         captions.append(f"{label}: {ours.peak:.0f} N, with the paper's parameters {theirs.peak:.0f} N; {parameters(row)}")
     figure = both_planes(curves, columns=len(labels))
     return Drawing(part, figure, what, f"{sine}. Peak, " + ". ".join(captions) + ".")
+
+
+def at_two_temperatures(number: int, voltage: float, in_words: str) -> PaperFigure:
+    """Figures 15 and 16: the model at 23 and 43 °C at one voltage.
+
+    Parameters
+    ----------
+    number : of the figure
+    voltage : [V]
+    in_words : the voltage as the title says it
+    """
+    conditions = {f"{warm:g} °C": Condition(LARGE_GAP, voltage, warm) for warm in (23.0, 43.0)}
+    what = f"Modelled force on both planes at 23 and 43 °C, {voltage:g} V."
+    return PaperFigure(
+        number,
+        f"Model at 23 and 43 °C {in_words}",
+        "model",
+        "The Bingham element with the parameters identified from the virtual stand; dashed with those of Tables 2 and "
+        "3. The paper states no motion: 2 Hz and 0.03 m are assumed, as in Figures 8 and 9.",
+        lambda data: (modelled("model", data, conditions, Sine(2.0, 0.030), what),),
+    )
 
 
 def parameters(row: ParameterRow) -> str:

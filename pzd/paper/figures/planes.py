@@ -14,7 +14,7 @@ from pzd.paper.figures.figure import Drawing
 from pzd.paper.loop import Loop, loop_of
 from pzd.paper.published import published
 from pzd.record import Array
-from pzd.report.gaps import criterion
+from pzd.signals.criterion import criterion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,7 +104,7 @@ def fitted(test: Test, row: ParameterRow) -> tuple[Array, float]:
     force = respond(element(identified(row)), Motion.of(test.record))
     period = 1.0 / (test.measure.frequency_Hz or 1.0)
     settled = test.record.time >= test.record.time[0] + period
-    return force, criterion(test.record.force[settled], force[settled])
+    return force, criterion((test.record.force - force)[settled], test.record.force[settled])
 
 
 def over_last_cycle(test: Test, force: Array) -> Loop:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pzd.artefacts import SummaryRow
 from pzd.report.context import REFERENCE, ReportContext, policy_in_words
-from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes, legend, thinned
+from pzd.report.drawing import BASELINE, BY_FIDELITY, Panel, Plot, axes, legend, thinned
 from pzd.report.ride_comfort import SettledRide
 from pzd.report.wording import number
 
@@ -34,7 +34,7 @@ def _panel(context: ReportContext, road: str, shown: list[SummaryRow], rides: di
         constant = row.policy == REFERENCE
         size = np.abs(ride.acceleration[window])
         time, size = thinned(np.arange(size.size) / ride.rate, size)
-        colour = PLAIN if constant else BY_FIDELITY[row.fidelity]
+        colour = BASELINE if constant else BY_FIDELITY[row.fidelity]
         ax.plot(time, size, color=colour, linestyle="--" if constant else "-", label=policy_in_words(row))
     ax.set_xlabel("time [s]")
     ax.set_ylabel("|a_K| [m/s²]")

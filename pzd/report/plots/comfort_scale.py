@@ -10,7 +10,7 @@ import numpy as np
 from pzd.artefacts import SummaryRow
 from pzd.comfort import iso2631_1997
 from pzd.report.context import REFERENCE, ReportContext, policy_in_words
-from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes
+from pzd.report.drawing import BASELINE, BY_FIDELITY, Panel, Plot, axes
 from pzd.report.wording import number
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def _panel(road: str, known: list[tuple[SummaryRow, float]]) -> Panel:
     _bands(ax, len(known), right)
     for place, (row, value) in enumerate(known):
         constant = row.policy == REFERENCE
-        colour = PLAIN if constant else BY_FIDELITY[row.fidelity]
+        colour = BASELINE if constant else BY_FIDELITY[row.fidelity]
         ax.plot(value, place, "o" if constant else "s", color=colour, markersize=6.0, zorder=3)
     ax.set_yticks(range(len(known)), names)
     ax.set_ylim(-0.6, len(known) + 2.6)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pzd.comfort import iso2631_1978
 from pzd.report.context import REFERENCE, ReportContext, policy_in_words
-from pzd.report.drawing import BY_FIDELITY, PLAIN, Panel, Plot, axes, legend
+from pzd.report.drawing import BASELINE, BY_FIDELITY, Panel, Plot, axes, legend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +36,7 @@ def _panel(context: ReportContext, road: str, cases: list[str]) -> Panel:
         parts, _ = ride.components
         kept = parts.rms >= _SMALLEST * float(parts.rms.max())
         constant = ride.row.policy == REFERENCE
-        colour = PLAIN if constant else BY_FIDELITY[ride.row.fidelity]
+        colour = BASELINE if constant else BY_FIDELITY[ride.row.fidelity]
         label = policy_in_words(ride.row)
         marker = "o" if constant else "s"
         ax.plot(parts.frequency[kept], parts.rms[kept], marker, color=colour, markersize=6.0, label=label, zorder=3)

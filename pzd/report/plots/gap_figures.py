@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pzd.report.context import ReportContext
-from pzd.report.drawing import FINAL, MEASURED, PLAIN, Panel, Plot, axes
+from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, Plot, axes
 from pzd.report.wording import number
 
 
@@ -13,7 +13,7 @@ def draw(context: ReportContext) -> Iterator[Panel]:
     """Bars before, after and of noise; before and noise alone where nothing was adopted."""
     gap = context.diagnosed.diagnosis.gap
     noise, after = ("noise alone", gap.noise_floor, MEASURED), ("after", gap.after, FINAL)
-    before = ("before" if context.extended else "simple model", gap.before, PLAIN)
+    before = ("before" if context.extended else "simple model", gap.before, BASELINE)
     bars = [noise, after, before] if context.extended else [noise, before]
     last = bars[1]
     figure, ax = axes(1.0 + 0.4 * len(bars), [bar[0] for bar in bars], key=0)

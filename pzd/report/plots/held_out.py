@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.report.context import ReportContext
-from pzd.report.drawing import FINAL, PLAIN, Panel, Plot, axes, legend
+from pzd.report.drawing import BASELINE, FINAL, Panel, Plot, axes, legend
 from pzd.report.gaps import of_record
 
 _MOST = 16
@@ -25,7 +25,7 @@ def draw(context: ReportContext) -> Iterator[Panel]:
     before, after = np.array([of_record(context, record) for record in records]).T
     figure, ax = axes(1.0 + 0.26 * max(len(names), 3), names)
     ax.hlines(names, after, before, color="#b8c4d0", linewidth=2.0)
-    ax.plot(before, names, "o", color=PLAIN, label="before")
+    ax.plot(before, names, "o", color=BASELINE, label="before")
     ax.plot(after, names, "s", color=FINAL, label="after")
     ax.set_xlim(0.0, 1.1 * float(max(before.max(), after.max())))
     ax.set_xlabel("W_s [-]")

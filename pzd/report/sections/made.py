@@ -23,7 +23,7 @@ _SOURCES = {
 }
 _LINE = "One straight line of stages; each writes the files that the next one reads, in the folders beside this page's:"
 _SIGNS = (
-    "Extension (rebound) is positive for displacement, velocity and force; force times velocity above nought "
+    "Extension (rebound) is positive for displacement, velocity and force; force times velocity above zero "
     "dissipates. The same input and seed give the same bytes; versions and times stand in each manifest.json."
 )
 

@@ -66,7 +66,7 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
 
     Raises
     ------
-    DataError : when a column is missing or stands there twice, or a cell is no date
+    DataError : when a column is missing or occurs twice, or a cell is no date
     ConfigError : when nothing says the unit of a column, or the unit is none of the quantity
     """
     found = _sources(sheet, layout)

@@ -82,7 +82,7 @@ def guessed(files: Sequence[Path]) -> list[str]:
         raise DataError(faults)
     control = control_of([header for file in found for header in file.dialect.header])
     if control == Control() and not any(VOLTAGE in dict(file.columns) for file in found):
-        control = Control("current", "A") if _told_by_names(found, "current") else control
+        control = Control("current", "A") if _in_names(found, "current") else control
     lines = ["# Guessed from the headers: check every line. Paths are relative to this file."]
     if control != Control():
         lines.append(f"control: {{name: {control.name}, unit: {control.unit}}}")
@@ -132,13 +132,13 @@ def _entry(files: Sequence[_File], control: Control) -> Iterator[str]:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
         yield from (f"  {q.name}:   # fill in: one of {', '.join(dialect.header)}" for q in lost)
-    told = {name: pattern for name in _absent(columns, control) if (pattern := _told_by_names(files, name))}
-    units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, (_, unit) in told.items())]
+    in_names = {name: pattern for name in _absent(columns, control) if (pattern := _in_names(files, name))}
+    units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, (_, unit) in in_names.items())]
     if units:
         yield "units:"
         yield from units
-    if told:
-        yield f"pattern: '{'.*'.join(pattern for pattern, _ in told.values())}'    # from the files' names"
+    if in_names:
+        yield f"pattern: '{'.*'.join(pattern for pattern, _ in in_names.values())}'    # from the files' names"
     if not lost and any(_turned(file, columns) for file in files):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
 
@@ -184,8 +184,8 @@ def _absent(columns: dict[Quantity, str], control: Control) -> list[str]:
     return [name for quantity, name in labels if quantity not in columns and name in _NAMES]
 
 
-def _told_by_names(files: Sequence[_File], name: str) -> tuple[str, str] | None:
-    """The pattern that finds a quantity in the name of every file, and its unit; None where one does not tell it."""
+def _in_names(files: Sequence[_File], name: str) -> tuple[str, str] | None:
+    """The pattern that finds a quantity in the name of every file, and its unit; None where one of them lacks it."""
     matches = [_NAMES[name].search(file.path.stem) for file in files]
     units = {match[2] for match in matches if match}
     if not all(matches) or len(units) != 1:
@@ -205,7 +205,7 @@ def _date_format(cell: str) -> str | None:
 
 
 def _turned(file: _File, columns: dict[Quantity, str]) -> bool:
-    """Whether the work of a file is negative as its numbers stand, whatever their units."""
+    """Whether the work of a file is negative, whatever its units."""
     dialect = file.dialect
     entry = FilesEntry(
         path=str(file.path),

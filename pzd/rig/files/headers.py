@@ -104,7 +104,7 @@ def _word(header: str, control: Control) -> Quantity | None:
 
 
 def _in_brackets(header: str, units: Sequence[str] | None, index: int) -> bool:
-    """Whether a unit stands there at all, which then is none of the quantity."""
+    """Whether a header has a unit in brackets, whatever it is a unit of."""
     return bool(units and units[index]) or bool(re.search(r"[\[(].*[\])]", header))
 
 

@@ -1,4 +1,4 @@
-"""Which files the config names."""
+"""The rig files that the paths and patterns of a config name."""
 
 from __future__ import annotations
 

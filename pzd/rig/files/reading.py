@@ -1,4 +1,4 @@
-"""The way of a record from its file to the artefact, one station after the other, none entered again.
+"""Reads rig files: listing, layout, channels, tests, refusals and records, each step once and in this order.
 
 listing -> layout -> format reader -> channels -> tests -> refusals -> fixture -> work -> record
 """
@@ -27,7 +27,7 @@ from pzd.schema.errors import ConfigError, DataError
 def read(
     entries: Sequence[FilesEntry], limits: Limits, control: Control, folder: Path
 ) -> tuple[Callable[[], Measured], ...]:
-    """Every test of every file, refused or believed; what is returned makes the record of each, in any order.
+    """Every test of every file, refused or accepted; what is returned makes the record of each, in any order.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def read(
     Raises
     ------
     ConfigError : when the config does not describe the files; every fault is listed
-    DataError : when a file cannot be believed; every such file is listed
+    DataError : when a file cannot be used; every such file is listed
     FilesError : when a file cannot be read
     """
     files = listed(entries, folder)
@@ -58,8 +58,8 @@ def read(
             data_faults += error.messages
     if config_faults:
         raise ConfigError(dict.fromkeys(config_faults))
-    wrong = [believed for believed in tests if works_on_the_rig(believed[1])]
-    right = [believed for believed in tests if not works_on_the_rig(believed[1])]
+    wrong = [test for test in tests if works_on_the_rig(test[1])]
+    right = [test for test in tests if not works_on_the_rig(test[1])]
     data_faults += [sign_fault(test, freed, layout_of[test.sheet.path], right) for test, freed in wrong]
     if data_faults:
         raise DataError(data_faults)

@@ -1,4 +1,4 @@
-"""Tests that are believed as records with all their channels, and what they are called."""
+"""Accepted tests as records with all their channels, and the names of the records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a test must satisfy to be believed at all; a test that does not is refused.
+"""What a test must satisfy to be used at all; a test that does not is refused.
 
 Everything milder is a finding of the preflight.
 """
@@ -33,7 +33,7 @@ LEAST_REVERSALS = 2
 
 
 def refuse(tests: Sequence[Test], layout: Layout) -> None:
-    """Refuse a file one of whose tests cannot be believed, whatever its fixture.
+    """Refuse a file one of whose tests cannot be used, whatever its fixture.
 
     Parameters
     ----------

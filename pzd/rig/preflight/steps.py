@@ -12,7 +12,7 @@ def check(test: Measured) -> list[Finding]:
     return [
         Finding(
             check="steps",
-            where=f"displacement, {_told(old)} until {old.end:.4g} s, {_told(new)} from {new.start:.4g} s",
+            where=f"displacement, {_in_words(old)} until {old.end:.4g} s, {_in_words(new)} from {new.start:.4g} s",
             size=old.change(new),
             unit="-",
             follows="two tests in one record, identified and diagnosed apart; for two records label each in a column of"
@@ -22,5 +22,5 @@ def check(test: Measured) -> list[Finding]:
     ]
 
 
-def _told(stretch: Stretch) -> str:
+def _in_words(stretch: Stretch) -> str:
     return f"{1e3 * stretch.amplitude:.3g} mm at {1.0 / stretch.period:.3g} Hz"

@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from pzd.rig.stand.waveform import Waveform
+from pzd.rig.stand.waveform import Waveform, two_turns
 
 
 class Lines(Waveform):
@@ -36,4 +36,4 @@ class Lines(Waveform):
     @property
     def settling(self) -> float:
         """Two turns at the lowest frequency, or a second."""
-        return max(2.0 / self.low_Hz, 1.0)
+        return two_turns(self.low_Hz)

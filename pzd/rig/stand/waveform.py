@@ -57,6 +57,11 @@ class Waveform(Frozen):
         """
 
 
+def two_turns(frequency: float) -> float:
+    """Time [s] after which a damper has forgotten its start at a frequency [Hz]: two turns, at least a second."""
+    return max(2.0 / frequency, 1.0)
+
+
 def started(course: Course, lead: float) -> Course:
     """The same motion started from rest, smoothly, and untouched from the middle of the lead on.
 

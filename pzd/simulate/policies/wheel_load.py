@@ -10,7 +10,7 @@ from pzd.simulate.policy import Policy
 
 
 def feedback(car: HalfCar, damping: float) -> Array:  # the signature of every feedback
-    """T_i = -k_i U_i: the dynamic load S_i + T_i of each wheel goes to nought where that is within reach.
+    """T_i = -k_i U_i: the dynamic load S_i + T_i of each wheel goes to zero where that is within reach.
 
     Source: Makowski and Knap 2021, section 6 (criterion of wheel dynamic load change)
     """

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pzd.paper.figures.canvas import FINAL, PLAIN, SOFT, panels
+from pzd.paper.figures.canvas import FINAL, BASELINE, SOFT, panels
 from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.published import published
@@ -68,8 +68,8 @@ def draw(data: FigureData) -> Iterator[Drawing]:
     minutes = np.array(time) / 60.0
     ax.plot(minutes, temperature, color=FINAL)
     for value, text in ((start, f"{start:g} °C, Figure 7a"), (end, f"{end:g} °C, Figure 7b")):
-        ax.axhline(value, color=PLAIN, linewidth=1.0, linestyle="--")
-        ax.annotate(text, (0.0, value), (4, -11), textcoords="offset points", color=PLAIN)
+        ax.axhline(value, color=BASELINE, linewidth=1.0, linestyle="--")
+        ax.annotate(text, (0.0, value), (4, -11), textcoords="offset points", color=BASELINE)
     ax.axhline(AMBIENT, color=SOFT, linewidth=0.8)
     ax.annotate("ambient 22 °C", (minutes[-1], AMBIENT), (0, 3), textcoords="offset points", ha="right")
     ax.set_xlim(0.0, float(minutes[-1]))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pzd.paper.figures.canvas import FORCE, MEASURED, PLAIN, key, panels
+from pzd.paper.figures.canvas import FORCE, MEASURED, BASELINE, key, panels
 from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.figures.models import parameters
@@ -25,7 +25,7 @@ def draw(data: FigureData) -> Iterator[Drawing]:
     figure, (ax,) = panels(ratios=(1.0,), height=3.2)
     time = test.record.time[part] - test.record.time[part][0]
     ax.plot(time, test.record.force[part], ".", color=MEASURED, markersize=2.0, label="measured")
-    ax.plot(time, force[part], color=PLAIN, linewidth=1.1, label="model")
+    ax.plot(time, force[part], color=BASELINE, linewidth=1.1, label="model")
     ax.set_xlabel("time t [s]")
     ax.set_ylabel(FORCE)
     ax.set_xlim(0.0, float(np.ceil(time[-1])))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.paper.figures.canvas import MEASURED, PLAIN
+from pzd.paper.figures.canvas import MEASURED, BASELINE
 from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.figures.planes import Curve, both_planes, fitted, over_last_cycle
@@ -20,7 +20,7 @@ def draw(data: FigureData) -> Iterator[Drawing]:
     cycle = test.cycle()
     curves = [
         Curve("measured", cycle, test, MEASURED),
-        Curve("model", over_last_cycle(test, force), colour=PLAIN, style={"linestyle": "--", "linewidth": 1.3}),
+        Curve("model", over_last_cycle(test, force), colour=BASELINE, style={"linestyle": "--", "linewidth": 1.3}),
     ]
     caption = f"{AT}, {SINE}: W_s = {w_s:.2e}; peak measured {cycle.peak:.0f} N, model {curves[1].loop.peak:.0f} N."
     yield Drawing("planes", both_planes(curves), "Measured and modelled force on both planes at 100 V.", caption)

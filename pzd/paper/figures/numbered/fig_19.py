@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.artefacts import RIDE_COLUMNS
-from pzd.paper.figures.canvas import FINAL, PLAIN, key, panels
+from pzd.paper.figures.canvas import FINAL, BASELINE, key, panels
 from pzd.paper.figures.cars import survey
 from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.fidelities import fidelities
@@ -17,7 +17,7 @@ from pzd.paper.car_search import CONSTANT_PEAKS, CONTROLLED_PEAKS, FREQUENCIES
 _SHOWN = 2.0
 """Length of what is shown of the settled ride [s]."""
 _TIME, _ACCELERATION = RIDE_COLUMNS[0], RIDE_COLUMNS[-1]
-_CURVES = {"constant": ("c-const.", PLAIN), "comfort": ("c-control", FINAL)}
+_CURVES = {"constant": ("c-const.", BASELINE), "comfort": ("c-control", FINAL)}
 
 
 def draw(data: FigureData) -> Iterator[Drawing]:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from pzd.rig.stand.waveform import Course, Waveform
+from pzd.rig.stand.waveform import Course, Waveform, two_turns
 from pzd.signals.harmonics import FourierSum
 
 
@@ -33,7 +33,7 @@ class Sine(Waveform):
     @property
     def settling(self) -> float:
         """Two cycles, or a second."""
-        return max(2.0 / self.frequency_Hz, 1.0)
+        return two_turns(self.frequency_Hz)
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
         """The sine."""

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from pzd.record import Array
-from pzd.rig.stand.waveform import Course, Waveform
+from pzd.rig.stand.waveform import Course, Waveform, two_turns
 
 
 class Sweep(Waveform):
@@ -55,7 +55,7 @@ class Sweep(Waveform):
     @property
     def settling(self) -> float:
         """Two turns at the lowest frequency, or a second."""
-        return max(2.0 / self.low_Hz, 1.0)
+        return two_turns(self.low_Hz)
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
         """The sweep."""

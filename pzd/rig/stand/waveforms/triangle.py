@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from pzd.rig.stand.waveform import Course, Waveform
+from pzd.rig.stand.waveform import Course, Waveform, two_turns
 from pzd.signals.harmonics import FourierSum
 
 _SMALLEST = 1e-10
@@ -45,7 +45,7 @@ class Triangle(Waveform):
     @property
     def settling(self) -> float:
         """Two cycles, or a second."""
-        return max(2.0 / self.frequency_Hz, 1.0)
+        return two_turns(self.frequency_Hz)
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
         """The sum of the harmonics that the actuator passes."""

@@ -1,4 +1,4 @@
-"""Stages that take no time: signatures and artefacts as of the real ones, numbers that show what they depend on."""
+"""Stub stages that take no time: signatures and artefacts of the real ones, numbers that show what they depend on."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from pzd.artefacts import (
     Gap,
     Identified,
     InverseRow,
+    NextTest,
     ParameterRow,
     RecordEntry,
     Region,
@@ -48,6 +49,16 @@ from pzd.table.config import TableConfig
 NAMES = ["ingest", "identify", "diagnose", "table", "simulate", "report"]
 UNDETERMINED = 99
 """A seed with which C is undetermined."""
+NEXT_TEST = NextTest(
+    waveform="sine",
+    frequency_Hz=4.0,
+    amplitude_m=0.01,
+    voltage_V=150.0,
+    separates=("orifice_quadratic", "shear_thinning"),
+    middle_m=0.03135,
+    peak_speed_m_per_s=0.251327,
+    peak_force_N=1512.345,
+)
 
 
 def ingest(rig: RigConfig, control: Control, folder: Path) -> Rig:

@@ -1,4 +1,4 @@
-"""Tells a diagnosis in about ten lines."""
+"""A diagnosis as about ten lines of text."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ _VERDICTS = {
     "unexplained": "a gap that repeats remains, and no name accounts for it",
 }
 _MOST = 3
-"""How many places and candidates are told."""
+"""How many places and candidates are listed."""
 
 
-def story(diagnosis: Diagnosis, control: Control, *, every_test: bool = False) -> list[str]:
-    """What is missing, where, how sure that is, what it was worth, and what to test next.
+def diagnosis_lines(diagnosis: Diagnosis, control: Control, *, every_test: bool = False) -> list[str]:
+    """The lines: what is missing, where, how sure that is, how far it closes the gap, and what to test next.
 
     Parameters
     ----------
-    diagnosis : what is told
+    diagnosis : the artefact of diagnose
     control : the control signal, for its unit
-    every_test : whether the prediction of each kept-back test and each voltage left out is told too
+    every_test : whether the prediction of each kept-back test and each voltage left out is listed too
     """
     unit = control.unit
     lines = [
@@ -75,8 +75,8 @@ def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[s
 
 def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:
     values = diagnosis.parameters.get(effect, {})
-    told = ", ".join(f"{name} = {_value(value, unit)}" for name, value in values.items())
-    return f"{told} to either side of x = {diagnosis.zero_m:.4g} m" if effect == "end_stop" else told
+    text = ", ".join(f"{name} = {_value(value, unit)}" for name, value in values.items())
+    return f"{text} to either side of x = {diagnosis.zero_m:.4g} m" if effect == "end_stop" else text
 
 
 def _value(value: Value, unit: str) -> str:
@@ -89,8 +89,8 @@ def _value(value: Value, unit: str) -> str:
 
 
 def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
-    told = {*diagnosis.effects, *diagnosis.rivals}
-    others = [one for one in diagnosis.ranking if one.effect not in told]
+    listed = {*diagnosis.effects, *diagnosis.rivals}
+    others = [one for one in diagnosis.ranking if one.effect not in listed]
     adopted = [one.gap_after for one in diagnosis.ranking if one.effect in diagnosis.effects]
     against = f" against {number(min(adopted))}" if adopted else ""
     for one in others[:_MOST]:
