@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pzd.artefacts import Prediction
+from pzd.damper.effects import library
 from pzd.diagnose.added_by_prediction import with_predictive_effects
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.kept_back import Trials
 from pzd.diagnose.missed import Missed
 from pzd.diagnose.search.evidence import evidence_of
-from pzd.diagnose.search.selection import Selection
+from pzd.diagnose.search.selection import Selection, against_nature
 
 HARMFUL = "the damper predicts kept-back tests worse with it"
+IMPOSSIBLE = "stand-in: fits with a value alone that it has nowhere in nature"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +57,8 @@ def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit:
     unit : of the control signal, for the words
     """
     plain = trials.plain_missed()
-    kept, missed, refused, by_criterion = selection, plain, None, False
+    kept, refused = _without_impossible(selection, forced)
+    missed, by_criterion = plain, False
     while kept.adopted:
         missed, by_criterion = _best(kept, trials)
         ours = [name for name in kept.adopted if name not in forced]
@@ -91,6 +96,32 @@ def with_additions(handed: HandedOn, trials: Trials, config: DiagnoseConfig) -> 
     )
 
 
+def _without_impossible(selection: Selection, forced: Sequence[str]) -> tuple[Selection, str | None]:
+    """The selection without effects that fit with impossible values alone; and why nothing is left, if nothing is.
+
+    One with a rival stays: there the verdict is `ambiguous`, and what is adopted is the best of several.
+    """
+    kept = selection
+    while odd := [] if kept.rivals else [name for name in against_nature(kept.fitted.damper) if name not in forced]:
+        kept = _without(kept, odd[-1], IMPOSSIBLE)
+    if kept.adopted or kept is selection:
+        return kept, None
+    words = [f"{name} with {_values(selection, name)}" for name in selection.adopted]
+    return kept, (
+        f"{' and '.join(words)} would fit the tests, but nowhere in nature is there such a value: something else that "
+        "looks alike is missing"
+    )
+
+
+def _values(selection: Selection, effect: str) -> str:
+    """The parameters of an effect as a sentence shows them."""
+    values = selection.fitted.damper.effects[effect]
+    return ", ".join(
+        f"{p.name} = {' and '.join(f'{value:.3g}' for value in np.atleast_1d(values[p.name]))} {p.unit}"
+        for p in library()[effect].parameters
+    )
+
+
 def _best(selection: Selection, trials: Trials) -> tuple[Missed, bool]:
     """What the damper misses, and whether it is fitted by criterion (4) since that predicts visibly better.
 
@@ -115,17 +146,18 @@ def _harmful(
     return next((name for name, other in without if trials.worse(missed, other)), None)
 
 
-def _without(selection: Selection, effect: str) -> Selection:
-    """The selection with one effect taken back, the rest fitted anew."""
+def _without(selection: Selection, effect: str, reason: str = HARMFUL) -> Selection:
+    """The selection with one effect taken back for a reason, the rest fitted anew."""
     damper = selection.fitted.damper
     effects = {name: values for name, values in damper.effects.items() if name != effect}
+    reasons = {**selection.reasons, effect: reason}
     if not effects:
         return replace(
             selection,
             fitted=selection.plain,
             last=selection.first,
             competitions=(),
-            reasons=_reasons_without(selection, effect),
+            reasons=reasons,
         )
     fewer = damper.model_copy(update={"effects": effects})
     last = evidence_of(selection.last.campaign, fewer)
@@ -134,12 +166,8 @@ def _without(selection: Selection, effect: str) -> Selection:
         fitted=fit(last.whole, tuple(effects), last.whole.start_with(fewer)),
         last=last,
         competitions=tuple(c for c in selection.competitions if c.effect != effect),
-        reasons=_reasons_without(selection, effect),
+        reasons=reasons,
     )
-
-
-def _reasons_without(selection: Selection, effect: str) -> dict[str, str]:
-    return {**selection.reasons, effect: HARMFUL}
 
 
 def _refused(

@@ -159,12 +159,6 @@ class Foretold:
     def worse(self, one: float, other: float) -> tuple[float | None, ...]:
         return (150.0,) if one > other else ()
 
-    def told(
-        self, plain: float, missed: float, damper: Damper | None, *, by_criterion: bool = False
-    ) -> tuple[float, float, bool]:
-        assert not by_criterion
-        return plain, missed, damper is None
-
 
 class _Figure(float):
     """What is missed, alike at every voltage."""
@@ -206,7 +200,7 @@ def test_effects_that_harm_the_prediction_are_taken_back(
     named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
     found = handed_on(named, cast("Trials", foretold), (), "V")
     assert found.selection.adopted == kept
-    assert cast("tuple[float, float, bool]", found.prediction)[2] == (not kept)
+    assert cast("float", found.missed) == (both if kept == (A, B) else only_a if kept else 1.0)
     assert all("worse" in found.selection.reasons[name] for name in {A, B} - set(kept))
     if kept:
         assert found.refused is None

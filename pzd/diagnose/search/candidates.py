@@ -184,9 +184,13 @@ def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:
     free = [
         name
         for name in before.effects
-        if library()[name].place in VARIES and name not in problem.varying and len(problem.voltages) > 1
+        if _may_vary(library()[name]) and name not in problem.varying and len(problem.voltages) > 1
     ]
     return [_varied(problem, before, name) for name in free]
+
+
+def _may_vary(effect: Effect) -> bool:
+    return effect.place in VARIES and not effect.same_at_every_voltage
 
 
 def _varied(problem: Problem, before: Fitted, effect: str, evaluations: int = MOST_EVALUATIONS) -> Candidate:
