@@ -18,7 +18,6 @@ from pzd.diagnose.fit.least_squares import Fitted
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.kept_back import Trials
 from pzd.diagnose.missed import Missed
-from pzd.diagnose.search.acceptance import no_stop
 from pzd.diagnose.search.candidates import Candidate, by_voltage, candidate, most_promising, seen_in
 from pzd.diagnose.search.selection import Selection, against_nature
 from pzd.diagnose.thresholds import LEAST_CUT_IN_PREDICTION, PREDICTED_AT_ONCE, SCREENED
@@ -91,7 +90,8 @@ def _best(
 def _tried(problem: Problem, fitted: Fitted, config: DiagnoseConfig) -> Iterator[Candidate]:
     """Candidates that are possible: a new effect each, or an adopted one with its parameters by voltage.
 
-    What a sensor shows is not tried: no ride feels it, and a delay fits any hysteresis a little.
+    What a sensor shows is not tried: no ride feels it, and a delay fits any hysteresis a little. Nor is what begins at
+    some displacement: it would grow beyond the recorded stroke, where no test shows it.
     """
     found: list[Candidate] = by_voltage(problem, fitted)
     if len(fitted.effects) < config.most_effects:
@@ -100,14 +100,11 @@ def _tried(problem: Problem, fitted: Fitted, config: DiagnoseConfig) -> Iterator
             for effect in library().values()
             if effect.name not in (*fitted.effects, *config.forbid)
             and effect.place != "sensor"
+            and not effect.about_zero
             and seen_in(problem, effect)
         ]
         found += [candidate(problem, fitted, effect) for effect in most_promising(problem, fitted, new, SCREENED)]
-    for each in found:
-        damper = each.fitted.damper
-        stop = "end_stop" in damper.effects and no_stop(damper, problem.scales.stroke)
-        if each.explained >= config.visible and not against_nature(damper) and not stop:
-            yield each
+    return (c for c in found if c.explained >= config.visible and not against_nature(c.fitted.damper))
 
 
 def _predicts_better(one: Missed, other: Missed, trials: Trials) -> bool:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.damper.compose import integrated_force, respond, sampling_steps, sensors_of, shown_moments
 from pzd.damper.model import Damper
@@ -40,6 +41,8 @@ class RecordLikelihood:
     """Samples of the motion that come before the first one compared."""
     stride: int
     """Motion samples from one compared sample to the next."""
+    compared: NDArray[np.bool_]
+    """(s,) which of the samples from the first on are compared: n of them, in one stretch or several."""
     measured: Array
     """(n,) force [N]."""
     peak: float
@@ -75,7 +78,7 @@ class RecordLikelihood:
 
     def at_compared(self, simulated: Array) -> Array:
         """(n,) or (n, p) of what was simulated at the samples that are compared."""
-        return simulated[self.first :: self.stride][: self.measured.size]
+        return simulated[self.first :: self.stride][: self.compared.size][self.compared]
 
     def shown(self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], late: float = 0.0) -> Array:
         """(m,) what was simulated as a channel shows it, between the samples by a cubic.
@@ -107,12 +110,25 @@ class RecordLikelihood:
         flat = self._scaled(values)
         return flat - self.frame @ ((1.0 - self.shrink).reshape(-1, *([1] * (flat.ndim - 1))) * (self.frame.T @ flat))
 
+    @cached_property
+    def _unbroken(self) -> NDArray[np.bool_]:
+        """Which whitened samples count: those whose predecessors, as many as the noise remembers, are compared too."""
+        return unbroken(self.compared, self.noise)
+
     def _scaled(self, values: Array) -> Array:
         if isinstance(self.noise, Autoregression):
-            return self.noise.whitened(values)
+            return self.noise.whitened(values)[self._unbroken]
         weights = self.weights.reshape(-1, *([1] * (values.ndim - 1)))
         harmonics = np.fft.rfft(values, axis=0)[: self.weights.size] / len(values) * weights
         return np.concatenate([harmonics.real, harmonics.imag[1:]])
+
+
+def unbroken(compared: NDArray[np.bool_], noise: PureError | Autoregression) -> NDArray[np.bool_]:
+    """Which whitened samples have all their predecessors in the same stretch of the samples (s,) that are compared."""
+    memory = noise.coefficients.size if isinstance(noise, Autoregression) else 0
+    before = np.convolve(compared, np.ones(memory + 1, dtype=np.int64))[: compared.size][compared][memory:]
+    whole: NDArray[np.bool_] = before == memory + 1
+    return whole
 
 
 def response(observation: RecordLikelihood, damper: Damper) -> Array:

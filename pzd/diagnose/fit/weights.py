@@ -12,7 +12,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.input_uncertainty import Expected
-from pzd.diagnose.fit.likelihood import RecordLikelihood, responses
+from pzd.diagnose.fit.likelihood import RecordLikelihood, responses, unbroken
 from pzd.diagnose.fit.prediction import motion_of, warms
 from pzd.identify.trial import in_motion
 from pzd.record import Array, Record, sliced
@@ -84,6 +84,7 @@ def _of_cycles(
         record.name,
         place,
         *_cycle_motion(record, run.period, [_resampled(channel, points) for channel in p.mean_motion]),
+        np.ones(cycle.size, dtype=np.bool_),
         cycle,
         peak,
         error,
@@ -136,32 +137,36 @@ def _of_samples(
 ) -> RecordLikelihood | None:
     record, force = p.record, given.force
     mask = mask & in_motion(record)
-    start, stop = int(np.argmax(mask)), int(mask.size - np.argmax(mask[::-1]))
-    if stop - start < 2 * CYCLE_POINTS:
+    if np.count_nonzero(mask) < 2 * CYCLE_POINTS:
         return None
+    start, stop = int(np.argmax(mask)), int(mask.size - np.argmax(mask[::-1]))
+    compared = mask[start:stop]
     noise = fit_smooth_residual(
         record.force[start:stop] - force[start:stop], _part(record, start, stop), force[start:stop]
     ).noise
-    peak = float(np.max(np.abs(record.force[start:stop])))
-    left = DISCREPANCY * _left_by(record.force[start:stop], force[start:stop], noise.variance)
+    measured = record.force[mask]
+    peak = float(np.max(np.abs(measured)))
+    left = DISCREPANCY * _left_by(measured, force[mask], noise.variance)
     if left**2 > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left**2)
     noise = Autoregression(noise.coefficients, max(noise.innovation, (RESOLUTION * peak) ** 2))
     motion, factor = motion_of(record, constant=p.constant)
+    rows = int(np.count_nonzero(unbroken(compared, noise)))
     bare = RecordLikelihood(
         record.name,
         place,
         motion,
         start * factor,
         factor,
-        record.force[start:stop],
+        compared,
+        measured,
         peak,
         noise,
         np.zeros(0),
-        np.zeros((stop - start - noise.coefficients.size, 0)),
+        np.zeros((rows, 0)),
         np.zeros(0),
     )
-    return with_nuisances(bare, given.damper, nuisance, given.timing[start:stop])
+    return with_nuisances(bare, given.damper, nuisance, given.timing[mask])
 
 
 def _part(record: Record, start: int, stop: int) -> Record:
