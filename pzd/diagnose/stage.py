@@ -50,7 +50,17 @@ def diagnose(
     from pzd.diagnose.kept_back import trials_of
     from pzd.diagnose.next_test import next_test, reach_of
     from pzd.diagnose.search.forward_selection import select_effects
-    from pzd.diagnose.verdict import decide, parameters_of, ranking_of, refused, unpredicted, weak, with_added
+    from pzd.diagnose.trends_of_tests import trend_of_tests
+    from pzd.diagnose.verdict import (
+        decide,
+        parameters_of,
+        ranking_of,
+        refused,
+        unless_systematic,
+        unpredicted,
+        weak,
+        with_added,
+    )
     from pzd.diagnose.where import regions
 
     records, cut_off = whole_records(rig, setting)
@@ -64,6 +74,8 @@ def diagnose(
     handed = handed_on(select_effects(campaign, plain, diagnose, jobs), trials, diagnose.force, control.unit)
     evidence = handed.selection.first
     decision = refused(handed.refused) if handed.refused else decide(handed.selection, diagnose)
+    if decision.verdict != "unexplained":
+        decision = unless_systematic(decision, trend_of_tests(campaign, handed.selection.fitted.damper, diagnose))
     if decision.verdict == "unexplained":
         handed = with_additions(handed, trials, diagnose)
         decision = with_added(decision, handed.added)

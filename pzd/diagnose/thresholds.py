@@ -123,6 +123,13 @@ PREDICTED_AT_ONCE = 3
 
 Reason: time; each takes as many refits as there are folds."""
 
+# What the tests' own gains, offsets and delays have in common (trends_of_tests.py)
+
+FEWEST_FOR_A_TREND = 3
+"""Degrees of freedom from which a trend over tests is looked for.
+
+Reason: with fewer a single odd test makes any trend; at three Student's t still asks for ten times the error."""
+
 # What the verdict adds (verdict.py, residual_check.py)
 
 CYCLE_CHANGE_SIGNIFICANCE = 1e-4

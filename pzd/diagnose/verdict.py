@@ -19,6 +19,7 @@ from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection, against_nature
 from pzd.diagnose.thresholds import CONTRADICTS, OUTSIDE_LIBRARY
+from pzd.diagnose.trends_of_tests import Trend
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
@@ -48,6 +49,11 @@ def unpredicted(prediction: Prediction | None) -> str:
 def refused(reason: str) -> Decision:
     """The verdict where what fits the tests does not predict others: something is missing, and it has no name."""
     return Decision("unexplained", reason, None)
+
+
+def unless_systematic(decision: Decision, trend: Trend | None) -> Decision:
+    """The decision where the tests' own gains, offsets and delays are chance; `unexplained` where they are not."""
+    return decision if trend is None else Decision("unexplained", f"{decision.reason}; but {trend}", None)
 
 
 def with_added(decision: Decision, added: Sequence[str]) -> Decision:
