@@ -45,12 +45,22 @@ def diagnose(
     from pzd.diagnose.data.cleaning import about, mid_stroke, prepare
     from pzd.diagnose.data.exclusions import whole_records, without
     from pzd.diagnose.data.split import split
-    from pzd.diagnose.handed_on import handed_on
+    from pzd.diagnose.handed_on import handed_on, with_additions
     from pzd.diagnose.held_out import held_out_gap
     from pzd.diagnose.kept_back import trials_of
     from pzd.diagnose.next_test import next_test, reach_of
     from pzd.diagnose.search.forward_selection import select_effects
-    from pzd.diagnose.verdict import decide, parameters_of, ranking_of, refused, unpredicted, weak
+    from pzd.diagnose.trends_of_tests import trend_of_tests
+    from pzd.diagnose.verdict import (
+        decide,
+        parameters_of,
+        ranking_of,
+        refused,
+        unless_systematic,
+        unpredicted,
+        weak,
+        with_added,
+    )
     from pzd.diagnose.where import regions
 
     records, cut_off = whole_records(rig, setting)
@@ -62,11 +72,14 @@ def diagnose(
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
     trials = trials_of(campaign, plain, diagnose.visible)
     handed = handed_on(select_effects(campaign, plain, diagnose, jobs), trials, diagnose.force, control.unit)
-    selection = handed.selection
-    evidence = selection.first
-    before = evidence.campaign.checks(selection.plain.damper)
-    after = evidence.campaign.checks(selection.fitted.damper) if selection.adopted else before
-    decision = refused(handed.refused) if handed.refused else decide(selection, before, after, diagnose)
+    evidence = handed.selection.first
+    decision = refused(handed.refused) if handed.refused else decide(handed.selection, diagnose)
+    if decision.verdict != "unexplained":
+        decision = unless_systematic(decision, trend_of_tests(campaign, handed.selection.fitted.damper, diagnose))
+    if decision.verdict == "unexplained":
+        handed = with_additions(handed, trials, diagnose)
+        decision = with_added(decision, handed.added)
+    selection, prediction = handed.selection, handed.prediction(trials)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
     reach = reach_of(stand.limits, recorded, voltages)
@@ -75,16 +88,18 @@ def diagnose(
     found = selection.fitted.damper.moved(zero) if selection.adopted else plain
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + weak(parts.hold_out) + unpredicted(handed.prediction) + without(cut_off),
+        reason=decision.reason + weak(parts.hold_out) + unpredicted(prediction) + without(cut_off),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, trials if handed.by_criterion else None),
         parameters=parameters_of(selection),
-        prediction=handed.prediction,
+        prediction=prediction,
         zero_m=found.zero_m,
         ranking=ranking_of(selection, evidence),
         rivals=selection.rivals,
-        where=() if decision.verdict == "none" else regions(before, control.unit, zero),
+        where=()
+        if decision.verdict == "none"
+        else regions(evidence.campaign.checks(selection.plain.damper), control.unit, zero),
         next_test=next_test(rivals, reach, evidence.whole.reference, offsets),
     )
     if not selection.adopted:

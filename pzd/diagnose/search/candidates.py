@@ -140,6 +140,16 @@ def _switched_off(effect: Effect, fitted: Fitted) -> bool:
     return vanishes and bool(fitted.searched[-1] - nearest < AT_EDGE)
 
 
+def most_promising(problem: Problem, before: Fitted, effects: Sequence[Effect], count: int) -> list[Effect]:
+    """The effects from whose starting values one linearised step promises the smallest misfits, best first."""
+    frame, _ = np.linalg.qr(before.slopes)
+    promised = [
+        min(_promised(problem, before, effect, start, frame) for start in _starts(problem, before, effect))
+        for effect in effects
+    ]
+    return [effects[i] for i in np.argsort(promised, kind="stable")[:count]]
+
+
 def _without_promise(problem: Problem, before: Fitted, effect: Effect) -> bool:
     """Whether a faint effect of one parameter promises nothing; one of more may act where nobody looks yet."""
     if len(effect.parameters) > 1:
@@ -174,9 +184,13 @@ def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:
     free = [
         name
         for name in before.effects
-        if library()[name].place in VARIES and name not in problem.varying and len(problem.voltages) > 1
+        if _may_vary(library()[name]) and name not in problem.varying and len(problem.voltages) > 1
     ]
     return [_varied(problem, before, name) for name in free]
+
+
+def _may_vary(effect: Effect) -> bool:
+    return effect.place in VARIES and not effect.same_at_every_voltage
 
 
 def _varied(problem: Problem, before: Fitted, effect: str, evaluations: int = MOST_EVALUATIONS) -> Candidate:
@@ -281,9 +295,8 @@ def _promised(problem: Problem, before: Fitted, effect: Effect, start: Array, fr
     residuals, slopes = [], []
     for o in problem.observations:
         forces = [simulated(point, o) for point in points]
-        at_start = o.left(forces[0])
-        residuals.append(at_start.residual)
-        slopes.append(at_start.slopes(np.stack([forces[0] - f for f in forces[1:]], axis=-1) / DIFFERENCE))
+        residuals.append(o.in_noise(o.measured - forces[0]))
+        slopes.append(o.in_noise(np.stack([forces[0] - f for f in forces[1:]], axis=-1) / DIFFERENCE))
     r, columns = np.concatenate(residuals), np.concatenate(slopes)
     r, columns = r - frame @ (frame.T @ r), columns - frame @ (frame.T @ columns)
     size = np.linalg.norm(columns, axis=0)
