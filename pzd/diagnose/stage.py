@@ -50,6 +50,7 @@ def diagnose(
     from pzd.diagnose.kept_back import trials_of
     from pzd.diagnose.next_test import next_test, reach_of
     from pzd.diagnose.search.forward_selection import select_effects
+    from pzd.diagnose.too_short import too_short, undecided
     from pzd.diagnose.verdict import decide, parameters_of, ranking_of, refused, unpredicted, weak
     from pzd.diagnose.where import regions
 
@@ -60,6 +61,11 @@ def diagnose(
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
+    own_rows = tuple(row for row in identified.rows if row.setting == setting)
+    voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
+    reach = reach_of(stand.limits, recorded, voltages)
+    if too_short(campaign):
+        return Diagnosed(undecided(recorded, reach), plain, plain, own_rows)
     trials = trials_of(campaign, plain, diagnose.visible)
     handed = handed_on(select_effects(campaign, plain, diagnose, jobs), trials, diagnose.force, control.unit)
     named = handed.named
@@ -68,8 +74,6 @@ def diagnose(
     after = evidence.campaign.checks(named.fitted.damper) if named.adopted else before
     decision = refused(handed.refused) if handed.refused else decide(named, before, after, diagnose)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
-    voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
-    reach = reach_of(stand.limits, recorded, voltages)
     rivals = [(name, damper.moved(zero)) for name, damper in named.rivalling]
     offsets = [evidence.campaign.offset(damper) for _, damper in named.rivalling]
     found = named.fitted.damper.moved(zero) if named.adopted else plain
@@ -88,5 +92,5 @@ def diagnose(
         next_test=next_test(rivals, reach, evidence.whole.reference, offsets),
     )
     if not named.adopted:
-        return Diagnosed(told, found, plain, tuple(row for row in identified.rows if row.setting == setting))
+        return Diagnosed(told, found, plain, own_rows)
     return Diagnosed(told, found, plain, base_parameters(named, decision.verdict, setting))
