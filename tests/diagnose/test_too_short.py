@@ -9,16 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaign import damper_of, sine
+from test_naming import diagnosed
 
-from pzd.artefacts import Diagnosed, Rig
 from pzd.damper.model import Damper
-from pzd.diagnose.config import DiagnoseConfig
-from pzd.diagnose.stage import diagnose
-from pzd.identify.config import IdentifyConfig
-from pzd.identify.stage import identify
-from pzd.quantities import Control
 from pzd.record import Record, sliced
-from pzd.rig.config import Limits, RigConfig
 
 PLAIN = damper_of([0.0])
 MISSING = damper_of([0.0], orifice_quadratic={"q": 2500.0})
@@ -33,14 +27,8 @@ def shortened(rng: np.random.Generator, damper: Damper, cycles: float, rate: flo
     )
 
 
-def diagnosed(*records: Record) -> Diagnosed:
-    rig, rules, stand = Rig(records, ()), IdentifyConfig(), RigConfig.model_construct(limits=Limits())
-    identified = identify(rules, rig, 1)
-    return diagnose(DiagnoseConfig(), rules, stand, rig, identified, Control(), None, 1)
-
-
 def gets_a_verdict(*records: Record) -> None:
-    found = diagnosed(*records).diagnosis
+    found = diagnosed(records).diagnosis
     assert found.verdict in {"none", "named", "ambiguous", "unexplained"}
     assert (found.gap is None) == found.reason.startswith("the records are too short")
 
@@ -60,7 +48,7 @@ def test_so_do_several(rng: np.random.Generator, cycles: tuple[float, ...]) -> N
 
 def test_what_is_said_is_that_nothing_is_known_and_what_to_record(rng: np.random.Generator) -> None:
     record = shortened(rng, MISSING, 1.2, 200.0)
-    found = diagnosed(record)
+    found = diagnosed((record,))
     told = found.diagnosis
     assert told.verdict == "ambiguous"
     assert told.reason.startswith("the records are too short to tell noise from what is missing")
