@@ -733,6 +733,30 @@ def test_ctrl_c_is_code_130_in_one_line(tmp_path: Path) -> None:
     assert err.startswith("interrupted; ")
 
 
+PRESSED_AT = """
+import importlib.abc, os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever started the tests may ignore it
+
+class Pressed(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == {module!r}:
+            exec("os.kill(os.getpid(), signal.SIGINT)\\nfor _ in range(9): pass")  # as dataclasses are made
+
+sys.meta_path.insert(0, Pressed())
+"""
+
+
+@pytest.mark.parametrize("module", ["pzd.cli.app", "typer", "pzd.cli.look", "pydantic", "pzd.damper.effects"])
+def test_ctrl_c_while_the_program_starts_is_code_130_in_one_line(tmp_path: Path, module: str) -> None:
+    (tmp_path / "sitecustomize.py").write_text(PRESSED_AT.format(module=module))
+    environment = {**ENVIRONMENT, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ENVIRONMENT['PYTHONPATH']}"}
+    command = [sys.executable, "-m", "pzd", "effects"]
+    ended = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert ended.stderr == "interrupted; finished stages stand, the one at work left what was there before\n"
+    assert ended.returncode == 130
+    assert ended.stdout == ""
+
+
 SLOW = """
 import sys, time
 from concurrent.futures import ThreadPoolExecutor

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.compiled import compiled, laid_in
+from pzd.compiled import compiled, inlined
 
 Array = NDArray[np.float64]
 
@@ -111,7 +111,7 @@ class Relaxation(NamedTuple):
     """Force by the change of the extension speed [N s/m]."""
 
 
-@laid_in
+@inlined
 def relaxation(time: float, C: float, k: float) -> Relaxation:
     """What slipping for a time [s] makes of the force.
 
@@ -128,7 +128,7 @@ def relaxation(time: float, C: float, k: float) -> Relaxation:
     return Relaxation(time, 1.0 + z * first, -z * first, k * time * first, k * time * second)
 
 
-@laid_in
+@inlined
 def slip(F: float, friction: float, u0: float, u1: float, over: Relaxation) -> float:
     """Force [N] after slipping while the extension speed goes linearly from u0 to u1 [m/s].
 
@@ -144,7 +144,7 @@ def slip(F: float, friction: float, u0: float, u1: float, over: Relaxation) -> f
     return over.decay * F + (over.rise * friction + over.by_speed * u0 + over.by_change * (u1 - u0))
 
 
-@laid_in
+@inlined
 def stick(F: float, k: float, u0: float, u1: float, time: float) -> float:
     """Force [N] after sticking for a time [s] while the extension speed goes linearly from u0 to u1 [m/s].
 
@@ -188,7 +188,7 @@ def _march(
         force[i] = F
 
 
-@laid_in
+@inlined
 def _side(F: float, T0: float) -> float:
     """To which side the oil flows; 0 where it sticks."""
     return 0.0 if abs(F) <= T0 else math.copysign(1.0, F)
@@ -253,13 +253,13 @@ def _until_stuck(G: float, u0: float, u1: float, left: float, element: Element) 
     return time
 
 
-@laid_in
+@inlined
 def _until_risen(distance: float, u: float, bend: float) -> float:
     """Time [s] in which a motion of u + bend t [m/s] goes a distance [m]: the smaller root, without cancellation."""
     return 2.0 * distance / (u + math.sqrt(max(u * u + 2.0 * bend * distance, 0.0)))
 
 
-@laid_in
+@inlined
 def _carry(slopes: Array, F: float, side: float, u0: float, u1: float, element: Element, over: Relaxation) -> None:
     """Bring the (3,) derivatives of the force by T0, C and k through one piece of fixed duration.
 

@@ -50,6 +50,7 @@ def diagnose(
     from pzd.diagnose.kept_back import trials_of
     from pzd.diagnose.next_test import next_test, reach_of
     from pzd.diagnose.search.forward_selection import select_effects
+    from pzd.diagnose.too_short import too_short, undecided
     from pzd.diagnose.trends_of_tests import trend_of_tests
     from pzd.diagnose.verdict import (
         decide,
@@ -70,6 +71,11 @@ def diagnose(
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
+    own_rows = tuple(row for row in identified.rows if row.setting == setting)
+    voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
+    reach = reach_of(stand.limits, recorded, voltages)
+    if too_short(campaign):
+        return Diagnosed(undecided(recorded, reach), plain, plain, own_rows)
     trials = trials_of(campaign, plain, diagnose.visible)
     handed = handed_on(select_effects(campaign, plain, diagnose, jobs), trials, diagnose.force, control.unit)
     evidence = handed.selection.first
@@ -81,8 +87,6 @@ def diagnose(
         decision = with_added(decision, handed.added)
     selection, prediction = handed.selection, handed.prediction(trials)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
-    voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
-    reach = reach_of(stand.limits, recorded, voltages)
     rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
     offsets = [evidence.campaign.offset(damper) for _, damper in selection.rivalling]
     found = selection.fitted.damper.moved(zero) if selection.adopted else plain
@@ -103,5 +107,5 @@ def diagnose(
         next_test=next_test(rivals, reach, evidence.whole.reference, offsets),
     )
     if not selection.adopted:
-        return Diagnosed(diagnosis, found, plain, tuple(row for row in identified.rows if row.setting == setting))
+        return Diagnosed(diagnosis, found, plain, own_rows)
     return Diagnosed(diagnosis, found, plain, base_parameters(selection, decision.verdict, setting))

@@ -16,6 +16,7 @@ from pzd.damper.model import Damper
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.intervals import LEVEL, standard_errors
 from pzd.diagnose.gap import probability_of_noise, visible_gap
+from pzd.diagnose.search.candidates import moved_by
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection, against_nature
 from pzd.diagnose.thresholds import CONTRADICTS, OUTSIDE_LIBRARY
@@ -81,9 +82,7 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
     chances = probability_of_noise(before), probability_of_noise(after)
     if not selection.adopted:
         return _nothing_adopted(sizes[0], chances[0], config)
-    change = (
-        f"{' and '.join(selection.adopted)}: the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
-    )
+    change = f"{' and '.join(selection.adopted)}: {_change(selection, sizes, config)}"
     if chances[1] < config.significance and _remains(sizes, config):
         words = f"{change}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
         return Decision("unexplained", words, None)
@@ -102,6 +101,17 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
         words = f"{change}; {', '.join(others)} would do as well on these tests"
         return Decision("ambiguous", words, confidence_of(selection))
     return Decision("named", f"{change}; what is left is within the noise or negligible", confidence_of(selection))
+
+
+def _change(selection: Selection, sizes: tuple[float, float], config: DiagnoseConfig) -> str:
+    """What the adopted effects change: the gap, or where noise hid that, the force in their own direction."""
+    if sizes[0] >= config.negligible:
+        return f"the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
+    moved = moved_by(selection.last.whole, selection.plain, selection.fitted)
+    return (
+        f"moves the force by {_percent(moved)} of peak, more than noise does in just that way, "
+        f"though the gap as a whole ({_percent(sizes[0])} of peak above the noise) does not stand out of it"
+    )
 
 
 def _remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pzd.artefacts import ForceRow, SummaryRow
+from pzd.artefacts import ForceRow, Gap, SummaryRow
 from pzd.comfort import iso2631_1978
 from pzd.report.blocks import Card
 from pzd.report.context import ReportContext, effect_in_words, policy_in_words
@@ -43,6 +43,8 @@ def _missing(context: ReportContext) -> str:
     names = listed([_name(effect) for effect in diagnosis.effects])
     if diagnosis.verdict == "named":
         return _capital(names)
+    if diagnosis.verdict == "ambiguous" and not diagnosis.effects:
+        return "Not settled by these tests"
     if diagnosis.verdict == "ambiguous":
         return _capital(listed([_name(e) for e in (*diagnosis.effects, *diagnosis.rivals)], "or")) + ": not settled"
     if diagnosis.verdict == "none":
@@ -67,16 +69,19 @@ def _capital(text: str) -> str:
 
 def _confidence(context: ReportContext) -> Card:
     diagnosis = context.diagnosed.diagnosis
-    gap = diagnosis.gap
+    sure = percent(diagnosis.confidence) if diagnosis.confidence is not None else "Not stated"
+    return Card("How sure is that?", sure, _gap(diagnosis.gap))
+
+
+def _gap(gap: Gap | None) -> str:
+    if gap is None:
+        return "The gap could not be measured."
     moved = (
         f"stays {number(gap.before)}"
         if gap.after == gap.before
         else f"goes from {number(gap.before)} to {number(gap.after)}"
     )
-    detail = f"The gap W_s on held-out data {moved}; noise alone is {number(gap.noise_floor)}."
-    return Card(
-        "How sure is that?", percent(diagnosis.confidence) if diagnosis.confidence is not None else "Not stated", detail
-    )
+    return f"The gap W_s on held-out data {moved}; noise alone is {number(gap.noise_floor)}."
 
 
 def _next(context: ReportContext) -> Card:

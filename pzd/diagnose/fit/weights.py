@@ -37,6 +37,8 @@ UNWEIGHTED = 0.05
 """What a plain element leaves [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k."""
 CYCLE_POINTS = 256
 """A cycle is simulated on at least this many points."""
+FEWEST_SAMPLES = 2 * CYCLE_POINTS
+"""Fewer samples of a motion that does not repeat do not show what colour their noise has."""
 MOST_POINTS = 2048
 """And on no more: the harmonics that are compared need no finer grid, however slow the test."""
 
@@ -54,9 +56,27 @@ def record_likelihood(
     given : what the damper makes of it, along which gain and delay act
     nuisance : priors of the test's own offset, gain and delay
     """
-    # Cycles differ where the damper warms, and their average would hide it.
-    averaged = p.cycles is not None and place >= 0 and not warms(p.record.temperature)
-    return (_of_cycles if averaged else _of_samples)(p, mask, place, given, nuisance)
+    if not enough(p, mask):
+        return None
+    return (_of_cycles if _averaged(p) else _of_samples)(p, mask, place, given, nuisance)
+
+
+def enough(p: Prepared, mask: NDArray[np.bool_]) -> bool:
+    """Whether some samples (n,) of a record can be weighed: a whole cycle where it repeats, else a long enough stretch.
+
+    Parameters
+    ----------
+    p : the record
+    mask : (n,) which of its samples count
+    """
+    if p.cycles is not None and _averaged(p):
+        return bool(p.cycles.whole(p.record.time, mask))
+    return int(np.count_nonzero(mask & in_motion(p.record))) >= FEWEST_SAMPLES
+
+
+def _averaged(p: Prepared) -> bool:
+    """Whether a record counts as its average cycle; cycles differ where the damper warms, and it would hide that."""
+    return p.cycles is not None and not warms(p.record.temperature)
 
 
 def _of_cycles(
@@ -66,10 +86,7 @@ def _of_cycles(
     if run is None:
         return None
     time, record, whole = p.record.time, p.record, p.folded
-    numbers = run.number(time)
-    counted = [n for n in range(run.count) if np.all(mask[numbers == n])]
-    if not counted:
-        return None
+    counted = run.whole(time, mask)
     simulated = run.fold(time, given.force)
     error = pure_error(whole - simulated)
     points = min(error.points, MOST_POINTS)
@@ -134,12 +151,11 @@ def _resampled(cycle: Array, points: int) -> Array:
 
 def _of_samples(
     p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
-) -> RecordLikelihood | None:
+) -> RecordLikelihood:
     record, force = p.record, given.force
     mask = mask & in_motion(record)
-    if np.count_nonzero(mask) < 2 * CYCLE_POINTS:
-        return None
-    start, stop = int(np.argmax(mask)), int(mask.size - np.argmax(mask[::-1]))
+    first, *_, last = np.flatnonzero(mask)
+    start, stop = int(first), int(last) + 1
     compared = mask[start:stop]
     noise = fit_smooth_residual(
         record.force[start:stop] - force[start:stop], _part(record, start, stop), force[start:stop]
