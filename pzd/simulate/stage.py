@@ -51,8 +51,10 @@ def simulate(
     if temperature is None:
         temperature = lowest_temperature(table)
     speed = simulate.vehicle_speed_km_per_h * KM_PER_H
-    way = Way(speed, speed * simulate.duration_s, seed, folder)
-    profiles = {road.name: road.profile(way) for road in simulate.roads}
+    profiles = {
+        road.name: road.profile(Way(speed, speed * simulate.duration_s, seed, folder, f"simulate.roads.{n}"))
+        for n, road in enumerate(simulate.roads)
+    }
     grids, oils = {}, {}
     for plain in {case.plain for case in planned} | {False}:
         damper = diagnosed.plain if plain else diagnosed.damper
