@@ -24,6 +24,7 @@ from pzd.schema.csvfile import read_rows
 from pzd.schema.errors import ConfigError, UserError
 from pzd.schema.jsonfile import read_json
 from pzd.schema.yamlfile import read_yaml
+from pzd.simulate.assumed import assumed
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class RunSummary:
     """The report's page."""
     marks: tuple[str, ...]
     """Why the results are not to be trusted."""
+    assumed: tuple[str, ...] = ()
+    """What the rides assume since the config does not say it."""
     stale: Mapping[str, str] = field(default_factory=dict)
     """Why results are not those of the config as it is today, by stage."""
 
@@ -79,14 +82,18 @@ def run_summary(run: Run) -> RunSummary:
 
 
 def summary_with_stale(given: Opened) -> RunSummary:
-    """The numbers of a config's run, with what makes them those of an older config or of other files.
+    """The numbers of a config's run, with what they assume, and what makes them those of an older config or files.
 
     Raises
     ------
     ConfigError : when there are none
     DataError : when a file of the run is at fault
     """
-    return replace(run_summary(given.run), stale=stale_stages(given))
+    found = run_summary(given.run)
+    effects = found.diagnosis.effects if found.diagnosis else ()
+    with_voltage = all(row.voltage_V is not None for row in found.parameters)
+    lines = assumed(given.config.simulate, effects, with_voltage) if found.summary else ()
+    return replace(found, stale=stale_stages(given), assumed=lines)
 
 
 def summary_of(folder: Path) -> RunSummary:

@@ -46,8 +46,8 @@ class Road(Frozen):
         """The name made from kind and size."""
 
     @property
-    def event_at(self) -> float | None:
-        """Where a single event begins on a road that is level otherwise [m]; None for a road that goes on and on."""
+    def event(self) -> tuple[float, float] | None:
+        """Where a single event begins and ends on a level road [m]; None on a road that goes on and on."""
         return None
 
     @abstractmethod

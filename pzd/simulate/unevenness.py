@@ -33,8 +33,8 @@ class Unevenness(Road):
 
     @property
     @override
-    def event_at(self) -> float | None:
-        return self.start_m
+    def event(self) -> tuple[float, float] | None:
+        return self.start_m, self.start_m + self.length_m
 
     @override
     def profile(self, way: Way) -> Profile:
