@@ -63,16 +63,17 @@ def rated(rides: Rides) -> tuple[RatedRide, ...]:
     ------
     DataError : when a table has no row of a ride, as after a careless edit
     """
-    ridden, weighted = ({row.case: row for row in rows} for rows in (rides.ridden, rides.weighted))
+    ridden = {row.case: row for row in rides.ridden}
+    weighted = {row.case: row for row in rides.weighted}
     spectrum: dict[str, list[SpectrumRow]] = {}
     for row in rides.spectrum:
         spectrum.setdefault(row.case, []).append(row)
-    tables = {"rides.csv": ridden, "weighted.csv": weighted, "spectrum.csv": spectrum}
+    tables = {"rides.csv": set(ridden), "weighted.csv": set(weighted), "spectrum.csv": set(spectrum)}
     faults = [
         f"{Rides.folder}/{name}: has no row of {row.case}; run the stage again"
-        for name, table in tables.items()
+        for name, cases in tables.items()
         for row in rides.summary
-        if row.case not in table
+        if row.case not in cases
     ]
     if faults:
         raise DataError(faults)

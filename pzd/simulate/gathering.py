@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pzd.artefacts import AXLE_COLUMNS, Ending, Response, RideRow, Rides
+from pzd.artefacts import AXLE_COLUMNS, Ending, Response, RideRow, Rides, SpectrumRow, WheelRow
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.outcome import POINT, Outcome, ride_of, summary_row, wheel_rows
 from pzd.simulate.plan import Case
@@ -41,7 +41,9 @@ def gathered(
     for road in config.roads:
         windows |= _windows(config, road.name, planned, outcomes)
     static = config.car.car().static_loads()
-    rides, summary, ridden, wheels, weighted, spectrum = [], [], [], [], [], []
+    rides, summary, ridden, weighted = [], [], [], []
+    wheels: list[WheelRow] = []
+    spectrum: list[SpectrumRow] = []
     for case, (held, outcome) in zip(planned, outcomes, strict=True):
         name, (window, ending) = case.name, windows[case.name]
         rides.append(ride_of(name, outcome, _left_out(case, with_voltage)))

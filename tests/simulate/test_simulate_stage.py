@@ -139,6 +139,21 @@ def test_force_answers_a_step_of_voltage_later_than_the_valve(damper) -> None:
     assert force.to_90_percent_s > voltage.to_90_percent_s
 
 
+def test_a_force_that_comes_with_the_stiffness_is_explained(damper) -> None:
+    """k from 199 to 423 kN/m: under 845 N the spring alone goes to 1796 N of 1837 N, as fast as the valve."""
+    times = {(r.signal, r.to_voltage_V): r for r in ride(damper).responses}
+    force = times["force", 150.0]
+    assert force.note.startswith(
+        "96% of the step come with the stiffness k of the oil spring, 1.99e+05 to 4.23e+05 N/m"
+    )
+    assert times["voltage", 150.0].note == ""
+    rows = tuple(row.model_copy(update={"k_N_per_m": 199e3}) for row in damper.base)
+    even = ride(damper.model_copy(update={"base": rows})).responses
+    assert [r.note for r in even] == [""] * 4
+    slow = next(r for r in even if (r.signal, r.to_voltage_V) == ("force", 150.0))
+    assert force.to_63_percent_s < 0.3 * slow.to_63_percent_s
+
+
 def test_with_an_instant_valve_the_force_takes_the_time_of_the_oil_spring(damper) -> None:
     """One stiffness at every voltage: F sticks up to the new T0 at the rate k v, then goes on as exp(-t k / C)."""
     rows = tuple(row.model_copy(update={"k_N_per_m": 199e3}) for row in damper.base)

@@ -53,11 +53,11 @@ def _cares(context: ReportContext) -> Iterator[str]:
         )
     pulling = [row for row in context.rides.wheels if row.pulling > _MUCH]
     if pulling:
-        worst = min(pulling, key=lambda row: row.min_contact_force_N)
+        axle = min(pulling, key=lambda row: row.min_contact_force_N)
         yield (
             f"the wheels of {len({row.case for row in pulling})} rides pull on the road, which no wheel can; worst "
-            f"axle {worst.axle} of {worst.case}: {amount(worst.min_contact_force_N, 'N')}, and "
-            f"{percent(worst.pulling)} of its time; a real wheel would leave the road"
+            f"axle {axle.axle} of {axle.case}: {amount(axle.min_contact_force_N, 'N')}, and "
+            f"{percent(axle.pulling)} of its time; a real wheel would leave the road"
         )
     if iso2631_1978.EDITION in context.config.editions:
         yield f"the exposure times of {iso2631_1978.EDITION}, withdrawn in 1997, rest on an {iso2631_1978.TRUST}"
