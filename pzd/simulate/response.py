@@ -104,8 +104,8 @@ def _carried(damper: Damper, before: float, after: float, forces: tuple[float, f
     if share < _NOTED:
         return ""
     return (
-        f"{share:.0%} of the step come with the stiffness k of the oil spring, {rows[before]:.3g} to {rows[after]:.3g} "
-        "N/m, as soon as the valve moves: a spring under load that stiffens gives more force before the oil has flowed"
+        f"{min(share, 1.0):.0%} of the step come with the stiffness of the oil spring, k from {rows[before]:.3g} to "
+        f"{rows[after]:.3g} N/m, which follows the valve: a loaded spring changes its force before the oil has flowed"
     )
 
 
