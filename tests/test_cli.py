@@ -324,6 +324,8 @@ def test_show_prints_the_numbers_of_the_run_and_writes_nothing(typed: Terminal, 
     text = "\n".join(typed.out)
     for part in ("200 (200 to 200)", "verdict: none", "sine-comfort-ideal", "a_w", "verified", "report.html"):
         assert part in text
+    assert "assumed, since the config does not say it:" in typed.out
+    assert any(line.startswith("  the car is makowski2021: 1200 kg") for line in typed.out)
     assert files_below(tmp_path) == before
 
 
