@@ -21,7 +21,7 @@ from pzd.artefacts.identified import FALLBACK, AuxiliaryRow, Identified, Measure
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
 from pzd.artefacts.rides import AXLE_COLUMNS, AXLES, ENERGY_LIMIT, RIDE_COLUMNS, Response, Ride, Rides, SummaryRow
-from pzd.artefacts.rig import Finding, RecordEntry, Rig
+from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig
 from pzd.artefacts.table import ForceRow, InverseRow, Table, TableNotes
 
 Artefact = Rig | Identified | Diagnosed | Table | Rides | Report
@@ -41,6 +41,7 @@ __all__ = [
     "ForceRow",
     "Gap",
     "Identified",
+    "IngestRow",
     "InverseRow",
     "KeptBack",
     "LeftOut",
