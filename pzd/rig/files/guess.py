@@ -80,33 +80,17 @@ def guessed(files: Sequence[Path], layout: str | None = None, folder: Path = Pat
     DataError : when a file is no table of a rig's channels, a line a file
     UserError : when a file cannot be read, or not by the layout that was asked for
     """
-    by_layout: dict[str, list[Path]] = {}
-    fitting: dict[str, NamedLayout] = {}
-    found: list[_File] = []
-    faults: list[str] = []
-    for path in files:
-        try:
-            dialect, form = described(path)
-            fits = best_layout(path, dialect.header, folder, layout)
-            if fits is not None:
-                by_layout.setdefault(fits[0], []).append(path)
-                fitting[fits[0]] = fits[1]
-            else:
-                found.append(_file(path, dialect, form))
-        except DataError as error:
-            faults += error.messages if layout else [f"{error.messages[0]}; init reads tables of named columns"]
-    if faults:
-        raise DataError(faults)
-    control = next((one.control.signal() for one in fitting.values()), None) or _control(found)
+    fitting, found = _sorted_out(files, layout, folder)
+    control = next((one.control.signal() for one, _ in fitting.values()), None) or _control(found)
     lines = [] if not found else ["# Guessed from the headers: check every line. Paths are relative to this file."]
     if fitting:
         lines.append("# By the layout that fits: check its values for your rig. Paths are relative to this file.")
     if control != Control():
         lines.append(f"control: {{name: {control.name}, unit: {control.unit}}}")
     lines += ["rig:", "  files:"]
-    for name, paths in by_layout.items():
+    for name, (fits, paths) in fitting.items():
         for pattern, _ in _patterns(paths):
-            lines += [f"    - path: {written(pattern)}", f"      layout: {name}    # {fitting[name].about}"]
+            lines += [f"    - path: {written(pattern)}", f"      layout: {name}    # {fits.about}"]
     groups: dict[tuple[object, ...], list[_File]] = {}
     for file in found:
         groups.setdefault(file.layout, []).append(file)
@@ -115,6 +99,28 @@ def guessed(files: Sequence[Path], layout: str | None = None, folder: Path = Pat
             mine = [file for file in group if file.path in members]
             lines += [f"    - path: {written(pattern)}", *(f"      {line}" for line in _entry(mine, control))]
     return lines
+
+
+def _sorted_out(
+    files: Sequence[Path], layout: str | None, folder: Path
+) -> tuple[dict[str, tuple[NamedLayout, list[Path]]], list[_File]]:
+    """The layouts that fit, each with its files, and the files that none fits."""
+    fitting: dict[str, tuple[NamedLayout, list[Path]]] = {}
+    found: list[_File] = []
+    faults: list[str] = []
+    for path in files:
+        try:
+            dialect, form = described(path)
+            fits = best_layout(path, dialect.header, folder, layout)
+            if fits is None:
+                found.append(_file(path, dialect, form))
+            else:
+                fitting.setdefault(fits[0], (fits[1], []))[1].append(path)
+        except DataError as error:
+            faults += error.messages if layout else [f"{error.messages[0]}; init reads tables of named columns"]
+    if faults:
+        raise DataError(faults)
+    return fitting, found
 
 
 def _control(files: Sequence[_File]) -> Control:

@@ -46,9 +46,7 @@ def measured(name: str, test: Test, freed: Freed, limits: Limits, control: Contr
         freed.force,
         *(test.channels.get(quantity) for quantity in (VOLTAGE, TEMPERATURE, PRESSURE)),
     )
-    return Measured(
-        record, run, clean, limits, freed.said or None, control, test.remarks, _ingested(name, test, freed)
-    )
+    return Measured(record, run, clean, limits, freed.said or None, control, test.remarks, _ingested(name, test, freed))
 
 
 def _ingested(name: str, test: Test, freed: Freed) -> tuple[IngestRow, ...]:

@@ -77,5 +77,10 @@ class Sheet:
     def place(self, row: int) -> str:
         """File, table and line of a data row; the number of the row where a format has no lines."""
         number = bisect_right(self.starts, row) - 1
-        file = at(self.path, self.tables[number] or None)
+        file = table_place(self.path, self.tables[number])
         return f"{file}: row {row - self.starts[number] + 1}" if self.lines is None else f"{file}:{self.lines[row]}"
+
+
+def table_place(path: Path, table: str) -> str:
+    """A file, and the table in it where that has a name."""
+    return f"{path}:{table}" if table else at(path)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array
-from pzd.rig.files.sheet import Sheet, Step, Wanted
+from pzd.rig.files.sheet import Sheet, Step, Wanted, table_place
 from pzd.schema.errors import DataError, at
 
 Cells = Array | list[str]
@@ -95,7 +95,9 @@ def sheet_of(path: Path, tables: Sequence[Table], pattern: str | None, wanted: W
     return _with_cells(bare, taken, wanted)
 
 
-def tables_of_tree(tree: Mapping[str, Any], name: str = "", constants: Mapping[str, float] | None = None) -> list[Table]:
+def tables_of_tree(
+    tree: Mapping[str, Any], name: str = "", constants: Mapping[str, float] | None = None
+) -> list[Table]:
     """The tables of a tree of structures: arrays of one length in one structure are the columns of one table.
 
     Parameters
@@ -214,12 +216,12 @@ def _differences(path: Path, first: Table, other: Table, asked: Iterable[str]) -
         if (head in first.header) != (head in other.header):
             holds, lacks = (first, other) if head in first.header else (other, first)
             yield (
-                f"{at(path, lacks.name or None)}: no column {head!r}, which {holds.name!r} has; "
+                f"{table_place(path, lacks.name)}: no column {head!r}, which {holds.name!r} has; "
                 "read them by entries of their own, with table: NAME"
             )
         elif head in first.header and _unit(first, head) != _unit(other, head):
             yield (
-                f"{at(path, other.name or None)}: {head!r} is in {_unit(other, head)!r} here and in "
+                f"{table_place(path, other.name)}: {head!r} is in {_unit(other, head)!r} here and in "
                 f"{_unit(first, head)!r} in {first.name!r}; read them by entries of their own, with table: NAME"
             )
 

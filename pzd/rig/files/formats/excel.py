@@ -69,7 +69,7 @@ def _cells(path: Path) -> list[tuple[str, list[list[Any]]]]:
     for _, cells in found:
         width = max(map(len, cells), default=0)
         for row in cells:
-            row += [None] * (width - len(row))
+            row.extend([None] * (width - len(row)))
         while cells and all(cell is None for cell in cells[-1]):
             cells.pop()
     return found

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from traceback import walk_tb
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -23,10 +25,8 @@ def holds(path: Path, start: bytes) -> bool:
 
 def tables(path: Path, entry: FilesEntry) -> list[Table]:
     """The tables of the channel groups, in physical values."""
-    from asammdf import MDF
-
     found = []
-    with MDF(path) as file:
+    with path.open("rb") as opened, _opened(opened) as file:
         for number, group in enumerate(file.groups):
             columns: dict[str, tuple[Cells, str]] = {}
             master = file.masters_db.get(number)
@@ -43,3 +43,18 @@ def tables(path: Path, entry: FilesEntry) -> list[Table]:
             name = getattr(group.channel_group, "acq_name", "") or f"group {number + 1}"
             found += equal_lengths(name, columns)
     return found
+
+
+def _opened(file: BinaryIO) -> Any:
+    """The file as the library sees it; one that it could not open is closed, as its destructor would fail aloud."""
+    from asammdf import MDF
+
+    try:
+        return MDF(file)
+    except Exception as error:
+        for frame, _ in walk_tb(error.__traceback__):
+            half_open = frame.f_locals.get("self")
+            if half_open is not None and hasattr(half_open, "_tempfile") and hasattr(half_open, "_closed"):
+                half_open._tempfile.close()  # noqa: SLF001  # the library has no other way to it
+                half_open._closed = True  # noqa: SLF001  # as above
+        raise

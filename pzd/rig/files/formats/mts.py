@@ -46,11 +46,12 @@ def tables(path: Path, entry: FilesEntry) -> list[Table]:
     decimal = told[DECIMAL] if len(told) > DECIMAL and told[DECIMAL] in (".", ",") else entry.decimal
     begins = [number for number, line in enumerate(lines) if line.startswith(BEGINS)]
     blocks = [
-        _block(path, lines, first, last, decimal)
-        for first, last in zip(begins, [*begins[1:], len(lines)], strict=True)
+        _block(path, lines, first, last, decimal) for first, last in zip(begins, [*begins[1:], len(lines)], strict=True)
     ]
     return [
-        Table(f"block {n + 1}" if len(blocks) > 1 else "", *block) for n, block in enumerate(blocks) if block is not None
+        Table(f"block {n + 1}" if len(blocks) > 1 else "", *block)
+        for n, block in enumerate(blocks)
+        if block is not None
     ]
 
 

@@ -24,7 +24,9 @@ def tables(path: Path, entry: FilesEntry) -> list[Table]:
     table = parquet.read_table(path)
     units = tuple(_unit(dict(field.metadata or {})) for field in table.schema)
     cells = tuple(
-        cells_of(column.to_pylist()) if column.null_count or not _plain(column.type) else column.to_numpy().astype(float)
+        cells_of(column.to_pylist())
+        if column.null_count or not _plain(column.type)
+        else column.to_numpy().astype(float)
         for column in table.columns
     )
     return [Table("", tuple(name.strip() for name in table.column_names), cells, units if any(units) else None)]

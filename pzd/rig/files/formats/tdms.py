@@ -31,7 +31,9 @@ def tables(path: Path, entry: FilesEntry) -> list[Table]:
         columns: dict[str, tuple[Cells, str]] = {}
         for channel in group.channels():
             if len(channel) and "wf_increment" in channel.properties and CLOCK not in columns:
-                columns[CLOCK] = (np.asarray(channel.time_track(), dtype=np.float64), "s")
+                start = float(channel.properties.get("wf_start_offset", 0.0))
+                step = float(channel.properties["wf_increment"])
+                columns[CLOCK] = (np.asarray(start + step * np.arange(len(channel)), dtype=np.float64), "s")
             if len(channel):
                 unit = channel.properties.get("unit_string", channel.properties.get("NI_UnitDescription", ""))
                 columns[channel.name.strip()] = (_cells(channel[:]), str(unit).strip())
