@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -16,6 +17,8 @@ from written_files import FORCE, TIME, X, lines, run, write, wrong
 from pzd.artefacts import Rig
 from pzd.cli.app import status
 from pzd.config import load
+from pzd.quantities import Control
+from pzd.rig.files.formats import formats
 from pzd.rig.files.guess import guessed
 from pzd.rig.files.layouts import all_layouts
 from pzd.rig.stage import ingest
@@ -212,6 +215,7 @@ def test_a_layout_beside_the_config_is_found_and_a_change_of_it_makes_the_run_st
     monkeypatch.chdir(tmp_path)
     text(tmp_path / "a.csv", {"t": TIME * 1e3, "x": X * 1e3, "f": FORCE})
     (tmp_path / "ours.yaml").write_text(OWN, encoding="utf-8")
+    (tmp_path / "my.yaml").write_text("", encoding="utf-8")  # as the shell makes it for `pzd init a.csv > my.yaml`
     assert status(["init", "a.csv"]) == 0
     printed = capsys.readouterr().out
     assert "layout: ours" in printed
@@ -269,8 +273,6 @@ def test_the_ingest_report_lists_everything_that_was_done(tmp_path: Path) -> Non
         ("fixture", None, "inertia of 0.1 kg", "taken out"),
     ]
     assert {(row.record, row.file) for row in rig.ingested} == {("100V", "100V.csv")}
-    from pzd.quantities import Control
-
     (tmp_path / "1-rig").mkdir()
     rig.write(tmp_path / "1-rig", Control())
     assert Rig.read(tmp_path / "1-rig", Control()).ingested == rig.ingested
@@ -281,3 +283,23 @@ def test_degrees_fahrenheit_are_said_with_their_zero(tmp_path: Path) -> None:
     rig = run(tmp_path, {"path": "a.csv", "layout": "us_dyno"})
     (said,) = [row.became for row in rig.ingested if row.step == "unit" and row.quantity == "temperature"]
     assert said == "degC: times 0.5555555556 -17.77777778"
+
+
+# ---------------------------------------------------------------- the page
+
+
+def test_every_format_and_layout_is_in_the_page_of_the_configs(root: Path, tmp_path: Path) -> None:
+    page = (root / "configs" / "README.md").read_text(encoding="utf-8")
+    assert [name for name in formats() if f"| `{name}` |" not in page] == []
+    shown = {name: layout.about for name, layout in all_layouts(tmp_path).items()}
+    assert [name for name, about in shown.items() if f"| `{name}` | {about} |" not in page] == []
+
+
+def test_a_config_by_a_layout_is_as_short_as_the_page_shows(root: Path, tmp_path: Path) -> None:
+    page = (root / "configs" / "README.md").read_text(encoding="utf-8")
+    shown = re.search(r"<!-- config by a layout -->\n```yaml\n(.*?)```", page, re.DOTALL)
+    assert shown is not None
+    (tmp_path / "my.yaml").write_text(shown[1], encoding="utf-8")
+    (tmp_path / "data").mkdir()
+    dyno(tmp_path / "data" / "C08_R12_150psi_0.131mps.csv")
+    assert len(ingest(load(tmp_path / "my.yaml").rig, Control(), tmp_path).records) == 1

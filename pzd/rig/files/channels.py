@@ -113,7 +113,8 @@ def _steps(sheet: Sheet, found: list[_Source], values: dict[Quantity, Array]) ->
         elif source.unit != own.unit:
             zero, one = to_canonical(np.array([0.0, 1.0]), source.unit, own)
             offset = f" {zero:+.10g}" if zero else ""
-            yield Step("unit", own.name, source.unit, f"{own.unit}: times {one - zero:.10g}{offset}")
+            if offset or one != 1.0:
+                yield Step("unit", own.name, source.unit, f"{own.unit}: times {one - zero:.10g}{offset}")
         if spec.sign < 0:
             yield Step("sign", own.name, "as recorded", "times -1")
 

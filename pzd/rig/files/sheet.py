@@ -80,6 +80,12 @@ class Sheet:
         file = table_place(self.path, self.tables[number])
         return f"{file}: row {row - self.starts[number] + 1}" if self.lines is None else f"{file}:{self.lines[row]}"
 
+    def place_in_file(self, row: int) -> str:
+        """The same in words, without the file."""
+        number = bisect_right(self.starts, row) - 1
+        line = f"row {row - self.starts[number] + 1}" if self.lines is None else f"line {self.lines[row]}"
+        return f"{line} of {self.tables[number]!r}" if self.tables[number] else line
+
 
 def table_place(path: Path, table: str) -> str:
     """A file, and the table in it where that has a name."""

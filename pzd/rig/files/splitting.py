@@ -130,7 +130,9 @@ def _steps(
 ) -> Iterator[Step]:
     """Which rows are this test, and the values that no column holds."""
     if count > 1:
-        yield Step("cut", None, f"test {index + 1} of {count}", f"{last - first} rows from {sheet.place(first)}")
+        yield Step(
+            "cut", None, f"test {index + 1} of {count}", f"{last - first} rows from {sheet.place_in_file(first)}"
+        )
     for spec in layout.channels:
         if spec.quantity in values:
             given = values[spec.quantity]

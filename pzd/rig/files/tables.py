@@ -231,15 +231,15 @@ def _unit(table: Table, head: str) -> str:
 
 
 def _steps(tables: Sequence[Table], taken: Sequence[Table], asked: Iterable[str]) -> Iterator[Step]:
+    """Which tables and columns are read, and which are left out."""
+    names = ", ".join(repr(table.name) for table in taken if table.name)
+    yield Step("read", None, f"table {names}".strip(), f"{sum(table.rows for table in taken)} rows")
+    unread = list(dict.fromkeys(head for table in taken for head in table.header if head not in asked))
+    if unread:
+        yield Step("left out", None, f"columns {', '.join(unread)}", "")
     for table in tables:
-        what = f"table {table.name!r}" if table.name else "the table"
-        if table in taken:
-            unread = [head for head in table.header if head not in asked]
-            yield Step("read", None, what, f"{table.rows} rows")
-            if unread:
-                yield Step("left out", None, f"columns {', '.join(unread)}" + (f" of {what}" if table.name else ""), "")
-        else:
-            yield Step("left out", None, f"{what}, {table.rows} rows", "no recording, or not the table asked for")
+        if table not in taken:
+            yield Step("left out", None, f"table {table.name!r}, {table.rows} rows", "no recording, or not asked for")
 
 
 def _with_cells(bare: Sheet, tables: Sequence[Table], wanted: Wanted) -> Sheet:

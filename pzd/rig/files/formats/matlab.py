@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.tables import Table, tables_of_tree
+from pzd.schema.errors import DataError, at
 
 KIND = "a MATLAB file"
 SUFFIXES = (".mat",)
@@ -22,8 +23,17 @@ def holds(path: Path, start: bytes) -> bool:
 
 
 def tables(path: Path, entry: FilesEntry) -> list[Table]:
-    """The tables of the variables and structures."""
+    """The tables of the variables and structures.
+
+    Raises
+    ------
+    DataError : when there are only objects of MATLAB's own classes
+    """
     from scipy.io import loadmat
+    from scipy.io.matlab import MatlabOpaque
 
     read = loadmat(path, simplify_cells=True)
-    return tables_of_tree({name: value for name, value in read.items() if not name.startswith("__")})
+    found = tables_of_tree({name: value for name, value in read.items() if not name.startswith("__")})
+    if not found and any(isinstance(value, MatlabOpaque) for value in read.values()):
+        raise DataError(f"{at(path)}: objects of MATLAB's own classes (table, timeseries); save the columns as arrays")
+    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from pzd.quantities import Control
@@ -12,6 +13,9 @@ from pzd.schema.yamlfile import read_yaml
 
 _OWN = ("path", "layout", "source")
 """Keys of an entry that no layout gives."""
+
+_ABOUT = re.compile(rb"^about:", re.MULTILINE)
+"""By this a layout is told from the other YAML files beside it."""
 
 
 def all_layouts(folder: Path) -> dict[str, NamedLayout]:
@@ -25,12 +29,8 @@ def all_layouts(folder: Path) -> dict[str, NamedLayout]:
     ------
     ConfigError : when one of them is wrong
     """
-    documents = [read_yaml(path) for place in (Path(__file__).parent, folder) for path in sorted(place.glob("*.yaml"))]
-    return {
-        document.path.stem: read_layout(document.path)
-        for document in documents
-        if isinstance(document.data, dict) and "about" in document.data
-    }
+    files = [path for place in (Path(__file__).parent, folder) for path in sorted(place.glob("*.yaml"))]
+    return {path.stem: read_layout(path) for path in files if _ABOUT.search(path.read_bytes())}
 
 
 def named_layout(name: str, folder: Path, place: str) -> NamedLayout:
