@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,11 @@ import pytest
 from written_files import FORCE, TIME, X, lines, refused, run, write, wrong
 
 from pzd.cli.app import status
+from pzd.config import load
 from pzd.quantities import Control
 from pzd.rig.files.formats import formats
+from pzd.rig.files.guess import guessed
+from pzd.rig.stage import ingest
 
 MM, KN, VOLTS = X * 1e3, FORCE / 1e3, np.full(TIME.size, 100.0)
 UNITS = {"time": "s", "pos": "mm", "load": "kN", "valve voltage": "V"}
@@ -280,6 +284,96 @@ def test_a_row_of_a_block_that_is_cut_short_is_named_by_its_line(tmp_path: Path)
     write(tmp_path / "a.dat", [*text[:20], text[20].rpartition("\t")[0], *text[21:]])
     (said,) = refused(tmp_path, {"path": "a.dat"} | NAMED)
     assert "a.dat:21: 4 numbers are needed here (got 3 fields" in said
+
+
+def test_keys_that_mean_nothing_for_a_format_are_refused(tmp_path: Path) -> None:
+    parquet(tmp_path / "a.parquet")
+    said = wrong(tmp_path, {"path": "a.parquet", "skip": 3, "table": "x"} | NAMED)
+    assert [line.split(" (")[0] for line in said] == [
+        "rig.files.0.skip: a Parquet file has nothing of the kind",
+        "rig.files.0.table: a Parquet file has nothing of the kind",
+    ]
+
+
+# ---------------------------------------------------------------- what would be silently wrong
+
+
+def test_a_key_that_stands_twice_in_an_object_is_refused(tmp_path: Path) -> None:
+    json_arrays(tmp_path / "a.json")
+    text = (tmp_path / "a.json").read_text(encoding="utf-8")
+    (tmp_path / "a.json").write_text(text.replace('"load [kN]"', '"load [kN]": [1], "load [kN]"'), encoding="utf-8")
+    (said,) = refused(tmp_path, {"path": "a.json"} | WRITERS["json_arrays"][2])
+    assert said.endswith("a.json: the key 'load [kN]' stands twice in one object")
+
+
+def test_waveforms_of_different_clocks_are_not_one_table(tmp_path: Path) -> None:
+    from nptdms import ChannelObject, TdmsWriter
+
+    with TdmsWriter(tmp_path / "a.tdms") as writer:
+        for head, step in (("pos", 2e-3), ("load", 1e-3)):
+            said = {"unit_string": UNITS[head], "wf_increment": step}
+            writer.write_segment([ChannelObject("Run", head, COLUMNS[head], said)])
+    entry = {"path": "a.tdms", "columns": {"time": "time", "displacement": "pos", "force": "load"}}
+    assert "missing column load" in refused(tmp_path, entry)[0]
+
+
+def test_invalid_samples_of_a_channel_are_empty_cells_and_channels_of_one_name_are_numbered(tmp_path: Path) -> None:
+    from asammdf import MDF, Signal
+
+    flawed = np.zeros(TIME.size, dtype=bool)
+    flawed[[4, 7]] = True
+    signals = [
+        Signal(MM, TIME, unit="mm", name="pos"),
+        Signal(KN, TIME, unit="kN", name="load", invalidation_bits=flawed),
+    ]
+    entry = {"path": "a.mf4", "columns": {"time": "time", "displacement": "pos", "force": "load"}}
+    with MDF(version="4.10") as file:
+        file.append(signals)
+        file.save(tmp_path / "a.mf4")
+    (said,) = refused(tmp_path, entry)
+    assert said.endswith("row 5: load: empty cell (2 such cells)")
+    with MDF(version="4.10") as file:
+        file.append([*signals[:1], Signal(KN, TIME, unit="kN", name="load"), Signal(MM, TIME, unit="kN", name="load")])
+        file.save(tmp_path / "a.mf4", overwrite=True)
+    assert "missing column load" in refused(tmp_path, entry)[0]
+    assert "load.1, load.2" in refused(tmp_path, entry)[0]
+
+
+def test_a_unit_of_the_file_that_the_config_or_the_header_contradicts_is_a_finding(tmp_path: Path) -> None:
+    parquet(tmp_path / "a.parquet")
+    rig = run(tmp_path, {"path": "a.parquet"} | NAMED | {"units": {"force": "N"}})
+    (found,) = [one for one in rig.entries[0].findings if one.check == "units"]
+    assert found.where == "force, whose header is 'load' and its unit 'kN'; the config says N"
+    assert found.size == pytest.approx(1e3)
+    columns = {"time_s": TIME, "displacement_m": X, "force_N": FORCE}
+    parquet(tmp_path / "b.parquet", columns, dict(zip(columns, ("s", "m", "lbf"), strict=True)))
+    (found,) = [one for one in run(tmp_path, {"path": "b.parquet"}).entries[0].findings if one.check == "units"]
+    assert found.where == "force, whose header is 'force_N'; the file says beside it lbf"
+
+
+def test_instants_in_cells_of_a_workbook_are_a_clock(tmp_path: Path) -> None:
+    begin = datetime(2024, 3, 25, 23, 59, 59)  # noqa: DTZ001  # Excel knows no zone
+    stamps = [begin + timedelta(milliseconds=2 * n) for n in range(TIME.size)]
+    excel(tmp_path / "a.xlsx", {"time": stamps, "pos": MM, "load": KN}, UNITS | {"time": ""})
+    text = "\n".join(guessed([tmp_path / "a.xlsx"]))
+    assert "time: '%Y-%m-%dT%H:%M:%S.%f'" in text
+    (tmp_path / "own.yaml").write_text(text, encoding="utf-8")
+    (record,) = ingest(load(tmp_path / "own.yaml").rig, Control(), tmp_path).records
+    assert record.time == pytest.approx(TIME, abs=1e-6)
+
+
+def test_a_list_of_rows_and_values_with_their_unit_are_json_too(tmp_path: Path) -> None:
+    heads = {"time_s": TIME, "displacement_m": X, "force_N": FORCE}
+    rows = [
+        dict(zip(heads, row, strict=True)) for row in zip(*(values.tolist() for values in heads.values()), strict=True)
+    ]
+    (tmp_path / "a.json").write_text(json.dumps(rows), encoding="utf-8")
+    said = {head: {"unit": UNITS[head], "values": COLUMNS[head].tolist()} for head in ("time", "pos", "load")}
+    (tmp_path / "b.json").write_text(json.dumps({"runs": [said, said]}), encoding="utf-8")
+    assert run(tmp_path, {"path": "a.json"}).records[0].force == pytest.approx(FORCE, abs=0.0)
+    entry = {"path": "b.json", "columns": {"time": "time", "displacement": "pos", "force": "load"}}
+    for record in run(tmp_path, entry).records:
+        assert record.force == pytest.approx(FORCE, abs=1e-10)
 
 
 # ---------------------------------------------------------------- real files, and text of loggers

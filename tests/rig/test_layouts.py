@@ -179,6 +179,17 @@ def test_clickers_pressure_temperature_and_currents_come_with_their_layouts(tmp_
     assert [entry.voltage_V for entry in rig.entries] == [0.0, 0.25, 0.5, 0.75, 1.0]
 
 
+def test_files_whose_channels_stand_in_another_order_are_told_apart(tmp_path: Path) -> None:
+    logger(tmp_path / "ME10mm5Hz.txt", *VOLTS)
+    logger(tmp_path / "ME10mm3Hz.txt", *reversed(VOLTS))
+    said = guessed(sorted(tmp_path.glob("ME*.txt")))
+    assert sum(line.startswith("control:") for line in said) == 1
+    rig = read_back(tmp_path, said)
+    assert len(rig.records) == 10
+    for record in rig.records:
+        assert record.force == pytest.approx(FORCE, abs=1e-4)
+
+
 def test_the_real_exports_of_the_press_are_found_and_read(shared: Path, tmp_path: Path) -> None:
     files = sorted((shared / "data" / "utfsm-mr" / "raw").glob("*.txt"))
     said = guessed(files)

@@ -124,15 +124,15 @@ def _remarks(sheet: Sheet, found: list[_Source]) -> tuple[Finding, ...]:
     remarks: list[Finding] = []
     for source in found:
         spec, header = source.spec, sheet.header[source.column]
-        ratio = _unit_of_header_over_ours(source, sheet)
-        if abs(ratio - 1.0) > 1e-9:
+        for told, ratio in _other_units(source, sheet):
+            said = "the config says" if spec.unit is not None else "the file says beside it"
             remarks.append(
                 Finding(
                     check="units",
-                    where=f"{spec.own.name}, whose header is {header!r}; the config says {source.unit}",
+                    where=f"{spec.own.name}, whose header is {header!r}{told}; {said} {source.unit}",
                     size=ratio,
                     unit="-",
-                    follows="the config was taken; by the header the channel would be this many times as large",
+                    follows=f"{source.unit} was taken; by the other the channel would be this many times as large",
                 )
             )
         if spec.quantity in (DISPLACEMENT, FORCE) and not spec.sign_said and COMPRESSION.search(header):
@@ -148,18 +148,22 @@ def _remarks(sheet: Sheet, found: list[_Source]) -> tuple[Finding, ...]:
     return tuple(remarks)
 
 
-def _unit_of_header_over_ours(source: _Source, sheet: Sheet) -> float:
-    """How many times as large a channel would be by the unit that the file names; 1 where that says nothing."""
+def _other_units(source: _Source, sheet: Sheet) -> Iterator[tuple[str, float]]:
+    """How many times as large a channel would be by another unit that the file names, in its header or beside it."""
     spec, header = source.spec, sheet.header[source.column]
+    if source.dated or spec.quantity is TEMPERATURE:
+        return
+    inside = spec.own.unit if header in spec.canonical_headers else in_header(header, spec.own)
     beside = sheet.units[source.column].strip("[]() ") if sheet.units else ""
-    told = beside or (spec.own.unit if header in spec.canonical_headers else in_header(header, spec.own))
-    if spec.unit is None or told is None or source.dated or spec.quantity is TEMPERATURE:
-        return 1.0
-    try:
-        theirs, ours = (float(to_canonical(np.ones(1), unit, spec.own)[0]) for unit in (told, source.unit))
-    except UnitError:
-        return 1.0
-    return theirs / ours
+    for told, shown in ((inside, ""), (beside, f" and its unit {beside!r}")):
+        try:
+            theirs, ours = (
+                float(to_canonical(np.ones(1), unit, spec.own)[0]) for unit in (told or source.unit, source.unit)
+            )
+        except UnitError:
+            continue
+        if abs(theirs / ours - 1.0) > 1e-9:
+            yield shown, theirs / ours
 
 
 def _steady(channel: Array) -> Array:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -249,15 +250,10 @@ def _events(file: _File) -> Iterator[str]:
 
 def _as_sniffed(file: _File, split: Split | None = None) -> FilesEntry:
     dialect = file.dialect
-    return FilesEntry(
-        path=str(file.path),
-        separator=dialect.separator,
-        decimal=dialect.decimal,
-        skip=dialect.skip,
-        units_row=dialect.units_row,
-        encoding=dialect.encoding,
-        split=split,
-    )
+    said: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
+    if file.form == TEXT:
+        said |= {"separator": dialect.separator, "decimal": dialect.decimal, "encoding": dialect.encoding}
+    return FilesEntry(path=str(file.path), split=split, **said)
 
 
 def _turned(file: _File, columns: dict[Quantity, str]) -> bool:

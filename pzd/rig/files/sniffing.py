@@ -130,8 +130,9 @@ def _table(
         return None
     first = data[0]
     width = len(rows[first])
-    units = _UNIT.fullmatch(rows[first - 1][0]) is not None and first > 1 and len(rows[first - 2]) == width
-    units = units and len(rows[first - 1]) == width and all(_UNIT.fullmatch(cell) for cell in rows[first - 1] if cell)
+    below = rows[first - 1]
+    units = first > 1 and len(rows[first - 2]) == len(below) == width and bool(below[0] or rows[first - 2][0])
+    units = units and any(below) and all(_UNIT.fullmatch(cell) for cell in below if cell)
     top = first - 1 - units
     if len(rows[top]) != width:
         return None

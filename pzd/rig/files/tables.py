@@ -152,6 +152,19 @@ def spelled(value: Any) -> str:
     return f"{value:.15g}" if isinstance(value, float) else str(value).strip()
 
 
+def number(text: str) -> float:
+    """The number that a text is; infinities, NaN and what Python alone takes for one are none.
+
+    Raises
+    ------
+    ValueError : when it is no finite number
+    """
+    value = float(text)
+    if "_" in text or not np.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
 def equal_lengths(name: str, columns: Mapping[str, tuple[Cells, str]]) -> list[Table]:
     """Columns of one group as tables, one a length: channels of different rates are not one table."""
     return _by_length(name, columns, {})
@@ -268,7 +281,7 @@ def _numbers(sheet: Sheet, head: str, pieces: Sequence[Cells]) -> tuple[Array, l
             continue
         for row, cell in enumerate(piece, start=start):
             try:
-                values[row] = float(cell) if cell else np.nan
+                values[row] = number(cell) if cell else np.nan
             except ValueError:
                 bad.append((row, cell))
     faults = [f"{sheet.place(row)}: {head}: a number is needed (got {cell!r})" for row, cell in bad[:MOST_FAULTS]]

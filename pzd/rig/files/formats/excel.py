@@ -17,6 +17,7 @@ from pzd.rig.files.tables import Table, cells_of, spelled
 KIND = "an Excel file"
 SUFFIXES = (".xlsx", ".xlsm")
 NEEDS = "openpyxl"
+HEEDS = ("skip", "header", "units_row", "table")
 
 
 def holds(path: Path, start: bytes) -> bool:
@@ -24,7 +25,8 @@ def holds(path: Path, start: bytes) -> bool:
     if not start.startswith(b"PK\x03\x04"):
         return False
     try:
-        return "xl/workbook.xml" in zipfile.ZipFile(path).namelist()
+        with zipfile.ZipFile(path) as archive:
+            return "xl/workbook.xml" in archive.namelist()
     except (OSError, zipfile.BadZipFile):
         return False
 

@@ -15,6 +15,7 @@ from pzd.rig.files.tables import Table, tables_of_tree
 KIND = "an HDF5 file"
 SUFFIXES = (".h5", ".hdf5", ".hdf")
 NEEDS = "h5py"
+HEEDS = ("table",)
 MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
@@ -48,7 +49,10 @@ def _tree(group: Any) -> dict[str, Any]:
 def _value(item: Any) -> Any:
     """The samples, number or text of one data set; None for anything else."""
     kind = _text(item.attrs.get("MATLAB_class", ""))
-    if item.shape is None or kind == "cell" or (item.dtype.kind not in "biufSUO") or "MATLAB_empty" in item.attrs:
+    if item.dtype.names:
+        return {name: item[name] for name in item.dtype.names} if item.ndim == 1 else None
+    references = item.dtype.kind == "O" and item.dtype.metadata is not None and "ref" in item.dtype.metadata
+    if item.shape is None or references or item.dtype.kind not in "biufSUO" or "MATLAB_empty" in item.attrs:
         return None
     read = item[()]
     if kind == "char":

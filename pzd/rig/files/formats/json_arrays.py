@@ -16,6 +16,7 @@ from pzd.schema.errors import DataError, at
 KIND = "a JSON file"
 SUFFIXES = (".json",)
 NEEDS = None
+HEEDS = ("table",)
 
 
 def holds(path: Path, start: bytes) -> bool:
@@ -32,14 +33,29 @@ def holds(path: Path, start: bytes) -> bool:
 def tables(path: Path, entry: FilesEntry) -> list[Table]:
     """The tables of the objects."""
     try:
-        read = json.loads(path.read_bytes(), parse_constant=_no_number)
+        read = json.loads(path.read_bytes(), parse_constant=_no_number, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise DataError(f"{at(path, error.lineno, error.colno)}: no JSON ({error.msg})") from None
+    except _TwiceError as error:
+        raise DataError(f"{at(path)}: the key {error.args[0]!r} stands twice in one object") from None
     if isinstance(read, list) and read and all(isinstance(row, dict) for row in read):
         if not any(isinstance(cell, list | dict) for row in read for cell in row.values()):
             return [table_of_rows("", read)]
         read = {str(number + 1): below for number, below in enumerate(read)}
     return tables_of_tree(read) if isinstance(read, dict) else []
+
+
+class _TwiceError(Exception):
+    """A key that stands twice in one object, of which a parser would keep the last."""
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key.strip() in found:
+            raise _TwiceError(key)
+        found[key.strip()] = value
+    return found
 
 
 def _no_number(word: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from traceback import walk_tb
 from typing import Any, BinaryIO
@@ -14,6 +15,7 @@ from pzd.rig.files.tables import Cells, Table, equal_lengths
 KIND = "an MDF file"
 SUFFIXES = (".mf4", ".mdf")
 NEEDS = "asammdf"
+HEEDS = ("table",)
 CLOCK = "time"
 """Header of the clock where the master channel has no name."""
 
@@ -28,21 +30,32 @@ def tables(path: Path, entry: FilesEntry) -> list[Table]:
     found = []
     with path.open("rb") as opened, _opened(opened) as file:
         for number, group in enumerate(file.groups):
-            columns: dict[str, tuple[Cells, str]] = {}
             master = file.masters_db.get(number)
-            for index, channel in enumerate(group.channels):
-                if index == master:
-                    continue
-                signal = file.get(group=number, index=index)
-                if signal.samples.ndim != 1 or signal.samples.dtype.kind not in "biuf":
-                    continue
-                if not columns:
-                    clock = group.channels[master].name if master is not None else CLOCK
-                    columns[clock or CLOCK] = (np.asarray(signal.timestamps, dtype=np.float64), "s")
-                columns[channel.name.strip()] = (signal.samples.astype(np.float64), (signal.unit or "").strip())
-            name = getattr(group.channel_group, "acq_name", "") or f"group {number + 1}"
-            found += equal_lengths(name, columns)
+            signals = [
+                file.get(group=number, index=index, ignore_invalidation_bits=True)
+                for index in range(len(group.channels))
+                if index != master
+            ]
+            plain = [signal for signal in signals if signal.samples.ndim == 1 and signal.samples.dtype.kind in "biuf"]
+            if plain:
+                clock = group.channels[master].name.strip() if master is not None else CLOCK
+                name = getattr(group.channel_group, "acq_name", "") or f"group {number + 1}"
+                found += equal_lengths(name, _columns(clock or CLOCK, plain))
     return found
+
+
+def _columns(clock: str, signals: Sequence[Any]) -> dict[str, tuple[Cells, str]]:
+    """The signals of one group and their clock, invalid samples empty; signals of one name are numbered."""
+    columns: dict[str, tuple[Cells, str]] = {clock: (np.asarray(signals[0].timestamps, dtype=np.float64), "s")}
+    names = [signal.name.strip() for signal in signals]
+    for number, signal in enumerate(signals):
+        name = names[number]
+        twice = names.count(name) > 1 or name == clock
+        samples = signal.samples.astype(np.float64)
+        if signal.invalidation_bits is not None:
+            samples[np.asarray(signal.invalidation_bits, dtype=np.bool_)] = np.nan
+        columns[f"{name}.{names[: number + 1].count(name)}" if twice else name] = (samples, (signal.unit or "").strip())
+    return columns
 
 
 def _opened(file: BinaryIO) -> Any:

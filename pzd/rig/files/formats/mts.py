@@ -13,12 +13,13 @@ import numpy as np
 from pzd.record import Array
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import text_of
-from pzd.rig.files.tables import Cells, Table
+from pzd.rig.files.tables import Cells, Table, number
 from pzd.schema.errors import DataError, at
 
 KIND = "a file of MTS's acquisition blocks"
 SUFFIXES = ()
 NEEDS = None
+HEEDS = ("decimal", "encoding", "table")
 
 SIGNATURE = "MTS793|"
 BEGINS = "Data Acquisition"
@@ -87,6 +88,6 @@ def _numbers(line: str, decimal: str) -> Array | None:
     """The numbers of a row; None where it holds anything else."""
     cells = line.rstrip("\t").replace(decimal, ".").split("\t")
     try:
-        return np.array([float(cell) for cell in cells])
+        return np.array([number(cell) for cell in cells])
     except ValueError:
         return None

@@ -10,6 +10,7 @@ from pzd.rig.files.tables import Table, cells_of
 KIND = "a Parquet file"
 SUFFIXES = (".parquet", ".pq")
 NEEDS = "pyarrow"
+HEEDS = ()
 
 
 def holds(path: Path, start: bytes) -> bool:
