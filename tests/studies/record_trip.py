@@ -2,15 +2,16 @@
 
     python tests/studies/record_trip.py
 
-One small file of the everyday kind (named columns, units, a constant, a known tare) is read. The order of the
-modules is that in which they are first entered; a return is a call of a function of a module from a module that
-comes later in that order. Calls inside a module do not count, nor do calls of a leaf, a module that imports no other
-of the room (units, the file's dialect): from there a record cannot go on.
+One small file of text (named columns, units, a constant, a known tare) and one of arrays by a layout are read. The
+order of the modules is that in which they are first entered; a return is a call of a function of a module from a
+module that comes later in that order. Calls inside a module do not count, nor do calls of a leaf, a module that
+imports no other of the room (units, the file's dialect): from there a record cannot go on.
 """
 
 from __future__ import annotations
 
 import ast
+import json
 import sys
 import tempfile
 from collections import Counter
@@ -64,23 +65,32 @@ def trip(rig: RigConfig, folder: Path) -> list[tuple[str, str | None]]:
 
 
 def main() -> None:
-    """Print entries and returns, module by module."""
+    """Print entries and returns, module by module, for a file of text and one of tables that a layout reads."""
     time = np.arange(500) * 2e-3
     x = 10.0 * np.sin(2.0 * np.pi * 5.0 * time)
     force = 3.0 * np.gradient(x, time) + 40.0
     rows = [f"{t:.9g},{a:.9g},{f:.9g}" for t, a, f in zip(time, x, force, strict=True)]
-    entry = {
+    text = {
         "path": "a.csv",
         "columns": {"time": "t", "displacement": "pos [mm]", "force": "load"},
         "units": {"time": "s", "force": "N"},
         "constants": {"voltage": "100 V"},
         "fixture": {"tare_N": 40},
     }
+    tables = {"path": "a.json", "layout": "json_units_in_keys", "fixture": {"tare_N": 40}}
+    arrays = {"time [s]": time, "displacement [mm]": x, "force [kN]": 1e-3 * force}
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "a.csv").write_text("\n".join(["t,pos [mm],load", *rows]) + "\n", encoding="utf-8")
-        config = RigConfig.model_validate({"files": (entry,)})
-        stage.ingest(config, Control(), Path(folder))  # what is imported late stands now
-        calls = trip(config, Path(folder))
+        content = json.dumps({key: values.tolist() for key, values in arrays.items()})
+        (Path(folder) / "a.json").write_text(content, encoding="utf-8")
+        for entry in (text, tables):
+            config = RigConfig.model_validate_json(json.dumps({"files": [entry]}))
+            stage.ingest(config, Control(), Path(folder))  # what is imported late stands now
+            told(trip(config, Path(folder)))
+
+
+def told(calls: list[tuple[str, str | None]]) -> None:
+    """Print the entries and returns of one trip."""
     order = list(dict.fromkeys(module for module, _ in calls))
     entered = Counter(module for module, _ in calls)
     later = Counter(m for m, above in calls if above in order and order.index(above) > order.index(m))

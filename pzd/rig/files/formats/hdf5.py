@@ -1,7 +1,7 @@
 """HDF5, among it MATLAB files of version 7.3: data sets of one length in one group are the columns of one table.
 
-The unit of a column is the attribute `unit` or `units` of its data set. MATLAB stores a matrix turned over, and texts
-as the numbers of their characters.
+The unit of a column is the attribute `unit` or `units` of its data set. MATLAB stores texts as the numbers of their
+characters, and a matrix turned over, which does not matter: the longer side is time.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def _value(item: Any) -> Any:
         return _text(read) if item.ndim == 0 else [_text(cell) for cell in read.ravel()]
     if item.ndim == 0 or item.size == 1:
         return float(read.ravel()[0]) if item.ndim else float(read)
-    return read.T if kind else read
+    return read
 
 
 def _text(value: Any) -> str:
