@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # before an interrupt is heeded, as little as possible is imp
 
 _GRACE_S = 0.4
 """How long the program may take to tidy up; with what it takes to notice, it is gone within a second."""
-_TOLD = "interrupted; finished stages stand, the one at work left what was there before"
+_MESSAGE = "interrupted; finished stages stand, the one at work left what was there before"
 _said: list[str] = []
 
 
@@ -26,8 +26,8 @@ def say_interrupted() -> None:
     """Say what an interrupt leaves behind."""
     from pzd.cli.output import complain
 
-    _said.append(_TOLD)
-    complain([_TOLD])
+    _said.append(_MESSAGE)
+    complain([_MESSAGE])
 
 
 def end_at_once_when_interrupted() -> None:
@@ -47,7 +47,7 @@ def raise_when_interrupted() -> None:
 
 
 def _end_at_once(_number: int, _frame: FrameType | None) -> None:
-    os.write(2, f"{_TOLD}\n".encode())
+    os.write(2, f"{_MESSAGE}\n".encode())
     os._exit(INTERRUPTED)
 
 

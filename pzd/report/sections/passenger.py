@@ -90,11 +90,11 @@ def _compared(context: ReportContext) -> Iterator[Block]:
         "the others hold was searched for on each road and at each fidelity, so that a_w is least."
     )
     header = ("road", "fidelity", "beside", f"a_w {policy}", "a_w of the other", "a_w", "wheel load", "travel")
-    rows = tuple(_beside(context, one, other) for one in found for other in one.others)
+    rows = tuple(_comparison_row(context, one, other) for one in found for other in one.others)
     yield Sheet(f"{policy} beside the others at the same fidelity (a_w: ISO 2631-1:1997)", header, rows)
 
 
-def _beside(context: ReportContext, one: Comparison, other: SummaryRow) -> tuple[str, ...]:
+def _comparison_row(context: ReportContext, one: Comparison, other: SummaryRow) -> tuple[str, ...]:
     mine = one.controlled
     return (
         mine.road,
