@@ -160,16 +160,35 @@ def test_the_closed_form_and_the_march_agree_to_1e_9_of_peak(kind: str, uneven: 
         np.testing.assert_allclose(closed, marched, rtol=0, atol=1e-9 * np.max(np.abs(marched)))
 
 
-def test_cutting_every_step_in_eight_changes_nothing(rng: np.random.Generator) -> None:
-    coarse, share = motions(rng)["wild"], np.arange(8) / 8
+def cut(coarse: Motion, parts: int) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and velocity of the same motion, every step cut in as many parts."""
+    share = np.arange(parts) / parts
     u0 = np.diff(coarse.displacement) / STEP - 0.5 * np.diff(coarse.velocity)
     bend = np.diff(coarse.velocity)[:, None] * share
     inside = coarse.displacement[:-1, None] + STEP * share * (u0[:, None] + 0.5 * bend)
     x = np.append(inside.ravel(), coarse.displacement[-1])
-    v = np.append((coarse.velocity[:-1, None] + bend).ravel(), coarse.velocity[-1])
+    return x, np.append((coarse.velocity[:-1, None] + bend).ravel(), coarse.velocity[-1])
+
+
+def test_cutting_every_step_in_eight_changes_nothing(rng: np.random.Generator) -> None:
+    coarse = motions(rng)["wild"]
+    x, v = cut(coarse, 8)
     whole = element_force(coarse.displacement, STEP, 300.0, 2700.0, 2e5, 0.0, coarse.velocity)
     fine = element_force(x, STEP / 8, 300.0, 2700.0, 2e5, 0.0, v)
     np.testing.assert_allclose(fine[::8], whole, rtol=0, atol=1e-9 * np.max(np.abs(whole)))
+
+
+@pytest.mark.parametrize("effects", [*FLOWS[:3], FLOWS[7], FLOWS[8]], ids="+".join)
+def test_oil_that_settles_within_a_fraction_of_a_step_is_followed(effects: dict) -> None:
+    """C/k is a twentieth of the step and less, as in a slow test of a stiff damper; cut in 64, no piece is stiff."""
+    hard = with_effects(effects)
+    base = tuple(row.model_copy(update={"k_N_per_m": 6e7}) for row in hard.base)
+    rows = element_rows(hard.model_copy(update={"base": base}), np.array([60.0]), None)
+    motion = sine(60.0)
+    stiff = march(motion.displacement, motion.velocity, np.array([STEP]), rows, 0.0, 1e-8)
+    x, v = cut(motion, 64)
+    fine = march(x, v, np.array([STEP / 64]), rows, 0.0, 1e-8)[::64]
+    assert np.max(np.abs(stiff - fine)) <= 1e-6 * np.max(np.abs(fine))
 
 
 @pytest.mark.parametrize("effects", [*FLOWS[:3], FLOWS[7]], ids="+".join)
