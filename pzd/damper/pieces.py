@@ -102,7 +102,7 @@ def _runge_kutta(
     return end, r6, dt * (d[0] * r0 + d[2] * r2 + d[3] * r3 + d[4] * r4 + d[5] * r5 + d[6] * r6)
 
 
-@laid_in
+@compiled
 def _rate(y: float, guess: float, at: float, regime: int, side: float, step: Step, explicit: bool) -> float:
     """Rate of the integrated variable.
 
