@@ -8,7 +8,7 @@ below the breakaway force nothing flows.
 
 from __future__ import annotations
 
-from pzd.compiled import compiled, laid_in
+from pzd.compiled import compiled
 from pzd.damper import kernels
 from pzd.damper.kernels import T0, C, Row, direction_factor
 
@@ -103,7 +103,7 @@ def speed_explicit(p: Row) -> bool:
     return _no_extra(p) or (_viscous_is_straight(p) and _extra_speed(1.0, p[C], p) >= 0.0)
 
 
-@laid_in
+@compiled
 def smooth_speed(force: float, p: Row, side: float, guess: float) -> float:
     """Flow speed [m/s] at a force at or above breakaway [N], the relief valve shut; closed form where there is one."""
     factor = direction_factor(side, p)

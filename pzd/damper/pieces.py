@@ -139,7 +139,7 @@ def _rosenbrock(y: float, r0: float, at: float, dt: float, regime: int, side: fl
     return end + error, error
 
 
-@laid_in
+@compiled
 def _rate(y: float, guess: float, at: float, regime: int, side: float, step: Step, explicit: bool) -> float:
     """Rate of the integrated variable.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from pzd.compiled import compiled, laid_in
+from pzd.compiled import compiled
 from pzd.damper.flow import breakaway, relief, relief_slope, smooth_speed
 from pzd.damper.kernels import K, Row, stroke_inverse, stroke_law, stroke_straight
 
@@ -115,7 +115,7 @@ def onto_edge(e: float, p: Row, regime: int, side: float, way: int) -> tuple[flo
     return onto, STICK, side
 
 
-@laid_in
+@compiled
 def speed_at(force: float, p: Row, regime: int, side: float, guess: float) -> float:
     """Flow speed [m/s] of a regime's own law at |F| = force."""
     if regime == STICK:
