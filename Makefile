@@ -52,7 +52,7 @@ blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the verdic
 	$(BIN)/pzd blind configs/blind.yaml
 
 .PHONY: bench
-bench: $(DEV)  ## Print how long a user waits, and the limits
+bench: $(DEV)  ## Print how long a user waits, beside the limits, and how fast the kernels are beside other solvers
 	$(BIN)/python tests/studies/bench.py
 
 .PHONY: coverage-study

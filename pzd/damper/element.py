@@ -180,9 +180,9 @@ def _march(
             for column in range(3):
                 slopes[i, column] = slopes[i - 1, column]
             if whole:
-                _carry(slopes[i], F, side, u0, u1, element, over)
+                _carry(slopes[i : i + 1], F, side, u0, u1, element, over)
         if not whole:
-            end = _cut(F, u0, u1, h, element, slopes[i] if slopes.size else slopes[:, 0])
+            end = _cut(F, u0, u1, h, element, slopes[i : i + 1])
             side = _side(end, T0)
         F = end
         force[i] = F
@@ -196,7 +196,10 @@ def _side(F: float, T0: float) -> float:
 
 @compiled
 def _cut(F: float, u0: float, u1: float, h: float, element: Element, slopes: Array) -> float:
-    """Force after a step in which the regime changes: cut where the rod turns round, then from regime to regime."""
+    """Force [N] after a step in which the regime changes: cut where the rod turns round, then from regime to regime.
+
+    Where they are not empty, the (1, 3) slopes are brought along.
+    """
     T0, C, k = element
     bend, start = (u1 - u0) / h, 0.0
     turn = u0 / (u0 - u1) * h if u0 * u1 < 0.0 else h
@@ -268,7 +271,7 @@ def _carry(slopes: Array, F: float, side: float, u0: float, u1: float, element: 
 
     Parameters
     ----------
-    slopes : (3,) changed in place
+    slopes : (1, 3) changed in place
     F : force at the start [N]
     side : to which the oil flows; 0 where it sticks
     u0, u1 : extension speed at the start and at the end [m/s]
@@ -279,12 +282,12 @@ def _carry(slopes: Array, F: float, side: float, u0: float, u1: float, element: 
     if over.time <= 0.0:
         return
     if side == 0.0:
-        slopes[2] += stick(0.0, 1.0, u0, u1, over.time)
+        slopes[0, 2] += stick(0.0, 1.0, u0, u1, over.time)
         return
     decay = over.decay
     g = k * (u0 - (F - side * T0) / C)
     by_stiffness = decay * over.time * g / k + (u1 - u0) * (over.rise * C / k - decay * over.time) * C / (k * over.time)
     by_speeds = (over.by_speed * u0 + over.by_change * (u1 - u0)) / C
-    slopes[0] = decay * slopes[0] + over.rise * side
-    slopes[1] = decay * slopes[1] + by_speeds - k / C * by_stiffness
-    slopes[2] = decay * slopes[2] + by_stiffness
+    slopes[0, 0] = decay * slopes[0, 0] + over.rise * side
+    slopes[0, 1] = decay * slopes[0, 1] + by_speeds - k / C * by_stiffness
+    slopes[0, 2] = decay * slopes[0, 2] + by_stiffness

@@ -96,6 +96,14 @@ def smooth_slope(w: float, p: Row, side: float) -> float:
 
 
 @compiled
+def speed_explicit(p: Row) -> bool:
+    """Whether `smooth_speed` is a closed form."""
+    if not _friction_is_sharp(p):
+        return False
+    return _no_extra(p) or (_viscous_is_straight(p) and _extra_speed(1.0, p[C], p) >= 0.0)
+
+
+@compiled
 def smooth_speed(force: float, p: Row, side: float, guess: float) -> float:
     """Flow speed [m/s] at a force at or above breakaway [N], the relief valve shut; closed form where there is one."""
     factor = direction_factor(side, p)
@@ -107,6 +115,12 @@ def smooth_speed(force: float, p: Row, side: float, guess: float) -> float:
             speed = _extra_speed(over, p[C] * factor, p)
             if speed >= 0.0:
                 return speed
+    return _searched_speed(force, p, factor, side, guess)
+
+
+@compiled
+def _searched_speed(force: float, p: Row, factor: float, side: float, guess: float) -> float:
+    """The same by Newton's method within a bracket."""
     if force <= 0.0:
         return 0.0
     low, high = 0.0, _viscous_speed(force, p[C] * factor, p)

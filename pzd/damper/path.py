@@ -4,7 +4,7 @@ Over a step the extension speed u = dx/dt and the parameter row go linearly:
 
     de/dt = u(t) - side w(|F|),   F = k(t) s(e),   side = sign(F)
 
-Where a piece of the path leaves its regime, the moment is found by bracketing and the piece is cut; so it is where
+Where a piece of the path leaves its regime, the moment is found within a bracket and the piece is cut; so it is where
 the rod turns round, for a force that leaves its regime and comes back would not be seen at the end.
 """
 
@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.compiled import compiled
-from pzd.damper.dormand_prince import STAGES
 from pzd.damper.flow import smooth_force
-from pzd.damper.kernels import T0, C, K, Row, interpolate, row_of
-from pzd.damper.pieces import Step, piece, row_in
+from pzd.damper.kernels import T0, C, K, Row, interpolate, row_of, stroke_slope
+from pzd.damper.pieces import Step, extension_speed, piece, row_in
 from pzd.damper.regimes import (
     SMOOTH,
     STICK,
@@ -41,7 +40,7 @@ STATES = 4
 
 _MOST_PIECES = 2000
 _MOST_BRACKETS = 60
-_FALSE_POSITIONS = 12  # then bisection, which cannot creep
+_NEWTON_STEPS = 12  # then bisection, which cannot creep
 _ON_EDGE = 1e-13  # of the force
 _OFF_EDGE = 1e-6  # of a piece
 _SHORTEST_PIECE = 1e-13  # of a piece; not zero, so that the side it leaves to is seen
@@ -49,7 +48,7 @@ _SAME_FORCE = 1e-11  # of the force; a saved flow speed that gives it within thi
 
 
 @compiled
-def advance(state: Array, step: Step, tolerance: float, stages: Array, booked: bool) -> None:
+def advance(state: Array, step: Step, tolerance: float, booked: bool) -> None:
     """Carry the state through one step.
 
     Parameters
@@ -57,7 +56,6 @@ def advance(state: Array, step: Step, tolerance: float, stages: Array, booked: b
     state : (4,) elastic deflection, flow speed, dissipated energy, work of the valve; changed in place
     step : what happens in it
     tolerance : admissible error of a piece, as a share of the force
-    stages : (STAGES,) to work in
     booked : whether the energies are booked, which doubles the work
     """
     e, w, at = state[DEFLECTION], state[SPEED], 0.0
@@ -72,7 +70,7 @@ def advance(state: Array, step: Step, tolerance: float, stages: Array, booked: b
         dt = min(dt, step.h - at)
         if at < turn * (1.0 - 1e-14):
             dt = min(dt, turn - at)
-        end, speed, error = piece(e, w, at, dt, regime, side, step, stages)
+        end, speed, error = piece(e, w, at, dt, regime, side, step)
         allowed = tolerance * (abs(spring_force(e, step.p1)) + size)
         if error > allowed and dt > 1e-7 * step.h:
             dt *= max(0.2, 0.9 * (allowed / error) ** 0.2)
@@ -80,13 +78,13 @@ def advance(state: Array, step: Step, tolerance: float, stages: Array, booked: b
         over, way = beyond(end, row_in(step, at + dt), regime, side)
         following, onto = regime, side
         if over > 0.0:
-            dt = _crossing(e, w, at, dt, over, regime, side, step, stages)
-            end, speed, error = piece(e, w, at, dt, regime, side, step, stages)
+            dt = _crossing(e, w, at, dt, over, way, regime, side, step)
+            end, speed, error = piece(e, w, at, dt, regime, side, step)
             p = row_in(step, at + dt)
             end, following, onto = onto_edge(end, p, regime, side, way)
             speed = speed_at(abs(spring_force(end, p)), p, following, onto, speed)
         if booked:
-            _book(state, e, end, w, speed, at, dt, regime, side, step, stages)
+            _book(state, e, end, w, speed, at, dt, regime, side, step)
         e, w = end, speed
         at += dt
         if at >= step.h * (1.0 - 1e-14):
@@ -111,34 +109,35 @@ def _miss(e: float, p: Row, regime: int, side: float) -> float:
 
 @compiled
 def _crossing(
-    e: float, w: float, at: float, dt: float, over: float, regime: int, side: float, step: Step, stages: Array
+    e: float, w: float, at: float, dt: float, over: float, way: int, regime: int, side: float, step: Step
 ) -> float:
-    """Length of the piece that ends on the edge of its regime: Illinois' false position, then bisection."""
+    """Length of the piece that ends on the edge of its regime: Newton's method within a bracket, then bisection."""
     size = abs(spring_force(e, step.p0)) + size_of(step)
     if regime == STICK:
-        end, _, _ = piece(e, w, at, dt, regime, side, step, stages)
+        end, _, _ = piece(e, w, at, dt, regime, side, step)
         side = math.copysign(1.0, end)
     low, high, below, above = 0.0, dt, min(_miss(e, row_in(step, at), regime, side), 0.0), over
     if regime == STICK and below > -_ON_EDGE * size:  # it starts on this edge: look for where it comes back
         low = _OFF_EDGE * dt
-        end, _, _ = piece(e, w, at, low, regime, side, step, stages)
+        end, _, _ = piece(e, w, at, low, regime, side, step)
         below = _miss(end, row_in(step, at + low), regime, side)
         if below >= 0.0:
             return _SHORTEST_PIECE * dt
+    time = (low * above - high * below) / (above - below)
     for i in range(_MOST_BRACKETS):
-        middle = (low * above - high * below) / (above - below)
-        if i > _FALSE_POSITIONS or not low < middle < high:
-            middle = 0.5 * (low + high)
-        end, _, _ = piece(e, w, at, middle, regime, side, step, stages)
-        miss = _miss(end, row_in(step, at + middle), regime, side)
+        if i > _NEWTON_STEPS or not low < time < high:
+            time = 0.5 * (low + high)
+        end, speed, _ = piece(e, w, at, time, regime, side, step)
+        p = row_in(step, at + time)
+        miss = _miss(end, p, regime, side)
         if abs(miss) <= _ON_EDGE * size or high - low <= 1e-15 * step.h:
-            return middle
+            return time
         if miss > 0.0:
-            high, above = middle, miss
-            below *= 0.5
+            high = time
         else:
-            low, below = middle, miss
-            above *= 0.5
+            low = time
+        lengthening = side * extension_speed(step, at + time) - speed
+        time -= miss / (way * p[K] * stroke_slope(end, side, p) * lengthening)  # as if the parameters stood still
     return high
 
 
@@ -154,10 +153,9 @@ def _book(
     regime: int,
     side: float,
     step: Step,
-    stages: Array,
 ) -> None:
     """Book the energies of a piece by Simpson's rule, its middle computed like its end."""
-    em, wm, _ = piece(e0, w0, at, 0.5 * dt, regime, side, step, stages)
+    em, wm, _ = piece(e0, w0, at, 0.5 * dt, regime, side, step)
     first, last = row_in(step, at), row_in(step, at + dt)
     middle = interpolate(first, last, 0.5)
     if regime != STICK:
@@ -194,7 +192,7 @@ def march(
     (n,) force [N]
     """
     force = np.empty(displacement.size)
-    _march(displacement, velocity, steps, rows, initial_force, tolerance, np.zeros(STATES), np.empty(STAGES), force)
+    _march(displacement, velocity, steps, rows, initial_force, tolerance, np.zeros(STATES), force)
     return force
 
 
@@ -220,7 +218,6 @@ def _march(
     initial_force: float,
     tolerance: float,
     state: Array,
-    stages: Array,
     force: Array,
 ) -> None:
     p0 = row_of(rows[0])
@@ -235,5 +232,5 @@ def _march(
         h = steps[min(i - 1, steps.size - 1)]
         mean = (displacement[i] - displacement[i - 1]) / h
         half = 0.5 * (velocity[i] - velocity[i - 1]) if velocity.size > 1 else 0.0
-        advance(state, Step(h, mean - half, mean + half, p0, p1, moving), tolerance, stages, False)
+        advance(state, Step(h, mean - half, mean + half, p0, p1, moving), tolerance, False)
         force[i] = spring_force(state[DEFLECTION], p1)

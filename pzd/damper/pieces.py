@@ -1,25 +1,27 @@
 """One piece of the path inside one regime: in closed form where it is straight, else by Runge-Kutta.
 
-Straight pieces with standing parameters are solved in closed form. The others are integrated by
-Dormand and Prince's pair of order 5(4) in the viscous force s = visc(w), in which w(s) and F(s)
-are both explicit and dF/ds >= 1, so that nothing is inverted.
+Straight pieces with standing parameters are solved in closed form. The others are integrated by Dormand and Prince's
+pair of order 5(4): in the elastic deflection e where the flow curve is inverted in closed form, else in the viscous
+force s = visc(w), in which w(s) and F(s) are both explicit and dF/ds >= 1, so that nothing is inverted. Where a piece
+is long beside the time in which the force settles (hard oil, slow test), Runge-Kutta would have to cut it in as many
+parts, and a Rosenbrock method of order 4(3) takes its place.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pzd.compiled import compiled
-from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
+from pzd.compiled import compiled, laid_in
+from pzd.damper import rosenbrock
+from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, TIMES
 from pzd.damper.element import relaxation, slip
 from pzd.damper.flow import (
     breakaway,
     relief_slope,
     smooth_force_of,
     smooth_rise,
+    smooth_slope,
+    speed_explicit,
     straight,
     viscous_force,
     viscous_speed,
@@ -27,9 +29,11 @@ from pzd.damper.flow import (
 from pzd.damper.kernels import K, Row, interpolate, stroke_law, stroke_moves, stroke_slope, stroke_straight
 from pzd.damper.regimes import RELIEF, STICK, deflection_on, speed_at, spring_force
 
-Array = NDArray[np.float64]
-
 _DIFFERENCE = 1e-3  # of a step, for the drift of the flow curve with moving parameters
+_STIFF = 2.5  # settling times in a piece; Runge-Kutta is stable up to 3.3
+_STIFF_TIMES, _STIFF_WEIGHTS = rosenbrock.TIMES, rosenbrock.STAGE_WEIGHTS
+_RATE_WEIGHTS, _TIME_WEIGHTS, _DIAGONAL = rosenbrock.RATE_WEIGHTS, rosenbrock.TIME_WEIGHTS, rosenbrock.DIAGONAL
+_NUDGE = 1e-7  # of the integrated variable, for the derivative of its rate
 
 
 class Step(NamedTuple):
@@ -44,35 +48,41 @@ class Step(NamedTuple):
     """Whether the two rows differ."""
 
 
-@compiled
+@laid_in
 def row_in(step: Step, at: float) -> Row:
     """The parameter row at a moment [s] of the step."""
     return interpolate(step.p0, step.p1, at / step.h) if step.moving else step.p0
 
 
-@compiled
+@laid_in
 def extension_speed(step: Step, at: float) -> float:
     """dx/dt [m/s] at a moment [s] of the step."""
     return step.u0 + (step.u1 - step.u0) * at / step.h
 
 
 @compiled
-def piece(
-    e: float, w: float, at: float, dt: float, regime: int, side: float, step: Step, stages: Array
-) -> tuple[float, float, float]:
+def piece(e: float, w: float, at: float, dt: float, regime: int, side: float, step: Step) -> tuple[float, float, float]:
     """Elastic deflection and flow speed after a piece of length dt, and its embedded error as a force [N]."""
     if regime == STICK:
         return e + dt * extension_speed(step, at + 0.5 * dt), 0.0, 0.0
     p = row_in(step, at)
-    force = abs(spring_force(e, p))
     if not step.moving and stroke_straight(p) and (regime == RELIEF or straight(p)):
+        force = abs(spring_force(e, p))
         slope = relief_slope(p, side) if regime == RELIEF else viscous_force(1.0, p, side)
         pull, pull_after = side * extension_speed(step, at), side * extension_speed(step, at + dt)
         end = slip(force, force - slope * w, pull, pull_after, relaxation(dt, slope, p[K]))
         return deflection_on(end, p, side), w + (end - force) / slope, 0.0
-    y, error = _runge_kutta(
-        force if regime == RELIEF else viscous_force(w, p, side), at, dt, regime, side, step, stages
-    )
+    if speed_explicit(p) and dt * p[K] <= _STIFF * smooth_slope(w, p, side):
+        end, last, error = _runge_kutta(e, extension_speed(step, at) - side * w, w, at, dt, regime, side, step, True)
+        p = row_in(step, at + dt)
+        force, other = side * p[K] * stroke_law(end, side, p), side * p[K] * stroke_law(end + error, side, p)
+        return end, side * (extension_speed(step, at + dt) - last), abs(other - force)
+    y = abs(spring_force(e, p)) if regime == RELIEF else viscous_force(w, p, side)
+    rate = _rate_of_force(y, at, regime, side, step)
+    if dt * p[K] > _STIFF * (relief_slope(p, side) if regime == RELIEF else smooth_slope(w, p, side)):
+        y, error = _rosenbrock(y, rate, at, dt, regime, side, step)
+    else:
+        y, _, error = _runge_kutta(y, rate, w, at, dt, regime, side, step, False)
     p = row_in(step, at + dt)
     if regime == RELIEF:
         return deflection_on(y, p, side), speed_at(y, p, regime, side, w), abs(error)
@@ -85,22 +95,64 @@ def piece(
 
 @compiled
 def _runge_kutta(
-    y: float, at: float, dt: float, regime: int, side: float, step: Step, stages: Array
-) -> tuple[float, float]:
-    """The integrated variable after dt, and its embedded error."""
-    end, error = y, 0.0
-    for i in range(STAGES):
-        change = 0.0
-        for j in range(i):
-            change += STAGE_WEIGHTS[i, j] * stages[j]
-        end = y + dt * change
-        stages[i] = _rate(end, at + TIMES[i] * dt, regime, side, step)
-        error += ERROR_WEIGHTS[i] * stages[i]
-    return end, dt * error
+    y: float, r0: float, w: float, at: float, dt: float, regime: int, side: float, step: Step, explicit: bool
+) -> tuple[float, float, float]:
+    """The integrated variable after dt, its rate there, and its embedded error; its rate at the start is given."""
+    a, t, d = STAGE_WEIGHTS, TIMES, ERROR_WEIGHTS
+    end = y + dt * (a[1, 0] * r0)
+    r1 = _rate(end, w, at + t[1] * dt, regime, side, step, explicit)
+    end = y + dt * (a[2, 0] * r0 + a[2, 1] * r1)
+    r2 = _rate(end, w, at + t[2] * dt, regime, side, step, explicit)
+    end = y + dt * (a[3, 0] * r0 + a[3, 1] * r1 + a[3, 2] * r2)
+    r3 = _rate(end, w, at + t[3] * dt, regime, side, step, explicit)
+    end = y + dt * (a[4, 0] * r0 + a[4, 1] * r1 + a[4, 2] * r2 + a[4, 3] * r3)
+    r4 = _rate(end, w, at + t[4] * dt, regime, side, step, explicit)
+    end = y + dt * (a[5, 0] * r0 + a[5, 1] * r1 + a[5, 2] * r2 + a[5, 3] * r3 + a[5, 4] * r4)
+    r5 = _rate(end, w, at + t[5] * dt, regime, side, step, explicit)
+    end = y + dt * (a[6, 0] * r0 + a[6, 2] * r2 + a[6, 3] * r3 + a[6, 4] * r4 + a[6, 5] * r5)
+    r6 = _rate(end, w, at + t[6] * dt, regime, side, step, explicit)
+    return end, r6, dt * (d[0] * r0 + d[2] * r2 + d[3] * r3 + d[4] * r4 + d[5] * r5 + d[6] * r6)
 
 
 @compiled
-def _rate(y: float, at: float, regime: int, side: float, step: Step) -> float:
+def _rosenbrock(y: float, r0: float, at: float, dt: float, regime: int, side: float, step: Step) -> tuple[float, float]:
+    """The integrated variable after dt, and its embedded error; its rate at the start is given."""
+    a, c, t, d = _STIFF_WEIGHTS, _RATE_WEIGHTS, _STIFF_TIMES, _TIME_WEIGHTS
+    nudge = _NUDGE * max(y, step.p0[K] * 1e-9)
+    settling = (_rate_of_force(y + nudge, at, regime, side, step) - r0) / nudge
+    span = _DIFFERENCE * dt
+    drift = (_rate_of_force(y, at + span, regime, side, step) - r0) / span
+    divisor = 1.0 / (dt * _DIAGONAL) - settling
+    u0 = (r0 + dt * d[0] * drift) / divisor
+    r = _rate_of_force(y + a[1, 0] * u0, at + t[1] * dt, regime, side, step)
+    u1 = (r + dt * d[1] * drift + c[1, 0] * u0 / dt) / divisor
+    r = _rate_of_force(y + a[2, 0] * u0 + a[2, 1] * u1, at + t[2] * dt, regime, side, step)
+    u2 = (r + dt * d[2] * drift + (c[2, 0] * u0 + c[2, 1] * u1) / dt) / divisor
+    r = _rate_of_force(y + a[3, 0] * u0 + a[3, 1] * u1 + a[3, 2] * u2, at + t[3] * dt, regime, side, step)
+    u3 = (r + dt * d[3] * drift + (c[3, 0] * u0 + c[3, 1] * u1 + c[3, 2] * u2) / dt) / divisor
+    end = y + a[4, 0] * u0 + a[4, 1] * u1 + a[4, 2] * u2 + a[4, 3] * u3
+    r = _rate_of_force(end, at + dt, regime, side, step)
+    u4 = (r + (c[4, 0] * u0 + c[4, 1] * u1 + c[4, 2] * u2 + c[4, 3] * u3) / dt) / divisor
+    end += u4
+    r = _rate_of_force(end, at + dt, regime, side, step)
+    error = (r + (c[5, 0] * u0 + c[5, 1] * u1 + c[5, 2] * u2 + c[5, 3] * u3 + c[5, 4] * u4) / dt) / divisor
+    return end + error, error
+
+
+@compiled
+def _rate(y: float, guess: float, at: float, regime: int, side: float, step: Step, explicit: bool) -> float:
+    """Rate of the integrated variable.
+
+    Equation: de/dt = u(t) - side w(|F|)      Source: eq. (1), the flow curve inverted
+    """
+    if not explicit:
+        return _rate_of_force(y, at, regime, side, step)
+    p = row_in(step, at)
+    return extension_speed(step, at) - side * speed_at(side * p[K] * stroke_law(y, side, p), p, regime, side, guess)
+
+
+@compiled
+def _rate_of_force(y: float, at: float, regime: int, side: float, step: Step) -> float:
     """Rate of the integrated variable: of s in SMOOTH, of |F| in RELIEF.
 
     Equation: d|F|/dt = k s'(e) (side u - w) + (dk/dt)/k |F| + k ds/dt at e; in SMOOTH less what the moving curve

@@ -14,7 +14,7 @@ from pzd.damper.kernels import row_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance, march
-from pzd.damper.pieces import STAGES, Step
+from pzd.damper.pieces import Step
 
 STEP = 1e-3
 TIME = np.arange(600) * STEP
@@ -160,16 +160,63 @@ def test_the_closed_form_and_the_march_agree_to_1e_9_of_peak(kind: str, uneven: 
         np.testing.assert_allclose(closed, marched, rtol=0, atol=1e-9 * np.max(np.abs(marched)))
 
 
-def test_cutting_every_step_in_eight_changes_nothing(rng: np.random.Generator) -> None:
-    coarse, share = motions(rng)["wild"], np.arange(8) / 8
+def cut(coarse: Motion, parts: int) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and velocity of the same motion, every step cut in as many parts."""
+    share = np.arange(parts) / parts
     u0 = np.diff(coarse.displacement) / STEP - 0.5 * np.diff(coarse.velocity)
     bend = np.diff(coarse.velocity)[:, None] * share
     inside = coarse.displacement[:-1, None] + STEP * share * (u0[:, None] + 0.5 * bend)
     x = np.append(inside.ravel(), coarse.displacement[-1])
-    v = np.append((coarse.velocity[:-1, None] + bend).ravel(), coarse.velocity[-1])
+    return x, np.append((coarse.velocity[:-1, None] + bend).ravel(), coarse.velocity[-1])
+
+
+def test_cutting_every_step_in_eight_changes_nothing(rng: np.random.Generator) -> None:
+    coarse = motions(rng)["wild"]
+    x, v = cut(coarse, 8)
     whole = element_force(coarse.displacement, STEP, 300.0, 2700.0, 2e5, 0.0, coarse.velocity)
     fine = element_force(x, STEP / 8, 300.0, 2700.0, 2e5, 0.0, v)
     np.testing.assert_allclose(fine[::8], whole, rtol=0, atol=1e-9 * np.max(np.abs(whole)))
+
+
+@pytest.mark.parametrize("effects", [*FLOWS[:3], FLOWS[7], FLOWS[8]], ids="+".join)
+def test_oil_that_settles_within_a_fraction_of_a_step_is_followed(effects: dict) -> None:
+    """C/k is a twentieth of the step and less, as in a slow test of a stiff damper; cut in 64, no piece is stiff."""
+    hard = with_effects(effects)
+    base = tuple(row.model_copy(update={"k_N_per_m": 6e7}) for row in hard.base)
+    rows = element_rows(hard.model_copy(update={"base": base}), np.array([60.0]), None)
+    motion = sine(60.0)
+    stiff = march(motion.displacement, motion.velocity, np.array([STEP]), rows, 0.0, 1e-8)
+    x, v = cut(motion, 64)
+    fine = march(x, v, np.array([STEP / 64]), rows, 0.0, 1e-8)[::64]
+    assert np.max(np.abs(stiff - fine)) <= 1e-6 * np.max(np.abs(fine))
+
+
+@pytest.mark.parametrize("effects", [*FLOWS[:3], FLOWS[7]], ids="+".join)
+@pytest.mark.parametrize("moving", [False, True], ids=["standing", "moving"])
+def test_a_scheme_of_fixed_steps_is_of_order_five(effects: dict, moving: bool) -> None:
+    first, last = (row_of(element_rows(with_effects(effects), np.array([u]), None)[0]) for u in (60.0, 70.0))
+    start, long, unlimited = 8e-3, 8e-3, 1e9
+
+    def after(steps: int) -> float:
+        state, share = np.array([start, 0.0, 0.0, 0.0]), np.linspace(0.0, 1.0, steps + 1)
+        u = 0.2 + 0.1 * share
+        rows = [tuple(a + s * (b - a) if a != b else a for a, b in zip(first, last, strict=True)) for s in share]
+        for i in range(steps):
+            ends = (rows[i], rows[i + 1]) if moving else (first, first)
+            advance(state, Step(long / steps, u[i], u[i + 1], *ends, moving), unlimited, False)
+        return float(state[DEFLECTION])
+
+    truth = after(512)
+    coarse, fine = (abs(after(steps) - truth) for steps in (1, 8))
+    assert np.log(coarse / fine) / np.log(8.0) > 4.8
+
+
+@pytest.mark.parametrize("effects", FLOWS[:4], ids="+".join)
+def test_one_step_a_sample_is_right_to_1e_6_of_peak(effects: dict) -> None:
+    motion, damper = sine(40.0), with_effects(effects)
+    truth = respond(damper, motion, tolerance=1e-12)
+    ours = respond(damper, motion, tolerance=1e-8)
+    assert np.max(np.abs(ours - truth)) <= 1e-6 * np.max(np.abs(truth))
 
 
 @pytest.mark.parametrize("effects", FLOWS[:3], ids="+".join)
@@ -196,7 +243,7 @@ def test_the_parabola_inside_a_step_makes_a_sampled_sine_four_hundred_times_bett
 def test_energy_goes_into_the_spring_the_oil_and_the_valve_and_nowhere_else(effects: dict) -> None:
     motion = sine(75 + 70 * np.sin(2 * np.pi * 2.3 * TIME))
     rows = element_rows(with_effects(effects), motion.voltage, None)
-    state, stages, stored, work = np.zeros(STATES), np.empty(STAGES), 0.0, 0.0
+    state, stored, work = np.zeros(STATES), 0.0, 0.0
     play = 3 + STROKE_AND_FLOW.index(("lash", "delta"))
     points, weights = np.polynomial.legendre.leggauss(4)
     for i in range(len(TIME) - 1):
@@ -207,10 +254,10 @@ def test_energy_goes_into_the_spring_the_oil_and_the_valve_and_nowhere_else(effe
             share = 0.5 * (1 + x)
             middle = tuple(a + share * (b - a) if a != b else a for a, b in zip(p0, p1, strict=True))
             probe, u = state.copy(), mean + half * (2 * share - 1)
-            advance(probe, Step(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, stages, False)
+            advance(probe, Step(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, False)
             e = probe[DEFLECTION]
             work += 0.5 * w * STEP * middle[2] * np.sign(e) * max(abs(e) - middle[play] / 2, 0.0) * u
-        advance(state, Step(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, stages, True)
+        advance(state, Step(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, True)
     stored = 0.5 * rows[-1, 2] * max(abs(state[DEFLECTION]) - rows[-1, play] / 2, 0.0) ** 2
     assert state[DISSIPATED] > 0.0
     assert abs(stored + state[DISSIPATED] - state[VALVE_WORK] - work) <= 2e-6 * state[DISSIPATED]

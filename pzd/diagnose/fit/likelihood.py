@@ -22,8 +22,8 @@ from pzd.record import Array
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError
 
-SIMULATION_TOLERANCE = 1e-8
-"""Of the damper's path, as a share of the force."""
+SIMULATION_TOLERANCE = 1e-7
+"""Of the damper's path, as a share of the force: a thousandth of what a step of a difference moves it."""
 REMEMBERED = 12
 """Element forces kept, enough for one column of slopes each of two fits at the same time."""
 
