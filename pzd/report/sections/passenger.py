@@ -71,7 +71,8 @@ def _windows(context: ReportContext) -> Iterator[str]:
     """In which part of a ride its numbers are taken."""
     spans = {ride.row.road: ride.ridden for ride in context.rated if ride.of_event}
     if any(not ride.of_event for ride in context.rated):
-        yield f"The first {amount(context.simulate.settle_s, 's')} of each ride are left out."
+        other = " over the other roads" if spans else ""
+        yield f"The first {amount(context.simulate.settle_s, 's')} of each ride{other} are left out."
     for road, span in spans.items():
         yield (
             f"The numbers on {road} are taken from {amount(span.from_s, 's')}, when axle 1 meets it, to "
