@@ -46,27 +46,37 @@ def harmonics(acceleration: Array, rate: float, fundamental: float) -> Component
     -------
     one component a harmonic, from the fundamental up to the Nyquist frequency, or to the 200th
     """
+    from scipy.linalg import solve_toeplitz
+
     count = min(max(int(0.49 * rate / fundamental + 1e-9), 1), _MOST_HARMONICS)
     step = 2.0 * np.pi * fundamental / rate
-    order = np.arange(0.0, count + 1.0)
-    upper = np.array([acceleration @ np.exp(-1j * step * k * np.arange(acceleration.size)) for k in order])
+    upper = _projections(acceleration, step, count)
     right = np.concatenate([upper[:0:-1].conj(), upper])
-    weights = np.linalg.solve(_gram(step, count, acceleration.size), right)
+    weights = solve_toeplitz(_gram(step, count, acceleration.size), right)
     total = acceleration.size * float(np.var(acceleration))
     left = float(acceleration @ acceleration) - float((right.conj() @ weights).real)
     rms = (np.sqrt(2.0) * np.abs(weights[count + 1 :])).astype(np.float64)
-    return Components(fundamental * order[1:], rms, 1.0 - left / total if total > 0.0 else 1.0)
+    return Components(fundamental * np.arange(1.0, count + 1.0), rms, 1.0 - left / total if total > 0.0 else 1.0)
 
 
-def _gram(step: float, count: int, samples: int) -> NDArray[np.complex128]:
-    """(2 count + 1,) squared: sums of exp(j (k - i) step n) over the samples."""
-    index = np.arange(-count, count + 1)
-    apart = step * (index[None, :] - index[:, None])
-    with np.errstate(invalid="ignore"):
-        sums = (1.0 - np.exp(1j * apart * samples)) / (1.0 - np.exp(1j * apart))
-    np.fill_diagonal(sums, samples)
-    gram: NDArray[np.complex128] = sums
-    return gram
+def _projections(acceleration: Array, step: float, count: int) -> NDArray[np.complex128]:
+    """(count + 1,) sums of a(n) exp(-j k step n) over the samples, k from 0."""
+    turn = np.exp(-1j * step * np.arange(acceleration.size))
+    part = acceleration.astype(np.complex128)
+    sums = np.empty(count + 1, dtype=np.complex128)
+    for k in range(count + 1):
+        sums[k] = np.sum(part)
+        part *= turn
+    return sums
+
+
+def _gram(step: float, count: int, samples: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """First column and row (2 count + 1,) of the sums of exp(j (k - i) step n) over the samples."""
+    apart = step * np.arange(1.0, 2.0 * count + 1.0)
+    row = np.empty(2 * count + 1, dtype=np.complex128)
+    row[0] = samples
+    row[1:] = (1.0 - np.exp(1j * apart * samples)) / (1.0 - np.exp(1j * apart))
+    return row.conj(), row
 
 
 def third_octaves(acceleration: Array, rate: float) -> Components:

@@ -34,7 +34,7 @@ def checked_temperature(config: SimulateConfig, table: Table) -> float | None:
 
 
 def checked_voltage(config: SimulateConfig, table: Table) -> None:
-    """Refuse a voltage of the policy `passive` that the table does not cover; without a control signal none is held.
+    """Refuse a voltage of the policy `passive` that the table does not cover.
 
     Raises
     ------
@@ -42,8 +42,10 @@ def checked_voltage(config: SimulateConfig, table: Table) -> None:
     """
     known = sorted({row.voltage_V for row in table.force if row.voltage_V is not None})
     asked = config.passive_voltage_V
-    if asked is None or not known:
+    if asked is None:
         return
+    if not known:
+        raise ConfigError(f"simulate.passive_voltage_V: the rig records no voltage; leave it out (got {asked:g})")
     apart = _SAME_VOLTAGE * max(abs(known[0]), abs(known[-1]))
     if not known[0] - apart <= asked <= known[-1] + apart:
         raise ConfigError(f"simulate.passive_voltage_V: must lie within the table, {_span(known)} (got {asked:g})")

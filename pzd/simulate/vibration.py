@@ -78,7 +78,7 @@ def components(acceleration: Array, rate: float, fundamental: float | None) -> t
     -------
     harmonics of the road where they carry the motion, else third-octave bands; and which
     """
-    if fundamental is None:
+    if fundamental is None or acceleration.size * fundamental < rate:  # less than one period
         return third_octaves(acceleration, rate), "third-octave bands"
     parts = harmonics(acceleration, rate, fundamental)
     if parts.share < _PERIODIC:

@@ -158,6 +158,9 @@ def test_wheels_that_pull_on_the_road_are_told_with_their_place(read: Reader) ->
     _, _, trust = read.text.partition("How far to trust it")
     assert "the wheels of 8 rides pull on the road, which no wheel can; worst axle 2 of sine-2.25Hz" in trust
     assert "1 230 N, and 26" in trust
+    _, _, table = read.text.partition("Force between wheel and road")
+    assert "at rest 4 600 N and 4 600 N" in table
+    assert re.search(r"sine-4\.5Hz comfort, dynamic 3 210 N .1 230 N 0 % 26 %", table)
 
 
 def test_intervals_statuses_and_findings_stand_on_the_page(read: Reader) -> None:

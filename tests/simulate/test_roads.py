@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from pzd.schema.errors import ConfigError, DataError, FilesError
+from pzd.schema.errors import ConfigError, DataError
 from pzd.signals.iso8608 import classes
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.kinematics import road_at
@@ -155,7 +155,7 @@ def test_a_road_file_that_cannot_be_believed_is_refused_with_its_line(tmp_path, 
 
 
 def test_a_road_file_that_is_not_there_is_said() -> None:
-    with pytest.raises(FilesError, match=r"absent\.csv"):
+    with pytest.raises(ConfigError, match=r"^simulate\.roads\.path: there is no such file.*\(got absent\.csv\)$"):
         read({"kind": "file", "path": "absent.csv"}).roads[0].profile(WAY)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -228,6 +229,19 @@ def test_a_car_with_other_values_is_not_called_by_the_name_of_the_model() -> Non
 def test_what_the_table_does_not_cover_is_refused(damper, given, message) -> None:
     with pytest.raises(ConfigError, match=message):
         ride(damper, policies=["passive"], **given)
+
+
+def test_a_rig_without_voltage_or_temperature_has_none_to_ride_at(damper) -> None:
+    bare = unvoiced(damper)
+    bare = bare.model_copy(update={"base": (bare.base[0].model_copy(update={"temperature_degC": None}),)})
+    table = table_of(bare)
+    rows = tuple(row.model_copy(update={"temperature_degC": None}) for row in table.force)
+    for given, message in (
+        ({"passive_voltage_V": 0.0}, "the rig records no voltage"),
+        ({"temperature_degC": 22.0}, "the table has no temperature"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            ride(bare, replace(table, force=rows), **given)
 
 
 def test_a_voltage_and_a_temperature_as_close_as_conditions_of_a_rig_are_taken(damper) -> None:

@@ -13,7 +13,8 @@ from pzd.artefacts import Diagnosed, Rides
 from pzd.comfort.weighting import WK, response
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.stage import simulate
-from pzd.simulate.window import Event, of_event
+from pzd.simulate.vibration import vibration
+from pzd.simulate.window import Event, Window, of_event
 
 BUMP = {"kind": "bump", "height_m": 0.05, "length_m": 2.0, "start_m": 10.0}
 ENTRY = 10.0 / 25.0
@@ -103,6 +104,15 @@ def test_a_w_on_a_sine_is_its_closed_form() -> None:
     assert found.weighted[0].a_w_m_per_s2 == pytest.approx(gain * found.summary[0].rms_aK_m_per_s2, rel=1e-4)
     assert (found.spectrum[0].frequency_Hz, found.spectrum[0].method) == (4.5, "a tone at its own frequency")
     assert found.spectrum[0].rms_m_per_s2 == pytest.approx(found.summary[0].rms_aK_m_per_s2, rel=1e-4)
+
+
+@pytest.mark.parametrize(("frequency", "method"), [(0.1, "third-octave bands"), (0.13, "harmonic by harmonic")])
+def test_a_slow_sine_is_taken_apart_by_its_harmonics_where_a_whole_period_is_there(frequency, method) -> None:
+    time = np.arange(16001) / 1000.0
+    ride = np.sin(2.0 * np.pi * frequency * time) + 0.5 * np.sin(4.0 * np.pi * frequency * time)
+    felt = vibration("case", "K", ride, 0.001, Window(8000, 16000), frequency)
+    assert {row.method for row in felt.spectrum} == {method}
+    assert sum(row.rms_m_per_s2**2 for row in felt.spectrum) < 2.0
 
 
 def test_the_dissipated_energy_is_that_of_the_settled_part() -> None:

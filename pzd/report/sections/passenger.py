@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.artefacts import SummaryRow
+from pzd.artefacts import SummaryRow, WheelRow
 from pzd.comfort import directive, iso2631_1978, iso2631_1997
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
 from pzd.report.context import Comparison, ReportContext
 from pzd.report.sections.pictures import Pictures, by_turns
-from pzd.report.wording import DASH, amount, minutes, number, percent
+from pzd.report.wording import DASH, amount, listed, minutes, number, percent
 from pzd.simulate.policies import policies
 
 COMFORT_TIME = "exposure_time_reduced_comfort"
@@ -71,7 +71,8 @@ def _windows(context: ReportContext) -> Iterator[str]:
     """In which part of a ride its numbers are taken."""
     spans = {ride.row.road: ride.ridden for ride in context.rated if ride.of_event}
     if any(not ride.of_event for ride in context.rated):
-        yield f"The first {amount(context.simulate.settle_s, 's')} of each ride are left out."
+        other = " over the other roads" if spans else ""
+        yield f"The first {amount(context.simulate.settle_s, 's')} of each ride{other} are left out."
     for road, span in spans.items():
         yield (
             f"The numbers on {road} are taken from {amount(span.from_s, 's')}, when axle 1 meets it, to "
@@ -188,21 +189,26 @@ def _suspension(context: ReportContext) -> Sheet:
 
 
 def _wheels(context: ReportContext) -> Sheet:
-    header = ("road", "dampers", "axle", "static load", "least contact force", "pulling on the road")
-    shown = {row.case: row for row in _all(context)}
+    """The axles side by side; what is at rest stands in the caption."""
+    by_case: dict[str, list[WheelRow]] = {}
+    for wheel in context.rides.wheels:
+        by_case.setdefault(wheel.case, []).append(wheel)
+    shown = [(row, by_case[row.case]) for row in _all(context) if row.case in by_case]
+    axles = [wheel.axle for wheel in shown[0][1]] if shown else []
+    at_rest = [amount(wheel.static_load_N, "N") for wheel in shown[0][1]] if shown else []
+    header = ("road", "dampers", *(f"least force, axle {n}" for n in axles), *(f"pulling, axle {n}" for n in axles))
     rows = tuple(
         (
-            shown[wheel.case].road,
-            context.dampers(shown[wheel.case]),
-            str(wheel.axle),
-            amount(wheel.static_load_N, "N"),
-            amount(wheel.min_contact_force_N, "N"),
-            f"{percent(wheel.pulling)} of the time",
+            row.road,
+            context.dampers(row),
+            *(amount(wheel.min_contact_force_N, "N") for wheel in wheels),
+            *(percent(wheel.pulling) for wheel in wheels),
         )
-        for wheel in context.rides.wheels
-        if wheel.case in shown
+        for row, wheels in shown
     )
-    return Sheet("Force between wheel and road: the static load less what the suspension pulls", header, rows)
+    caption = "Force between wheel and road: the static load less the force of spring and damper"
+    at = f" (at rest {listed(at_rest)}; pulling: share of the time at 0 or below)" if at_rest else ""
+    return Sheet(f"{caption}{at}", header, rows)
 
 
 def _daily(context: ReportContext) -> Iterator[Sheet]:

@@ -38,6 +38,10 @@ class RoadFile(Road):
     @override
     def profile(self, way: Way) -> Profile:
         path = way.folder / self.path
+        if not path.is_file():
+            raise ConfigError(
+                f"{way.key}.path: there is no such file; the path counts from the config (got {self.path})"
+            )
         place, height = _read(path)
         length = float(place[-1] - place[0])
         if length < way.distance * (1.0 - _SAME):
