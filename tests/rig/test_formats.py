@@ -19,6 +19,7 @@ from pzd.quantities import Control
 from pzd.rig.files.formats import formats
 from pzd.rig.files.guess import guessed
 from pzd.rig.stage import ingest
+from pzd.schema.errors import DataError
 
 MM, KN, VOLTS = X * 1e3, FORCE / 1e3, np.full(TIME.size, 100.0)
 UNITS = {"time": "s", "pos": "mm", "load": "kN", "valve voltage": "V"}
@@ -250,9 +251,20 @@ def test_a_damaged_file_is_refused_in_one_line(tmp_path: Path, name: str) -> Non
     written(tmp_path / file)
     content = (tmp_path / file).read_bytes()
     (tmp_path / file).write_bytes(content[: len(content) // 3])
-    assert all(
-        said.startswith(str(tmp_path / file)) and "\n" not in said for said in refused(tmp_path, {"path": file} | entry)
-    )
+    with pytest.raises(DataError) as caught:
+        guessed([tmp_path / file])
+    for said in (*refused(tmp_path, {"path": file} | entry), *caught.value.messages):
+        assert said.startswith(str(tmp_path / file))
+        assert "\n" not in said
+
+
+def test_a_file_that_ends_in_the_middle_of_its_samples_is_not_read_as_a_shorter_test(tmp_path: Path) -> None:
+    for file, written, entry in (WRITERS["tdms"], WRITERS["mdf"], WRITERS["json_arrays"], WRITERS["matlab"]):
+        written(tmp_path / file)
+        content = (tmp_path / file).read_bytes()
+        (tmp_path / file).write_bytes(content[: int(0.97 * len(content))])
+        (said,) = refused(tmp_path, {"path": file} | entry)
+        assert said.startswith(str(tmp_path / file))
 
 
 @pytest.mark.parametrize("name", [name for name, module in formats().items() if module.NEEDS])
