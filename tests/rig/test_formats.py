@@ -326,7 +326,8 @@ def test_waveforms_of_different_clocks_are_not_one_table(tmp_path: Path) -> None
             said = {"unit_string": UNITS[head], "wf_increment": step}
             writer.write_segment([ChannelObject("Run", head, COLUMNS[head], said)])
     entry = {"path": "a.tdms", "columns": {"time": "time", "displacement": "pos", "force": "load"}}
-    assert "missing column load" in refused(tmp_path, entry)[0]
+    (said,) = refused(tmp_path, entry)
+    assert "a.tdms:Run clock 1: missing column load; it stands in table 'Run clock 2'" in said
 
 
 def test_invalid_samples_of_a_channel_are_empty_cells_and_channels_of_one_name_are_numbered(tmp_path: Path) -> None:
@@ -349,6 +350,23 @@ def test_invalid_samples_of_a_channel_are_empty_cells_and_channels_of_one_name_a
         file.save(tmp_path / "a.mf4", overwrite=True)
     assert "missing column load" in refused(tmp_path, entry)[0]
     assert "load.1, load.2" in refused(tmp_path, entry)[0]
+
+
+def test_a_master_channel_that_is_an_angle_is_no_clock(tmp_path: Path) -> None:
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as file:
+        file.append(
+            [
+                Signal(values, TIME, name=head, unit=UNITS[head], master_metadata=("time", 2))
+                for head, values in (("pos", MM), ("load", KN))
+            ]
+        )
+        file.save(tmp_path / "a.mf4")
+    entry = {"path": "a.mf4", "columns": {"time": "time", "displacement": "pos", "force": "load"}}
+    (said,) = wrong(tmp_path, entry)
+    assert "rig.files.0.units: time:" in said
+    assert "is no unit of it" in said
 
 
 def test_a_unit_of_the_file_that_the_config_or_the_header_contradicts_is_a_finding(tmp_path: Path) -> None:
