@@ -19,6 +19,7 @@ from pzd.quantities import Control
 from pzd.rig.files.formats import formats
 from pzd.rig.files.guess import guessed
 from pzd.rig.stage import ingest
+from pzd.schema.errors import DataError
 
 MM, KN, VOLTS = X * 1e3, FORCE / 1e3, np.full(TIME.size, 100.0)
 UNITS = {"time": "s", "pos": "mm", "load": "kN", "valve voltage": "V"}
@@ -250,9 +251,20 @@ def test_a_damaged_file_is_refused_in_one_line(tmp_path: Path, name: str) -> Non
     written(tmp_path / file)
     content = (tmp_path / file).read_bytes()
     (tmp_path / file).write_bytes(content[: len(content) // 3])
-    assert all(
-        said.startswith(str(tmp_path / file)) and "\n" not in said for said in refused(tmp_path, {"path": file} | entry)
-    )
+    with pytest.raises(DataError) as caught:
+        guessed([tmp_path / file])
+    for said in (*refused(tmp_path, {"path": file} | entry), *caught.value.messages):
+        assert said.startswith(str(tmp_path / file))
+        assert "\n" not in said
+
+
+def test_a_file_that_ends_in_the_middle_of_its_samples_is_not_read_as_a_shorter_test(tmp_path: Path) -> None:
+    for file, written, entry in (WRITERS["tdms"], WRITERS["mdf"], WRITERS["json_arrays"], WRITERS["matlab"]):
+        written(tmp_path / file)
+        content = (tmp_path / file).read_bytes()
+        (tmp_path / file).write_bytes(content[: int(0.97 * len(content))])
+        (said,) = refused(tmp_path, {"path": file} | entry)
+        assert said.startswith(str(tmp_path / file))
 
 
 @pytest.mark.parametrize("name", [name for name, module in formats().items() if module.NEEDS])
@@ -314,7 +326,8 @@ def test_waveforms_of_different_clocks_are_not_one_table(tmp_path: Path) -> None
             said = {"unit_string": UNITS[head], "wf_increment": step}
             writer.write_segment([ChannelObject("Run", head, COLUMNS[head], said)])
     entry = {"path": "a.tdms", "columns": {"time": "time", "displacement": "pos", "force": "load"}}
-    assert "missing column load" in refused(tmp_path, entry)[0]
+    (said,) = refused(tmp_path, entry)
+    assert "a.tdms:Run clock 1: missing column load; it stands in table 'Run clock 2'" in said
 
 
 def test_invalid_samples_of_a_channel_are_empty_cells_and_channels_of_one_name_are_numbered(tmp_path: Path) -> None:
@@ -337,6 +350,23 @@ def test_invalid_samples_of_a_channel_are_empty_cells_and_channels_of_one_name_a
         file.save(tmp_path / "a.mf4", overwrite=True)
     assert "missing column load" in refused(tmp_path, entry)[0]
     assert "load.1, load.2" in refused(tmp_path, entry)[0]
+
+
+def test_a_master_channel_that_is_an_angle_is_no_clock(tmp_path: Path) -> None:
+    from asammdf import MDF, Signal
+
+    with MDF(version="4.10") as file:
+        file.append(
+            [
+                Signal(values, TIME, name=head, unit=UNITS[head], master_metadata=("time", 2))
+                for head, values in (("pos", MM), ("load", KN))
+            ]
+        )
+        file.save(tmp_path / "a.mf4")
+    entry = {"path": "a.mf4", "columns": {"time": "time", "displacement": "pos", "force": "load"}}
+    (said,) = wrong(tmp_path, entry)
+    assert "rig.files.0.units: time:" in said
+    assert "is no unit of it" in said
 
 
 def test_a_unit_of_the_file_that_the_config_or_the_header_contradicts_is_a_finding(tmp_path: Path) -> None:

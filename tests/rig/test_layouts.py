@@ -208,10 +208,12 @@ def test_the_scale_of_one_press_is_not_proposed_for_the_logger_of_another(tmp_pa
 
 def test_what_an_entry_says_goes_before_its_layout_key_by_key(tmp_path: Path) -> None:
     us(tmp_path / "a.csv")
-    entry = {"path": "a.csv", "layout": "us_dyno", "units": {"force": "kN"}, "columns": {"velocity": ""}}
-    (record,) = run(tmp_path, entry).records
+    units = {"force": "kN", "temperature": "degC"}
+    rig = run(tmp_path, {"path": "a.csv", "layout": "us_dyno", "units": units, "columns": {"velocity": ""}})
+    (record,) = rig.records
     assert record.force == pytest.approx(FORCE / POUND * 1e3, abs=1e-2)
-    assert record.median_temperature() == pytest.approx(22.0)
+    assert record.median_temperature() == pytest.approx(1.8 * 22.0 + 32.0)
+    assert "velocity" not in {row.quantity for row in rig.ingested}
 
 
 OWN = """about: our own

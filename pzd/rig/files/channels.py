@@ -218,6 +218,10 @@ def _missing(sheet: Sheet, spec: ChannelSpec, place: str) -> str:
     name, wanted = spec.own.name, spec.named or spec.own.column
     near = nearest(wanted, sheet.header) or next((h for h in sheet.header if name in h.lower()), None)
     hint = f"; is it {near!r}? then say {place}.columns: {{{name}: {near}}}" if near else ""
+    if wanted in sheet.elsewhere:
+        hint = (
+            f"; it stands in table {sheet.elsewhere[wanted]!r}, which has another clock or length: export them as one"
+        )
     return f"{sheet.top}: missing column {wanted}{hint} (got {', '.join(sheet.header)})"
 
 

@@ -66,13 +66,15 @@ class Sheet:
     """Rows at which the file itself begins another recording: another table of a workbook, group or block."""
     tables: tuple[str, ...] = ("",)
     """Name of the table that begins at each start; empty where the file is one table."""
+    elsewhere: dict[str, str] = field(default_factory=dict)
+    """Headers of the tables that are left out, each with its table."""
     steps: tuple[Step, ...] = ()
     """What was read and what was left out."""
 
     @property
     def top(self) -> str:
-        """File and line of the header."""
-        return at(self.path, self.header_line)
+        """File, table and line of the header."""
+        return at(table_place(self.path, self.tables[0]), self.header_line)
 
     def place(self, row: int) -> str:
         """File, table and line of a data row; the number of the row where a format has no lines."""

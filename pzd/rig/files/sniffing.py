@@ -14,7 +14,7 @@ from pathlib import Path
 from pzd.quantities import CHANNELS
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, kind_of, unread
-from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, tables_in
+from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in, tables_in
 from pzd.rig.files.headers import assigned, control_of
 from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.tables import spelled
@@ -65,8 +65,9 @@ def described(path: Path) -> tuple[Dialect, str]:
         sheet = read_sheet(path, entry, Wanted(known=frozenset(q.column for q in CHANNELS)), "rig.files")
         skip = (sheet.header_line or 1) - 1
         return Dialect("utf-8", ",", ".", skip, sheet.header, None, ("",) * len(sheet.header)), form
-    if hasattr(module, "rows"):
-        sniffs = [dialect for rows in module.rows(path).values() if (dialect := sniffed_rows(rows)) is not None]
+    sheets = rows_in(path, module)
+    if sheets is not None:
+        sniffs = [dialect for rows in sheets.values() if (dialect := sniffed_rows(rows)) is not None]
     else:
         filled = [table for table in tables_in(path, entry, module) if table.rows]
         sniffs = [

@@ -41,16 +41,13 @@ class Table:
     """Unit of every column where the file says it apart from the header."""
     lines: NDArray[np.int64] | None = None
     """(rows,) line of every data row in the file, None where a format has no lines."""
+    header_line: int | None = None
+    """Line of the headers, None where a format has no lines."""
 
     @property
     def rows(self) -> int:
         """Number of data rows."""
         return len(self.cells[0]) if self.cells else 0
-
-    @property
-    def header_line(self) -> int | None:
-        """Line above the data, None where a format has no lines."""
-        return None if self.lines is None or not self.lines.size else max(int(self.lines[0]) - 1, 1)
 
 
 def sheet_of(path: Path, tables: Sequence[Table], pattern: str | None, wanted: Wanted) -> Sheet:
@@ -90,6 +87,7 @@ def sheet_of(path: Path, tables: Sequence[Table], pattern: str | None, wanted: W
         None if first.lines is None else np.concatenate([t.lines for t in taken if t.lines is not None]),
         starts=starts,
         tables=tuple(table.name for table in taken),
+        elsewhere={head: table.name for table in filled if table not in taken for head in table.header},
         steps=tuple(_steps(filled, taken, asked)),
     )
     return _with_cells(bare, taken, wanted)

@@ -9,11 +9,15 @@ of `tables`: it parses the columns that are asked for and no other.
 from __future__ import annotations
 
 import pkgutil
+from collections.abc import Callable
+from contextlib import redirect_stdout
 from functools import lru_cache
 from importlib import import_module
 from importlib.util import find_spec
+from io import StringIO
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.sheet import Sheet, Wanted
@@ -93,14 +97,33 @@ def tables_in(path: Path, entry: FilesEntry, module: ModuleType) -> list[Table]:
     ------
     DataError : when the library of the format cannot read it
     """
+    found: list[Table] = _by_library(path, module, lambda: module.tables(path, entry))
+    return found
+
+
+def rows_in(path: Path, module: ModuleType) -> dict[str, list[list[str]]] | None:
+    """The cells of every sheet of a file of loose cells, row by row; None for a format of named columns.
+
+    Raises
+    ------
+    DataError : when the library of the format cannot read it
+    """
+    if not hasattr(module, "rows"):
+        return None
+    found: dict[str, list[list[str]]] = _by_library(path, module, lambda: module.rows(path))
+    return found
+
+
+def _by_library(path: Path, module: ModuleType, read: Callable[[], Any]) -> Any:
+    """What a format's library makes of a file; a damaged one makes these libraries raise anything."""
     try:
-        found: list[Table] = module.tables(path, entry)
+        with redirect_stdout(StringIO()):  # where a library prints what it stumbles over
+            return read()
     except UserError:
         raise
-    except Exception as error:  # a damaged file makes these libraries raise anything
+    except Exception as error:
         why = " ".join(str(error).split()) or type(error).__name__
         raise DataError(f"{at(path)}: {module.KIND} that cannot be read ({why})") from error
-    return found
 
 
 def _known(path: Path) -> str:

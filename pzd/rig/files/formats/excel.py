@@ -57,6 +57,7 @@ def _table(name: str, cells: list[list[Any]], entry: FilesEntry) -> Table | None
         tuple(cells_of([row[n] for row in body]) for n in range(width)),
         units,
         np.arange(len(body)) + entry.skip + above + 1,
+        entry.skip + 1 if entry.header is None else None,
     )
 
 

@@ -18,6 +18,8 @@ NEEDS = "asammdf"
 HEEDS = ("table",)
 CLOCK = "time"
 """Header of the clock where the master channel has no name."""
+TIME_MASTER = 1
+"""Kind of a master channel that is a time, and no angle, distance or count."""
 
 
 def holds(path: Path, start: bytes) -> bool:
@@ -38,15 +40,17 @@ def tables(path: Path, entry: FilesEntry) -> list[Table]:
             ]
             plain = [signal for signal in signals if signal.samples.ndim == 1 and signal.samples.dtype.kind in "biuf"]
             if plain:
-                clock = group.channels[master].name.strip() if master is not None else CLOCK
+                clock = None if master is None else group.channels[master]
                 name = getattr(group.channel_group, "acq_name", "") or f"group {number + 1}"
-                found += equal_lengths(name, _columns(clock or CLOCK, plain))
+                found += equal_lengths(name, _columns(clock, plain))
     return found
 
 
-def _columns(clock: str, signals: Sequence[Any]) -> dict[str, tuple[Cells, str]]:
+def _columns(master: Any, signals: Sequence[Any]) -> dict[str, tuple[Cells, str]]:
     """The signals of one group and their clock, invalid samples empty; signals of one name are numbered."""
-    columns: dict[str, tuple[Cells, str]] = {clock: (np.asarray(signals[0].timestamps, dtype=np.float64), "s")}
+    clock = CLOCK if master is None else master.name.strip() or CLOCK
+    unit = "s" if getattr(master, "sync_type", TIME_MASTER) == TIME_MASTER else str(master.unit or "-")
+    columns: dict[str, tuple[Cells, str]] = {clock: (np.asarray(signals[0].timestamps, dtype=np.float64), unit)}
     names = [signal.name.strip() for signal in signals]
     for number, signal in enumerate(signals):
         name = names[number]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.record import Array
 from pzd.rig.config import FilesEntry
@@ -21,6 +22,8 @@ SUFFIXES = ()
 NEEDS = None
 HEEDS = ("decimal", "encoding", "table")
 
+Block = tuple[tuple[str, ...], tuple[Cells, ...], tuple[str, ...], NDArray[np.int64], int]
+"""Headers, columns, units, line of every row, and line of the headers."""
 SIGNATURE = "MTS793|"
 BEGINS = "Data Acquisition"
 """How the line above each block begins."""
@@ -56,11 +59,8 @@ def tables(path: Path, entry: FilesEntry) -> list[Table]:
     ]
 
 
-Block = tuple[tuple[str, ...], tuple[Cells, ...], tuple[str, ...], "np.ndarray[tuple[int], np.dtype[np.int64]]"]
-
-
 def _block(path: Path, lines: list[str], begin: int, end: int, decimal: str) -> Block | None:
-    """Headers, columns, units and lines of one block; None where it has no rows."""
+    """One block; None where it has no rows."""
     first = next(
         (n for n in range(begin + 1, min(end, begin + MOST_ABOVE)) if _numbers(lines[n], decimal) is not None), None
     )
@@ -81,7 +81,7 @@ def _block(path: Path, lines: list[str], begin: int, end: int, decimal: str) -> 
             raise DataError(f"{at(path, n + 1)}: {width} numbers are needed here (got {got} fields: {lines[n][:60]!r})")
         rows.append(row)
         numbers.append(n + 1)
-    return header, tuple(np.array(rows).T), units, np.array(numbers, dtype=np.int64)
+    return header, tuple(np.array(rows).T), units, np.array(numbers, dtype=np.int64), first - 1
 
 
 def _numbers(line: str, decimal: str) -> Array | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.tables import Cells, Table, cells_of, equal_lengths
+from pzd.schema.errors import DataError, at
 
 KIND = "a TDMS file"
 SUFFIXES = (".tdms",)
@@ -25,10 +26,18 @@ def holds(path: Path, start: bytes) -> bool:
 
 
 def tables(path: Path, entry: FilesEntry) -> list[Table]:
-    """The tables of the groups."""
+    """The tables of the groups.
+
+    Raises
+    ------
+    DataError : when the file ends in the middle of its data, as it does where the logger was cut off
+    """
     from nptdms import TdmsFile
 
-    return [table for group in TdmsFile.read(path).groups() for table in _group(group.name, group.channels())]
+    file = TdmsFile.read(path)
+    if file.file_status.incomplete_final_segment:
+        raise DataError(f"{at(path)}: ends in the middle of its data; export it again, or what is left of it")
+    return [table for group in file.groups() for table in _group(group.name, group.channels())]
 
 
 def _group(name: str, channels: Sequence[Any]) -> list[Table]:
