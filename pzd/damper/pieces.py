@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from pzd.compiled import compiled, laid_in
+from pzd.compiled import compiled, inlined
 from pzd.damper import rosenbrock
 from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, TIMES
 from pzd.damper.element import relaxation, slip
@@ -48,13 +48,13 @@ class Step(NamedTuple):
     """Whether the two rows differ."""
 
 
-@laid_in
+@inlined
 def row_in(step: Step, at: float) -> Row:
     """The parameter row at a moment [s] of the step."""
     return interpolate(step.p0, step.p1, at / step.h) if step.moving else step.p0
 
 
-@laid_in
+@inlined
 def extension_speed(step: Step, at: float) -> float:
     """dx/dt [m/s] at a moment [s] of the step."""
     return step.u0 + (step.u1 - step.u0) * at / step.h
