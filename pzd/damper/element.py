@@ -12,11 +12,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.compiled import compiled
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 
 def element_force(

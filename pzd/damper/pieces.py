@@ -10,9 +10,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pzd.compiled import compiled
 from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
 from pzd.damper.flow import (
@@ -26,8 +23,7 @@ from pzd.damper.flow import (
 )
 from pzd.damper.kernels import K, Row, interpolate, stroke_law, stroke_moves, stroke_slope, stroke_straight
 from pzd.damper.regimes import RELIEF, STICK, deflection_on, speed_at, spring_force
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 _DIFFERENCE = 1e-3  # of a step, for the drift of the flow curve with moving parameters
 _SMALL = 1e-3  # below it the exponential's quotients are taken from their series

@@ -8,16 +8,15 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.damper.model import Damper
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.data.split import UNTOUCHED, Split
 from pzd.diagnose.fit.input_uncertainty import Expected, expected
 from pzd.diagnose.residual_check import ResidualCheck, check_residual
+from pzd.record import Mask
 from pzd.signals.nuisance import NuisanceConfig
 
-Mask = NDArray[np.bool_]
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
