@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pzd.diagnose.data.cleaning import Prepared
-from pzd.diagnose.fit.input_uncertainty import Expected
+from pzd.diagnose.fit.input_uncertainty import Predicted
 from pzd.diagnose.fit.prediction import counted
 from pzd.diagnose.thresholds import CYCLE_CHANGE_SIGNIFICANCE
 from pzd.record import Array, Mask, sliced
@@ -53,7 +53,7 @@ class ResidualCheck:
         return float(np.max(np.abs(self.prepared.record.force)))
 
 
-def check_residual(given: Expected, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> ResidualCheck:
+def check_residual(given: Predicted, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> ResidualCheck:
     """The record against what a damper makes of it, over the wanted samples past the warm-up."""
     record = prepared.record
     predicted, residual = given.force, record.force - given.force
