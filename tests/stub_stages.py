@@ -163,7 +163,7 @@ def simulate(simulate: SimulateConfig, diagnosed: Diagnosed, table: Table, seed:
         energy_error=1e-9,
         outside_table=0.0,
     )
-    return Rides((ride,), (summary,))
+    return Rides((ride,), (summary,), (), (), (), ())
 
 
 def report(report: ReportConfig, rides: Rides, control: Control, setting: str | None, folder: Path) -> Report:

@@ -324,6 +324,8 @@ def test_show_prints_the_numbers_of_the_run_and_writes_nothing(typed: Terminal, 
     text = "\n".join(typed.out)
     for part in ("200 (200 to 200)", "verdict: none", "sine-comfort-ideal", "a_w", "verified", "report.html"):
         assert part in text
+    assert "assumed, since the config does not say it:" in typed.out
+    assert any(line.startswith("  the car is makowski2021: 1200 kg") for line in typed.out)
     assert files_below(tmp_path) == before
 
 
@@ -731,6 +733,30 @@ def test_ctrl_c_is_code_130_in_one_line(tmp_path: Path) -> None:
     assert running.returncode == 130
     assert err.count("\n") == 1
     assert err.startswith("interrupted; ")
+
+
+PRESSED_AT = """
+import importlib.abc, os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever started the tests may ignore it
+
+class Pressed(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == {module!r}:
+            exec("os.kill(os.getpid(), signal.SIGINT)\\nfor _ in range(9): pass")  # as dataclasses are made
+
+sys.meta_path.insert(0, Pressed())
+"""
+
+
+@pytest.mark.parametrize("module", ["pzd.cli.app", "typer", "pzd.cli.look", "pydantic", "pzd.damper.effects"])
+def test_ctrl_c_while_the_program_starts_is_code_130_in_one_line(tmp_path: Path, module: str) -> None:
+    (tmp_path / "sitecustomize.py").write_text(PRESSED_AT.format(module=module))
+    environment = {**ENVIRONMENT, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ENVIRONMENT['PYTHONPATH']}"}
+    command = [sys.executable, "-m", "pzd", "effects"]
+    ended = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert ended.stderr == "interrupted; finished stages stand, the one at work left what was there before\n"
+    assert ended.returncode == 130
+    assert ended.stdout == ""
 
 
 SLOW = """

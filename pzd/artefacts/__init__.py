@@ -20,7 +20,21 @@ from pzd.artefacts.diagnosed import (
 from pzd.artefacts.identified import FALLBACK, AuxiliaryRow, Identified, MeasureRow, ParameterRow, base_of
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
-from pzd.artefacts.rides import AXLE_COLUMNS, AXLES, ENERGY_LIMIT, RIDE_COLUMNS, Response, Ride, Rides, SummaryRow
+from pzd.artefacts.rides import (
+    AXLE_COLUMNS,
+    AXLES,
+    ENERGY_LIMIT,
+    RIDE_COLUMNS,
+    Ending,
+    Response,
+    Ride,
+    RideRow,
+    Rides,
+    SpectrumRow,
+    SummaryRow,
+    WeightedRow,
+    WheelRow,
+)
 from pzd.artefacts.rig import Finding, RecordEntry, Rig
 from pzd.artefacts.table import ForceRow, InverseRow, Table, TableNotes
 
@@ -37,6 +51,7 @@ __all__ = [
     "ComfortRow",
     "Diagnosed",
     "Diagnosis",
+    "Ending",
     "Finding",
     "ForceRow",
     "Gap",
@@ -56,11 +71,15 @@ __all__ = [
     "Report",
     "Response",
     "Ride",
+    "RideRow",
     "Rides",
     "Rig",
+    "SpectrumRow",
     "SummaryRow",
     "Table",
     "TableNotes",
     "Value",
+    "WeightedRow",
+    "WheelRow",
     "base_of",
 ]

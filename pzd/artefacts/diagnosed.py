@@ -112,7 +112,8 @@ class Diagnosis(Frozen):
     reason: str
     effects: tuple[str, ...]
     confidence: float | None = Field(ge=0.0, le=1.0)
-    gap: Gap
+    gap: Gap | None
+    """None where it could not be measured, which `reason` tells."""
     parameters: dict[str, dict[str, Value]]
     ranking: tuple[Ranked, ...]
     rivals: tuple[str, ...]

@@ -27,8 +27,13 @@ _RIDE_HEADER = RIDE_COLUMNS + tuple(name.format(axle) for axle in AXLES for name
 _RIDE_OPTIONAL = tuple(name.format(axle) for axle in AXLES for name in AXLE_COLUMNS[-2:])
 
 
+Ending = Literal[
+    "end of the ride", "motion died away", "motion falls no further", "ride over before the motion died away"
+]
+
+
 class SummaryRow(Frozen):
-    """One ride in one line; peaks and r.m.s. are taken after `settle`."""
+    """One ride in one line; all but the last two columns are taken over its window, see `RideRow`."""
 
     case: str
     road: str
@@ -44,8 +49,64 @@ class SummaryRow(Frozen):
     """R.m.s. of the dynamic wheel load, the larger of the two axles."""
     dissipated_J: float
     energy_error: float
+    """Of the whole ride."""
     outside_table: float
-    """Share of the ride spent beyond what the rig reached."""
+    """Share of the whole ride spent beyond what the rig reached."""
+
+
+class RideRow(Frozen):
+    """The window in which the numbers of a ride are taken, and what was held constant in it."""
+
+    case: str
+    from_s: float
+    """The settling time; on a single event, when axle 1 meets it."""
+    to_s: float
+    """The end of the ride; on a single event, when the motion of every ride over it has died away, or falls no
+    further."""
+    ending: Ending
+    """How the motion of this ride ends."""
+    voltage_V: float | None
+    """Of a policy that holds one voltage."""
+    damping_Ns_per_m: float | None
+    """Of a policy that asks for one damping coefficient, per axle."""
+
+
+class WheelRow(Frozen):
+    """The force between the wheels of one axle and the road, in the window of the ride."""
+
+    case: str
+    axle: int
+    static_load_N: float
+    rms_dynamic_load_N: float
+    """R.m.s. of the force about the static load."""
+    min_contact_force_N: float
+    """Smallest force; below 0 the wheel would leave the road, and this car's wheels pull on it instead."""
+    pulling: float
+    """Share of the time in which the force is 0 or below."""
+
+
+class WeightedRow(Frozen):
+    """The frequency-weighted acceleration of a ride, from every step in its window."""
+
+    case: str
+    point: str
+    weighting: str
+    duration_s: float
+    a_w_m_per_s2: float
+    peak_m_per_s2: float
+    MTVV_m_per_s2: float
+    VDV_m_per_s1_75: float
+
+
+class SpectrumRow(Frozen):
+    """One component of the unweighted acceleration of a ride, from every step in its window."""
+
+    case: str
+    point: str
+    method: str
+    """How the components were found."""
+    frequency_Hz: float
+    rms_m_per_s2: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +126,8 @@ class Response(Frozen):
     velocity_m_per_s: float
     to_63_percent_s: float | None
     to_90_percent_s: float | None
+    note: str
+    """Why the force may be there before the voltage; empty otherwise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +138,14 @@ class Rides:
 
     rides: tuple[Ride, ...]
     summary: tuple[SummaryRow, ...]
+    ridden: tuple[RideRow, ...]
+    wheels: tuple[WheelRow, ...]
+    weighted: tuple[WeightedRow, ...]
+    spectrum: tuple[SpectrumRow, ...]
     responses: tuple[Response, ...] = field(default=())
 
     def write(self, folder: Path, control: Control, jobs: int = 1) -> None:
-        """Write one CSV a case, so many at the same time, summary.csv and response.csv."""
+        """Write one CSV a case, so many at the same time, and one table of each kind over all cases."""
 
         def written(ride: Ride) -> None:
             columns = {name: ride.columns.get(name) for name in _RIDE_HEADER}
@@ -86,6 +153,10 @@ class Rides:
 
         parallel_map(written, self.rides, jobs)
         write_rows(folder / "summary.csv", SummaryRow, self.summary, control)
+        write_rows(folder / "rides.csv", RideRow, self.ridden, control)
+        write_rows(folder / "wheels.csv", WheelRow, self.wheels, control)
+        write_rows(folder / "weighted.csv", WeightedRow, self.weighted, control)
+        write_rows(folder / "spectrum.csv", SpectrumRow, self.spectrum, control)
         write_rows(folder / "response.csv", Response, self.responses, control)
 
     @classmethod
@@ -97,7 +168,15 @@ class Rides:
 
         summary = read_rows(folder / "summary.csv", SummaryRow, control)
         rides = tuple(parallel_map(ride, summary, jobs))
-        return cls(rides, summary, read_rows(folder / "response.csv", Response, control))
+        return cls(
+            rides,
+            summary,
+            read_rows(folder / "rides.csv", RideRow, control),
+            read_rows(folder / "wheels.csv", WheelRow, control),
+            read_rows(folder / "weighted.csv", WeightedRow, control),
+            read_rows(folder / "spectrum.csv", SpectrumRow, control),
+            read_rows(folder / "response.csv", Response, control),
+        )
 
     def untrusted(self, _: Control) -> tuple[str, ...]:
         """Why the result is not to be trusted (exit 4): rides whose energy balance does not close."""

@@ -24,7 +24,7 @@ def gap_cut(found: Diagnosed, clean: Mapping[str, Clean], *, gains_out: bool = F
     clean : the noise-free records by name
     gains_out : compare shapes alone: the best gain of each record taken out, before and after alike
     """
-    held_out = [clean[name] for name in found.diagnosis.gap.held_out]
+    held_out = [clean[name] for name in _held_out(found)]
     before, after = (
         sum(_squares(damper, record, gains_out=gains_out) for record in held_out)
         for damper in (found.plain, found.damper)
@@ -42,7 +42,7 @@ def gap_cut_of_truth(found: Diagnosed, clean: Mapping[str, Clean]) -> float:
     found : the diagnosis with the damper before
     clean : the noise-free records by name, with what was recorded of them
     """
-    held_out = found.diagnosis.gap.held_out
+    held_out = _held_out(found)
     fitted = {name: record for name, record in clean.items() if name not in held_out} or clean
     before = after = 0.0
     for record in (clean[name] for name in held_out):
@@ -51,6 +51,13 @@ def gap_cut_of_truth(found: Diagnosed, clean: Mapping[str, Clean]) -> float:
         after += float(np.sum((error * record.force[warm_up(record.motion.displacement) :]) ** 2))
         before += _squares(found.plain, record, gains_out=False)
     return 1.0 - after / before
+
+
+def _held_out(found: Diagnosed) -> tuple[str, ...]:
+    gap = found.diagnosis.gap
+    if gap is None:
+        raise ValueError("the gap could not be measured, so nothing is known of what is taken away")
+    return gap.held_out
 
 
 def _squares(damper: Damper, record: Clean, *, gains_out: bool) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -12,7 +13,12 @@ import typer
 
 from pzd.cli import blind, figures, look, stages, start
 from pzd.cli.exits import DONE, INTERRUPTED, OWN_FAULT
-from pzd.cli.interrupt import end_soon_after_interrupt, say_interrupted
+from pzd.cli.interrupt import (
+    end_at_once_when_interrupted,
+    end_soon_after_interrupt,
+    raise_when_interrupted,
+    say_interrupted,
+)
 from pzd.cli.output import complain, own_fault, silence
 from pzd.schema.errors import ConfigError, FilesError, UserError
 
@@ -65,11 +71,19 @@ def main() -> NoReturn:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     end_soon_after_interrupt()
-    code = status(sys.argv[1:])
+    try:
+        raise_when_interrupted()
+        code = status(sys.argv[1:])
+        end_at_once_when_interrupted()
+    except KeyboardInterrupt:  # right before or behind the command, or a second one
+        say_interrupted()
+        code = INTERRUPTED
     try:
         sys.stdout.flush()
     except BrokenPipeError:
         silence(sys.stdout)
+    if code == INTERRUPTED:
+        os._exit(code)  # Python would end by the signal where it struck inside of `exec`, as dataclasses are made
     sys.exit(code)
 
 

@@ -49,8 +49,8 @@ def _diagnosis(run: RunSummary) -> Column:
         "verdict": found.verdict,
         "effects": ", ".join(found.effects) or "-",
         "confidence": number(found.confidence),
-        "gap before": number(found.gap.before),
-        "gap after": number(found.gap.after),
+        "gap before": number(found.gap.before if found.gap else None),
+        "gap after": number(found.gap.after if found.gap else None),
     }
 
 

@@ -49,6 +49,8 @@ def diagnosis_lines(diagnosis: Diagnosis, control: Control, *, every_test: bool 
 
 def _gap(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
+    if gap is None:
+        return "gap: could not be measured"
     share = f", {1.0 - gap.after / gap.before:.0%} less" if gap.after < gap.before else ""
     records = f"{len(gap.held_out)} record{'s' if len(gap.held_out) != 1 else ''}"
     held = {"records": records, "mixed": f"{records}, whole or in part"}.get(

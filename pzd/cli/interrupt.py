@@ -9,27 +9,54 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
-import time
 
 from pzd.cli.exits import INTERRUPTED
-from pzd.cli.output import complain
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # before an interrupt is heeded, as little as possible is imported
+    from types import FrameType
 
 _GRACE_S = 0.4
 """How long the program may take to tidy up; with what it takes to notice, it is gone within a second."""
-_said = threading.Event()
+_MESSAGE = "interrupted; finished stages stand, the one at work left what was there before"
+_said: list[str] = []
 
 
 def say_interrupted() -> None:
     """Say what an interrupt leaves behind."""
-    _said.set()
-    complain(["interrupted; finished stages stand, the one at work left what was there before"])
+    from pzd.cli.output import complain
+
+    _said.append(_MESSAGE)
+    complain([_MESSAGE])
+
+
+def end_at_once_when_interrupted() -> None:
+    """From now on, an interrupt ends the program in one line: for what runs before and behind a command.
+
+    Imports cannot be tidied up, and an exception out of them shows a traceback. Where interrupts are ignored, as a
+    shell starts what runs in the background, they remain so.
+    """
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _end_at_once)
+
+
+def raise_when_interrupted() -> None:
+    """From now on, an interrupt raises KeyboardInterrupt, as usual in Python."""
+    if signal.getsignal(signal.SIGINT) is _end_at_once:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _end_at_once(_number: int, _frame: FrameType | None) -> None:
+    os.write(2, f"{_MESSAGE}\n".encode())
+    os._exit(INTERRUPTED)
 
 
 def end_soon_after_interrupt() -> None:
     """From now on, end the program soon after an interrupt, however it takes it."""
     if os.name == "nt":
         return  # there a pipe cannot be told of signals
+    import threading
+
     receive, send = os.pipe()
     os.set_blocking(send, False)
     signal.set_wakeup_fd(send, warn_on_full_buffer=False)
@@ -37,9 +64,11 @@ def end_soon_after_interrupt() -> None:
 
 
 def _end(receive: int) -> None:
+    import time
+
     while os.read(receive, 1) != bytes([signal.SIGINT]):
         pass
     time.sleep(_GRACE_S)
-    if not _said.is_set():
+    if not _said:
         say_interrupted()
     os._exit(INTERRUPTED)

@@ -83,6 +83,7 @@ def show(
         [[line] for line in diagnosis_lines(found.diagnosis, found.control)] if found.diagnosis else [],
     )
     _section(output, "rides", _rides(found))
+    _section(output, "assumed, since the config does not say it", [[line] for line in found.assumed])
     _section(output, "comfort", _comfort(found))
     output.say(*(f"not to be trusted: {mark}" for mark in found.marks))
     output.say(f"report: {found.page or 'not written yet'}")

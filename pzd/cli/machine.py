@@ -22,6 +22,7 @@ def run_as_data(run: RunSummary) -> dict[str, Any]:
         "parameters": run.parameters,
         "diagnosis": run.diagnosis,
         "rides": run.summary,
+        "assumed": run.assumed,
         "comfort": run.comfort,
         "report": run.page.as_posix() if run.page else None,
     }

@@ -35,6 +35,7 @@ FLAT_TOP_MIN = 4.0
 _MINUTES = {"24h": 1440.0, "16h": 960.0, "8h": 480.0, "4h": 240.0, "2.5h": 150.0, "1h": 60.0, "25min": 25.0}
 _MINUTES |= {"16min": 16.0, "1min": FLAT_TOP_MIN}
 
+NOT_COVERED = "the chart begins at 1 Hz and ends at 80 Hz"
 LONGEST_MIN = _MINUTES["24h"]
 _SAME = 1e-9
 
@@ -93,7 +94,7 @@ def exposure(acceleration: float, frequency: float, boundary: Boundary) -> Expos
     """
     table = chart()
     if not table.frequency[0] * (1 - _SAME) <= frequency <= table.frequency[-1] * (1 + _SAME):
-        return Exposure(None, "the chart covers 1 to 80 Hz only", frequency)
+        return Exposure(None, f"not covered: {NOT_COVERED}", frequency)
     levels = FACTORS[boundary] * table.levels_at(frequency)
     if acceleration > levels[-1] * (1.0 + _SAME):
         return Exposure(0.0, "over the chart", frequency)
@@ -106,12 +107,25 @@ def exposure(acceleration: float, frequency: float, boundary: Boundary) -> Expos
 
 
 def shortest(components: Components, boundary: Boundary) -> Exposure:
-    """The shortest time of any component: each is rated by itself, as the standard does with bands."""
+    """The shortest time of any component: each is rated by itself, as the standard does with bands.
+
+    A component below 1 Hz or above 80 Hz has no time. It is weighed as if it lay at the nearer end of the chart: where
+    it would govern there the vibration is not covered by the standard, and no time is given.
+    """
     rated = [
-        (found.minutes, -float(level / FACTORS[boundary] / chart().levels_at(float(frequency))[0]), found)
+        (*_severity(float(level), float(frequency), boundary), exposure(float(level), float(frequency), boundary))
         for frequency, level in zip(components.frequency, components.rms, strict=True)
-        if (found := exposure(float(level), float(frequency), boundary)).minutes is not None
     ]
-    if not rated:
-        return Exposure(None, "the chart covers 1 to 80 Hz only")
-    return min(rated, key=lambda item: item[:2])[2]
+    covered = [item for item in rated if item[2].minutes is not None]
+    worst = min(rated, key=lambda item: item[:2])
+    if not covered or worst[:2] < min(item[:2] for item in covered):
+        return Exposure(None, f"not covered: {NOT_COVERED}", worst[2].frequency)
+    return min(covered, key=lambda item: item[:2])[2]
+
+
+def _severity(acceleration: float, frequency: float, boundary: Boundary) -> tuple[float, float]:
+    """Time at the nearest frequency of the chart [min], and how far the level is above its lowest line, negative."""
+    table = chart()
+    nearest = min(max(frequency, float(table.frequency[0])), float(table.frequency[-1]))
+    found = exposure(acceleration, nearest, boundary)
+    return found.minutes or 0.0, -float(acceleration / FACTORS[boundary] / table.levels_at(nearest)[0])

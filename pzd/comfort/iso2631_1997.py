@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pzd.comfort.measures import crest_factor, maximum_transient, rms, vibration_dose
+from pzd.comfort.measures import maximum_transient, peak, rms, vibration_dose
 from pzd.record import Array
 
 EDITION = "ISO 2631-1:1997"
@@ -52,11 +52,23 @@ class Evaluation:
     """[m/s^1.75]"""
     mtvv: float
     """[m/s2]"""
-    crest: float
-    mtvv_ratio: float
-    """MTVV / a_w."""
-    vdv_ratio: float
-    """VDV / (a_w T^(1/4))."""
+    duration: float
+    """T, over which these were taken [s]."""
+
+    @property
+    def crest(self) -> float:
+        """Peak over r.m.s.; 0 for a vehicle at rest, as the ratios below."""
+        return self.peak / self.a_w if self.a_w > 0.0 else 0.0
+
+    @property
+    def mtvv_ratio(self) -> float:
+        """MTVV / a_w."""
+        return self.mtvv / self.a_w if self.a_w > 0.0 else 0.0
+
+    @property
+    def vdv_ratio(self) -> float:
+        """VDV / (a_w T^(1/4))."""
+        return self.vdv / (self.a_w * self.duration**0.25) if self.a_w > 0.0 else 0.0
 
     @property
     def beyond(self) -> tuple[str, ...]:
@@ -81,20 +93,14 @@ def evaluate(weighted: Array, rate: float) -> Evaluation:
 
     Returns
     -------
-    the measures; ratios are 0 for a vehicle at rest
+    the measures
     """
-    a_w, vdv, mtvv = rms(weighted), vibration_dose(weighted, rate), maximum_transient(weighted, rate)
-    duration = weighted.size / rate
-    crest = crest_factor(weighted)
-    moving = a_w > 0.0
     return Evaluation(
-        a_w=a_w,
-        peak=crest * a_w,
-        vdv=vdv,
-        mtvv=mtvv,
-        crest=crest,
-        mtvv_ratio=mtvv / a_w if moving else 0.0,
-        vdv_ratio=vdv / (a_w * duration**0.25) if moving else 0.0,
+        a_w=rms(weighted),
+        peak=peak(weighted),
+        vdv=vibration_dose(weighted, rate),
+        mtvv=maximum_transient(weighted, rate),
+        duration=weighted.size / rate,
     )
 
 

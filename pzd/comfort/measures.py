@@ -1,4 +1,4 @@
-"""Measures of a vibration history: r.m.s., peak, VDV, MTVV and crest factor."""
+"""Measures of a vibration history: r.m.s., peak, VDV and MTVV."""
 
 from __future__ import annotations
 
@@ -66,12 +66,3 @@ def maximum_transient(acceleration: Array, rate: float) -> float:
     window = min(max(round(INTEGRATION_TIME_S * rate), 1), acceleration.size)
     total = np.concatenate([[0.0], np.cumsum(acceleration**2)])
     return float(np.sqrt(np.max(total[window:] - total[:-window]) / window))
-
-
-def crest_factor(acceleration: Array) -> float:
-    """Peak over r.m.s. of the weighted history (n,); 0 for a vehicle at rest.
-
-    Source: ISO 2631-1:1997, 6.2.1
-    """
-    level = rms(acceleration)
-    return peak(acceleration) / level if level > 0.0 else 0.0

@@ -12,6 +12,10 @@ from pzd.record import Array
 _MOST_HARMONICS = 200
 _TRUE_CENTRE = 10.0
 """True centres are 10^(n/10) Hz, edges 10^((n +- 1/2)/10) Hz."""
+_NOMINAL = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)
+"""Nominal centres of a decade, ISO 266."""
+_LOWEST_BAND = -10
+"""The band at 0.1 Hz; what lies below counts with it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +30,7 @@ class Components:
     """Share of the mean square that all of them carry together."""
 
 
-def harmonics(acceleration: Array, rate: float, fundamental: float, highest: float) -> Components:
+def harmonics(acceleration: Array, rate: float, fundamental: float) -> Components:
     """Least-squares harmonics of a ride over a periodic road, whole number of periods or not.
 
     Equation: a(t_n) = sum_k c_k exp(j k p n), |k| <= K, p = 2 pi f / rate; the normal equations are Toeplitz
@@ -37,13 +41,12 @@ def harmonics(acceleration: Array, rate: float, fundamental: float, highest: flo
     acceleration : (n,) settled ride, one period or more [m/s2]
     rate : sampling rate [Hz]
     fundamental : frequency of the road [Hz]
-    highest : no harmonic above this, nor above the Nyquist frequency, nor after the 200th [Hz]
 
     Returns
     -------
-    one component a harmonic, from the fundamental up
+    one component a harmonic, from the fundamental up to the Nyquist frequency, or to the 200th
     """
-    count = min(max(int(min(highest, 0.49 * rate) / fundamental + 1e-9), 1), _MOST_HARMONICS)
+    count = min(max(int(0.49 * rate / fundamental + 1e-9), 1), _MOST_HARMONICS)
     step = 2.0 * np.pi * fundamental / rate
     order = np.arange(0.0, count + 1.0)
     upper = np.array([acceleration @ np.exp(-1j * step * k * np.arange(acceleration.size)) for k in order])
@@ -66,26 +69,27 @@ def _gram(step: float, count: int, samples: int) -> NDArray[np.complex128]:
     return gram
 
 
-def third_octaves(acceleration: Array, rate: float, nominal: Array) -> Components:
+def third_octaves(acceleration: Array, rate: float) -> Components:
     """R.m.s. in third-octave bands, by adding up the mean square of the spectral lines between true edges.
 
     Parameters
     ----------
     acceleration : (n,) settled ride [m/s2]
     rate : sampling rate [Hz]
-    nominal : (m,) nominal centres of the bands [Hz]
 
     Returns
     -------
-    one component a band, at its nominal centre
+    one component a band, at its nominal centre, from 0.1 Hz to the Nyquist frequency
     """
+    number = np.arange(_LOWEST_BAND, int(np.floor(_TRUE_CENTRE * np.log10(0.5 * rate) + 0.5)) + 1)
+    nominal = np.array([_NOMINAL[n % 10] * 10.0 ** (n // 10) for n in number])
     lines = np.fft.rfft(acceleration - acceleration.mean())
     mean_square = 2.0 * np.abs(lines) ** 2 / acceleration.size**2
     if acceleration.size % 2 == 0:
         mean_square[-1] *= 0.5
     frequency = np.fft.rfftfreq(acceleration.size, 1.0 / rate)
-    number = np.round(_TRUE_CENTRE * np.log10(nominal))
     low, high = 10.0 ** ((number - 0.5) / _TRUE_CENTRE), 10.0 ** ((number + 0.5) / _TRUE_CENTRE)
+    low[0] = 0.0
     bands = np.array([mean_square[(frequency >= a) & (frequency < b)].sum() for a, b in zip(low, high, strict=True)])
     total = float(mean_square.sum())
     return Components(nominal, np.sqrt(bands), float(bands.sum()) / total if total > 0.0 else 1.0)

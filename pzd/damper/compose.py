@@ -10,8 +10,9 @@ import numpy as np
 from pzd.damper.columns import DRIVE, NEUTRAL, PARALLEL, STROKE_AND_FLOW, Column, acting
 from pzd.damper.competing_forms import module_of
 from pzd.damper.drive import effective_voltage
+from pzd.damper.element import element_force
 from pzd.damper.flow import flow_force
-from pzd.damper.kernels import parallel_forces, row_of
+from pzd.damper.kernels import T0, C, K, parallel_forces, plain, row_of
 from pzd.damper.laws import arguments, functions
 from pzd.damper.material import base_voltages, material
 from pzd.damper.model import Damper
@@ -57,6 +58,8 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
 def integrated_force(rows: Array, motion: Motion, steps: Array, initial_force: float, tolerance: float) -> Array:
     """(n,) force [N] of the element with its stroke and flow effects.
 
+    An element alone whose parameters stand still is solved in closed form, everything else piece by piece.
+
     Parameters
     ----------
     rows : (n, r) or (1, r) parameter rows, see `kernels.Row`
@@ -65,7 +68,11 @@ def integrated_force(rows: Array, motion: Motion, steps: Array, initial_force: f
     initial_force : force of the oil spring at the first sample [N]
     tolerance : admissible error of a piece, as a share of the force
     """
-    return march(motion.displacement, motion.velocity, steps, rows, initial_force, tolerance)
+    x, v = motion.displacement, motion.velocity
+    if len(rows) == 1 and plain(row_of(rows[0])):
+        friction, damping, stiffness = rows[0, [T0, C, K]]
+        return element_force(x, steps, friction, damping, stiffness, initial_force, v)
+    return march(x, v, steps, rows, initial_force, tolerance)
 
 
 def with_parallel(force: Array, parallel: Array | None, motion: Motion) -> Array:

@@ -125,10 +125,16 @@ class Parameter:
     """How a fit looks for it."""
     natural_from: float = -math.inf
     """Smallest value that the effect has in nature; a fit may go below, and is then something that looks alike."""
+    natural_to: float = math.inf
+    """Largest value that the effect has in nature; a fit may go beyond, and is then something that looks alike."""
 
     def admits(self, value: float) -> bool:
         """Whether the value lies within the limits."""
         return math.isfinite(value) and self.low <= value <= self.high
+
+
+def _always(values: Mapping[str, float], damping: float) -> bool:
+    return True
 
 
 @dataclass(frozen=True)
@@ -152,6 +158,10 @@ class Effect:
     """Where it acts among the effects of its place: those of a smaller number come first."""
     about_zero: bool = False
     """Whether a fit looks for the zero of the displacement too: the law is another about another zero."""
+    same_at_every_voltage: bool = False
+    """Whether no control signal changes it, as a length or a mass: a fit looks for one value alone."""
+    natural: Callable[[Mapping[str, float], float], bool] = _always
+    """Whether its parameters are possible together, beside the C of the element [N s/m]."""
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name.

@@ -1,24 +1,37 @@
-"""The paper's Bingham element, integrated exactly for a displacement linear between samples.
+"""The paper's Bingham element, integrated exactly for a displacement that is linear or a parabola between samples.
 
 Equation: F = k (x - y),  C dy/dt + T0 sign(dy/dt) = F      Source: Makowski and Knap 2021, eq. (1)-(3)
 
-Eliminating y gives dF/dt = k dx/dt - (k/C) soft(F, T0), whose right-hand side is continuous:
-along one step G = F sign(dx) passes through slip against the motion, stick, and slip with it,
-in this order, and each of the three has a closed form.
+Eliminating y gives dF/dt = k dx/dt - (k/C) soft(F, T0), whose right-hand side is continuous. While the rod does not
+turn round, G = F sign(dx/dt) passes through slip against the motion, stick, and slip with it, in this order: `stick`
+and `slip` are their closed forms, and all that there is.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from pzd.compiled import compiled
+from pzd.compiled import compiled, inlined
 from pzd.record import Array
+
+_STRAIGHT = np.zeros(1)
+_NO_SLOPES = np.empty((0, 3))
+_SMALL = 1e-3  # below it the exponential's quotients are taken from their series
+_MOST_NEWTON_STEPS = 60
+_SHORTEST_STRETCH = 1e-15  # of a stretch: how closely the moment is found at which the oil sticks
 
 
 def element_force(
-    displacement: Array, step: float, friction: float, damping: float, stiffness: float, initial_force: float = 0.0
+    displacement: Array,
+    step: Array | float,
+    friction: float,
+    damping: float,
+    stiffness: float,
+    initial_force: float = 0.0,
+    velocity: Array | None = None,
 ) -> Array:
     """Force of the Bingham element under a sampled displacement.
 
@@ -26,24 +39,33 @@ def element_force(
 
     Parameters
     ----------
-    displacement : (n,) extension x, linear between samples [m]
-    step : sampling interval [s]
+    displacement : (n,) extension x [m]
+    step : sampling interval [s], or (n - 1,) of them
     friction : T0 [N]
     damping : C [N s/m]
     stiffness : k [N/m]
     initial_force : F at the first sample [N]
+    velocity : (n,) extension speed [m/s], whose change bends the displacement to a parabola inside each step;
+        None: linear between samples
 
     Returns
     -------
     (n,) force [N]
     """
-    force = np.empty_like(displacement)
-    _march(displacement, step, friction, damping, stiffness, initial_force, force)
+    force = np.empty(displacement.size)
+    bend, steps = _STRAIGHT if velocity is None else velocity, np.atleast_1d(np.asarray(step, dtype=np.float64))
+    _march(displacement, bend, steps, friction, damping, stiffness, initial_force, force, _NO_SLOPES)
     return force
 
 
 def element_force_sensitivities(
-    displacement: Array, step: float, friction: float, damping: float, stiffness: float, initial_force: float = 0.0
+    displacement: Array,
+    step: Array | float,
+    friction: float,
+    damping: float,
+    stiffness: float,
+    initial_force: float = 0.0,
+    velocity: Array | None = None,
 ) -> tuple[Array, Array]:
     """Force of the Bingham element and its derivatives by T0, C and k, the initial force held.
 
@@ -52,89 +74,215 @@ def element_force_sensitivities(
 
     Parameters
     ----------
-    displacement : (n,) extension x, linear between samples [m]
-    step : sampling interval [s]
-    friction : T0 [N]
-    damping : C [N s/m]
-    stiffness : k [N/m]
-    initial_force : F at the first sample [N]
+    displacement, step, friction, damping, stiffness, initial_force, velocity : as `element_force`
 
     Returns
     -------
     (n,) force [N] and (n, 3) dF/dT0 [-], dF/dC [m/s], dF/dk [m]
     """
-    force = np.empty_like(displacement)
-    slopes = np.empty((displacement.size, 3))
-    _march_with_slopes(displacement, step, friction, damping, stiffness, initial_force, force, slopes)
+    force, slopes = np.empty(displacement.size), np.empty((displacement.size, 3))
+    bend, steps = _STRAIGHT if velocity is None else velocity, np.atleast_1d(np.asarray(step, dtype=np.float64))
+    _march(displacement, bend, steps, friction, damping, stiffness, initial_force, force, slopes)
     return force, slopes
 
 
+class Element(NamedTuple):
+    """T0 [N], C [N s/m] and k [N/m]."""
+
+    T0: float
+    C: float
+    k: float
+
+
+class Relaxation(NamedTuple):
+    """What slipping for a time makes of the force, see `slip`."""
+
+    time: float
+    """[s]"""
+    decay: float
+    """exp(-k time/C), the share of the force that is left [-]."""
+    rise: float
+    """1 - decay."""
+    by_speed: float
+    """Force by the extension speed at the start [N s/m]."""
+    by_change: float
+    """Force by the change of the extension speed [N s/m]."""
+
+
+@inlined
+def relaxation(time: float, C: float, k: float) -> Relaxation:
+    """What slipping for a time [s] makes of the force.
+
+    Equation: phi_1(z) = (e^z - 1)/z, phi_2(z) = (phi_1(z) - 1)/z at z = -k time/C
+    Source: Hochbruck and Ostermann 2010, Acta Numerica 19, eq. (2.10)
+    """
+    z = -k / C * time
+    if z > -_SMALL:
+        second = 0.5 + z * (1.0 / 6.0 + z * (1.0 / 24.0 + z / 120.0))
+        first = 1.0 + z * second
+    else:
+        first = math.expm1(z) / z
+        second = (first - 1.0) / z
+    return Relaxation(time, 1.0 + z * first, -z * first, k * time * first, k * time * second)
+
+
+@inlined
+def slip(F: float, friction: float, u0: float, u1: float, over: Relaxation) -> float:
+    """Force [N] after slipping while the extension speed goes linearly from u0 to u1 [m/s].
+
+    Equation: dF/dt = k u - (k/C) (F - friction)      Source: eq. (1)-(3), slipping; closed form
+
+    Parameters
+    ----------
+    F : at the start [N]
+    friction : T0 sign(F) [N]
+    u0, u1 : extension speed at the start and at the end [m/s]
+    over : of the time that it slips
+    """
+    return over.decay * F + (over.rise * friction + over.by_speed * u0 + over.by_change * (u1 - u0))
+
+
+@inlined
+def stick(F: float, k: float, u0: float, u1: float, time: float) -> float:
+    """Force [N] after sticking for a time [s] while the extension speed goes linearly from u0 to u1 [m/s].
+
+    Equation: dF/dt = k u      Source: eq. (1), dy/dt = 0
+    """
+    return F + k * (0.5 * (u0 + u1)) * time
+
+
 @compiled
-def _march(x: Array, h: float, T0: float, C: float, k: float, F: float, force: Array) -> None:
-    rise = -math.expm1(-h * k / C)
+def _march(
+    x: Array, v: Array, steps: Array, T0: float, C: float, k: float, F: float, force: Array, slopes: Array
+) -> None:
+    """Fill force and, where it is not empty, slopes: most steps lie in one regime, the others are cut."""
+    element, over = Element(T0, C, k), relaxation(steps[0], C, k)
     force[0] = F
+    for column in range(3 if slopes.size else 0):
+        slopes[0, column] = 0.0
+    side = _side(F, T0)
     for i in range(1, x.size):
-        F = advance_force(F, x[i] - x[i - 1], h, T0, C, k, rise)
+        h = steps[min(i - 1, steps.size - 1)]
+        if h != over.time:
+            over = relaxation(h, C, k)
+        mean = (x[i] - x[i - 1]) / h
+        half = 0.5 * (v[i] - v[i - 1]) if v.size > 1 else 0.0
+        u0, u1 = mean - half, mean + half
+        if side == 0.0:
+            end = stick(F, k, u0, u1, h)
+            whole = abs(end) <= T0 and u0 * u1 >= 0.0
+        else:
+            end = slip(F, side * T0, u0, u1, over)
+            whole = side * end > T0 and (side * u0 >= 0.0 or side * u1 <= 0.0)
+        if slopes.size:
+            for column in range(3):
+                slopes[i, column] = slopes[i - 1, column]
+            if whole:
+                _carry(slopes[i], F, side, u0, u1, element, over)
+        if not whole:
+            end = _cut(F, u0, u1, h, element, slopes[i] if slopes.size else slopes[:, 0])
+            side = _side(end, T0)
+        F = end
         force[i] = F
 
 
-@compiled
-def advance_force(F: float, dx: float, h: float, T0: float, C: float, k: float, rise: float) -> float:
-    """Force one step later; `rise` is 1 - exp(-h k / C)."""
-    s = 1.0 if dx >= 0.0 else -1.0
-    G = s * F
-    w = abs(dx) / h
-    left = h
-    if G < -T0:
-        end = G + (C * w - T0 - G) * rise
-        if end < -T0 or w == 0.0:
-            return s * end
-        left -= C / k * math.log1p((-T0 - G) / (C * w))
-        G = -T0
-    if G <= T0:
-        end = G + k * w * left
-        if end <= T0:
-            return s * end
-        left -= (T0 - G) / (k * w)
-        G = T0
-    share = rise if left == h else -math.expm1(-max(left, 0.0) * k / C)
-    return s * (G + (T0 + C * w - G) * share)
+@inlined
+def _side(F: float, T0: float) -> float:
+    """To which side the oil flows; 0 where it sticks."""
+    return 0.0 if abs(F) <= T0 else math.copysign(1.0, F)
 
 
 @compiled
-def _march_with_slopes(
-    x: Array, h: float, T0: float, C: float, k: float, F: float, force: Array, slopes: Array
-) -> None:
-    by_T0, by_C, by_k = 0.0, 0.0, 0.0
-    force[0] = F
-    slopes[0, :] = 0.0
-    for i in range(1, x.size):
-        dx = x[i] - x[i - 1]
-        s = 1.0 if dx >= 0.0 else -1.0
-        w = abs(dx) / h
-        left = h
+def _cut(F: float, u0: float, u1: float, h: float, element: Element, slopes: Array) -> float:
+    """Force after a step in which the regime changes: cut where the rod turns round, then from regime to regime."""
+    T0, C, k = element
+    bend, start = (u1 - u0) / h, 0.0
+    turn = u0 / (u0 - u1) * h if u0 * u1 < 0.0 else h
+    for stop in (turn, h):
+        s = 1.0 if u0 + 0.5 * bend * (start + stop) >= 0.0 else -1.0
         for regime in (-1.0, 0.0, 1.0):
-            G = s * F
+            G, left = s * F, stop - start
             if left <= 0.0 or (regime < 0.0 and G >= -T0) or (regime == 0.0 and G > T0):
                 continue
-            if regime == 0.0:
-                used = left if k * w * left <= T0 - G else (T0 - G) / (k * w)
-                by_k += s * w * used
-                F = s * (G + k * w * used)
-            else:
-                used = left
-                if regime < 0.0 and w > 0.0:
-                    used = min(left, C / k * math.log1p((-T0 - G) / (C * w)))
-                decay = math.exp(-used * k / C)
-                over = F - s * (regime * T0 + C * w)
-                by_T0 = by_T0 * decay + s * regime * (1.0 - decay)
-                by_C = by_C * decay + s * w * (1.0 - decay) + over * decay * used * k / (C * C)
-                by_k = by_k * decay - over * decay * used / C
-                F = s * (regime * T0 + C * w) + over * decay
-            if regime < 1.0 and used < left:
-                F = s * regime * T0 if regime < 0.0 else s * T0  # exactly on the edge of the next regime
-            left -= used
-        force[i] = F
-        slopes[i, 0] = by_T0
-        slopes[i, 1] = by_C
-        slopes[i, 2] = by_k
+            u, last, used, leaves = u0 + bend * start, u0 + bend * stop, left, False
+            if regime < 0.0:
+                leaves = s * slip(F, -s * T0, u, last, relaxation(left, C, k)) >= -T0
+                used = _until_stuck(G, s * u, s * last, left, element) if leaves else left
+            elif regime == 0.0:
+                leaves = s * stick(F, k, u, last, left) > T0
+                used = min(_until_risen((T0 - G) / k, s * u, s * bend), left) if leaves else left
+            over, last = relaxation(used, C, k), u + bend * used
+            if slopes.size:
+                _carry(slopes, F, regime * s, u, last, element, over)
+            F = stick(F, k, u, last, used) if regime == 0.0 else slip(F, regime * s * T0, u, last, over)
+            if leaves:
+                F = -s * T0 if regime < 0.0 else s * T0  # exactly on the edge of the next regime
+            start = stop if used >= left else start + used
+    return F
+
+
+@compiled
+def _until_stuck(G: float, u0: float, u1: float, left: float, element: Element) -> float:
+    """Time [s] after which slip against the motion ends, G = -T0, by Newton's method within a bracket.
+
+    Parameters
+    ----------
+    G : force in the direction of the motion [N], below -T0
+    u0, u1 : speed of the motion at the start and after `left`, not below 0 [m/s]
+    left : time in which it ends for certain [s]
+    element : T0, C, k
+    """
+    T0, C, k = element
+    low, high = 0.0, left
+    time = min(C / k * math.log1p(max(-T0 - G, 0.0) / (C * (0.5 * (u0 + u1)))), left)
+    for _ in range(_MOST_NEWTON_STEPS):
+        u = u0 + (u1 - u0) * time / left
+        miss = slip(G, -T0, u0, u, relaxation(time, C, k)) + T0
+        if miss < 0.0:
+            low = time
+        else:
+            high = time
+        following = time - miss / (k * u - k / C * miss)
+        if not low <= following <= high:
+            following = 0.5 * (low + high)
+        if abs(following - time) <= _SHORTEST_STRETCH * left:
+            return following
+        time = following
+    return time
+
+
+@inlined
+def _until_risen(distance: float, u: float, bend: float) -> float:
+    """Time [s] in which a motion of u + bend t [m/s] goes a distance [m]: the smaller root, without cancellation."""
+    return 2.0 * distance / (u + math.sqrt(max(u * u + 2.0 * bend * distance, 0.0)))
+
+
+@inlined
+def _carry(slopes: Array, F: float, side: float, u0: float, u1: float, element: Element, over: Relaxation) -> None:
+    """Bring the (3,) derivatives of the force by T0, C and k through one piece of fixed duration.
+
+    Equation: those of `slip` and `stick` differentiated, with g = dF/dt at the start and the extension speed's rate b:
+    d(dF/dk)/dt = u - w - (k/C) dF/dk, d(dF/dC)/dt = (k/C) (w - dF/dC), w = (F - T0 side)/C
+
+    Parameters
+    ----------
+    slopes : (3,) changed in place
+    F : force at the start [N]
+    side : to which the oil flows; 0 where it sticks
+    u0, u1 : extension speed at the start and at the end [m/s]
+    element : T0, C, k
+    over : of the time that it takes
+    """
+    T0, C, k = element
+    if over.time <= 0.0:
+        return
+    if side == 0.0:
+        slopes[2] += stick(0.0, 1.0, u0, u1, over.time)
+        return
+    decay = over.decay
+    g = k * (u0 - (F - side * T0) / C)
+    by_stiffness = decay * over.time * g / k + (u1 - u0) * (over.rise * C / k - decay * over.time) * C / (k * over.time)
+    by_speeds = (over.by_speed * u0 + over.by_change * (u1 - u0)) / C
+    slopes[0] = decay * slopes[0] + over.rise * side
+    slopes[1] = decay * slopes[1] + by_speeds - k / C * by_stiffness
+    slopes[2] = decay * slopes[2] + by_stiffness

@@ -90,6 +90,7 @@ def _rows() -> Iterator[str]:
     yield from _function("with_stroke_of(p, q)", f"return ({taken},)")
     same = " and ".join(f"p[{i}] == q[{i}]" for i in moved) or "True"
     yield from _function("stroke_moves(p, q)", f"return not ({same})")
+    yield from _function("plain(p)", f"return {_none_on([*acting('stroke'), *acting('flow')])}")
 
 
 def _drive() -> Iterator[str]:
@@ -236,6 +237,8 @@ with_stroke_of: Callable[[Row, Row], Row] = _MODULE.with_stroke_of
 """A row with the parameters of the stroke effects of another one."""
 stroke_moves: Callable[[Row, Row], bool] = _MODULE.stroke_moves
 """Whether two rows differ in a parameter of a stroke effect."""
+plain: Callable[[Row], bool] = _MODULE.plain
+"""Whether no stroke or flow effect acts: the element of the paper alone."""
 
 follow_voltage: Callable[[float, float, float, Array, Array], float] = _MODULE.follow_voltage
 """Effective voltage [V] when the signal has gone linearly from `before` to `now` [V] in a step [s]; (d,) voltages

@@ -4,7 +4,8 @@ Over a step the extension speed u = dx/dt and the parameter row go linearly:
 
     de/dt = u(t) - side w(|F|),   F = k(t) s(e),   side = sign(F)
 
-Where a piece of the path leaves its regime, the moment is found by bracketing and the piece is cut.
+Where a piece of the path leaves its regime, the moment is found by bracketing and the piece is cut; so it is where
+the rod turns round, for a force that leaves its regime and comes back would not be seen at the end.
 """
 
 from __future__ import annotations
@@ -57,7 +58,9 @@ def advance(state: Array, step: Step, tolerance: float, stages: Array, booked: b
     stages : (STAGES,) to work in
     booked : whether the energies are booked, which doubles the work
     """
-    e, w, at, dt = state[DEFLECTION], state[SPEED], 0.0, step.h
+    e, w, at = state[DEFLECTION], state[SPEED], 0.0
+    turn = step.u0 / (step.u0 - step.u1) * step.h if step.u0 * step.u1 < 0.0 else step.h
+    dt = step.h
     force = abs(spring_force(e, step.p0))
     size = size_of(step)
     regime, side = regime_of(spring_force(e, step.p0), step.p0)
@@ -65,6 +68,8 @@ def advance(state: Array, step: Step, tolerance: float, stages: Array, booked: b
         w = speed_at(force, step.p0, regime, side, w)
     for _ in range(_MOST_PIECES):
         dt = min(dt, step.h - at)
+        if at < turn * (1.0 - 1e-14):
+            dt = min(dt, turn - at)
         end, speed, error = piece(e, w, at, dt, regime, side, step, stages)
         allowed = tolerance * (abs(spring_force(e, step.p1)) + size)
         if error > allowed and dt > 1e-7 * step.h:

@@ -7,11 +7,11 @@ are both explicit and dF/ds >= 1, so that nothing is inverted.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from pzd.compiled import compiled
 from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
+from pzd.damper.element import relaxation, slip
 from pzd.damper.flow import (
     breakaway,
     relief_slope,
@@ -26,7 +26,6 @@ from pzd.damper.regimes import RELIEF, STICK, deflection_on, speed_at, spring_fo
 from pzd.record import Array
 
 _DIFFERENCE = 1e-3  # of a step, for the drift of the flow curve with moving parameters
-_SMALL = 1e-3  # below it the exponential's quotients are taken from their series
 
 
 class Step(NamedTuple):
@@ -64,8 +63,8 @@ def piece(
     force = abs(spring_force(e, p))
     if not step.moving and stroke_straight(p) and (regime == RELIEF or straight(p)):
         slope = relief_slope(p, side) if regime == RELIEF else viscous_force(1.0, p, side)
-        pull = side * extension_speed(step, at)
-        end = _straight(force, p[K], slope, p[K] * (pull - w), side * (step.u1 - step.u0) / step.h, dt)
+        pull, pull_after = side * extension_speed(step, at), side * extension_speed(step, at + dt)
+        end = slip(force, force - slope * w, pull, pull_after, relaxation(dt, slope, p[K]))
         return deflection_on(end, p, side), w + (end - force) / slope, 0.0
     y, error = _runge_kutta(
         force if regime == RELIEF else viscous_force(w, p, side), at, dt, regime, side, step, stages
@@ -78,22 +77,6 @@ def piece(
     w = viscous_speed(y, p, side)
     error *= smooth_rise(w, p, side)
     return deflection_on(smooth_force_of(y, p, side), p, side), w, abs(error)
-
-
-@compiled
-def _straight(force: float, k: float, slope: float, approach: float, bend: float, dt: float) -> float:
-    """|F| after dt on a straight piece of the flow curve.
-
-    Equation: d|F|/dt = approach + k bend t - (k/slope) (|F| - |F|_0), closed form
-    """
-    z = -k / slope * dt
-    if z > -_SMALL:
-        second = 0.5 + z * (1.0 / 6.0 + z * (1.0 / 24.0 + z / 120.0))
-        first = 1.0 + z * second
-    else:
-        first = math.expm1(z) / z
-        second = (first - 1.0) / z
-    return force + dt * (first * approach + dt * second * k * bend)
 
 
 @compiled

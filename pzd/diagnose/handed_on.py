@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pzd.artefacts import Prediction
+from pzd.damper.effects import library
+from pzd.diagnose.added_by_prediction import with_predictive_effects
+from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.kept_back import Trials
 from pzd.diagnose.missed import Missed
 from pzd.diagnose.search.evidence import evidence_of
-from pzd.diagnose.search.selection import Selection
+from pzd.diagnose.search.selection import Selection, against_nature
 
 HARMFUL = "the damper predicts kept-back tests worse with it"
+IMPOSSIBLE = "stand-in: fits with a value alone that it has nowhere in nature"
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,11 +26,21 @@ class HandedOn:
     """What was adopted and does no harm, and what it predicts."""
 
     selection: Selection
-    prediction: Prediction | None
+    plain: Missed
+    """What the plain damper misses of kept-back tests."""
+    missed: Missed
+    """What the damper handed on misses of them."""
     refused: str | None
     """Why the plain damper is handed on although effects fitted the tests; None where it is not."""
     by_criterion: bool = False
     """Whether the last fit is by criterion (4), every sample alike: what is left is then no noise to weigh by."""
+    added: tuple[str, ...] = ()
+    """Which effects were added for what the damper predicts with them, and for nothing else."""
+
+    def prediction(self, trials: Trials) -> Prediction | None:
+        """What is predicted of kept-back tests and voltages, for diagnosis.json; None where nothing could be."""
+        damper = self.selection.fitted.damper if self.selection.adopted else None
+        return trials.prediction(self.plain, self.missed, damper, by_criterion=self.by_criterion)
 
 
 def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit: str) -> HandedOn:
@@ -41,7 +57,8 @@ def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit:
     unit : of the control signal, for the words
     """
     plain = trials.plain_missed()
-    kept, missed, refused, by_criterion = selection, plain, None, False
+    kept, refused = _without_impossible(selection, forced)
+    missed, by_criterion = plain, False
     while kept.adopted:
         missed, by_criterion = _best(kept, trials)
         ours = [name for name in kept.adopted if name not in forced]
@@ -55,12 +72,54 @@ def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit:
             refused = _refused(selection, (missed, plain), trials, worse, unit)
         kept = _without(kept, harmful)
     if not kept.adopted:
-        return HandedOn(kept, trials.prediction(plain, plain, None), refused)
+        return HandedOn(kept, plain, plain, refused)
     found = trials.fitted_by_criterion(kept.fitted.damper, trials.nothing) if by_criterion else None
     if found is not None:
         kept = replace(kept, fitted=found[1], last=replace(kept.last, whole=found[0]))
-    prediction = trials.prediction(plain, missed, kept.fitted.damper, by_criterion=by_criterion)
-    return HandedOn(kept, prediction, None, by_criterion)
+    return HandedOn(kept, plain, missed, None, by_criterion)
+
+
+def with_additions(handed: HandedOn, trials: Trials, config: DiagnoseConfig) -> HandedOn:
+    """The same with the effects that improve the prediction of kept-back tests, where a gap has no name.
+
+    Parameters
+    ----------
+    handed : what does no harm
+    trials : the tests, dealt into folds
+    config : how many effects there may be, which are forbidden, what is visible
+    """
+    more = with_predictive_effects(handed.selection, handed.missed, trials, config)
+    if more is None:
+        return handed
+    return replace(
+        handed, selection=more.selection, missed=more.missed, refused=None, by_criterion=True, added=more.effects
+    )
+
+
+def _without_impossible(selection: Selection, forced: Sequence[str]) -> tuple[Selection, str | None]:
+    """The selection without effects that fit with impossible values alone; and why nothing is left, if nothing is.
+
+    One with a rival stays: there the verdict is `ambiguous`, and what is adopted is the best of several.
+    """
+    kept = selection
+    while odd := [] if kept.rivals else [name for name in against_nature(kept.fitted.damper) if name not in forced]:
+        kept = _without(kept, odd[-1], IMPOSSIBLE)
+    if kept.adopted or kept is selection:
+        return kept, None
+    words = [f"{name} with {_values(selection, name)}" for name in selection.adopted]
+    return kept, (
+        f"{' and '.join(words)} would fit the tests, but nowhere in nature is there such a value: something else that "
+        "looks alike is missing"
+    )
+
+
+def _values(selection: Selection, effect: str) -> str:
+    """The parameters of an effect as a sentence shows them."""
+    values = selection.fitted.damper.effects[effect]
+    return ", ".join(
+        f"{p.name} = {' and '.join(f'{value:.3g}' for value in np.atleast_1d(values[p.name]))} {p.unit}"
+        for p in library()[effect].parameters
+    )
 
 
 def _best(selection: Selection, trials: Trials) -> tuple[Missed, bool]:
@@ -87,17 +146,18 @@ def _harmful(
     return next((name for name, other in without if trials.worse(missed, other)), None)
 
 
-def _without(selection: Selection, effect: str) -> Selection:
-    """The selection with one effect taken back, the rest fitted anew."""
+def _without(selection: Selection, effect: str, reason: str = HARMFUL) -> Selection:
+    """The selection with one effect taken back for a reason, the rest fitted anew."""
     damper = selection.fitted.damper
     effects = {name: values for name, values in damper.effects.items() if name != effect}
+    reasons = {**selection.reasons, effect: reason}
     if not effects:
         return replace(
             selection,
             fitted=selection.plain,
             last=selection.first,
             competitions=(),
-            reasons=_reasons_without(selection, effect),
+            reasons=reasons,
         )
     fewer = damper.model_copy(update={"effects": effects})
     last = evidence_of(selection.last.campaign, fewer)
@@ -106,12 +166,8 @@ def _without(selection: Selection, effect: str) -> Selection:
         fitted=fit(last.whole, tuple(effects), last.whole.start_with(fewer)),
         last=last,
         competitions=tuple(c for c in selection.competitions if c.effect != effect),
-        reasons=_reasons_without(selection, effect),
+        reasons=reasons,
     )
-
-
-def _reasons_without(selection: Selection, effect: str) -> dict[str, str]:
-    return {**selection.reasons, effect: HARMFUL}
 
 
 def _refused(

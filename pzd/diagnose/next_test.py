@@ -152,9 +152,9 @@ def _plans(reach: Reach, temperature: float | None) -> Iterator[tuple[NextTest, 
     voltages: list[float | tuple[float, ...] | None] = [*reach.voltages] or [None]
     if len(reach.voltages) > 1:
         voltages.append((reach.voltages[0], reach.voltages[-1]))
-    frequencies = sorted({*(f for f in FREQUENCIES if f < reach.frequency), _rounded_down(reach.frequency)})
+    frequencies = sorted({*(f for f in FREQUENCIES if f < reach.frequency), rounded_down(reach.frequency)})
     for (name, shape, harmonic), f, share, voltage in itertools.product(shapes, frequencies, STROKES, voltages):
-        amplitude = _rounded_down(min(share * reach.amplitude, reach.speed / (2.0 * np.pi * f)))
+        amplitude = rounded_down(min(share * reach.amplitude, reach.speed / (2.0 * np.pi * f)))
         if harmonic * f > reach.frequency or amplitude < LEAST * reach.amplitude:
             continue
         stepped = isinstance(voltage, tuple)
@@ -170,7 +170,7 @@ def _plans(reach: Reach, temperature: float | None) -> Iterator[tuple[NextTest, 
         yield plan, replace(motion, displacement=reach.middle + motion.displacement)
 
 
-def _rounded_down(value: float) -> float:
+def rounded_down(value: float) -> float:
     """A positive number to three digits, never above it; 0.02 stays 0.02 though a difference gave 0.0199...9."""
     digits = 2 - math.floor(math.log10(value))
     return round(math.floor(value * (1.0 + ROUND_OFF) * 10.0**digits) / 10.0**digits, max(digits, 0))

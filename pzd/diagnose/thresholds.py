@@ -108,6 +108,28 @@ PREDICTS_WORSE = 2.0
 
 Reason: the customary 95 %."""
 
+# When an effect is added for what it predicts alone (added_by_prediction.py)
+
+LEAST_CUT_IN_PREDICTION = 0.05
+"""An effect lowers the pooled W_s of kept-back tests by at least this share.
+
+Reason: less than a twentieth is no reason for a law more, however sure it is; not tuned."""
+SCREENED = 5
+"""Effects that are fitted, those that promise most of what a linearised step would reach.
+
+Reason: time; on configs/utfsm.yaml the effect that predicts best is among the first three."""
+PREDICTED_AT_ONCE = 3
+"""Candidates of which kept-back tests are predicted, those that fit best.
+
+Reason: time; each takes as many refits as there are folds."""
+
+# What the tests' own gains, offsets and delays have in common (trends_of_tests.py)
+
+FEWEST_FOR_A_TREND = 3
+"""Degrees of freedom from which a trend over tests is looked for.
+
+Reason: with fewer a single odd test makes any trend; at three Student's t still asks for ten times the error."""
+
 # What the verdict adds (verdict.py, residual_check.py)
 
 CYCLE_CHANGE_SIGNIFICANCE = 1e-4

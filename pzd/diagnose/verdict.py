@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -16,10 +16,11 @@ from pzd.damper.model import Damper
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.intervals import LEVEL, standard_errors
 from pzd.diagnose.gap import probability_of_noise, visible_gap
-from pzd.diagnose.residual_check import ResidualCheck
+from pzd.diagnose.search.candidates import moved_by
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection, against_nature
 from pzd.diagnose.thresholds import CONTRADICTS, OUTSIDE_LIBRARY
+from pzd.diagnose.trends_of_tests import Trend
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
@@ -51,24 +52,37 @@ def refused(reason: str) -> Decision:
     return Decision("unexplained", reason, None)
 
 
-def decide(
-    selection: Selection, before: Sequence[ResidualCheck], after: Sequence[ResidualCheck], config: DiagnoseConfig
-) -> Decision:
+def unless_systematic(decision: Decision, trend: Trend | None) -> Decision:
+    """The decision where the tests' own gains, offsets and delays are chance; `unexplained` where they are not."""
+    return decision if trend is None else Decision("unexplained", f"{decision.reason}; but {trend}", None)
+
+
+def with_added(decision: Decision, added: Sequence[str]) -> Decision:
+    """The decision beside effects that were added for what they predict alone: they explain nothing by themselves."""
+    if not added:
+        return decision
+    words = (
+        f"{decision.reason}; kept-back tests are predicted better with {' and '.join(added)}, whatever it stands for"
+    )
+    return replace(decision, reason=words)
+
+
+def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
     """The verdict on what was adopted, from what is left of the gap.
 
     Parameters
     ----------
     selection : what was adopted
-    before, after : every record seen against the plain damper and against the adopted one
     config : thresholds
     """
+    checks = selection.first.campaign.checks
+    before = checks(selection.plain.damper)
+    after = checks(selection.fitted.damper) if selection.adopted else before
     sizes = visible_gap(before), visible_gap(after)
     chances = probability_of_noise(before), probability_of_noise(after)
     if not selection.adopted:
         return _nothing_adopted(sizes[0], chances[0], config)
-    change = (
-        f"{' and '.join(selection.adopted)}: the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
-    )
+    change = f"{' and '.join(selection.adopted)}: {_change(selection, sizes, config)}"
     if chances[1] < config.significance and _remains(sizes, config):
         words = f"{change}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
         return Decision("unexplained", words, None)
@@ -87,6 +101,17 @@ def decide(
         words = f"{change}; {', '.join(others)} would do as well on these tests"
         return Decision("ambiguous", words, confidence_of(selection))
     return Decision("named", f"{change}; what is left is within the noise or negligible", confidence_of(selection))
+
+
+def _change(selection: Selection, sizes: tuple[float, float], config: DiagnoseConfig) -> str:
+    """What the adopted effects change: the gap, or where noise hid that, the force in their own direction."""
+    if sizes[0] >= config.negligible:
+        return f"the gap falls from {_percent(sizes[0])} to {_percent(sizes[1])} of peak"
+    moved = moved_by(selection.last.whole, selection.plain, selection.fitted)
+    return (
+        f"moves the force by {_percent(moved)} of peak, more than noise does in just that way, "
+        f"though the gap as a whole ({_percent(sizes[0])} of peak above the noise) does not stand out of it"
+    )
 
 
 def _remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:

@@ -22,9 +22,9 @@ from pzd.record import Array
 from pzd.schema.csvfile import read_rows
 from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
+from pzd.simulate.config import KM_PER_H
 from pzd.simulate.linear import harmonic_response
 from pzd.simulate.minimise import TieBreak
-from pzd.simulate.riding import KM_PER_H
 
 _PRINTED = published()
 FREQUENCIES = (2.25, 4.5)

@@ -24,6 +24,7 @@ from pzd.schema.csvfile import read_rows
 from pzd.schema.errors import ConfigError, UserError
 from pzd.schema.jsonfile import read_json
 from pzd.schema.yamlfile import read_yaml
+from pzd.simulate.assumed import assumed
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class RunSummary:
     """The report's page."""
     marks: tuple[str, ...]
     """Why the results are not to be trusted."""
+    assumed: tuple[str, ...] = ()
+    """What the rides assume since the config does not say it."""
     stale: Mapping[str, str] = field(default_factory=dict)
     """Why results are not those of the config as it is today, by stage."""
 
@@ -79,14 +82,14 @@ def run_summary(run: Run) -> RunSummary:
 
 
 def summary_with_stale(given: Opened) -> RunSummary:
-    """The numbers of a config's run, with what makes them those of an older config or of other files.
+    """The numbers of a config's run, with what they assume, and what makes them those of an older config or files.
 
     Raises
     ------
     ConfigError : when there are none
     DataError : when a file of the run is at fault
     """
-    return replace(run_summary(given.run), stale=stale_stages(given))
+    return _beside_its_config(run_summary(given.run), given)
 
 
 def summary_of(folder: Path) -> RunSummary:
@@ -101,15 +104,20 @@ def summary_of(folder: Path) -> RunSummary:
     if not written.is_file():
         raise ConfigError(f"{folder}: this folder holds no run, it has no {CONFIG}; give a folder like runs/quickstart")
     run = Run(folder, written, control_of(read_yaml(written).data))
-    return replace(run_summary(run), stale=_stale_by_its_config(run))
-
-
-def _stale_by_its_config(run: Run) -> dict[str, str]:
-    config = run.config_of_results()
+    found, config = run_summary(run), run.config_of_results()
     if config is None or not config.is_file():
-        return {"all": f"their config {config or ''} is missing, so nobody can say whether these are its numbers"}
+        lost = f"their config {config or ''} is missing, so nobody can say whether these are its numbers"
+        return replace(found, stale={"all": lost})
     try:
         document = read_yaml(config)
-        return stale_stages(Opened(document, validated(document), replace(run, config=config)))
+        return _beside_its_config(found, Opened(document, validated(document), replace(run, config=config)))
     except UserError as error:
-        return {"all": f"their config would be refused: {'; '.join(error.messages)}"}
+        return replace(found, stale={"all": f"their config would be refused: {'; '.join(error.messages)}"})
+
+
+def _beside_its_config(found: RunSummary, given: Opened) -> RunSummary:
+    """The numbers with what a config says of them: what is stale, and what the rides assume since it does not say."""
+    effects = found.diagnosis.effects if found.diagnosis else ()
+    with_voltage = all(row.voltage_V is not None for row in found.parameters)
+    lines = assumed(given.config.simulate, effects, with_voltage) if found.summary else ()
+    return replace(found, stale=stale_stages(given), assumed=lines)

@@ -16,20 +16,30 @@ from pzd.damper.model import BaseRow
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.report.config import ReportConfig
-from pzd.report.ride_comfort import SettledRide
+from pzd.report.ride_comfort import RatedRide
 from pzd.report.wording import amount
+from pzd.simulate.assumed import assumed
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.plan import PLAIN_SUFFIX
 from pzd.simulate.roads.sine import Sine
 
-REFERENCE = "constant"
-"""The policy that the others are set beside."""
+BASELINES = ("best_fixed_voltage", "best_constant_c", "passive", "constant")
+"""What a controlled policy is set beside, the most telling first."""
 _OF_A_SINE = 1.5
 """A motion whose peak speed stays within so many times that of a sine is a simple swing."""
 _MOST_SAMPLES = 300_000
 """A map of the gap is made from about so many samples."""
 _REALISTIC = ("dynamic", "table", "ideal")
 """Fidelities, the one nearest to the road first."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Rides over one road at one fidelity."""
+
+    controlled: SummaryRow
+    others: tuple[SummaryRow, ...]
+    """Those that do not control, in the order of `BASELINES`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +53,7 @@ class ReportContext:
     diagnosed: Diagnosed
     table: Table
     rides: Rides
-    settled: tuple[SettledRide, ...]
+    rated: tuple[RatedRide, ...]
     comfort: tuple[ComfortRow, ...]
     control: Control
     setting: str | None
@@ -176,16 +186,51 @@ class ReportContext:
         mine = [row for row in self.rides.summary if row.road == road]
         return tuple(row for row in mine if row.case.endswith(PLAIN_SUFFIX) == plain)
 
-    def reference(self, road: str) -> SummaryRow | None:
-        """The ride at constant damping over a road, on plain viscous dampers where there is one."""
-        constant = [row for row in self.cases(road) if row.policy == REFERENCE]
-        return max(constant, key=lambda row: _REALISTIC.index(row.fidelity), default=None)
+    @cached_property
+    def by_case(self) -> dict[str, RatedRide]:
+        """The rides as they are rated, by case."""
+        return {ride.row.case: ride for ride in self.rated}
 
-    def controlled(self, road: str) -> tuple[SummaryRow, ...]:
-        """The rides of the first policy that controls, nearest to a real one first."""
-        others = [row for row in self.cases(road) if row.policy != REFERENCE]
-        first = [row for row in others if row.policy == others[0].policy]
-        return tuple(sorted(first, key=lambda row: _REALISTIC.index(row.fidelity)))
+    def a_w(self, row: SummaryRow) -> float:
+        """Weighted r.m.s. of a ride [m/s2]."""
+        return self.by_case[row.case].weighted.a_w_m_per_s2
+
+    def comparisons(self, road: str) -> tuple[Comparison, ...]:
+        """The controlled policy beside the others over a road, a fidelity each, the one nearest to a real car first."""
+        found = []
+        for fidelity in _REALISTIC:
+            rows = {row.policy: row for row in self.cases(road) if row.fidelity == fidelity}
+            controlled = [row for policy, row in rows.items() if self.simulate.is_controlled(policy)]
+            others = tuple(rows[policy] for policy in BASELINES if policy in rows)
+            if controlled and others:
+                found.append(Comparison(controlled[0], others))
+        return tuple(found)
+
+    def nearest(self, road: str) -> tuple[SummaryRow, ...]:
+        """The rides over a road at the fidelity nearest to a real car at which it was compared, or ridden at all."""
+        compared = self.comparisons(road)
+        if compared:
+            return (compared[0].controlled, *compared[0].others)
+        best = min((_REALISTIC.index(row.fidelity) for row in self.cases(road)), default=0)
+        return tuple(row for row in self.cases(road) if row.fidelity == _REALISTIC[best])
+
+    def policy(self, row: SummaryRow) -> str:
+        """What drove the dampers, with what it held constant."""
+        held = self.by_case[row.case].ridden
+        name = row.policy.replace("_", " ").removesuffix(" c")
+        if held.damping_Ns_per_m is not None:
+            return f"{name} c = {amount(held.damping_Ns_per_m, 'N s/m', 3)}"
+        return name if held.voltage_V is None else f"{name} {self.voltage(held.voltage_V)}"
+
+    def dampers(self, row: SummaryRow) -> str:
+        """What drove the dampers, and how exactly it was computed."""
+        return f"{self.policy(row)}, {row.fidelity}"
+
+    @cached_property
+    def assumed(self) -> tuple[str, ...]:
+        """What the rides assume since the config does not say it."""
+        with_voltage = all(row.voltage_V is not None for row in self.diagnosed.damper.base)
+        return assumed(self.simulate, self.diagnosed.damper.effects, with_voltage)
 
     def without(self, row: SummaryRow) -> SummaryRow | None:
         """The same ride on the damper before diagnose."""
@@ -213,10 +258,3 @@ def effect_in_words(name: str) -> str:
 def effects_in_words(names: Sequence[str]) -> list[str]:
     """Each effect in words, with its name."""
     return [f"{effect_in_words(name)} ({name})" for name in names]
-
-
-def policy_in_words(row: SummaryRow) -> str:
-    """What drove the dampers, and how exactly it was computed."""
-    if row.policy == REFERENCE:
-        return "constant c" if row.fidelity == _REALISTIC[-1] else f"constant c, {row.fidelity}"
-    return f"{row.policy}, {row.fidelity}"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from pzd.artefacts import SummaryRow
 from pzd.record import Array
 from pzd.report.blocks import Picture
 from pzd.report.context import ReportContext
@@ -29,6 +30,13 @@ GRID = "#e3e6ea"
 INK = "#1f2933"
 BY_FIDELITY = {"ideal": "#56b4e9", "table": "#009e73", "dynamic": "#0072b2"}
 """Colours of Okabe and Ito (2008), which people with any colour vision tell apart."""
+BY_BASELINE = {
+    "best_fixed_voltage": "#d55e00",
+    "best_constant_c": "#cc79a7",
+    "passive": "#4d4d4d",
+    "constant": "#e69f00",
+}
+"""Likewise, of what a controlled ride is set beside."""
 MAP = "cividis"
 _MOST_POINTS = 700
 _FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
@@ -135,6 +143,11 @@ def _encoded(panel: Panel) -> Picture:
     text = text[text.index("<svg") :].replace("'DejaVu Sans'", _FONTS)
     data = base64.b64encode(text.encode()).decode()
     return Picture(panel.title, f"data:image/svg+xml;base64,{data}", panel.alt, panel.caption)
+
+
+def line_of(context: ReportContext, row: SummaryRow) -> tuple[str, bool]:
+    """The colour of a ride, and whether it is controlled."""
+    return BY_BASELINE.get(row.policy, BY_FIDELITY[row.fidelity]), context.simulate.is_controlled(row.policy)
 
 
 def thinned(*columns: Array) -> tuple[Array, ...]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from pzd.artefacts import ForceRow, SummaryRow
-from pzd.comfort import iso2631_1978
+from collections.abc import Mapping
+
+from pzd.artefacts import ForceRow, Gap
 from pzd.report.blocks import Card
-from pzd.report.context import ReportContext, effect_in_words, policy_in_words
+from pzd.report.context import BASELINES, Comparison, ReportContext, effect_in_words
 from pzd.report.sections.missing import rig_test, verdict
-from pzd.report.sections.passenger import change, times
-from pzd.report.wording import DASH, amount, listed, number, percent, sentence
+from pzd.report.sections.passenger import change
+from pzd.report.wording import amount, listed, number, percent, sentence
 
 
 def cards(context: ReportContext) -> tuple[Card, ...]:
@@ -43,6 +44,8 @@ def _missing(context: ReportContext) -> str:
     names = listed([_name(effect) for effect in diagnosis.effects])
     if diagnosis.verdict == "named":
         return _capital(names)
+    if diagnosis.verdict == "ambiguous" and not diagnosis.effects:
+        return "Not settled by these tests"
     if diagnosis.verdict == "ambiguous":
         return _capital(listed([_name(e) for e in (*diagnosis.effects, *diagnosis.rivals)], "or")) + ": not settled"
     if diagnosis.verdict == "none":
@@ -67,16 +70,19 @@ def _capital(text: str) -> str:
 
 def _confidence(context: ReportContext) -> Card:
     diagnosis = context.diagnosed.diagnosis
-    gap = diagnosis.gap
+    sure = percent(diagnosis.confidence) if diagnosis.confidence is not None else "Not stated"
+    return Card("How sure is that?", sure, _gap(diagnosis.gap))
+
+
+def _gap(gap: Gap | None) -> str:
+    if gap is None:
+        return "The gap could not be measured."
     moved = (
         f"stays {number(gap.before)}"
         if gap.after == gap.before
         else f"goes from {number(gap.before)} to {number(gap.after)}"
     )
-    detail = f"The gap W_s on held-out data {moved}; noise alone is {number(gap.noise_floor)}."
-    return Card(
-        "How sure is that?", percent(diagnosis.confidence) if diagnosis.confidence is not None else "Not stated", detail
-    )
+    return f"The gap W_s on held-out data {moved}; noise alone is {number(gap.noise_floor)}."
 
 
 def _next(context: ReportContext) -> Card:
@@ -90,31 +96,55 @@ def _next(context: ReportContext) -> Card:
 
 
 def _comfort(context: ReportContext) -> Card:
-    pairs = [(road, context.reference(road), context.controlled(road)) for road in context.roads]
-    compared = [(context.road(road), a, rows) for road, a, rows in pairs if a is not None and rows]
-    gain = "What does the passenger gain?"
-    if not compared:
-        return Card(gain, "Not compared", "No ride at constant damping stands beside another.")
-    _, reference, rows = compared[0]
-    beside = f"{_capital(policy_in_words(rows[0]))}, beside {policy_in_words(reference)}."
-    levels = "; ".join(f"{road}: {_levels(context, a, b[0])}" for road, a, b in compared)
-    if iso2631_1978.EDITION not in context.config.editions:
-        return Card(gain, levels, f"Acceleration a_w. {beside}")
-    longer = "; ".join(f"{road}: {times(context, a, b[0])}" for road, a, b in compared)
-    source = f"Within reduced comfort, if nothing else is said, {iso2631_1978.EDITION} ({iso2631_1978.TRUST})."
-    detail = f"{beside} {source} Acceleration a_w: {levels}.{_ideal(context, compared)}"
-    return Card("How much longer can a passenger sit?", longer, detail)
+    question = "What does control give the passenger?"
+    found = {road: compared[0] for road in context.roads if (compared := context.comparisons(road))}
+    if not found:
+        return Card(question, "Nothing controls the dampers", _uncontrolled(context))
+    first = next(iter(found.values()))
+    against = first.others[0].policy
+    answer = "; ".join(
+        f"{context.road(road)}: a_w {change(context.a_w(one.others[0]), context.a_w(one.controlled))}"
+        for road, one in found.items()
+    )
+    beside = f"{_capital(_name(first.controlled.policy))} beside {_the(against)}, both {first.controlled.fidelity}"
+    return Card(question, answer, f"{beside}. {_price(context, found)} {_others(context, found)}".strip())
 
 
-def _ideal(context: ReportContext, compared: list[tuple[str, SummaryRow, tuple[SummaryRow, ...]]]) -> str:
-    """What control would reach if every demanded force were there at once."""
-    found = [(road, a, row) for road, a, rows in compared for row in rows[1:] if row.fidelity == "ideal"]
-    texts = "; ".join(f"{road}: {times(context, a, row)}" for road, a, row in found)
-    return f" With ideal dampers: {texts}." if texts else ""
+def _uncontrolled(context: ReportContext) -> str:
+    """The comfort of the dampers as they are."""
+    rows = [(road, context.nearest(road)) for road in context.roads]
+    levels = "; ".join(
+        f"{context.road(road)}: a_w {amount(context.a_w(rides[0]), 'm/s2')}, {context.dampers(rides[0])}"
+        for road, rides in rows
+        if rides
+    )
+    return sentence(levels)
 
 
-def _levels(context: ReportContext, reference: SummaryRow, controlled: SummaryRow) -> str:
-    before, after = (context.value(row.case, "a_w") for row in (reference, controlled))
-    if before is None or after is None:
-        before, after = reference.rms_aK_m_per_s2, controlled.rms_aK_m_per_s2
-    return change(before, after) if before else DASH
+def _price(context: ReportContext, found: Mapping[str, Comparison]) -> str:
+    """What it costs in wheel load and travel, beside the same ride."""
+    parts = []
+    for road, one in found.items():
+        load = change(one.others[0].rms_wheel_load_N, one.controlled.rms_wheel_load_N)
+        travel = change(one.others[0].peak_deflection_m, one.controlled.peak_deflection_m)
+        parts.append(f"{context.road(road)}: wheel load {load}, travel {travel}")
+    return f"Its price: {'; '.join(parts)}."
+
+
+def _others(context: ReportContext, found: Mapping[str, Comparison]) -> str:
+    """The same beside each of the other rides at the same fidelity."""
+    texts = []
+    for policy in BASELINES:
+        told = [
+            f"{context.road(road)} {change(context.a_w(other), context.a_w(one.controlled))}"
+            for road, one in found.items()
+            for other in one.others[1:]
+            if other.policy == policy
+        ]
+        if told:
+            texts.append(f"Beside {_the(policy)} a_w is: {'; '.join(told)}.")
+    return " ".join(texts)
+
+
+def _the(policy: str) -> str:
+    return {"passive": "the passive damper", "constant": "constant c"}.get(policy, f"the {_name(policy)}")

@@ -35,7 +35,7 @@ def page(context: ReportContext, jobs: int = 1) -> str:
         trust.render(context),
         made.render(context),
     )
-    return render(_title(context), cards(context), sections)
+    return render(_title(context), cards(context), context.assumed, sections)
 
 
 def _drawn(context: ReportContext, jobs: int) -> Pictures:
@@ -48,7 +48,7 @@ def _title(context: ReportContext) -> str:
     return f"Damper and comfort report: {context.chosen}" if context.chosen else "Damper and comfort report"
 
 
-def render(title: str, headline: tuple[Card, ...], sections: tuple[Section, ...]) -> str:
+def render(title: str, headline: tuple[Card, ...], assumed: tuple[str, ...], sections: tuple[Section, ...]) -> str:
     """Fill the template; every text is escaped there."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -60,4 +60,6 @@ def render(title: str, headline: tuple[Card, ...], sections: tuple[Section, ...]
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    return environment.get_template("report.html").render(title=title, cards=headline, sections=sections)
+    return environment.get_template("report.html").render(
+        title=title, cards=headline, assumed=assumed, sections=sections
+    )

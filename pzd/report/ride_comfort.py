@@ -4,79 +4,85 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
-from pzd.artefacts import RIDE_COLUMNS, ComfortRow, Ride, SummaryRow
+import numpy as np
+
+from pzd.artefacts import ComfortRow, RideRow, Rides, SpectrumRow, SummaryRow, WeightedRow
 from pzd.comfort import directive, iso2631_1978, iso2631_1997
-from pzd.comfort.measures import rms
-from pzd.comfort.spectrum import Components, harmonics, third_octaves
-from pzd.comfort.weighting import weighted
-from pzd.record import Array
+from pzd.comfort.spectrum import Components
 from pzd.report.config import ReportConfig
+from pzd.schema.errors import DataError
 
 UNWEIGHTED = "unweighted"
-_TIME, _ACCELERATION = RIDE_COLUMNS[0], RIDE_COLUMNS[-1]
 _RUN_UP_S = 3.0
 """Within this time the weighting has forgotten how the ride began."""
-_PERIODIC = 0.98
-"""Share of the mean square that the harmonics of the road must carry for the ride to count as periodic."""
-_TONE = 0.999
-"""Share of the mean square in one harmonic that makes a ride a tone."""
 
 
 @dataclass(frozen=True, eq=False)
-class SettledRide:
-    """One ride after `settle`, weighted and unweighted."""
+class RatedRide:
+    """One ride as it is rated: all of it taken from every step in its window."""
 
     row: SummaryRow
-    rate: float
-    """[Hz]"""
-    acceleration: Array
-    """(n,) at K [m/s2]"""
-    weighted: Array
-    """(n,) by Wk [m/s2]"""
-    fundamental: float | None
-    """Frequency of a harmonic road [Hz]."""
-    run_up: float
-    """What was cut off [s]."""
+    ridden: RideRow
+    weighted: WeightedRow
+    spectrum: tuple[SpectrumRow, ...]
 
-    @cached_property
-    def components(self) -> tuple[Components, str]:
-        """What the ride is made of, and how that was found."""
-        nominal = iso2631_1978.chart().frequency
-        if self.fundamental is None:
-            return third_octaves(self.acceleration, self.rate, nominal), "third-octave bands"
-        parts = harmonics(self.acceleration, self.rate, self.fundamental, float(nominal[-1]))
-        if parts.share < _PERIODIC:
-            bands = third_octaves(self.acceleration, self.rate, nominal)
-            return bands, "third-octave bands, since the ride does not repeat with the road"
-        total = rms(self.acceleration - self.acceleration.mean())
-        tone = total > 0.0 and float(parts.rms.max()) ** 2 >= _TONE * total**2
-        return parts, "a tone at its own frequency" if tone else "harmonic by harmonic"
+    @property
+    def evaluation(self) -> iso2631_1997.Evaluation:
+        """The weighted measures."""
+        found = self.weighted
+        return iso2631_1997.Evaluation(
+            a_w=found.a_w_m_per_s2,
+            peak=found.peak_m_per_s2,
+            vdv=found.VDV_m_per_s1_75,
+            mtvv=found.MTVV_m_per_s2,
+            duration=found.duration_s,
+        )
+
+    @property
+    def components(self) -> Components:
+        """What the unweighted acceleration is made of."""
+        levels = np.array([row.rms_m_per_s2 for row in self.spectrum])
+        return Components(np.array([row.frequency_Hz for row in self.spectrum]), levels, 1.0)
+
+    @property
+    def method(self) -> str:
+        """How the components were found."""
+        return self.spectrum[0].method
+
+    @property
+    def of_event(self) -> bool:
+        """Whether the ride is over a single event."""
+        return self.ridden.ending != "end of the ride"
 
 
-def settled(ride: Ride, row: SummaryRow, settle: float, fundamental: float | None) -> SettledRide:
-    """Weight the whole ride from its start, then cut off the settling time.
+def rated(rides: Rides) -> tuple[RatedRide, ...]:
+    """Every ride with its rows of each table, in the order of the summary.
 
-    Parameters
-    ----------
-    ride : the whole history
-    row : its line of the summary
-    settle : time that peaks and r.m.s. leave out [s]
-    fundamental : frequency of the road, None where it is not harmonic [Hz]
-
-    Returns
-    -------
-    the ride after `settle`
+    Raises
+    ------
+    DataError : when a table has no row of a ride, as after a careless edit
     """
-    time, acceleration = ride.columns[_TIME], ride.columns[_ACCELERATION]
-    rate = float((time.size - 1) / (time[-1] - time[0]))
-    first = min(round(settle * rate), time.size - 1)
-    history = weighted(acceleration, rate)
-    return SettledRide(row, rate, acceleration[first:], history[first:], fundamental, settle)
+    ridden = {row.case: row for row in rides.ridden}
+    weighted = {row.case: row for row in rides.weighted}
+    spectrum: dict[str, list[SpectrumRow]] = {}
+    for row in rides.spectrum:
+        spectrum.setdefault(row.case, []).append(row)
+    tables = {"rides.csv": set(ridden), "weighted.csv": set(weighted), "spectrum.csv": set(spectrum)}
+    faults = [
+        f"{Rides.folder}/{name}: has no row of {row.case}; run the stage again"
+        for name, cases in tables.items()
+        for row in rides.summary
+        if row.case not in cases
+    ]
+    if faults:
+        raise DataError(faults)
+    return tuple(
+        RatedRide(row, ridden[row.case], weighted[row.case], tuple(spectrum[row.case])) for row in rides.summary
+    )
 
 
-def assess(ride: SettledRide, config: ReportConfig) -> tuple[ComfortRow, ...]:
+def assess(ride: RatedRide, config: ReportConfig) -> tuple[ComfortRow, ...]:
     """Every comfort row of one ride."""
     parts: dict[str, Callable[[], Iterator[tuple[str, float | None, str, str]]]] = {
         UNWEIGHTED: lambda: _unweighted(ride),
@@ -99,20 +105,20 @@ def assess(ride: SettledRide, config: ReportConfig) -> tuple[ComfortRow, ...]:
     )
 
 
-def _unweighted(ride: SettledRide) -> Iterator[tuple[str, float | None, str, str]]:
+def _unweighted(ride: RatedRide) -> Iterator[tuple[str, float | None, str, str]]:
     yield "peak", ride.row.peak_abs_aK_m_per_s2, "m/s2", "computed from every step"
     yield "rms", ride.row.rms_aK_m_per_s2, "m/s2", "computed from every step"
 
 
-def _edition_1997(ride: SettledRide, config: ReportConfig) -> Iterator[tuple[str, float | None, str, str]]:
-    found = iso2631_1997.evaluate(ride.weighted, ride.rate)
-    trust = "verified" + (f"; {ride.run_up:g} s settling holds the start" if ride.run_up < _RUN_UP_S else "")
+def _edition_1997(ride: RatedRide, config: ReportConfig) -> Iterator[tuple[str, float | None, str, str]]:
+    found = ride.evaluation
+    trust = f"verified{_span(ride)}"
     beyond = "; ".join(found.beyond)
     more = f"{trust}; to be read beside a_w: {beyond}" if beyond else f"{trust}; a_w suffices"
     yield "a_w", found.a_w, "m/s2", trust
     yield "weighted_peak", found.peak, "m/s2", trust
     yield "crest_factor", found.crest, "-", _condition(trust, found.crest, iso2631_1997.CREST_LIMIT)
-    yield "VDV", found.vdv, "m/s^1.75", f"{more}; over {ride.weighted.size / ride.rate:.4g} s"
+    yield "VDV", found.vdv, "m/s^1.75", f"{more}; over {found.duration:.4g} s"
     yield "MTVV", found.mtvv, "m/s2", more
     yield "MTVV_over_a_w", found.mtvv_ratio, "-", _condition(trust, found.mtvv_ratio, iso2631_1997.MTVV_LIMIT)
     yield "VDV_over_a_w_T", found.vdv_ratio, "-", _condition(trust, found.vdv_ratio, iso2631_1997.VDV_LIMIT)
@@ -120,6 +126,14 @@ def _edition_1997(ride: SettledRide, config: ReportConfig) -> Iterator[tuple[str
     yield "comfort_reaction", found.a_w, "m/s2", reaction
     if config.health_guidance_zone is not None:
         yield "health_guidance_zone", found.a_w, "m/s2", _zone(found.a_w, config.health_guidance_zone)
+
+
+def _span(ride: RatedRide) -> str:
+    """What is to be known about the window of a ride."""
+    start, end = ride.ridden.from_s, ride.ridden.to_s
+    if ride.of_event:
+        return f"; over {end - start:.4g} s from the entry of axle 1 on, {ride.ridden.ending}"
+    return f"; {start:g} s settling holds the start" if start < _RUN_UP_S else ""
 
 
 def _condition(trust: str, value: float, limit: float) -> str:
@@ -132,21 +146,21 @@ def _zone(a_w: float, name: str) -> str:
     return f"not verified: sources disagree on the zone; {place} {name} m/s2, for 8 h a day"
 
 
-def _edition_1978(ride: SettledRide) -> Iterator[tuple[str, float | None, str, str]]:
-    parts, how = ride.components
+def _edition_1978(ride: RatedRide) -> Iterator[tuple[str, float | None, str, str]]:
+    parts = ride.components
     for boundary in iso2631_1978.FACTORS:
         found = iso2631_1978.shortest(parts, boundary)
         place = f"governed by {found.frequency:.4g} Hz" if found.frequency is not None else ""
-        status = "; ".join(text for text in (iso2631_1978.TRUST, found.remark, how, place) if text)
+        status = "; ".join(text for text in (iso2631_1978.TRUST, found.remark, ride.method, place) if text)
         yield f"exposure_time_{boundary}", found.minutes, "min", status
 
 
-def _directive(ride: SettledRide, config: ReportConfig) -> Iterator[tuple[str, float | None, str, str]]:
-    found = iso2631_1997.evaluate(ride.weighted, ride.rate)
+def _directive(ride: RatedRide, config: ReportConfig) -> Iterator[tuple[str, float | None, str, str]]:
+    found = ride.evaluation
     hours, note = config.daily_exposure_h, f"verified; {config.daily_exposure_h:g} h a day, vertical direction only"
     daily = directive.daily_exposure(found.a_w, hours)
     yield "A(8)", daily, "m/s2", f"{note}; {directive.zone(daily, directive.ACTION, directive.LIMIT)}"
-    dose = directive.daily_dose(found.vdv, ride.weighted.size / ride.rate, hours)
+    dose = directive.daily_dose(found.vdv, found.duration, hours)
     place = directive.zone(dose, directive.ACTION_VDV, directive.LIMIT_VDV)
     yield "VDV_day", dose, "m/s^1.75", f"{note}; {place}"
     for name, value in (("action", directive.ACTION), ("limit", directive.LIMIT)):

@@ -199,7 +199,10 @@ def _input(run: RunNumbers, name: str, asked: Asked) -> Found:
         "road_amplitude_m": amplitudes[0] if len(amplitudes) == 1 else None,
     }
     value = values[name]
-    return Found(value, "input of the run" if value is not None else "the roads of the run have no one amplitude")
+    if value is not None:
+        return Found(value, "input of the run")
+    roads = name == "road_amplitude_m"
+    return Found(None, "the roads of the run have no one amplitude" if roads else "the run has no such bound")
 
 
 def _distinct(values: Iterable[float | None]) -> list[float | None]:

@@ -48,18 +48,12 @@ def report(
     from pzd.report.context import ReportContext
     from pzd.report.page import page
     from pzd.report.reference import compared, file_of, read_reference
-    from pzd.report.ride_comfort import assess, settled
+    from pzd.report.ride_comfort import assess, rated
     from pzd.report.run_numbers import RunNumbers
-    from pzd.simulate.roads.sine import Sine
 
     expected = read_reference(file_of(report.reference, folder), control) if report.reference else None
     log = logging.getLogger(__name__)
-    fundamentals = {road.name: road.frequency_Hz for road in simulate.roads if isinstance(road, Sine)}
-    rows = {row.case: row for row in rides.summary}
-    finished = tuple(
-        settled(ride, rows[ride.case], simulate.settle_s, fundamentals.get(rows[ride.case].road))
-        for ride in rides.rides
-    )
+    finished = rated(rides)
     comfort = tuple(row for ride in finished for row in assess(ride, report))
     log.info("%d comfort values of %d rides", len(comfort), len(finished))
     context = ReportContext(
@@ -70,7 +64,7 @@ def report(
         diagnosed=diagnosed,
         table=table,
         rides=rides,
-        settled=finished,
+        rated=finished,
         comfort=comfort,
         control=control,
         setting=setting,

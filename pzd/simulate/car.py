@@ -8,6 +8,9 @@ import numpy as np
 
 from pzd.record import Array
 
+GRAVITY = 9.80665
+"""Standard acceleration of free fall [m/s2]."""
+
 
 @dataclass(frozen=True)
 class HalfCar:
@@ -33,6 +36,14 @@ class HalfCar:
     def wheelbase(self) -> float:
         """a1 + a2 [m]."""
         return self.distances[0] + self.distances[1]
+
+    def static_loads(self) -> tuple[float, float]:
+        """Load of each axle at rest [N].
+
+        Equation: N_10 = m g a2 / (a1 + a2), N_20 = m g a1 / (a1 + a2)      Source: balance of moments
+        """
+        whole = self.mass * GRAVITY / self.wheelbase
+        return whole * self.distances[1], whole * self.distances[0]
 
     def force_directions(self) -> Array:
         """Directions in which the suspension forces act on (z, phi).

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from dataclasses import replace
 from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -25,11 +26,17 @@ else:
     RoadBlock = Annotated[reduce(operator.or_, roads().values()), Field(discriminator="kind")]
 
 Pair = tuple[float, float]
+KM_PER_H = 1.0 / 3.6
+"""[m/s]"""
+DEFAULT_CONTROLLED = "comfort"
+"""The policy that the report sets beside the others where the config does not say."""
 
 
 class CarBlock(Frozen):
     """The car: one of the library, and whatever is to be different from it."""
 
+    name: str | None = None
+    """What the report calls it. By default the name of the model, or `own` where a value differs from it."""
     model: str = "makowski2021"
     """Name of the car in the library."""
     mass_kg: float | None = Field(default=None, gt=0.0)
@@ -63,10 +70,21 @@ class CarBlock(Frozen):
             raise ValueError(f"both must be above zero (got {pair[0]:g}, {pair[1]:g})")
         return pair
 
+    @model_validator(mode="after")
+    def _comfort_point_in_the_car(self) -> CarBlock:
+        car = self.car()
+        low, high = -car.distances[0] - car.wheelbase, car.distances[1] + car.wheelbase
+        if not low <= car.comfort_point <= high:
+            raise ValueError(
+                f"x_K_m must lie within the car, no farther than its wheelbase beyond an axle: "
+                f"from {low:.4g} to {high:.4g} m (got {car.comfort_point:g})"
+            )
+        return self
+
     def car(self) -> HalfCar:
-        """The car of the library with what the config changes."""
+        """The car of the library with what the config changes; it keeps its name only where that is nothing."""
         known = cars()[self.model]
-        return HalfCar(
+        built = HalfCar(
             name=known.name,
             mass=_first(self.mass_kg, known.mass),
             pitch_inertia=_first(self.pitch_inertia_kgm2, known.pitch_inertia),
@@ -76,6 +94,7 @@ class CarBlock(Frozen):
             motion_ratios=self.motion_ratio or known.motion_ratios,
             dampers=self.dampers_per_axle or known.dampers,
         )
+        return replace(built, name=self.name or (known.name if built == known else "own"))
 
 
 def _first(given: float | None, known: float) -> float:
@@ -92,29 +111,34 @@ class SimulateConfig(Frozen):
     roads: tuple[RoadBlock, ...] = Field(default=(Sine(frequency_Hz=2.25), Sine(frequency_Hz=4.5)), min_length=1)
     """The roads, each a ride of its own."""
     policies: tuple[str, ...] | None = Field(default=None, min_length=1)
-    """How the dampers are controlled. By default `constant` and `comfort`; on a rig without a control
-    signal `constant` and `passive`."""
+    """How the dampers are controlled. By default `constant`, `best_constant_c`, `passive`,
+    `best_fixed_voltage` and `comfort`; on a rig without a control signal `constant` and `passive`."""
+    controlled: str | None = None
+    """The policy that the report sets beside the others, one that controls. By default the only such one of
+    `policies`, or `comfort`; where there are several others, the config must say which."""
     fidelities: tuple[Fidelity, ...] = Field(default=("ideal", "table", "dynamic"), min_length=1)
     """How a demanded force comes about: `ideal` at once; `table` by the voltage that the table gives for
     it; `dynamic` by that voltage, the lag of the valve and the damper's own dynamics."""
     constant_damping_Ns_per_m: float = Field(default=4500.0, gt=0.0)
     """c of the policy `constant`, per axle."""
-    passive_voltage_V: float = 0.0
-    """Voltage of the policy `passive`, and of every valve before the ride."""
+    passive_voltage_V: float | None = None
+    """Voltage of the policy `passive`, and of every valve before the ride, within those of the table. By
+    default that of the table which is nearest to 0."""
     response_speed_m_per_s: float = Field(default=0.2, gt=0.0)
     """Speed at which the response of the damper's force to a step of voltage is computed."""
-    bounds: Literal["coefficients", "table"] = "coefficients"
-    """What bounds the forces Omega(V) that `ideal` may demand: [c_min V, c_max V], or the table between its
-    lowest and highest voltage. `table` and `dynamic` are always bounded by the table."""
-    c_min_Ns_per_m: float = Field(default=750.0, ge=0.0)
+    bounds: Literal["coefficients", "table"] | None = None
+    """What bounds the forces Omega(V) that `ideal` may demand: [c_min V, c_max V], or the damper's own table
+    between its lowest and highest voltage. By default the table, unless `c_min_Ns_per_m` and
+    `c_max_Ns_per_m` are given. `table` and `dynamic` are always bounded by the table."""
+    c_min_Ns_per_m: float | None = Field(default=None, ge=0.0)
     """Smallest damping coefficient of an axle."""
-    c_max_Ns_per_m: float = Field(default=45000.0, gt=0.0)
+    c_max_Ns_per_m: float | None = Field(default=None, gt=0.0)
     """Largest damping coefficient of an axle."""
     tie_break: TieBreak = "equal_share"
     """Which of the forces that make |a_K| smallest, where there are many: the smallest (Euclidean norm),
     the same share of each damper's range, or the largest."""
     temperature_degC: float | None = None
-    """Temperature of the dampers during the ride; by default the lowest of the table."""
+    """Temperature of the dampers during the ride, within those of the table; by default its lowest."""
     control_period_s: float = Field(default=0.001, gt=0.0)
     """The voltage is set this often; `ideal` acts at every instant."""
     valve_response_s: float = Field(default=0.0039, ge=0.0)
@@ -125,11 +149,12 @@ class SimulateConfig(Frozen):
     tolerance: float = Field(default=1e-9, gt=0.0)
     """Largest local error of a step, as a share of the motion."""
     duration_s: float = Field(default=16.0, gt=0.0)
-    """Length of each ride."""
+    """Length of each ride; on a single bump or step long enough for the motion to die away."""
     settle_s: float = Field(default=8.0, ge=0.0)
-    """Peaks and r.m.s. are taken after this time."""
+    """On roads that go on and on, peaks and r.m.s. are taken after this time. On a single bump or step they
+    are taken from the moment when axle 1 meets it until the motion has died away."""
     output_rate_Hz: float = Field(default=500.0, gt=0.0)
-    """Rate of the written histories; peaks and r.m.s. are taken from every step."""
+    """Rate of the written histories; every other number is taken from every step."""
 
     @field_validator("policies")
     @classmethod
@@ -149,14 +174,46 @@ class SimulateConfig(Frozen):
             listed = getattr(self, field) or ()
             if len(set(listed)) < len(listed):
                 raise ValueError(f"{field}: one is named twice")
-        if self.c_max_Ns_per_m < self.c_min_Ns_per_m:
-            raise ValueError("c_max_Ns_per_m must be at least c_min_Ns_per_m")
+        self._bounds_consistent()
+        self._controlled_consistent()
         if self.settle_s >= self.duration_s:
             raise ValueError("settle_s must be shorter than duration_s")
         for field in ("control_period_s", "duration_s", "settle_s"):
             self._whole_steps(field, getattr(self, field))
         self._whole_steps("1 / output_rate_Hz", 1.0 / self.output_rate_Hz)
         return self
+
+    def _bounds_consistent(self) -> None:
+        given = (self.c_min_Ns_per_m is not None, self.c_max_Ns_per_m is not None)
+        if given[0] != given[1] or (self.bounds == "coefficients" and not all(given)):
+            raise ValueError("bounds by coefficients need both c_min_Ns_per_m and c_max_Ns_per_m")
+        if self.bounds == "table" and any(given):
+            raise ValueError("bounds: table leaves no use for c_min_Ns_per_m and c_max_Ns_per_m; leave one of them out")
+        if self.coefficients is not None and self.coefficients[1] < self.coefficients[0]:
+            raise ValueError("c_max_Ns_per_m must be at least c_min_Ns_per_m")
+
+    def _controlled_consistent(self) -> None:
+        names = [name for name in self.policies or () if policies()[name].controlled]
+        if self.controlled is not None:
+            known = [name for name, policy in policies().items() if policy.controlled]
+            if self.controlled not in known:
+                raise ValueError(f"controlled: {self.controlled} does not control; these do: {', '.join(known)}")
+            if self.controlled not in (names or [DEFAULT_CONTROLLED]):
+                raise ValueError(f"controlled: {self.controlled} is none of policies")
+        elif len(names) > 1 and DEFAULT_CONTROLLED not in names:
+            raise ValueError(f"controlled: say which one the report is about: {', '.join(names)}")
+
+    @property
+    def coefficients(self) -> tuple[float, float] | None:
+        """c_min and c_max [N s/m] where they bound the forces of `ideal`; None where the table does."""
+        if self.c_min_Ns_per_m is None or self.c_max_Ns_per_m is None:
+            return None
+        return self.c_min_Ns_per_m, self.c_max_Ns_per_m
+
+    def is_controlled(self, policy: str) -> bool:
+        """Whether a policy is the controlled one that the report sets beside the others."""
+        names = [name for name in self.policies or () if policies()[name].controlled]
+        return policy == (self.controlled or (names[0] if len(names) == 1 else DEFAULT_CONTROLLED))
 
     def _whole_steps(self, name: str, time: float) -> None:
         steps = time / self.integration_step_s

@@ -20,12 +20,6 @@ LEAST_RELAXATION = 1e-5
 """An oil spring that relaxes faster than this [s] is rigid for a car, and is taken as this fast."""
 
 
-def lowest_temperature(table: Table) -> float | None:
-    """The lowest temperature of the table [degC]; None where it has none."""
-    known = [row.temperature_degC for row in table.force if row.temperature_degC is not None]
-    return min(known, default=None)
-
-
 def grid_of(table: Table, temperature: float | None) -> TableArrays:
     """The table at one temperature [degC], as the compiled loop reads it."""
     lookup = Lookup.of(table, temperature)

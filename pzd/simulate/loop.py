@@ -18,6 +18,7 @@ from pzd.simulate.ride_model import (
     BEHIND,
     COMFORT,
     DEFLECTION,
+    DISSIPATED,
     DYNAMIC,
     FORCE,
     HIGH,
@@ -38,9 +39,13 @@ from pzd.simulate.ride_model import (
 from pzd.simulate.stepper import advance, choose_side
 from pzd.table.kernel import table_voltage
 
-PEAK_DEFLECTION, LOAD_1, LOAD_2, OUTSIDE, SAMPLES, STEPS_DONE = range(6)
-"""What is summed over the steps behind `settle`; OUTSIDE and STEPS_DONE over all."""
-TALLIES = 6
+OUTSIDE, STEPS_DONE = range(2)
+"""Steps beyond what the rig reached, and steps done."""
+TALLIES = 2
+A_K, LOAD_1, LOAD_2, TRAVEL, LOST = range(5)
+"""What is kept of every step: acceleration at K [m/s2], suspension force S + T of each axle [N], larger deflection
+of the two suspensions [m], energy dissipated so far [J]."""
+COURSE_COLUMNS = 5
 COLUMNS = 16
 """time, z, phi, a_K, and per axle deflection, rate, spring, damper and demanded force, voltage."""
 
@@ -142,12 +147,12 @@ def _note(time: float, y: Array, model: RideModel, control: Array, workspace: Ar
 
 
 @inlined
-def _tally(workspace: Array, tally: Array) -> None:
-    """Take one step into peaks and sums."""
-    tally[SAMPLES] += 1.0
+def _keep(y: Array, workspace: Array, row: Array) -> None:
+    """Fill one row of the course."""
+    row[A_K], row[LOST] = workspace[COMFORT, 0], y[DISSIPATED]
     for i in range(2):
-        tally[PEAK_DEFLECTION] = max(tally[PEAK_DEFLECTION], abs(workspace[DEFLECTION, i]))
-        tally[LOAD_1 + i] += (workspace[SPRINGS, i] + workspace[FORCE, i]) ** 2
+        row[LOAD_1 + i] = workspace[SPRINGS, i] + workspace[FORCE, i]
+    row[TRAVEL] = max(abs(workspace[DEFLECTION, 0]), abs(workspace[DEFLECTION, 1]))
 
 
 @compiled
@@ -161,8 +166,7 @@ def ride(
     tolerance: float,
     per_control: int,
     per_output: int,
-    settle: int,
-    acceleration: Array,
+    course: Array,
     history: Array,
     tally: Array,
     stages: Array,
@@ -177,8 +181,7 @@ def ride(
     steps, h : number and length of the steps of integration [s]
     tolerance : see `advance`
     per_control, per_output : steps between two acts of the controller, and between two rows of the history
-    settle : number of steps before peaks and sums are taken
-    acceleration : (steps + 1,) a_K at every step [m/s2], filled
+    course : (steps + 1, COURSE_COLUMNS) what is kept of every step, filled
     history : (steps // per_output + 1, COLUMNS) filled
     tally : (TALLIES,) filled; fewer steps are done where the table ends
     stages, end : room to work in, see `advance`
@@ -195,14 +198,12 @@ def ride(
         if n % per_control == 0:
             set_control(time, y, model, control, workspace, scratch)
         motion(time, y, model, control, workspace, scratch)
-        acceleration[n] = workspace[COMFORT, 0]
+        _keep(y, workspace, course[n])
         tally[STEPS_DONE] = n
         if math.isnan(workspace[COMFORT, 0]):
             return
         if beyond_reach(model, control, workspace):
             tally[OUTSIDE] += 1.0
-        if n >= settle:
-            _tally(workspace, tally)
         if n % per_output == 0:
             _note(time, y, model, control, workspace, history[n // per_output])
         if n < steps:

@@ -1,16 +1,22 @@
-"""What a ride comes to: its history, and the numbers taken from every step behind `settle`."""
+"""What a ride comes to: its history, and the numbers taken from every step in its window."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.artefacts import AXLE_COLUMNS, AXLES, RIDE_COLUMNS, Ride, SummaryRow
+from pzd.artefacts import AXLE_COLUMNS, AXLES, RIDE_COLUMNS, Ride, SummaryRow, WheelRow
 from pzd.comfort.measures import rms
 from pzd.record import Array
 from pzd.signals.recursion import all_pole
+from pzd.simulate.loop import A_K, LOAD_1, LOAD_2, LOST, TRAVEL
+from pzd.simulate.window import Window
+
+POINT = "K"
+"""The point of the car at which comfort is judged."""
 
 JERK_CORNER = 80.0
 """Corner of the low-pass behind which the jerk is taken [Hz]: the raw jerk of a law that switches has no r.m.s."""
@@ -24,20 +30,24 @@ class Outcome:
 
     history: Array
     """(n, 16) rows thinned to the rate of output, columns as in the artefact `Ride`."""
-    comfort: Array
-    """(m,) acceleration at K at every step [m/s2]."""
+    course: Array
+    """(m, COURSE_COLUMNS) what is kept of every step, see `pzd.simulate.loop`."""
     step: float
     """Length of a step [s]."""
-    peak_deflection: float
-    """Largest deflection of either suspension behind `settle` [m]."""
-    wheel_load: float
-    """R.m.s. of the dynamic wheel load behind `settle`, the larger of both axles [N]."""
     outside: float
     """Share of the ride in which a damper moves faster than the rig did."""
-    dissipated: float
-    """[J]"""
     energy_error: float
     """See `balance_error`."""
+
+    @property
+    def comfort(self) -> Array:
+        """(m,) acceleration at K at every step [m/s2]."""
+        return self.course[:, A_K]
+
+    @property
+    def loads(self) -> Array:
+        """(m, 2) suspension force S + T of each axle at every step [N]; where it pulls, it relieves the wheel."""
+        return self.course[:, LOAD_1 : LOAD_2 + 1]
 
 
 def low_passed_jerk(acceleration: Array, step: float) -> Array:
@@ -73,25 +83,49 @@ def _low_passed(values: Array, warped: float, damping: float) -> Array:
     return all_pole(past, fed[:, np.newaxis])[:, 0]
 
 
-def summary_row(case: str, road: str, policy: str, fidelity: str, outcome: Outcome, settle: float) -> SummaryRow:
-    """The ride in one line; peaks and r.m.s. are taken after `settle` [s]."""
-    first = round(settle / outcome.step)
-    comfort = outcome.comfort[first:]
+def summary_row(case: str, road: str, policy: str, fidelity: str, outcome: Outcome, window: Window) -> SummaryRow:
+    """The ride in one line."""
+    within = outcome.course[window.steps]
+    lost = within[:, LOST]
     return SummaryRow(
         case=case,
         road=road,
         policy=policy,
         fidelity=fidelity,
-        point="K",
-        peak_abs_aK_m_per_s2=float(np.max(np.abs(comfort))),
-        rms_aK_m_per_s2=rms(comfort),
-        rms_jerk_m_per_s3=rms(low_passed_jerk(outcome.comfort, outcome.step)[first:]),
-        peak_deflection_m=outcome.peak_deflection,
-        rms_wheel_load_N=outcome.wheel_load,
-        dissipated_J=outcome.dissipated,
+        point=POINT,
+        peak_abs_aK_m_per_s2=float(np.max(np.abs(within[:, A_K]))),
+        rms_aK_m_per_s2=rms(within[:, A_K]),
+        rms_jerk_m_per_s3=rms(low_passed_jerk(outcome.comfort, outcome.step)[window.steps]),
+        peak_deflection_m=float(np.max(within[:, TRAVEL])),
+        rms_wheel_load_N=max(rms(load) for load in outcome.loads[window.steps].T),
+        dissipated_J=float(lost[-1] - lost[0]),
         energy_error=outcome.energy_error,
         outside_table=outcome.outside,
     )
+
+
+def wheel_rows(case: str, outcome: Outcome, window: Window, static: tuple[float, float]) -> Iterator[WheelRow]:
+    """The force between wheels and road, an axle a row.
+
+    Equation: N_i = N_i0 - (S_i + T_i), N_i0 the static load        Source: balance of the massless wheel
+
+    Parameters
+    ----------
+    case : name of the ride
+    outcome : the ride
+    window : in which it is judged
+    static : static load of each axle [N], see `HalfCar.static_loads`
+    """
+    for axle, load, at_rest in zip(AXLES, outcome.loads[window.steps].T, static, strict=True):
+        contact = at_rest - load
+        yield WheelRow(
+            case=case,
+            axle=axle,
+            static_load_N=at_rest,
+            rms_dynamic_load_N=rms(load),
+            min_contact_force_N=float(np.min(contact)),
+            pulling=float(np.mean(contact <= 0.0)),
+        )
 
 
 def ride_of(case: str, outcome: Outcome, without: tuple[str, ...]) -> Ride:

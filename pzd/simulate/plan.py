@@ -10,6 +10,9 @@ from pzd.simulate.policies import policies
 from pzd.simulate.policy import Policy
 from pzd.simulate.road import Road
 
+WITH_VOLTAGE = ("constant", "best_constant_c", "passive", "best_fixed_voltage", "comfort")
+WITHOUT_VOLTAGE = ("constant", "passive")
+"""The policies that are ridden where the config names none."""
 PLAIN_SUFFIX = "-plain"
 """Appended to the case that rides on the damper before diagnose."""
 
@@ -47,7 +50,7 @@ def cases(config: SimulateConfig, with_voltage: bool, changed: bool) -> tuple[Ca
     ConfigError : when a policy is named that needs the voltage of a rig without one
     """
     known = policies()
-    default = ("constant", "comfort") if with_voltage else ("constant", "passive")
+    default = WITH_VOLTAGE if with_voltage else WITHOUT_VOLTAGE
     chosen = [known[name] for name in config.policies or default]
     if not with_voltage:
         _refuse_without_voltage(config, chosen)
@@ -58,7 +61,8 @@ def cases(config: SimulateConfig, with_voltage: bool, changed: bool) -> tuple[Ca
                 if not _possible(policy, fidelity, with_voltage):
                     continue
                 found.append(Case(road, policy, fidelity, plain=False))
-                if changed and (fidelity != "ideal" or (config.bounds == "table" and policy.aim != "damping")):
+                by_table = fidelity != "ideal" or (config.coefficients is None and policy.aim != "damping")
+                if changed and by_table and policy.tuned is None:
                     found.append(Case(road, policy, fidelity, plain=True))
     if not found:
         raise ConfigError("simulate.fidelities: none of them can ride any of the policies; add table or dynamic")
@@ -67,7 +71,7 @@ def cases(config: SimulateConfig, with_voltage: bool, changed: bool) -> tuple[Ca
 
 def _possible(policy: Policy, fidelity: Fidelity, with_voltage: bool) -> bool:
     if policy.aim == "voltage":
-        return fidelity != "ideal"
+        return fidelity != "ideal" and (with_voltage or policy.tuned is None)
     return with_voltage or fidelity == "ideal"
 
 
@@ -76,7 +80,7 @@ def _refuse_without_voltage(config: SimulateConfig, chosen: list[Policy]) -> Non
         f"simulate.policies: {policy.name} sets the voltage of the dampers, and the rig records none; "
         "map a control signal, or ride constant and passive"
         for policy in chosen
-        if policy.aim in ("feedback", "minimise")
+        if policy.controlled or policy.tuned == "voltage"
     ]
     if wrong:
         raise ConfigError(wrong)

@@ -22,6 +22,10 @@ class Policy:
     meaning: str
     """What it does, in one sentence."""
     aim: Aim
+    controlled: bool = False
+    """Whether it answers to the ride, so that the report sets it beside the others; False for what stays as it is."""
+    tuned: Literal["voltage", "damping"] | None = None
+    """What is held constant at the value with which a_w is least, for each road and fidelity by itself."""
     feedback: Callable[[HalfCar, float], Array] | None = None
     """(car, constant damping) -> (2, 8) gains on (deflection 1, 2, its rate 1, 2, z, phi, dz, dphi):
     the force that the aims `damping` and `feedback` ask of each axle."""

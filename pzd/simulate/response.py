@@ -25,6 +25,8 @@ from pzd.simulate.config import SimulateConfig
 
 SHARES = (0.63, 0.9)
 """Of the whole way."""
+_NOTED = 0.05
+"""Share of a step from which on it is worth a word."""
 _STEP = 1e-4
 """Sampling interval [s]."""
 _BEFORE, _AFTER = 0.5, 1.0
@@ -80,9 +82,31 @@ def _step(damper: Damper, before: float, after: float, speed: float, temperature
             velocity_m_per_s=speed,
             to_63_percent_s=times[0],
             to_90_percent_s=times[1],
+            note=_carried(damper, before, after, (first, last)) if signal == "force" else "",
         )
         for signal, times in answers
     ]
+
+
+def _carried(damper: Damper, before: float, after: float, forces: tuple[float, float]) -> str:
+    """What of the step the oil spring carries at once.
+
+    Equation: F = k(U) (x - y): the step of k alone moves F by F_1 (k_2 / k_1 - 1), before the oil flows
+
+    Parameters
+    ----------
+    damper : with its effects
+    before, after : voltages [V]
+    forces : at steady slip before and after [N]
+    """
+    rows = {row.voltage_V: row.k_N_per_m for row in damper.base}
+    share = forces[0] * (rows[after] / rows[before] - 1.0) / (forces[1] - forces[0])
+    if share < _NOTED:
+        return ""
+    return (
+        f"{min(share, 1.0):.0%} of the step come with the stiffness of the oil spring, k from {rows[before]:.3g} to "
+        f"{rows[after]:.3g} N/m, which follows the valve: a loaded spring changes its force before the oil has flowed"
+    )
 
 
 def _stands_at_rest(damper: Damper, name: str, places: Array) -> bool:

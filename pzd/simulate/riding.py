@@ -9,12 +9,12 @@ import numpy as np
 from pzd.damper.dormand_prince import STAGES
 from pzd.schema.errors import DataError
 from pzd.simulate.car import HalfCar
-from pzd.simulate.config import SimulateConfig
+from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.dampers import rubs
 from pzd.simulate.dynamic_damper import DynamicDamper
 from pzd.simulate.energy import balance_error, stored_energy
 from pzd.simulate.linear import ride_exactly
-from pzd.simulate.loop import COLUMNS, LOAD_1, OUTSIDE, PEAK_DEFLECTION, SAMPLES, STEPS_DONE, TALLIES, ride
+from pzd.simulate.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALLIES, ride
 from pzd.simulate.minimise import TIE_BREAKS
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.plan import Case
@@ -22,7 +22,6 @@ from pzd.simulate.profile import Profile
 from pzd.simulate.ride_model import (
     BY_COEFFICIENTS,
     BY_TABLE,
-    DISSIPATED,
     DYNAMIC,
     FEEDBACK,
     IDEAL,
@@ -41,7 +40,6 @@ from pzd.simulate.ride_model import (
     workspace,
 )
 
-KM_PER_H = 1.0 / 3.6
 _FIDELITIES = {"ideal": IDEAL, "table": TABLE, "dynamic": DYNAMIC}
 _AIMS = {"damping": FEEDBACK, "feedback": FEEDBACK, "minimise": MINIMISE, "voltage": VOLTAGE}
 
@@ -54,7 +52,6 @@ class Clock:
     steps: int
     per_control: int
     per_output: int
-    settle: int
 
     @classmethod
     def of(cls, config: SimulateConfig) -> Clock:
@@ -65,37 +62,58 @@ class Clock:
             round(config.duration_s / h),
             round(config.control_period_s / h),
             round(1.0 / (config.output_rate_Hz * h)),
-            round(config.settle_s / h),
         )
 
 
-def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamper) -> ControlSpec:
+@dataclass(frozen=True)
+class Held:
+    """What a policy may hold constant during a ride."""
+
+    voltage: float
+    """Of `passive` and the like, and of every valve before the ride [V]."""
+    damping: float
+    """c of `constant` and the like, per axle [N s/m]."""
+
+    @classmethod
+    def of(cls, config: SimulateConfig, grid: TableArrays) -> Held:
+        """What the config says; without a word the voltage of the table that is nearest to 0."""
+        nearest = float(grid.voltages[np.argmin(np.abs(grid.voltages))])
+        voltage = nearest if config.passive_voltage_V is None else config.passive_voltage_V
+        return cls(voltage, config.constant_damping_Ns_per_m)
+
+
+def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamper, held: Held) -> ControlSpec:
     """Policy, bounds and fidelity of a case as numbers."""
     policy, fidelity = case.policy, _FIDELITIES[case.fidelity]
     bounds = BY_TABLE
     if fidelity == IDEAL:
-        bounds = BY_COEFFICIENTS if config.bounds == "coefficients" else BY_TABLE
+        bounds = BY_TABLE if config.coefficients is None else BY_COEFFICIENTS
         if policy.aim == "damping":
             bounds = UNBOUNDED
     gains = np.zeros((2, SENSED))
     if policy.feedback is not None:
-        gains = np.ascontiguousarray(policy.feedback(car, config.constant_damping_Ns_per_m))
+        gains = np.ascontiguousarray(policy.feedback(car, held.damping))
     jumps = rubs(damper) if fidelity == DYNAMIC else bounds == BY_TABLE
     return ControlSpec(
         fidelity,
         _AIMS[policy.aim],
         bounds,
         TIE_BREAKS[config.tie_break],
-        float(config.c_min_Ns_per_m),
-        float(config.c_max_Ns_per_m),
-        float(config.passive_voltage_V),
+        *(config.coefficients or (0.0, np.inf)),
+        held.voltage,
         jumps,
         gains,
     )
 
 
 def ride_case(
-    config: SimulateConfig, case: Case, profile: Profile, grid: TableArrays, damper: DynamicDamper, ends: bool
+    config: SimulateConfig,
+    case: Case,
+    profile: Profile,
+    grid: TableArrays,
+    damper: DynamicDamper,
+    ends: bool,
+    held: Held | None = None,
 ) -> Outcome:
     """Ride one case.
 
@@ -106,6 +124,7 @@ def ride_case(
     profile : the road
     grid, damper : the damper as table and with its dynamics
     ends : whether the table ends where the rig did, so that a ride beyond is refused
+    held : by default what the config says
 
     Returns
     -------
@@ -115,27 +134,26 @@ def ride_case(
     ------
     DataError : when the ride needs the table where it ends
     """
-    car, clock = config.car.car(), Clock.of(config)
+    car, clock, held = config.car.car(), Clock.of(config), held or Held.of(config, grid)
     speed = config.vehicle_speed_km_per_h * KM_PER_H
     if case.fidelity == "ideal" and case.policy.aim == "damping" and profile.smooth:
         frequency = profile.wavenumber * speed / (2.0 * np.pi)
         return ride_exactly(
             car,
-            config.constant_damping_Ns_per_m,
+            held.damping,
             frequency,
             profile.amplitude,
             speed,
             clock.step,
             clock.steps,
             clock.per_output,
-            clock.settle,
             float(np.max(grid.reach)),
         )
     own = damper._replace(scratch=np.zeros_like(damper.scratch))  # rides at the same time work in rooms of their own
     model = RideModel(
         vehicle(car, speed),
         road_coefficients(profile, car.wheelbase),
-        control_spec_of(config, case, car, damper),
+        control_spec_of(config, case, car, damper, held),
         grid,
         own,
     )
@@ -145,7 +163,7 @@ def ride_case(
 def ride_of_model(model: RideModel, clock: Clock, tolerance: float, name: str, ends: bool) -> Outcome:
     """Ride from rest on a level start, and balance the energies; see `ride_case`."""
     acts, scratch, y = control(model.control_spec.voltage), workspace(), np.zeros(STATES)
-    comfort = np.zeros(clock.steps + 1)
+    course = np.zeros((clock.steps + 1, COURSE_COLUMNS))
     history = np.zeros((clock.steps // clock.per_output + 1, COLUMNS))
     tally = np.zeros(TALLIES)
     before = stored_energy(0.0, y, model, acts, scratch)
@@ -159,8 +177,7 @@ def ride_of_model(model: RideModel, clock: Clock, tolerance: float, name: str, e
         tolerance,
         clock.per_control,
         clock.per_output,
-        clock.settle,
-        comfort,
+        course,
         history,
         tally,
         np.zeros((STAGES + 1, STATES)),
@@ -171,12 +188,9 @@ def ride_of_model(model: RideModel, clock: Clock, tolerance: float, name: str, e
     change = stored_energy(clock.steps * clock.step, y, model, acts, scratch) - before
     return Outcome(
         history=history,
-        comfort=comfort,
+        course=course,
         step=clock.step,
-        peak_deflection=float(tally[PEAK_DEFLECTION]),
-        wheel_load=float(np.sqrt(np.max(tally[LOAD_1 : LOAD_1 + 2]) / tally[SAMPLES])),
         outside=float(tally[OUTSIDE] / (clock.steps + 1)),
-        dissipated=float(y[DISSIPATED]),
         energy_error=balance_error(change, y),
     )
 

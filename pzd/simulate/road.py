@@ -24,6 +24,8 @@ class Way:
     """Of the run, for roads that are drawn."""
     folder: Path
     """Of the config, for roads that are read."""
+    key: str = "simulate.roads"
+    """Of the road in the config, for errors."""
 
 
 class Road(Frozen):
@@ -42,6 +44,11 @@ class Road(Frozen):
     @abstractmethod
     def own_name(self) -> str:
         """The name made from kind and size."""
+
+    @property
+    def event(self) -> tuple[float, float] | None:
+        """Where a single event begins and ends on a level road [m]; None on a road that goes on and on."""
+        return None
 
     @abstractmethod
     def profile(self, way: Way) -> Profile:

@@ -9,6 +9,7 @@ from pydantic import Field
 from typing_extensions import override
 
 from pzd.record import Array
+from pzd.schema.errors import ConfigError
 from pzd.simulate.profile import Profile, through
 from pzd.simulate.road import Road, Way
 
@@ -30,8 +31,18 @@ class Unevenness(Road):
     def shape(self, along: Array) -> Array:
         """Height as a share of `height_m` over the share 0 to 1 of the length."""
 
+    @property
+    @override
+    def event(self) -> tuple[float, float] | None:
+        return self.start_m, self.start_m + self.length_m
+
     @override
     def profile(self, way: Way) -> Profile:
+        if self.start_m >= way.distance:
+            raise ConfigError(
+                f"{way.key}.start_m: the ride ends after {way.distance:.6g} m, before the {self.kind} "
+                f"(got {self.start_m:g} m)"
+            )
         spacing = self.length_m / _KNOTS
         place = spacing * np.arange(round(self.start_m / spacing) + _KNOTS + 2)
         return through(self.height_m * self.shape(np.clip((place - self.start_m) / self.length_m, 0.0, 1.0)), spacing)

@@ -16,7 +16,8 @@ class TableConfig(Frozen):
     """Beyond the speeds that the rig reached: hold the last force, leave the cells empty (a ride
     that needs them is refused), or go on with the identified law, marked `inside` = 0."""
     unreachable: Literal["empty", "clamp"] = "empty"
-    """A force that no voltage gives: an empty cell of the inverse, or the voltage that comes nearest."""
+    """A force of the inverse that no voltage gives, in a gap between tested voltages where `outside` is `error`:
+    an empty cell, or the voltage that comes nearest."""
     speed_max_m_per_s: float = Field(default=1.0, gt=0.0, le=10.0)
     """Largest speed of the table, what the car may need; never less than the rig reached."""
     speed_points: int = Field(default=24, ge=2, le=1000)
@@ -30,4 +31,4 @@ class TableConfig(Frozen):
     """Nodes are added until the line between two of them keeps to the law within this share of the
     largest force."""
     force_levels: int = Field(default=41, ge=2, le=1000)
-    """Force levels of the inverse, evenly from the lowest to the highest force of each direction."""
+    """Force levels of the inverse at each speed, evenly from the least to the largest force there."""

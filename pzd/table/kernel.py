@@ -93,6 +93,8 @@ def table_voltage(
         if min(before, after) <= force <= max(before, after):
             step = (force - before) / (after - before) if after != before else 0.0
             return float(voltages[i] + step * (voltages[i + 1] - voltages[i]))
+        if force == after:  # beside an empty cell
+            return float(voltages[i + 1])
         before = after
     return float(np.nan)
 

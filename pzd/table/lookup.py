@@ -98,8 +98,13 @@ class Lookup:
 
     def nearest_voltage_for(self, force: ArrayLike, velocity: ArrayLike) -> Array:
         """Lowest voltage [V] whose force comes nearest to the wanted one; NaN where the table ends."""
-        low, high = self.range(velocity)
-        return self.voltage_for(np.clip(force, low, high), velocity)
+        F, v, _ = _broadcast(force, velocity)
+        low, high = self.range(v)
+        found = self.voltage_for(np.clip(F, low, high), v)
+        gap = np.isnan(found) & (low <= high)
+        nodes = self.force(self.voltages[:, np.newaxis], v[gap])
+        found[gap] = self.voltages[np.nanargmin(np.abs(nodes - F[gap]), axis=0)] if gap.any() else found[gap]
+        return found
 
     def inside(self, voltage: ArrayLike, velocity: ArrayLike) -> NDArray[np.bool_]:
         """Whether the rig reached that speed at that voltage, linear between the voltages."""

@@ -64,13 +64,16 @@ def test_agrees_with_an_event_restarted_high_order_solver_to_1e_9(rng: np.random
         assert np.max(np.abs(ours - restarted(x, T0, C, k))) <= 1e-9 * np.max(np.abs(ours))
 
 
+@pytest.mark.parametrize("bent", [False, True], ids=["linear", "parabola"])
 @pytest.mark.parametrize("column", [0, 1, 2])
-def test_sensitivities_are_the_limit_of_central_differences(rng: np.random.Generator, column: int) -> None:
+def test_sensitivities_are_the_limit_of_central_differences(rng: np.random.Generator, column: int, bent: bool) -> None:
     x, values = multisine(rng), np.array([400.0, 2500.0, 4e5])
+    velocity = np.gradient(x, STEP) if bent else None
     step = np.zeros(3)
     step[column] = 1e-6 * values[column]
-    difference = element_force(x, STEP, *(values + step)) - element_force(x, STEP, *(values - step))
-    _, slopes = element_force_sensitivities(x, STEP, *values)
+    ahead, behind = (element_force(x, STEP, *(values + s), 0.0, velocity) for s in (step, -step))
+    difference = ahead - behind
+    _, slopes = element_force_sensitivities(x, STEP, *values, 0.0, velocity)
     expected = difference / (2 * step[column])
     assert np.max(np.abs(slopes[:, column] - expected)) <= 1e-6 * np.max(np.abs(expected))
 

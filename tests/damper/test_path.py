@@ -8,12 +8,12 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from pzd.damper.columns import STROKE_AND_FLOW
-from pzd.damper.compose import TOLERANCE, element_rows, respond, steady_force
+from pzd.damper.compose import TOLERANCE, constant_rows, element_rows, integrated_force, respond, steady_force
 from pzd.damper.element import element_force
 from pzd.damper.kernels import row_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance
+from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance, march
 from pzd.damper.pieces import STAGES, Step
 
 STEP = 1e-3
@@ -139,11 +139,37 @@ def test_dropping_the_moving_stiffness_would_be_seen() -> None:
     assert np.max(np.abs(np.diff(force)[jumps])) > 5 * np.median(np.abs(np.diff(force)))
 
 
-def test_the_plain_damper_is_the_exact_element() -> None:
-    x = np.interp(TIME, [0, 0.15, 0.3, 0.45, 0.6], [0.0, 0.02, -0.02, 0.02, 0.0])
-    flat = np.zeros_like(x)
-    ours = respond(PLAIN, Motion(TIME, x, flat, flat, flat))
-    np.testing.assert_allclose(ours, element_force(x, STEP, 300.0, 2700.0, 2e5), rtol=0, atol=1e-8)
+def motions(rng: np.random.Generator) -> dict[str, Motion]:
+    """A sine, the same so small that the oil mostly sticks, and one that turns round in every other step."""
+    wild = np.cumsum(rng.normal(0.0, 1e-4, TIME.size))
+    even, flat = sine(0.0), np.zeros_like(TIME)
+    small = Motion(TIME, 0.02 * even.displacement, 0.02 * even.velocity, flat)
+    return {"sine": even, "small": small, "wild": Motion(TIME, wild, np.gradient(wild, STEP), flat)}
+
+
+@pytest.mark.parametrize("kind", ["sine", "small", "wild"])
+@pytest.mark.parametrize("uneven", [False, True], ids=["even", "uneven"])
+def test_the_closed_form_and_the_march_agree_to_1e_9_of_peak(kind: str, uneven: bool, rng: np.random.Generator) -> None:
+    motion = motions(rng)[kind]
+    steps = STEP * (rng.uniform(0.5, 1.5, TIME.size - 1) if uneven else np.ones(1))
+    for size in ((1.0, 1.0, 1.0), (0.0, 1.0, 1.0), (0.1, 0.03, 3.0), (3.0, 1.0, 0.1)):
+        T0, C, k = np.array([400.0, 2500.0, 4e5]) * size * rng.uniform(0.5, 2.0, 3)
+        rows, _ = constant_rows(T0, C, k, {})
+        closed = integrated_force(rows, motion, steps, 100.0, TOLERANCE)
+        marched = march(motion.displacement, motion.velocity, steps, rows, 100.0, TOLERANCE)
+        np.testing.assert_allclose(closed, marched, rtol=0, atol=1e-9 * np.max(np.abs(marched)))
+
+
+def test_cutting_every_step_in_eight_changes_nothing(rng: np.random.Generator) -> None:
+    coarse, share = motions(rng)["wild"], np.arange(8) / 8
+    u0 = np.diff(coarse.displacement) / STEP - 0.5 * np.diff(coarse.velocity)
+    bend = np.diff(coarse.velocity)[:, None] * share
+    inside = coarse.displacement[:-1, None] + STEP * share * (u0[:, None] + 0.5 * bend)
+    x = np.append(inside.ravel(), coarse.displacement[-1])
+    v = np.append((coarse.velocity[:-1, None] + bend).ravel(), coarse.velocity[-1])
+    whole = element_force(coarse.displacement, STEP, 300.0, 2700.0, 2e5, 0.0, coarse.velocity)
+    fine = element_force(x, STEP / 8, 300.0, 2700.0, 2e5, 0.0, v)
+    np.testing.assert_allclose(fine[::8], whole, rtol=0, atol=1e-9 * np.max(np.abs(whole)))
 
 
 @pytest.mark.parametrize("effects", FLOWS[:3], ids="+".join)
@@ -216,7 +242,6 @@ def test_a_voltage_that_is_needed_and_not_given_is_said() -> None:
 def test_a_stick_that_begins_on_its_edge_finds_the_far_edge(friction: float, rng: np.random.Generator) -> None:
     weak = Damper(base=(BaseRow(T0_N=friction, C_Ns_per_m=2816.0, k_N_per_m=1.64e5),))
     x = np.cumsum(rng.normal(0.0, 1e-4, 600))
-    flat = np.zeros_like(x)
-    ours = respond(weak, Motion(TIME, x, flat, flat))
+    ours = march(x, np.zeros(1), np.array([STEP]), element_rows(weak, None, None), 0.0, TOLERANCE)
     exact = element_force(x, STEP, friction, 2816.0, 1.64e5)
     np.testing.assert_allclose(ours, exact, rtol=0, atol=1e-8 * np.max(np.abs(exact)))

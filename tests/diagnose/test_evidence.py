@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 from campaign import damper_of, sine, sines
 
+from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.data.cleaning import prepare
-from pzd.diagnose.data.split import TRAINING, split
+from pzd.diagnose.data.split import TRAINING, UNTOUCHED, VALIDATION, split
 from pzd.diagnose.fit.input_uncertainty import expected
 from pzd.diagnose.fit.least_squares import fit
+from pzd.diagnose.fit.likelihood import RecordLikelihood
 from pzd.diagnose.fit.prediction import counted
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.record import Record
@@ -104,3 +107,59 @@ def test_the_hardest_tests_of_the_rig_are_fitted(rng: np.random.Generator) -> No
     for channel in ("force", "velocity", "displacement"):
         peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in prepared]
         assert roles[int(np.argmax(peaks))][0] == TRAINING
+
+
+# ---------------------------------------------------------------- no sample is in two parts
+
+
+def road_record(rng: np.random.Generator, count: int, name: str) -> Record:
+    """A test that does not repeat: three tones without a common period."""
+    time = np.arange(count) / 500.0
+    tones = ((1.13, 0.012), (2.71, 0.006), (6.97, 0.002))
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(tones))
+    angles = [2.0 * np.pi * f * time + p for (f, _), p in zip(tones, phases, strict=True)]
+    x, v, a = (
+        sum(X * (2.0 * np.pi * f) ** n * wave(at) for (f, X), at in zip(tones, angles, strict=True))
+        for n, wave in ((0, np.sin), (1, np.cos), (2, lambda at: -np.sin(at)))
+    )
+    force = respond(damper_of((0.0,)), Motion(time, x, v, a, np.zeros(count)))
+    measured = force + 5.0 * rng.standard_normal(count)
+    return Record(name, None, time, x, v, a, measured, np.zeros(count))
+
+
+def samples_of(observation: RecordLikelihood) -> set[tuple[str, int]]:
+    """The samples of the record that an observation is compared at."""
+    begins = observation.first // observation.stride
+    return {(observation.name, int(i)) for i in begins + np.flatnonzero(observation.compared)}
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_no_sample_is_in_two_parts(rng: np.random.Generator, count: int) -> None:
+    records = tuple(road_record(rng, 10_000, f"road-{i}") for i in range(count))
+    found = evidence(records, damper_of((0.0,)))
+    compared = {
+        part: {s for o in problem.observations for s in samples_of(o)}
+        for part, problem in (
+            (TRAINING, found.halves[0]),
+            (VALIDATION, found.halves[1]),
+            ((TRAINING, VALIDATION), found.whole),
+        )
+    }
+    assert not compared[TRAINING] & compared[VALIDATION]
+    assert compared[TRAINING] | compared[VALIDATION] == compared[TRAINING, VALIDATION]
+    roles = dict(zip((p.record.name for p in found.campaign.prepared), found.campaign.parts.roles, strict=True))
+    for part, samples in compared.items():
+        wanted = part if isinstance(part, tuple) else (part,)
+        assert samples
+        assert {int(roles[name][i]) for name, i in samples} == set(wanted)
+    assert UNTOUCHED not in {int(roles[name][i]) for name, i in compared[TRAINING, VALIDATION]}
+
+
+def test_noise_is_white_within_the_stretches_that_are_compared(rng: np.random.Generator) -> None:
+    found = evidence((road_record(rng, 10_000, "road"),), damper_of((0.0,)))
+    (training,) = found.halves[0].observations
+    (force,) = fit(found.halves[0], (), found.halves[0].start()).simulated
+    left = training.in_noise(training.measured - force)
+    assert np.count_nonzero(np.diff(training.compared.astype(int)) == 1) == 3  # four stretches
+    assert left.size < training.measured.size or not training.noise.coefficients.size
+    assert float(left @ left) / left.size == pytest.approx(1.0, abs=0.15)

@@ -16,7 +16,6 @@ from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import split
 from pzd.diagnose.fit.least_squares import fit
-from pzd.diagnose.fit.likelihood import RecordLikelihood, response
 from pzd.diagnose.handed_on import handed_on
 from pzd.diagnose.kept_back import Trials, trials_of
 from pzd.diagnose.missed import Missed
@@ -29,7 +28,7 @@ from pzd.identify.stage import identify
 from pzd.quantities import Control
 from pzd.record import Record
 from pzd.rig.config import FilesEntry, RigConfig
-from pzd.signals.nuisance import AT_MOST, NuisanceConfig
+from pzd.signals.nuisance import NuisanceConfig
 
 TWO = (0.0, 150.0)
 TESTS = ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03))
@@ -160,12 +159,6 @@ class FixedPredictions:
     def worse(self, one: float, other: float) -> tuple[float | None, ...]:
         return (150.0,) if one > other else ()
 
-    def prediction(
-        self, plain: float, missed: float, damper: Damper | None, *, by_criterion: bool = False
-    ) -> tuple[float, float, bool]:
-        assert not by_criterion
-        return plain, missed, damper is None
-
 
 class _Figure(float):
     """What is missed, alike at every voltage."""
@@ -207,7 +200,7 @@ def test_effects_that_harm_the_prediction_are_taken_back(
     named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
     found = handed_on(named, cast("Trials", fixed), (), "V")
     assert found.selection.adopted == kept
-    assert cast("tuple[float, float, bool]", found.prediction)[2] == (not kept)
+    assert cast("float", found.missed) == (both if kept == (A, B) else only_a if kept else 1.0)
     assert all("worse" in found.selection.reasons[name] for name in {A, B} - set(kept))
     if kept:
         assert found.refused is None
@@ -257,38 +250,6 @@ def test_the_fit_that_is_handed_on_goes_with_what_it_was_fitted_to(rng: np.rando
     compared = zip(found.selection.last.whole.observations, found.selection.fitted.simulated, strict=True)
     assert all(o.measured.size == force.size for o, force in compared)
     assert len(found.selection.fitted.simulated) == len(records)
-
-
-# ---------------------------------------------------------------- the tests' own offset, gain and delay
-
-
-def late_by(seconds: float, rng: np.random.Generator) -> tuple[RecordLikelihood, Damper]:
-    damper = damper_of((0.0,), sensor_delay={"tau": seconds})
-    plain = damper_of((0.0,))
-    (one,) = evidence_of(campaign_of((sine(damper, 0.0, 2.0, 0.03, rng, noise=1e-3),)), plain).whole.observations
-    return one, plain
-
-
-def test_a_test_is_late_by_no_more_than_its_prior_lets_it(rng: np.random.Generator) -> None:
-    sd = NuisanceConfig().delay_s
-    left = {share: late_by(share * sd, rng) for share in (1.0, 10.0)}
-    within, beyond = (one.left(response(one, plain), AT_MOST) for one, plain in left.values())
-    own = within.free.size
-    assert within.residual[-own] == pytest.approx(1.0, abs=0.2)
-    assert beyond.residual[-own] == AT_MOST
-    assert not beyond.free[0]
-    # What it may not explain stays: it cost as little before as the squares of ten standard deviations.
-    assert within.residual @ within.residual < 2.0 * within.residual.size
-    assert beyond.residual @ beyond.residual > 100.0 + 2.0 * beyond.residual.size
-
-
-@pytest.mark.parametrize("share", [1.0, 10.0])
-def test_slopes_follow_the_likeliest_nuisances(rng: np.random.Generator, share: float) -> None:
-    one, plain = late_by(share * NuisanceConfig().delay_s, rng)
-    force = response(one, plain)
-    change = 1e-3 * force[:, None] * np.linspace(-1.0, 1.0, force.size)[:, None] ** 2
-    moved = one.left(force - change[:, 0]).residual - one.left(force).residual
-    assert one.left(force).slopes(change)[:, 0] == pytest.approx(moved, abs=1e-3 * float(np.max(np.abs(moved))))
 
 
 def test_every_voltage_of_the_campaign_is_dealt_into_folds(rng: np.random.Generator) -> None:

@@ -92,7 +92,9 @@ def test_a_spring_and_a_mass_cannot_be_told_apart_on_one_frequency_and_the_next_
 def test_a_spring_that_pushes_away_is_not_called_a_gas_spring(rng: np.random.Generator) -> None:
     told = diagnosed(sines(damper_of(TWO, gas_spring={"k_g": -3000.0}), rng, TWO)).diagnosis
     assert told.verdict == "unexplained", told.reason
-    assert "no gas_spring has" in told.reason
+    assert "gas_spring with k_g = -3" in told.reason
+    assert "nowhere in nature" in told.reason
+    assert "gas_spring" not in told.effects
 
 
 def test_something_that_is_not_in_the_library_is_unexplained(rng: np.random.Generator) -> None:

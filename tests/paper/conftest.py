@@ -12,7 +12,7 @@ from pzd.identify.stage import identify
 from pzd.paper.published import published
 from pzd.quantities import Control
 from pzd.report.reference import compared
-from pzd.report.ride_comfort import assess, settled
+from pzd.report.ride_comfort import assess, rated
 from pzd.report.run_numbers import RunNumbers
 from pzd.rig.stage import synthesise
 from pzd.simulate.stage import simulate
@@ -44,14 +44,6 @@ def rides(config: RunConfig, rig: Rig, identified: Identified) -> Rides:
 
 @pytest.fixture(scope="package")
 def beside(config: RunConfig, identified: Identified, rides: Rides) -> dict[str, ReferenceRow]:
-    rows = {row.case: row for row in rides.summary}
-    tones = {road.name: road.frequency_Hz for road in config.simulate.roads}
-    comfort = tuple(
-        row
-        for ride in rides.rides
-        for row in assess(
-            settled(ride, rows[ride.case], config.simulate.settle_s, tones[rows[ride.case].road]), config.report
-        )
-    )
+    comfort = tuple(row for ride in rated(rides) for row in assess(ride, config.report))
     found = compared(tuple(published().values()), RunNumbers(identified, rides, comfort, config.simulate, Control()))
     return {row.id: row for row in found}

@@ -126,6 +126,7 @@ def test_the_short_ride_gives_the_peaks_of_the_whole_simulation(config: RunConfi
     from pzd.simulate.road import Way
 
     simulate = config.simulate.model_copy(update={"tie_break": tie_break})
+    assert simulate.coefficients == BOUNDS
     oil = dynamic_damper_of(Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=1e3, k_N_per_m=1e5),)), None, 0.0)
     still = np.zeros((1, 2))
     grid = TableArrays(np.zeros(1), np.array([0.0, 10.0]), still, still, np.array([10.0]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,12 +28,14 @@ from pzd.artefacts import (
     Report,
     Response,
     Ride,
+    RideRow,
     Rides,
     Rig,
     SummaryRow,
     Table,
     TableNotes,
     Value,
+    WheelRow,
 )
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.model import BaseRow, Damper
@@ -41,8 +43,11 @@ from pzd.damper.motion import Motion
 from pzd.quantities import Control
 from pzd.record import Record
 from pzd.report.config import ReportConfig
+from pzd.report.ride_comfort import RatedRide, rated
 from pzd.report.stage import report
 from pzd.simulate.config import SimulateConfig
+from pzd.simulate.vibration import Vibration, vibration
+from pzd.simulate.window import settled
 
 PLAIN = Damper(
     base=(
@@ -224,7 +229,31 @@ def table() -> Table:
     return Table(rows, (), notes)
 
 
-def ride(case: str, road: str, policy: str, fidelity: str, harmonics: dict[float, float]) -> tuple[Ride, SummaryRow]:
+@dataclass(frozen=True)
+class Made:
+    """A ride whose acceleration at K is known, with its row of every table."""
+
+    ride: Ride
+    row: SummaryRow
+    ridden: RideRow
+    wheels: tuple[WheelRow, ...]
+    felt: Vibration
+
+    def rated(self) -> RatedRide:
+        """As the report rates it."""
+        return rated(rides_of([self]))[0]
+
+
+def made(
+    case: str,
+    road: str,
+    policy: str,
+    fidelity: str,
+    harmonics: dict[float, float],
+    fundamental: float | None = None,
+    settle: float = SETTLE_S,
+    held: dict[str, float] | None = None,
+) -> Made:
     """A ride whose acceleration at K is a sum of sines, each with its amplitude."""
     time = np.arange(round(DURATION_S * RATE_HZ) + 1) / RATE_HZ
     a = np.sum([size * np.sin(2.0 * np.pi * f * time + 0.4) for f, size in harmonics.items()], axis=0)
@@ -238,23 +267,66 @@ def ride(case: str, road: str, policy: str, fidelity: str, harmonics: dict[float
         rms_aK_m_per_s2=float(np.sqrt(np.mean(a**2))),
         rms_jerk_m_per_s3=12.0,
         peak_deflection_m=0.034,
-        rms_wheel_load_N=800.0,
+        rms_wheel_load_N=1000.0 if policy == "comfort" else 800.0,
         dissipated_J=950.0,
         energy_error=3e-9,
         outside_table=0.31,
     )
-    return Ride(case, {"time_s": time, "a_K_m_per_s2": a}), row
+    ridden = RideRow(
+        case=case,
+        from_s=settle,
+        to_s=DURATION_S,
+        ending="end of the ride",
+        voltage_V=None,
+        damping_Ns_per_m=None,
+    ).model_copy(update=held or {})
+    wheels = tuple(
+        WheelRow(
+            case=case,
+            axle=axle,
+            static_load_N=4600.0,
+            rms_dynamic_load_N=800.0,
+            min_contact_force_N=-1234.0 if (policy, axle) == ("comfort", 2) else 3210.0,
+            pulling=0.26 if (policy, axle) == ("comfort", 2) else 0.0,
+        )
+        for axle in (1, 2)
+    )
+    felt = vibration(case, "K", a, 1.0 / RATE_HZ, settled(settle, 1.0 / RATE_HZ, a.size - 1), fundamental)
+    return Made(Ride(case, {"time_s": time, "a_K_m_per_s2": a}), row, ridden, wheels, felt)
+
+
+def rides_of(made: Sequence[Made], responses: tuple[Response, ...] = ()) -> Rides:
+    """The artefact of rides made by hand."""
+    return Rides(
+        tuple(one.ride for one in made),
+        tuple(one.row for one in made),
+        tuple(one.ridden for one in made),
+        tuple(wheel for one in made for wheel in one.wheels),
+        tuple(one.felt.weighted for one in made),
+        tuple(line for one in made for line in one.felt.spectrum),
+        responses,
+    )
 
 
 def rides() -> Rides:
-    made = []
+    """Control does better by the table than the best fixed voltage, and worse dynamically."""
+    found = []
     for f, constant, controlled in ((2.25, 2.2, 0.75), (4.5, 3.6, 1.05)):
         road = f"sine-{f:g}Hz"
-        made.append(ride(f"{road}-constant-ideal", road, "constant", "ideal", {f: constant}))
+        found.append(
+            made(
+                f"{road}-constant-ideal", road, "constant", "ideal", {f: constant}, f, held={"damping_Ns_per_m": 4500.0}
+            )
+        )
         for fidelity, worse in (("ideal", 1.0), ("table", 1.2), ("dynamic", 1.3)):
             parts = {f: worse * controlled, 3.0 * f: 0.2 * controlled}
-            made.append(ride(f"{road}-comfort-{fidelity}", road, "comfort", fidelity, parts))
-        made.append(ride(f"{road}-comfort-dynamic-plain", road, "comfort", "dynamic", {f: 1.5 * controlled}))
+            found.append(made(f"{road}-comfort-{fidelity}", road, "comfort", fidelity, parts, f))
+        for fidelity, level in (("table", 1.5), ("dynamic", 1.0)):
+            case = f"{road}-best_fixed_voltage-{fidelity}"
+            held = {"voltage_V": 62.0}
+            found.append(made(case, road, "best_fixed_voltage", fidelity, {f: level * controlled}, f, held=held))
+        case = f"{road}-comfort-dynamic-plain"
+        found.append(made(case, road, "comfort", "dynamic", {f: 1.5 * controlled}, f))
     step = Response(
         signal="voltage",
         from_voltage_V=0.0,
@@ -262,8 +334,9 @@ def rides() -> Rides:
         velocity_m_per_s=0.2,
         to_63_percent_s=0.0039,
         to_90_percent_s=0.009,
+        note="",
     )
-    return Rides(tuple(r for r, _ in made), tuple(s for _, s in made), (step,))
+    return rides_of(found, (step,))
 
 
 @pytest.fixture(scope="session")
@@ -273,6 +346,6 @@ def run() -> Run:
 
 
 @pytest.fixture(scope="session")
-def made_ride() -> Callable[..., tuple[Ride, SummaryRow]]:
+def made_ride() -> Callable[..., Made]:
     """The maker of rides of known harmonics."""
-    return ride
+    return made

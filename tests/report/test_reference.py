@@ -9,19 +9,20 @@ from typing import Any
 
 import pytest
 
-from pzd.artefacts import Identified, MeasureRow, ParameterRow, ReferenceRow, Rides, SummaryRow
+from pzd.artefacts import Identified, MeasureRow, ParameterRow, ReferenceRow, SummaryRow
 from pzd.comfort.iso2631_1978 import FACTORS
 from pzd.quantities import Control, Quantity
 from pzd.report.arithmetic import evaluated, terms
 from pzd.report.config import ReportConfig
 from pzd.report.reference import Expected, compared, file_of, read_reference, same_test
-from pzd.report.ride_comfort import assess, settled
+from pzd.report.ride_comfort import assess, rated
 from pzd.report.run_numbers import RunNumbers
 from pzd.report.selectors import UNITS
 from pzd.schema.errors import ConfigError, DataError
 from pzd.simulate.config import SimulateConfig
 
 VOLTS = Control()
+PAPER = SimulateConfig(c_min_Ns_per_m=750.0, c_max_Ns_per_m=45000.0)
 TEST = "gap 0.25 mm,{},22,2,0.03"
 HEAD = "id,setting,voltage_V,temperature_degC,frequency_Hz,amplitude_m,selector,value,unit,tolerance\n"
 
@@ -41,20 +42,15 @@ def faults(folder: Path, text: str, control: Control = VOLTS) -> list[str]:
 
 @pytest.fixture(scope="module")
 def numbers(run: Any) -> RunNumbers:
-    rows = {row.case: row for row in run.rides.summary}
     config = ReportConfig(editions=("ISO 2631-1:1997", "ISO 2631:1978", "Directive 2002/44/EC"))
-    comfort = tuple(
-        row
-        for ride in run.rides.rides
-        for row in assess(settled(ride, rows[ride.case], 4.0, float(rows[ride.case].road[5:-2])), config)
-    )
+    comfort = tuple(row for ride in rated(run.rides) for row in assess(ride, config))
     on = run.identified.measures[0]
     measures = (
         on,
         on.model_copy(update={"record": "r01", "voltage_V": 149.6, "peak_force_N": 2940.0}),
         on.model_copy(update={"record": "r02", "frequency_Hz": 1.0, "peak_force_N": 870.0}),
     )
-    return RunNumbers(Identified(run.identified.rows, measures), run.rides, comfort, SimulateConfig(), VOLTS)
+    return RunNumbers(Identified(run.identified.rows, measures), run.rides, comfort, PAPER, VOLTS)
 
 
 def rows_of(folder: Path, numbers: RunNumbers, text: str) -> dict[str, ReferenceRow]:
@@ -289,7 +285,7 @@ def test_the_response_to_a_step_is_the_rising_one(tmp_path: Path, numbers: RunNu
     step = numbers.rides.responses[0]
     rising = step.model_copy(update={"signal": "force", "to_90_percent_s": 0.0155})
     falling = rising.model_copy(update={"from_voltage_V": 150.0, "to_voltage_V": 0.0, "to_90_percent_s": 0.02})
-    rides = Rides(numbers.rides.rides, numbers.rides.summary, (step, rising, falling))
+    rides = replace(numbers.rides, responses=(step, rising, falling))
     text = "id,selector,value,unit\nRESP,response.force_to_90_percent_s,9,ms\n"
     found = rows_of(tmp_path, replace(numbers, rides=rides), text)["RESP"]
     assert found.computed == pytest.approx(15.5)

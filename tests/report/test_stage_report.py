@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from pzd.comfort.iso2631_1978 import exposure
 from pzd.comfort.weighting import WK, response
 from pzd.quantities import Control
 from pzd.report.config import ReportConfig
-from pzd.report.ride_comfort import assess, settled
+from pzd.report.ride_comfort import assess, rated
+from pzd.schema.errors import DataError
 
 ALL = ReportConfig(
     editions=("ISO 2631-1:1997", "ISO 2631:1978", "Directive 2002/44/EC"), health_guidance_zone="0.45-0.90"
@@ -98,14 +100,14 @@ def test_peak_and_rms_are_those_of_every_step(run: Any, told: Report) -> None:
 
 
 def test_a_ride_that_does_not_repeat_with_its_road_falls_back_to_bands(made_ride: Callable[..., Any]) -> None:
-    ride, summary = made_ride("r-comfort-ideal", "r", "comfort", "ideal", {2.25: 0.5, 3.1: 0.5})
-    rows = assess(settled(ride, summary, 4.0, 2.25), ReportConfig())
+    ride = made_ride("r-comfort-ideal", "r", "comfort", "ideal", {2.25: 0.5, 3.1: 0.5}, 2.25)
+    rows = assess(ride.rated(), ReportConfig())
     assert all("third-octave bands, since" in r.status for r in rows if r.edition == "ISO 2631:1978")
 
 
 def test_a_random_ride_is_rated_by_third_octaves(made_ride: Callable[..., Any]) -> None:
-    ride, summary = made_ride("r-comfort-ideal", "r", "comfort", "ideal", {5.0: 0.5, 12.5: 0.2})
-    rows = assess(settled(ride, summary, 4.0, None), ReportConfig())
+    ride = made_ride("r-comfort-ideal", "r", "comfort", "ideal", {5.0: 0.5, 12.5: 0.2})
+    rows = assess(ride.rated(), ReportConfig())
     found = next(r for r in rows if r.measure == "exposure_time_fatigue_decreased_proficiency")
     assert found.value == pytest.approx(
         exposure(0.5 / np.sqrt(2.0), 5.0, "fatigue_decreased_proficiency").minutes, rel=0.02
@@ -114,18 +116,39 @@ def test_a_random_ride_is_rated_by_third_octaves(made_ride: Callable[..., Any]) 
 
 
 def test_a_car_at_rest_may_ride_for_ever(made_ride: Callable[..., Any]) -> None:
-    ride, summary = made_ride("r-comfort-ideal", "r", "comfort", "ideal", {5.0: 0.0})
     for fundamental in (None, 2.25):
-        rows = {r.measure: r for r in assess(settled(ride, summary, 4.0, fundamental), ALL)}
+        ride = made_ride("r-comfort-ideal", "r", "comfort", "ideal", {5.0: 0.0}, fundamental)
+        rows = {r.measure: r for r in assess(ride.rated(), ALL)}
         assert rows["a_w"].value == 0.0
         assert rows["exposure_time_reduced_comfort"].value == 1440.0
         assert rows["time_to_limit_value"].value is None
 
 
 def test_a_short_settling_time_is_said(made_ride: Callable[..., Any]) -> None:
-    ride, summary = made_ride("r-comfort-ideal", "r", "comfort", "ideal", {5.0: 0.5})
-    rows = {r.measure: r for r in assess(settled(ride, summary, 1.0, 5.0), ReportConfig())}
+    ride = made_ride("r-comfort-ideal", "r", "comfort", "ideal", {5.0: 0.5}, 5.0, settle=1.0)
+    rows = {r.measure: r for r in assess(ride.rated(), ReportConfig())}
     assert "1 s settling holds the start" in rows["a_w"].status
+
+
+def test_a_ride_below_1_hz_is_not_covered_by_the_edition_of_1978(made_ride: Callable[..., Any]) -> None:
+    for fundamental in (None, 0.9):
+        ride = made_ride("r-comfort-ideal", "r", "comfort", "ideal", {0.9: 5.0}, fundamental)
+        rows = {r.measure: r for r in assess(ride.rated(), ALL)}
+        found = rows["exposure_time_reduced_comfort"]
+        assert found.value is None
+        assert "not covered" in found.status
+
+
+def test_the_window_of_an_event_is_said(made_ride: Callable[..., Any]) -> None:
+    whole = made_ride("r-comfort-ideal", "r", "comfort", "ideal", {5.0: 0.5})
+    ridden = whole.ridden.model_copy(update={"from_s": 0.4, "to_s": 2.9, "ending": "motion died away"})
+    rows = {r.measure: r for r in assess(replace(whole, ridden=ridden).rated(), ReportConfig())}
+    assert rows["a_w"].status == "verified; over 2.5 s from the entry of axle 1 on, motion died away"
+
+
+def test_a_table_without_a_ride_of_the_summary_is_refused_by_name(run: Any) -> None:
+    with pytest.raises(DataError, match=r"5-simulate/weighted\.csv: has no row of sine-2\.25Hz-constant-ideal"):
+        rated(replace(run.rides, weighted=run.rides.weighted[1:]))
 
 
 def test_the_report_writes_itself_and_reads_itself_back(told: Report, tmp_path: Path) -> None:

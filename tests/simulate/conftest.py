@@ -38,7 +38,7 @@ Rider = Callable[..., Outcome]
 
 @pytest.fixture(scope="session")
 def ride(damper: Damper, table: Table) -> Rider:
-    """Ride one case; `generic` takes constant damping through the generic integrator."""
+    """Ride one case within the paper's bounds; `generic` takes constant damping through the generic integrator."""
 
     def go(
         policy: str = "comfort",
@@ -49,7 +49,8 @@ def ride(damper: Damper, table: Table) -> Rider:
         generic: bool = False,
         **given: object,
     ) -> Outcome:
-        config = SimulateConfig.model_validate_json(json.dumps(given))
+        paper = {} if given.get("bounds") == "table" else {"c_min_Ns_per_m": 750.0, "c_max_Ns_per_m": 45000.0}
+        config = SimulateConfig.model_validate_json(json.dumps({**paper, **given}))
         case = Case(config.roads[road], policies()[policy], fidelity, plain=False)
         speed = config.vehicle_speed_km_per_h / 3.6
         profile = case.road.profile(Way(speed, speed * config.duration_s, 1, Path()))

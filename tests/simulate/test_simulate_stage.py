@@ -17,6 +17,7 @@ from pzd.schema.errors import ConfigError, DataError
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.dampers import dynamic_damper_of, grid_of
 from pzd.simulate.plan import cases
+from pzd.simulate.policies import policies
 from pzd.simulate.riding import ride_case
 from pzd.simulate.road import Way
 from pzd.simulate.stage import simulate
@@ -41,8 +42,9 @@ def test_a_case_is_road_policy_fidelity(damper) -> None:
     rides = ride(damper)
     assert [row.case for row in rides.summary] == [
         f"sine-2.25Hz-{policy}-{fidelity}"
-        for policy in ("constant", "comfort")
+        for policy in ("constant", "best_constant_c", "passive", "best_fixed_voltage", "comfort")
         for fidelity in ("ideal", "table", "dynamic")
+        if fidelity != "ideal" or policy not in ("passive", "best_fixed_voltage")
     ]
     assert [r.case for r in rides.rides] == [row.case for row in rides.summary]
     assert all(abs(row.energy_error) < 1e-6 for row in rides.summary)
@@ -54,6 +56,7 @@ def test_the_same_ride_on_the_damper_before_diagnose_stands_beside(damper) -> No
     rides = {row.case: row for row in ride(changed, plain=damper, policies=["comfort"]).summary}
     assert set(rides) == {
         "sine-2.25Hz-comfort-ideal",
+        "sine-2.25Hz-comfort-ideal-plain",
         "sine-2.25Hz-comfort-table",
         "sine-2.25Hz-comfort-table-plain",
         "sine-2.25Hz-comfort-dynamic",
@@ -112,6 +115,8 @@ def test_the_files_read_back_as_they_were_written(damper, tmp_path) -> None:
     again = Rides.read(tmp_path, Control())
     assert again.summary == rides.summary
     assert again.responses == rides.responses
+    assert (again.ridden, again.wheels) == (rides.ridden, rides.wheels)
+    assert (again.weighted, again.spectrum) == (rides.weighted, rides.spectrum)
     assert np.array_equal(again.rides[1].columns["a_K_m_per_s2"], rides.rides[1].columns["a_K_m_per_s2"])
     header = (tmp_path / "sine-2.25Hz-comfort-ideal.csv").read_text(encoding="utf-8").splitlines()[0]
     assert header.startswith("time_s,z_m,phi_rad,a_K_m_per_s2,deflection_1_m,")
@@ -123,6 +128,7 @@ def test_written_histories_are_thinned_and_peaks_are_not(damper) -> None:
     assert len(thin.rides[0].columns["time_s"]) == 21
     assert len(full.rides[0].columns["time_s"]) == 1001
     assert thin.summary == full.summary
+    assert (thin.weighted, thin.spectrum, thin.wheels) == (full.weighted, full.spectrum, full.wheels)
 
 
 def test_force_answers_a_step_of_voltage_later_than_the_valve(damper) -> None:
@@ -131,6 +137,21 @@ def test_force_answers_a_step_of_voltage_later_than_the_valve(damper) -> None:
     assert voltage.to_90_percent_s == pytest.approx(0.0039 * np.log(10.0))
     assert voltage.to_90_percent_s == pytest.approx(0.009, rel=0.01)
     assert force.to_90_percent_s > voltage.to_90_percent_s
+
+
+def test_a_force_that_comes_with_the_stiffness_is_explained(damper) -> None:
+    """k from 199 to 423 kN/m: under 845 N the spring alone goes to 1796 N of 1837 N, as fast as the valve."""
+    times = {(r.signal, r.to_voltage_V): r for r in ride(damper).responses}
+    force = times["force", 150.0]
+    assert force.note.startswith(
+        "96% of the step come with the stiffness of the oil spring, k from 1.99e+05 to 4.23e+05 N/m"
+    )
+    assert times["voltage", 150.0].note == ""
+    rows = tuple(row.model_copy(update={"k_N_per_m": 199e3}) for row in damper.base)
+    even = ride(damper.model_copy(update={"base": rows})).responses
+    assert [r.note for r in even] == [""] * 4
+    slow = next(r for r in even if (r.signal, r.to_voltage_V) == ("force", 150.0))
+    assert force.to_63_percent_s < 0.3 * slow.to_63_percent_s
 
 
 def test_with_an_instant_valve_the_force_takes_the_time_of_the_oil_spring(damper) -> None:
@@ -149,11 +170,18 @@ def test_with_an_instant_valve_the_force_takes_the_time_of_the_oil_spring(damper
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"policies": ["comfy"]}, "no policy is called comfy; there are comfort, constant"),
+        ({"policies": ["comfy"]}, "no policy is called comfy; there are best_constant_c, best_fixed"),
         ({"car": {"model": "fiat"}}, "no car is called fiat; there are makowski2021"),
         ({"car": {"motion_ratio": [1.0, 0.0]}}, "above zero"),
         ({"control_period_s": 0.0015}, "whole number of integration_step_s"),
-        ({"c_max_Ns_per_m": 1.0}, "at least c_min"),
+        ({"c_max_Ns_per_m": 1.0}, "need both c_min"),
+        ({"bounds": "coefficients"}, "need both c_min"),
+        ({"bounds": "table", "c_min_Ns_per_m": 1.0, "c_max_Ns_per_m": 2.0}, "leave one of them out"),
+        ({"c_min_Ns_per_m": 2.0, "c_max_Ns_per_m": 1.0}, "at least c_min"),
+        ({"car": {"x_K_m": 50.0}}, r"x_K_m must lie within the car.*from -4\.749 to 4\.116 m \(got 50\)"),
+        ({"controlled": "passive"}, "passive does not control; these do: comfort, skyhook, wheel_load"),
+        ({"controlled": "skyhook"}, "skyhook is none of policies"),
+        ({"policies": ["skyhook", "wheel_load"]}, "say which one the report is about: skyhook, wheel_load"),
         ({"settle_s": 1.0}, "shorter than duration_s"),
         ({"fidelities": ["ideal", "ideal"]}, "named twice"),
         ({"roads": [{"kind": "iso8608", "road_class": "Z"}]}, "there is no class Z"),
@@ -162,6 +190,54 @@ def test_with_an_instant_valve_the_force_takes_the_time_of_the_oil_spring(damper
 def test_a_config_that_makes_no_sense_is_refused_with_what_would(given, message) -> None:
     with pytest.raises(ValidationError, match=message):
         config(**given)
+
+
+def test_the_controlled_policy_is_the_one_that_controls_wherever_it_stands_in_the_list() -> None:
+    for given, name in (
+        ({}, "comfort"),
+        ({"policies": ["constant", "passive", "comfort"]}, "comfort"),
+        ({"policies": ["passive", "wheel_load"]}, "wheel_load"),
+        ({"policies": ["skyhook", "comfort"]}, "comfort"),
+        ({"policies": ["comfort", "skyhook"], "controlled": "skyhook"}, "skyhook"),
+    ):
+        chosen = config(**given)
+        assert [policy for policy in policies() if chosen.is_controlled(policy)] == [name]
+
+
+def test_a_car_with_other_values_is_not_called_by_the_name_of_the_model() -> None:
+    for given, name in (
+        ({}, "makowski2021"),
+        ({"a1_m": 1.794}, "makowski2021"),
+        ({"a1_m": 1.7}, "own"),
+        ({"a1_m": 1.7, "name": "van"}, "van"),
+    ):
+        assert config(car=given).car.car().name == name
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            {"passive_voltage_V": 400.0},
+            r"^simulate\.passive_voltage_V: must lie within the table, 0 to 150 \(got 400\)$",
+        ),
+        ({"passive_voltage_V": -20.0}, r"^simulate\.passive_voltage_V: .*\(got -20\)$"),
+        ({"temperature_degC": 80.0}, r"^simulate\.temperature_degC: must lie within the table, 22 degC; .*\(got 80\)$"),
+    ],
+)
+def test_what_the_table_does_not_cover_is_refused(damper, given, message) -> None:
+    with pytest.raises(ConfigError, match=message):
+        ride(damper, policies=["passive"], **given)
+
+
+def test_a_voltage_and_a_temperature_as_close_as_conditions_of_a_rig_are_taken(damper) -> None:
+    ride(damper, policies=["passive"], fidelities=["table"], passive_voltage_V=151.0, temperature_degC=23.5)
+
+
+def test_a_damper_that_was_never_tested_at_0_volts_is_passive_at_its_lowest(damper) -> None:
+    upper = damper.model_copy(update={"base": damper.base[1:]})
+    row = ride(upper, policies=["passive"], fidelities=["table"]).ridden[0]
+    assert (row.voltage_V, row.damping_Ns_per_m) == (50.0, None)
 
 
 BY_VOLTAGE = {"at_voltage_V": (0.0, 150.0), "k_g": (1000.0, 40000.0)}

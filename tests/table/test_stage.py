@@ -82,29 +82,47 @@ def test_a_damper_that_rises_with_voltage_everywhere_has_nothing_to_note() -> No
     assert np.all(np.diff(np.abs(forces), axis=0) > 0.0)
 
 
-def test_every_voltage_of_the_inverse_gives_its_force() -> None:
+def test_every_row_of_the_inverse_has_a_voltage_and_gives_its_force() -> None:
     table = table_of(damper_of([2, 3]))
-    given = [row for row in table.inverse if row.voltage_V is not None]
-    assert 0.1 * len(table.inverse) < len(given) < len(table.inverse)
+    assert all(row.voltage_V is not None for row in table.inverse)
     for temperature in (22.0, 43.0):
         lookup = Lookup.of(table, temperature)
-        rows = [row for row in given if row.temperature_degC == temperature]
+        rows = [row for row in table.inverse if row.temperature_degC == temperature]
         force = lookup.force([r.voltage_V or 0.0 for r in rows], [r.velocity_m_per_s for r in rows])
         np.testing.assert_allclose(force, [r.force_N for r in rows], rtol=1e-9, atol=1e-9)
 
 
-def test_a_force_that_no_voltage_gives_is_empty_or_the_nearest() -> None:
+def test_at_every_speed_the_inverse_goes_from_the_least_to_the_largest_force() -> None:
+    table = table_of(damper_of([1]))
+    lookup = Lookup.of(table)
+    assert {row.velocity_m_per_s for row in table.inverse} == {row.velocity_m_per_s for row in table.force}
+    for velocity in (-1.0, -0.0, 0.0, 1.0):
+        rows = [r for r in table.inverse if str(r.velocity_m_per_s) == str(velocity)]
+        low, high = lookup.range(velocity)
+        assert (rows[0].force_N, rows[-1].force_N) == (low, high)
+        assert np.diff([r.force_N for r in rows]) == pytest.approx((high - low) / 40.0)
+
+
+def test_a_force_in_a_gap_of_the_table_is_empty_or_has_the_nearest_voltage() -> None:
+    """Tested fast at 0 and 150 V and slowly between: at speed only the two ends are known."""
     damper = damper_of([1])
-    empty = table_of(damper).inverse
-    clamped = table_of(damper, TableConfig(unreachable="clamp")).inverse
-    lookup = Lookup.of(table_of(damper))
-    assert all(row.voltage_V is not None for row in clamped)
-    for hole, filled in zip(empty, clamped, strict=True):
-        low, high = lookup.range(filled.velocity_m_per_s)
-        if hole.voltage_V is None:
-            assert not low <= filled.force_N <= high
-            nearest = float(np.clip(filled.force_N, low, high))
-            assert lookup.force(filled.voltage_V, filled.velocity_m_per_s) == pytest.approx(nearest)
+    records = tuple(sine(U, 22.0, amplitude) for U, amplitude in {0.0: 0.03, 100.0: 0.005, 150.0: 0.03}.items())
+    made = [
+        tabulate(
+            TableConfig(outside="error", unreachable=unreachable, voltages_V=(0.0, 100.0, 150.0)),
+            Rig(records, ()),
+            Diagnosed.undiagnosed(damper),
+            Control(),
+            None,
+        )
+        for unreachable in ("empty", "clamp")
+    ]
+    fast = 0.03 * 4.0 * np.pi
+    empty, clamped = (
+        [row for row in table.inverse if row.velocity_m_per_s == pytest.approx(fast, rel=1e-3)] for table in made
+    )
+    assert [row.voltage_V for row in empty] == [0.0, *[None] * 39, 150.0]
+    assert [row.voltage_V for row in clamped] == [*[0.0] * 21, *[150.0] * 20]
 
 
 def test_rows_beyond_the_rig_are_marked_and_clamped_or_empty_as_asked() -> None:

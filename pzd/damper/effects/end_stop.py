@@ -44,6 +44,7 @@ EFFECT = Effect(
         ),
     ),
     about_zero=True,
+    same_at_every_voltage=True,
     source="quadratic bump stop; Dixon 2007, The Shock Absorber Handbook",
     tests=(
         ({"x": 0.03, "v": 0.0, "a": 0.0, "k_e": 1.0e6, "x_e": 0.02}, 100.0),

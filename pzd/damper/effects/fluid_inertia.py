@@ -24,6 +24,7 @@ EFFECT = Effect(
             natural_from=0.0,
         ),
     ),
+    same_at_every_voltage=True,
     source="fluid inerter; Swift et al. 2013, Vehicle System Dynamics 51(11)",
     tests=(({"x": 0.01, "v": 1.0, "a": 4.0, "m": 5.0}, 20.0),),
     hidden=growing("m", lambda s: 0.5 * s.force / s.acceleration),

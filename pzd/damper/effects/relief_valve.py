@@ -6,6 +6,7 @@ car dampers open between 0.05 and 0.3 m/s.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf
 
 import numpy as np
@@ -16,6 +17,11 @@ from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
     beyond = float(draw.uniform(0.2, 0.6)) * scales.damping
     return lambda s: {"F_r": scales.force * (1.0 - 0.95 * s), "C_r": beyond}
+
+
+def _flatter(values: Mapping[str, float], damping: float) -> bool:
+    """Whether an open valve lets more through than the closed one."""
+    return values["C_r"] < damping
 
 
 EFFECT = Effect(
@@ -36,6 +42,7 @@ EFFECT = Effect(
             "C_r", "N s/m", 0.0, 1.0e-3, 1.0e8, "slope beyond it", Search(lambda s: s.damping, (0.4,), logarithmic=True)
         ),
     ),
+    natural=_flatter,
     source="two-stage damper valve; Dixon 2007, The Shock Absorber Handbook",
     tests=(({"F_r": 900.0, "T0": 300.0}, 900.0), ({"F_r": 200.0, "T0": 300.0}, 300.0)),
     hidden=_hidden,

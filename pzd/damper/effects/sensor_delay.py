@@ -11,11 +11,29 @@ from numpy.typing import NDArray
 
 from pzd.damper.effect import Effect, Parameter, Search, growing
 
+LATEST = 0.03
+"""Largest delay between two channels of one stand [s].
+
+Three times the group delay of a filter of second order at 20 Hz (0.011 s), as slow as filters of a rig get.
+"""
+
 EFFECT = Effect(
     name="sensor_delay",
     place="sensor",
     law="F recorded at t - tau",
-    parameters=(Parameter("tau", "s", 0.0, -0.1, 0.1, "delay of the force channel", Search(lambda _: 1.0e-3, (0.0,))),),
+    parameters=(
+        Parameter(
+            "tau",
+            "s",
+            0.0,
+            -0.1,
+            0.1,
+            "delay of the force channel",
+            Search(lambda _: 1.0e-3, (0.0,)),
+            natural_from=-LATEST,
+            natural_to=LATEST,
+        ),
+    ),
     source="pure dead time of a measuring chain",
     tests=(({"time": 1.0, "tau": 0.002}, 0.998),),
     hidden=growing("tau", lambda _: 0.02, either=True),

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.damper.model import Damper
-from pzd.diagnose.fit.likelihood import Left
 from pzd.diagnose.fit.parameters import Problem, Unknown, simulated
 from pzd.record import Array
 
-Found = tuple[list[Left], list[Array]]
-"""What is left in units of noise, and simulated forces, an observation each."""
+Left = tuple[list[Array], list[Array]]
+"""Residuals in units of noise and simulated forces, an observation each."""
 
 DIFFERENCE = 1e-4
 """Step of the searched variables for forward differences."""
@@ -73,13 +72,13 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
     evaluations : of the model, at most
     """
     unknowns = problem.unknowns(effects)
-    found, slopes, (left, forces) = _search(problem, unknowns, start, start.size, evaluations)
+    found, slopes, (residuals, forces) = _search(problem, unknowns, start, start.size, evaluations)
     prior = _prior(problem, len(unknowns))
     return Fitted(
         problem.point(found, unknowns).damper(),
         tuple(effects),
         found,
-        tuple(each.residual for each in left),
+        tuple(residuals),
         tuple(forces),
         slopes,
         _covariance(np.concatenate([slopes, prior])),
@@ -91,13 +90,13 @@ def misfit_of(problem: Problem, damper: Damper) -> float:
     """Smallest misfit that T0, C and k alone reach while the effects stay as a damper has them."""
     unknowns = problem.unknowns(tuple(damper.effects))
     start = problem.start_with(damper)
-    _, _, (left, _) = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS)
-    return float(sum(each.residual @ each.residual for each in left))
+    _, _, (residuals, _) = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS)
+    return float(sum(r @ r for r in residuals))
 
 
 def _search(
     problem: Problem, unknowns: Sequence[Unknown], start: Array, free: int, evaluations: int
-) -> tuple[Array, Array, Found]:
+) -> tuple[Array, Array, Left]:
     """Where a search over the first `free` variables ends, (3 b + e,), with slopes, residuals and forces there."""
     from scipy.optimize import least_squares
 
@@ -108,22 +107,20 @@ def _search(
     def whole(x: Array) -> Array:
         return np.concatenate([x, begin[free:]])
 
-    known: dict[bytes, Found] = {}
+    known: dict[bytes, Left] = {}
 
-    def left_at(x: Array) -> Found:
+    def left_at(x: Array) -> Left:
         """Asked twice of each point, for its residuals and for its slopes."""
         key = x.tobytes()
         if key not in known:
-            known[key] = _left(problem, unknowns, whole(x))
+            known[key] = _residuals(problem, unknowns, whole(x))
         return known[key]
 
     def residuals_at(x: Array) -> Array:
-        return np.concatenate(
-            [*(each.residual for each in left_at(x)[0]), prior[:, : centre.size] @ (x[: centre.size] - centre)]
-        )
+        return np.concatenate([*left_at(x)[0], prior[:, : centre.size] @ (x[: centre.size] - centre)])
 
     def slopes_at(x: Array) -> Array:
-        return np.concatenate([_slopes(problem, unknowns, whole(x), free, left_at(x)), prior[:, :free]])
+        return np.concatenate([_slopes(problem, unknowns, whole(x), free, left_at(x)[1]), prior[:, :free]])
 
     found = least_squares(
         residuals_at,
@@ -159,27 +156,27 @@ def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array
     )
 
 
-def _left(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Found:
+def _residuals(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Left:
     point = problem.point(x, unknowns)
     forces = [simulated(point, o) for o in problem.observations]
-    return [o.left(f) for o, f in zip(problem.observations, forces, strict=True)], forces
+    return [o.in_noise(o.measured - f) for o, f in zip(problem.observations, forces, strict=True)], forces
 
 
-def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array, free: int, found: Found) -> Array:
+def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array, free: int, forces: Sequence[Array]) -> Array:
     """(w, free) derivatives of the residuals by forward differences; a test moves with its own voltage alone.
 
-    `found` is what is left at the point itself.
+    `forces` are those at the point itself.
     """
     rows = len(problem.base)
     shifted = [problem.point(_shifted(x, j), unknowns) for j in range(free)]
     blocks = []
-    for o, left, here in zip(problem.observations, *found, strict=True):
+    for o, here in zip(problem.observations, forces, strict=True):
         own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(3 * rows)
         moving = [
             j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]
         ]
         columns = [*own, *(3 * rows + j for j in moving if 3 * rows + j < free)]
-        change = left.slopes(np.stack([here - simulated(shifted[j], o) for j in columns], axis=-1) / DIFFERENCE)
+        change = o.in_noise(np.stack([here - simulated(shifted[j], o) for j in columns], axis=-1) / DIFFERENCE)
         block = np.zeros((len(change), free))
         block[:, columns] = change
         blocks.append(block)

@@ -41,6 +41,8 @@ class RecordLikelihood:
     """Samples of the motion that come before the first one compared."""
     stride: int
     """Motion samples from one compared sample to the next."""
+    compared: NDArray[np.bool_]
+    """(s,) which of the samples from the first on are compared: n of them, in one stretch or several."""
     measured: Array
     """(n,) force [N]."""
     peak: float
@@ -49,11 +51,9 @@ class RecordLikelihood:
     weights: Array
     """(H + 1,) of the harmonics of an average cycle; empty where samples are compared."""
     frame: Array
-    """(w, q) orthonormal columns, in units of noise, along which chance moves the force: jumps, instants."""
+    """(w, q) orthonormal columns, in units of noise, along which nuisances move the force."""
     shrink: Array
     """(q,) factor on the residual along each of them."""
-    own: Array
-    """(w, s) what one standard deviation of the test's own offset, gain and delay makes of the force, as `in_noise`."""
 
     @cached_property
     def steps(self) -> Array:
@@ -78,7 +78,7 @@ class RecordLikelihood:
 
     def at_compared(self, simulated: Array) -> Array:
         """(n,) or (n, p) of what was simulated at the samples that are compared."""
-        return simulated[self.first :: self.stride][: self.measured.size]
+        return simulated[self.first :: self.stride][: self.compared.size][self.compared]
 
     def shown(self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], late: float = 0.0) -> Array:
         """(m,) what was simulated as a channel shows it, between the samples by a cubic.
@@ -110,61 +110,25 @@ class RecordLikelihood:
         flat = self._scaled(values)
         return flat - self.frame @ ((1.0 - self.shrink).reshape(-1, *([1] * (flat.ndim - 1))) * (self.frame.T @ flat))
 
-    def left(self, force: Array, limit: float = np.inf) -> Left:
-        """What a simulated force (n,) leaves of the measured one beside the likeliest offset, gain and delay.
-
-        `limit` caps each of them, in standard deviations of its prior. The search goes without a cap: with one its
-        squares have kinks, between which it crawls where the noise is small. What is handed on is held to kept-back
-        tests, to which nothing is fitted.
-        """
-        residual = self.in_noise(self.measured - force)
-        normal = self.own.T @ self.own + np.eye(self.own.shape[1])
-        likeliest, free = _within(normal, self.own.T @ residual, limit)
-        return Left(self, np.concatenate([residual - self.own @ likeliest, likeliest]), free)
+    @cached_property
+    def _unbroken(self) -> NDArray[np.bool_]:
+        """Which whitened samples count: those whose predecessors, as many as the noise remembers, are compared too."""
+        return unbroken(self.compared, self.noise)
 
     def _scaled(self, values: Array) -> Array:
         if isinstance(self.noise, Autoregression):
-            return self.noise.whitened(values)
+            return self.noise.whitened(values)[self._unbroken]
         weights = self.weights.reshape(-1, *([1] * (values.ndim - 1)))
         harmonics = np.fft.rfft(values, axis=0)[: self.weights.size] / len(values) * weights
         return np.concatenate([harmonics.real, harmonics.imag[1:]])
 
 
-@dataclass(frozen=True, eq=False)
-class Left:
-    """What a simulated force leaves of the measured one, and how far the test's own offset, gain and delay had to go.
-
-    Equation: |r|^2 = min_b |r_0 - A b|^2 + |b|^2, |b_i| <= limit     Source: Gaussian prior, truncated
-    """
-
-    of: RecordLikelihood
-    residual: Array
-    """(w + s,) in units of noise, then offset, gain and delay in standard deviations of their priors."""
-    free: NDArray[np.bool_]
-    """(s,) which of offset, gain and delay are not at their limits, and follow the force."""
-
-    def slopes(self, values: Array) -> Array:
-        """(w + s, p) derivatives of the residual, from those of the measured less the simulated force (n, p)."""
-        change, own = self.of.in_noise(values), self.of.own[:, self.free]
-        following = np.linalg.solve(own.T @ own + np.eye(own.shape[1]), own.T @ change)
-        moved = np.zeros((self.free.size, change.shape[1]))
-        moved[self.free] = following
-        return np.concatenate([change - own @ following, moved])
-
-
-def _within(normal: Array, pull: Array, limit: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Minimum of b' N b / 2 - b' p within abs(b) <= limit, and which of b (s,) lie inside: an active set, few."""
-    found, free = np.zeros(pull.size), np.ones(pull.size, dtype=np.bool_)
-    for _ in range(2 * pull.size + 1):
-        inside = np.linalg.solve(normal[np.ix_(free, free)], pull[free] - normal[np.ix_(free, ~free)] @ found[~free])
-        found[free] = np.clip(inside, -limit, limit)
-        free_now = np.abs(found) < limit
-        outward = (pull - normal @ found) * np.sign(found) >= 0.0
-        free_now |= ~outward
-        if np.array_equal(free_now, free):
-            break
-        free = free_now
-    return found, free
+def unbroken(compared: NDArray[np.bool_], noise: PureError | Autoregression) -> NDArray[np.bool_]:
+    """Which whitened samples have all their predecessors in the same stretch of the samples (s,) that are compared."""
+    memory = noise.coefficients.size if isinstance(noise, Autoregression) else 0
+    before = np.convolve(compared, np.ones(memory + 1, dtype=np.int64))[: compared.size][compared][memory:]
+    whole: NDArray[np.bool_] = before == memory + 1
+    return whole
 
 
 def response(observation: RecordLikelihood, damper: Damper) -> Array:

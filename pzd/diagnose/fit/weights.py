@@ -12,7 +12,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.input_uncertainty import Predicted
-from pzd.diagnose.fit.likelihood import RecordLikelihood, responses
+from pzd.diagnose.fit.likelihood import RecordLikelihood, responses, unbroken
 from pzd.diagnose.fit.prediction import motion_of, warms
 from pzd.identify.trial import in_motion
 from pzd.record import Array, Record, sliced
@@ -26,6 +26,8 @@ RESOLUTION = 3e-4
 """No force is believed to be known better than this share of the record's peak (r.m.s.)."""
 INSTANT = 1e-6
 """Delay by which the slope of a force over time is taken [s]."""
+LATEST = 3.0
+"""At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope."""
 DISCREPANCY = 0.3
 """Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
 fitted: a model that still lacks something must not be bent to where the noise happens to be smallest."""
@@ -35,6 +37,8 @@ UNWEIGHTED = 0.05
 """What a plain element leaves [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k."""
 CYCLE_POINTS = 256
 """A cycle is simulated on at least this many points."""
+FEWEST_SAMPLES = 2 * CYCLE_POINTS
+"""Fewer samples of a motion that does not repeat do not show what colour their noise has."""
 MOST_POINTS = 2048
 """And on no more: the harmonics that are compared need no finer grid, however slow the test."""
 
@@ -52,9 +56,27 @@ def record_likelihood(
     given : what the damper makes of it, along which gain and delay act
     nuisance : priors of the test's own offset, gain and delay
     """
-    # Cycles differ where the damper warms, and their average would hide it.
-    averaged = p.cycles is not None and place >= 0 and not warms(p.record.temperature)
-    return (_of_cycles if averaged else _of_samples)(p, mask, place, given, nuisance)
+    if not enough(p, mask):
+        return None
+    return (_of_cycles if _averaged(p) else _of_samples)(p, mask, place, given, nuisance)
+
+
+def enough(p: Prepared, mask: NDArray[np.bool_]) -> bool:
+    """Whether some samples (n,) of a record can be weighed: a whole cycle where it repeats, else a long enough stretch.
+
+    Parameters
+    ----------
+    p : the record
+    mask : (n,) which of its samples count
+    """
+    if p.cycles is not None and _averaged(p):
+        return bool(p.cycles.whole(p.record.time, mask))
+    return int(np.count_nonzero(mask & in_motion(p.record))) >= FEWEST_SAMPLES
+
+
+def _averaged(p: Prepared) -> bool:
+    """Whether a record counts as its average cycle; cycles differ where the damper warms, and it would hide that."""
+    return p.cycles is not None and not warms(p.record.temperature)
 
 
 def _of_cycles(
@@ -64,10 +86,7 @@ def _of_cycles(
     if run is None:
         return None
     time, record, whole = p.record.time, p.record, p.folded
-    numbers = run.number(time)
-    counted = [n for n in range(run.count) if np.all(mask[numbers == n])]
-    if not counted:
-        return None
+    counted = run.whole(time, mask)
     simulated = run.fold(time, given.force)
     error = pure_error(whole - simulated)
     points = min(error.points, MOST_POINTS)
@@ -82,13 +101,13 @@ def _of_cycles(
         record.name,
         place,
         *_cycle_motion(record, run.period, [_resampled(channel, points) for channel in p.mean_motion]),
+        np.ones(cycle.size, dtype=np.bool_),
         cycle,
         peak,
         error,
         weights,
         np.zeros((2 * weights.size - 1, 0)),
         np.zeros(0),
-        np.zeros((2 * weights.size - 1, 0)),
     )
     return with_nuisances(bare, given.damper, nuisance)
 
@@ -132,36 +151,38 @@ def _resampled(cycle: Array, points: int) -> Array:
 
 def _of_samples(
     p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
-) -> RecordLikelihood | None:
+) -> RecordLikelihood:
     record, force = p.record, given.force
     mask = mask & in_motion(record)
-    start, stop = int(np.argmax(mask)), int(mask.size - np.argmax(mask[::-1]))
-    if stop - start < 2 * CYCLE_POINTS:
-        return None
+    first, *_, last = np.flatnonzero(mask)
+    start, stop = int(first), int(last) + 1
+    compared = mask[start:stop]
     noise = fit_smooth_residual(
         record.force[start:stop] - force[start:stop], _part(record, start, stop), force[start:stop]
     ).noise
-    peak = float(np.max(np.abs(record.force[start:stop])))
-    left = DISCREPANCY * _left_by(record.force[start:stop], force[start:stop], noise.variance)
+    measured = record.force[mask]
+    peak = float(np.max(np.abs(measured)))
+    left = DISCREPANCY * _left_by(measured, force[mask], noise.variance)
     if left**2 > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left**2)
     noise = Autoregression(noise.coefficients, max(noise.innovation, (RESOLUTION * peak) ** 2))
     motion, factor = motion_of(record, constant=p.constant)
+    rows = int(np.count_nonzero(unbroken(compared, noise)))
     bare = RecordLikelihood(
         record.name,
         place,
         motion,
         start * factor,
         factor,
-        record.force[start:stop],
+        compared,
+        measured,
         peak,
         noise,
         np.zeros(0),
-        np.zeros((stop - start - noise.coefficients.size, 0)),
+        np.zeros((rows, 0)),
         np.zeros(0),
-        np.zeros((stop - start - noise.coefficients.size, 0)),
     )
-    return with_nuisances(bare, given.damper, nuisance, given.timing[start:stop])
+    return with_nuisances(bare, given.damper, nuisance, given.timing[mask])
 
 
 def _part(record: Record, start: int, stop: int) -> Record:
@@ -173,10 +194,10 @@ def _part(record: Record, start: int, stop: int) -> Record:
 def with_nuisances(
     bare: RecordLikelihood, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
 ) -> RecordLikelihood:
-    """The observation with the test's own offset, gain and delay, jumps and instants of the voltage beside its noise.
+    """The observation with the test's own offset, gain and delay, jumps and instants of the voltage integrated out.
 
-    Equation: r' = (I + V V')^(-1/2) r, V = [jumps, s_t dF/dt_U]; A = (I + V V')^(-1/2) [-s_d dF/dt, s_o peak, s_g F],
-              all in units of noise                         Source: Gaussian prior, marginal and truncated likelihood
+    Equation: r' = (I + V V')^(-1/2) r, V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise
+                                                    Source: Gaussian prior, marginal likelihood
 
     A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
     that, F(t - d) - F + d dF/dt, is taken off the measured force.
@@ -184,20 +205,20 @@ def with_nuisances(
     shown = responses(bare, damper)
     force, averaged = shown(0.0), isinstance(bare.noise, PureError)
     late = (shown(INSTANT) - force) / INSTANT
-    chance = np.column_stack(
+    columns = np.column_stack(
         [
+            nuisance.delay_s * late,
+            np.full(force.size, nuisance.offset * bare.peak),
+            nuisance.gain * force,
             _neighbours_of(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
             *([] if timing is None else [timing]),
         ]
     )
-    frame, size, _ = np.linalg.svd(bare.in_noise(chance), full_matrices=False)
-    beside = replace(bare, frame=frame, shrink=1.0 / np.sqrt(1.0 + size**2))
-    own = np.column_stack(
-        [nuisance.delay_s * late, np.full(force.size, nuisance.offset * bare.peak), nuisance.gain * force]
-    )
-    whole = replace(beside, own=beside.in_noise(own))
-    delay = nuisance.delay_s * float(whole.left(force).residual[-own.shape[1]])
-    return replace(whole, measured=bare.measured - (shown(delay) - force - delay * late))
+    left, size, right = np.linalg.svd(bare.in_noise(columns), full_matrices=False)
+    likeliest = right[:, 0] @ (size / (1.0 + size**2) * (left.T @ bare.in_noise(bare.measured - force)))
+    delay = nuisance.delay_s * float(np.clip(likeliest, -LATEST, LATEST))
+    measured = bare.measured - (shown(delay) - force - delay * late)
+    return replace(bare, measured=measured, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
 
 
 def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLikelihood:
@@ -216,11 +237,11 @@ def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLi
     if isinstance(weighed.noise, Autoregression):
         white = Autoregression(np.zeros(0), scale**2)
         none = np.zeros((weighed.measured.size, 0))
-        return replace(weighed, noise=white, frame=none, shrink=np.zeros(0), own=none)
+        return replace(weighed, noise=white, frame=none, shrink=np.zeros(0))
     weights = np.full(weighed.weights.size, np.sqrt(2.0 * samples) / scale)
     weights[0] /= np.sqrt(2.0)
     none = np.zeros((2 * weights.size - 1, 0))
-    return replace(weighed, weights=weights, frame=none, shrink=np.zeros(0), own=none)
+    return replace(weighed, weights=weights, frame=none, shrink=np.zeros(0))
 
 
 def _neighbours_of(bends: Array) -> Array:

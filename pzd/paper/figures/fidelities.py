@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from pzd.artefacts import Ride, SummaryRow, base_of
+from pzd.artefacts import Rides, SummaryRow, base_of
 from pzd.paper.figures.canvas import COLOURS, BASELINE, SOFT, panels
 from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.figure import Drawing
@@ -22,7 +22,7 @@ from pzd.paper.car_search import (
 from pzd.paper.fidelity import SettingRides, rides_on
 from pzd.paper.published import LARGE_GAP, SMALL_GAP, published
 from pzd.comfort.iso2631_1978 import TRUST, Boundary, Exposure, exposure, shortest
-from pzd.report.ride_comfort import settled
+from pzd.report.ride_comfort import rated
 from pzd.simulate.linear import harmonic_response
 
 _BOUNDARY: Boundary = "reduced_comfort"
@@ -98,23 +98,20 @@ def _ideal(data: FigureData) -> list[Bar]:
         )
         bars.append(Bar(f"constant c = {damping:g} N s/m", BASELINE, peaks, times))
     rows = [data.ride(frequency, "comfort", "ideal") for frequency in FREQUENCIES]
-    return [*bars, _bar(data, "control, ideal", COLOURS[0], data.rides_of_setting.rides.rides, rows)]
+    return [*bars, _bar("control, ideal", COLOURS[0], data.rides_of_setting.rides, rows)]
 
 
 def _real(data: FigureData, gap: SettingRides) -> Iterator[Bar]:
     colour = COLOURS[1] if gap.setting == LARGE_GAP else COLOURS[2]
     for policy, fidelity in (("passive", "dynamic"), ("comfort", "table"), ("comfort", "dynamic")):
         rows = [row for row in gap.rides.summary if (row.policy, row.fidelity) == (policy, fidelity)]
-        yield _bar(data, f"{gap.setting}, {_NAMES[policy]}, {fidelity}", colour, gap.rides.rides, rows)
+        yield _bar(f"{gap.setting}, {_NAMES[policy]}, {fidelity}", colour, gap.rides, rows)
 
 
-def _bar(data: FigureData, name: str, colour: str, rides: tuple[Ride, ...], rows: list[SummaryRow]) -> Bar:
-    by_case = {ride.case: ride for ride in rides}
-    times = []
-    for row, frequency in zip(rows, FREQUENCIES, strict=True):
-        parts, _ = settled(by_case[row.case], row, data.simulate.settle_s, frequency).components
-        times.append(_time(shortest(parts, _BOUNDARY)))
-    return Bar(name, colour, tuple(row.peak_abs_aK_m_per_s2 for row in rows), tuple(times))
+def _bar(name: str, colour: str, rides: Rides, rows: list[SummaryRow]) -> Bar:
+    by_case = {ride.row.case: ride for ride in rated(rides)}
+    times = tuple(_time(shortest(by_case[row.case].components, _BOUNDARY)) for row in rows)
+    return Bar(name, colour, tuple(row.peak_abs_aK_m_per_s2 for row in rows), times)
 
 
 def _time(found: Exposure) -> str:

@@ -93,7 +93,7 @@ class FigureData:
         """What a run that is up to date as far as its parameters leads to by the paper's own, plain model."""
         rig, identified = run.read(Rig), run.read(Identified)
         setting = setting_in_use(config.setting, [entry.setting for entry in rig.entries])
-        ideal = config.simulate.model_copy(update={"policies": None, "fidelities": ("ideal",)})
+        ideal = config.simulate.model_copy(update={"policies": ("constant", "comfort"), "fidelities": ("ideal",)})
         rides_of_setting = rides_on(base_of(identified.rows, setting), setting, rig, ideal, config.table, run.control)
         return cls(rig, identified, rides_of_setting, config.simulate, config.table, run.control, setting)
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from pzd.artefacts import SummaryRow
 from pzd.comfort import iso2631_1997
-from pzd.report.context import REFERENCE, ReportContext, policy_in_words
-from pzd.report.drawing import BASELINE, BY_FIDELITY, Panel, Plot, axes
+from pzd.report.context import ReportContext
+from pzd.report.drawing import Panel, Plot, axes, line_of
 from pzd.report.wording import number
 
 if TYPE_CHECKING:
@@ -26,27 +26,29 @@ def draw(context: ReportContext) -> Iterator[Panel]:
         values = [(row, context.value(row.case, "a_w")) for row in context.cases(road)]
         known = [(row, value) for row, value in values if value is not None]
         if known:
-            yield _panel(context.road(road), known[::-1])
+            yield _panel(context, road, known[::-1])
 
 
-def _panel(road: str, known: list[tuple[SummaryRow, float]]) -> Panel:
-    names = [policy_in_words(row) for row, _ in known]
+def _panel(context: ReportContext, road: str, known: list[tuple[SummaryRow, float]]) -> Panel:
+    names = [context.dampers(row) for row, _ in known]
     figure, ax = axes(max(1.5 + 0.25 * len(known), _HEIGHT), names, key=0)
     right = max(2.6, 1.15 * max(value for _, value in known))
     _bands(ax, len(known), right)
     for place, (row, value) in enumerate(known):
-        constant = row.policy == REFERENCE
-        colour = BASELINE if constant else BY_FIDELITY[row.fidelity]
-        ax.plot(value, place, "o" if constant else "s", color=colour, markersize=6.0, zorder=3)
+        colour, controlled = line_of(context, row)
+        ax.plot(value, place, "s" if controlled else "o", color=colour, markersize=6.0, zorder=3)
     ax.set_yticks(range(len(known)), names)
     ax.set_ylim(-0.6, len(known) + 2.6)
     ax.set_xlim(0.0, right)
     ax.set_xlabel("a_w [m/s²]")
     ax.grid(visible=False, axis="y")
-    alt = "; ".join(f"{policy_in_words(row)}: {number(value)} m/s²" for row, value in known[::-1])
-    title = f"How it is likely to be felt, {road}"
+    alt = "; ".join(f"{context.dampers(row)}: {number(value)} m/s²" for row, value in known[::-1])
+    title = f"How it is likely to be felt, {context.road(road)}"
     return Panel(
-        figure, title, f"Weighted r.m.s. a_w on {road}: {alt}.", "Bands overlap; the last two are not verified."
+        figure,
+        title,
+        f"Weighted r.m.s. a_w on {context.road(road)}: {alt}.",
+        "Bands overlap; the last two are not verified.",
     )
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pzd.comfort import iso2631_1978
-from pzd.report.context import REFERENCE, ReportContext, policy_in_words
-from pzd.report.drawing import BASELINE, BY_FIDELITY, Panel, Plot, axes, legend
+from pzd.report.context import ReportContext
+from pzd.report.drawing import Panel, Plot, axes, legend, line_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,11 +20,11 @@ _SMALLEST = 0.02
 
 
 def draw(context: ReportContext) -> Iterator[Panel]:
-    """Lines of equal time, and every component of the rides."""
+    """Lines of equal time, and every component of the controlled ride and of the best one beside it."""
     if iso2631_1978.EDITION not in context.config.editions:
         return
     for road in context.roads:
-        rows = [row for row in (context.reference(road), *context.controlled(road)[:1]) if row is not None]
+        rows = context.nearest(road)[:2]
         if rows:
             yield _panel(context, road, [row.case for row in rows])
 
@@ -32,13 +32,12 @@ def draw(context: ReportContext) -> Iterator[Panel]:
 def _panel(context: ReportContext, road: str, cases: list[str]) -> Panel:
     figure, ax = axes(3.3)
     _boundaries(ax)
-    for ride in (ride for ride in context.settled if ride.row.case in cases):
-        parts, _ = ride.components
+    for ride in (ride for ride in context.rated if ride.row.case in cases):
+        parts = ride.components
         kept = parts.rms >= _SMALLEST * float(parts.rms.max())
-        constant = ride.row.policy == REFERENCE
-        colour = BASELINE if constant else BY_FIDELITY[ride.row.fidelity]
-        label = policy_in_words(ride.row)
-        marker = "o" if constant else "s"
+        colour, controlled = line_of(context, ride.row)
+        label = context.dampers(ride.row)
+        marker = "s" if controlled else "o"
         ax.plot(parts.frequency[kept], parts.rms[kept], marker, color=colour, markersize=6.0, label=label, zorder=3)
     ax.set_xlabel("frequency [Hz]")
     ax.set_ylabel("acceleration, r.m.s. [m/s²]")

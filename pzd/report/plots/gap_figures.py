@@ -10,8 +10,10 @@ from pzd.report.wording import number
 
 
 def draw(context: ReportContext) -> Iterator[Panel]:
-    """Bars before, after and of noise; before and noise alone where nothing was adopted."""
+    """Bars before, after and of noise; before and noise alone where nothing was adopted; none where it is unknown."""
     gap = context.diagnosed.diagnosis.gap
+    if gap is None:
+        return
     noise, after = ("noise alone", gap.noise_floor, MEASURED), ("after", gap.after, FINAL)
     before = ("before" if context.extended else "simple model", gap.before, BASELINE)
     bars = [noise, after, before] if context.extended else [noise, before]

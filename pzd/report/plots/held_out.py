@@ -15,9 +15,10 @@ _MOST = 16
 
 def draw(context: ReportContext) -> Iterator[Panel]:
     """Two dots a record, joined; nothing where diagnose changed nothing."""
-    if not context.extended:
+    gap = context.diagnosed.diagnosis.gap
+    if not context.extended or gap is None:
         return
-    held_out = set(context.diagnosed.diagnosis.gap.held_out)
+    held_out = set(gap.held_out)
     records = [record for record in context.records if record.name in held_out][:_MOST][::-1]
     if not records:
         return

@@ -126,11 +126,15 @@ def _responses(context: ReportContext) -> Sheet:
             f"{context.voltage(r.from_voltage_V)} to {context.voltage(r.to_voltage_V)}",
             amount(r.velocity_m_per_s, "m/s"),
             *(f"{number(1000.0 * t)} ms" if t is not None else DASH for t in (r.to_63_percent_s, r.to_90_percent_s)),
+            r.note,
         )
         for r in context.rides.responses
     )
     return Sheet(
-        "Answer to a step at constant speed", ("signal", "step", "speed", "to 63 %", "to 90 %"), rows, len(rows) > _FOLD
+        "Answer to a step at constant speed",
+        ("signal", "step", "speed", "to 63 %", "to 90 %", ""),
+        rows,
+        len(rows) > _FOLD,
     )
 
 

@@ -38,6 +38,8 @@ def verdict(diagnosis: Diagnosis) -> str:
     adopted = listed(effects_in_words(diagnosis.effects))
     if diagnosis.verdict == "named":
         text = f"Missing from the simple model: {adopted}"
+    elif diagnosis.verdict == "ambiguous" and not diagnosis.effects:
+        text = "These tests do not settle whether anything is missing"
     elif diagnosis.verdict == "ambiguous":
         rivals = listed(effects_in_words(diagnosis.rivals), "or")
         text = f"These tests do not settle what is missing. Best: {adopted or DASH}; also possible: {rivals or DASH}"
@@ -51,6 +53,8 @@ def verdict(diagnosis: Diagnosis) -> str:
 
 def _gap(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
+    if gap is None:
+        return ""
     left = f"standard error {number(gap.standard_error, 2)}, noise alone {number(gap.noise_floor)}"
     if gap.after == gap.before:
         text = f"The model is handed on unchanged: W_s on held-out data is {number(gap.before)} ({left})."

@@ -1,4 +1,4 @@
-"""What the passenger feels: controlled beside constant damping, with and without the missing effect."""
+"""What the passenger feels: the controlled ride beside the others, with and without the missing effect."""
 
 from __future__ import annotations
 
@@ -7,25 +7,24 @@ from collections.abc import Iterator
 from pzd.artefacts import SummaryRow
 from pzd.comfort import directive, iso2631_1978, iso2631_1997
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
-from pzd.report.context import REFERENCE, ReportContext, policy_in_words
+from pzd.report.context import Comparison, ReportContext
 from pzd.report.sections.pictures import Pictures, by_turns
 from pzd.report.wording import DASH, amount, minutes, number, percent
 from pzd.simulate.policies import policies
 
 COMFORT_TIME = "exposure_time_reduced_comfort"
-BEYOND_COMFORT = {
-    "exposure_time_fatigue_decreased_proficiency": "until fatigue",
-    "exposure_time_exposure_limit": "until the exposure limit",
-}
-"""The boundaries that tell rides apart which are over that of comfort from the start, in words."""
+
+
+_SAME = 0.0005
+"""A change of a smaller share is none."""
 
 
 def render(context: ReportContext, pictures: Pictures) -> Section:
     """The fifth section."""
     blocks: list[Block] = [Paragraph(_ride(context)), *_meanings(context)]
-    blocks += [block for road in context.roads for block in _compared(context, road)]
+    blocks += _compared(context)
     blocks += by_turns(pictures["passenger"])
-    blocks += [_accelerations(context), *_exposures(context), _suspension(context), *_daily(context)]
+    blocks += [_accelerations(context), _suspension(context), _wheels(context), *_exposures(context), *_daily(context)]
     worth = _worth(context)
     if worth.rows:
         text = "The same rides on the damper before anything was added to it: what the missing effect is worth."
@@ -51,7 +50,7 @@ def _meanings(context: ReportContext) -> tuple[Notes, ...]:
     rows = _all(context)
     used = {row.policy for row in rows}
     names = [f"{name}: {policy.meaning}" for name, policy in policies().items() if name in used]
-    exact = {row.fidelity for row in rows if row.policy != REFERENCE}
+    exact = {row.fidelity for row in rows}
     names += [f"{name}: {text}" for name, text in _FIDELITIES.items() if name in exact]
     return (Notes(tuple(names)),) if names else ()
 
@@ -64,63 +63,59 @@ def _ride(context: ReportContext) -> str:
         f"A half-car ({car.name}: {amount(car.mass, 'kg', 4)}, springs {springs} kN/m, wheelbase "
         f"{amount(car.wheelbase, 'm')}) at {amount(config.vehicle_speed_km_per_h, 'km/h')}, judged at point K, "
         f"{amount(abs(car.comfort_point), 'm')} {'behind' if car.comfort_point > 0.0 else 'ahead of'} the centre of "
-        f"gravity. Constant c is {amount(config.constant_damping_Ns_per_m, 'N s/m', 4)} at each axle. The first "
-        f"{amount(config.settle_s, 's')} of each ride are left out."
+        f"gravity. {' '.join(_windows(context))}"
     )
 
 
-def _compared(context: ReportContext, road: str) -> tuple[Block, ...]:
-    """One road: constant damping in a sentence, and what each controlled ride makes of it."""
-    reference, controlled = context.reference(road), context.controlled(road)
-    if reference is None or not controlled:
-        return ()
-    text = f"{context.road(road)}, at {policy_in_words(reference)}: {_reaction_to(context, reference)}. Under control:"
-    items = (
-        f"{policy_in_words(row)}: {_reaction_to(context, row)}{_gain(context, reference, row)}" for row in controlled
+def _windows(context: ReportContext) -> Iterator[str]:
+    """In which part of a ride its numbers are taken."""
+    spans = {ride.row.road: ride.ridden for ride in context.rated if ride.of_event}
+    if any(not ride.of_event for ride in context.rated):
+        yield f"The first {amount(context.simulate.settle_s, 's')} of each ride are left out."
+    for road, span in spans.items():
+        yield (
+            f"The numbers on {road} are taken from {amount(span.from_s, 's')}, when axle 1 meets it, to "
+            f"{amount(span.to_s, 's')}, when the motion of every ride over it has died away or falls no further."
+        )
+
+
+def _compared(context: ReportContext) -> Iterator[Block]:
+    """The controlled policy beside every other at the same fidelity."""
+    found = [one for road in context.roads for one in context.comparisons(road)]
+    if not found:
+        return
+    policy = found[0].controlled.policy
+    yield Paragraph(
+        f"The policy {policy} is set beside the others on the same road and at the same fidelity. What the best of "
+        "the others hold was searched for on each road and at each fidelity, so that a_w is least."
     )
-    return Paragraph(text), Notes(tuple(items))
+    header = ("road", "fidelity", "beside", f"a_w {policy}", "a_w of the other", "a_w", "wheel load", "travel")
+    rows = tuple(_comparison_row(context, one, other) for one in found for other in one.others)
+    yield Sheet(f"{policy} beside the others at the same fidelity (a_w: ISO 2631-1:1997)", header, rows)
 
 
-def _reaction_to(context: ReportContext, row: SummaryRow) -> str:
-    a_w = context.value(row.case, "a_w")
-    level = "" if a_w is None else f", a_w {amount(a_w, 'm/s2')}"
-    return f"peak acceleration {amount(row.peak_abs_aK_m_per_s2, 'm/s2')}{level}"
-
-
-def _gain(context: ReportContext, reference: SummaryRow, row: SummaryRow) -> str:
-    before, after = context.value(reference.case, "a_w"), context.value(row.case, "a_w")
-    less = f" ({change(before, after)})" if before and after is not None else ""
-    if iso2631_1978.EDITION not in context.config.editions:
-        return less
-    return f"{less}; within reduced comfort, if nothing else is said, {times(context, reference, row)}"
+def _comparison_row(context: ReportContext, one: Comparison, other: SummaryRow) -> tuple[str, ...]:
+    mine = one.controlled
+    return (
+        mine.road,
+        mine.fidelity,
+        context.policy(other),
+        amount(context.a_w(mine), "m/s2"),
+        amount(context.a_w(other), "m/s2"),
+        change(context.a_w(other), context.a_w(mine)),
+        change(other.rms_wheel_load_N, mine.rms_wheel_load_N),
+        change(other.peak_deflection_m, mine.peak_deflection_m),
+    )
 
 
 def change(before: float, after: float) -> str:
     """A change in percent, in words."""
-    share = after / before - 1.0
-    return f"{percent(abs(share))} {'less' if share <= 0.0 else 'more'}"
-
-
-def times(context: ReportContext, reference: SummaryRow, controlled: SummaryRow) -> str:
-    """Time within reduced comfort of a controlled ride beside that at constant damping.
-
-    Where both are over that boundary from the start, the next one that either keeps to at all is taken, and said.
-    """
-    for measure, until in ((COMFORT_TIME, ""), *BEYOND_COMFORT.items()):
-        before, after = (context.value(row.case, measure) for row in (reference, controlled))
-        if before or after:
-            return f"{_before_and_after(before, after)}{f' {until}' if until else ''}"
-    return _before_and_after(*(context.value(row.case, COMFORT_TIME) for row in (reference, controlled)))
-
-
-def _before_and_after(before: float | None, after: float | None) -> str:
-    if before is None or after is None:
+    if before == 0.0:
         return DASH
-    if before == after:
-        return f"{minutes(after)} either way"
-    told = before > 0.0 and 0.0 < after < iso2631_1978.LONGEST_MIN
-    factor = f" ({number(after / before, 2)} times)" if told else ""
-    return f"{minutes(after)} instead of {minutes(before)}{factor}"
+    share = after / before - 1.0
+    if abs(share) < _SAME:
+        return "the same"
+    return f"{percent(abs(share))} {'less' if share <= 0.0 else 'more'}"
 
 
 def _all(context: ReportContext) -> list[SummaryRow]:
@@ -132,7 +127,7 @@ def _accelerations(context: ReportContext) -> Sheet:
     rows = tuple(
         (
             row.road,
-            policy_in_words(row),
+            context.dampers(row),
             amount(row.peak_abs_aK_m_per_s2, "m/s2"),
             amount(row.rms_aK_m_per_s2, "m/s2"),
             *(amount(context.value(row.case, name), unit) for name, unit in _WEIGHTED),
@@ -157,7 +152,7 @@ def _exposures(context: ReportContext) -> Iterator[Sheet]:
     rows = tuple(
         (
             row.road,
-            policy_in_words(row),
+            context.dampers(row),
             *(minutes(context.value(row.case, f"exposure_time_{boundary}")) for boundary in iso2631_1978.FACTORS),
             _status(context, row.case),
         )
@@ -181,7 +176,7 @@ def _suspension(context: ReportContext) -> Sheet:
     rows = tuple(
         (
             row.road,
-            policy_in_words(row),
+            context.dampers(row),
             f"{number(1000.0 * row.peak_deflection_m)} mm",
             amount(row.rms_wheel_load_N, "N"),
             amount(row.rms_jerk_m_per_s3, "m/s3"),
@@ -192,6 +187,24 @@ def _suspension(context: ReportContext) -> Sheet:
     return Sheet("What comfort costs: travel and wheel load", header, rows)
 
 
+def _wheels(context: ReportContext) -> Sheet:
+    header = ("road", "dampers", "axle", "static load", "least contact force", "pulling on the road")
+    shown = {row.case: row for row in _all(context)}
+    rows = tuple(
+        (
+            shown[wheel.case].road,
+            context.dampers(shown[wheel.case]),
+            str(wheel.axle),
+            amount(wheel.static_load_N, "N"),
+            amount(wheel.min_contact_force_N, "N"),
+            f"{percent(wheel.pulling)} of the time",
+        )
+        for wheel in context.rides.wheels
+        if wheel.case in shown
+    )
+    return Sheet("Force between wheel and road: the static load less what the suspension pulls", header, rows)
+
+
 def _daily(context: ReportContext) -> Iterator[Sheet]:
     if directive.EDITION not in context.config.editions:
         return
@@ -199,7 +212,7 @@ def _daily(context: ReportContext) -> Iterator[Sheet]:
     rows = tuple(
         (
             row.road,
-            policy_in_words(row),
+            context.dampers(row),
             amount(context.value(row.case, "A(8)"), "m/s2"),
             amount(context.value(row.case, "VDV_day"), "m/s^1.75"),
             *(amount(context.value(row.case, f"time_to_{name}_value"), "h") for name in ("action", "limit")),
@@ -216,7 +229,7 @@ def _worth(context: ReportContext) -> Sheet:
     rows = tuple(
         (
             row.road,
-            policy_in_words(row),
+            context.dampers(row),
             *(amount(each.peak_abs_aK_m_per_s2, "m/s2") for each in (other, row)),
             *(amount(context.value(each.case, "a_w"), "m/s2") for each in (other, row)),
             *(minutes(context.value(each.case, COMFORT_TIME)) for each in (other, row)),
@@ -228,7 +241,7 @@ def _worth(context: ReportContext) -> Sheet:
 
 
 def _beyond(context: ReportContext) -> Iterator[str]:
-    for ride in context.settled:
-        found = iso2631_1997.evaluate(ride.weighted, ride.rate).beyond
+    for ride in context.rated:
+        found = ride.evaluation.beyond
         if found and iso2631_1997.EDITION in context.config.editions:
             yield f"{ride.row.case}: {'; '.join(found)}"

@@ -8,7 +8,7 @@ from pzd.artefacts import ENERGY_LIMIT, ParameterRow
 from pzd.comfort import iso2631_1978
 from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
 from pzd.report.context import ReportContext
-from pzd.report.wording import number, percent
+from pzd.report.wording import amount, number, percent
 
 _MUCH = 0.01
 
@@ -50,6 +50,14 @@ def _cares(context: ReportContext) -> Iterator[str]:
             f"{len(beyond)} rides leave what the rig reached ({number(context.table.notes.reached_m_per_s)} m/s), "
             f"{worst.case} for {percent(worst.outside_table)} of its time: "
             f"{does[context.table.notes.outside]}, untested"
+        )
+    pulling = [row for row in context.rides.wheels if row.pulling > _MUCH]
+    if pulling:
+        axle = min(pulling, key=lambda row: row.min_contact_force_N)
+        yield (
+            f"the wheels of {len({row.case for row in pulling})} rides pull on the road, which no wheel can; worst "
+            f"axle {axle.axle} of {axle.case}: {amount(axle.min_contact_force_N, 'N')}, and "
+            f"{percent(axle.pulling)} of its time; a real wheel would leave the road"
         )
     if iso2631_1978.EDITION in context.config.editions:
         yield f"the exposure times of {iso2631_1978.EDITION}, withdrawn in 1997, rest on an {iso2631_1978.TRUST}"

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pzd.damper.compose import (
     element_rows,
+    integrated_force,
     parallel_rows,
     recorded,
     respond,
@@ -16,7 +19,7 @@ from pzd.damper.compose import (
 from pzd.damper.kernels import K, parallel_forces, row_of, stroke_straight
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.damper.path import deflections, march
+from pzd.damper.path import deflections
 from pzd.record import Array
 
 TOLERANCE = 1e-7
@@ -58,7 +61,7 @@ def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None
     own = np.array(element_rows(damper, effective, motion.temperature))
     rows = own.copy()
     rows[:, K] /= 1.0 + own[:, K] / frame_stiffness
-    force = march(motion.displacement, motion.velocity, steps, rows, 0.0, TOLERANCE)
+    force = integrated_force(rows, motion, steps, 0.0, TOLERANCE)
     parallel = parallel_rows(damper, effective)
     if parallel is not None or not all(stroke_straight(row_of(row)) for row in own):
         force = _by_rounds(motion, steps, own, rows, parallel, force, frame_stiffness)
@@ -98,7 +101,6 @@ def _by_rounds(
         change = max(np.max(np.abs(more - last[0])), frame_stiffness * np.max(np.abs(bend - last[1])))
         if change <= _SETTLED * np.max(np.abs(total)):
             break
-        element = march(
-            motion.displacement - more / frame_stiffness + bend, motion.velocity, steps, rows, 0.0, TOLERANCE
-        )
+        behind = replace(motion, displacement=motion.displacement - more / frame_stiffness + bend)
+        element = integrated_force(rows, behind, steps, 0.0, TOLERANCE)
     return np.asarray(element + more)

@@ -2,4 +2,4 @@
 
 from pzd.simulate.policy import Policy
 
-POLICY = Policy("comfort", "smallest acceleration at K among the forces within reach", "minimise")
+POLICY = Policy("comfort", "smallest acceleration at K among the forces within reach", "minimise", controlled=True)

@@ -19,4 +19,4 @@ def feedback(car: HalfCar, damping: float) -> Array:  # the signature of every f
     return gains
 
 
-POLICY = Policy("constant", "constant damping coefficient at both axles", "damping", feedback)
+POLICY = Policy("constant", "constant damping coefficient at both axles", "damping", feedback=feedback)

@@ -19,4 +19,10 @@ def feedback(car: HalfCar, damping: float) -> Array:
     return gains
 
 
-POLICY = Policy("skyhook", "the force of a damper between body and sky, where it is within reach", "feedback", feedback)
+POLICY = Policy(
+    "skyhook",
+    "the force of a damper between body and sky, where it is within reach",
+    "feedback",
+    controlled=True,
+    feedback=feedback,
+)

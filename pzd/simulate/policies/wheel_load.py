@@ -19,4 +19,4 @@ def feedback(car: HalfCar, damping: float) -> Array:  # the signature of every f
     return gains
 
 
-POLICY = Policy("wheel_load", "smallest change of each wheel's load", "feedback", feedback)
+POLICY = Policy("wheel_load", "smallest change of each wheel's load", "feedback", controlled=True, feedback=feedback)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Literal
 
@@ -10,11 +11,13 @@ from pydantic import Field
 from typing_extensions import override
 
 from pzd.record import Array
-from pzd.schema.errors import DataError, FilesError
+from pzd.schema.errors import ConfigError, DataError, FilesError
 from pzd.simulate.profile import Profile, through
 from pzd.simulate.road import Road, Way
 
 _HEADER = "distance_m,height_m"
+_SAME = 1e-9
+"""Lengths that differ by less than this share are the same."""
 
 
 class RoadFile(Road):
@@ -25,7 +28,8 @@ class RoadFile(Road):
     path: str
     """The CSV file; a relative path counts from the config."""
     spacing_m: float = Field(default=0.05, gt=0.0)
-    """The heights are read at this spacing, by linear interpolation, and joined by a smooth curve."""
+    """The heights are read at this spacing or a little closer, by linear interpolation, and joined by a smooth
+    curve."""
 
     @override
     def own_name(self) -> str:
@@ -33,9 +37,18 @@ class RoadFile(Road):
 
     @override
     def profile(self, way: Way) -> Profile:
-        place, height = _read(way.folder / self.path)
-        even = np.arange(0.0, place[-1] - place[0], self.spacing_m)
-        return through(np.interp(even, place - place[0], height), self.spacing_m)
+        path = way.folder / self.path
+        place, height = _read(path)
+        length = float(place[-1] - place[0])
+        if length < way.distance * (1.0 - _SAME):
+            raise ConfigError(
+                f"{way.key}.path: {path} is shorter than the ride: {way.distance:.6g} m are needed for "
+                f"{way.distance / way.vehicle_speed:g} s at {way.vehicle_speed:.4g} m/s; make simulate.duration_s "
+                f"{length / way.vehicle_speed:.4g} s or less, or give a longer road (got {length:.6g} m)"
+            )
+        spaces = math.ceil(length / self.spacing_m * (1.0 - _SAME))
+        even = np.linspace(0.0, length, spaces + 1)
+        return through(np.interp(even, place - place[0], height), length / spaces)
 
 
 def _read(path: Path) -> tuple[Array, Array]:

@@ -1,20 +1,31 @@
-"""A road drawn from the spectrum of an ISO 8608 class; each seed is another road of the same class."""
+"""A road drawn from the spectrum of an ISO 8608 class; each seed is another road of the same class.
+
+The height is a function of place and seed alone: a longer ride meets the same road and goes on.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Literal
+from zlib import crc32
 
 import numpy as np
 from pydantic import Field, field_validator
 from typing_extensions import override
 
+from pzd.record import Array
 from pzd.signals.iso8608 import classes
 from pzd.signals.iso8608 import profile as drawn
 from pzd.simulate.profile import Profile, through
 from pzd.simulate.road import Road, Way
 
-_LEAST_LENGTH = 100.0
-"""A shorter ride still gets a road of this length [m], so that its long waves are there."""
+_PIECE = 1000.0
+"""The road is made of pieces of this length [m], ten times its longest wave, drawn one by one."""
+_BAND_FROM = 0.01
+"""Lowest wavenumber [cycles/m]; ISO 8608 begins at 0.011."""
+_KNOTS_A_WAVE = 16
+_MARGIN = 100
+"""Knots behind the ride: the end of a spline is felt through fewer than these."""
 _RUN_IN = 5.0
 """Length over which the road rises out of the level [m]."""
 
@@ -28,6 +39,9 @@ class Iso8608(Road):
     """Class A (very good) to H."""
     shortest_wave_m: float = Field(default=0.3, gt=0.0)
     """Waves shorter than this are left out: the tyre's footprint swallows them."""
+    seed: int | None = Field(default=None, ge=0)
+    """Of this road: the same seed gives the same road, in another run too. By default it comes from the
+    seed of the run and the name of the road."""
 
     @field_validator("road_class")
     @classmethod
@@ -42,14 +56,29 @@ class Iso8608(Road):
 
     @override
     def profile(self, way: Way) -> Profile:
-        length = max(way.distance, _LEAST_LENGTH)
-        draw = np.random.default_rng([way.seed, ord(self.road_class[0])])
-        road = drawn(classes()[self.road_class], length, draw, (0.01, 1.0 / self.shortest_wave_m))
-        steps = int(16.0 * length / self.shortest_wave_m)
-        spacing = length / steps
-        place = spacing * np.arange(steps + 1, dtype=np.float64)
-        rising = np.clip(place / _RUN_IN, 0.0, 1.0)
-        return through(road(place)[0] * rising * rising * (3.0 - 2.0 * rising), spacing)
+        """The road as far as the ride goes.
+
+        Equation: xi = cos(r) xi_k + sin(r) xi_(k+1), r from 0 to pi/2 over half a piece; cos2 + sin2 = 1 keeps the
+        spectrum
+        """
+        seed = [way.seed, crc32(self.name.encode())] if self.seed is None else [self.seed]
+        half = math.ceil(0.5 * _KNOTS_A_WAVE * _PIECE / self.shortest_wave_m)
+        spacing = 0.5 * _PIECE / half
+        knots = math.ceil(way.distance / spacing) + _MARGIN
+        fade = 0.5 * np.pi * np.arange(half) / half
+        piece, parts = self._piece([*seed, 0], 2 * half), []
+        for number in range(1, knots // half + 2):
+            following = self._piece([*seed, number], 2 * half)
+            parts.append(np.cos(fade) * piece[half:] + np.sin(fade) * following[:half])
+            piece = following
+        rising = np.clip(spacing * np.arange(knots + 1) / _RUN_IN, 0.0, 1.0)
+        return through(np.concatenate(parts)[: knots + 1] * rising * rising * (3.0 - 2.0 * rising), spacing)
+
+    def _piece(self, seed: list[int], knots: int) -> Array:
+        """(knots,) heights of one piece [m], of a draw of its own."""
+        band = (_BAND_FROM, 1.0 / self.shortest_wave_m)
+        road = drawn(classes()[self.road_class], _PIECE, np.random.default_rng(seed), band)
+        return road(_PIECE / knots * np.arange(knots, dtype=np.float64))[0]
 
 
 ROAD = Iso8608

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pzd.artefacts import RIDE_COLUMNS
+from pzd.artefacts import RIDE_COLUMNS, WheelRow
 from pzd.paper.figures.canvas import FINAL, BASELINE, key, panels
 from pzd.paper.figures.cars import survey
 from pzd.paper.figures.sources import FigureData
@@ -49,9 +49,34 @@ def accelerations(data: FigureData) -> Drawing:
     caption = (
         f"Settled rides, forces ideal within c_min and c_max, tie-break {data.simulate.tie_break}. Peaks: "
         + "; ".join(captions)
-        + "."
+        + f". {contact(data)}"
     )
     return Drawing("acceleration", figure, "Magnitude of the acceleration at K over time at 2.25 and 4.5 Hz.", caption)
+
+
+def contact(data: FigureData) -> str:
+    """The force between wheels and road in the controlled rides, in words.
+
+    The paper's half-car has no unsprung masses: wheels without mass hand on the force of spring and damper, so that
+    the road feels it and the static load, see `pzd.simulate.outcome.wheel_rows`.
+    """
+    told = []
+    for frequency in FREQUENCIES:
+        case = data.ride(frequency, "comfort", "ideal").case
+        worst = min((w for w in data.rides_of_setting.rides.wheels if w.case == case), key=_least)
+        told.append(
+            f"{worst.min_contact_force_N / 1000.0:.1f} kN at axle {worst.axle} at {frequency:g} Hz, "
+            f"0 or less {worst.pulling:.0%} of the time"
+        )
+    return (
+        "The car has no unsprung masses, so the force between wheel and road is the static load less the force of "
+        f"spring and damper; under control it falls to {'; '.join(told)}: below 0 the wheels pull on the road, which no "
+        "wheel can."
+    )
+
+
+def _least(wheel: WheelRow) -> float:
+    return wheel.min_contact_force_N
 
 
 FIGURE = PaperFigure(

@@ -1,0 +1,116 @@
+"""More effects for a damper that leaves a gap without a name: those with which it predicts kept-back tests better.
+
+Where a law is missing that no name accounts for, evidence weighed by noise misleads: each law is bent towards what is
+missing, and takes other values on other tests. What counts there is what the damper is for, to predict tests. An effect
+is added if whole tests that no fit has seen are predicted better with it, beyond chance, and at no voltage worse. That
+makes no name of it: the verdict stays `unexplained`.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from pzd.damper.effects import library
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.fit.least_squares import Fitted
+from pzd.diagnose.fit.parameters import Problem
+from pzd.diagnose.kept_back import Trials
+from pzd.diagnose.missed import Missed
+from pzd.diagnose.search.candidates import Candidate, by_voltage, candidate, seen_in
+from pzd.diagnose.search.selection import Selection, against_nature
+from pzd.diagnose.search.starts import most_promising
+from pzd.diagnose.thresholds import LEAST_CUT_IN_PREDICTION, PREDICTED_AT_ONCE, SCREENED
+
+log = logging.getLogger(__name__)
+
+ADDED = "added: kept-back tests are predicted better with it; what it stands for is open"
+
+
+@dataclass(frozen=True, eq=False)
+class Extended:
+    """A damper with more effects."""
+
+    selection: Selection
+    missed: Missed
+    """What it misses of kept-back tests."""
+    effects: tuple[str, ...]
+    """What was added, best first."""
+
+
+def with_predictive_effects(
+    selection: Selection, missed: Missed, trials: Trials, config: DiagnoseConfig
+) -> Extended | None:
+    """The damper with the effects that improve its prediction of kept-back tests, added one after another.
+
+    All fits are by criterion (4), every sample alike, and nothing is fitted to a kept-back test.
+
+    Parameters
+    ----------
+    selection : what was adopted
+    missed : what the damper misses of kept-back tests
+    trials : the tests, dealt into folds
+    config : how many effects there may be, which are forbidden, what is visible
+
+    Returns
+    -------
+    None where nothing improves the prediction
+    """
+    added: dict[str, str] = {}
+    at = trials.fitted_by_criterion(selection.fitted.damper, trials.nothing)
+    while at is not None:
+        found = _best(*at, missed, trials, config)
+        if found is None:
+            break
+        chosen, missed = found
+        added[chosen.effect] = ADDED
+        log.info("diagnose: %s added, W_s of kept-back tests %.4g", chosen.effect, missed.criterion)
+        at = trials.fitted_by_criterion(chosen.fitted.damper, trials.nothing)
+    if at is None or not added:
+        return None
+    problem, fitted = at
+    reasons = {**selection.reasons, **added}
+    last = replace(selection.last, whole=problem)
+    return Extended(replace(selection, fitted=fitted, last=last, reasons=reasons), missed, tuple(added))
+
+
+def _best(
+    problem: Problem, fitted: Fitted, missed: Missed, trials: Trials, config: DiagnoseConfig
+) -> tuple[Candidate, Missed] | None:
+    """Of the candidates that fit best, the one that predicts best; None where none predicts better than without it."""
+    promising = sorted(_tried(problem, fitted, config), key=lambda c: c.delta_bic)[:PREDICTED_AT_ONCE]
+    better = []
+    for each in promising:
+        predicted = trials.missed_by_criterion(each.fitted.damper)
+        if _predicts_better(predicted, missed, trials):
+            better.append((each, predicted))
+    return min(better, key=lambda pair: pair[1].criterion or 0.0, default=None)
+
+
+def _tried(problem: Problem, fitted: Fitted, config: DiagnoseConfig) -> Iterator[Candidate]:
+    """Candidates that are possible: a new effect each, or an adopted one with its parameters by voltage.
+
+    What a sensor shows is not tried: no ride feels it, and a delay fits any hysteresis a little. Nor is what begins at
+    some displacement: it would grow beyond the recorded stroke, where no test shows it.
+    """
+    found: list[Candidate] = by_voltage(problem, fitted)
+    if len(fitted.effects) < config.most_effects:
+        new = [
+            effect
+            for effect in library().values()
+            if effect.name not in (*fitted.effects, *config.forbid)
+            and effect.place != "sensor"
+            and not effect.about_zero
+            and seen_in(problem, effect)
+        ]
+        found += [candidate(problem, fitted, effect) for effect in most_promising(problem, fitted, new, SCREENED)]
+    return (c for c in found if c.explained >= config.visible and not against_nature(c.fitted.damper))
+
+
+def _predicts_better(one: Missed, other: Missed, trials: Trials) -> bool:
+    """Whether kept-back tests are predicted better, visibly and beyond chance, and at no voltage worse."""
+    if one.criterion is None or other.criterion is None:
+        return False
+    less = one.criterion <= (1.0 - LEAST_CUT_IN_PREDICTION) * other.criterion
+    return less and bool(trials.worse(other, one)) and not trials.worse(one, other)

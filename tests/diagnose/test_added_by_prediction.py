@@ -1,0 +1,124 @@
+"""Where a gap has no name, the damper gets what lets it predict tests that no fit has seen, and nothing impossible."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from campaign import damper_of, sines
+from test_kept_back import TWO, campaign_of
+
+from pzd.damper.effects import library
+from pzd.damper.model import Damper
+from pzd.diagnose.added_by_prediction import Extended, with_predictive_effects
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.fit.least_squares import fit
+from pzd.diagnose.handed_on import handed_on
+from pzd.diagnose.kept_back import Trials, trials_of
+from pzd.diagnose.search.candidates import by_voltage
+from pzd.diagnose.search.evidence import evidence_of
+from pzd.diagnose.search.selection import Selection, against_nature
+from pzd.record import Record
+
+TESTS = ((0.5, 0.03), (1.0, 0.02), (2.0, 0.03))
+
+
+def records_of(truth: Damper, rng: np.random.Generator) -> tuple[Record, ...]:
+    return sines(truth, rng, TWO, tests=TESTS, cycles=3, noise=2e-3)
+
+
+def plain_selection(records: tuple[Record, ...], config: DiagnoseConfig) -> tuple[Selection, Trials]:
+    campaign = campaign_of(records)
+    evidence = evidence_of(campaign, damper_of(TWO))
+    plain = fit(evidence.whole, (), evidence.whole.start())
+    return Selection(plain, plain, (), {}, evidence, evidence), trials_of(campaign, plain.damper, config.visible)
+
+
+def extended(records: tuple[Record, ...], config: DiagnoseConfig) -> tuple[Extended | None, float]:
+    """What is added to the plain damper, and what that misses of kept-back tests by itself."""
+    selection, trials = plain_selection(records, config)
+    missed = trials.plain_missed()
+    assert missed.criterion is not None
+    return with_predictive_effects(selection, missed, trials, config), missed.criterion
+
+
+def test_what_is_missing_is_added_one_effect_after_another(rng: np.random.Generator) -> None:
+    truth = damper_of(TWO, preload_offset={"F_0": 150.0}, gas_spring={"k_g": 8000.0})
+    found, before = extended(records_of(truth, rng), DiagnoseConfig())
+    assert found is not None
+    assert set(found.effects) == {"preload_offset", "gas_spring"}
+    assert found.missed.criterion is not None
+    assert found.missed.criterion < 0.05 * before
+    values = found.selection.fitted.damper.effects
+    assert values["preload_offset"]["F_0"] == pytest.approx(150.0, rel=0.05)
+    assert values["gas_spring"]["k_g"] == pytest.approx(8000.0, rel=0.05)
+
+
+def test_nothing_is_added_to_a_damper_that_lacks_nothing(rng: np.random.Generator) -> None:
+    found, _ = extended(records_of(damper_of(TWO), rng), DiagnoseConfig())
+    assert found is None
+
+
+def test_no_more_is_added_than_the_config_allows_nor_what_it_forbids(rng: np.random.Generator) -> None:
+    truth = damper_of(TWO, preload_offset={"F_0": 150.0}, gas_spring={"k_g": 8000.0})
+    records = records_of(truth, rng)
+    found, _ = extended(records, DiagnoseConfig(most_effects=1))
+    assert found is not None
+    assert len(found.effects) == 1
+    found, _ = extended(records, DiagnoseConfig(forbid=("preload_offset", "asymmetry")))
+    assert found is None or not {"preload_offset", "asymmetry"} & set(found.effects)
+
+
+def test_what_only_a_sensor_shows_is_not_added(rng: np.random.Generator) -> None:
+    found, _ = extended(records_of(damper_of(TWO, sensor_delay={"tau": 0.004}), rng), DiagnoseConfig())
+    assert found is None or "sensor_delay" not in found.effects
+
+
+# ---------------------------------------------------------------- nothing impossible
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("gas_spring", {"k_g": -1488.0}),
+        ("fluid_inertia", {"m": -3.0}),
+        ("sensor_delay", {"tau": -0.05}),
+        ("relief_valve", {"F_r": 900.0, "C_r": 4000.0}),
+    ],
+)
+def test_values_that_nature_does_not_have_are_found(effect: str, values: dict[str, float]) -> None:
+    assert against_nature(damper_of(TWO, **{effect: values})) == (effect,)
+    possible = {name: abs(value) / 10.0 for name, value in values.items()}
+    assert against_nature(damper_of(TWO, **{effect: possible})) == ()
+
+
+def test_one_impossible_value_among_those_by_voltage_is_enough() -> None:
+    damper = damper_of(TWO)
+    values: dict[str, float | tuple[float, ...]] = {"k_g": (500.0, -20.0), "at_voltage_V": TWO}
+    assert against_nature(damper.model_copy(update={"effects": {"gas_spring": values}})) == ("gas_spring",)
+
+
+def test_an_effect_that_fits_with_an_impossible_value_alone_is_not_handed_on(rng: np.random.Generator) -> None:
+    truth = damper_of(TWO, gas_spring={"k_g": -6000.0})
+    selection, trials = plain_selection(records_of(truth, rng), DiagnoseConfig())
+    whole = selection.first.whole
+    spring = fit(whole, ("gas_spring",), whole.start_with(truth))
+    assert spring.misfit < 0.1 * selection.plain.misfit
+    found = handed_on(replace(selection, fitted=spring, reasons={"gas_spring": "adopted"}), trials, (), "V")
+    assert found.selection.adopted == ()
+    assert found.refused is not None
+    assert "gas_spring with k_g = -6e+03 N/m" in found.refused
+    assert "in nature" in found.selection.reasons["gas_spring"]
+
+
+def test_lengths_and_masses_are_one_value_at_every_voltage(rng: np.random.Generator) -> None:
+    truth = damper_of(TWO, end_stop={"k_e": 2e7, "x_e": 0.02}, preload_offset={"F_0": 100.0})
+    selection, _ = plain_selection(records_of(truth, rng), DiagnoseConfig())
+    whole = selection.first.whole
+    fitted = fit(whole, ("end_stop", "preload_offset"), whole.start_with(truth))
+    assert [c.effect for c in by_voltage(whole, fitted)] == ["preload_offset"]
+    assert {name for name, effect in library().items() if effect.same_at_every_voltage} == {
+        "end_stop",
+        "fluid_inertia",
+    }
