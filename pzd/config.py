@@ -6,40 +6,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, TypeAdapter, ValidationError, field_validator
+from pydantic import Field, TypeAdapter, ValidationError
 
 from pzd.blind.config import BlindConfig
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
-from pzd.quantities import CHANNELS, VOLTAGE, Control
+from pzd.quantities import Control
 from pzd.report.config import ReportConfig
-from pzd.rig.config import RigConfig
+from pzd.rig.config import ControlConfig, RigConfig
 from pzd.schema.errors import ConfigError
 from pzd.schema.model import Frozen
 from pzd.schema.nearest import nearest
 from pzd.schema.yamlfile import Document, read_yaml
 from pzd.simulate.config import SimulateConfig
 from pzd.table.config import TableConfig
-
-
-class ControlConfig(Frozen):
-    """The control signal of the valve."""
-
-    name: str = Field(default=VOLTAGE.name, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
-    """What it is called: `voltage_V` reads `current_A` with `{name: current, unit: A}`."""
-    unit: str = Field(default=VOLTAGE.unit, pattern=r'^[^\s,;"]+$')
-    """Its unit."""
-
-    @field_validator("name")
-    @classmethod
-    def _not_another_channel(cls, name: str) -> str:
-        if name in {channel.name for channel in CHANNELS} - {VOLTAGE.name}:
-            raise ValueError(f"{name} is another channel of the rig; the control needs a name of its own")
-        return name
-
-    def signal(self) -> Control:
-        """The control signal as the files name it."""
-        return Control(self.name, self.unit)
 
 
 class RunConfig(Frozen):

@@ -22,10 +22,12 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 from pzd.cli.app import app
+from pzd.rig.files.formats import formats
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 DECLARED = [Requirement(text) for text in PROJECT["project"]["dependencies"]]
+EXTRAS = [Requirement(text) for extra in PROJECT["project"]["optional-dependencies"].values() for text in extra]
 LOCKS = ("requirements.lock", "requirements-build.lock", "requirements-dev.lock")
 PYTHONS = ("3.11", "3.12", "3.13")
 
@@ -55,6 +57,18 @@ def test_a_lock_pins_and_hashes_everything_and_names_no_host(lock: str) -> None:
 def test_the_lock_satisfies_what_the_project_declares() -> None:
     locked = pins("requirements.lock")
     assert [str(need) for need in DECLARED if version(locked[canonicalize_name(need.name)]) not in need.specifier] == []
+
+
+def test_the_lock_for_the_tests_holds_the_extras_and_the_one_for_users_does_not() -> None:
+    locked, runtime = pins("requirements-dev.lock"), pins("requirements.lock")
+    assert [str(need) for need in EXTRAS if version(locked[canonicalize_name(need.name)]) not in need.specifier] == []
+    assert [need.name for need in EXTRAS if canonicalize_name(need.name) in runtime] == []
+
+
+def test_what_a_format_needs_is_an_extra() -> None:
+    needed = {module.NEEDS for module in formats().values() if module.NEEDS}
+    assert needed
+    assert needed <= {canonicalize_name(need.name) for need in EXTRAS}
 
 
 def test_the_locks_agree_with_each_other() -> None:
@@ -91,7 +105,7 @@ def imported(module: Path) -> set[str]:
 
 def test_every_import_is_declared() -> None:
     providers = packages_distributions()
-    declared = {canonicalize_name(need.name) for need in DECLARED}
+    declared = {canonicalize_name(need.name) for need in DECLARED + EXTRAS}
     assert [
         f"{module.relative_to(ROOT)}: {name}"
         for module in sorted((ROOT / "pzd").rglob("*.py"))

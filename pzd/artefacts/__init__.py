@@ -35,7 +35,7 @@ from pzd.artefacts.rides import (
     WeightedRow,
     WheelRow,
 )
-from pzd.artefacts.rig import Finding, RecordEntry, Rig
+from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig
 from pzd.artefacts.table import ForceRow, InverseRow, Table, TableNotes
 
 Artefact = Rig | Identified | Diagnosed | Table | Rides | Report
@@ -56,6 +56,7 @@ __all__ = [
     "ForceRow",
     "Gap",
     "Identified",
+    "IngestRow",
     "InverseRow",
     "KeptBack",
     "LeftOut",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
 from pzd.record import Array, Record
@@ -13,6 +13,9 @@ from pzd.schema.csvfile import read_columns, write_columns
 from pzd.schema.jsonfile import read_json_list, write_json
 from pzd.schema.model import Frozen
 from pzd.schema.processes import parallel_map
+
+INGEST = "ingest.json"
+"""What was done to the files of a real rig."""
 
 
 class Finding(Frozen):
@@ -48,6 +51,21 @@ class RecordEntry(Frozen):
     """What a known fixture took out of the force, in words."""
 
 
+class IngestRow(Frozen):
+    """One thing that was done on the way from a file to a record."""
+
+    record: str
+    file: str
+    """Name of the file, without its folder."""
+    step: Literal["read", "left out", "rename", "unit", "sign", "value", "cut", "fixture"]
+    quantity: str | None
+    """The quantity concerned; empty for the file as a whole."""
+    was: str
+    """What stands in the file or in the config."""
+    became: str
+    """What was made of it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Rig:
     """The rig records in canonical columns, and what the preflight found."""
@@ -56,21 +74,27 @@ class Rig:
 
     records: tuple[Record, ...]
     entries: tuple[RecordEntry, ...]
+    ingested: tuple[IngestRow, ...] = ()
+    """What was done to the files of a real rig, in the order of the records."""
 
     def write(self, folder: Path, control: Control, jobs: int = 1) -> None:
-        """Write records.json and one CSV a record, so many at the same time."""
+        """Write records.json and one CSV a record, so many at the same time; of files also ingest.json."""
 
         def written(record: Record) -> None:
             write_columns(folder / f"{record.name}.csv", _channels(record), control)
 
         write_json(folder / "records.json", self.entries, control)
+        if self.ingested:
+            write_json(folder / INGEST, self.ingested, control)
         parallel_map(written, self.records, jobs)
 
     @classmethod
     def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
         """Read and check them again, so many at the same time."""
         entries = read_json_list(folder / "records.json", RecordEntry, control)
-        return cls(tuple(parallel_map(lambda entry: _read_record(folder, entry, control), entries, jobs)), entries)
+        records = parallel_map(lambda entry: _read_record(folder, entry, control), entries, jobs)
+        report = folder / INGEST
+        return cls(tuple(records), entries, read_json_list(report, IngestRow, control) if report.is_file() else ())
 
 
 def _channels(record: Record) -> Mapping[str, Array | None]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,7 +15,7 @@ from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose
 from pzd.cli.output import Output
 
 if TYPE_CHECKING:
-    from pzd.artefacts import ParameterRow, RecordEntry
+    from pzd.artefacts import IngestRow, ParameterRow, RecordEntry
     from pzd.pipeline.run_summary import RunSummary
 
 RunFolders = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of runs, e.g. runs/quickstart.")]
@@ -35,13 +35,13 @@ def check(
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
-    entries = preflight(given)
+    entries, ingested = preflight(given)
     if as_json:
         output.say_json(plain_data({"config": config.as_posix(), "records": entries}, given.run.control))
         check_setting(given, entries)
         return DONE
     for entry in entries:
-        output.say(*_entry(entry))
+        output.say(*_entry(entry), *(_ingested(ingested, entry.name) if verbose else ()))
     check_setting(given, entries)
     found = sum(len(entry.findings) for entry in entries)
     output.say(f"{len(entries)} records, {found} findings; the config is in order, nothing was written")
@@ -52,6 +52,14 @@ def _entry(entry: RecordEntry) -> Iterator[str]:
     yield f"{entry.name}: {number(entry.cycles)} cycles at {number(entry.rate_Hz)} Hz"
     for finding in entry.findings:
         yield f"  {finding.check}: {finding.where}: {number(finding.size)} {finding.unit}; {finding.follows}"
+
+
+def _ingested(rows: Sequence[IngestRow], record: str) -> Iterator[str]:
+    """What was done to the file of one record."""
+    for row in rows:
+        if row.record == record:
+            what = f"{row.step} {row.quantity}" if row.quantity else row.step
+            yield f"  {row.file}: {what}: {row.was}" + (f" -> {row.became}" if row.became else "")
 
 
 def show(

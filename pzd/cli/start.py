@@ -15,9 +15,13 @@ from pzd.cli.output import Output
 
 RigFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Rig files to make a config for.")]
 
+LayoutName = Annotated[
+    str | None, typer.Option("--layout", metavar="NAME", help="Read the files by this layout, or refuse.")
+]
 
-def init(files: RigFiles, verbose: Verbose = False) -> int:
-    """Print a config guessed from rig files."""
+
+def init(files: RigFiles, layout: LayoutName = None, verbose: Verbose = False) -> int:
+    """Print a config for rig files: by the layout that fits, else guessed from the headers."""
     from pzd.rig.files.guess import guessed
     from pzd.schema.errors import ConfigError
 
@@ -25,7 +29,7 @@ def init(files: RigFiles, verbose: Verbose = False) -> int:
     absent = [path for path in files if not path.is_file()]
     if absent:
         raise ConfigError(f"{path}: no such file" for path in absent)
-    output.say(*guessed(files))
+    output.say(*guessed(files, layout))
     return DONE
 
 

@@ -21,7 +21,7 @@ _STRAIGHT = np.zeros(1)
 _NO_SLOPES = np.empty((0, 3))
 _SMALL = 1e-3  # below it the exponential's quotients are taken from their series
 _MOST_NEWTON_STEPS = 60
-_SHORTEST_STRETCH = 1e-15  # of a stretch: how closely the moment is found at which the oil sticks
+_INSTANT = 1e-15  # of a stretch: how closely the moment is found at which the oil sticks
 
 
 def element_force(
@@ -245,7 +245,7 @@ def _until_stuck(G: float, u0: float, u1: float, left: float, element: Element) 
         following = time - miss / (k * u - k / C * miss)
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        if abs(following - time) <= _SHORTEST_STRETCH * left:
+        if abs(following - time) <= _INSTANT * left:
             return following
         time = following
     return time

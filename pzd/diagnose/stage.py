@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
 
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, Rig, base_of
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
-
-if TYPE_CHECKING:
-    from pzd.damper.model import Damper
-    from pzd.diagnose.campaign import Campaign
-    from pzd.diagnose.handed_on import HandedOn
-    from pzd.diagnose.kept_back import Trials
-    from pzd.diagnose.verdict import Decision
 
 log = logging.getLogger(__name__)
 
@@ -50,12 +42,14 @@ def diagnose(
     """
     from pzd.diagnose.base_parameters import base_parameters
     from pzd.diagnose.campaign import Campaign
+    from pzd.diagnose.conclusion import concluded
     from pzd.diagnose.data.cleaning import about, mid_stroke, prepare
     from pzd.diagnose.data.exclusions import whole_records, without
     from pzd.diagnose.data.split import split
     from pzd.diagnose.held_out import held_out_gap
     from pzd.diagnose.kept_back import trials_of
     from pzd.diagnose.next_test import next_test, reach_of
+    from pzd.diagnose.search.forward_selection import select_effects
     from pzd.diagnose.too_short import too_short, undecided
     from pzd.diagnose.verdict import parameters_of, ranking_of, unpredicted, weak
     from pzd.diagnose.where import regions
@@ -68,14 +62,13 @@ def diagnose(
     plain = base_of(identified.rows, setting)
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
     own_rows = tuple(row for row in identified.rows if row.setting == setting)
-    voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
-    reach = reach_of(stand.limits, recorded, voltages)
+    reach = reach_of(stand.limits, recorded, [row.voltage_V for row in plain.base if row.voltage_V is not None])
     if too_short(campaign):
         return Diagnosed(undecided(recorded, reach), plain, plain, own_rows)
     trials = trials_of(campaign, plain, diagnose.visible)
-    handed, decision = _concluded(campaign, trials, plain, diagnose, control)
-    evidence = handed.selection.first
+    handed, decision = concluded(select_effects(campaign, plain, diagnose, jobs), trials, diagnose, control.unit)
     selection, prediction = handed.selection, handed.prediction(trials)
+    evidence, before = selection.first, campaign.checks(selection.plain.damper)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
     offsets = [evidence.campaign.offset(damper) for _, damper in selection.rivalling]
@@ -91,29 +84,9 @@ def diagnose(
         zero_m=found.zero_m,
         ranking=ranking_of(selection, evidence),
         rivals=selection.rivals,
-        where=()
-        if decision.verdict == "none"
-        else regions(evidence.campaign.checks(selection.plain.damper), control.unit, zero),
+        where=() if decision.verdict == "none" else regions(before, control.unit, zero),
         next_test=next_test(rivals, reach, evidence.whole.reference, offsets),
     )
-    rows = base_parameters(selection, decision.verdict, setting) if selection.adopted else own_rows
-    return Diagnosed(diagnosis, found, plain, rows)
-
-
-def _concluded(
-    campaign: Campaign, trials: Trials, plain: Damper, config: DiagnoseConfig, control: Control
-) -> tuple[HandedOn, Decision]:
-    """What is handed on, and the verdict: effects selected, those that predict worse taken back, others added."""
-    from pzd.diagnose.handed_on import handed_on, with_additions
-    from pzd.diagnose.search.forward_selection import select_effects
-    from pzd.diagnose.trends_of_tests import trend_of_tests
-    from pzd.diagnose.verdict import decide, refused, unless_systematic, with_added
-
-    handed = handed_on(select_effects(campaign, plain, config, campaign.jobs), trials, config.force, control.unit)
-    decision = refused(handed.refused) if handed.refused else decide(handed.selection, config)
-    if decision.verdict != "unexplained":
-        decision = unless_systematic(decision, trend_of_tests(campaign, handed.selection.fitted.damper, config))
-    if decision.verdict == "unexplained":
-        handed = with_additions(handed, trials, config)
-        decision = with_added(decision, handed.added)
-    return handed, decision
+    if not selection.adopted:
+        return Diagnosed(diagnosis, found, plain, own_rows)
+    return Diagnosed(diagnosis, found, plain, base_parameters(selection, decision.verdict, setting))

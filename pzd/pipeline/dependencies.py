@@ -124,6 +124,8 @@ def _file_hashes(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
     paths = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
     try:
         files = [file for value in paths for file in matching(folder, value)]
+        layouts = [value for path, value in values.items() if path.endswith(".layout") and isinstance(value, str)]
+        files += [file for name in layouts if (file := folder / f"{name}.yaml").is_file()]
         if expected := values.get("report.reference"):
             from pzd.report.reference import path_of
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from pzd.quantities import CHANNELS, VOLTAGE, Control
 from pzd.rig.stand.config import VirtualEntry
 from pzd.schema.model import Frozen
 
@@ -36,6 +37,26 @@ WithUnit = Annotated[str, BeforeValidator(_text)]
 """A number with its unit, like `100 V`."""
 
 
+class ControlConfig(Frozen):
+    """The control signal of the valve."""
+
+    name: str = Field(default=VOLTAGE.name, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    """What it is called: `voltage_V` reads `current_A` with `{name: current, unit: A}`."""
+    unit: str = Field(default=VOLTAGE.unit, pattern=r'^[^\s,;"]+$')
+    """Its unit."""
+
+    @field_validator("name")
+    @classmethod
+    def _not_another_channel(cls, name: str) -> str:
+        if name in {channel.name for channel in CHANNELS} - {VOLTAGE.name}:
+            raise ValueError(f"{name} is another channel of the rig; the control needs a name of its own")
+        return name
+
+    def signal(self) -> Control:
+        """The control signal as the files name it."""
+        return Control(self.name, self.unit)
+
+
 class Fixture(Frozen):
     """What stands between the damper and the sensors, where it is known; taken out of the records."""
 
@@ -58,13 +79,15 @@ class Split(Frozen):
     """Text in the event that begins a new test, e.g. `DAQ Resume`."""
     gap_s: float | None = Field(default=None, gt=0.0)
     """A pause of the clock longer than this [s] begins a new test."""
+    tables: bool = False
+    """Each table of the file (sheet, group, block) is a test, as it is without `split`: for `constants` of each."""
     constants: dict[str, tuple[WithUnit, ...]] = Field(default={})
     """Quantity -> one value with unit for each test in the file, in their order."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        if sum(way is not None for way in (self.column, self.event, self.gap_s)) != 1:
-            raise ValueError("say exactly one of column, event (with begins), gap_s")
+        if sum((self.column is not None, self.event is not None, self.gap_s is not None, self.tables)) != 1:
+            raise ValueError("say exactly one of column, event (with begins), gap_s, tables")
         if (self.event is None) != (self.begins is None):
             raise ValueError("event and begins belong together")
         return self
@@ -75,6 +98,9 @@ class FilesEntry(Frozen):
 
     path: str = Field(min_length=1)
     """Path or glob pattern (`*`, `?`, `**`), relative to the folder of this config."""
+    layout: str | None = Field(default=None, pattern=r"^[A-Za-z0-9_-]+$")
+    """Name of a layout, which says everything below for files of one kind: one that comes with pzd, or NAME.yaml
+    beside this config. What is said here is put over it, key by key."""
     columns: dict[str, Header] = Field(default={})
     """Quantity -> header in the file, e.g. `{time: t, force: Load}`; what is not named has its canonical header.
     An empty header (`{voltage: ''}`) leaves a column out."""
@@ -95,7 +121,9 @@ class FilesEntry(Frozen):
     split: Split | None = None
     """How a file with several tests is cut; not cut by default."""
     format: str | None = None
-    """Reader of the files, e.g. `text`; by the ending of the name where nothing is said."""
+    """Format of the files, e.g. `text`; by their content, then the ending of the name where nothing is said."""
+    table: str | None = None
+    """Name or pattern (`*`, `?`) of the sheets, groups or structures to read; by default every one with a recording."""
     separator: str | None = Field(default=None, min_length=1, max_length=1)
     """Between fields: `,`, `;`, a tab, or a blank for any run of blanks; seen from the header by default."""
     decimal: str = Field(default=".", pattern=r"^[.,]$")
@@ -140,6 +168,25 @@ class FilesEntry(Frozen):
         except LookupError:
             raise ValueError("an encoding that Python knows is needed, e.g. utf-8, latin-1, utf-16") from None
         return encoding
+
+
+class NamedLayout(FilesEntry):
+    """A layout file: everything that an entry of `rig.files` may say of files of one kind, but their path."""
+
+    path: Literal[""] = ""
+    """Stands in the entry, not in the layout."""
+    about: str
+    """Whose files these are, in a line."""
+    control: ControlConfig = ControlConfig()
+    """The control signal that the files record; the config must name the same one."""
+    name: str | None = None
+    """Regular expression that a file's name must match for `pzd init` to propose the layout by itself."""
+
+    @model_validator(mode="after")
+    def _stands_alone(self) -> Self:
+        if self.layout is not None:
+            raise ValueError("a layout names no other layout")
+        return self
 
 
 class Limits(Frozen):

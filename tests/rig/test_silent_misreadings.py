@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zipfile
 from pathlib import Path
 
@@ -198,24 +197,22 @@ def test_a_clock_without_a_date_goes_on_past_midnight_and_noon(tmp_path: Path, u
 # ---------------------------------------------------------------- other kinds of files
 
 
-def test_a_file_that_is_no_text_is_called_what_it_is_whatever_its_name(tmp_path: Path) -> None:
-    openpyxl_like = tmp_path / "a.csv"
-    with zipfile.ZipFile(openpyxl_like, "w") as book:
-        book.writestr("xl/workbook.xml", "<workbook/>")
+def test_a_file_that_no_format_reads_is_called_what_it_is_whatever_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("run.csv", "time_s,displacement_m,force_N")
     kinds = {
-        "an Excel file": openpyxl_like.read_bytes(),
-        "a MATLAB file": b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(200),
-        "an HDF5 file": b"\x89HDF\r\n\x1a\n" + bytes(200),
-        "a JSON file": json.dumps({"time": [0, 1], "force": [1, 2]}).encode(),
-        "a TDMS file": b"TDSm" + bytes(64),
+        "a zip archive": path.read_bytes(),
+        "an Excel file of before 2007": b"\xd0\xcf\x11\xe0" + bytes(64),
+        "a PDF file": b"%PDF-1.7" + bytes(64),
     }
     for kind, content in kinds.items():
-        openpyxl_like.write_bytes(content)
+        path.write_bytes(content)
         (said,) = refused(tmp_path)
-        assert f"a.csv: this is {kind}" in said
+        assert f"a.csv: this is {kind}; export the table as" in said
         assert "encoding" not in said
         with pytest.raises(DataError, match=f"this is {kind}"):
-            guessed([openpyxl_like])
+            guessed([path])
 
 
 # ---------------------------------------------------------------- what the file says otherwise than the config

@@ -3,7 +3,8 @@
     PYTHONPATH=. python tests/studies/record_trip.py rig
     PYTHONPATH=. python tests/studies/record_trip.py diagnose
 
-rig: one small file of the everyday kind (named columns, units, a constant, a known tare) is read. diagnose: eight
+rig: one small file of text (named columns, units, a constant, a known tare) and one of arrays by a layout are read.
+diagnose: eight
 sines at two voltages, with an orifice hidden in the damper, are diagnosed. The order of the modules is that in which
 they are first entered; a return is a call of a function of a module from a module that comes later in that order.
 Calls inside a module do not count, nor do calls of a leaf, a module that imports no other of its package: from there a
@@ -85,15 +86,15 @@ def trip(folder: Path, act: Callable[[], object]) -> list[Call]:
     return calls
 
 
-def of_record(folder: Path) -> list[Call]:
-    """The trip of one file through pzd/rig/files."""
+def of_records(folder: Path) -> list[list[Call]]:
+    """The trips of a file of text and of one of arrays, which a layout reads, through pzd/rig/files."""
     from pzd.rig.stage import ingest
 
     time = np.arange(500) * 2e-3
     x = 10.0 * np.sin(2.0 * np.pi * 5.0 * time)
     force = 3.0 * np.gradient(x, time) + 40.0
     rows = [f"{t:.9g},{a:.9g},{f:.9g}" for t, a, f in zip(time, x, force, strict=True)]
-    entry = {
+    text = {
         "path": "a.csv",
         "columns": {"time": "t", "displacement": "pos [mm]", "force": "load"},
         "units": {"time": "s", "force": "N"},
@@ -101,9 +102,16 @@ def of_record(folder: Path) -> list[Call]:
         "fixture": {"tare_N": 40},
     }
     (folder / "a.csv").write_text("\n".join(["t,pos [mm],load", *rows]) + "\n", encoding="utf-8")
-    config = RigConfig.model_validate({"files": (entry,)})
-    ingest(config, Control(), folder)  # what is imported late is there now
-    return trip(PACKAGE / "rig" / "files", lambda: ingest(config, Control(), folder))
+    tables = {"path": "a.json", "layout": "json_units_in_keys", "fixture": {"tare_N": 40}}
+    arrays = {"time [s]": time, "displacement [mm]": x, "force [kN]": 1e-3 * force}
+    content = json.dumps({key: values.tolist() for key, values in arrays.items()})
+    (folder / "a.json").write_text(content, encoding="utf-8")
+    trips = []
+    for entry in (text, tables):
+        config = RigConfig.model_validate_json(json.dumps({"files": [entry]}))
+        ingest(config, Control(), folder)  # what is imported late is there now
+        trips.append(trip(PACKAGE / "rig" / "files", lambda config=config: ingest(config, Control(), folder)))
+    return trips
 
 
 def of_campaign(folder: Path) -> list[Call]:
@@ -153,11 +161,12 @@ def printed(folder: Path, calls: list[Call]) -> Iterator[str]:
 
 
 def main(what: str) -> None:
-    """Print the trip."""
+    """Print the trips."""
     with tempfile.TemporaryDirectory() as folder:
-        calls = of_record(Path(folder)) if what == "rig" else of_campaign(Path(folder))
-    for line in printed(PACKAGE / ("rig/files" if what == "rig" else "diagnose"), calls):
-        sys.stdout.write(f"{line}\n")
+        trips = of_records(Path(folder)) if what == "rig" else [of_campaign(Path(folder))]
+    for calls in trips:
+        for line in printed(PACKAGE / ("rig/files" if what == "rig" else "diagnose"), calls):
+            sys.stdout.write(f"{line}\n")
 
 
 if __name__ == "__main__":

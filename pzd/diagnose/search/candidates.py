@@ -98,9 +98,8 @@ def candidates(
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         found = list(pool.map(one, tried))
         best = min((c.delta_bic for c in found), default=0.0)
-        found = list(
-            pool.map(lambda c: finished(problem, before, c) if c.delta_bic < WORTH_SEARCHING * best else c, found)
-        )
+        worth = WORTH_SEARCHING * best
+        found = list(pool.map(lambda c: finished(problem, before, c) if c.delta_bic < worth else c, found))
     return tuple(sorted(found, key=lambda c: c.delta_bic))
 
 
@@ -152,16 +151,11 @@ def best_competing_form(problem: Problem, before: Fitted) -> Candidate:
 
 def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:
     """Every effect of `before` whose parameters may differ by voltage, fitted so."""
-    free = [
-        name
-        for name in before.effects
-        if _may_vary(library()[name]) and name not in problem.varying and len(problem.voltages) > 1
-    ]
+    if len(problem.voltages) == 1:
+        return []
+    fixed = [library()[name] for name in before.effects if name not in problem.varying]
+    free = [e.name for e in fixed if e.place in VARIES and not e.same_at_every_voltage]
     return [_varied(problem, before, name) for name in free]
-
-
-def _may_vary(effect: Effect) -> bool:
-    return effect.place in VARIES and not effect.same_at_every_voltage
 
 
 def _varied(problem: Problem, before: Fitted, effect: str, evaluations: int = MOST_EVALUATIONS) -> Candidate:

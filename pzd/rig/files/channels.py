@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from pzd.artefacts import Finding
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Quantity
 from pzd.record import Array
 from pzd.rig.files.layout import LABELS, NEEDED, ChannelSpec, Layout
-from pzd.rig.files.sheet import Sheet
+from pzd.rig.files.sheet import Sheet, Step
 from pzd.rig.files.units import UnitError, in_header, to_canonical
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.nearest import nearest
@@ -40,6 +41,8 @@ class Channels:
     """Cells that are bad or empty, each with its line."""
     remarks: tuple[Finding, ...] = ()
     """What the file itself says otherwise than the config."""
+    steps: tuple[Step, ...] = ()
+    """What was renamed, converted and turned."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,29 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
         except UnitError as fault:
             raise ConfigError(f"{layout.place}.units: {fault} (in {sheet.path})") from None
         values[source.spec.quantity] = _steady(channel) if source.spec.quantity in LABELS else channel
-    return Channels(_clock(sheet, found), tuple(faults)) if faults else Channels(values, remarks=_remarks(sheet, found))
+    if faults:
+        return Channels(_clock(sheet, found), tuple(faults))
+    return Channels(values, remarks=_remarks(sheet, found), steps=tuple(_steps(sheet, found, values)))
+
+
+def _steps(sheet: Sheet, found: list[_Source], values: dict[Quantity, Array]) -> Iterator[Step]:
+    """What was done to each column; nothing for one that stands there as it is handed on."""
+    for source in found:
+        spec, own, head = source.spec, source.spec.own, sheet.header[source.column]
+        if spec.quantity not in values:
+            yield Step("left out", own.name, f"column {head!r}", "every cell is empty")
+            continue
+        if head != own.column:
+            yield Step("rename", own.name, f"column {head!r}", own.column)
+        if source.dated:
+            yield Step("unit", own.name, f"dates and times like {source.unit}", "s since the first")
+        elif source.unit != own.unit:
+            zero, one = to_canonical(np.array([0.0, 1.0]), source.unit, own)
+            offset = f" {zero:+.10g}" if zero else ""
+            if offset or one != 1.0:
+                yield Step("unit", own.name, source.unit, f"{own.unit}: times {one - zero:.10g}{offset}")
+        if spec.sign < 0:
+            yield Step("sign", own.name, "as recorded", "times -1")
 
 
 def _remarks(sheet: Sheet, found: list[_Source]) -> tuple[Finding, ...]:
@@ -99,15 +124,15 @@ def _remarks(sheet: Sheet, found: list[_Source]) -> tuple[Finding, ...]:
     remarks: list[Finding] = []
     for source in found:
         spec, header = source.spec, sheet.header[source.column]
-        ratio = _unit_of_header_over_ours(source, sheet)
-        if abs(ratio - 1.0) > 1e-9:
+        for told, ratio in _other_units(source, sheet):
+            said = "the config says" if spec.unit is not None else "the file says beside it"
             remarks.append(
                 Finding(
                     check="units",
-                    where=f"{spec.own.name}, whose header is {header!r}; the config says {source.unit}",
+                    where=f"{spec.own.name}, whose header is {header!r}{told}; {said} {source.unit}",
                     size=ratio,
                     unit="-",
-                    follows="the config was taken; by the header the channel would be this many times as large",
+                    follows=f"{source.unit} was taken; by the other the channel would be this many times as large",
                 )
             )
         if spec.quantity in (DISPLACEMENT, FORCE) and not spec.sign_said and COMPRESSION.search(header):
@@ -123,17 +148,22 @@ def _remarks(sheet: Sheet, found: list[_Source]) -> tuple[Finding, ...]:
     return tuple(remarks)
 
 
-def _unit_of_header_over_ours(source: _Source, sheet: Sheet) -> float:
-    """How many times as large a channel would be by the unit that its header names; 1 where that says nothing."""
+def _other_units(source: _Source, sheet: Sheet) -> Iterator[tuple[str, float]]:
+    """How many times as large a channel would be by another unit that the file names, in its header or beside it."""
     spec, header = source.spec, sheet.header[source.column]
-    told = spec.own.unit if header in spec.canonical_headers else in_header(header, spec.own)
-    if spec.unit is None or told is None or source.dated or spec.quantity is TEMPERATURE:
-        return 1.0
-    try:
-        theirs, ours = (float(to_canonical(np.ones(1), unit, spec.own)[0]) for unit in (told, source.unit))
-    except UnitError:
-        return 1.0
-    return theirs / ours
+    if source.dated or spec.quantity is TEMPERATURE:
+        return
+    inside = spec.own.unit if header in spec.canonical_headers else in_header(header, spec.own)
+    beside = sheet.units[source.column].strip("[]() ") if sheet.units else ""
+    for told, shown in ((inside, ""), (beside, f" and its unit {beside!r}")):
+        try:
+            theirs, ours = (
+                float(to_canonical(np.ones(1), unit, spec.own)[0]) for unit in (told or source.unit, source.unit)
+            )
+        except UnitError:
+            continue
+        if abs(theirs / ours - 1.0) > 1e-9:
+            yield shown, theirs / ours
 
 
 def _steady(channel: Array) -> Array:

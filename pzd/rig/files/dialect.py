@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection
 from pathlib import Path
 
@@ -14,21 +13,15 @@ from pzd.schema.errors import DataError, FilesError, at
 SEPARATORS = (",", ";", "\t")
 """Separators that are recognised from the header line."""
 KINDS = (
-    (b"PK\x03\x04", "an Excel file", "xl/workbook"),
-    (b"PK\x03\x04", "a zip archive", ""),
-    (b"\xd0\xcf\x11\xe0", "an old Excel file", ""),
-    (b"MATLAB 5.0", "a MATLAB file", ""),
-    (b"\x89HDF", "an HDF5 file (or a MATLAB file of version 7.3)", ""),
-    (b"TDSm", "a TDMS file", ""),
-    (b"MDF ", "an MDF file", ""),
-    (b"PAR1", "a Parquet file", ""),
-    (b"\x1f\x8b", "a gzip archive", ""),
-    (b"%PDF", "a PDF file", ""),
-    (b"<?xml", "an XML file", ""),
-    (b"<html", "an HTML page", ""),
-    (b"<!DOCTYPE", "an HTML page", ""),
+    (b"PK\x03\x04", "a zip archive"),
+    (b"\xd0\xcf\x11\xe0", "an Excel file of before 2007"),
+    (b"\x1f\x8b", "a gzip archive"),
+    (b"%PDF", "a PDF file"),
+    (b"<?xml", "an XML file"),
+    (b"<html", "an HTML page"),
+    (b"<!DOCTYPE", "an HTML page"),
 )
-"""How files begin that are no tables of text, what they are, and what else they hold."""
+"""How files begin that no format reads, and what they are."""
 BLANKS = " "
 """Stands for any run of blanks."""
 
@@ -47,7 +40,7 @@ def text_of(path: Path, encoding: str) -> str:
         raise FilesError(f"{at(path)}: cannot be read ({error.strerror})") from None
     kind = kind_of(raw)
     if kind:
-        raise DataError(f"{at(path)}: this is {kind}; export the table as CSV or other delimited text")
+        raise DataError(unread(path, kind))
     try:
         text = raw.decode("utf-8-sig" if encoding.lower().replace("_", "-") in ("utf-8", "utf8") else encoding)
     except UnicodeError as error:
@@ -61,18 +54,13 @@ def text_of(path: Path, encoding: str) -> str:
 
 
 def kind_of(raw: bytes) -> str | None:
-    """What a file is that is no table of text, by its content whatever its name; None where it may be one."""
-    for magic, kind, holds in KINDS:
-        if raw.startswith(magic) and (not holds or holds.encode() in raw):
-            return kind
-    start = raw[:100].lstrip()
-    if start.startswith((b"{", b"[")):
-        try:
-            json.loads(raw)
-        except ValueError:
-            return None
-        return "a JSON file"
-    return None
+    """What a file is that no format reads, by its content whatever its name; None where it may be text."""
+    return next((kind for magic, kind in KINDS if raw.startswith(magic)), None)
+
+
+def unread(path: Path, kind: str) -> str:
+    """What to say of a file of a kind that no format reads."""
+    return f"{at(path)}: this is {kind}; export the table as xlsx, CSV or other delimited text"
 
 
 def without_blank_end(text: str) -> str:

@@ -7,17 +7,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from pzd.quantities import CHANNELS, DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
+from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
 from pzd.record import Array
-from pzd.rig.config import FilesEntry
-from pzd.rig.files.formats import reader
+from pzd.rig.config import FilesEntry, NamedLayout, Split
+from pzd.rig.files.fitting import best_layout
+from pzd.rig.files.formats import TEXT, read_sheet
 from pzd.rig.files.headers import assigned, control_of, is_canonical, unit_of
 from pzd.rig.files.layout import NEEDED, own_quantity
 from pzd.rig.files.sheet import Wanted
-from pzd.rig.files.sniffing import Dialect, sniffed
+from pzd.rig.files.sniffing import Dialect, described
 from pzd.schema.errors import DataError, at
 from pzd.schema.scalars import written
 from pzd.signals.work import work
@@ -38,6 +40,10 @@ FORMATS = (
 )
 """Formats of date and time that are tried on the first row."""
 
+_EVENTS = re.compile(r"event|marker|marke|ereignis", re.IGNORECASE)
+_GOES_ON = re.compile(r"resume|restart|start|begin|weiter", re.IGNORECASE)
+"""Words of an event with which another recording begins."""
+
 
 @dataclass(frozen=True)
 class _File:
@@ -46,21 +52,25 @@ class _File:
     path: Path
     dialect: Dialect
     columns: tuple[tuple[Quantity, str], ...]
+    form: str
+    """Its format."""
 
     @property
     def layout(self) -> tuple[object, ...]:
         """What two files must share to be read by one entry."""
         d = self.dialect
         kind = [_date_format(cell) for cell in d.first]
-        return d.header, d.units, d.separator, d.decimal, d.skip, d.encoding, tuple(kind)
+        return self.form, d.header, d.units, d.separator, d.decimal, d.skip, d.encoding, tuple(kind)
 
 
-def guessed(files: Sequence[Path]) -> list[str]:
+def guessed(files: Sequence[Path], layout: str | None = None, folder: Path = Path()) -> list[str]:
     """A config for rig files, as lines of YAML, with empty places where only a person knows the answer.
 
     Parameters
     ----------
     files : the rig files
+    layout : the layout to read them by; by default one that fits, else none
+    folder : where layouts of the user may lie
 
     Returns
     -------
@@ -69,57 +79,75 @@ def guessed(files: Sequence[Path]) -> list[str]:
     Raises
     ------
     DataError : when a file is no table of a rig's channels, a line a file
-    UserError : when a file cannot be read
+    UserError : when a file cannot be read, or not by the layout that was asked for
     """
-    found: list[_File] = []
-    faults: list[str] = []
-    for path in files:
-        try:
-            found.append(_file(path))
-        except DataError as error:
-            faults.append(f"{error.messages[0]}; init reads tables with a line of headers on top")
-    if faults:
-        raise DataError(faults)
-    control = control_of([header for file in found for header in file.dialect.header])
-    if control == Control() and not any(VOLTAGE in dict(file.columns) for file in found):
-        control = Control("current", "A") if _in_names(found, "current") else control
-    lines = ["# Guessed from the headers: check every line. Paths are relative to this file."]
+    fitting, found = _sorted_out(files, layout, folder)
+    control = next((one.control.signal() for one, _ in fitting.values()), None) or _control(found)
+    lines = [] if not found else ["# Guessed from the headers: check every line. Paths are relative to this file."]
+    if fitting:
+        lines.append("# By the layout that fits: check its values for your rig. Paths are relative to this file.")
     if control != Control():
         lines.append(f"control: {{name: {control.name}, unit: {control.unit}}}")
     lines += ["rig:", "  files:"]
+    for name, (fits, paths) in fitting.items():
+        for pattern, _ in _patterns(paths):
+            lines += [f"    - path: {written(pattern)}", f"      layout: {name}    # {fits.about}"]
     groups: dict[tuple[object, ...], list[_File]] = {}
     for file in found:
         groups.setdefault(file.layout, []).append(file)
     for group in groups.values():
-        for pattern, members in _patterns(group):
-            lines += [f"    - path: {written(pattern)}", *(f"      {line}" for line in _entry(members, control))]
+        for pattern, members in _patterns([file.path for file in group]):
+            mine = [file for file in group if file.path in members]
+            lines += [f"    - path: {written(pattern)}", *(f"      {line}" for line in _entry(mine, control))]
     return lines
 
 
-def _file(path: Path) -> _File:
-    dialect = sniffed(path)
-    if dialect is None:
-        canonical = Wanted(known=frozenset(q.column for q in CHANNELS))
-        sheet = reader(path, "text", "rig.files")(path, FilesEntry(path=str(path)), canonical)
-        dialect = Dialect(
-            "utf-8", ",", ".", (sheet.header_line or 1) - 1, sheet.header, None, ("",) * len(sheet.header)
-        )
+def _sorted_out(
+    files: Sequence[Path], layout: str | None, folder: Path
+) -> tuple[dict[str, tuple[NamedLayout, list[Path]]], list[_File]]:
+    """The layouts that fit, each with its files, and the files that none fits."""
+    fitting: dict[str, tuple[NamedLayout, list[Path]]] = {}
+    found: list[_File] = []
+    faults: list[str] = []
+    for path in files:
+        try:
+            dialect, form = described(path)
+            fits = best_layout(path, dialect.header, folder, layout)
+            if fits is None:
+                found.append(_file(path, dialect, form))
+            else:
+                fitting.setdefault(fits[0], (fits[1], []))[1].append(path)
+        except DataError as error:
+            faults += error.messages if layout else [f"{error.messages[0]}; init reads tables of named columns"]
+    if faults:
+        raise DataError(faults)
+    return fitting, found
+
+
+def _control(files: Sequence[_File]) -> Control:
+    control = control_of([header for file in files for header in file.dialect.header])
+    if control == Control() and not any(VOLTAGE in dict(file.columns) for file in files):
+        control = Control("current", "A") if _in_names(files, "current") else control
+    return control
+
+
+def _file(path: Path, dialect: Dialect, form: str) -> _File:
     columns = assigned(dialect.header, dialect.units, control_of(dialect.header))
     if not columns:
         shown = ", ".join(dialect.header[:_SHOWN]) + (", ..." if len(dialect.header) > _SHOWN else "")
-        raise DataError(f"{at(path, dialect.header_line)}: no header names time, displacement or force (got {shown})")
-    return _File(path, dialect, tuple(columns.items()))
+        line = dialect.header_line if form == TEXT else None
+        raise DataError(f"{at(path, line)}: no header names time, displacement or force (got {shown})")
+    return _File(path, dialect, tuple(columns.items()), form)
 
 
-def _patterns(files: Sequence[_File]) -> list[tuple[str, Sequence[_File]]]:
+def _patterns(paths: Sequence[Path]) -> list[tuple[str, Sequence[Path]]]:
     """One pattern for all the files where one matches exactly these, else every file by itself."""
-    paths = [file.path for file in files]
     folders, endings = {path.parent for path in paths}, {path.suffix for path in paths}
     if len(paths) > 1 and len(folders) == len(endings) == 1:
         folder, pattern = paths[0].parent, f"*{paths[0].suffix}"
         if set(folder.glob(pattern)) == set(paths):
-            return [((folder / pattern).as_posix(), files)]
-    return [(file.path.as_posix(), [file]) for file in files]
+            return [((folder / pattern).as_posix(), paths)]
+    return [(path.as_posix(), [path]) for path in paths]
 
 
 def _entry(files: Sequence[_File], control: Control) -> Iterator[str]:
@@ -139,6 +167,7 @@ def _entry(files: Sequence[_File], control: Control) -> Iterator[str]:
         yield from units
     if in_names:
         yield f"pattern: '{'.*'.join(pattern for pattern, _ in in_names.values())}'    # from the files' names"
+    yield from _events(files[0])
     if not lost and any(_turned(file, columns) for file in files):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
 
@@ -152,7 +181,7 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
         yield 'separator: " "'
     if dialect.decimal == "," and any("," in cell for cell in dialect.first):
         yield "decimal: ','"
-    if dialect.units is not None:
+    if dialect.units_row:
         yield "units_row: true"
 
 
@@ -204,20 +233,35 @@ def _date_format(cell: str) -> str | None:
     return None
 
 
-def _turned(file: _File, columns: dict[Quantity, str]) -> bool:
-    """Whether the work of a file is negative, whatever its units."""
+def _events(file: _File) -> Iterator[str]:
+    """Where a logger that was paused says so in its last column: the event with which it went on."""
+    head = file.dialect.header[-1]
+    if file.form != TEXT or not _EVENTS.search(head):
+        return
+    wanted = Wanted(texts=frozenset((head,)))
+    try:
+        sheet = read_sheet(file.path, _as_sniffed(file, Split(event=head, begins=" ")), wanted, "rig.files")
+    except DataError:
+        return
+    later = [text for text in sheet.texts[sheet.header.index(head)][1:] if _GOES_ON.search(text)]
+    if later:
+        yield f"split: {{event: {written(head)}, begins: {written(later[0])}}}"
+
+
+def _as_sniffed(file: _File, split: Split | None = None) -> FilesEntry:
     dialect = file.dialect
-    entry = FilesEntry(
-        path=str(file.path),
-        separator=dialect.separator,
-        decimal=dialect.decimal,
-        skip=dialect.skip,
-        units_row=dialect.units is not None,
-        encoding=dialect.encoding,
-    )
+    said: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
+    if file.form == TEXT:
+        said |= {"separator": dialect.separator, "decimal": dialect.decimal, "encoding": dialect.encoding}
+    return FilesEntry(path=str(file.path), split=split, **said)
+
+
+def _turned(file: _File, columns: dict[Quantity, str]) -> bool:
+    """Whether the work of a file is negative as its numbers stand, whatever their units."""
     heads = frozenset((columns[DISPLACEMENT], columns[FORCE]))
     try:
-        sheet = reader(file.path, "text", "rig.files")(file.path, entry, Wanted(heads, numbers=heads))
+        needed = tuple(frozenset((head,)) for head in heads)
+        sheet = read_sheet(file.path, _as_sniffed(file), Wanted(heads, numbers=heads, needed=needed), "rig.files")
     except DataError:
         return False
     numbers: list[Array] = [

@@ -24,11 +24,11 @@ from pzd.rig.files.layout import ALSO_READ, own_quantity
 from pzd.rig.files.units import UnitError, in_header, to_canonical
 
 _LOOKS_LIKE = {
-    TIME: r"^t$|time|zeit|\btemps\b|tiempo|^second|^sek",
-    DISPLACEMENT: r"^[xs]$|disp|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera",
+    TIME: r"^t$|^tout$|time|zeit|\btemps\b|tiempo|^second|^sek",
+    DISPLACEMENT: r"^[xs]$|disp|^dist|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera",
     VELOCITY: r"^v$|vel|speed|geschw|vitesse",
     ACCELERATION: r"^a$|acc|beschl|acel",
-    FORCE: r"^f$|force|load|kraft|effort|fuerza|carga",
+    FORCE: r"^f$|^for[cç]|force|load|kraft|effort|fuerza|carga",
     TEMPERATURE: r"temp(?!s\b)|t[eé]mp[eé]r",
     PRESSURE: r"^p$|press|druck|presi",
 }

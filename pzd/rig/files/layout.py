@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from pzd.quantities import CHANNELS, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
 from pzd.rig.config import FilesEntry
+from pzd.rig.files.layouts import named_layout, with_layout
 from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.units import UnitError, constant
 from pzd.schema.errors import ConfigError
@@ -75,6 +76,7 @@ class Layout:
             known=frozenset(known | set(self.entry.columns.values())),
             numbers=frozenset(h for spec in self.channels if not spec.dated for h in spec.headers),
             texts=frozenset(texts),
+            needed=tuple(frozenset(spec.headers) for spec in self.channels if spec.quantity in NEEDED),
         )
 
     def values(self, path: Path) -> tuple[Values, str | None]:
@@ -144,14 +146,20 @@ class Layout:
         return values
 
 
-def layouts(entries: Sequence[FilesEntry], control: Control) -> tuple[Layout, ...]:
+def layouts(entries: Sequence[FilesEntry], control: Control, folder: Path) -> tuple[Layout, ...]:
     """The layout of every entry of `rig.files`, each checked: its keys name quantities, no two say the same.
+
+    Parameters
+    ----------
+    entries : `rig.files` of the config
+    control : the control signal
+    folder : the config's folder, where named layouts may lie
 
     Raises
     ------
     ConfigError : with every wrong key of an entry
     """
-    return tuple(_layout(entry, f"rig.files.{number}", control) for number, entry in enumerate(entries))
+    return tuple(_layout(entry, f"rig.files.{number}", control, folder) for number, entry in enumerate(entries))
 
 
 def own_quantity(quantity: Quantity, control: Control) -> Quantity:
@@ -159,7 +167,16 @@ def own_quantity(quantity: Quantity, control: Control) -> Quantity:
     return control.quantity if quantity is VOLTAGE else quantity
 
 
-def _layout(entry: FilesEntry, place: str, control: Control) -> Layout:
+def _layout(entry: FilesEntry, place: str, control: Control, folder: Path) -> Layout:
+    if entry.layout is not None:
+        named = named_layout(entry.layout, folder, f"{place}.layout")
+        theirs = named.control.signal()
+        if theirs not in (Control(), control):
+            raise ConfigError(
+                f"{place}.layout: files of this layout record a {theirs.name}; say at the top of the config "
+                f"control: {{name: {theirs.name}, unit: {theirs.unit}}} (got {entry.layout!r})"
+            )
+        entry = with_layout(entry, named)
     layout = Layout(entry, place, control, tuple(_spec(quantity, entry, control) for quantity in CHANNELS))
     faults = _faults(layout)
     if faults:

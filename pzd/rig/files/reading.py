@@ -13,7 +13,7 @@ from pzd.quantities import Control
 from pzd.rig.config import FilesEntry, Limits
 from pzd.rig.files.channels import channels
 from pzd.rig.files.fixture import Freed, damper_alone
-from pzd.rig.files.formats import reader
+from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import Layout, layouts
 from pzd.rig.files.listing import listed
 from pzd.rig.files.records import measured, names
@@ -43,7 +43,7 @@ def read(
     FilesError : when a file cannot be read
     """
     files = listed(entries, folder)
-    described = layouts(entries, control)
+    described = layouts(entries, control, folder)
     tests: list[tuple[Test, Freed]] = []
     layout_of: dict[Path, Layout] = {}
     config_faults: list[str] = []
@@ -73,7 +73,7 @@ def _read_file(path: Path, layout: Layout) -> list[tuple[Test, Freed]]:
     """The tests of one file, and displacement and force of the damper alone in each."""
     entry = layout.entry
     values, setting = layout.values(path)
-    sheet = reader(path, entry.format, layout.place)(path, entry, layout.wanted())
+    sheet = read_sheet(path, entry, layout.wanted(), layout.place)
     tests = split_into_tests(channels(sheet, layout), sheet, layout, values, setting)
     refuse(tests, layout)
     return [(test, damper_alone(test, entry.fixture)) for test in tests]

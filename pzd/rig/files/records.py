@@ -7,10 +7,12 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from pzd.artefacts import IngestRow
 from pzd.quantities import ACCELERATION, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
 from pzd.record import Record
 from pzd.rig.config import Limits
 from pzd.rig.files.fixture import Freed
+from pzd.rig.files.sheet import Step
 from pzd.rig.files.splitting import Test
 from pzd.rig.preflight import Measured
 from pzd.schema.errors import ConfigError
@@ -44,7 +46,16 @@ def measured(name: str, test: Test, freed: Freed, limits: Limits, control: Contr
         freed.force,
         *(test.channels.get(quantity) for quantity in (VOLTAGE, TEMPERATURE, PRESSURE)),
     )
-    return Measured(record, run, clean, limits, freed.said or None, control, test.remarks)
+    return Measured(record, run, clean, limits, freed.said or None, control, test.remarks, _ingested(name, test, freed))
+
+
+def _ingested(name: str, test: Test, freed: Freed) -> tuple[IngestRow, ...]:
+    """What was done to the file of a record, as rows of the ingest report."""
+    steps = (*test.steps, *([Step("fixture", None, freed.said, "taken out")] if freed.said else []))
+    return tuple(
+        IngestRow(record=name, file=test.sheet.path.name, step=s.step, quantity=s.quantity, was=s.was, became=s.became)
+        for s in steps
+    )
 
 
 def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,21 @@ class Wanted:
     """Columns of numbers."""
     texts: frozenset[str] = frozenset()
     """Columns of texts: dates, labels, events."""
+    needed: tuple[frozenset[str], ...] = ()
+    """For each quantity that a recording must have, the headers that may hold it."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing that was done on the way from a file to its records, for the ingest report."""
+
+    step: Literal["read", "left out", "rename", "unit", "sign", "value", "cut", "fixture"]
+    quantity: str | None
+    """The quantity concerned; None for the file as a whole."""
+    was: str
+    """What stands in the file or in the config."""
+    became: str
+    """What was made of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +62,12 @@ class Sheet:
     """Column -> its cells as they stand, stripped."""
     faults: dict[int, list[str]] = field(default_factory=dict)
     """Column of numbers -> the cells that are no finite numbers, each with its line."""
+    starts: tuple[int, ...] = (0,)
+    """Rows at which the file itself begins another recording: another table of a workbook, group or block."""
+    tables: tuple[str, ...] = ("",)
+    """Name of the table that begins at each start; empty where the file is one table."""
+    steps: tuple[Step, ...] = ()
+    """What was read and what was left out."""
 
     @property
     def top(self) -> str:
@@ -52,5 +75,18 @@ class Sheet:
         return at(self.path, self.header_line)
 
     def place(self, row: int) -> str:
-        """File and line of a data row."""
-        return at(self.path, None if self.lines is None else int(self.lines[row]))
+        """File, table and line of a data row; the number of the row where a format has no lines."""
+        number = bisect_right(self.starts, row) - 1
+        file = table_place(self.path, self.tables[number])
+        return f"{file}: row {row - self.starts[number] + 1}" if self.lines is None else f"{file}:{self.lines[row]}"
+
+    def place_in_file(self, row: int) -> str:
+        """The same in words, without the file."""
+        number = bisect_right(self.starts, row) - 1
+        line = f"row {row - self.starts[number] + 1}" if self.lines is None else f"line {self.lines[row]}"
+        return f"{line} of {self.tables[number]!r}" if self.tables[number] else line
+
+
+def table_place(path: Path, table: str) -> str:
+    """A file, and the table in it where that has a name."""
+    return f"{path}:{table}" if table else at(path)

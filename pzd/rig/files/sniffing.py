@@ -1,4 +1,4 @@
-"""How a text file of unknown layout is written: encoding, separator, decimal sign, preamble, row of units.
+"""How a file of unknown layout is written: encoding, separator, decimal sign, preamble, row of units.
 
 Only for the guess of a config: what is read for a run is read as the config says.
 """
@@ -7,10 +7,17 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, kind_of
+from pzd.quantities import CHANNELS
+from pzd.rig.config import FilesEntry
+from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, kind_of, unread
+from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, tables_in
+from pzd.rig.files.headers import assigned, control_of
+from pzd.rig.files.sheet import Wanted
+from pzd.rig.files.tables import spelled
 from pzd.schema.errors import DataError, FilesError, at
 
 MOST_LINES = 400
@@ -30,14 +37,45 @@ class Dialect:
     skip: int
     header: tuple[str, ...]
     units: tuple[str, ...] | None
-    """The row of units below the header, None where there is none."""
+    """The unit of every column where the file says it apart from the header."""
     first: tuple[str, ...]
     """The first row of data."""
+    units_row: bool = False
+    """Whether the units are the row below the header, as the config then has to say."""
 
     @property
     def header_line(self) -> int:
         """Line of the header in the file."""
         return self.skip + 1
+
+
+def described(path: Path) -> tuple[Dialect, str]:
+    """How a file is written, and its format; of several tables, the one with most of a rig's channels.
+
+    Raises
+    ------
+    UserError : when the file cannot be read, or holds no table
+    """
+    form = format_of(path, None, "rig.files")
+    module, entry = formats()[form], FilesEntry(path=str(path))
+    if form == TEXT:
+        found = sniffed(path)
+        if found is not None:
+            return found, form
+        sheet = read_sheet(path, entry, Wanted(known=frozenset(q.column for q in CHANNELS)), "rig.files")
+        skip = (sheet.header_line or 1) - 1
+        return Dialect("utf-8", ",", ".", skip, sheet.header, None, ("",) * len(sheet.header)), form
+    if hasattr(module, "rows"):
+        sniffs = [dialect for rows in module.rows(path).values() if (dialect := sniffed_rows(rows)) is not None]
+    else:
+        filled = [table for table in tables_in(path, entry, module) if table.rows]
+        sniffs = [
+            Dialect("utf-8", ",", ".", 0, t.header, t.units, tuple(spelled(cells[0]) for cells in t.cells))
+            for t in filled
+        ]
+    if not sniffs:
+        raise DataError(f"{at(path)}: {module.KIND} without a table of numbers below headers")
+    return max(sniffs, key=lambda d: len(assigned(d.header, d.units, control_of(d.header)))), form
 
 
 def sniffed(path: Path) -> Dialect | None:
@@ -54,14 +92,21 @@ def sniffed(path: Path) -> Dialect | None:
         raise FilesError(f"{at(path)}: cannot be read ({error.strerror})") from None
     kind = kind_of(raw)
     if kind:
-        raise DataError(f"{at(path)}: this is {kind}; export the table as CSV or other delimited text")
+        raise DataError(unread(path, kind))
     encoding = _encoding(raw)
     text = raw.decode(encoding, errors="replace").removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     lines = text.split("\n")[:MOST_LINES]
     ways = [(separator, decimal) for separator in (*SEPARATORS, BLANKS) for decimal in ".," if separator != decimal]
-    tables = [_table(lines, encoding, *way) for way in ways]
+    tables = [_table([fields_of(line, way[0]) for line in lines], encoding, *way) for way in ways]
     found = [table for table in tables if table is not None]
     return max(found, key=lambda rated: rated[0])[1] if found else None
+
+
+def sniffed_rows(rows: Sequence[Sequence[str]]) -> Dialect | None:
+    """The same of rows of cells, say those of a workbook's sheet."""
+    width = max((sum(bool(cell) for cell in row) for row in rows), default=0)
+    found = _table([[cell.strip() for cell in row[:width]] for row in rows[:MOST_LINES]], "utf-8", ",", ".")
+    return found[1] if found else None
 
 
 def _encoding(raw: bytes) -> str:
@@ -74,21 +119,28 @@ def _encoding(raw: bytes) -> str:
     return "utf-8"
 
 
-def _table(lines: list[str], encoding: str, separator: str, decimal: str) -> tuple[tuple[int, int], Dialect] | None:
-    """The table that the lines hold read this way, rated by the rows and then the numbers in it."""
-    rows = [[cell.strip('"') for cell in fields_of(line, separator)] for line in lines]
+def _table(
+    cells: list[list[str]], encoding: str, separator: str, decimal: str
+) -> tuple[tuple[int, int], Dialect] | None:
+    """The table that the rows hold read this way, rated by the rows and then the numbers in it."""
+    rows = [[cell.strip('"') for cell in row] for row in cells]
     numbers = [_numbers(row, decimal) for row in rows]
     data = [n for n, row in enumerate(rows) if len(row) > 1 and 2 * numbers[n] >= len(row) and numbers[n]]
     if not data or data[0] == 0:
         return None
     first = data[0]
     width = len(rows[first])
-    units = _UNIT.fullmatch(rows[first - 1][0]) is not None and first > 1 and len(rows[first - 2]) == width
-    units = units and len(rows[first - 1]) == width and all(_UNIT.fullmatch(cell) for cell in rows[first - 1] if cell)
+    below = rows[first - 1]
+    units = first > 1 and len(rows[first - 2]) == len(below) == width and bool(below[0] or rows[first - 2][0])
+    units = units and any(below) and all(_UNIT.fullmatch(cell) for cell in below if cell)
     top = first - 1 - units
     if len(rows[top]) != width:
         return None
-    alike = [n for n in data if len(rows[n]) == width]
+    if separator == BLANKS and any(head.endswith((",", ";")) for head in rows[top]):
+        return None  # blanks behind the separator
+    # A row may leave out the last column where that is one of events.
+    shortest = width - (not _numbers(rows[first][-1:], decimal))
+    alike = [n for n in data if shortest <= len(rows[n]) <= width]
     found = Dialect(
         encoding,
         separator,
@@ -97,6 +149,7 @@ def _table(lines: list[str], encoding: str, separator: str, decimal: str) -> tup
         tuple(rows[top]),
         tuple(rows[first - 1]) if units else None,
         tuple(rows[first]),
+        units_row=units,
     )
     return (len(alike), sum(numbers[n] for n in alike[:1])), found
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.artefacts import Finding
 from pzd.quantities import FORCE, TIME, Quantity
@@ -13,7 +13,7 @@ from pzd.record import Array
 from pzd.rig.config import Split
 from pzd.rig.files.channels import Channels
 from pzd.rig.files.layout import ChannelSpec, Layout, Values
-from pzd.rig.files.sheet import Sheet
+from pzd.rig.files.sheet import Sheet, Step
 from pzd.schema.errors import ConfigError, DataError
 
 
@@ -39,6 +39,8 @@ class Test:
     """What the force of the cell was multiplied by."""
     whole: bool = True
     """Whether the file is meant to be one test, in which the clock must go on."""
+    steps: tuple[Step, ...] = ()
+    """What was done to the file on the way here."""
 
     def place(self, row: int) -> str:
         """File and line of one sample."""
@@ -65,9 +67,10 @@ def split_into_tests(
     ]
     if twice:
         raise ConfigError(twice)
+    alone = split is None and len(sheet.starts) == 1
     if channels.faults:
-        return (Test(None, setting, channels.values, sheet, faults=channels.faults, whole=split is None),)
-    starts = [0] if split is None else _starts(sheet, split, channels.values[TIME], place)
+        return (Test(None, setting, channels.values, sheet, faults=channels.faults, whole=alone),)
+    starts = _starts(sheet, split, channels.values[TIME], place)
     bounds = list(zip(starts, [*starts[1:], sheet.rows], strict=True))
     faults = [
         f"{place}.split.constants: {spec.own.name}: {len(values[spec.quantity])} values for {len(bounds)} tests "
@@ -86,7 +89,8 @@ def split_into_tests(
             first,
             channels.remarks,
             force_sign=next(spec.sign for spec in layout.channels if spec.quantity is FORCE),
-            whole=split is None,
+            whole=alone,
+            steps=(*sheet.steps, *channels.steps, *_steps(sheet, layout, values, index, first, last, len(bounds))),
         )
         for index, (first, last) in enumerate(bounds)
     )
@@ -104,21 +108,37 @@ def _given_under(layout: Layout, spec: ChannelSpec) -> str:
     return "split.constants" if entry.split and names & set(entry.split.constants) else "pattern"
 
 
-def _starts(sheet: Sheet, split: Split, time: Array, place: str) -> list[int]:
-    """First rows of the tests."""
-    if split.gap_s is not None:
+def _starts(sheet: Sheet, split: Split | None, time: Array, place: str) -> list[int]:
+    """First rows of the tests: where the config says, and where the file itself begins another table."""
+    begins = np.zeros(sheet.rows, dtype=np.bool_)
+    if split is not None and split.gap_s is not None:
         jump = np.diff(time)
-        new = (jump > split.gap_s) | (jump < 0.0)
-        return [0, *(int(row) + 1 for row in np.flatnonzero(new))]
-    header = split.column or split.event or ""
-    if sheet.header.count(header) != 1:
-        raise DataError(f"{sheet.top}: {place}.split: no single column {header!r}")
-    cells = np.array(sheet.texts[sheet.header.index(header)])
-    if split.column is not None:
-        begins: NDArray[np.bool_] = cells[1:] != cells[:-1]
-    else:
-        begins = np.char.find(cells[1:], split.begins or "") >= 0
-    return [0, *(int(row) + 1 for row in np.flatnonzero(begins))]
+        begins[1:] = (jump > split.gap_s) | (jump < 0.0)
+    elif split is not None and not split.tables:
+        header = split.column or split.event or ""
+        if sheet.header.count(header) != 1:
+            raise DataError(f"{sheet.top}: {place}.split: no single column {header!r}")
+        cells = np.array(sheet.texts[sheet.header.index(header)])
+        by_event = np.char.find(cells[1:], split.begins or "") >= 0
+        begins[1:] = cells[1:] != cells[:-1] if split.column is not None else by_event
+    begins[list(sheet.starts)] = True
+    return [int(row) for row in np.flatnonzero(begins)]
+
+
+def _steps(
+    sheet: Sheet, layout: Layout, values: Values, index: int, first: int, last: int, count: int
+) -> Iterator[Step]:
+    """Which rows are this test, and the values that no column holds."""
+    if count > 1:
+        yield Step(
+            "cut", None, f"test {index + 1} of {count}", f"{last - first} rows from {sheet.place_in_file(first)}"
+        )
+    for spec in layout.channels:
+        if spec.quantity in values:
+            given = values[spec.quantity]
+            value = given[index if len(given) > 1 else 0]
+            under = _given_under(layout, spec)
+            yield Step("value", spec.own.name, f"no column; {under}", f"{value:.6g} {spec.own.unit}")
 
 
 def _piece(channels: dict[Quantity, Array], values: Values, index: int, first: int, last: int) -> dict[Quantity, Array]:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d.+-].*?)\s*")
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
+_LOGGERS = {"Sec": "s", "sec": "s", "Volts": "V", "Amps": "A", "lbs": "lbf", "kips": "kip", "deg_C": "degC"}
+"""How loggers spell units that pint does not know, or takes for others: a rig's `lbs` are pounds of force."""
 
 
 class UnitError(ValueError):
@@ -92,8 +94,8 @@ def _registry() -> pint.UnitRegistry[float]:
 
 
 def _spelled(unit: str) -> str:
-    """Exponents as pint reads them: m/s2 is m/s^2."""
-    return re.sub(r"([A-Za-z])(\d)", r"\1^\2", unit)
+    """Exponents as pint reads them, m/s2 as m/s^2; and what loggers call a unit that pint knows by another name."""
+    return re.sub(r"([A-Za-z])(\d)", r"\1^\2", _LOGGERS.get(unit, unit))
 
 
 def _one_line(error: Exception) -> str:

@@ -15,7 +15,7 @@ from types import ModuleType
 
 import numpy as np
 
-from pzd.artefacts import Finding, RecordEntry, Rig
+from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig
 from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
@@ -38,6 +38,8 @@ class Measured:
     """The control signal, recorded as the voltage."""
     remarks: tuple[Finding, ...] = ()
     """What the file itself says otherwise than the config."""
+    ingested: tuple[IngestRow, ...] = ()
+    """What was done to the file on the way to this record."""
 
     def channels(self) -> tuple[Channel, ...]:
         """Every recorded channel but the clock: what is sensed of the motion first, then what labels the record."""
@@ -90,15 +92,15 @@ def examined(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:
     jobs : records made and examined at the same time
     """
 
-    def listed(given: Callable[[], Measured]) -> tuple[Record, RecordEntry]:
+    def listed(given: Callable[[], Measured]) -> tuple[Record, RecordEntry, tuple[IngestRow, ...]]:
         test = given()
-        return test.record, _entry(test)
+        return test.record, _entry(test), test.ingested
 
     found = parallel_map(listed, tests, jobs)
-    entries = tuple(entry for _, entry in found)
+    entries = tuple(entry for _, entry, _ in found)
     for module in checks().values():
         entries = module.compared(entries) if hasattr(module, "compared") else entries
-    return Rig(tuple(record for record, _ in found), entries)
+    return Rig(tuple(record for record, _, _ in found), entries, tuple(row for _, _, rows in found for row in rows))
 
 
 def _entry(test: Measured) -> RecordEntry:

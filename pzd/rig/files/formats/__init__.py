@@ -1,25 +1,31 @@
-"""Readers of rig files, one file a format: `SUFFIXES`, and `read(path, entry, wanted) -> Sheet`.
+"""Formats of rig files, one file each: `KIND`, `SUFFIXES`, `NEEDS`, `HEEDS`, `holds(path, start)` and `tables`.
 
-A reader whose library is an extra imports it inside `read`.
+`NEEDS` is the library that the format is read with, None where pzd itself needs it anyway; it is imported inside
+`tables`. `HEEDS` are the keys of `MANNERS` that mean something for the format; others are refused. A format of loose
+cells (a workbook) has `rows(path)` too, from which `pzd init` sees the layout. Delimited text alone has `read` instead
+of `tables`: it parses the columns that are asked for and no other.
 """
 
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Callable
 from functools import lru_cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.sheet import Sheet, Wanted
-from pzd.schema.errors import ConfigError
-
-Reader = Callable[[Path, FilesEntry, Wanted], Sheet]
+from pzd.rig.files.tables import Table, sheet_of
+from pzd.schema.errors import ConfigError, DataError, FilesError, UserError, at
 
 TEXT = "text"
-"""The format of files whose ending no other format claims."""
+"""The format of files that no other format knows by their content or their ending."""
+MANNERS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding", "table")
+"""Keys of an entry about how a file is written."""
+START = 4096
+"""Bytes from the start of a file by which its format is known."""
 
 
 @lru_cache(maxsize=1)
@@ -28,16 +34,83 @@ def formats() -> dict[str, ModuleType]:
     return {found.name: import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__)}
 
 
-def reader(path: Path, name: str | None, place: str) -> Reader:
-    """The reader for a file: the one named, else the one that claims its ending, else text.
+def format_of(path: Path, name: str | None, place: str) -> str:
+    """The name of a file's format: the one that the config says, else by content, else by its ending, else text.
+
+    Parameters
+    ----------
+    path : the file
+    name : `format` of the config
+    place : where the entry stands in the config
 
     Raises
     ------
-    ConfigError : when no format has the name
+    ConfigError : when no format has the name, or its library is not installed
+    FilesError : when the file cannot be read
     """
     if name is not None and name not in formats():
         raise ConfigError(f"{place}.format: no such format; there are {', '.join(formats())} (got {name!r})")
+    found = name or _known(path)
+    library = formats()[found].NEEDS
+    if library is not None and find_spec(library) is None:
+        raise ConfigError(
+            f"{at(path)}: {formats()[found].KIND} is read with {library}, which is not installed; "
+            "pip install 'pzd[formats]'"
+        )
+    return found
+
+
+def read_sheet(path: Path, entry: FilesEntry, wanted: Wanted, place: str) -> Sheet:
+    """The wanted columns of a file of any format.
+
+    Parameters
+    ----------
+    path : the file
+    entry : how it is to be read
+    wanted : the columns to read
+    place : where the entry stands in the config
+
+    Raises
+    ------
+    ConfigError : when no format has the name that the config says, or its library is not installed
+    DataError : when the file is damaged or holds no such table
+    FilesError : when the file cannot be read
+    """
+    module = formats()[format_of(path, entry.format, place)]
+    idle = [k for k in MANNERS if k not in module.HEEDS and getattr(entry, k) != FilesEntry.model_fields[k].default]
+    if idle:
+        raise ConfigError(f"{place}.{key}: {module.KIND} has nothing of the kind ({at(path)})" for key in idle)
+    if hasattr(module, "read"):
+        sheet: Sheet = module.read(path, entry, wanted)
+        return sheet
+    return sheet_of(path, tables_in(path, entry, module), entry.table, wanted)
+
+
+def tables_in(path: Path, entry: FilesEntry, module: ModuleType) -> list[Table]:
+    """The tables of a file of one format.
+
+    Raises
+    ------
+    DataError : when the library of the format cannot read it
+    """
+    try:
+        found: list[Table] = module.tables(path, entry)
+    except UserError:
+        raise
+    except Exception as error:  # a damaged file makes these libraries raise anything
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise DataError(f"{at(path)}: {module.KIND} that cannot be read ({why})") from error
+    return found
+
+
+def _known(path: Path) -> str:
+    """The format that knows a file's content, else its ending, else text."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(START)
+    except OSError as error:
+        raise FilesError(f"{at(path)}: cannot be read ({error.strerror})") from None
+    others = {name: module for name, module in formats().items() if name != TEXT}
+    by_content = next((name for name, module in others.items() if module.holds(path, start)), None)
     ending = path.suffix.lower()
-    claimed = next((n for n, module in formats().items() if ending in module.SUFFIXES), TEXT)
-    chosen: Reader = formats()[name or claimed].read
-    return chosen
+    return by_content or next((name for name, module in others.items() if ending in module.SUFFIXES), TEXT)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import csv
 import io
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,16 +20,23 @@ from numpy.typing import NDArray
 from pzd.record import Array
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import BLANKS, after_lines, field_counts, fields_of, separator_of, text_of, without_blank_end
-from pzd.rig.files.sheet import Sheet, Wanted
+from pzd.rig.files.sheet import Sheet, Step, Wanted
 from pzd.schema.errors import DataError, at
 
 if TYPE_CHECKING:
     import pandas as pd
 
+KIND = "a text file"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+NEEDS = None
+HEEDS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding")
 
 MOST_FAULTS = 5
 """Faults of one kind that are listed for one file."""
+
+
+_INSIDE = "\x1e"
+"""Stands for a separator inside an event, which no logger quotes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +68,8 @@ class _Table:
 
     def texts(self, column: int) -> list[str]:
         """The cells of one column, stripped; empty where a line ends before it."""
-        cells = self._parsed([column], "str")[column]
-        return [cell.strip() for cell in cells.fillna("").tolist()]
+        cells = self._parsed([column], "str")[column].fillna("").tolist()
+        return [cell.replace(_INSIDE, "," if self.separator == "\x1f" else self.separator).strip() for cell in cells]
 
     def _parsed(self, columns: list[int], kind: str) -> pd.DataFrame:
         import pandas as pd
@@ -195,7 +204,9 @@ def _sheet(
         raise DataError(f"{at(path, entry.skip + 1)}: no header line")
     if lines.size == 0:
         raise DataError(f"{at(path, header_line)}: no data rows below the header")
-    uneven = (fields != len(header)) & ~_ends_before_the_event(entry, header, fields)
+    uneven = fields != len(header)
+    if entry.split is not None and entry.split.event == header[-1]:
+        body, uneven = _with_loose_events(body, fields, len(header), separator)
     if uneven.any():
         raise DataError(_uneven(path, lines, fields, np.flatnonzero(uneven), len(header), separator))
     units = tuple(heads[-1]) if entry.units_row else None
@@ -205,7 +216,21 @@ def _sheet(
     dated = [i for i, head in enumerate(header) if "%S" in head or (units is not None and "%S" in units[i])]
     numbers, faults = table.numbers([i for i, head in enumerate(header) if head in wanted.numbers and i not in dated])
     texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
-    return Sheet(path, tuple(header), header_line, units, int(lines.size), lines, numbers, texts, faults)
+    steps = tuple(_steps(entry, header, wanted, lines))
+    return Sheet(path, tuple(header), header_line, units, int(lines.size), lines, numbers, texts, faults, steps=steps)
+
+
+def _steps(entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[np.int64]) -> Iterator[Step]:
+    """What is read of a file, and the lines and columns that are left out."""
+    if entry.skip:
+        yield Step("left out", None, f"{entry.skip} lines above the header", "")
+    dropped = int(lines[-1] - lines[0]) + 1 - lines.size
+    if dropped:
+        yield Step("left out", None, f"{dropped} lines that begin with {entry.comment!r}", "")
+    yield Step("read", None, f"lines {lines[0]} to {lines[-1]}", f"{lines.size} rows")
+    unread = [head for head in header if head not in wanted.numbers | wanted.texts]
+    if unread:
+        yield Step("left out", None, f"columns {', '.join(unread)}", "")
 
 
 def _uneven(
@@ -226,11 +251,27 @@ def _uneven(
     return [*shown, f"{at(path)}: and {rows.size - MOST_FAULTS} more such lines{hint}"]
 
 
-def _ends_before_the_event(entry: FilesEntry, header: list[str], fields: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Rows that leave out the last column, where that is the column of events."""
-    allowed = entry.split is not None and entry.split.event is not None and header[-1] == entry.split.event
-    shorter: NDArray[np.bool_] = fields == len(header) - 1
-    return shorter if allowed else np.zeros_like(shorter)
+def _with_loose_events(
+    body: str, fields: NDArray[np.int64], width: int, separator: str
+) -> tuple[str, NDArray[np.bool_]]:
+    """Rows whose last column is that of events: it may be left out, or hold separators that nothing quotes.
+
+    Returns
+    -------
+    the body with such separators marked, and (rows,) which rows are uneven all the same
+    """
+    uneven = (fields != width) & (fields != width - 1)
+    longer = np.flatnonzero(fields > width)
+    if not longer.size:
+        return body, uneven
+    rows = body.split("\n")
+    for row in longer.tolist():
+        cells = rows[row].split(None if separator == BLANKS else separator)
+        event = cells[width - 1 :]
+        if all(re.search("[A-Za-z]", cell) for cell in event):
+            rows[row] = separator.join([*cells[: width - 1], _INSIDE.join(event)])
+            uneven[row] = False
+    return "\n".join(rows), uneven
 
 
 def _number(cell: str, decimal: str) -> float:

@@ -1,0 +1,63 @@
+"""JSON: arrays by name, `{"time [s]": [...], "force [kN]": [...]}`, at the top or in objects below, or a list of rows.
+
+`{"unit": "mm", "values": [...]}` is a column too, and a single number beside arrays a column of one value.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pzd.rig.config import FilesEntry
+from pzd.rig.files.tables import Table, table_of_rows, tables_of_tree
+from pzd.schema.errors import DataError, at
+
+KIND = "a JSON file"
+SUFFIXES = (".json",)
+NEEDS = None
+HEEDS = ("table",)
+
+
+def holds(path: Path, start: bytes) -> bool:
+    """Whether a file is of this format by how it begins, and all of it JSON."""
+    if not start.removeprefix(b"\xef\xbb\xbf").lstrip().startswith((b"{", b"[")):
+        return False
+    try:
+        json.loads(path.read_bytes())
+    except ValueError:
+        return False
+    return True
+
+
+def tables(path: Path, entry: FilesEntry) -> list[Table]:
+    """The tables of the objects."""
+    try:
+        read = json.loads(path.read_bytes(), parse_constant=_no_number, object_pairs_hook=_object)
+    except json.JSONDecodeError as error:
+        raise DataError(f"{at(path, error.lineno, error.colno)}: no JSON ({error.msg})") from None
+    except _TwiceError as error:
+        raise DataError(f"{at(path)}: the key {error.args[0]!r} stands twice in one object") from None
+    if isinstance(read, list) and read and all(isinstance(row, dict) for row in read):
+        if not any(isinstance(cell, list | dict) for row in read for cell in row.values()):
+            return [table_of_rows("", read)]
+        read = {str(number + 1): below for number, below in enumerate(read)}
+    return tables_of_tree(read) if isinstance(read, dict) else []
+
+
+class _TwiceError(Exception):
+    """A key that stands twice in one object, of which a parser would keep the last."""
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key.strip() in found:
+            raise _TwiceError(key)
+        found[key.strip()] = value
+    return found
+
+
+def _no_number(word: str) -> Any:
+    """NaN counts as an empty cell; an infinity as the cell that it is."""
+    return None if word == "NaN" else float(word.replace("Infinity", "inf"))

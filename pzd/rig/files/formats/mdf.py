@@ -1,0 +1,73 @@
+"""MDF 3 and 4 of vehicle and rig loggers: every channel group is a table, its master channel the clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from traceback import walk_tb
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from pzd.rig.config import FilesEntry
+from pzd.rig.files.tables import Cells, Table, equal_lengths
+
+KIND = "an MDF file"
+SUFFIXES = (".mf4", ".mdf")
+NEEDS = "asammdf"
+HEEDS = ("table",)
+CLOCK = "time"
+"""Header of the clock where the master channel has no name."""
+
+
+def holds(path: Path, start: bytes) -> bool:
+    """Whether a file is of this format by how it begins."""
+    return start.startswith((b"MDF     ", b"UnFinMF "))
+
+
+def tables(path: Path, entry: FilesEntry) -> list[Table]:
+    """The tables of the channel groups, in physical values."""
+    found = []
+    with path.open("rb") as opened, _opened(opened) as file:
+        for number, group in enumerate(file.groups):
+            master = file.masters_db.get(number)
+            signals = [
+                file.get(group=number, index=index, ignore_invalidation_bits=True)
+                for index in range(len(group.channels))
+                if index != master
+            ]
+            plain = [signal for signal in signals if signal.samples.ndim == 1 and signal.samples.dtype.kind in "biuf"]
+            if plain:
+                clock = group.channels[master].name.strip() if master is not None else CLOCK
+                name = getattr(group.channel_group, "acq_name", "") or f"group {number + 1}"
+                found += equal_lengths(name, _columns(clock or CLOCK, plain))
+    return found
+
+
+def _columns(clock: str, signals: Sequence[Any]) -> dict[str, tuple[Cells, str]]:
+    """The signals of one group and their clock, invalid samples empty; signals of one name are numbered."""
+    columns: dict[str, tuple[Cells, str]] = {clock: (np.asarray(signals[0].timestamps, dtype=np.float64), "s")}
+    names = [signal.name.strip() for signal in signals]
+    for number, signal in enumerate(signals):
+        name = names[number]
+        twice = names.count(name) > 1 or name == clock
+        samples = signal.samples.astype(np.float64)
+        if signal.invalidation_bits is not None:
+            samples[np.asarray(signal.invalidation_bits, dtype=np.bool_)] = np.nan
+        columns[f"{name}.{names[: number + 1].count(name)}" if twice else name] = (samples, (signal.unit or "").strip())
+    return columns
+
+
+def _opened(file: BinaryIO) -> Any:
+    """The file as the library sees it; one that it could not open is closed, as its destructor would fail aloud."""
+    from asammdf import MDF
+
+    try:
+        return MDF(file)
+    except Exception as error:
+        for frame, _ in walk_tb(error.__traceback__):
+            half_open = frame.f_locals.get("self")
+            if half_open is not None and hasattr(half_open, "_tempfile") and hasattr(half_open, "_closed"):
+                half_open._tempfile.close()  # noqa: SLF001  # the library has no other way to it
+                half_open._closed = True  # noqa: SLF001  # as above
+        raise

@@ -1,0 +1,65 @@
+"""TDMS of LabVIEW: every group is a table; units from `unit_string`, the clock of a waveform from its increment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pzd.rig.config import FilesEntry
+from pzd.rig.files.tables import Cells, Table, cells_of, equal_lengths
+
+KIND = "a TDMS file"
+SUFFIXES = (".tdms",)
+NEEDS = "nptdms"
+HEEDS = ("table",)
+CLOCK = "time"
+"""Header of the clock of a group of waveforms, which has no channel of its own."""
+
+
+def holds(path: Path, start: bytes) -> bool:
+    """Whether a file is of this format by how it begins."""
+    return start.startswith(b"TDSm")
+
+
+def tables(path: Path, entry: FilesEntry) -> list[Table]:
+    """The tables of the groups."""
+    from nptdms import TdmsFile
+
+    return [table for group in TdmsFile.read(path).groups() for table in _group(group.name, group.channels())]
+
+
+def _group(name: str, channels: Sequence[Any]) -> list[Table]:
+    """The tables of one group: waveforms of one clock stand in one table, with what has no clock of its own."""
+    filled = [channel for channel in channels if len(channel)]
+    clocks = list(dict.fromkeys(filter(None, map(_clock, filled))))
+    if any(channel.name.strip() == CLOCK for channel in filled):
+        clocks = []
+    found = []
+    for number, clock in enumerate(clocks or [None]):
+        mine = [channel for channel in filled if clock is None or _clock(channel) in (clock, None)]
+        columns = {channel.name.strip(): (_cells(channel[:]), _unit(channel)) for channel in mine}
+        if clock is not None:
+            _, start, step, length = clock
+            columns[CLOCK] = (np.asarray(start + step * np.arange(length), dtype=np.float64), "s")
+        found += equal_lengths(f"{name} clock {number + 1}" if len(clocks) > 1 else name, columns)
+    return found
+
+
+def _clock(channel: Any) -> tuple[str, float, float, int] | None:
+    """When a waveform began, the offset of its first sample and the step of its clock [s], and its length."""
+    said = channel.properties
+    if "wf_increment" not in said:
+        return None
+    begun = str(said.get("wf_start_time", ""))
+    return begun, float(said.get("wf_start_offset", 0.0)), float(said["wf_increment"]), len(channel)
+
+
+def _unit(channel: Any) -> str:
+    return str(channel.properties.get("unit_string", channel.properties.get("NI_UnitDescription", ""))).strip()
+
+
+def _cells(samples: Any) -> Cells:
+    return samples.astype(np.float64) if samples.dtype.kind in "biuf" else cells_of(samples.tolist())
