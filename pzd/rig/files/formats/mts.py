@@ -19,7 +19,7 @@ from pzd.schema.errors import DataError, at
 KIND = "a file of MTS's acquisition blocks"
 SUFFIXES = ()
 NEEDS = None
-HEEDS = ("decimal", "encoding", "table")
+OPTIONS = ("decimal", "encoding", "table")
 
 SIGNATURE = "MTS793|"
 BEGINS = "Data Acquisition"

@@ -14,7 +14,7 @@ from pzd.rig.files.tables import Cells, Table, cells_of, equal_lengths
 KIND = "a TDMS file"
 SUFFIXES = (".tdms",)
 NEEDS = "nptdms"
-HEEDS = ("table",)
+OPTIONS = ("table",)
 CLOCK = "time"
 """Header of the clock of a group of waveforms, which has no channel of its own."""
 
