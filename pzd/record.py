@@ -9,6 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Complex = NDArray[np.complex128]
+Rows = NDArray[np.intp]
+"""Types of arrays for all of pzd: numbers, which samples, complex numbers, and indices of samples."""
 
 CONSTANT_SHARE = 0.02
 """A voltage whose r.m.s. about its median stays within this share of the scale is constant."""
@@ -45,7 +49,7 @@ class Record:
         return None if self.temperature is None else float(np.median(self.temperature))
 
 
-def sliced(record: Record, kept: NDArray[np.bool_]) -> Record:
+def sliced(record: Record, kept: Mask) -> Record:
     """The record's samples where the mask (n,) is set."""
 
     def cut(channel: Array | None) -> Array | None:

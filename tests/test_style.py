@@ -136,6 +136,16 @@ def test_a_private_word_is_found_as_module_class_function_and_constant(tmp_path:
     assert {name for _, name in names_in(module)} & PRIVATE_WORDS == {"story", "near", "told", "stand_in", "judged"}
 
 
+def test_no_type_of_array_is_named_twice() -> None:
+    found: dict[str, list[str]] = {}
+    for path in MODULES:
+        for statement in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(statement, ast.Assign) and ast.unparse(statement.value).startswith("NDArray["):
+                found.setdefault(ast.unparse(statement.value), []).append(path.relative_to(ROOT).as_posix())
+    assert found.keys() >= {"NDArray[np.float64]", "NDArray[np.bool_]"}
+    assert {kind: places for kind, places in found.items() if len(places) > 1} == {}
+
+
 def written_lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     """Lines of a function; its docstring does not make it long."""
     first = node.body[0]

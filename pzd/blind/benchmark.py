@@ -18,7 +18,7 @@ from pathlib import Path
 from pzd.blind.case import Places, Scored
 from pzd.blind.diagnosis import Methods, diagnose_case
 from pzd.blind.hide import Setup, hide
-from pzd.blind.plan import Planned, plan
+from pzd.blind.plan import PlannedCase, plan
 from pzd.blind.scoring import score_case
 from pzd.schema.errors import DataError
 from pzd.schema.jsonfile import read_json
@@ -69,7 +69,7 @@ class Benchmark:
             done |= self._worked(waiting, len(cases), jobs)
         return tuple(done[case.id] for case in cases)
 
-    def finished(self, cases: Iterable[Planned]) -> dict[str, Scored]:
+    def finished(self, cases: Iterable[PlannedCase]) -> dict[str, Scored]:
         """The scores that stand there and were made from the same config and code."""
         found = {}
         for case in cases:
@@ -79,18 +79,18 @@ class Benchmark:
                     found[case.id] = score
         return found
 
-    def _prepare(self, waiting: Iterable[Planned]) -> None:
+    def _prepare(self, waiting: Iterable[PlannedCase]) -> None:
         """Take away what an earlier run left of the cases."""
         for case in waiting:
             shutil.rmtree(self.places.case(case.id), ignore_errors=True)
             for path in (self.places.truth(case.id), self.places.clean(case.id), self.places.scored(case.id)):
                 path.unlink(missing_ok=True)
 
-    def _worked(self, waiting: list[Planned], whole: int, jobs: int) -> dict[str, Scored]:
+    def _worked(self, waiting: list[PlannedCase], whole: int, jobs: int) -> dict[str, Scored]:
         begun = time.monotonic()
         found: dict[str, Scored] = {}
 
-        def kept(case: Planned) -> None:
+        def kept(case: PlannedCase) -> None:
             found[case.id] = score_case(
                 self.places, case.id, self.made_from, self.setup.control, keep_files=self.setup.blind.keep_files
             )
@@ -114,16 +114,16 @@ class Benchmark:
 
 
 def _in_turn(
-    cases: list[Planned],
-    draw: Callable[[Planned], Future[None]],
-    diagnose: Callable[[Planned], Future[None]],
-    kept: Callable[[Planned], None],
+    cases: list[PlannedCase],
+    draw: Callable[[PlannedCase], Future[None]],
+    diagnose: Callable[[PlannedCase], Future[None]],
+    kept: Callable[[PlannedCase], None],
     jobs: int,
 ) -> None:
     """Draw and diagnose every case, at most `jobs` at work; what is drawn is diagnosed first."""
-    waiting, drawn = list(reversed(cases)), list[Planned]()
-    drawing: dict[Future[None], Planned] = {}
-    seeking: dict[Future[None], Planned] = {}
+    waiting, drawn = list(reversed(cases)), list[PlannedCase]()
+    drawing: dict[Future[None], PlannedCase] = {}
+    seeking: dict[Future[None], PlannedCase] = {}
     while waiting or drawn or drawing or seeking:
         while len(drawing) + len(seeking) < jobs and (drawn or waiting):
             if drawn:

@@ -10,7 +10,7 @@ import numpy as np
 from pzd.blind.case import Places, Truth
 from pzd.blind.clean import Clean, write_clean
 from pzd.blind.config import BlindConfig, TestPlan
-from pzd.blind.plan import Planned
+from pzd.blind.plan import PlannedCase
 from pzd.blind.sizes import Outside, sizes, with_effects
 from pzd.blind.visible import gap_after_refit
 from pzd.damper.model import BaseRow, Damper
@@ -39,7 +39,7 @@ class Setup:
         return next(campaign for campaign in self.blind.campaigns if campaign.name == name)
 
 
-def hide(setup: Setup, planned: Planned, places: Places) -> None:
+def hide(setup: Setup, planned: PlannedCase, places: Places) -> None:
     """Draw a case; write its rig files where the diagnosis looks, and its truth where it does not.
 
     Parameters
@@ -58,7 +58,7 @@ def hide(setup: Setup, planned: Planned, places: Places) -> None:
     write_clean(places.clean(planned.id), _known(records))
 
 
-def drawn(setup: Setup, planned: Planned) -> tuple[Truth, list[Taken]]:
+def drawn(setup: Setup, planned: PlannedCase) -> tuple[Truth, list[Taken]]:
     """The truth of a case, and what the data logger has of it.
 
     Parameters

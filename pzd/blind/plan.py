@@ -19,7 +19,7 @@ Key = TypeVar("Key", bound=str)
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedCase:
     """One case before anything is drawn."""
 
     index: int
@@ -38,7 +38,7 @@ class Planned:
         return any(name in library() and library()[name].needs == what for name in self.hidden)
 
 
-def plan(config: BlindConfig) -> tuple[Planned, ...]:
+def plan(config: BlindConfig) -> tuple[PlannedCase, ...]:
     """Every case, in the order in which they are done.
 
     Parameters
@@ -53,7 +53,7 @@ def plan(config: BlindConfig) -> tuple[Planned, ...]:
     for index in range(config.cases):
         kind = next(kinds)
         campaign = next(campaigns[kind])
-        found.append(Planned(index, kind, campaign, next(what[kind, campaign])))
+        found.append(PlannedCase(index, kind, campaign, next(what[kind, campaign])))
     return tuple(found)
 
 

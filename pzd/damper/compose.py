@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.damper.columns import DRIVE, NEUTRAL, PARALLEL, STROKE_AND_FLOW, Column, acting
 from pzd.damper.competing_forms import module_of
@@ -20,8 +19,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.damper.path import march
 from pzd.damper.values import columns_of, value_of
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 TOLERANCE = 1e-9
 """Admissible error of one piece of the path, as a share of the force."""

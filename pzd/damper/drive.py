@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.compiled import compiled
 from pzd.damper.columns import DRIVE, NEUTRAL
 from pzd.damper.kernels import follow_voltage
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 
 def drive_row(effects: Mapping[str, Mapping[str, float]]) -> Array:

@@ -13,11 +13,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.compiled import compiled, inlined
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 _STRAIGHT = np.zeros(1)
 _NO_SLOPES = np.empty((0, 3))

@@ -15,15 +15,14 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.compiled import cache_folder
 from pzd.damper.columns import DRIVE, PARALLEL, STROKE_AND_FLOW, Column, acting
 from pzd.damper.competing_forms import module_of
 from pzd.damper.effect import Effect
 from pzd.damper.laws import ELEMENT, arguments, functions
+from pzd.record import Array
 
-Array = NDArray[np.float64]
 Row = tuple[float, ...]
 """Parameters at one moment: T0 [N], C [N s/m], k [N/m], then those of `columns.STROKE_AND_FLOW`."""
 

@@ -8,15 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.damper.columns import acting
 from pzd.damper.competing_forms import module_of
 from pzd.damper.laws import arguments, functions
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.values import column
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 _SAME_VOLTAGE = 0.02  # of the largest voltage; labels of one voltage at two temperatures differ a little
 

@@ -5,12 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pzd.record import Record
-
-Array = NDArray[np.float64]
+from pzd.record import Array, Record
 
 
 @dataclass(frozen=True, eq=False)

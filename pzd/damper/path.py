@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.compiled import compiled
 from pzd.damper.flow import smooth_force
@@ -31,8 +30,7 @@ from pzd.damper.regimes import (
     spring_energy,
     spring_force,
 )
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 DEFLECTION, SPEED, DISSIPATED, VALVE_WORK = range(4)
 """The state: e [m], the last flow speed w [m/s], and the energies so far [J]."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.compiled import compiled
 from pzd.damper.kernels import Row, interpolate, row_of
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 
 @compiled

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.damper.columns import NEUTRAL, Column
 from pzd.damper.model import Damper
-
-Array = NDArray[np.float64]
+from pzd.record import Array
 
 
 def value_of(damper: Damper, effect: str, parameter: str) -> float:

@@ -11,7 +11,7 @@ from pzd.diagnose.verdict import Verdict
 from pzd.identify.determination import NAMES, scales_of
 from pzd.identify.fit import row_of
 from pzd.identify.objective import Bingham
-from pzd.identify.trust import Evidence
+from pzd.identify.trust import ParameterEvidence
 
 DOUBTS: dict[Verdict, str] = {
     "unexplained": "something is still missed: the parameters are the model's, not the damper's",
@@ -45,7 +45,7 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
         residuals = measured - np.concatenate([f for _, f in mine])
         parameters = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
         evidence = [
-            Evidence(name, scale, width, width, SHOWN, doubt=DOUBTS.get(verdict))
+            ParameterEvidence(name, scale, width, width, SHOWN, doubt=DOUBTS.get(verdict))
             for name, scale, width in zip(NAMES, scales_of(parameters, measured).tolist(), widths.tolist(), strict=True)
         ]
         labels = (setting, row.voltage_V, row.temperature_degC)

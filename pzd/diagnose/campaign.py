@@ -8,16 +8,15 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.damper.model import Damper
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.data.split import UNTOUCHED, Split
-from pzd.diagnose.fit.input_uncertainty import Expected, expected
+from pzd.diagnose.fit.input_uncertainty import Predicted, expected
 from pzd.diagnose.residual_check import ResidualCheck, check_residual
+from pzd.record import Mask
 from pzd.signals.nuisance import NuisanceConfig
 
-Mask = NDArray[np.bool_]
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 
@@ -31,7 +30,7 @@ class Campaign:
     nuisance: NuisanceConfig
     jobs: int = 1
     """Records that are simulated at the same time."""
-    _expected: dict[tuple[str, int], Expected] = field(default_factory=dict, repr=False)
+    _expected: dict[tuple[str, int], Predicted] = field(default_factory=dict, repr=False)
     _checks: dict[str, tuple[ResidualCheck, ...]] = field(default_factory=dict, repr=False)
 
     @property
@@ -43,7 +42,7 @@ class Campaign:
         """(n,) the samples of each record in one role of the split."""
         return tuple(roles == role for roles in self.parts.roles)
 
-    def expected(self, damper: Damper, numbers: Sequence[int]) -> tuple[Expected, ...]:
+    def expected(self, damper: Damper, numbers: Sequence[int]) -> tuple[Predicted, ...]:
         """What the damper makes of some of the records."""
         key = damper.model_dump_json()
         new = [i for i in numbers if (key, i) not in self._expected]

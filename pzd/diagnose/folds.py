@@ -6,18 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.damper.material import by_voltage
 from pzd.damper.model import Damper
 from pzd.diagnose.data.cleaning import Prepared
+from pzd.record import Mask
 
 FOLDS = 5
 """Each fold keeps back about a fifth of the tests: enough is left to fit, and the refits stay few."""
 PARTS = 2
 """Halves of a test that is alone at its voltage: the first predicts the second, and the second the first."""
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,9 +22,10 @@ from pzd.diagnose.fit.least_squares import MOST_EVALUATIONS, Fitted, fit
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.prediction import counted, predicted_force
 from pzd.diagnose.fit.weights import record_likelihood, unweighted
-from pzd.diagnose.folds import Mask, deal
+from pzd.diagnose.folds import deal
 from pzd.diagnose.missed import Missed, worse
 from pzd.diagnose.search.evidence import evidence_of
+from pzd.record import Mask
 from pzd.signals.nuisance import NuisanceConfig, columns_of
 
 EVALUATIONS = 6

@@ -5,20 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.diagnose.data.cleaning import Prepared
-from pzd.diagnose.fit.input_uncertainty import Expected
+from pzd.diagnose.fit.input_uncertainty import Predicted
 from pzd.diagnose.fit.prediction import counted
 from pzd.diagnose.thresholds import CYCLE_CHANGE_SIGNIFICANCE
-from pzd.record import Array, sliced
+from pzd.record import Array, Mask, sliced
 from pzd.signals.between_cycles import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.signals.jumps import jumps, jumps_in_cycles, within_a_sample
 from pzd.signals.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
 from pzd.signals.nuisance import NuisanceConfig, nuisance
 from pzd.signals.smooth_residual import fit_smooth_residual
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,7 @@ class ResidualCheck:
         return float(np.max(np.abs(self.prepared.record.force)))
 
 
-def check_residual(given: Expected, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> ResidualCheck:
+def check_residual(given: Predicted, prepared: Prepared, wanted: Mask, config: NuisanceConfig) -> ResidualCheck:
     """The record against what a damper makes of it, over the wanted samples past the warm-up."""
     record = prepared.record
     predicted, residual = given.force, record.force - given.force

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from pzd.artefacts import Diagnosis, NextTest
-from pzd.diagnose.campaign import Campaign, Mask
+from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.data.split import TRAINING
 from pzd.diagnose.fit.weights import FEWEST_SAMPLES, enough
 from pzd.diagnose.next_test import Reach, rounded_down
+from pzd.record import Mask
 
 CYCLES = "ten"
 """Of a test: noise is told from what repeats, and a quarter of the cycles chooses, another is held out."""

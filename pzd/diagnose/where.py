@@ -28,7 +28,7 @@ MOST_REGIONS = 10
 
 
 @dataclass(frozen=True, eq=False)
-class GapMap:
+class GapDensity:
     """Every checked sample (or point of an average cycle) of all records, with its part of the gap."""
 
     density: Array
@@ -65,7 +65,7 @@ def regions(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> tu
     return tuple(region for _, region in found[:MOST_REGIONS]) or (Region(region="everywhere alike", share_of_gap=1.0),)
 
 
-def gap_map(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> GapMap:
+def gap_map(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> GapDensity:
     """The gap sample by sample, noise's share taken off; positions are as recorded."""
     points = [_points(j) for j in checks]
     speed = max(float(np.max(np.abs(p["velocity"]))) for p in points)
@@ -74,7 +74,7 @@ def gap_map(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> Ga
     for j, p in zip(checks, points, strict=True):
         for axis, words in _labels(j, p, speed, stroke, unit, zero).items():
             labels.setdefault(axis, []).append(words)
-    return GapMap(
+    return GapDensity(
         np.concatenate([p["density"] for p in points]),
         np.concatenate([p["weight"] for p in points]),
         {axis: np.concatenate(words) for axis, words in labels.items() if len(words) == len(checks)},

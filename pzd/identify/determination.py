@@ -6,7 +6,14 @@ import numpy as np
 
 from pzd.identify.misfit import Misfit
 from pzd.identify.objective import Bingham, Objective
-from pzd.identify.trust import MISFIT, SPRING_TO_NOISE, STATIONARY, Evidence, displacement_noise, friction_scale
+from pzd.identify.trust import (
+    MISFIT,
+    SPRING_TO_NOISE,
+    STATIONARY,
+    ParameterEvidence,
+    displacement_noise,
+    friction_scale,
+)
 from pzd.record import Array
 
 NAMES = ("T0", "C", "k")
@@ -23,7 +30,7 @@ def scales_of(parameters: Bingham, measured: Array) -> Array:
 
 def evidence_of(
     objective: Objective, parameters: Bingham, criterion: float, facts: Array, misfit: Misfit
-) -> list[Evidence]:
+) -> list[ParameterEvidence]:
     """What the data say of T0, C and k.
 
     Parameters
@@ -44,7 +51,7 @@ def evidence_of(
     vetoes[2] = vetoes[2] or _blurred(objective, parameters)
     doubt = _doubt(float(np.sqrt(criterion)), misfit)
     return [
-        Evidence(name, scale, by_noise, width, share, veto, doubt)
+        ParameterEvidence(name, scale, by_noise, width, share, veto, doubt)
         for name, scale, by_noise, width, share, veto in zip(NAMES, scales, noise, widths, visible, vetoes, strict=True)
     ]
 

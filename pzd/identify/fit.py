@@ -18,7 +18,7 @@ from pzd.identify.objective import Bingham, Fit, Objective
 from pzd.identify.part import parts_of
 from pzd.identify.separable import descend, fit_separable
 from pzd.identify.trial import trial_of
-from pzd.identify.trust import Evidence, stationarity, trust_of, visible_shares
+from pzd.identify.trust import ParameterEvidence, stationarity, trust_of, visible_shares
 from pzd.record import Array, Condition, Record
 from pzd.signals.criterion import criterion
 from pzd.signals.stretches import separate_tests
@@ -105,7 +105,7 @@ def row_of(
     labels: tuple[str | None, float | None, float | None],
     parameters: Bingham,
     widths: Array,
-    evidence: Sequence[Evidence],
+    evidence: Sequence[ParameterEvidence],
     fitted: tuple[Array, Array],
 ) -> ParameterRow:
     """The row of one condition or node; what is undetermined has no number.

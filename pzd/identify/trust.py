@@ -42,7 +42,7 @@ class Trust:
 
 
 @dataclass(frozen=True)
-class Evidence:
+class ParameterEvidence:
     """What the data say of one parameter."""
 
     name: str
@@ -139,7 +139,7 @@ def displacement_noise(displacement: Array) -> float:
     return float(np.quantile(np.abs(np.diff(displacement, 3)), 0.9) / (1.645 * np.sqrt(20.0)))
 
 
-def trust_of(evidence: Sequence[Evidence]) -> Trust:
+def trust_of(evidence: Sequence[ParameterEvidence]) -> Trust:
     """The status of a row from the evidence on its parameters."""
     reasons = [e.undetermined() for e in evidence]
     weak = [None if reason else e.weak() for e, reason in zip(evidence, reasons, strict=True)]

@@ -15,7 +15,7 @@ from pzd.schema.errors import ConfigError
 
 if TYPE_CHECKING:
     from pzd.rig.preflight import Measured
-    from pzd.rig.stand.config import Planned
+    from pzd.rig.stand.config import PlannedRecord
     from pzd.rig.stand.recording import Taken
 
 log = logging.getLogger(__name__)
@@ -75,7 +75,9 @@ def synthesise(rig: RigConfig, seed: int, control: Control, folder: Path, jobs: 
     return examined(tests, jobs)
 
 
-def _taken(take: Callable[[Planned], Taken], planned: Planned, limits: Limits, control: Control) -> Measured:
+def _taken(
+    take: Callable[[PlannedRecord], Taken], planned: PlannedRecord, limits: Limits, control: Control
+) -> Measured:
     """A record of the virtual stand, with its cycles and clean motion."""
     from pzd.rig.preflight import Measured
     from pzd.rig.stand.recording import record_of

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 
 class Frozen(BaseModel):
@@ -21,3 +22,21 @@ class Frozen(BaseModel):
 
     former_keys: ClassVar[Mapping[str, str]] = {}
     """Keys that a config had once, each with the one that stands in its place: a hint where the old one is written."""
+
+
+class OneOfAKind(Frozen):
+    """A block of which there are several kinds, one file each, and which names what is made of it."""
+
+    kind: str
+    """Which kind."""
+    label: str | None = Field(default=None, pattern=r"^[A-Za-z0-9._-]+$")
+    """Name in the names of records and cases; by default made from kind and size."""
+
+    @property
+    def name(self) -> str:
+        """How records and cases call it."""
+        return self.label or self.own_name()
+
+    @abstractmethod
+    def own_name(self) -> str:
+        """The name made from kind and size."""

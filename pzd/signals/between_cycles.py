@@ -12,10 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.record import Array
+from pzd.record import Array, Complex
 from pzd.signals.autoregression import Autoregression, autoregression
-
-Complex = NDArray[np.complex128]
 
 BAND_LIMIT = 0.4
 """Harmonics are judged up to this share of the sampling rate."""

@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pzd.record import Array
-
-Coefficients = NDArray[np.complex128]
+from pzd.record import Array, Complex
 
 _WHOLE = 1e-7  # a period this close to a whole number of steps is one, in steps
 _BLOCK = 8192  # samples that stay in the cache
@@ -24,7 +21,7 @@ class FourierSum:
 
     period: float
     """P, in the unit of s."""
-    coefficients: Coefficients
+    coefficients: Complex
     """(n,) c_0, c_1, ...; the amplitude of line n is abs(c_n)."""
 
     def __call__(self, place: Array) -> tuple[Array, Array, Array]:
@@ -55,7 +52,7 @@ def _steps_a_period(place: Array, period: float) -> int | None:
     return whole if even and whole > 0 and abs(period / step - whole) < _WHOLE else None
 
 
-def _fast(sums: Coefficients, place: Array, period: float, steps: int) -> Array:
+def _fast(sums: Complex, place: Array, period: float, steps: int) -> Array:
     """The sums on an even grid that meets itself again after one period."""
     lines = sums.shape[1]
     shifted = sums * np.exp(2j * np.pi * np.arange(lines) * (place[0] / period))
@@ -68,7 +65,7 @@ def _fast(sums: Coefficients, place: Array, period: float, steps: int) -> Array:
     return np.stack([np.resize(row, place.size) for row in once])
 
 
-def _direct(sums: Coefficients, phase: Array) -> Array:
+def _direct(sums: Complex, phase: Array) -> Array:
     """The sums at any places, by Horner's rule in exp(2 pi i phase)."""
     result = np.empty((3, phase.size))
     for start in range(0, phase.size, _BLOCK):

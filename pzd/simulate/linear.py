@@ -8,15 +8,12 @@ quadratic forms of its start.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pzd.record import Array
+from pzd.record import Array, Complex
 from pzd.simulate.car import HalfCar
 from pzd.simulate.energy import balance_error
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.ride_model import DISSIPATED, ROAD_WORK, STATES
-
-Complex = NDArray[np.complex128]
 
 
 def harmonic_response(

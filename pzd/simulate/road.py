@@ -6,9 +6,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import Field
-
-from pzd.schema.model import Frozen
+from pzd.schema.model import OneOfAKind
 from pzd.simulate.profile import Profile
 
 
@@ -28,22 +26,8 @@ class Way:
     """Of the road in the config, for errors."""
 
 
-class Road(Frozen):
+class Road(OneOfAKind):
     """A road under the wheels; each kind is one file in `roads/` with a `kind` of its own."""
-
-    kind: str
-    """Which road."""
-    label: str | None = Field(default=None, pattern=r"^[A-Za-z0-9._-]+$")
-    """Name of the road in the names of cases; by default made from kind and size."""
-
-    @property
-    def name(self) -> str:
-        """How cases call this road."""
-        return self.label or self.own_name()
-
-    @abstractmethod
-    def own_name(self) -> str:
-        """The name made from kind and size."""
 
     @property
     def event(self) -> tuple[float, float] | None:

@@ -15,7 +15,7 @@ from pzd.identify.fit import identify_condition
 from pzd.identify.objective import Bingham, Objective
 from pzd.identify.separable import fit_separable
 from pzd.identify.trial import trial_of
-from pzd.identify.trust import Evidence, displacement_noise, trust_of, visible_shares
+from pzd.identify.trust import ParameterEvidence, displacement_noise, trust_of, visible_shares
 from pzd.record import Condition, Record
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -114,9 +114,9 @@ def test_linearly_dependent_slopes_are_invisible(rng: np.random.Generator) -> No
 def test_undetermined_and_weak_stand_in_one_status() -> None:
     trust = trust_of(
         [
-            Evidence("T0", 100.0, 1.0, 1.0, 0.3),
-            Evidence("C", 1000.0, 600.0, 600.0, 0.3),
-            Evidence("k", 1e5, 2e4, 2e4, 0.3),
+            ParameterEvidence("T0", 100.0, 1.0, 1.0, 0.3),
+            ParameterEvidence("C", 1000.0, 600.0, 600.0, 0.3),
+            ParameterEvidence("k", 1e5, 2e4, 2e4, 0.3),
         ]
     )
     assert trust.determined == (True, False, True)

@@ -26,7 +26,7 @@ NEIGHBOURS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Expected:
+class Predicted:
     """The force that a damper gives in a record, and how uncertain it is."""
 
     damper: Damper
@@ -38,7 +38,7 @@ class Expected:
     """(n, 1) change of the force by one standard deviation of the voltage's instant [N]; (n, 0) where it stands."""
 
 
-def expected(damper: Damper, prepared: Prepared, delay: float) -> Expected:
+def expected(damper: Damper, prepared: Prepared, delay: float) -> Predicted:
     """What a damper makes of a record.
 
     Parameters
@@ -48,7 +48,7 @@ def expected(damper: Damper, prepared: Prepared, delay: float) -> Expected:
     delay : standard deviation of a test's own delay [s]
     """
     force = predicted_force(damper, prepared)
-    return Expected(damper, force, force_error(damper, prepared), _timing(damper, prepared, force, delay))
+    return Predicted(damper, force, force_error(damper, prepared), _timing(damper, prepared, force, delay))
 
 
 def _timing(damper: Damper, prepared: Prepared, force: Array, delay: float) -> Array:

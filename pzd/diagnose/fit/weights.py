@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.data.cleaning import Prepared
-from pzd.diagnose.fit.input_uncertainty import Expected
+from pzd.diagnose.fit.input_uncertainty import Predicted
 from pzd.diagnose.fit.likelihood import RecordLikelihood, responses, unbroken
 from pzd.diagnose.fit.prediction import motion_of, warms
 from pzd.identify.trial import in_motion
@@ -44,7 +44,7 @@ MOST_POINTS = 2048
 
 
 def record_likelihood(
-    p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
 ) -> RecordLikelihood | None:
     """The observation of some samples of a record; None where they are too few.
 
@@ -80,7 +80,7 @@ def _averaged(p: Prepared) -> bool:
 
 
 def _of_cycles(
-    p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
 ) -> RecordLikelihood | None:
     run = p.cycles
     if run is None:
@@ -150,7 +150,7 @@ def _resampled(cycle: Array, points: int) -> Array:
 
 
 def _of_samples(
-    p: Prepared, mask: NDArray[np.bool_], place: int, given: Expected, nuisance: NuisanceConfig
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
 ) -> RecordLikelihood:
     record, force = p.record, given.force
     mask = mask & in_motion(record)

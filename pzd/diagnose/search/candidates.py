@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -12,15 +11,14 @@ import numpy as np
 from pzd.damper.competing_forms import competing_forms, known
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library
-from pzd.diagnose.fit.least_squares import DIFFERENCE, MOST_EVALUATIONS, Fitted, fit
-from pzd.diagnose.fit.parameters import Problem, Unknown, simulated
+from pzd.diagnose.fit.least_squares import MOST_EVALUATIONS, Fitted, fit
+from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.prediction import WARMS, ends
+from pzd.diagnose.search.starts import fainter, promising_starts, starts_of, without_promise
 from pzd.diagnose.thresholds import (
     AT_EDGE,
-    FAINT,
     FAINTER_STARTS,
     FIRST_EVALUATIONS,
-    LEAST_PROMISE,
     MOST_EVALUATIONS_OF_BEST,
     MOVING_VOLTAGE,
     STARTS_TRIED,
@@ -94,7 +92,7 @@ def candidates(
     ]
 
     def one(effect: Effect) -> Candidate:
-        unlikely = silent and _without_promise(problem, before, effect)
+        unlikely = silent and without_promise(problem, before, effect)
         return (_barely if unlikely else candidate)(problem, before, effect)
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
@@ -120,7 +118,7 @@ def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     starts = promising_starts(problem, before, effect)
     for start in (
         *starts[:STARTS_TRIED],
-        *(_fainter(problem, before, effect, starts[0], share) for share in FAINTER_STARTS),
+        *(fainter(problem, before, effect, starts[0], share) for share in FAINTER_STARTS),
     ):
         reached.append(
             _from(problem, before, effect.name, np.concatenate([_base(problem, before), start]), FIRST_EVALUATIONS)
@@ -139,37 +137,10 @@ def _switched_off(effect: Effect, fitted: Fitted) -> bool:
     return vanishes and bool(fitted.searched[-1] - nearest < AT_EDGE)
 
 
-def most_promising(problem: Problem, before: Fitted, effects: Sequence[Effect], count: int) -> list[Effect]:
-    """The effects from whose starting values one linearised step promises the smallest misfits, best first."""
-    frame, _ = np.linalg.qr(before.slopes)
-    promised = [
-        min(_promised(problem, before, effect, start, frame) for start in _starts(problem, before, effect))
-        for effect in effects
-    ]
-    return [effects[i] for i in np.argsort(promised, kind="stable")[:count]]
-
-
-def _without_promise(problem: Problem, before: Fitted, effect: Effect) -> bool:
-    """Whether a faint effect of one parameter promises nothing; one of more may act where nobody looks yet."""
-    if len(effect.parameters) > 1:
-        return False
-    frame, _ = np.linalg.qr(before.slopes)
-    starts = _starts(problem, before, effect)
-    faint = (*starts, *(_fainter(problem, before, effect, start, FAINT) for start in starts))
-    promised = min(_promised(problem, before, effect, start, frame) for start in faint)
-    return before.misfit - promised < LEAST_PROMISE
-
-
 def _barely(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     """An effect as faint as it is looked for."""
-    start = _fainter(problem, before, effect, _starts(problem, before, effect)[0], FAINTER_STARTS[-1])
+    start = fainter(problem, before, effect, starts_of(problem, before, effect)[0], FAINTER_STARTS[-1])
     return _from(problem, before, effect.name, np.concatenate([before.searched, start]), 1)
-
-
-def _fainter(problem: Problem, before: Fitted, effect: Effect, start: Array, share: float) -> Array:
-    """Starting values that lie so much nearer to those that switch the effect off."""
-    unknowns = _new(problem, before, effect)
-    return np.array([u.searched(u.fainter(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
 
 
 def best_competing_form(problem: Problem, before: Fitted) -> Candidate:
@@ -246,54 +217,3 @@ def moved_by(problem: Problem, before: Fitted, after: Fitted) -> float:
         for o, a, b in zip(problem.observations, after.simulated, before.simulated, strict=True)
     ]
     return float(np.sqrt(np.mean(squares)))
-
-
-def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
-    """All starting values of an effect, first those from which one linearised step promises the smallest misfit.
-
-    Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
-                                                                Source: Gauss-Newton step
-    """
-    starts = _starts(problem, before, effect)
-    if len(starts) == 1:
-        return starts
-    frame, _ = np.linalg.qr(before.slopes)
-    promised = [_promised(problem, before, effect, start, frame) for start in starts]
-    return [starts[i] for i in np.argsort(promised, kind="stable")]
-
-
-def _starts(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
-    unknowns = _new(problem, before, effect)
-    grid = itertools.product(*(u.parameter.search.starts for u in unknowns))
-    return [np.array([_searched(u, value) for u, value in zip(unknowns, values, strict=True)]) for values in grid]
-
-
-def _new(problem: Problem, before: Fitted, effect: Effect) -> tuple[Unknown, ...]:
-    """What is looked for with an effect beside those of `before`."""
-    return problem.unknowns((*before.effects, effect.name))[len(before.unknowns) :]
-
-
-def _searched(unknown: Unknown, start: float) -> float:
-    return float(np.log(start)) if unknown.parameter.search.logarithmic else start
-
-
-def _promised(problem: Problem, before: Fitted, effect: Effect, start: Array, frame: Array) -> float:
-    effects = (*before.effects, effect.name)
-    unknowns = problem.unknowns(effects)
-    here = np.concatenate([before.searched, start])
-    points = [problem.point(here, unknowns)]
-    for j in range(before.searched.size, here.size):
-        shifted = here.copy()
-        shifted[j] += DIFFERENCE
-        points.append(problem.point(shifted, unknowns))
-    residuals, slopes = [], []
-    for o in problem.observations:
-        forces = [simulated(point, o) for point in points]
-        residuals.append(o.in_noise(o.measured - forces[0]))
-        slopes.append(o.in_noise(np.stack([forces[0] - f for f in forces[1:]], axis=-1) / DIFFERENCE))
-    r, columns = np.concatenate(residuals), np.concatenate(slopes)
-    r, columns = r - frame @ (frame.T @ r), columns - frame @ (frame.T @ columns)
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns / np.where(size > 0.0, size, 1.0)
-    left = r - columns @ np.linalg.lstsq(columns, r, rcond=1e-6)[0]
-    return float(left @ left)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.damper.effect import Scales
 from pzd.damper.material import by_voltage
@@ -21,10 +20,8 @@ from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.weights import record_likelihood
 from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.thresholds import MOST_TIME_CONSTANTS
-from pzd.record import Array, voltage_scale
+from pzd.record import Array, Mask, voltage_scale
 from pzd.signals.criterion import criterion
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

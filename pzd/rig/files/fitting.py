@@ -1,4 +1,4 @@
-"""Which layout fits a rig file: its columns stand there, and the file read by it is believed."""
+"""Which layout fits a rig file: the file has its columns, and what is read by it is accepted."""
 
 from __future__ import annotations
 

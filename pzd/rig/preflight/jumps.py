@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.artefacts import Finding
-from pzd.record import Array
+from pzd.record import Array, Rows
 from pzd.rig.preflight import Measured
-
-Rows = NDArray[np.intp]
 
 LEAST_HELD = 5
 """Equal samples from which a channel was held: a busy logger repeats its last value, or writes -9999."""

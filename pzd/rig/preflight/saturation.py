@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.artefacts import Finding
-from pzd.record import Array
+from pzd.record import Array, Rows
 from pzd.rig.preflight import Measured
-
-Rows = NDArray[np.intp]
 
 LONGEST_PEAK = 4
 """Equal samples at an extreme up to this many may be the peak itself."""

@@ -166,7 +166,7 @@ class Jitter(Frozen):
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedRecord:
     """One record that the stand is going to take."""
 
     name: str
@@ -221,7 +221,7 @@ class VirtualEntry(Frozen):
         if reason and absent:
             yield f"{field} is missing: {reason}"
 
-    def plan(self, control: Control | None = None) -> tuple[Planned, ...]:
+    def plan(self, control: Control | None = None) -> tuple[PlannedRecord, ...]:
         """Every record that the stand is going to take, in order, with its name.
 
         Parameters
@@ -230,7 +230,7 @@ class VirtualEntry(Frozen):
         """
         unit = (control or Control()).unit
         return tuple(
-            Planned(self._name(test, voltage, temperature, number, unit), test, voltage, temperature)
+            PlannedRecord(self._name(test, voltage, temperature, number, unit), test, voltage, temperature)
             for test in self.tests
             for temperature in test.temperatures_degC or self.temperatures_degC or (None,)
             for voltage in test.voltages_V or self.voltages_V or (None,)

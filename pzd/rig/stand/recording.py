@@ -19,7 +19,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.quantities import Control
 from pzd.record import Array, Record
-from pzd.rig.stand.config import Planned, StandTest, VirtualEntry
+from pzd.rig.stand.config import PlannedRecord, StandTest, VirtualEntry
 from pzd.rig.stand.frame import force_in_frame
 from pzd.rig.stand.programmes import Warming, voltage_over
 from pzd.rig.stand.sensors import draw_for, sensed
@@ -113,7 +113,7 @@ def take(
 
 def taker(
     entry: VirtualEntry, seed: int, folder: Path = Path(), law: ForceLaw = force_in_frame
-) -> Callable[[Planned], Taken]:
+) -> Callable[[PlannedRecord], Taken]:
     """What takes one planned record, in any order; it keeps the motion of the test that it took last.
 
     Parameters
@@ -122,7 +122,7 @@ def taker(
     """
     drive: _Drive | None = None
 
-    def taken(planned: Planned) -> Taken:
+    def taken(planned: PlannedRecord) -> Taken:
         nonlocal drive
         if drive is None or drive.test is not planned.test:
             drive = _drive(entry, planned.test, seed, folder)
@@ -158,7 +158,7 @@ def _duration(test: StandTest, folder: Path) -> float:
     return (test.cycles or test.waveform.usual_cycles) * test.waveform.cycle(folder)
 
 
-def _taken(entry: VirtualEntry, planned: Planned, drive: _Drive, seed: int, law: ForceLaw) -> Taken:
+def _taken(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, seed: int, law: ForceLaw) -> Taken:
     motion, force = _truth(entry, planned, drive, law)
     force += entry.fixture.tare_N + entry.fixture.mass_kg * motion.acceleration
     draw = partial(draw_for, seed, planned.name)
@@ -181,7 +181,7 @@ def _taken(entry: VirtualEntry, planned: Planned, drive: _Drive, seed: int, law:
     )
 
 
-def _truth(entry: VirtualEntry, planned: Planned, drive: _Drive, law: ForceLaw) -> tuple[Motion, Array]:
+def _truth(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, law: ForceLaw) -> tuple[Motion, Array]:
     """Motion, voltage, temperature and force of the damper at the fine rate."""
     motion, stiffness = drive.motion, entry.fixture.stiffness_N_per_m
     if planned.voltage is not None:

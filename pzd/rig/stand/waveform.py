@@ -8,34 +8,19 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from pydantic import Field
 
 from pzd.record import Array
-from pzd.schema.model import Frozen
+from pzd.schema.model import OneOfAKind
 
 Course = Callable[[Array], tuple[Array, Array, Array]]
 """Displacement [m], velocity [m/s] and acceleration [m/s2] at any times (n,) [s], exactly."""
 
 
-class Waveform(Frozen):
+class Waveform(OneOfAKind):
     """The motion of the actuator in one test; each kind is one file in `waveforms/` with `kind` of its own."""
 
     usual_cycles: ClassVar[int] = 10
     """Cycles of a test that says nothing of its length."""
-
-    kind: str
-    """Which waveform."""
-    label: str | None = Field(default=None, pattern=r"^[A-Za-z0-9._-]+$")
-    """Name of the waveform in the names of records; by default made from kind and size."""
-
-    @property
-    def name(self) -> str:
-        """How records call this waveform."""
-        return self.label or self.own_name()
-
-    @abstractmethod
-    def own_name(self) -> str:
-        """The name made from kind and size."""
 
     @abstractmethod
     def cycle(self, folder: Path) -> float:

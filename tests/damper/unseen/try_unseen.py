@@ -18,7 +18,7 @@ from pzd.artefacts import Diagnosed, ForceRow, Table, TableNotes
 from pzd.blind.case import Places
 from pzd.blind.diagnosis import COST, Methods, diagnose_case
 from pzd.blind.hide import Setup, hide
-from pzd.blind.plan import Planned, hideable
+from pzd.blind.plan import PlannedCase, hideable
 from pzd.config import load
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.effects import library
@@ -194,7 +194,7 @@ def named(name: str) -> dict[str, object]:
         path.write_text(CONFIG, encoding="utf-8")
         config = load(path, ())
         setup = Setup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
-        places, planned = Places(Path(folder)), Planned(0, "single", "all", (name,))
+        places, planned = Places(Path(folder)), PlannedCase(0, "single", "all", (name,))
         hide(setup, planned, places)
         methods = Methods(config.identify, config.diagnose, config.rig.limits, setup.control, config.seed)
         diagnose_case(methods, places.case(planned.id))

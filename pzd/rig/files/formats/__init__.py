@@ -1,9 +1,9 @@
-"""Formats of rig files, one file each: `KIND`, `SUFFIXES`, `NEEDS`, `HEEDS`, `holds(path, start)` and `tables`.
+"""Formats of rig files, one file each: `KIND`, `SUFFIXES`, `NEEDS`, `OPTIONS`, `holds(path, start)` and `tables`.
 
 `NEEDS` is the library that the format is read with, None where pzd itself needs it anyway; it is imported inside
-`tables`. `HEEDS` are the keys of `MANNERS` that mean something for the format; others are refused. A format of loose
-cells (a workbook) has `rows(path)` too, from which `pzd init` sees the layout. Delimited text alone has `read` instead
-of `tables`: it parses the columns that are asked for and no other.
+`tables`. `OPTIONS` are the keys of `ALL_OPTIONS` that mean something for the format; others are refused. A format of
+loose cells (a workbook) has `rows(path)` too, from which `pzd init` sees the layout. Delimited text alone has `read`
+instead of `tables`: it parses the columns that are asked for and no other.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from pzd.schema.errors import ConfigError, DataError, FilesError, UserError, at
 
 TEXT = "text"
 """The format of files that no other format knows by their content or their ending."""
-MANNERS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding", "table")
+ALL_OPTIONS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding", "table")
 """Keys of an entry about how a file is written."""
 START = 4096
 """Bytes from the start of a file by which its format is known."""
@@ -81,7 +81,9 @@ def read_sheet(path: Path, entry: FilesEntry, wanted: Wanted, place: str) -> She
     FilesError : when the file cannot be read
     """
     module = formats()[format_of(path, entry.format, place)]
-    idle = [k for k in MANNERS if k not in module.HEEDS and getattr(entry, k) != FilesEntry.model_fields[k].default]
+    idle = [
+        k for k in ALL_OPTIONS if k not in module.OPTIONS and getattr(entry, k) != FilesEntry.model_fields[k].default
+    ]
     if idle:
         raise ConfigError(f"{place}.{key}: {module.KIND} has nothing of the kind ({at(path)})" for key in idle)
     if hasattr(module, "read"):

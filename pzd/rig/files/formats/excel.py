@@ -17,7 +17,7 @@ from pzd.rig.files.tables import Table, cells_of, spelled
 KIND = "an Excel file"
 SUFFIXES = (".xlsx", ".xlsm")
 NEEDS = "openpyxl"
-HEEDS = ("skip", "header", "units_row", "table")
+OPTIONS = ("skip", "header", "units_row", "table")
 
 
 def holds(path: Path, start: bytes) -> bool:

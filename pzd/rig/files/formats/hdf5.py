@@ -15,7 +15,7 @@ from pzd.rig.files.tables import Table, tables_of_tree
 KIND = "an HDF5 file"
 SUFFIXES = (".h5", ".hdf5", ".hdf")
 NEEDS = "h5py"
-HEEDS = ("table",)
+OPTIONS = ("table",)
 MAGIC = b"\x89HDF\r\n\x1a\n"
 
 

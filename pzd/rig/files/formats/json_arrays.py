@@ -16,7 +16,7 @@ from pzd.schema.errors import DataError, at
 KIND = "a JSON file"
 SUFFIXES = (".json",)
 NEEDS = None
-HEEDS = ("table",)
+OPTIONS = ("table",)
 
 
 def holds(path: Path, start: bytes) -> bool:

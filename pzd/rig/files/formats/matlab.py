@@ -15,7 +15,7 @@ from pzd.schema.errors import DataError, at
 KIND = "a MATLAB file"
 SUFFIXES = (".mat",)
 NEEDS = None
-HEEDS = ("table",)
+OPTIONS = ("table",)
 
 
 def holds(path: Path, start: bytes) -> bool:

@@ -15,7 +15,7 @@ from pzd.rig.files.tables import Cells, Table, equal_lengths
 KIND = "an MDF file"
 SUFFIXES = (".mf4", ".mdf")
 NEEDS = "asammdf"
-HEEDS = ("table",)
+OPTIONS = ("table",)
 CLOCK = "time"
 """Header of the clock where the master channel has no name."""
 TIME_MASTER = 1

@@ -20,7 +20,7 @@ from pzd.schema.errors import DataError, at
 KIND = "a file of MTS's acquisition blocks"
 SUFFIXES = ()
 NEEDS = None
-HEEDS = ("decimal", "encoding", "table")
+OPTIONS = ("decimal", "encoding", "table")
 
 Block = tuple[tuple[str, ...], tuple[Cells, ...], tuple[str, ...], NDArray[np.int64], int]
 """Headers, columns, units, line of every row, and line of the headers."""

@@ -10,7 +10,7 @@ from pzd.rig.files.tables import Table, cells_of
 KIND = "a Parquet file"
 SUFFIXES = (".parquet", ".pq")
 NEEDS = "pyarrow"
-HEEDS = ()
+OPTIONS = ()
 
 
 def holds(path: Path, start: bytes) -> bool:

@@ -15,7 +15,7 @@ from pzd.schema.errors import DataError, at
 KIND = "a TDMS file"
 SUFFIXES = (".tdms",)
 NEEDS = "nptdms"
-HEEDS = ("table",)
+OPTIONS = ("table",)
 CLOCK = "time"
 """Header of the clock of a group of waveforms, which has no channel of its own."""
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 KIND = "a text file"
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
 NEEDS = None
-HEEDS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding")
+OPTIONS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding")
 
 MOST_FAULTS = 5
 """Faults of one kind that are listed for one file."""

@@ -1,0 +1,94 @@
+"""Where the search for an effect starts: its starting values, and what a linearised step promises from each."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from pzd.damper.effect import Effect
+from pzd.diagnose.fit.least_squares import DIFFERENCE, Fitted
+from pzd.diagnose.fit.parameters import Problem, Unknown, simulated
+from pzd.diagnose.thresholds import FAINT, LEAST_PROMISE
+from pzd.record import Array
+
+
+def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
+    """All starting values of an effect, first those from which one linearised step promises the smallest misfit.
+
+    Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
+                                                                Source: Gauss-Newton step
+    """
+    starts = starts_of(problem, before, effect)
+    if len(starts) == 1:
+        return starts
+    frame, _ = np.linalg.qr(before.slopes)
+    promised = [_promised_misfit(problem, before, effect, start, frame) for start in starts]
+    return [starts[i] for i in np.argsort(promised, kind="stable")]
+
+
+def most_promising(problem: Problem, before: Fitted, effects: Sequence[Effect], count: int) -> list[Effect]:
+    """The effects from whose starting values one linearised step promises the smallest misfits, best first."""
+    frame, _ = np.linalg.qr(before.slopes)
+    promised = [
+        min(_promised_misfit(problem, before, effect, start, frame) for start in starts_of(problem, before, effect))
+        for effect in effects
+    ]
+    return [effects[i] for i in np.argsort(promised, kind="stable")[:count]]
+
+
+def without_promise(problem: Problem, before: Fitted, effect: Effect) -> bool:
+    """Whether a faint effect of one parameter promises nothing; one of more may act where nobody looks yet."""
+    if len(effect.parameters) > 1:
+        return False
+    frame, _ = np.linalg.qr(before.slopes)
+    starts = starts_of(problem, before, effect)
+    faint = (*starts, *(fainter(problem, before, effect, start, FAINT) for start in starts))
+    promised = min(_promised_misfit(problem, before, effect, start, frame) for start in faint)
+    return before.misfit - promised < LEAST_PROMISE
+
+
+def starts_of(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
+    """All combinations of the starting values of an effect, each (parameters,) in the units of the search."""
+    unknowns = _new(problem, before, effect)
+    grid = itertools.product(*(u.parameter.search.starts for u in unknowns))
+    return [np.array([_searched(u, value) for u, value in zip(unknowns, values, strict=True)]) for values in grid]
+
+
+def fainter(problem: Problem, before: Fitted, effect: Effect, start: Array, share: float) -> Array:
+    """Starting values that lie so much nearer to those that switch the effect off."""
+    unknowns = _new(problem, before, effect)
+    return np.array([u.searched(u.fainter(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
+
+
+def _new(problem: Problem, before: Fitted, effect: Effect) -> tuple[Unknown, ...]:
+    """What is looked for with an effect beside those of `before`."""
+    return problem.unknowns((*before.effects, effect.name))[len(before.unknowns) :]
+
+
+def _searched(unknown: Unknown, start: float) -> float:
+    return float(np.log(start)) if unknown.parameter.search.logarithmic else start
+
+
+def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Array, frame: Array) -> float:
+    """Sum of squares after one linearised step from a start, `frame` spanning what the base rows can take up."""
+    effects = (*before.effects, effect.name)
+    unknowns = problem.unknowns(effects)
+    here = np.concatenate([before.searched, start])
+    points = [problem.point(here, unknowns)]
+    for j in range(before.searched.size, here.size):
+        shifted = here.copy()
+        shifted[j] += DIFFERENCE
+        points.append(problem.point(shifted, unknowns))
+    residuals, slopes = [], []
+    for o in problem.observations:
+        forces = [simulated(point, o) for point in points]
+        residuals.append(o.in_noise(o.measured - forces[0]))
+        slopes.append(o.in_noise(np.stack([forces[0] - f for f in forces[1:]], axis=-1) / DIFFERENCE))
+    r, columns = np.concatenate(residuals), np.concatenate(slopes)
+    r, columns = r - frame @ (frame.T @ r), columns - frame @ (frame.T @ columns)
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns / np.where(size > 0.0, size, 1.0)
+    left = r - columns @ np.linalg.lstsq(columns, r, rcond=1e-6)[0]
+    return float(left @ left)
