@@ -18,7 +18,7 @@ from pzd.record import Array
 Left = tuple[list[Array], list[Array]]
 """Residuals in units of noise and simulated forces, an observation each."""
 
-DIFFERENCE = 1e-4
+DIFFERENCE = 1e-3
 """Step of the searched variables for forward differences."""
 MOST_EVALUATIONS = 20
 PRECISION = 1e-5
