@@ -85,12 +85,13 @@ def half_widths(parts: Sequence[Part], misfit: Misfit, level: float = 0.95) -> A
 def _faint(parts: Sequence[Part], slopes: Sequence[Array], bread: Array) -> Array:
     """(p,) variance by a force that grows with the square of the speed, too faint to show beside T0, C and k.
 
-    Equation: V = (B J' g)^2 a^2, g = v |v|, a = min(faint / rms(g - J B J' g), largest / rms(g)), rms in shares of peak
+    Equation: V = (B J' g)^2 a^2, g = w |w|, a = min(faint / rms(g - J B J' g), largest / rms(g)), rms in shares of peak
 
     One sine shows hardly a tenth of it: C takes up the rest, four times what is left in force. Tests at several speeds
     show more, and less of it can hide.
     """
-    speeds = [p.record.velocity[p.counted] for p in parts]
+    # The slope by C is the speed of the flow; where the control signal moves, every node has a C and the rod stands in.
+    speeds = [p.slopes[:, 1] if p.constant else p.record.velocity[p.counted] for p in parts]
     squares = [v * np.abs(v) for v in speeds]
     taken = bread @ np.sum([s.T @ g for s, g in zip(slopes, squares, strict=True)], axis=0)
     peaks = [float(np.max(np.abs(p.force))) for p in parts]
