@@ -19,11 +19,11 @@ goes further in one of two thousand; more is a gap. What all tests share shows i
 class NuisanceConfig(Frozen):
     """What may differ from test to test without being an effect: standard deviations, zero mean."""
 
-    offset: float = Field(default=0.005, ge=0.0)
+    offset: float = Field(default=0.005, ge=0.0, le=0.5)
     """Offset of the force, as a share of the test's peak force."""
-    delay_s: float = Field(default=0.0005, ge=0.0)
+    delay_s: float = Field(default=0.0005, ge=0.0, le=0.1)
     """Delay of the force."""
-    gain: float = Field(default=0.02, ge=0.0)
+    gain: float = Field(default=0.02, ge=0.0, le=0.5)
     """Gain of the force, as a share of it."""
 
 
