@@ -61,21 +61,19 @@ def diagnose(
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
-    own_rows = tuple(row for row in identified.rows if row.setting == setting)
-    voltages = [row.voltage_V for row in plain.base if row.voltage_V is not None]
-    reach = reach_of(stand.limits, recorded, voltages)
+    rows = tuple(row for row in identified.rows if row.setting == setting)
+    reach = reach_of(stand.limits, recorded, [row.voltage_V for row in plain.base if row.voltage_V is not None])
     if too_short(campaign):
-        return Diagnosed(undecided(recorded, reach), plain, plain, own_rows)
+        return Diagnosed(undecided(recorded, reach), plain, plain, rows)
     trials = trials_of(campaign, plain, diagnose.visible)
     handed = handed_on(select_effects(campaign, plain, diagnose, jobs), trials, diagnose.force, control.unit)
     named = handed.named
-    evidence = named.first
-    before = evidence.campaign.checks(named.plain.damper)
-    after = evidence.campaign.checks(named.fitted.damper) if named.adopted else before
+    before = campaign.checks(named.plain.damper)
+    after = campaign.checks(named.fitted.damper) if named.adopted else before
     decision = refused(handed.refused) if handed.refused else decide(named, before, after, diagnose)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     rivals = [(name, damper.moved(zero)) for name, damper in named.rivalling]
-    offsets = [evidence.campaign.offset(damper) for _, damper in named.rivalling]
+    offsets = [campaign.offset(damper) for _, damper in named.rivalling]
     found = named.fitted.damper.moved(zero) if named.adopted else plain
     told = Diagnosis(
         verdict=decision.verdict,
@@ -86,11 +84,9 @@ def diagnose(
         parameters=parameters_of(named),
         prediction=handed.prediction,
         zero_m=found.zero_m,
-        ranking=ranking_of(named, evidence),
+        ranking=ranking_of(named, named.first),
         rivals=named.rivals,
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),
-        next_test=next_test(rivals, reach, evidence.whole.reference, offsets),
+        next_test=next_test(rivals, reach, named.first.whole.reference, offsets),
     )
-    if not named.adopted:
-        return Diagnosed(told, found, plain, own_rows)
-    return Diagnosed(told, found, plain, base_parameters(named, decision.verdict, setting))
+    return Diagnosed(told, found, plain, base_parameters(named, decision.verdict, setting) if named.adopted else rows)
