@@ -21,10 +21,10 @@ class Gap(Frozen):
     """The gap between simulation and measurement on what no fit has seen."""
 
     criterion: Literal["W_s"] = "W_s"
-    before: float
-    after: float
-    noise_floor: float
-    standard_error: float
+    before: float = Field(ge=0.0)
+    after: float = Field(ge=0.0)
+    noise_floor: float = Field(ge=0.0)
+    standard_error: float = Field(ge=0.0)
     held_out: tuple[str, ...]
     hold_out: Literal["records", "cycles", "segments", "mixed"]
 

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pzd.damper.model import BaseRow, Damper
 from pzd.quantities import Control
 from pzd.schema.csvfile import read_rows, write_rows
+from pzd.schema.errors import DataError
 from pzd.schema.model import Frozen
 
 
@@ -34,6 +35,17 @@ class ParameterRow(Frozen):
     rmse_N: float = Field(ge=0.0)
     status: str = Field(pattern=r"^(ok|(weak|undetermined): [T0Ck, ]+.*)$")
     """`ok`, or `weak: T0 ...` / `undetermined: C, k ...` with the reason."""
+
+    @model_validator(mode="after")
+    def _inside_its_interval(self) -> ParameterRow:
+        """A value written by hand in another unit than its interval, or without it, is told."""
+        for name in ("T0_N", "C_Ns_per_m", "k_N_per_m"):
+            value, low, high = (getattr(self, f"{name}{end}") for end in ("", "_low95", "_high95"))
+            if value is not None and not (low is None or low <= value) & (high is None or value <= high):
+                raise ValueError(
+                    f"{name} must lie between {name}_low95 and {name}_high95; change them too, or leave them empty"
+                )
+        return self
 
 
 class AuxiliaryRow(Frozen):
@@ -98,8 +110,13 @@ class Identified:
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
         """Read and check them again."""
+        rows = read_rows(folder / "parameters.csv", ParameterRow, control)
+        places = [(row.setting, row.voltage_V, row.temperature_degC) for row in rows]
+        twice = [_condition(row, control) for i, row in enumerate(rows) if places[i] in places[:i]]
+        if twice:
+            raise DataError(f"{folder / 'parameters.csv'}: two rows of one condition ({each})" for each in twice)
         return cls(
-            read_rows(folder / "parameters.csv", ParameterRow, control),
+            rows,
             read_rows(folder / "measures.csv", MeasureRow, control),
             read_rows(folder / "auxiliary.csv", AuxiliaryRow, control),
         )

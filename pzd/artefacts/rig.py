@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
+import numpy as np
+
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
 from pzd.record import Array, Record
 from pzd.schema.csvfile import read_columns, write_columns
+from pzd.schema.errors import DataError
 from pzd.schema.jsonfile import read_json_list, write_json
 from pzd.schema.model import Frozen
 from pzd.schema.processes import parallel_map
@@ -114,9 +117,17 @@ def _read_record(folder: Path, entry: RecordEntry, control: Control) -> Record:
     optional = (VOLTAGE.column, TEMPERATURE.column, PRESSURE.column)
     header = [q.column for q in (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)]
     columns = read_columns(folder / f"{entry.name}.csv", header, control, optional)
-    return Record(
+    record = Record(
         entry.name,
         entry.setting,
         *(columns[name] for name in header[:5]),
         *(columns.get(name) for name in optional),
     )
+    told, holds = entry.voltage_V, record.median_voltage()
+    if (told is None) != (holds is None) or not np.isclose(told or 0.0, holds or 0.0):
+        name = control.renamed(VOLTAGE.column)
+        raise DataError(
+            f"{folder / 'records.json'}: {name} of {entry.name}: must be the median of its file "
+            f"(got {told}, where {entry.name}.csv has {holds})"
+        )
+    return record

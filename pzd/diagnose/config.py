@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from pzd.damper.effects import library
 from pzd.schema.model import Frozen
@@ -14,10 +14,10 @@ class DiagnoseConfig(Frozen):
 
     significance: float = Field(default=1e-3, gt=0.0, lt=1.0)
     """A gap is believed when noise alone would show it less often than this."""
-    visible: float = Field(default=0.0025, ge=0.0)
+    visible: float = Field(default=0.0025, ge=0.0, le=0.1)
     """A gap smaller than this share of the peak force (r.m.s.) counts as nothing missing; an effect that moves the
     force by less is not adopted."""
-    negligible: float = Field(default=0.001, ge=0.0)
+    negligible: float = Field(default=0.001, ge=0.0, le=0.1)
     """Below this share of the peak force no further effect is looked for."""
     unexplained_share: float = Field(default=0.3, gt=0.0, le=1.0)
     """What may remain of the gap (r.m.s.) under the verdicts `named` and `ambiguous`."""
@@ -40,4 +40,13 @@ class DiagnoseConfig(Frozen):
         unknown = [name for name in names if name not in library()]
         if unknown:
             raise ValueError(f"no effect is called {', '.join(unknown)}; there is {', '.join(library())}")
+        if len(set(names)) < len(names):
+            raise ValueError("one is named twice")
         return names
+
+    @model_validator(mode="after")
+    def _not_both(self) -> DiagnoseConfig:
+        both = sorted({*self.force} & {*self.forbid})
+        if both:
+            raise ValueError(f"force and forbid contradict each other on {', '.join(both)}")
+        return self

@@ -61,8 +61,11 @@ def check_residual(given: Predicted, prepared: Prepared, wanted: Mask, config: N
     rough = _rough_variance(prepared, residual, mask)
     calm = _jumps(prepared) == 0.0
     slack = np.zeros(residual.size)
-    slack[mask] = nuisance(residual[mask], predicted[mask], record.rate, rough, config, given.timing[mask], calm[mask])
-    slack += np.where(mask & ~calm, within_a_sample(record.force - slack, predicted), 0.0)
+    late = np.zeros(residual.size)
+    slack[mask], late[mask] = nuisance(
+        residual[mask], predicted[mask], record.rate, rough, config, given.timing[mask], calm[mask]
+    )
+    slack = np.where(mask & ~calm, _beside_jumps(record.force, predicted, slack, late), slack + late)
     folded = _folded(prepared, residual - slack, mask)
     if folded is not None:
         return _repeating(prepared, mask, residual, slack, folded, given.displacement_variance)
@@ -73,6 +76,19 @@ def _jumps(prepared: Prepared) -> Array:
     """(n,) how far the force bends beside a jump [N]; 0 elsewhere."""
     record = prepared.record
     return jumps_in_cycles(prepared.cycles, record.time, record.force) if prepared.cycles else jumps(record.force)
+
+
+def _beside_jumps(force: Array, predicted: Array, sized: Array, late: Array) -> Array:
+    """(n,) what a test and chance explain beside a jump [N]: the slope of the force counts where it makes less remain.
+
+    Parameters
+    ----------
+    force, predicted : (n,) [N]
+    sized, late : (n,) what the test's offset and gain explain, and what its delay does along the slope [N]
+    """
+    found = [slack + within_a_sample(force - slack, predicted) for slack in (sized, sized + late)]
+    left = [np.abs(force - predicted - slack) for slack in found]
+    return np.where(left[0] <= left[1], *found)
 
 
 def _repeating(

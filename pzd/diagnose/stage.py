@@ -61,17 +61,17 @@ def diagnose(
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
-    own_rows = tuple(row for row in identified.rows if row.setting == setting)
+    rows = tuple(row for row in identified.rows if row.setting == setting)
     reach = reach_of(stand.limits, recorded, [row.voltage_V for row in plain.base if row.voltage_V is not None])
     if too_short(campaign):
-        return Diagnosed(undecided(recorded, reach), plain, plain, own_rows)
+        return Diagnosed(undecided(recorded, reach), plain, plain, rows)
     trials = trials_of(campaign, plain, diagnose.visible)
     handed, decision = concluded(select_effects(campaign, plain, diagnose, jobs), trials, diagnose, control.unit)
     selection, prediction = handed.selection, handed.prediction(trials)
-    evidence, before = selection.first, campaign.checks(selection.plain.damper)
+    before = campaign.checks(selection.plain.damper)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
-    offsets = [evidence.campaign.offset(damper) for _, damper in selection.rivalling]
+    offsets = [campaign.offset(damper) for _, damper in selection.rivalling]
     found = selection.fitted.damper.moved(zero) if selection.adopted else plain
     diagnosis = Diagnosis(
         verdict=decision.verdict,
@@ -82,11 +82,11 @@ def diagnose(
         parameters=parameters_of(selection),
         prediction=prediction,
         zero_m=found.zero_m,
-        ranking=ranking_of(selection, evidence),
+        ranking=ranking_of(selection, selection.first),
         rivals=selection.rivals,
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),
-        next_test=next_test(rivals, reach, evidence.whole.reference, offsets),
+        next_test=next_test(rivals, reach, selection.first.whole.reference, offsets),
     )
-    if not selection.adopted:
-        return Diagnosed(diagnosis, found, plain, own_rows)
-    return Diagnosed(diagnosis, found, plain, base_parameters(selection, decision.verdict, setting))
+    if selection.adopted:
+        rows = base_parameters(selection, decision.verdict, setting)
+    return Diagnosed(diagnosis, found, plain, rows)

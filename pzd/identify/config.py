@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from pzd.record import SAME_TEMPERATURE
 from pzd.schema.model import Frozen
@@ -47,3 +48,10 @@ class IdentifyConfig(Frozen):
     """What may differ from test to test, which intervals allow for; `diagnose.nuisance` judges the gap by its own."""
     evolutionary: EvolutionaryConfig = EvolutionaryConfig()
     """Settings of `method: evolutionary`."""
+
+    @field_validator("nodes")
+    @classmethod
+    def _rising(cls, nodes: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        if nodes is not None and any(after <= before for before, after in itertools.pairwise(nodes)):
+            raise ValueError("nodes must rise from one to the next")
+        return nodes

@@ -4,7 +4,8 @@ Three things move an estimate. Noise: what differs between cycles that ought to 
 nothing repeats, between stretches of a record. The sensors: offset, gain and delay of the force
 differ from test to test, and no cycle shows it; their prior standard deviations are sent through
 the fit, and where a condition has several tests, what these disagree by corrects them. And what the
-model misses, where the lack of fit is beyond noise (misfit.py). An interval therefore means: were
+model misses: where the lack of fit is beyond noise (misfit.py), and in any case a little that no test
+shows, which C takes up on a single sine. An interval therefore means: were
 the tests repeated on the same damper, the sensors mounted anew, 95 of 100 such intervals would hold
 the parameters that the model has in the mean. Where the model lacks nothing these are the damper's
 own; where it does, the status says that they are not.
@@ -30,6 +31,11 @@ LEVERAGE = 1e-3
 """A stretch that a parameter depends on alone leaves no residual; its correction stops at this share."""
 PRIOR_WORTH = 4.0
 """The prior variances of the sensors weigh as much as so many degrees of freedom against what the tests show."""
+FAINT = 5e-4
+"""What a law that the model lacks may leave unseen, r.m.s. as a share of peak: a tenth of the error of a load cell of
+class 0.5, and less than 1 % of noise lets a few cycles show."""
+LARGEST = 0.005
+"""And as much of it may stand there in all: half a percent of peak is little for any damper."""
 SILENT = 1e-6
 """Tests that can disagree on a parameter by less than this share of its variance say nothing of the sensors."""
 
@@ -69,11 +75,31 @@ def half_widths(parts: Sequence[Part], misfit: Misfit, level: float = 0.95) -> A
     noise = _noise(parts, slopes, bread)
     sensors = _sensors(parts, slopes, bread, noise)
     samples = sum(p.residuals.size for p in parts)
-    missed = misfit.absorbed**2 * samples * np.diag(bread)
+    missed = misfit.absorbed**2 * samples * np.diag(bread) + _faint(parts, slopes, bread)
     together = _sum([noise, sensors, _Estimate(missed, np.full(size.size, np.inf))])
     quantile = stdtrit(np.maximum(together.freedom, 1.0), 0.5 + 0.5 * level)
     widths: Array = quantile * np.sqrt(together.variance) / size
     return np.where(unseen, np.inf, widths)
+
+
+def _faint(parts: Sequence[Part], slopes: Sequence[Array], bread: Array) -> Array:
+    """(p,) variance by a force that grows with the square of the speed, too faint to show beside T0, C and k.
+
+    Equation: V = (B J' g)^2 a^2, g = w |w|, a = min(faint / rms(g - J B J' g), largest / rms(g)), rms in shares of peak
+
+    One sine shows hardly a tenth of it: C takes up the rest, four times what is left in force. Tests at several speeds
+    show more, and less of it can hide.
+    """
+    # The slope by C is the speed of the flow; where the control signal moves, every node has a C and the rod stands in.
+    speeds = [p.slopes[:, 1] if p.constant else p.record.velocity[p.counted] for p in parts]
+    squares = [v * np.abs(v) for v in speeds]
+    taken = bread @ np.sum([s.T @ g for s, g in zip(slopes, squares, strict=True)], axis=0)
+    peaks = [float(np.max(np.abs(p.force))) for p in parts]
+    left = [(g - s @ taken) / peak for s, g, peak in zip(slopes, squares, peaks, strict=True)]
+    whole = [g / peak for g, peak in zip(squares, peaks, strict=True)]
+    rms_left, rms_whole = (float(np.sqrt(np.mean(np.concatenate(each) ** 2))) for each in (left, whole))
+    size = min(FAINT / max(rms_left, 1e-12 * rms_whole), LARGEST / rms_whole)
+    return np.asarray((taken * size) ** 2)
 
 
 def _sum(terms: Sequence[_Estimate]) -> _Estimate:

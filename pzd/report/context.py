@@ -10,7 +10,18 @@ from functools import cached_property
 
 import numpy as np
 
-from pzd.artefacts import ComfortRow, Diagnosed, Identified, ParameterRow, RecordEntry, Rides, Rig, SummaryRow, Table
+from pzd.artefacts import (
+    ComfortRow,
+    Diagnosed,
+    Identified,
+    ParameterRow,
+    RecordEntry,
+    ReferenceRow,
+    Rides,
+    Rig,
+    SummaryRow,
+    Table,
+)
 from pzd.damper.competing_forms import competing_forms
 from pzd.damper.model import BaseRow
 from pzd.quantities import Control
@@ -57,6 +68,8 @@ class ReportContext:
     comfort: tuple[ComfortRow, ...]
     control: Control
     setting: str | None
+    expected: tuple[ReferenceRow, ...] | None = None
+    """The expected numbers beside those of the run; None where the config names none."""
 
     @cached_property
     def chosen(self) -> str | None:

@@ -7,7 +7,7 @@ from pzd.report.context import ReportContext
 from pzd.report.drawing import pictures
 from pzd.report.headline import cards
 from pzd.report.plots import library
-from pzd.report.sections import damper, made, missing, model, passenger, tested, trust
+from pzd.report.sections import damper, expected, made, missing, model, passenger, tested, trust
 from pzd.report.sections.pictures import Pictures
 
 _PLACES = ("model", "missing", "damper", "passenger")
@@ -32,6 +32,7 @@ def page(context: ReportContext, jobs: int = 1) -> str:
         missing.render(context, drawn),
         damper.render(context, drawn),
         passenger.render(context, drawn),
+        *expected.render(context),
         trust.render(context),
         made.render(context),
     )

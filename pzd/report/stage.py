@@ -56,6 +56,7 @@ def report(
     finished = rated(rides)
     comfort = tuple(row for ride in finished for row in assess(ride, report))
     log.info("%d comfort values of %d rides", len(comfort), len(finished))
+    found = compared(expected, RunNumbers(identified, rides, comfort, simulate, control)) if expected else None
     context = ReportContext(
         config=report,
         simulate=simulate,
@@ -68,6 +69,6 @@ def report(
         comfort=comfort,
         control=control,
         setting=setting,
+        expected=found,
     )
-    found = compared(expected, RunNumbers(identified, rides, comfort, simulate, control)) if expected else None
     return Report(comfort=comfort, page=page(context, jobs), reference=found)

@@ -195,9 +195,9 @@ class Limits(Frozen):
     The next test that a diagnosis proposes lies within these limits, be they wider or narrower than the records.
     """
 
-    stroke_m: float | None = Field(default=None, gt=0.0)
+    stroke_m: float | None = Field(default=None, gt=0.0, le=1.0)
     """Largest stroke, end to end, half of it to either side of the middle of the recorded displacements [m]."""
-    speed_m_per_s: float | None = Field(default=None, gt=0.0)
+    speed_m_per_s: float | None = Field(default=None, gt=0.0, le=10.0)
     """Largest speed [m/s]."""
     force_N: float | None = Field(default=None, gt=0.0)
     """Largest force, also the range of the load cell [N]."""

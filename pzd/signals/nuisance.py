@@ -9,6 +9,8 @@ from pydantic import Field
 from pzd.record import Array
 from pzd.schema.model import Frozen
 
+TIMED = 2
+"""Columns from this one on say when a force comes; those before it, how large it is."""
 AT_MOST = 3.5
 """Offset, gain, delay and the instant of the voltage explain at most so many standard deviations of a test: chance
 goes further in one of two thousand; more is a gap. What all tests share shows in the fits, whatever this allows."""
@@ -17,11 +19,11 @@ goes further in one of two thousand; more is a gap. What all tests share shows i
 class NuisanceConfig(Frozen):
     """What may differ from test to test without being an effect: standard deviations, zero mean."""
 
-    offset: float = Field(default=0.005, ge=0.0)
+    offset: float = Field(default=0.005, ge=0.0, le=0.5)
     """Offset of the force, as a share of the test's peak force."""
-    delay_s: float = Field(default=0.0005, ge=0.0)
+    delay_s: float = Field(default=0.0005, ge=0.0, le=0.1)
     """Delay of the force."""
-    gain: float = Field(default=0.02, ge=0.0)
+    gain: float = Field(default=0.02, ge=0.0, le=0.5)
     """Gain of the force, as a share of it."""
 
 
@@ -33,7 +35,7 @@ def nuisance(
     config: NuisanceConfig,
     timing: Array,
     calm: NDArray[np.bool_],
-) -> Array:
+) -> tuple[Array, Array]:
     """The part of a residual that offset, gain and delay of the test explain within their priors.
 
     Equation: min_b |r - A b|^2 / s^2 + |b|^2, |b_i| <= 3.5, A = [sd_o peak, sd_g F, -sd_d dF/dt, sd_t dF/dt_U]
@@ -51,15 +53,16 @@ def nuisance(
 
     Returns
     -------
-    (n,) force [N]
+    (n,) force by offset and gain, and (n,) by when it comes [N]; beside a jump, where the slope of the force is that of
+    one sample, the second may be far from anything that a delay does
     """
     columns = np.hstack([columns_of(predicted, rate, config), timing])
     weight = max(variance, 1e-12 * float(np.max(np.abs(predicted))) ** 2)
     counted = columns[calm]
     normal = counted.T @ counted / weight + np.eye(columns.shape[1])
     estimate = np.linalg.solve(normal, counted.T @ residual[calm] / weight)
-    explained: Array = columns @ np.clip(estimate, -AT_MOST, AT_MOST)
-    return explained
+    within = np.clip(estimate, -AT_MOST, AT_MOST)
+    return columns[:, :TIMED] @ within[:TIMED], columns[:, TIMED:] @ within[TIMED:]
 
 
 def columns_of(predicted: Array, rate: float, config: NuisanceConfig) -> Array:

@@ -166,7 +166,11 @@ def _hiding(rng: Generator, plain: Damper, motions: list[Motion], size: float) -
 
     hiding = library()[name].hidden
     assert hiding is not None, name
-    return plain.with_effect(name, of_size(hiding(rng, scales), changed, size))
+    values = of_size(hiding(rng, scales), changed, size)
+    if name == "relief_valve" and values["F_r"] <= plain.base[0].T0_N:
+        # Always open, it leaves a Bingham element with C_r for C: nothing is hidden, so another effect is drawn.
+        return _hiding(rng, plain, motions, size)
+    return plain.with_effect(name, values)
 
 
 def _record(

@@ -236,7 +236,13 @@ def test_the_stage_writes_what_the_config_names(run: Any, tmp_path: Path) -> Non
         patch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
         written(tmp_path, f"{HEAD}off,{TEST.format(0)},measures.peak_force_N,1500,N,0.02\n")
         report = run.told(ReportConfig(reference="lab.csv"), folder=tmp_path)
-        assert run.told().reference is None
+        plain = run.told()
+    assert plain.reference is None
+    assert "What was expected" not in plain.page
+    assert "Expected numbers in lab.csv: 1, of which the run computes 1." in report.page
+    shown = report.page.replace("\u202f", "").replace("\u00a0", " ")
+    assert '<td class="n">1500 N</td><td class="n">1514 N</td><td class="n">1.009</td>' in shown
+    assert "within the tolerance of 0.02: off by +0.00933" in shown
     report.write(tmp_path, Control())
     lines = (tmp_path / "reference.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == "id,kind,expected,computed,unit,ratio,note"
