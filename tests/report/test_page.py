@@ -205,7 +205,7 @@ def test_pictures_drawn_at_the_same_time_are_the_same(page: str, run: Any) -> No
 
 def test_the_same_input_gives_the_same_bytes_in_another_process() -> None:
     code = (
-        f"import sys; sys.path.insert(0, {str(HERE)!r}); import hashlib, conftest as c\n"
+        f"import sys; sys.path[:0] = [{str(HERE)!r}, {str(HERE.parent)!r}]; import hashlib, conftest as c\n"
         "run = c.Run(c.rig(), c.identified(), c.diagnosed(), c.table(), c.rides())\n"
         "print(hashlib.sha256(run.told().page.encode()).hexdigest())"
     )
