@@ -20,8 +20,8 @@ from pzd.diagnose.thresholds import CONTRADICTS, FEWEST_FOR_A_TREND
 from pzd.record import Array
 from pzd.signals.nuisance import NuisanceConfig, columns_of
 
-UNIT = NuisanceConfig(offset=1.0, delay_s=1.0, gain=1.0)
-"""Offset in peak forces, gain as a share, delay in seconds."""
+UNIT = NuisanceConfig(offset=0.01, delay_s=0.001, gain=0.01)
+"""What they are counted in: a hundredth of the peak force, a millisecond, a hundredth of the force."""
 OWN = ("offset", "gain", "delay")
 """What a test may have of its own, in the order of `columns_of`."""
 
@@ -76,7 +76,7 @@ def trend_of_tests(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
 
 
 def _own(checks: Sequence[ResidualCheck]) -> tuple[Array, Array]:
-    """(n, 3) offset [peak], gain and delay [s] of every test, and (3,) what one of each makes of the force [peak]."""
+    """(n, 3) offset, gain and delay of every test in `UNIT`, and (3,) what one of each makes of the force [peak]."""
     found, size = [], []
     for check in checks:
         force = (check.prepared.record.force - check.residual)[check.wanted]
