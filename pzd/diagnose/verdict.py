@@ -61,10 +61,9 @@ def with_added(decision: Decision, added: Sequence[str]) -> Decision:
     """The decision beside effects that were added for what they predict alone: they explain nothing by themselves."""
     if not added:
         return decision
-    words = (
-        f"{decision.reason}; kept-back tests are predicted better with {' and '.join(added)}, whatever it stands for"
-    )
-    return replace(decision, reason=words)
+    names, stands = " and ".join(added), "it stands" if len(added) == 1 else "they stand"
+    words = f"kept-back tests are predicted better with {names}, whatever {stands} for"
+    return replace(decision, reason=f"{decision.reason}; {words}")
 
 
 def decide(selection: Selection, config: DiagnoseConfig) -> Decision:

@@ -57,6 +57,7 @@ def content(case: Scored) -> dict[str, object]:
     return case.model_dump(exclude=COSTS)
 
 
+@pytest.mark.ci
 def test_a_run_stops_and_goes_on_and_does_not_hang_on_the_number_of_processes(
     small: Small, benchmark_of: BenchmarkOf, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -79,6 +80,7 @@ def test_a_run_stops_and_goes_on_and_does_not_hang_on_the_number_of_processes(
     assert benchmark_of(small(), tmp_path / "one").run(jobs=1) == both
 
 
+@pytest.mark.ci
 def test_cases_are_drawn_and_diagnosed_in_processes_of_their_own(
     small: Small, benchmark_of: BenchmarkOf, tmp_path: Path
 ) -> None:

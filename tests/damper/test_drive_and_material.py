@@ -92,6 +92,7 @@ def test_the_nodes_for_compiled_loops_give_the_same_rows() -> None:
         assert q == pytest.approx(np.interp(voltage, [20.0, 100.0], [10.0, 30.0]))
 
 
+@pytest.mark.ci
 def test_an_edited_law_is_seen_although_the_kernels_are_cached(tmp_path: Path) -> None:
     copy = tmp_path / "pzd"
     shutil.copytree(Path(pzd.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))

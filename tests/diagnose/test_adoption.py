@@ -17,6 +17,7 @@ from pzd.diagnose.search.selection import Round, Selection
 from pzd.record import Record
 
 
+@pytest.mark.ci
 def test_parameters_differ_by_voltage_where_the_data_demand_it(rng: np.random.Generator) -> None:
     thinning = {"n": (0.95, 0.75), "at_voltage_V": TWO}
     damper = damper_of(TWO).with_effect("shear_thinning", thinning)
@@ -53,6 +54,7 @@ def warming(
     )  # fmt: skip
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("drifts", [pytest.param(True, marks=pytest.mark.ci), False])
 def test_a_drift_is_named_where_the_damper_warms_and_only_if_there_is_one(
     drifts: bool,  # a parameter of the test

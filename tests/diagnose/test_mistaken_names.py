@@ -17,6 +17,7 @@ from pzd.record import Record
 LINEAR_TESTS = ((0.5, 0.015), (0.5, 0.03), (2.0, 0.01), (2.0, 0.02))
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("form", "values"), [("guide_friction", {"F_g": 40.0}), ("cubic_spring", {"k_3": 6e6})])
 def test_a_force_that_is_in_no_library_is_not_named_after_the_effect_next_to_it(
     form: str, values: dict[str, float], rng: np.random.Generator

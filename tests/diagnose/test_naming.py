@@ -89,6 +89,7 @@ def test_a_spring_and_a_mass_cannot_be_told_apart_on_one_frequency_and_the_next_
     assert told.next_test.distance_percent > 0.5
 
 
+@pytest.mark.ci
 def test_a_spring_that_pushes_away_is_not_called_a_gas_spring(rng: np.random.Generator) -> None:
     told = diagnosed(sines(damper_of(TWO, gas_spring={"k_g": -3000.0}), rng, TWO)).diagnosis
     assert told.verdict == "unexplained", told.reason
@@ -111,6 +112,7 @@ def test_something_that_is_not_in_the_library_is_unexplained(rng: np.random.Gene
     assert told.verdict == "unexplained", told.reason
 
 
+@pytest.mark.ci
 def test_a_forbidden_effect_is_never_adopted_and_a_forced_one_always(rng: np.random.Generator) -> None:
     records = sines(damper_of(TWO, gas_spring={"k_g": 3000.0}), rng, TWO)
     assert "gas_spring" not in diagnosed(records, forbid=("gas_spring",)).damper.effects

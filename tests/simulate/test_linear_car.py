@@ -37,6 +37,7 @@ def test_the_closed_form_satisfies_the_equation_of_motion() -> None:
     assert comfort == pytest.approx(car.force_to_comfort() @ forces)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("road", [0, 1])
 def test_the_generic_integrator_agrees_with_the_exact_ride(ride, road) -> None:
     exact = ride("constant", road=road, duration_s=4.0, settle_s=1.0)
