@@ -16,6 +16,8 @@ Rows = NDArray[np.intp]
 
 CONSTANT_SHARE = 0.02
 """A voltage whose r.m.s. about its median stays within this share of the scale is constant."""
+DIFFERENT_SHARE = 0.1
+"""Voltages further apart than this share of the scale were set: a supply scatters by a few hundredths at most."""
 SAME_TEMPERATURE = 2.0
 """Records within this many degC are one condition."""
 
@@ -162,6 +164,25 @@ def conditions(
             bands = _bands(by_temperature, [r.median_voltage() for r in by_temperature], within)
             found.extend(_condition(setting, members) for members in bands)
     return tuple(found), tuple(r for r in records if not is_constant(r, scale))
+
+
+def merged_voltages(records: Sequence[Record], voltage_within: float) -> tuple[float, float] | None:
+    """Lowest and highest voltage of the constant records, where one condition would hold them all though they differ.
+
+    Parameters
+    ----------
+    records : the rig's records, of any setting
+    voltage_within : largest spread of voltage inside one condition [V]
+
+    Returns
+    -------
+    None where they make several conditions, or where they are scatter about one voltage
+    """
+    scale = voltage_scale(records)
+    voltages = [r.median_voltage() for r in records if is_constant(r, scale)]
+    known = [voltage for voltage in voltages if voltage is not None]
+    spread = max(known) - min(known) if known else 0.0
+    return (min(known), max(known)) if DIFFERENT_SHARE * scale < spread <= voltage_within else None
 
 
 def _condition(setting: str | None, members: Sequence[Record]) -> Condition:

@@ -82,7 +82,7 @@ def _record(path: Path, setting: str | None) -> Record:
 
 
 def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
-    """A row a setting: T0 is the mean force, k the seed."""
+    """A row a setting: T0 is the mean force, k the seed in N/mm times 100."""
     rows = []
     for setting in sorted({record.setting for record in rig.records}, key=str):
         level = float(np.mean([record.force[0] for record in rig.records if record.setting == setting]))
@@ -100,7 +100,7 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
                 C_Ns_per_m=damping,
                 C_Ns_per_m_low95=damping,
                 C_Ns_per_m_high95=damping,
-                k_N_per_m=float(seed),
+                k_N_per_m=1e5 * seed,
                 k_N_per_m_low95=None,
                 k_N_per_m_high95=None,
                 status="ok" if damping else "undetermined: C, the records are too slow",

@@ -35,7 +35,7 @@ from pzd.artefacts.rides import (
     WeightedRow,
     WheelRow,
 )
-from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig
+from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig, extent
 from pzd.artefacts.table import ForceRow, InverseRow, Table, TableNotes
 
 Artefact = Rig | Identified | Diagnosed | Table | Rides | Report
@@ -83,4 +83,5 @@ __all__ = [
     "WeightedRow",
     "WheelRow",
     "base_of",
+    "extent",
 ]

@@ -9,12 +9,13 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field
 
 from pzd.artefacts.identified import ParameterRow
-from pzd.damper.model import Damper
+from pzd.damper.model import PHYSICAL, Damper
 from pzd.quantities import Control
 from pzd.schema.csvfile import read_rows, write_rows
+from pzd.schema.errors import DataError
 from pzd.schema.jsonfile import read_json, write_json
 from pzd.schema.model import Frozen
-from pzd.schema.yamlfile import read_yaml_model, write_yaml_model
+from pzd.schema.yamlfile import read_yaml, read_yaml_model, write_yaml_model
 
 
 class Gap(Frozen):
@@ -165,10 +166,55 @@ class Diagnosed:
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
-        """Read and check them again."""
-        return cls(
+        """Read and check them again, each by itself and against one another."""
+        found = cls(
             read_json(folder / "diagnosis.json", Diagnosis, control),
             read_yaml_model(folder / "damper.yaml", Damper, control),
             read_yaml_model(folder / "plain.yaml", Damper, control),
             read_rows(folder / "parameters.csv", ParameterRow, control),
         )
+        if faults := [*_effects_apart(found, folder), *_base_apart(found, folder, control)]:
+            raise DataError(faults)
+        return found
+
+
+OTHER_UNIT = 100.0
+"""From this ratio on two values of one parameter are in different units; the least between two units is 1000."""
+
+
+def _effects_apart(found: Diagnosed, folder: Path) -> list[str]:
+    """Effects that only one of damper.yaml and diagnosis.json has, each with its place."""
+    told, acting = found.diagnosis.effects, found.damper.effects
+    if set(told) == set(acting):
+        return []
+    damper = read_yaml(folder / "damper.yaml", DataError)
+    diagnosis = read_yaml(folder / "diagnosis.json", DataError)
+    return [
+        f"{damper.place(('effects', name))}: effects.{name}: diagnosis.json does not have it among its effects; "
+        "add it there too, or take it out here"
+        for name in acting
+        if name not in told
+    ] + [
+        f"{diagnosis.place(('effects', str(number)))}: effects.{number}: damper.yaml has no {name}; "
+        "add it there too, or take it out here"
+        for number, name in enumerate(told)
+        if name not in acting
+    ]
+
+
+def _base_apart(found: Diagnosed, folder: Path, control: Control) -> list[str]:
+    """Values of T0, C and k in damper.yaml that parameters.csv has in another unit, each with its place."""
+    rows = {(row.voltage_V, row.temperature_degC): row for row in found.parameters}
+    faults: list[str] = []
+    for number, base in enumerate(found.damper.base):
+        row = rows.get((base.voltage_V, base.temperature_degC))
+        for name in PHYSICAL if row else ():
+            here, there = float(getattr(base, name)), getattr(row, name)
+            if there is None or not 0.0 < min(here, there) * OTHER_UNIT < max(here, there):
+                continue
+            place = read_yaml(folder / "damper.yaml", DataError).place(("base", str(number), name))
+            faults.append(
+                f"{place}: base.{number}.{control.renamed(name)}: parameters.csv has {there:g} there; "
+                f"is it in another unit? change both if it is meant (got {here:g})"
+            )
+    return faults

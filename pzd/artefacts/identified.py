@@ -8,10 +8,10 @@ from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from pzd.damper.model import BaseRow, Damper
+from pzd.damper.model import PHYSICAL, BaseRow, Damper, unphysical
 from pzd.quantities import Control
 from pzd.schema.csvfile import read_rows, write_rows
-from pzd.schema.errors import DataError
+from pzd.schema.errors import DataError, at
 from pzd.schema.model import Frozen
 
 
@@ -115,6 +115,8 @@ class Identified:
         twice = [_condition(row, control) for i, row in enumerate(rows) if places[i] in places[:i]]
         if twice:
             raise DataError(f"{folder / 'parameters.csv'}: two rows of one condition ({each})" for each in twice)
+        if faults := _unphysical(rows, folder / "parameters.csv"):
+            raise DataError(faults)
         return cls(
             rows,
             read_rows(folder / "measures.csv", MeasureRow, control),
@@ -128,6 +130,17 @@ class Identified:
             for row in self.rows
             if row.T0_N is None or row.C_Ns_per_m is None
         )
+
+
+def _unphysical(rows: tuple[ParameterRow, ...], path: Path) -> list[str]:
+    """Values without an interval that no damper has, each with its line."""
+    return [
+        f"{at(path, line)}: {name}: {wrong} (got {value:g})"
+        for line, row in enumerate(rows, start=2)
+        for name in PHYSICAL
+        if (value := getattr(row, name)) is not None and getattr(row, f"{name}_low95") is None
+        if (wrong := unphysical(name, value)) is not None
+    ]
 
 
 def _condition(row: ParameterRow, control: Control) -> str:

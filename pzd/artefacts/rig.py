@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from pzd.schema.errors import DataError
 from pzd.schema.jsonfile import read_json_list, write_json
 from pzd.schema.model import Frozen
 from pzd.schema.processes import parallel_map
+from pzd.schema.yamlfile import read_yaml
+from pzd.signals.work import work
 
 INGEST = "ingest.json"
 """What was done to the files of a real rig."""
@@ -49,6 +51,14 @@ class RecordEntry(Frozen):
     """Sampling rate."""
     cycles: float
     """Number of cycles of the motion."""
+    displacement_range_m: tuple[float, float] | None = None
+    """Smallest and largest displacement."""
+    velocity_range_m_per_s: tuple[float, float] | None = None
+    """Smallest and largest velocity."""
+    force_range_N: tuple[float, float] | None = None
+    """Smallest and largest force."""
+    work_J: float | None = None
+    """Work done on the damper over the record; its sign tells force and displacement of one direction."""
     findings: tuple[Finding, ...] = ()
     removed: str | None = None
     """What a known fixture took out of the force, in words."""
@@ -95,7 +105,9 @@ class Rig:
     def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
         """Read and check them again, so many at the same time."""
         entries = read_json_list(folder / "records.json", RecordEntry, control)
-        records = parallel_map(lambda entry: _read_record(folder, entry, control), entries, jobs)
+        records = parallel_map(
+            lambda number: _read_record(folder, number, entries[number], control), range(len(entries)), jobs
+        )
         report = folder / INGEST
         return cls(tuple(records), entries, read_json_list(report, IngestRow, control) if report.is_file() else ())
 
@@ -113,7 +125,7 @@ def _channels(record: Record) -> Mapping[str, Array | None]:
     return columns if record.pressure is None else {**columns, PRESSURE.column: record.pressure}
 
 
-def _read_record(folder: Path, entry: RecordEntry, control: Control) -> Record:
+def _read_record(folder: Path, number: int, entry: RecordEntry, control: Control) -> Record:
     optional = (VOLTAGE.column, TEMPERATURE.column, PRESSURE.column)
     header = [q.column for q in (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)]
     columns = read_columns(folder / f"{entry.name}.csv", header, control, optional)
@@ -123,11 +135,54 @@ def _read_record(folder: Path, entry: RecordEntry, control: Control) -> Record:
         *(columns[name] for name in header[:5]),
         *(columns.get(name) for name in optional),
     )
-    told, holds = entry.voltage_V, record.median_voltage()
-    if (told is None) != (holds is None) or not np.isclose(told or 0.0, holds or 0.0):
-        name = control.renamed(VOLTAGE.column)
+    if faults := _contradictions(entry, record, control):
+        document = read_yaml(folder / "records.json", DataError)
         raise DataError(
-            f"{folder / 'records.json'}: {name} of {entry.name}: must be the median of its file "
-            f"(got {told}, where {entry.name}.csv has {holds})"
+            f"{document.place((str(number), control.renamed(name)))}: {fault}" for name, fault in faults.items()
         )
     return record
+
+
+def extent(record: Record) -> dict[str, Any]:
+    """What an entry of records.json says of the numbers of its file, by which an edit of one of the two is seen."""
+    return {
+        "voltage_V": record.median_voltage(),
+        "temperature_degC": record.median_temperature(),
+        "rate_Hz": record.rate,
+        "displacement_range_m": _range(record.displacement),
+        "velocity_range_m_per_s": _range(record.velocity),
+        "force_range_N": _range(record.force),
+        "work_J": work(record.displacement, record.force),
+    }
+
+
+_MEDIANS = ("voltage_V", "temperature_degC")
+_MAY_BE_LEFT_OUT = ("displacement_range_m", "velocity_range_m_per_s", "force_range_N", "work_J")
+
+
+def _range(channel: Array) -> tuple[float, float]:
+    return float(channel.min()), float(channel.max())
+
+
+def _contradictions(entry: RecordEntry, record: Record, control: Control) -> dict[str, str]:
+    """What an entry says otherwise than its file, by its key, after a hand edit of one of them."""
+    faults: dict[str, str] = {}
+    for name, holds in extent(record).items():
+        said = getattr(entry, name)
+        if (said is None and (holds is None or name in _MAY_BE_LEFT_OUT)) or _close(said, holds):
+            continue
+        must = "the median" if name in _MEDIANS else "that"
+        faults[name] = (
+            f"{control.renamed(name)} of {entry.name}: must be {must} of its file (got {_shown(said)}, "
+            f"where {entry.name}.csv has {_shown(holds)}); one of them was edited: "
+            "take that back, or change the other too"
+        )
+    return faults
+
+
+def _close(said: Any, holds: Any) -> bool:
+    return said is not None and holds is not None and bool(np.allclose(said, holds, rtol=1e-5, atol=1e-8))
+
+
+def _shown(value: Any) -> str:
+    return f"{value[0]:.6g} to {value[1]:.6g}" if isinstance(value, tuple) else str(value)

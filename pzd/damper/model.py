@@ -5,13 +5,17 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from pzd.damper.competing_forms import known
 from pzd.damper.effects import library
 from pzd.schema.model import Frozen
 
 EffectValues = Mapping[str, float | tuple[float, ...]]
+
+PHYSICAL = {"T0_N": (0.0, 1e7), "C_Ns_per_m": (0.1, 1e8), "k_N_per_m": (1e3, 1e10)}
+"""Limits within which T0, C and k of any damper lie, from those of a drawer to those of a bridge: an oil spring of less
+than 1 N/mm gives way by the whole stroke. What lies outside is in another unit."""
 
 
 class BaseRow(Frozen):
@@ -27,6 +31,23 @@ class BaseRow(Frozen):
     """Damping coefficient."""
     k_N_per_m: float = Field(gt=0.0)
     """Stiffness of the oil spring."""
+
+    @field_validator(*PHYSICAL)
+    @classmethod
+    def _physical(cls, value: float, info: ValidationInfo) -> float:
+        """Of what a person writes; a search may look further."""
+        if info.mode == "json" and info.field_name and (wrong := unphysical(info.field_name, value)):
+            raise ValueError(wrong)
+        return value
+
+
+def unphysical(name: str, value: float) -> str | None:
+    """What a value of T0, C or k (by its column) must be, where no damper has it; None where one may."""
+    low, high = PHYSICAL[name]
+    if low <= value <= high:
+        return None
+    unit = name.partition("_")[2].replace("_per_", "/").replace("Ns", "N s")
+    return f"must lie between {low:g} and {high:g} {unit}, as that of every damper does; is it in another unit?"
 
 
 class Damper(Frozen):
@@ -46,10 +67,17 @@ class Damper(Frozen):
     """Recorded displacement from which x in the laws of `end_stop` and `gas_spring` is counted, as a displacement
     sensor has any zero: the middle of the stroke on the stand. In a car it is the static position."""
 
-    @model_validator(mode="after")
-    def _known_effects(self) -> Damper:
-        for name, values in self.effects.items():
+    @field_validator("effects")
+    @classmethod
+    def _known_effects(
+        cls, effects: dict[str, dict[str, float | tuple[float, ...]]]
+    ) -> dict[str, dict[str, float | tuple[float, ...]]]:
+        for name, values in effects.items():
             _check_effect(name, values)
+        return effects
+
+    @model_validator(mode="after")
+    def _reference(self) -> Damper:
         for name in self.effects:
             if known()[name].place == "material" and self.reference_temperature_degC is None:
                 raise ValueError(f"{name} needs reference_temperature_degC")

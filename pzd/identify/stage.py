@@ -8,7 +8,9 @@ from dataclasses import replace
 
 from pzd.artefacts import AuxiliaryRow, Identified, ParameterRow, Rig
 from pzd.identify.config import IdentifyConfig
-from pzd.record import Condition, Record, conditions
+from pzd.quantities import Control
+from pzd.record import Condition, Record, conditions, merged_voltages
+from pzd.schema.errors import ConfigError
 from pzd.schema.progress import Listener, Progress, no_listener
 from pzd.schema.wording import supported
 
@@ -16,8 +18,12 @@ Labels = tuple[str | None, float | None, float | None]
 
 log = logging.getLogger(__name__)
 
+_VOLTAGE = Control()
 
-def identify(identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener = no_listener) -> Identified:
+
+def identify(
+    identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener = no_listener, control: Control = _VOLTAGE
+) -> Identified:
     """The Bingham parameters of every condition of every setting, with intervals and their trust.
 
     Parameters
@@ -26,13 +32,19 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener =
     rig : the records
     seed : of the evolutionary search
     progress : hears of every condition that is done
+    control : the control signal, which names the voltage in messages
 
     Returns
     -------
     one row a condition or voltage node, one row of measures a record, one of auxiliaries a condition that shows any
+
+    Raises
+    ------
+    ConfigError : when `identify.group` makes one condition of all voltages
     """
     from pzd.identify.measures import measures
 
+    _refuse_one_condition(identify, rig, control)
     constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
     found = _constant_rows(constant, identify, seed, progress)
     rows = {_labels(row): row for row, _ in found}
@@ -44,6 +56,18 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener =
         measures(rig.records),
         tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_order)),
     )
+
+
+def _refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> None:
+    within = config.group.voltage_V
+    merged = merged_voltages(rig.records, within) if within is not None else None
+    if merged is not None:
+        key, span = control.renamed("voltage_V"), f"{merged[0]:.4g} to {merged[1]:.4g} {control.unit}"
+        raise ConfigError(
+            f"identify.group.{key}: merges every {control.quantity.name} of the rig ({span}) into one condition, so "
+            "that T0, C and k could not depend on it; say less than lies between two of them, or leave it empty "
+            f"(got {within:g})"
+        )
 
 
 def _constant_rows(

@@ -31,7 +31,7 @@ def listed(entries: Sequence[FilesEntry], folder: Path) -> tuple[Listed, ...]:
 
     Raises
     ------
-    ConfigError : when a path matches no file
+    ConfigError : when a path matches no file, or two entries read the same of a file
     """
     found: list[Listed] = []
     faults: list[str] = []
@@ -42,9 +42,42 @@ def listed(entries: Sequence[FilesEntry], folder: Path) -> tuple[Listed, ...]:
         if not paths:
             hint = f"; {entry.source}" if entry.source else "; the path is relative to the config's folder"
             faults.append(f"{place}.path: no such file under {folder}{hint} (got {entry.path!r})")
+    faults += _read_twice(found)
     if faults:
         raise ConfigError(faults)
     return tuple(sorted(found, key=lambda one: (one.path.as_posix(), one.number)))
+
+
+def _read_twice(found: Sequence[Listed]) -> list[str]:
+    """Pairs of entries that read the same of a file; each may take other tables, columns or tests."""
+    first: dict[tuple[Path, str], Listed] = {}
+    pairs: dict[tuple[int, int], list[Path]] = {}
+    for one in found:
+        way = one.entry.model_dump_json(include={"layout", "columns", "table", "split"})
+        before = first.setdefault((one.path.resolve(), way), one)
+        if before is not one:
+            pairs.setdefault((before.number, one.number), []).append(one.path)
+    faults: list[str] = []
+    for (first_number, number), paths in pairs.items():
+        earlier, later = _entry(found, first_number), _entry(found, number)
+        more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
+        faults.append(
+            f"rig.files.{number}.path: reads {paths[0].name}{more}, which rig.files.{first_number} reads too"
+            f"{_settings(earlier, later)}; each test belongs to one entry: narrow one of the paths "
+            f"(got {earlier.path!r} and {later.path!r})"
+        )
+    return faults
+
+
+def _entry(found: Sequence[Listed], number: int) -> FilesEntry:
+    return next(one.entry for one in found if one.number == number)
+
+
+def _settings(one: FilesEntry, other: FilesEntry) -> str:
+    """Under which settings, where two entries name different ones."""
+    if one.setting == other.setting:
+        return ""
+    return f", as setting {one.setting or 'without a name'} and {other.setting or 'without a name'}"
 
 
 def matching(folder: Path, pattern: str) -> list[Path]:

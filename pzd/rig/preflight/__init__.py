@@ -15,7 +15,7 @@ from types import ModuleType
 
 import numpy as np
 
-from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig
+from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig, extent
 from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
@@ -108,10 +108,8 @@ def _entry(test: Measured) -> RecordEntry:
     return RecordEntry(
         name=record.name,
         setting=record.setting,
-        voltage_V=record.median_voltage(),
-        temperature_degC=record.median_temperature(),
-        rate_Hz=record.rate,
         cycles=float(test.run.count) if test.run else 0.5 * len(reversals(record.displacement)),
         findings=findings(test),
         removed=test.removed,
+        **extent(record),
     )
