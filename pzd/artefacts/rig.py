@@ -51,12 +51,12 @@ class RecordEntry(Frozen):
     """Sampling rate."""
     cycles: float
     """Number of cycles of the motion."""
-    displacement_range_m: tuple[float, float] | None = None
-    """Smallest and largest displacement."""
-    velocity_range_m_per_s: tuple[float, float] | None = None
-    """Smallest and largest velocity."""
-    force_range_N: tuple[float, float] | None = None
-    """Smallest and largest force."""
+    displacement_rms_m: float | None = None
+    """R.m.s. of the displacement about its mean."""
+    velocity_rms_m_per_s: float | None = None
+    """R.m.s. of the velocity about its mean."""
+    force_rms_N: float | None = None
+    """R.m.s. of the force about its mean."""
     work_J: float | None = None
     """Work done on the damper over the record; its sign tells force and displacement of one direction."""
     findings: tuple[Finding, ...] = ()
@@ -149,40 +149,44 @@ def extent(record: Record) -> dict[str, Any]:
         "voltage_V": record.median_voltage(),
         "temperature_degC": record.median_temperature(),
         "rate_Hz": record.rate,
-        "displacement_range_m": _range(record.displacement),
-        "velocity_range_m_per_s": _range(record.velocity),
-        "force_range_N": _range(record.force),
+        "displacement_rms_m": _rms(record.displacement),
+        "velocity_rms_m_per_s": _rms(record.velocity),
+        "force_rms_N": _rms(record.force),
         "work_J": work(record.displacement, record.force),
     }
 
 
+OTHER_UNIT = 3.0
+"""From this ratio on a channel is in another unit; a pound-force and a newton lie 4.4 apart. A sample that is edited,
+such as a spike that is taken out, moves the r.m.s. by less."""
 _MEDIANS = ("voltage_V", "temperature_degC")
-_MAY_BE_LEFT_OUT = ("displacement_range_m", "velocity_range_m_per_s", "force_range_N", "work_J")
+_MAY_BE_LEFT_OUT = ("displacement_rms_m", "velocity_rms_m_per_s", "force_rms_N", "work_J")
 
 
-def _range(channel: Array) -> tuple[float, float]:
-    return float(channel.min()), float(channel.max())
+def _rms(channel: Array) -> float:
+    return float(np.std(channel))
 
 
 def _contradictions(entry: RecordEntry, record: Record, control: Control) -> dict[str, str]:
-    """What an entry says otherwise than its file, by its key, after a hand edit of one of them."""
+    """What an entry says otherwise than its file, by its key, after an edit of one of them to another unit or sign."""
     faults: dict[str, str] = {}
     for name, holds in extent(record).items():
         said = getattr(entry, name)
-        if (said is None and (holds is None or name in _MAY_BE_LEFT_OUT)) or _close(said, holds):
+        if (said is None and (holds is None or name in _MAY_BE_LEFT_OUT)) or _agree(name, said, holds):
             continue
         must = "the median" if name in _MEDIANS else "that"
         faults[name] = (
-            f"{control.renamed(name)} of {entry.name}: must be {must} of its file (got {_shown(said)}, "
-            f"where {entry.name}.csv has {_shown(holds)}); one of them was edited: "
-            "take that back, or change the other too"
+            f"{control.renamed(name)} of {entry.name}: must be {must} of its file (got {said}, "
+            f"where {entry.name}.csv has {holds}); one of them was edited: take that back, or change the other too"
         )
     return faults
 
 
-def _close(said: Any, holds: Any) -> bool:
-    return said is not None and holds is not None and bool(np.allclose(said, holds, rtol=1e-5, atol=1e-8))
-
-
-def _shown(value: Any) -> str:
-    return f"{value[0]:.6g} to {value[1]:.6g}" if isinstance(value, tuple) else str(value)
+def _agree(name: str, said: float | None, holds: float | None) -> bool:
+    if said is None or holds is None:
+        return False
+    if name == "work_J":
+        return said * holds >= 0.0
+    if name in _MAY_BE_LEFT_OUT:
+        return max(abs(said), abs(holds)) <= OTHER_UNIT * min(abs(said), abs(holds))
+    return bool(np.isclose(said, holds, rtol=1e-3))

@@ -33,7 +33,7 @@ ABSORBED = 2.0
 times what is left, along the parameter that suffers most (C beside a quadratic orifice); twice is half of that, since
 an interval adds another factor of two."""
 
-TOLD = 0.01
+SPEAKS = 0.01
 """A misfit beyond this share of peak widens no interval any further: the status tells it, and that the parameters are
 the model's; an interval that held those of the damper all the same would run from nothing to a hundred times as much
 where a tenth of the force is missed, and tell nothing. Up to a hidden effect of 5 % of peak it holds them with this."""
@@ -55,8 +55,8 @@ class Misfit:
 
     @property
     def absorbed(self) -> float:
-        """R.m.s. force that the parameters may have taken up beside, in error [N]; no more than `TOLD` lets it be."""
-        return ABSORBED * self.force * min(1.0, TOLD / self.share) if self.share > 0.0 else 0.0
+        """R.m.s. force that the parameters may have taken up beside, in error [N]; no more than `SPEAKS` lets it be."""
+        return ABSORBED * self.force * min(1.0, SPEAKS / self.share) if self.share > 0.0 else 0.0
 
 
 def misfit_of(parts: Sequence[Part]) -> Misfit:
