@@ -38,7 +38,7 @@ def identified(level: float) -> Identified:
         C_Ns_per_m=1.0,
         C_Ns_per_m_low95=None,
         C_Ns_per_m_high95=None,
-        k_N_per_m=1.0,
+        k_N_per_m=2e5,
         k_N_per_m_low95=None,
         k_N_per_m_high95=None,
         W_s=0.0,

@@ -22,8 +22,8 @@ from pzd.record import Array
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError
 
-SIMULATION_TOLERANCE = 1e-6
-"""Of the damper's path, as a share of the force: a thousandth of what the step of a difference moves it, and three
+SIMULATION_TOLERANCE = 5e-7
+"""Of the damper's path, as a share of the force: a two-thousandth of what the step of a difference moves it, and six
 hundred times less than any force is believed to be known."""
 REMEMBERED = 12
 """Element forces kept, enough for one column of slopes each of two fits at the same time."""
