@@ -188,11 +188,11 @@ def diagnosed(*effects: str) -> Diagnosed:
         (
             "damper.yaml",
             "k_N_per_m: 200000.0",
-            "k_N_per_m: 2e+11",
-            "base.0.k_N_per_m: must lie between 1000 and 1e+10 N/m",
+            "k_N_per_m: 2e+14",
+            "base.0.k_N_per_m: must lie between 1 and 1e+13 N/m",
         ),
-        ("damper.yaml", "C_Ns_per_m: 2700.0", "C_Ns_per_m: 0.0027", "must lie between 0.1 and 1e+08 N s/m"),
-        ("damper.yaml", "T0_N: 300.0", "T0_N: 3e+8", "T0_N: must lie between 0 and 1e+07 N, as that of every damper"),
+        ("damper.yaml", "C_Ns_per_m: 2700.0", "C_Ns_per_m: 2.7e-05", "must lie between 0.0001 and 1e+09 N s/m"),
+        ("damper.yaml", "T0_N: 300.0", "T0_N: 3e+9", "T0_N: must lie between 0 and 1e+08 N, as that of every damper"),
         ("plain.yaml", "k_N_per_m: 200000.0", "k_N_per_m: 0.2", "plain.yaml:6:16: base.0.k_N_per_m: must lie between"),
         ("damper.yaml", "C_Ns_per_m: 2700.0", "C_Ns_per_m: 2.7", "C_Ns_per_m: parameters.csv has 2700 there; is it in"),
         ("damper.yaml", "T0_N: 300.0", "T0_N: 0.3", "damper.yaml:4:11: base.0.T0_N: parameters.csv has 300 there"),
@@ -238,7 +238,7 @@ def test_a_parameter_without_its_interval_must_still_be_one_that_a_damper_has(tm
     identified().write(tmp_path, Control())
     path = tmp_path / "parameters.csv"
     path.write_text(path.read_text().replace(",200000.0,190000.0,210000.0,", ",0.2,,,"))
-    with pytest.raises(DataError, match=r"parameters.csv:2: k_N_per_m: must lie between 1000 and 1e\+10 N/m.*got 0.2"):
+    with pytest.raises(DataError, match=r"parameters.csv:2: k_N_per_m: must lie between 1 and 1e\+13 N/m.*got 0.2"):
         Identified.read(tmp_path, Control())
 
 

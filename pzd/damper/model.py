@@ -13,9 +13,9 @@ from pzd.schema.model import Frozen
 
 EffectValues = Mapping[str, float | tuple[float, ...]]
 
-PHYSICAL = {"T0_N": (0.0, 1e7), "C_Ns_per_m": (0.1, 1e8), "k_N_per_m": (1e3, 1e10)}
-"""Limits within which T0, C and k of any damper lie, from those of a drawer to those of a bridge: an oil spring of less
-than 1 N/mm gives way by the whole stroke. What lies outside is in another unit."""
+PHYSICAL = {"T0_N": (0.0, 1e8), "C_Ns_per_m": (1e-4, 1e9), "k_N_per_m": (1.0, 1e13)}
+"""Limits within which T0, C and k of any damper lie, from those of a drawer to those of a bridge, wide enough for an
+element that hardly damps or hardly gives. What lies outside is in another unit."""
 
 
 class BaseRow(Frozen):

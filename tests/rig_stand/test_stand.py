@@ -119,7 +119,7 @@ def test_a_frame_and_the_oil_spring_are_springs_in_series() -> None:
 
 
 def test_a_gas_spring_in_a_frame_carries_what_two_springs_in_series_carry() -> None:
-    nothing = [{"T0_N": 0, "C_Ns_per_m": 0.1, "k_N_per_m": 1e5}]
+    nothing = [{"T0_N": 0, "C_Ns_per_m": 1e-3, "k_N_per_m": 1e5}]
     (test,) = taken(stand(nothing, {"gas_spring": {"k_g": 20_000}}, fixture={"stiffness_N_per_m": 200_000}))
     expected = test.truth.displacement / (1.0 / 20_000 + 1.0 / 200_000)
     np.testing.assert_allclose(test.true_force, expected, atol=0.01)
