@@ -35,8 +35,8 @@ class Extended:
     selection: Selection
     missed: Missed
     """What it misses of kept-back tests."""
-    effects: tuple[str, ...]
-    """What was added, best first."""
+    added: tuple[str, ...]
+    """What was added, best first, in words."""
 
 
 def with_predictive_effects(
@@ -57,22 +57,28 @@ def with_predictive_effects(
     -------
     None where nothing improves the prediction
     """
-    added: dict[str, str] = {}
+    added: list[Candidate] = []
     at = trials.fitted_by_criterion(selection.fitted.damper, trials.nothing)
     while at is not None:
         found = _best(*at, missed, trials, config)
         if found is None:
             break
         chosen, missed = found
-        added[chosen.effect] = ADDED
-        log.info("diagnose: %s added, W_s of kept-back tests %.4g", chosen.effect, missed.criterion)
+        added.append(chosen)
+        log.info("diagnose: %s added, W_s of kept-back tests %.4g", _in_words(chosen), missed.criterion)
         at = trials.fitted_by_criterion(chosen.fitted.damper, trials.nothing)
     if at is None or not added:
         return None
     problem, fitted = at
-    reasons = {**selection.reasons, **added}
+    reasons = {**selection.reasons, **{each.effect: ADDED for each in added if not each.varies}}
     last = replace(selection.last, whole=problem)
-    return Extended(replace(selection, fitted=fitted, last=last, reasons=reasons), missed, tuple(added))
+    return Extended(
+        replace(selection, fitted=fitted, last=last, reasons=reasons), missed, tuple(_in_words(each) for each in added)
+    )
+
+
+def _in_words(added: Candidate) -> str:
+    return f"{added.effect} by voltage" if added.varies else added.effect
 
 
 def _best(

@@ -35,7 +35,7 @@ class HandedOn:
     by_criterion: bool = False
     """Whether the last fit is by criterion (4), every sample alike: what is left is then no noise to weigh by."""
     added: tuple[str, ...] = ()
-    """Which effects were added for what the damper predicts with them, and for nothing else."""
+    """What was added for what the damper predicts with it, and for nothing else, in words."""
 
     def prediction(self, trials: Trials) -> Prediction | None:
         """What is predicted of kept-back tests and voltages, for diagnosis.json; None where nothing could be."""
@@ -92,7 +92,7 @@ def with_additions(handed: HandedOn, trials: Trials, config: DiagnoseConfig) -> 
     if more is None:
         return handed
     return replace(
-        handed, selection=more.selection, missed=more.missed, refused=None, by_criterion=True, added=more.effects
+        handed, selection=more.selection, missed=more.missed, refused=None, by_criterion=True, added=more.added
     )
 
 

@@ -11,17 +11,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.damper.model import Damper
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.residual_check import ResidualCheck
+from pzd.diagnose.search.evidence import nearest_row
 from pzd.diagnose.thresholds import CONTRADICTS, FEWEST_FOR_A_TREND
 from pzd.record import Array
 from pzd.signals.nuisance import NuisanceConfig, columns_of
 
 UNIT = NuisanceConfig(offset=0.01, delay_s=0.001, gain=0.01)
 """What they are counted in: a hundredth of the peak force, a millisecond, a hundredth of the force."""
+SAME = 1e-6
+"""Tests whose frequency, speed or stroke differ by a smaller share do not differ; their temperatures likewise."""
 OWN = ("offset", "gain", "delay")
 """What a test may have of its own, in the order of `columns_of`."""
 
@@ -48,8 +52,8 @@ class Trend:
 def trend_of_tests(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -> Trend | None:
     """The surest trend of the tests' own gains, offsets and delays over their motion; None where chance explains all.
 
-    Equation: t = b sqrt(n - g - 1) / sqrt(sum e^2 / sum x^2), y = b x + e within g conditions
-                                                            Source: regression within groups; Bonferroni over the pairs
+    Equation: t = b / sqrt(sum e^2 / (n - g - 1) / sum x^2), y = b x + e about the means in each of g conditions
+                                                            Source: least squares; Bonferroni over the pairs
 
     Parameters
     ----------
@@ -58,11 +62,10 @@ def trend_of_tests(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
     config : how small a probability is believed, and what is visible
     """
     checks = [c for c in campaign.checks(damper) if c.prepared.constant and c.wanted.any()]
-    group = np.array([c.prepared.record.median_voltage() or 0.0 for c in checks])
-    group = np.round(group, 6)
+    condition = np.array([nearest_row(damper.base, c.prepared) for c in checks])
     own, sizes = _own(checks)
     pairs = [
-        (name, follows, _regressed(own[:, i], over, group), sizes[i])
+        (name, follows, _regressed(own[:, i], over, condition), sizes[i])
         for i, name in enumerate(OWN)
         for follows, over in _motions(checks)
     ]
@@ -97,20 +100,20 @@ def _motions(checks: Sequence[ResidualCheck]) -> Iterator[tuple[str, Array]]:
     yield "temperature", np.array([np.nan if t is None else t for t in warmth])
 
 
-def _regressed(values: Array, over: Array, group: Array) -> tuple[float, float] | None:
+def _regressed(values: Array, over: Array, condition: NDArray[np.int64]) -> tuple[float, float] | None:
     """R.m.s. of what follows a quantity within conditions, and its probability by chance; None with too few tests."""
     from scipy.special import stdtr
 
     known = np.isfinite(over)
-    y, x, group = values[known], over[known], group[known]
-    free = y.size - np.unique(group).size - 1
+    y, x, condition = values[known], over[known], condition[known]
+    free = y.size - np.unique(condition).size - 1
     if free < FEWEST_FOR_A_TREND:
         return None
-    for each in np.unique(group):
-        inside = group == each
+    for each in np.unique(condition):
+        inside = condition == each
         y[inside] -= y[inside].mean()
         x[inside] -= x[inside].mean()
-    if np.sum(x**2) <= 1e-12 * y.size:
+    if np.ptp(x) <= SAME * max(1.0, float(np.max(np.abs(over[known])))):
         return None
     slope = float(x @ y / (x @ x))
     left = float(np.sum((y - slope * x) ** 2)) / free

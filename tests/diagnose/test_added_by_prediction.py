@@ -47,7 +47,7 @@ def test_what_is_missing_is_added_one_effect_after_another(rng: np.random.Genera
     truth = damper_of(TWO, preload_offset={"F_0": 150.0}, gas_spring={"k_g": 8000.0})
     found, before = extended(records_of(truth, rng), DiagnoseConfig())
     assert found is not None
-    assert set(found.effects) == {"preload_offset", "gas_spring"}
+    assert set(found.added) == {"preload_offset", "gas_spring"}
     assert found.missed.criterion is not None
     assert found.missed.criterion < 0.05 * before
     values = found.selection.fitted.damper.effects
@@ -65,14 +65,14 @@ def test_no_more_is_added_than_the_config_allows_nor_what_it_forbids(rng: np.ran
     records = records_of(truth, rng)
     found, _ = extended(records, DiagnoseConfig(most_effects=1))
     assert found is not None
-    assert len(found.effects) == 1
+    assert len(found.added) == 1
     found, _ = extended(records, DiagnoseConfig(forbid=("preload_offset", "asymmetry")))
-    assert found is None or not {"preload_offset", "asymmetry"} & set(found.effects)
+    assert found is None or not {"preload_offset", "asymmetry"} & set(found.added)
 
 
 def test_what_only_a_sensor_shows_is_not_added(rng: np.random.Generator) -> None:
     found, _ = extended(records_of(damper_of(TWO, sensor_delay={"tau": 0.004}), rng), DiagnoseConfig())
-    assert found is None or "sensor_delay" not in found.effects
+    assert found is None or "sensor_delay" not in found.added
 
 
 # ---------------------------------------------------------------- nothing impossible

@@ -51,6 +51,18 @@ def test_gains_that_follow_the_frequency_are_a_trend(rng: np.random.Generator) -
     assert 0.7 * 0.05 < found.size < 0.05
 
 
+def test_voltages_as_a_rig_records_them_are_one_condition(rng: np.random.Generator) -> None:
+    """No two tests hold a voltage to the last digit."""
+    records = [
+        replace(r, voltage=r.voltage + 0.2 * rng.standard_normal())
+        for r in frequency_dependent(rng, 0.05)
+        if r.voltage is not None
+    ]
+    found = trend(tuple(records))
+    assert found is not None
+    assert (found.own, found.follows) == ("gain", "frequency")
+
+
 def test_a_damper_that_depends_on_frequency_is_not_none(rng: np.random.Generator) -> None:
     diagnosis = diagnosed(frequency_dependent(rng, 0.05)).diagnosis
     assert diagnosis.verdict == "unexplained"

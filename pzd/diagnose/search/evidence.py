@@ -64,7 +64,7 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
     damper : where the fits start and along which gain and delay of a test act
     """
     prepared = campaign.prepared
-    places = [_nearest_row(damper.base, p) if p.constant else -1 for p in prepared]
+    places = [nearest_row(damper.base, p) if p.constant else -1 for p in prepared]
     shown = in_use(campaign.seen)
     given = dict(zip(shown, campaign.expected(damper, shown), strict=True))
     made: dict[tuple[int, bytes], RecordLikelihood | None] = {}
@@ -115,7 +115,7 @@ def _of(prepared: Prepared, channel: str) -> Array:
     return np.asarray(getattr(prepared.record, channel))
 
 
-def _nearest_row(rows: Sequence[BaseRow], prepared: Prepared) -> int:
+def nearest_row(rows: Sequence[BaseRow], prepared: Prepared) -> int:
     """Index of the base row of a record: of the rows of the nearest voltage, that of the nearest temperature."""
     voltage, temperature = prepared.record.median_voltage() or 0.0, prepared.record.median_temperature() or 0.0
     _, nearest = min(by_voltage(rows), key=lambda group: abs(group[0] - voltage))
