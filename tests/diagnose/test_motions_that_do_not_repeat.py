@@ -111,7 +111,7 @@ def test_nothing_is_missed_in_a_plain_damper(motion: str, rng: Generator) -> Non
 
 
 @pytest.mark.parametrize("effect", SIZES)
-@pytest.mark.parametrize("motion", ["1 and 10.03 Hz"])  # a minute each: the others are asked for by hand
+@pytest.mark.parametrize("motion", ["1 and 10.03 Hz", "1.1 and 12.3 Hz", "a beat"])  # the others by hand
 def test_what_is_hidden_is_named_with_its_size(motion: str, effect: str, rng: Generator) -> None:
     parameter, sizes = SIZES[effect]
     size = dict(zip(MOTIONS, sizes, strict=True))[motion]

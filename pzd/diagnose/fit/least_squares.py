@@ -18,8 +18,12 @@ from pzd.record import Array
 Left = tuple[list[Array], list[Array]]
 """Residuals in units of noise and simulated forces, an observation each."""
 
-DIFFERENCE = 1e-3
-"""Step of the searched variables for forward differences."""
+DIFFERENCE = 3e-3
+"""Step of the searched variables to either side for their slopes.
+
+Reason: the gain of the tests leaves T0, C and k open along one direction, common to them all, so that what forward
+differences leave of the curvature ends a search up to a standard deviation away from the optimum. A smaller step shows
+the errors of the simulation, see `likelihood.SIMULATION_TOLERANCE`."""
 MOST_EVALUATIONS = 20
 PRECISION = 1e-5
 """Relative change of the sum of squares at which a search ends."""
@@ -120,7 +124,7 @@ def _search(
         return np.concatenate([*left_at(x)[0], prior[:, : centre.size] @ (x[: centre.size] - centre)])
 
     def slopes_at(x: Array) -> Array:
-        return np.concatenate([_slopes(problem, unknowns, whole(x), free, left_at(x)[1]), prior[:, :free]])
+        return np.concatenate([_slopes(problem, unknowns, whole(x), (low[:free], high[:free])), prior[:, :free]])
 
     found = least_squares(
         residuals_at,
@@ -162,30 +166,33 @@ def _residuals(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Left:
     return [o.in_noise(o.measured - f) for o, f in zip(problem.observations, forces, strict=True)], forces
 
 
-def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array, free: int, forces: Sequence[Array]) -> Array:
-    """(w, free) derivatives of the residuals by forward differences; a test moves with its own voltage alone.
+def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array]) -> Array:
+    """(w, free) derivatives of the residuals by central differences, one-sided at the limits (free,) of the search.
 
-    `forces` are those at the point itself.
+    A test moves with its own voltage alone.
     """
     rows = len(problem.base)
-    shifted = [problem.point(_shifted(x, j), unknowns) for j in range(free)]
+    low, high = limits
+    free = low.size
+    below, above = np.maximum(x[:free] - DIFFERENCE, low), np.minimum(x[:free] + DIFFERENCE, high)
+    points = [tuple(problem.point(_with(x, j, at[j]), unknowns) for at in (below, above)) for j in range(free)]
     blocks = []
-    for o, here in zip(problem.observations, forces, strict=True):
+    for o in problem.observations:
         own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(3 * rows)
         moving = [
             j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]
         ]
         columns = [*own, *(3 * rows + j for j in moving if 3 * rows + j < free)]
-        change = o.in_noise(np.stack([here - simulated(shifted[j], o) for j in columns], axis=-1) / DIFFERENCE)
-        block = np.zeros((len(change), free))
-        block[:, columns] = change
+        change = [np.subtract(*(simulated(point, o) for point in points[j])) for j in columns]
+        block = np.zeros((o.in_noise(o.measured).size, free))
+        block[:, columns] = o.in_noise(np.stack(change, axis=-1) / (above - below)[columns])
         blocks.append(block)
     return np.concatenate(blocks)
 
 
-def _shifted(x: Array, j: int) -> Array:
+def _with(x: Array, j: int, value: float) -> Array:
     moved = x.copy()
-    moved[j] += DIFFERENCE
+    moved[j] = value
     return moved
 
 

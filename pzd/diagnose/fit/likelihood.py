@@ -26,7 +26,7 @@ SIMULATION_TOLERANCE = 1e-8
 """Of the damper's path, as a share of the force, in every step by itself.
 
 Reason: over a record the errors add up to some hundred times as much, and jump as the parameters move. The slopes of a
-rounded yield are then wrong by 0.3 %, at 5e-7 by 3 %, and the search stopped far from the optimum."""
+rounded yield are then wrong by 0.6 %, at 5e-7 by 15 %, and the search stopped far from the optimum."""
 REMEMBERED = 12
 """Element forces kept, enough for one column of slopes each of two fits at the same time."""
 
