@@ -71,6 +71,16 @@ def sliced(record: Record, kept: Mask) -> Record:
     )
 
 
+def clock_fault(time: Array) -> tuple[int, str] | None:
+    """The first sample at which a clock (n,) stands still or goes back, and that in words; None where it goes on."""
+    wrong = np.flatnonzero(np.diff(time) <= 0.0)
+    if not wrong.size:
+        return None
+    row = int(wrong[0]) + 1
+    more = f", and {wrong.size - 1} more such rows" if wrong.size > 1 else ""
+    return row, f"time does not increase: {time[row]:.9g} s after {time[row - 1]:.9g} s{more}"
+
+
 @dataclass(frozen=True, eq=False)
 class Condition:
     """Records of one setting taken at one constant voltage and one temperature."""

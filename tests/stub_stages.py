@@ -69,7 +69,7 @@ def ingest(rig: RigConfig, control: Control, folder: Path) -> Rig:
         raise DataError(f"{path}:1: a number is needed (got nonsense)" for path in wrong)
     records = tuple(_record(one.path, one.entry.setting) for one in files)
     entries = [
-        RecordEntry(name=r.name, setting=r.setting, voltage_V=1.0, temperature_degC=22.0, rate_Hz=1.0, cycles=3.0)
+        RecordEntry(name=r.name, setting=r.setting, voltage_V=1.0, temperature_degC=22.0, rate_Hz=1.0, cycles=0.0)
         for r in records
     ]
     return Rig(records, tuple(entries))

@@ -308,12 +308,12 @@ def test_check_says_what_it_found_and_writes_nothing(typed: Terminal, tmp_path: 
     before = files_below(tmp_path)
     assert typed("check", "first.yaml") == 0
     assert typed.out == [
-        "a: 3 cycles at 1 Hz",
-        "b: 3 cycles at 1 Hz",
+        "a: 0 cycles at 1 Hz",
+        "b: 0 cycles at 1 Hz",
         "2 records, 0 findings; the config is in order, nothing was written",
     ]
     assert typed("check", "first.yaml", "--set", "setting=gap") == 2
-    assert typed.out == ["a: 3 cycles at 1 Hz", "b: 3 cycles at 1 Hz"]  # the preflight of all, whatever the setting
+    assert typed.out == ["a: 0 cycles at 1 Hz", "b: 0 cycles at 1 Hz"]  # the preflight of all, whatever the setting
     assert files_below(tmp_path) == before
 
 
@@ -457,8 +457,8 @@ def test_check_as_json_holds_every_record_with_its_findings(typed: Terminal) -> 
     found = printed_json(typed, "check", "first.yaml", "--set", "control.name=current", "--set", "control.unit=A")
     assert found["config"] == "first.yaml"
     assert [(one["name"], one["cycles"], one["current_A"], one["findings"]) for one in found["records"]] == [
-        ("a", 3.0, 1.0, []),
-        ("b", 3.0, 1.0, []),
+        ("a", 0.0, 1.0, []),
+        ("b", 0.0, 1.0, []),
     ]
     assert not Path("runs").exists()
 

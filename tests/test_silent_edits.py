@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pzd.artefacts import Diagnosed, Identified, ParameterRow, RecordEntry, Rig, extent
+from pzd.artefacts import Diagnosed, Identified, ParameterRow, RecordEntry, Rig, Value, extent
+from pzd.cli.diagnosis import diagnosis_lines
 from pzd.config import load
 from pzd.damper.model import BaseRow, Damper
 from pzd.identify.config import GroupConfig, IdentifyConfig
 from pzd.identify.stage import identify
+from pzd.pipeline.command import opened, preflight
 from pzd.quantities import Control
 from pzd.record import Record, merged_voltages
 from pzd.rig.config import FilesEntry, Split
 from pzd.rig.files.listing import listed
 from pzd.schema.errors import ConfigError, DataError
+from pzd.signals.cycles import cycles
+
+Written = Identified | Rig | Diagnosed
+Edit = Callable[[str], str]
 
 FILES = "rig:\n  files:\n    - path: data/*.csv\n"
 VIRTUAL = """rig:
@@ -54,6 +61,29 @@ def test_a_config_that_cannot_be_meant_so_is_refused(tmp_path: Path, text: str, 
     assert told in refused.value.messages[0], refused.value.messages
 
 
+def replaced(old: str, new: str) -> Edit:
+    def edit(text: str) -> str:
+        assert old in text
+        return text.replace(old, new)
+
+    return edit
+
+
+def edited(artefact: Written, folder: Path, file: str, edit: Edit) -> Written:
+    """The artefact read back after an edit of one of its files."""
+    artefact.write(folder, Control())
+    path = folder / file
+    path.write_text(edit(path.read_text()))
+    return type(artefact).read(folder, Control())
+
+
+def refusal(artefact: Written, folder: Path, file: str, edit: Edit) -> str:
+    """What is told of an artefact that is refused after such an edit."""
+    with pytest.raises(DataError) as refused:
+        edited(artefact, folder, file, edit)
+    return "\n".join(refused.value.messages)
+
+
 def identified() -> Identified:
     row = ParameterRow(
         setting=None,
@@ -78,168 +108,191 @@ def identified() -> Identified:
 @pytest.mark.parametrize(
     ("edit", "told"),
     [
-        (lambda text: text.replace(",300.0,", ",0.3,"), "T0_N must lie between T0_N_low95 and T0_N_high95"),
-        (lambda text: text.replace(",2600.0,", ",26000.0,"), "C_Ns_per_m must lie between C_Ns_per_m_low95"),
+        (replaced(",300.0,", ",0.3,"), "T0_N must lie between T0_N_low95 and T0_N_high95"),
+        (replaced(",2600.0,", ",26000.0,"), "C_Ns_per_m must lie between C_Ns_per_m_low95"),
+        (replaced(",200000.0,190000.0,210000.0,", ",0.2,,,"), "csv:2: k_N_per_m: must lie between 1 and 1e+13 N/m"),
         (lambda text: text + text.splitlines()[1] + "\n", "two rows of one condition"),
     ],
 )
 def test_parameters_edited_by_hand_are_held_against_their_intervals_and_stand_once(
-    tmp_path: Path, edit: Callable[[str], str], told: str
+    tmp_path: Path, edit: Edit, told: str
 ) -> None:
-    identified().write(tmp_path, Control())
-    path = tmp_path / "parameters.csv"
-    path.write_text(edit(path.read_text()))
-    with pytest.raises(DataError) as refused:
-        Identified.read(tmp_path, Control())
-    assert told in refused.value.messages[0], refused.value.messages
+    assert told in refusal(identified(), tmp_path, "parameters.csv", edit)
 
 
 def test_a_parameter_edited_by_hand_may_go_without_its_interval(tmp_path: Path) -> None:
-    identified().write(tmp_path, Control())
-    path = tmp_path / "parameters.csv"
-    path.write_text(path.read_text().replace(",300.0,290.0,310.0,", ",450.0,,,"))
-    assert Identified.read(tmp_path, Control()).rows[0].T0_N == 450.0
+    found = edited(identified(), tmp_path, "parameters.csv", replaced(",300.0,290.0,310.0,", ",450.0,,,"))
+    assert isinstance(found, Identified)
+    assert found.rows[0].T0_N == 450.0
 
 
 def rig() -> Rig:
-    time = np.arange(128) / 128.0
-    swing = 0.02 * np.sin(7.0 * time)
-    force = 1e3 * np.cos(7.0 * time) + 40.0
-    record = Record("r0", None, time, swing, np.gradient(swing, time), 0.0 * time, force, np.full(128, 50.0))
-    entry = RecordEntry(name="r0", setting=None, cycles=1.0, **extent(record))
-    return Rig((record,), (entry,))
+    time = np.arange(512) / 128.0
+    phase = 7.0 * time
+    swing, speed, acceleration = 0.02 * np.sin(phase), 0.14 * np.cos(phase), -0.98 * np.sin(phase)
+    force = 1e3 * np.cos(phase) + 40.0
+    record = Record("r0", None, time, swing, speed, acceleration, force, np.full(time.size, 50.0))
+    return Rig((record,), (RecordEntry(name="r0", setting=None, **extent(record, cycles(time, swing))),))
 
 
-def told_of_the_rig(folder: Path) -> str:
-    with pytest.raises(DataError) as refused:
-        Rig.read(folder, Control())
-    return "\n".join(refused.value.messages)
+def scaled(column: int, factor: float) -> Edit:
+    """One column of a record in other units, or turned over."""
+
+    def edit(text: str) -> str:
+        header, *rows = [line.split(",") for line in text.splitlines()]
+        for row in rows:
+            row[column] = repr(factor * float(row[column]))
+        return "".join(",".join(row) + "\n" for row in (header, *rows))
+
+    return edit
+
+
+def first_cycles(text: str) -> str:
+    """The record without its second half."""
+    return "\n".join(text.splitlines()[:258]) + "\n"
+
+
+def row_twice(text: str) -> str:
+    lines = text.splitlines()
+    return "\n".join([*lines[:9], lines[8], *lines[9:]]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("key", "number", "told"),
+    [
+        ("voltage_V", 150.0, "records.json:5:18: voltage_V of r0: must be the median of its file (got 150.0"),
+        ("temperature_degC", 60.0, "temperature_degC of r0: must be the median of its"),
+        ("rate_Hz", 256.0, "rate_Hz of r0: must be that of its file (got 256.0"),
+        ("cycles", 40.0, "records.json:8:15: cycles of r0: must be that of its file (got 40.0, where r0.csv has 4.0)"),
+        ("acceleration_rms_m_per_s2", 700.0, "acceleration_rms_m_per_s2 of r0: must be that of its file (got 700.0"),
+    ],
+)
+def test_a_number_edited_in_the_list_of_records_alone_is_told(
+    tmp_path: Path, key: str, number: float, told: str
+) -> None:
+    def edit(text: str) -> str:
+        return re.sub(rf'"{key}": [^,]*', f'"{key}": {number}', text)
+
+    assert told in refusal(rig(), tmp_path, "records.json", edit)
+
+
+@pytest.mark.parametrize(
+    ("edit", "told"),
+    [
+        (scaled(1, 1e3), "displacement_rms_m of r0: must be that of its file (got 0.0"),
+        (scaled(1, -1.0), "work_J of r0: must be that of its file"),
+        (scaled(2, 1e3), "velocity_rms_m_per_s of r0: must be that of its file"),
+        (scaled(3, 1e3), "acceleration_rms_m_per_s2 of r0: must be that of its file"),
+        (scaled(4, 1e-3), "force_rms_N of r0: must be that of its file"),
+        (scaled(4, -1.0), "work_J of r0: must be that of its file"),
+        (scaled(0, 1e3), "rate_Hz of r0: must be that of its file (got 128.0"),
+        (first_cycles, "cycles of r0: must be that of its file (got 4.0, where r0.csv has 2.0)"),
+        (row_twice, "r0.csv:10: time does not increase: 0.0546875 s after 0.0546875 s"),
+    ],
+)
+def test_a_record_edited_to_another_unit_sign_or_length_is_told(tmp_path: Path, edit: Edit, told: str) -> None:
+    assert told in refusal(rig(), tmp_path, "r0.csv", edit)
+
+
+def test_a_spike_taken_out_by_hand_is_no_contradiction(tmp_path: Path) -> None:
+    def edit(text: str) -> str:
+        header, *rows = [line.split(",") for line in text.splitlines()]
+        rows[7][4] = repr(0.5 * (float(rows[6][4]) + float(rows[8][4])) + 5.0)
+        return "".join(",".join(row) + "\n" for row in (header, *rows))
+
+    assert edited(rig(), tmp_path, "r0.csv", edit)
+
+
+def diagnosed() -> Diagnosed:
+    plain = Damper(base=(BaseRow(voltage_V=0.0, T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e5),))
+    damper = plain.with_effect("gas_spring", {"k_g": 5000.0}).with_effect("preload_offset", {"F_0": 80.0})
+    stiffness = Value(value=5000.0, low95=4900.0, high95=5100.0, unit="N/m")
+    offset = Value(value=80.0, low95=70.0, high95=90.0, unit="N")
+    parameters = {
+        "gas_spring": {"k_g": stiffness},
+        "preload_offset": {"F_0": offset},
+    }
+    told = {"effects": tuple(damper.effects), "parameters": parameters}
+    return Diagnosed(Diagnosed.undiagnosed(plain).diagnosis.model_copy(update=told), damper, plain, identified().rows)
+
+
+OUT_OF_ANY_DAMPER = [
+    ("k_N_per_m: 200000.0", "k_N_per_m: 0.2", "yaml:6:16: base.0.k_N_per_m: must lie between"),
+    ("k_N_per_m: 200000.0", "k_N_per_m: 2e+14", "base.0.k_N_per_m: must lie between 1 and 1e+13 N/m"),
+    ("C_Ns_per_m: 2700.0", "C_Ns_per_m: 2.7e-05", "must lie between 0.0001 and 1e+09 N s/m"),
+    ("T0_N: 300.0", "T0_N: 3e+9", "T0_N: must lie between 0 and 1e+08 N, as that of every damper"),
+]
+BESIDE_ITS_DIAGNOSIS = [
+    ("C_Ns_per_m: 2700.0", "C_Ns_per_m: 2.7", "C_Ns_per_m: parameters.csv has 2700 there; is it in"),
+    ("T0_N: 300.0", "T0_N: 0.3", "damper.yaml:4:11: base.0.T0_N: parameters.csv has 300 there"),
+    ("gas_spring:", "gas_sprin:", "no effect is called gas_sprin; is it gas_spring?"),
+    ("k_g: 5000.0", "k_gas: 5000.0", "gas_spring takes k_g (got k_gas)"),
+    (
+        "k_g: 5000.0",
+        "k_g: 5.0",
+        "yaml:9:10: effects.gas_spring.k_g: diagnosis.json has 5000 N/m there; is it in a",
+    ),
+    ("k_g: 5000.0", "k_g: -6000.0", "yaml:9:5: effects.gas_spring: no gas_spring has such values in nature"),
+    ("F_0: 80.0", "F_0: -80.0", "F_0: diagnosis.json has 80 N there; its interval holds no value of this sign"),
+    ("effects:\n", "effects:\n  lash:\n    delta: 0.001\n", "yaml:9:5: effects.lash: diagnosis.json does not have it"),
+]
+"""What is edited in damper.yaml, and what is told."""
+
+
+@pytest.mark.parametrize(("old", "new", "told"), OUT_OF_ANY_DAMPER + BESIDE_ITS_DIAGNOSIS)
+def test_a_damper_edited_to_what_no_damper_has_or_nobody_diagnosed_is_refused(
+    tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    assert told in refusal(diagnosed(), tmp_path, "damper.yaml", replaced(old, new))
+
+
+def test_a_plain_damper_edited_to_what_no_damper_has_is_refused(tmp_path: Path) -> None:
+    for number, (old, new, told) in enumerate(OUT_OF_ANY_DAMPER):
+        (folder := tmp_path / str(number)).mkdir()
+        assert told in refusal(diagnosed(), folder, "plain.yaml", replaced(old, new))
 
 
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        (
-            '"voltage_V": 50.0',
-            '"voltage_V": 150.0',
-            "records.json:5:18: voltage_V of r0: must be the median of its file (got 150.0",
-        ),
-        ('"temperature_degC": null', '"temperature_degC": 60.0', "temperature_degC of r0: must be the median of its"),
-        ('"rate_Hz": 128.0', '"rate_Hz": 256.0', "rate_Hz of r0: must be that of its file (got 256.0"),
+        ('"gas_spring",', '"gas_spring", "lash",', "effects.1: damper.yaml has no lash; add it there too"),
+        ('"gas_spring",', "", "effects.gas_spring: diagnosis.json does not have it among its effects"),
+        ('"low95": 4900.0', '"low95": 49000.0', "value must lie between low95 and high95; change them too"),
+        ('"low95": 4900.0', '"low95": [4900.0]', "must be lists of one length, or no lists"),
     ],
 )
-def test_a_number_edited_in_the_list_of_records_alone_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
-    rig().write(tmp_path, Control())
-    assert Rig.read(tmp_path, Control()).entries == rig().entries
-    listed = tmp_path / "records.json"
-    assert old in listed.read_text()
-    listed.write_text(listed.read_text().replace(old, new))
-    assert told in told_of_the_rig(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("column", "factor", "told"),
-    [
-        (1, 1e3, "displacement_rms_m of r0: must be that of its file (got 0.0"),
-        (1, -1.0, "work_J of r0: must be that of its file"),
-        (2, 1e3, "velocity_rms_m_per_s of r0: must be that of its file"),
-        (4, 1e-3, "force_rms_N of r0: must be that of its file"),
-        (4, -1.0, "work_J of r0: must be that of its file"),
-        (0, 1e3, "rate_Hz of r0: must be that of its file (got 128.0"),
-    ],
-)
-def test_a_column_of_a_record_edited_to_another_unit_or_sign_is_told(
-    tmp_path: Path, column: int, factor: float, told: str
+def test_a_diagnosis_edited_to_contradict_itself_or_its_damper_is_refused(
+    tmp_path: Path, old: str, new: str, told: str
 ) -> None:
-    rig().write(tmp_path, Control())
-    path = tmp_path / "r0.csv"
-    header, *rows = [line.split(",") for line in path.read_text().splitlines()]
-    for row in rows:
-        row[column] = repr(factor * float(row[column]))
-    path.write_text("".join(",".join(row) + "\n" for row in (header, *rows)))
-    assert told in told_of_the_rig(tmp_path)
-
-
-def test_a_spike_taken_out_by_hand_is_no_contradiction(tmp_path: Path) -> None:
-    rig().write(tmp_path, Control())
-    path = tmp_path / "r0.csv"
-    header, *rows = [line.split(",") for line in path.read_text().splitlines()]
-    rows[7][4] = repr(0.5 * (float(rows[6][4]) + float(rows[8][4])) + 5.0)
-    path.write_text("".join(",".join(row) + "\n" for row in (header, *rows)))
-    assert Rig.read(tmp_path, Control()).records[0].name == "r0"
-
-
-def diagnosed(*effects: str) -> Diagnosed:
-    plain = Damper(base=(BaseRow(voltage_V=0.0, T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e5),))
-    damper = plain.with_effect("gas_spring", {"k_g": 5000.0})
-    told = Diagnosed.undiagnosed(plain).diagnosis.model_copy(update={"effects": ("gas_spring", *effects)})
-    return Diagnosed(told, damper, plain, identified().rows)
-
-
-@pytest.mark.parametrize(
-    ("file", "old", "new", "told"),
-    [
-        (
-            "damper.yaml",
-            "k_N_per_m: 200000.0",
-            "k_N_per_m: 0.2",
-            "damper.yaml:6:16: base.0.k_N_per_m: must lie between",
-        ),
-        (
-            "damper.yaml",
-            "k_N_per_m: 200000.0",
-            "k_N_per_m: 2e+14",
-            "base.0.k_N_per_m: must lie between 1 and 1e+13 N/m",
-        ),
-        ("damper.yaml", "C_Ns_per_m: 2700.0", "C_Ns_per_m: 2.7e-05", "must lie between 0.0001 and 1e+09 N s/m"),
-        ("damper.yaml", "T0_N: 300.0", "T0_N: 3e+9", "T0_N: must lie between 0 and 1e+08 N, as that of every damper"),
-        ("plain.yaml", "k_N_per_m: 200000.0", "k_N_per_m: 0.2", "plain.yaml:6:16: base.0.k_N_per_m: must lie between"),
-        ("damper.yaml", "C_Ns_per_m: 2700.0", "C_Ns_per_m: 2.7", "C_Ns_per_m: parameters.csv has 2700 there; is it in"),
-        ("damper.yaml", "T0_N: 300.0", "T0_N: 0.3", "damper.yaml:4:11: base.0.T0_N: parameters.csv has 300 there"),
-        ("damper.yaml", "gas_spring:", "gas_sprin:", "no effect is called gas_sprin; is it gas_spring?"),
-        ("damper.yaml", "k_g: 5000.0", "k_gas: 5000.0", "gas_spring takes k_g (got k_gas)"),
-        (
-            "damper.yaml",
-            "effects:\n",
-            "effects:\n  lash:\n    delta: 0.001\n",
-            "damper.yaml:9:5: effects.lash: diagnosis.json does not have it among its effects; add it there too",
-        ),
-        (
-            "diagnosis.json",
-            '"gas_spring"',
-            '"gas_spring", "lash"',
-            "effects.1: damper.yaml has no lash; add it there too",
-        ),
-        ("diagnosis.json", '"gas_spring"', "", "effects.gas_spring: diagnosis.json does not have it among its effects"),
-    ],
-)
-def test_a_damper_edited_to_what_no_damper_has_or_nobody_diagnosed_is_refused(
-    tmp_path: Path, file: str, old: str, new: str, told: str
-) -> None:
-    diagnosed().write(tmp_path, Control())
-    assert Diagnosed.read(tmp_path, Control()).damper == diagnosed().damper
-    path = tmp_path / file
-    assert old in path.read_text()
-    path.write_text(path.read_text().replace(old, new))
-    with pytest.raises(DataError) as refused:
-        Diagnosed.read(tmp_path, Control())
-    assert told in refused.value.messages[0], refused.value.messages
+    assert told in refusal(diagnosed(), tmp_path, "diagnosis.json", replaced(old, new))
 
 
 def test_a_damper_edited_to_other_values_that_a_damper_may_have_is_taken(tmp_path: Path) -> None:
-    diagnosed().write(tmp_path, Control())
-    path = tmp_path / "damper.yaml"
-    path.write_text(path.read_text().replace("T0_N: 300.0", "T0_N: 0.0").replace("2700.0", "9000.0"))
-    base = Diagnosed.read(tmp_path, Control()).damper.base[0]
-    assert (base.T0_N, base.C_Ns_per_m) == (0.0, 9000.0)
+    found = edited(
+        diagnosed(), tmp_path, "damper.yaml", lambda text: text.replace("300.0", "0.0").replace("2700", "9000")
+    )
+    assert isinstance(found, Diagnosed)
+    assert (found.damper.base[0].T0_N, found.damper.base[0].C_Ns_per_m) == (0.0, 9000.0)
 
 
-def test_a_parameter_without_its_interval_must_still_be_one_that_a_damper_has(tmp_path: Path) -> None:
-    identified().write(tmp_path, Control())
-    path = tmp_path / "parameters.csv"
-    path.write_text(path.read_text().replace(",200000.0,190000.0,210000.0,", ",0.2,,,"))
-    with pytest.raises(DataError, match=r"parameters.csv:2: k_N_per_m: must lie between 1 and 1e\+13 N/m.*got 0.2"):
-        Identified.read(tmp_path, Control())
+def test_a_value_of_an_effect_edited_in_the_damper_is_told_in_place_of_the_one_diagnosed(tmp_path: Path) -> None:
+    found = edited(diagnosed(), tmp_path, "damper.yaml", replaced("k_g: 5000.0", "k_g: 8000.0"))
+    assert isinstance(found, Diagnosed)
+    assert found.damper.effects["gas_spring"]["k_g"] == 8000.0
+    lines = diagnosis_lines(found.diagnosis, Control())
+    assert "adopted: gas_spring, k_g = 8000 N/m (edited by hand)" in lines
+    assert "adopted: preload_offset, F_0 = 80 (70 to 90) N" in lines
+
+
+def test_a_value_against_nature_that_was_diagnosed_so_is_read_back(tmp_path: Path) -> None:
+    """A fit may find what only looks like its effect, and says so in the reason."""
+    odd = diagnosed()
+    stiffness = Value(value=-500.0, low95=-600.0, high95=-400.0, unit="N/m")
+    told = odd.diagnosis.model_copy(
+        update={"parameters": {"gas_spring": {"k_g": stiffness}}, "effects": ("gas_spring",)}
+    )
+    found = Diagnosed(told, odd.plain.with_effect("gas_spring", {"k_g": -500.0}), odd.plain, odd.parameters)
+    assert edited(found, tmp_path, "damper.yaml", str)
 
 
 def test_a_file_under_two_settings_is_refused_with_both_entries(tmp_path: Path) -> None:
@@ -278,6 +331,16 @@ def test_a_group_that_makes_one_condition_of_all_voltages_is_refused(control: Co
     with pytest.raises(ConfigError) as refused:
         identify(config, at_voltages(0.0, 50.0, 150.0), seed=1, control=control)
     assert told in refused.value.messages[0]
+
+
+def test_the_check_refuses_such_a_group_too(tmp_path: Path) -> None:
+    config = tmp_path / "lab.yaml"
+    two = VIRTUAL.replace("{voltage_V: 0, T0_N: 6", "{voltage_V: 150, T0_N: 6").replace("[0]", "[0, 150]")
+    config.write_text(two)
+    assert len(preflight(opened(config, tmp_path))[0]) == 2
+    config.write_text(f"{two}identify: {{group: {{voltage_V: 1000}}}}\n")
+    with pytest.raises(ConfigError, match=r"lab\.yaml:9:31: identify\.group\.voltage_V: merges every"):
+        preflight(opened(config, tmp_path))
 
 
 def test_a_group_may_hold_what_scatters_about_one_voltage_or_some_of_several() -> None:

@@ -6,16 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, model_validator
 
+from pzd.artefacts.contradictions import contradictions
 from pzd.artefacts.identified import ParameterRow
-from pzd.damper.model import PHYSICAL, Damper
+from pzd.damper.competing_forms import known
+from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.schema.csvfile import read_rows, write_rows
 from pzd.schema.errors import DataError
 from pzd.schema.jsonfile import read_json, write_json
 from pzd.schema.model import Frozen
-from pzd.schema.yamlfile import read_yaml, read_yaml_model, write_yaml_model
+from pzd.schema.yamlfile import read_yaml_model, write_yaml_model
 
 
 class Gap(Frozen):
@@ -68,6 +71,17 @@ class Value(Frozen):
     high95: float | tuple[float, ...] | None
     unit: str
     at_voltage_V: tuple[float, ...] | None = None
+
+    @model_validator(mode="after")
+    def _inside_its_interval(self) -> Value:
+        """A value written by hand outside of its interval is told, as are lists that do not belong together."""
+        given = [each for each in (self.value, self.low95, self.high95, self.at_voltage_V) if each is not None]
+        if len({len(each) if isinstance(each, tuple) else None for each in given}) > 1:
+            raise ValueError("value, low95, high95 and at_voltage_V must be lists of one length, or no lists")
+        low, high = (-np.inf if self.low95 is None else self.low95), (np.inf if self.high95 is None else self.high95)
+        if np.any(np.less(self.value, low)) or np.any(np.greater(self.value, high)):
+            raise ValueError("value must lie between low95 and high95; change them too, or make them null")
+        return self
 
 
 class Ranked(Frozen):
@@ -166,55 +180,25 @@ class Diagnosed:
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
-        """Read and check them again, each by itself and against one another."""
-        found = cls(
-            read_json(folder / "diagnosis.json", Diagnosis, control),
-            read_yaml_model(folder / "damper.yaml", Damper, control),
-            read_yaml_model(folder / "plain.yaml", Damper, control),
-            read_rows(folder / "parameters.csv", ParameterRow, control),
-        )
-        if faults := [*_effects_apart(found, folder), *_base_apart(found, folder, control)]:
+        """Read and check them again, each by itself and against one another; told are the values that act."""
+        diagnosis = read_json(folder / "diagnosis.json", Diagnosis, control)
+        damper = read_yaml_model(folder / "damper.yaml", Damper, control)
+        rows = read_rows(folder / "parameters.csv", ParameterRow, control)
+        if faults := contradictions(diagnosis, damper, rows, folder, control):
             raise DataError(faults)
-        return found
+        told = diagnosis.model_copy(update={"parameters": _as_acting(diagnosis, damper), "zero_m": damper.zero_m})
+        return cls(told, damper, read_yaml_model(folder / "plain.yaml", Damper, control), rows)
 
 
-OTHER_UNIT = 100.0
-"""From this ratio on two values of one parameter are in different units; the least between two units is 1000."""
-
-
-def _effects_apart(found: Diagnosed, folder: Path) -> list[str]:
-    """Effects that only one of damper.yaml and diagnosis.json has, each with its place."""
-    told, acting = found.diagnosis.effects, found.damper.effects
-    if set(told) == set(acting):
-        return []
-    damper = read_yaml(folder / "damper.yaml", DataError)
-    diagnosis = read_yaml(folder / "diagnosis.json", DataError)
-    return [
-        f"{damper.place(('effects', name))}: effects.{name}: diagnosis.json does not have it among its effects; "
-        "add it there too, or take it out here"
-        for name in acting
-        if name not in told
-    ] + [
-        f"{diagnosis.place(('effects', str(number)))}: effects.{number}: damper.yaml has no {name}; "
-        "add it there too, or take it out here"
-        for number, name in enumerate(told)
-        if name not in acting
-    ]
-
-
-def _base_apart(found: Diagnosed, folder: Path, control: Control) -> list[str]:
-    """Values of T0, C and k in damper.yaml that parameters.csv has in another unit, each with its place."""
-    rows = {(row.voltage_V, row.temperature_degC): row for row in found.parameters}
-    faults: list[str] = []
-    for number, base in enumerate(found.damper.base):
-        row = rows.get((base.voltage_V, base.temperature_degC))
-        for name in PHYSICAL if row else ():
-            here, there = float(getattr(base, name)), getattr(row, name)
-            if there is None or not 0.0 < min(here, there) * OTHER_UNIT < max(here, there):
-                continue
-            place = read_yaml(folder / "damper.yaml", DataError).place(("base", str(number), name))
-            faults.append(
-                f"{place}: base.{number}.{control.renamed(name)}: parameters.csv has {there:g} there; "
-                f"is it in another unit? change both if it is meant (got {here:g})"
-            )
-    return faults
+def _as_acting(diagnosis: Diagnosis, damper: Damper) -> dict[str, dict[str, Value]]:
+    """The parameters of the effects as the damper has them, without intervals where somebody edited them since."""
+    found: dict[str, dict[str, Value]] = {}
+    for name, values in damper.effects.items():
+        nodes = values.get("at_voltage_V")
+        for parameter in known()[name].parameters:
+            diagnosed, acting = diagnosis.parameters.get(name, {}).get(parameter.name), values[parameter.name]
+            at = nodes if isinstance(nodes, tuple) and isinstance(acting, tuple) else None
+            if diagnosed is None or (diagnosed.value, diagnosed.at_voltage_V) != (acting, at):
+                diagnosed = Value(value=acting, low95=None, high95=None, unit=parameter.unit, at_voltage_V=at)
+            found.setdefault(name, {})[parameter.name] = diagnosed
+    return found

@@ -10,13 +10,15 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
-from pzd.record import Array, Record
+from pzd.record import Array, Record, clock_fault
 from pzd.schema.csvfile import read_columns, write_columns
-from pzd.schema.errors import DataError
+from pzd.schema.errors import DataError, at
 from pzd.schema.jsonfile import read_json_list, write_json
 from pzd.schema.model import Frozen
 from pzd.schema.processes import parallel_map
 from pzd.schema.yamlfile import read_yaml
+from pzd.signals.cycles import Cycles, cycles
+from pzd.signals.reversals import reversals
 from pzd.signals.work import work
 
 INGEST = "ingest.json"
@@ -55,6 +57,8 @@ class RecordEntry(Frozen):
     """R.m.s. of the displacement about its mean."""
     velocity_rms_m_per_s: float | None = None
     """R.m.s. of the velocity about its mean."""
+    acceleration_rms_m_per_s2: float | None = None
+    """R.m.s. of the acceleration about its mean."""
     force_rms_N: float | None = None
     """R.m.s. of the force about its mean."""
     work_J: float | None = None
@@ -128,7 +132,10 @@ def _channels(record: Record) -> Mapping[str, Array | None]:
 def _read_record(folder: Path, number: int, entry: RecordEntry, control: Control) -> Record:
     optional = (VOLTAGE.column, TEMPERATURE.column, PRESSURE.column)
     header = [q.column for q in (TIME, DISPLACEMENT, VELOCITY, ACCELERATION, FORCE, VOLTAGE, TEMPERATURE, PRESSURE)]
-    columns = read_columns(folder / f"{entry.name}.csv", header, control, optional)
+    path = folder / f"{entry.name}.csv"
+    columns = read_columns(path, header, control, optional)
+    if fault := clock_fault(columns[TIME.column]):
+        raise DataError(f"{at(path, fault[0] + 2)}: {fault[1]}")
     record = Record(
         entry.name,
         entry.setting,
@@ -143,14 +150,22 @@ def _read_record(folder: Path, number: int, entry: RecordEntry, control: Control
     return record
 
 
-def extent(record: Record) -> dict[str, Any]:
-    """What an entry of records.json says of the numbers of its file, by which an edit of one of the two is seen."""
+def extent(record: Record, run: Cycles | None) -> dict[str, Any]:
+    """What an entry of records.json says of the numbers of its file, by which an edit of one of the two is seen.
+
+    Parameters
+    ----------
+    record : what the file holds
+    run : the cycles that repeat in it; a cycle of any other motion goes to either side
+    """
     return {
+        "cycles": float(run.count) if run else 0.5 * len(reversals(record.displacement)),
         "voltage_V": record.median_voltage(),
         "temperature_degC": record.median_temperature(),
         "rate_Hz": record.rate,
         "displacement_rms_m": _rms(record.displacement),
         "velocity_rms_m_per_s": _rms(record.velocity),
+        "acceleration_rms_m_per_s2": _rms(record.acceleration),
         "force_rms_N": _rms(record.force),
         "work_J": work(record.displacement, record.force),
     }
@@ -160,7 +175,10 @@ OTHER_UNIT = 3.0
 """From this ratio on a channel is in another unit; a pound-force and a newton lie 4.4 apart. A sample that is edited,
 such as a spike that is taken out, moves the r.m.s. by less."""
 _MEDIANS = ("voltage_V", "temperature_degC")
-_MAY_BE_LEFT_OUT = ("displacement_rms_m", "velocity_rms_m_per_s", "force_rms_N", "work_J")
+_RMS = ("displacement_rms_m", "velocity_rms_m_per_s", "acceleration_rms_m_per_s2", "force_rms_N")
+_MAY_BE_LEFT_OUT = (*_RMS, "work_J")
+SAME_CYCLES = 1.0
+"""A sample that is edited moves either end of a run by no more than part of a cycle."""
 
 
 def _rms(channel: Array) -> float:
@@ -170,7 +188,7 @@ def _rms(channel: Array) -> float:
 def _contradictions(entry: RecordEntry, record: Record, control: Control) -> dict[str, str]:
     """What an entry says otherwise than its file, by its key, after an edit of one of them to another unit or sign."""
     faults: dict[str, str] = {}
-    for name, holds in extent(record).items():
+    for name, holds in extent(record, cycles(record.time, record.displacement)).items():
         said = getattr(entry, name)
         if (said is None and (holds is None or name in _MAY_BE_LEFT_OUT)) or _agree(name, said, holds):
             continue
@@ -187,6 +205,8 @@ def _agree(name: str, said: float | None, holds: float | None) -> bool:
         return False
     if name == "work_J":
         return said * holds >= 0.0
-    if name in _MAY_BE_LEFT_OUT:
+    if name == "cycles":
+        return abs(said - holds) <= SAME_CYCLES
+    if name in _RMS:
         return max(abs(said), abs(holds)) <= OTHER_UNIT * min(abs(said), abs(holds))
     return bool(np.isclose(said, holds, rtol=1e-3))

@@ -84,10 +84,17 @@ def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:
 def _value(value: Value, unit: str) -> str:
     if isinstance(value.value, tuple):
         places = zip(value.value, value.at_voltage_V or (), strict=False)
-        return "; ".join(f"{number(one)} {value.unit} at {number(voltage)} {unit}" for one, voltage in places)
+        return "; ".join(
+            f"{number(one)} {value.unit} at {number(voltage)} {unit}" for one, voltage in places
+        ) + _by_hand(value)
     low = None if isinstance(value.low95, tuple) else value.low95
     high = None if isinstance(value.high95, tuple) else value.high95
-    return f"{interval(value.value, low, high)} {value.unit}"
+    return f"{interval(value.value, low, high)} {value.unit}{_by_hand(value)}"
+
+
+def _by_hand(value: Value) -> str:
+    """Said of what nobody fitted."""
+    return " (edited by hand)" if value.low95 is None and value.high95 is None else ""
 
 
 def _rejected(diagnosis: Diagnosis) -> Iterator[str]:

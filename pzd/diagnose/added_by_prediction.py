@@ -13,13 +13,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from pzd.damper.effects import library
+from pzd.damper.nature import against_nature
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import Fitted
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.kept_back import Trials
 from pzd.diagnose.missed import Missed
 from pzd.diagnose.search.candidates import Candidate, by_voltage, candidate, seen_in
-from pzd.diagnose.search.selection import Selection, against_nature
+from pzd.diagnose.search.selection import Selection
 from pzd.diagnose.search.starts import most_promising
 from pzd.diagnose.thresholds import LEAST_CUT_IN_PREDICTION, PREDICTED_AT_ONCE, SCREENED
 

@@ -9,13 +9,14 @@ import numpy as np
 
 from pzd.artefacts import Prediction
 from pzd.damper.effects import library
+from pzd.damper.nature import against_nature
 from pzd.diagnose.added_by_prediction import with_predictive_effects
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.kept_back import Trials
 from pzd.diagnose.missed import Missed
 from pzd.diagnose.search.evidence import evidence_of
-from pzd.diagnose.search.selection import Selection, against_nature
+from pzd.diagnose.search.selection import Selection
 
 HARMFUL = "the damper predicts kept-back tests worse with it"
 IMPOSSIBLE = "stand-in: fits with a value alone that it has nowhere in nature"

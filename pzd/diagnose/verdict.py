@@ -13,12 +13,13 @@ from pzd.damper.competing_forms import known
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
+from pzd.damper.nature import against_nature
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.intervals import LEVEL, standard_errors
 from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.search.candidates import moved_by
 from pzd.diagnose.search.evidence import Evidence
-from pzd.diagnose.search.selection import Selection, against_nature
+from pzd.diagnose.search.selection import Selection
 from pzd.diagnose.thresholds import CONTRADICTS, OUTSIDE_LIBRARY
 from pzd.diagnose.trends_of_tests import Trend
 

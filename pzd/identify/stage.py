@@ -44,7 +44,7 @@ def identify(
     """
     from pzd.identify.measures import measures
 
-    _refuse_one_condition(identify, rig, control)
+    refuse_one_condition(identify, rig, control)
     constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
     found = _constant_rows(constant, identify, seed, progress)
     rows = {_labels(row): row for row, _ in found}
@@ -58,7 +58,19 @@ def identify(
     )
 
 
-def _refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> None:
+def refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> None:
+    """Refuse a group of voltages as wide as all that the rig has.
+
+    Parameters
+    ----------
+    config : the config's `identify` block
+    rig : the records
+    control : the control signal, which names the voltage in messages
+
+    Raises
+    ------
+    ConfigError : when `identify.group` makes one condition of all voltages
+    """
     within = config.group.voltage_V
     merged = merged_voltages(rig.records, within) if within is not None else None
     if merged is not None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pzd.artefacts import IngestRow, RecordEntry, Rig
 from pzd.config import RunConfig, setting_in_use, validated
+from pzd.identify.stage import refuse_one_condition
 from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
 from pzd.runs import Run
@@ -124,7 +125,10 @@ def preflight(given: Opened) -> tuple[tuple[RecordEntry, ...], tuple[IngestRow, 
     _check_reference(given)
     with given.placed():
         made = Pipeline(given.config, given.run, (first,), lambda _: None).made(first)
-    return (made.entries, made.ingested) if isinstance(made, Rig) else ((), ())
+        if not isinstance(made, Rig):
+            return (), ()
+        refuse_one_condition(given.config.identify, made, given.run.control)
+    return made.entries, made.ingested
 
 
 def check_setting(given: Opened, entries: Sequence[RecordEntry]) -> None:

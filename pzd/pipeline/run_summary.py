@@ -22,7 +22,6 @@ from pzd.quantities import Control
 from pzd.runs import CONFIG, Run
 from pzd.schema.csvfile import read_rows
 from pzd.schema.errors import ConfigError, UserError
-from pzd.schema.jsonfile import read_json
 from pzd.schema.yamlfile import read_yaml
 from pzd.simulate.assumed import assumed
 
@@ -67,13 +66,12 @@ def run_summary(run: Run) -> RunSummary:
     at = run.folder
     control = control_of(read_yaml(at / CONFIG).data) if (at / CONFIG).is_file() else run.control
     run = replace(run, control=control)
-    diagnosis = at / Diagnosed.folder / "diagnosis.json"
     comfort = at / Report.folder / "comfort.csv"
     return RunSummary(
         at,
         control,
         run.read(Identified).rows if Identified in there else (),
-        read_json(diagnosis, Diagnosis, control) if Diagnosed in there else None,
+        run.read(Diagnosed).diagnosis if Diagnosed in there else None,
         read_rows(at / Rides.folder / "summary.csv", SummaryRow, control) if Rides in there else (),
         read_rows(comfort, ComfortRow, control) if Report in there else (),
         page_of(run) if Report in there else None,

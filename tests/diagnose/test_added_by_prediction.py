@@ -11,6 +11,7 @@ from test_kept_back import TWO, campaign_of
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
+from pzd.damper.nature import against_nature
 from pzd.diagnose.added_by_prediction import Extended, with_predictive_effects
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import fit
@@ -18,7 +19,7 @@ from pzd.diagnose.handed_on import handed_on
 from pzd.diagnose.kept_back import Trials, trials_of
 from pzd.diagnose.search.candidates import by_voltage
 from pzd.diagnose.search.evidence import evidence_of
-from pzd.diagnose.search.selection import Selection, against_nature
+from pzd.diagnose.search.selection import Selection
 from pzd.record import Record
 
 TESTS = ((0.5, 0.03), (1.0, 0.02), (2.0, 0.03))

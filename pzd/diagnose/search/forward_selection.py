@@ -10,6 +10,7 @@ from functools import partial
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
+from pzd.damper.nature import against_nature
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import Fitted, fit
@@ -27,7 +28,7 @@ from pzd.diagnose.search.candidates import (
 )
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.diagnose.search.reweighting import reweighted
-from pzd.diagnose.search.selection import Competition, Round, Selection, against_nature
+from pzd.diagnose.search.selection import Competition, Round, Selection
 from pzd.diagnose.thresholds import NEARLY_AS_GOOD, WIDER
 
 log = logging.getLogger(__name__)

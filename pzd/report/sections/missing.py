@@ -118,14 +118,19 @@ def _value_rows(context: ReportContext, effect: str, name: str, value: Value) ->
     unit = unit_of(value.unit)
     if not isinstance(value.value, tuple):
         low, high = (bound if not isinstance(bound, tuple) else None for bound in (value.low95, value.high95))
-        return [(effect, name, interval(value.value, low, high), unit)]
+        return [(effect, name, _with_interval(value.value, low, high), unit)]
     nodes = value.at_voltage_V or (None,) * len(value.value)
     unknown = (None,) * len(value.value)
     lows, highs = (bound if isinstance(bound, tuple) else unknown for bound in (value.low95, value.high95))
     return [
-        (effect, f"{name} at {context.voltage(node)}", interval(each, low, high), unit)
+        (effect, f"{name} at {context.voltage(node)}", _with_interval(each, low, high), unit)
         for node, each, low, high in zip(nodes, value.value, lows, highs, strict=True)
     ]
+
+
+def _with_interval(value: float, low: float | None, high: float | None) -> str:
+    """A value with its interval, which only what nobody fitted lacks."""
+    return f"{number(value)} (edited by hand)" if low is None and high is None else interval(value, low, high)
 
 
 def _ranking(diagnosis: Diagnosis) -> Sheet:

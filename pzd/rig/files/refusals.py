@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, TIME, VELOCITY
-from pzd.record import Array
+from pzd.record import Array, clock_fault
 from pzd.rig.files.layout import Layout
 from pzd.rig.files.splitting import Test
 from pzd.schema.errors import DataError
@@ -70,13 +70,8 @@ def _faults(test: Test, layout: Layout) -> list[str]:
 
 def _standstills(test: Test) -> list[str]:
     """Where the clock stands still or goes back, in a line; empty where it goes on. NaN is another's fault."""
-    time = test.channels[TIME]
-    backwards = np.flatnonzero(np.diff(time) <= 0.0)
-    if not backwards.size:
-        return []
-    row = int(backwards[0]) + 1
-    more = f", and {backwards.size - 1} more such rows" if backwards.size > 1 else ""
-    return [f"{test.place(row)}: time does not increase: {time[row]:.9g} s after {time[row - 1]:.9g} s{more}"]
+    fault = clock_fault(test.channels[TIME])
+    return [f"{test.place(fault[0])}: {fault[1]}"] if fault else []
 
 
 def _two_rates(test: Test) -> list[str]:

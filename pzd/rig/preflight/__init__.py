@@ -22,7 +22,6 @@ from pzd.rig.config import Limits
 from pzd.schema.processes import parallel_map
 from pzd.signals.cycles import Cycles
 from pzd.signals.kinematics import Kinematics
-from pzd.signals.reversals import reversals
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +107,7 @@ def _entry(test: Measured) -> RecordEntry:
     return RecordEntry(
         name=record.name,
         setting=record.setting,
-        cycles=float(test.run.count) if test.run else 0.5 * len(reversals(record.displacement)),
         findings=findings(test),
         removed=test.removed,
-        **extent(record),
+        **extent(record, test.run),
     )
