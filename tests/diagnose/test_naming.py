@@ -8,7 +8,7 @@ from campaign import coloured, damper_of, sine, sines
 
 from pzd.artefacts import Diagnosed, Rig
 from pzd.damper.compose import respond
-from pzd.damper.model import Damper
+from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.stage import diagnose
@@ -141,3 +141,24 @@ def stepped(damper: Damper, rng: np.random.Generator, frequency: float) -> Recor
     return Record(
         f"steps{frequency:g}", None, fine[keep], x[keep], v[keep], a[keep], force[keep] + noise, voltage[keep]
     )
+
+
+def rigid_tests(rate: float, rng: np.random.Generator, **effects: dict[str, float]) -> tuple[Record, ...]:
+    """Quiet tests (0.3 N) of a damper whose force jumps by 600 N at every reversal, whatever the rate."""
+    damper = Damper(base=(BaseRow(voltage_V=0.0, T0_N=300.0, C_Ns_per_m=2500.0, k_N_per_m=1e8),), effects=effects)
+    motions = ((0.5, 0.02), (1.0, 0.02), (1.0, 0.03), (2.0, 0.02))
+    return tuple(sine(damper, 0.0, f, x, rng, noise=2e-4, colour=0.0, rate=rate) for f, x in motions)
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("rate", [200.0, 1000.0])
+def test_nothing_is_missed_in_a_rigid_damper(rate: float, rng: np.random.Generator) -> None:
+    assert diagnosed(rigid_tests(rate, rng)).diagnosis.verdict == "none"
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("rate", [200.0, 1000.0])
+def test_the_gas_charge_of_a_rigid_damper_is_named(rate: float, rng: np.random.Generator) -> None:
+    charge = {"preload_offset": {"F_0": 300.0}, "gas_spring": {"k_g": 3000.0}}
+    found = diagnosed(rigid_tests(rate, rng, **charge)).diagnosis
+    assert (found.verdict, set(found.effects)) == ("named", set(charge))

@@ -84,13 +84,28 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
     if reference is None:
         recorded = [t for t in (p.record.median_temperature() for p in prepared) if t is not None]
         reference = float(np.median(recorded)) if recorded else None
-    fastest = MOST_TIME_CONSTANTS * max(p.record.rate for p in prepared)
+    fastest = _fastest(prepared, damper)
     varying = frozenset(name for name, values in damper.effects.items() if "at_voltage_V" in values)
     problems = [
         Problem(part, damper.base, scales, fastest, reference, varying)
         for part in (whole, *(observed(campaign.in_role(role)) for role in (TRAINING, VALIDATION)))
     ]
     return Evidence(campaign, problems[0], (problems[1], problems[2]))
+
+
+def _fastest(prepared: Sequence[Prepared], damper: Damper) -> float:
+    """Largest k / C [1/s] that the samples tell from a larger one.
+
+    In slip the force settles with C / k. After a reversal it turns over a stroke of 2 T0 / k, which the piston goes
+    within one sample where k is larger than the second term says.
+
+    Equation: max(3 f, 4 T0 f^2 / (C a)), from a t^2 / 2 = 2 T0 / k at t = 1 / f, a the peak acceleration of the
+    gentlest test
+    """
+    rate = max(p.record.rate for p in prepared)
+    gentlest = min(float(np.max(np.abs(p.record.acceleration))) for p in prepared)
+    turning = max(4.0 * row.T0_N * rate**2 / (row.C_Ns_per_m * gentlest) for row in damper.base)
+    return max(MOST_TIME_CONSTANTS * rate, turning)
 
 
 def _scales(
