@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import io
 import re
+import subprocess
+import sys
 import tokenize
 import warnings
 from collections.abc import Iterator
@@ -96,6 +98,12 @@ def test_every_exception_in_the_project_file_says_why() -> None:
     lines = (ROOT / "pyproject.toml").read_text(encoding="utf-8").splitlines()
     rules = [line for line in lines if re.match(r'\s+"[A-Z]+\d*",', line) or "ignore_" in line]
     assert [line for line in rules if not re.search(r"# \S+ \S+", line)] == []
+
+
+def test_ruff_looks_at_every_source() -> None:
+    listing = [sys.executable, "-m", "ruff", "check", "--show-files", "."]
+    looked_at = subprocess.run(listing, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert {str(path) for path in SOURCES} <= set(looked_at)
 
 
 def test_nothing_is_left_unfinished() -> None:

@@ -17,13 +17,13 @@ import pytest
 
 from pzd.artefacts import base_of
 from pzd.config import RunConfig
+from pzd.paper.fidelity import rides_on
 from pzd.paper.figures.draw import FigureSet, _entry, drawn
-from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.figures.models import tabulated
 from pzd.paper.figures.numbered import library
 from pzd.paper.figures.numbered.fig_07 import heating
 from pzd.paper.figures.planes import element, loop
-from pzd.paper.fidelity import rides_on
+from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.published import published
 
 SMALL, LARGE = "gap 0.15 mm", "gap 0.25 mm"
@@ -68,7 +68,14 @@ def data() -> FigureData:
         ]
     }
     car = {"a1_m": 1.962, "a2_m": 1.068, "pitch_inertia_kgm2": 2216, "x_K_m": -0.856}
-    ride = {"car": car, "c_min_Ns_per_m": 750, "c_max_Ns_per_m": 45000, "tie_break": "largest", "fidelities": ["ideal"], "integration_step_s": 0.002}
+    ride = {
+        "car": car,
+        "c_min_Ns_per_m": 750,
+        "c_max_Ns_per_m": 45000,
+        "tie_break": "largest",
+        "fidelities": ["ideal"],
+        "integration_step_s": 0.002,
+    }
     ride |= {"control_period_s": 0.002, "tolerance": 1e-6, "duration_s": 12, "settle_s": 8, "output_rate_Hz": 250}
     whole = {"rig": rig, "setting": LARGE, "simulate": ride}
     config = RunConfig.model_validate_json(json.dumps(whole))
