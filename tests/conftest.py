@@ -74,6 +74,21 @@ def _shared() -> Path | None:
     return folder if (folder / "data").is_dir() else None
 
 
+@pytest.fixture(scope="session", autouse=True)
+def kernels_compiled_once(request: pytest.FixtureRequest) -> None:
+    """Where tests run in several processes the first compiles for all: at once, each would take half a minute."""
+    if not hasattr(request.config, "workerinput"):
+        return
+    from filelock import FileLock
+
+    from pzd.compiled import cache_folder
+    from pzd.simulate.precompile import _MARK
+
+    with FileLock(cache_folder() / "tests.lock"):
+        if not (cache_folder() / _MARK).exists():
+            subprocess.run([sys.executable, "-m", "pzd.simulate.precompile"], cwd=ROOT, check=True)
+
+
 @pytest.fixture(scope="session")
 def root() -> Path:
     """The root of the repository."""

@@ -119,18 +119,9 @@ def diagnose(diagnose: DiagnoseConfig, rig: Rig, identified: Identified, setting
         held_out=("a",),
         hold_out="records",
     )
-    told = Diagnosis(
-        verdict="none",
-        reason=f"{len(rig.records)} records are explained",
-        effects=(),
-        confidence=None,
-        gap=gap,
-        parameters={},
-        ranking=(),
-        rivals=(),
-        where=(Region(region="abs(v) > 0.25 m/s", share_of_gap=0.7),),
-        next_test=None,
-    )
+    reason = f"{len(rig.records)} records are explained"
+    where = (Region(region="abs(v) > 0.25 m/s", share_of_gap=0.7),)
+    told = Diagnosis.without_effects("none", reason, gap, where)
     damper = base_of(identified.rows, setting)
     return Diagnosed(told, damper, damper)
 

@@ -18,7 +18,7 @@ from pzd.identify.stage import identify
 from pzd.pipeline.command import opened, preflight
 from pzd.quantities import Control
 from pzd.record import Record, merged_voltages
-from pzd.rig.config import FilesEntry, Split
+from pzd.rig.config import FilesEntry, FileSplit
 from pzd.rig.files.listing import listed
 from pzd.schema.errors import ConfigError, DataError
 from pzd.signals.cycles import cycles
@@ -309,7 +309,7 @@ def test_a_file_under_two_settings_is_refused_with_both_entries(tmp_path: Path) 
         (soft.model_copy(update={"path": "data/a.csv"}), hard.model_copy(update={"path": "data/b*"})), tmp_path
     )
     assert [one.path.name for one in alone] == ["a.csv", "b.csv"]
-    cuts = [Split(column="damper"), Split(gap_s=2.0)]
+    cuts = [FileSplit(column="damper"), FileSplit(gap_s=2.0)]
     assert len(listed([FilesEntry(path="data/a.csv", split=cut) for cut in cuts], tmp_path)) == 2
 
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import ast
 import io
 import re
+import subprocess
+import sys
 import tokenize
 import warnings
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -51,12 +54,22 @@ PRIVATE_WORDS = frozenset(
 )
 """Names that modules, classes, functions and constants once had and that said nothing to anybody else."""
 
+ALIKE_IN_MEANING = {"Condition", "Loop", "Sine", "Test"}
+"""Classes of two packages that share a name because they mean the same: where the damper stands, a closed loop, a
+harmonic motion, a test of the rig. Any other word stands for one thing."""
+
 SOURCE_OF_DRAWS = ROOT / "tests" / "conftest.py"
 GENERATOR = re.compile(
     r"\bdefault_rng\b|\bRandomState\b|\bSeedSequence\b|\bnp\.random\.(?!Generator\b)\w+"
     r"|\brandom\.Random\b|\bimport (random|secrets)\b|\bfrom (random|secrets|numpy\.random) import (?!Generator\b)"
 )
 """What makes or seeds a generator, in a test as in its helpers."""
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """The syntax tree of a module of pzd, parsed once for all tests."""
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def comments(source: str) -> Iterator[tuple[int, str]]:
@@ -98,11 +111,17 @@ def test_every_exception_in_the_project_file_says_why() -> None:
     assert [line for line in rules if not re.search(r"# \S+ \S+", line)] == []
 
 
+def test_ruff_looks_at_every_source() -> None:
+    listing = [sys.executable, "-m", "ruff", "check", "--show-files", "."]
+    looked_at = subprocess.run(listing, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert {str(path) for path in SOURCES} <= set(looked_at)
+
+
 def test_nothing_is_left_unfinished() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{node.lineno}"
         for path in MODULES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in ast.walk(tree_of(path))
         if isinstance(node, ast.Name) and node.id == NotImplementedError.__name__
     ]
     assert found == []
@@ -110,7 +129,7 @@ def test_nothing_is_left_unfinished() -> None:
 
 def names_in(path: Path) -> Iterator[tuple[int, str]]:
     """Line and name, in small letters with underscores, of a module, its classes, functions and constants."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
     yield 1, path.stem
     for node in ast.walk(tree):
         if isinstance(node, ast.ClassDef | ast.FunctionDef):
@@ -136,10 +155,19 @@ def test_a_private_word_is_found_as_module_class_function_and_constant(tmp_path:
     assert {name for _, name in names_in(module)} & PRIVATE_WORDS == {"story", "near", "told", "stand_in", "judged"}
 
 
+def test_no_class_of_another_package_has_the_same_name_and_another_meaning() -> None:
+    packages: dict[str, set[str]] = {}
+    for path in MODULES:
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.ClassDef):
+                packages.setdefault(node.name, set()).add(path.relative_to(PACKAGE).parts[0])
+    assert {name for name, found in packages.items() if len(found) > 1} == ALIKE_IN_MEANING
+
+
 def test_no_type_of_array_is_named_twice() -> None:
     found: dict[str, list[str]] = {}
     for path in MODULES:
-        for statement in ast.parse(path.read_text(encoding="utf-8")).body:
+        for statement in tree_of(path).body:
             if isinstance(statement, ast.Assign) and ast.unparse(statement.value).startswith("NDArray["):
                 found.setdefault(ast.unparse(statement.value), []).append(path.relative_to(ROOT).as_posix())
     assert found.keys() >= {"NDArray[np.float64]", "NDArray[np.bool_]"}
@@ -160,7 +188,7 @@ def long_ones() -> dict[str, int]:
         name, text = path.relative_to(PACKAGE).as_posix(), path.read_text(encoding="utf-8")
         if (lines := len(text.splitlines())) > LONG_MODULE:
             found[name] = lines
-        for node in ast.walk(ast.parse(text)):
+        for node in ast.walk(tree_of(path)):
             if (
                 isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
                 and (lines := written_lines(node)) > LONG_FUNCTION

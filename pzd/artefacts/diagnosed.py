@@ -139,6 +139,29 @@ class Diagnosis(Frozen):
     zero_m: float = 0.0
     """Recorded displacement from which the parameters of an effect count x, such as x_e of `end_stop`."""
 
+    @classmethod
+    def without_effects(
+        cls,
+        verdict: Literal["none", "ambiguous", "unexplained"],
+        reason: str,
+        gap: Gap | None,
+        where: tuple[Region, ...] = (),
+        next_test: NextTest | None = None,
+    ) -> Self:
+        """A verdict under which no effect was weighed: none adopted, none ranked, no rivals."""
+        return cls(
+            verdict=verdict,
+            reason=reason,
+            effects=(),
+            confidence=None,
+            gap=gap,
+            parameters={},
+            ranking=(),
+            rivals=(),
+            where=where,
+            next_test=next_test,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
@@ -157,19 +180,7 @@ class Diagnosed:
     def undiagnosed(cls, damper: Damper, plain: Damper | None = None) -> Self:
         """A damper that nobody diagnosed, in the form in which the stages behind diagnose take it."""
         gap = Gap(before=0.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=(), hold_out="records")
-        nothing = Diagnosis(
-            verdict="none",
-            reason="not diagnosed",
-            effects=(),
-            confidence=None,
-            gap=gap,
-            parameters={},
-            ranking=(),
-            rivals=(),
-            where=(),
-            next_test=None,
-        )
-        return cls(nothing, damper, plain or damper)
+        return cls(Diagnosis.without_effects("none", "not diagnosed", gap), damper, plain or damper)
 
     def write(self, folder: Path, control: Control) -> None:
         """Write diagnosis.json, damper.yaml, plain.yaml and parameters.csv."""

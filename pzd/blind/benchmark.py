@@ -17,7 +17,7 @@ from pathlib import Path
 
 from pzd.blind.case import Places, Scored
 from pzd.blind.diagnosis import Methods, diagnose_case
-from pzd.blind.hide import Setup, hide
+from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.plan import PlannedCase, plan
 from pzd.blind.scoring import score_case
 from pzd.schema.errors import DataError
@@ -43,7 +43,7 @@ def _ends_quietly() -> None:
 class Benchmark:
     """What is hidden, how it is sought, and where the files go."""
 
-    setup: Setup
+    setup: BenchmarkSetup
     methods: Methods
     places: Places
     made_from: str

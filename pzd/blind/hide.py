@@ -25,7 +25,7 @@ from pzd.signals.nuisance import NuisanceConfig
 
 
 @dataclass(frozen=True)
-class Setup:
+class BenchmarkSetup:
     """What every case starts from."""
 
     blind: BlindConfig
@@ -39,7 +39,7 @@ class Setup:
         return next(campaign for campaign in self.blind.campaigns if campaign.name == name)
 
 
-def hide(setup: Setup, planned: PlannedCase, places: Places) -> None:
+def hide(setup: BenchmarkSetup, planned: PlannedCase, places: Places) -> None:
     """Draw a case; write its rig files where the diagnosis looks, and its truth where it does not.
 
     Parameters
@@ -58,7 +58,7 @@ def hide(setup: Setup, planned: PlannedCase, places: Places) -> None:
     write_clean(places.clean(planned.id), _known(records))
 
 
-def drawn(setup: Setup, planned: PlannedCase) -> tuple[Truth, list[Taken]]:
+def drawn(setup: BenchmarkSetup, planned: PlannedCase) -> tuple[Truth, list[Taken]]:
     """The truth of a case, and what the data logger has of it.
 
     Parameters
@@ -123,14 +123,14 @@ def _scattered(damper: Damper, spread: float, draw: np.random.Generator) -> Damp
     return Damper(base=tuple(rows))
 
 
-def _stand(setup: Setup, campaign: TestPlan, damper: Damper, *, warms: bool) -> VirtualEntry:
+def _stand(setup: BenchmarkSetup, campaign: TestPlan, damper: Damper, *, warms: bool) -> VirtualEntry:
     """The stand with this campaign, without noise and jitter."""
     changes = {"damper": damper, "tests": campaign.tests, "noise": Noise(), "jitter": Jitter(), "setting": None}
     warming = {"temperatures_degC": (setup.blind.warming,)} if warms else {}
     return setup.stand.model_copy(update={**changes, **warming})
 
 
-def _noise(setup: Setup, share: float, rho: float, unsteady: float) -> dict[str, Noise | Jitter]:
+def _noise(setup: BenchmarkSetup, share: float, rho: float, unsteady: float) -> dict[str, Noise | Jitter]:
     """What the sensors add in this case; voltage and temperature as the config's stand has them."""
     own, nuisance = setup.stand.noise, setup.nuisance
     noise = Noise(

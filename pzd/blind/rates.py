@@ -21,7 +21,7 @@ VISIBLE = 0.005
 LOW_NOISE = 0.01
 """Noise up to this share of the peak is low."""
 
-Test = Callable[[Scored], bool]
+Predicate = Callable[[Scored], bool]
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Rate:
     count: int
 
     @classmethod
-    def of(cls, cases: Iterable[Scored], hit: Test) -> Rate:
+    def of(cls, cases: Iterable[Scored], hit: Predicate) -> Rate:
         """How many of the cases pass a test."""
         hits = [hit(case) for case in cases]
         return cls(sum(hits), len(hits))
@@ -153,7 +153,7 @@ def _bin(start: float, end: float) -> str:
 
 
 def _row(labels: tuple[str, str, str, str], cases: list[Scored]) -> RateRow:
-    def share(hit: Test) -> float:
+    def share(hit: Predicate) -> float:
         return round(Rate.of(cases, hit).share or 0.0, 4)
 
     exact, wrong = Rate.of(cases, rightly), Rate.of(cases, wrongly)

@@ -9,8 +9,8 @@ import numpy as np
 
 from pzd.blind.case import Scored
 from pzd.blind.rates import (
+    Predicate,
     Rate,
-    Test,
     ambiguous_with_truth,
     among,
     calibration_rows,
@@ -60,7 +60,7 @@ def lines(cases: Sequence[Scored]) -> list[Line]:
 # ---------------------------------------------------------------- lines of rates
 
 
-def rate_line(about: str, figure: str, cases: Sequence[Scored], hit: Test, target: str = "") -> Line:
+def rate_line(about: str, figure: str, cases: Sequence[Scored], hit: Predicate, target: str = "") -> Line:
     """A share of cases beside its target.
 
     Parameters

@@ -10,7 +10,7 @@ from pzd.cli.options import CORES, RUNS, Config, Force, Jobs, Quiet, Runs, Set, 
 from pzd.cli.output import Output
 
 if TYPE_CHECKING:
-    from pzd.blind.hide import Setup
+    from pzd.blind.hide import BenchmarkSetup
     from pzd.config import RunConfig
 
 FOLDER = "blind"
@@ -45,21 +45,21 @@ def blind(
     return DONE
 
 
-def _setup(config: RunConfig) -> Setup:
+def _setup(config: RunConfig) -> BenchmarkSetup:
     """What every case starts from.
 
     Raises
     ------
     ConfigError : when the config has no `blind` block, or not one virtual stand
     """
-    from pzd.blind.hide import Setup
+    from pzd.blind.hide import BenchmarkSetup
     from pzd.schema.errors import ConfigError
 
     if config.blind is None:
         raise ConfigError("blind: the config has no such block; configs/blind.yaml is an example")
     if config.rig.virtual is None or len(config.rig.virtual) != 1:
         raise ConfigError("rig.virtual: pzd blind needs one virtual stand, whose damper the cases start from")
-    return Setup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
+    return BenchmarkSetup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
 
 
 def _made_from(config: RunConfig) -> str:

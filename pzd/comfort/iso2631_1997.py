@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pzd.comfort.measures import maximum_transient, peak, rms, vibration_dose
+from pzd.comfort.measures import maximum_transient, peak, vibration_dose
 from pzd.record import Array
+from pzd.signals.root_mean_square import rms
 
 EDITION = "ISO 2631-1:1997"
 

@@ -1,4 +1,4 @@
-"""Measures of a vibration history: r.m.s., peak, VDV and MTVV."""
+"""Measures of a vibration history beside its r.m.s.: peak, VDV and MTVV."""
 
 from __future__ import annotations
 
@@ -8,22 +8,6 @@ from pzd.record import Array
 
 INTEGRATION_TIME_S = 1.0
 """tau of the running r.m.s. behind MTVV, ISO 2631-1:1997, 6.3.1."""
-
-
-def rms(acceleration: Array) -> float:
-    """Root mean square.
-
-    Equation: a = sqrt(1/T int a(t)^2 dt)                Source: ISO 2631-1:1997, eq. (1)
-
-    Parameters
-    ----------
-    acceleration : (n,) [m/s2]
-
-    Returns
-    -------
-    [m/s2]
-    """
-    return float(np.sqrt(np.mean(acceleration**2)))
 
 
 def peak(acceleration: Array) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from pzd.compiled import compiled
 from pzd.damper.flow import smooth_force
 from pzd.damper.kernels import T0, C, K, Row, interpolate, row_of, stroke_slope
-from pzd.damper.pieces import Step, extension_speed, piece, row_in
+from pzd.damper.pieces import TimeStep, extension_speed, piece, row_in
 from pzd.damper.regimes import (
     SMOOTH,
     STICK,
@@ -46,7 +46,7 @@ _SAME_FORCE = 1e-11  # of the force; a saved flow speed that gives it within thi
 
 
 @compiled
-def advance(state: Array, step: Step, tolerance: float, booked: bool) -> None:
+def advance(state: Array, step: TimeStep, tolerance: float, booked: bool) -> None:
     """Carry the state through one step.
 
     Parameters
@@ -94,7 +94,7 @@ def advance(state: Array, step: Step, tolerance: float, booked: bool) -> None:
 
 
 @compiled
-def size_of(step: Step) -> float:
+def size_of(step: TimeStep) -> float:
     """How large the force of a step is at least [N], where it passes through zero too: T0 + C |u|."""
     return step.p1[T0] + step.p1[C] * max(abs(step.u0), abs(step.u1))
 
@@ -107,7 +107,7 @@ def _miss(e: float, p: Row, regime: int, side: float) -> float:
 
 @compiled
 def _crossing(
-    e: float, w: float, at: float, dt: float, over: float, way: int, regime: int, side: float, step: Step
+    e: float, w: float, at: float, dt: float, over: float, way: int, regime: int, side: float, step: TimeStep
 ) -> float:
     """Length of the piece that ends on the edge of its regime: Newton's method within a bracket, then bisection."""
     size = abs(spring_force(e, step.p0)) + size_of(step)
@@ -150,7 +150,7 @@ def _book(
     dt: float,
     regime: int,
     side: float,
-    step: Step,
+    step: TimeStep,
 ) -> None:
     """Book the energies of a piece by Simpson's rule, its middle computed like its end."""
     em, wm, _ = piece(e0, w0, at, 0.5 * dt, regime, side, step)
@@ -230,5 +230,5 @@ def _march(
         h = steps[min(i - 1, steps.size - 1)]
         mean = (displacement[i] - displacement[i - 1]) / h
         half = 0.5 * (velocity[i] - velocity[i - 1]) if velocity.size > 1 else 0.0
-        advance(state, Step(h, mean - half, mean + half, p0, p1, moving), tolerance, False)
+        advance(state, TimeStep(h, mean - half, mean + half, p0, p1, moving), tolerance, False)
         force[i] = spring_force(state[DEFLECTION], p1)

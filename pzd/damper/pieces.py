@@ -36,7 +36,7 @@ _RATE_WEIGHTS, _TIME_WEIGHTS, _DIAGONAL = rosenbrock.RATE_WEIGHTS, rosenbrock.TI
 _NUDGE = 1e-7  # of the integrated variable, for the derivative of its rate
 
 
-class Step(NamedTuple):
+class TimeStep(NamedTuple):
     """One step: length h [s], extension speed from u0 to u1 [m/s], parameter rows from p0 to p1."""
 
     h: float
@@ -49,19 +49,21 @@ class Step(NamedTuple):
 
 
 @inlined
-def row_in(step: Step, at: float) -> Row:
+def row_in(step: TimeStep, at: float) -> Row:
     """The parameter row at a moment [s] of the step."""
     return interpolate(step.p0, step.p1, at / step.h) if step.moving else step.p0
 
 
 @inlined
-def extension_speed(step: Step, at: float) -> float:
+def extension_speed(step: TimeStep, at: float) -> float:
     """dx/dt [m/s] at a moment [s] of the step."""
     return step.u0 + (step.u1 - step.u0) * at / step.h
 
 
 @compiled
-def piece(e: float, w: float, at: float, dt: float, regime: int, side: float, step: Step) -> tuple[float, float, float]:
+def piece(
+    e: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep
+) -> tuple[float, float, float]:
     """Elastic deflection and flow speed after a piece of length dt, and its embedded error as a force [N]."""
     if regime == STICK:
         return e + dt * extension_speed(step, at + 0.5 * dt), 0.0, 0.0
@@ -95,7 +97,7 @@ def piece(e: float, w: float, at: float, dt: float, regime: int, side: float, st
 
 @compiled
 def _runge_kutta(
-    y: float, r0: float, w: float, at: float, dt: float, regime: int, side: float, step: Step, explicit: bool
+    y: float, r0: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep, explicit: bool
 ) -> tuple[float, float, float]:
     """The integrated variable after dt, its rate there, and its embedded error; its rate at the start is given."""
     a, t, d = STAGE_WEIGHTS, TIMES, ERROR_WEIGHTS
@@ -115,7 +117,9 @@ def _runge_kutta(
 
 
 @compiled
-def _rosenbrock(y: float, r0: float, at: float, dt: float, regime: int, side: float, step: Step) -> tuple[float, float]:
+def _rosenbrock(
+    y: float, r0: float, at: float, dt: float, regime: int, side: float, step: TimeStep
+) -> tuple[float, float]:
     """The integrated variable after dt, and its embedded error; its rate at the start is given."""
     a, c, t, d = _STIFF_WEIGHTS, _RATE_WEIGHTS, _STIFF_TIMES, _TIME_WEIGHTS
     nudge = _NUDGE * max(y, step.p0[K] * 1e-9)
@@ -140,7 +144,7 @@ def _rosenbrock(y: float, r0: float, at: float, dt: float, regime: int, side: fl
 
 
 @compiled
-def _rate(y: float, guess: float, at: float, regime: int, side: float, step: Step, explicit: bool) -> float:
+def _rate(y: float, guess: float, at: float, regime: int, side: float, step: TimeStep, explicit: bool) -> float:
     """Rate of the integrated variable.
 
     Equation: de/dt = u(t) - side w(|F|)      Source: eq. (1), the flow curve inverted
@@ -152,7 +156,7 @@ def _rate(y: float, guess: float, at: float, regime: int, side: float, step: Ste
 
 
 @compiled
-def _rate_of_force(y: float, at: float, regime: int, side: float, step: Step) -> float:
+def _rate_of_force(y: float, at: float, regime: int, side: float, step: TimeStep) -> float:
     """Rate of the integrated variable: of s in SMOOTH, of |F| in RELIEF.
 
     Equation: d|F|/dt = k s'(e) (side u - w) + (dk/dt)/k |F| + k ds/dt at e; in SMOOTH less what the moving curve
@@ -181,7 +185,7 @@ def _rate_of_force(y: float, at: float, regime: int, side: float, step: Step) ->
 
 
 @compiled
-def _behind_stroke(rate: float, force: float, at: float, p: Row, side: float, step: Step) -> float:
+def _behind_stroke(rate: float, force: float, at: float, p: Row, side: float, step: TimeStep) -> float:
     """Rate of |F| [N/s] behind the stroke effects, at a |F| [N] whose rate without them is given.
 
     Equation: d|F|/dt = s'(e) rate + k ds/dt at constant e

@@ -16,6 +16,7 @@ from pzd.damper.motion import Motion
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.record import Array, Record
 from pzd.rig.config import Limits
+from pzd.signals.root_mean_square import rms
 
 FREQUENCIES = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
 """Frequencies that are weighed [Hz], and the largest."""
@@ -214,4 +215,4 @@ def _distance(first: Array, second: Array) -> float:
     slack = np.column_stack([np.ones(first.size), first, np.gradient(first)])
     difference = second - first
     left = difference - slack @ np.linalg.lstsq(slack, difference, rcond=None)[0]
-    return float(np.sqrt(np.mean(left**2)) / np.max(np.abs(first)))
+    return float(rms(left) / np.max(np.abs(first)))

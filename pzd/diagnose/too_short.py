@@ -39,20 +39,14 @@ def undecided(recorded: Sequence[Prepared], reach: Reach) -> Diagnosis:
     amplitude = min(0.5 * float(np.ptp(record.displacement)), reach.amplitude)
     frequency = rounded_down(min(reach.frequency, reach.speed / (2.0 * np.pi * amplitude)))
     longest = max(p.record.time.size for p in recorded)
-    return Diagnosis(
+    return Diagnosis.without_effects(
         verdict="ambiguous",
         reason=(
             "the records are too short to tell noise from what is missing: too little of them repeats a cycle, and "
             f"a motion that does not repeat takes {FEWEST_SAMPLES} samples to fit, the same to choose and to hold out "
             f"(the longest record has {longest}); record {CYCLES} cycles of a test, of at least 40 samples each"
         ),
-        effects=(),
-        confidence=None,
         gap=None,
-        parameters={},
-        ranking=(),
-        rivals=(),
-        where=(),
         next_test=NextTest(
             waveform=f"sine, {CYCLES} cycles",
             frequency_Hz=frequency,

@@ -21,6 +21,7 @@ from pzd.diagnose.search.evidence import nearest_row
 from pzd.diagnose.thresholds import CONTRADICTS, FEWEST_FOR_A_TREND
 from pzd.record import Array
 from pzd.signals.nuisance import NuisanceConfig, columns_of
+from pzd.signals.root_mean_square import rms
 
 UNIT = NuisanceConfig(offset=0.01, delay_s=0.001, gain=0.01)
 """What they are counted in: a hundredth of the peak force, a millisecond, a hundredth of the force."""
@@ -94,7 +95,7 @@ def _motions(checks: Sequence[ResidualCheck]) -> Iterator[tuple[str, Array]]:
     records = [c.prepared.record for c in checks]
     cycles = [c.prepared.cycles for c in checks]
     yield "frequency", np.log([np.nan if run is None else run.frequency for run in cycles])
-    yield "speed", np.log([float(np.sqrt(np.mean(r.velocity**2))) for r in records])
+    yield "speed", np.log([rms(r.velocity) for r in records])
     yield "stroke", np.log([float(np.ptp(r.displacement)) for r in records])
     warmth = [r.median_temperature() for r in records]
     yield "temperature", np.array([np.nan if t is None else t for t in warmth])
@@ -117,7 +118,7 @@ def _regressed(values: Array, over: Array, condition: NDArray[np.int64]) -> tupl
         return None
     slope = float(x @ y / (x @ x))
     left = float(np.sum((y - slope * x) ** 2)) / free
-    size = abs(slope) * float(np.sqrt(np.mean(x**2)))
+    size = abs(slope) * rms(x)
     if left <= 0.0:
         return size, 0.0 if slope else 1.0
     return size, float(2.0 * stdtr(free, -abs(slope) * np.sqrt(float(x @ x) / left)))

@@ -21,6 +21,7 @@ from pzd.identify.trial import trial_of
 from pzd.identify.trust import ParameterEvidence, stationarity, trust_of, visible_shares
 from pzd.record import Array, Condition, Record
 from pzd.signals.criterion import criterion
+from pzd.signals.root_mean_square import rms
 from pzd.signals.stretches import separate_tests
 
 
@@ -140,7 +141,7 @@ def row_of(
         k_N_per_m_low95=stiffness[1],
         k_N_per_m_high95=stiffness[2],
         W_s=criterion(residuals, measured),
-        rmse_N=float(np.sqrt(np.mean(residuals**2))),
+        rmse_N=rms(residuals),
         status=trust.status,
     )
 

@@ -22,6 +22,7 @@ from pzd.identify.misfit import Misfit
 from pzd.identify.part import Part
 from pzd.record import Array
 from pzd.signals.reversals import reversals
+from pzd.signals.root_mean_square import rms
 
 TURNS = 4
 """Half strokes in a stretch of a record that does not repeat: two full cycles outlast the memory of the noise."""
@@ -97,7 +98,7 @@ def _faint(parts: Sequence[Part], slopes: Sequence[Array], bread: Array) -> Arra
     peaks = [float(np.max(np.abs(p.force))) for p in parts]
     left = [(g - s @ taken) / peak for s, g, peak in zip(slopes, squares, peaks, strict=True)]
     whole = [g / peak for g, peak in zip(squares, peaks, strict=True)]
-    rms_left, rms_whole = (float(np.sqrt(np.mean(np.concatenate(each) ** 2))) for each in (left, whole))
+    rms_left, rms_whole = (rms(np.concatenate(each)) for each in (left, whole))
     size = min(FAINT / max(rms_left, 1e-12 * rms_whole), LARGEST / rms_whole)
     return np.asarray((taken * size) ** 2)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.record import Array
+from pzd.signals.root_mean_square import rms
 
 SENSOR_ERROR = 0.005
 """A systematic force error of this share of r.m.s. is always possible: load cells are of class 0.5 at best."""
@@ -89,7 +90,7 @@ class ParameterEvidence:
 
 def friction_scale(friction: float, force: Array) -> float:
     """What the uncertainty of T0 is measured against [N]."""
-    return max(friction, FRICTION_FLOOR * float(np.sqrt(np.mean(force**2))))
+    return max(friction, FRICTION_FLOOR * rms(force))
 
 
 def visible_shares(slopes: Array, scales: Array, energy: float) -> Array:

@@ -23,7 +23,7 @@ class Notes:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class TextTable:
     """A table; cells are text, and columns of numbers stand flush right."""
 
     caption: str
@@ -31,7 +31,7 @@ class Sheet:
     rows: tuple[tuple[str, ...], ...]
     folded: bool = False
     """Whether the reader opens it first."""
-    kind: str = field(default="sheet", init=False)
+    kind: str = field(default="table", init=False)
 
     @property
     def numeric(self) -> tuple[bool, ...]:
@@ -60,7 +60,7 @@ class Gallery:
     kind: str = field(default="gallery", init=False)
 
 
-Block = Paragraph | Notes | Sheet | Gallery
+Block = Paragraph | Notes | TextTable | Gallery
 
 
 @dataclass(frozen=True)

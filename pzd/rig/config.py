@@ -68,7 +68,7 @@ class Fixture(Frozen):
     """Force that the cell shows without a damper, in its own direction: taken out before `sign` turns the force."""
 
 
-class Split(Frozen):
+class FileSplit(Frozen):
     """Where one test ends and the next begins in a file that holds several; exactly one way."""
 
     column: str | None = None
@@ -118,7 +118,7 @@ class FilesEntry(Frozen):
     """Which setting of the damper these files measured."""
     fixture: Fixture | None = None
     """A known fixture, taken out and said in records.json."""
-    split: Split | None = None
+    split: FileSplit | None = None
     """How a file with several tests is cut; not cut by default."""
     format: str | None = None
     """Format of the files, e.g. `text`; by their content, then the ending of the name where nothing is said."""

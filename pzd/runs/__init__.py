@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from pzd.runs.disk import file_hash, versions
-from pzd.runs.folder import CONFIG, StageFolder, Run
+from pzd.runs.folder import CONFIG, Run, StageFolder
 
-__all__ = ["CONFIG", "StageFolder", "Run", "file_hash", "versions"]
+__all__ = ["CONFIG", "Run", "StageFolder", "file_hash", "versions"]

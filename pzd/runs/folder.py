@@ -73,8 +73,8 @@ class Run:
             owner = run._owner(manifest.parent.name)
             if owner is not None and owner.exists() and owner != config.resolve():
                 raise ConfigError(
-                    f"{run.folder}: this folder holds the results of {owner}, and {config.resolve()} has the same stem; "
-                    "rename one of them or give --runs another folder"
+                    f"{run.folder}: this folder holds the results of {owner}, and {config.resolve()} has the same "
+                    "stem; rename one of them or give --runs another folder"
                 )
         return run
 
@@ -150,7 +150,7 @@ class Run:
             yield
 
     def write_config(self, text: str) -> None:
-        """Write the config with every default, unless it is there already; one edited by hand is kept under a name of its own."""
+        """Write the config with every default, unless it is there; one edited by hand is kept under another name."""
         path, hashes = self.folder / CONFIG, self.folder / _CONFIG_HASHES
         with as_files_error(path):
             if path.exists() and path.read_bytes() == text.encode():
@@ -193,6 +193,7 @@ class Run:
         ------
         FilesError : when the disk does not take it; what was there before still is
         """
+
         def fill(fresh: Path) -> None:
             if isinstance(artefact, Rig | Rides):
                 artefact.write(fresh, self.control, jobs)
@@ -225,6 +226,7 @@ class Run:
         ------
         FilesError : when the disk does not take it; what was there before still is
         """
+
         def fill(fresh: Path) -> None:
             write(fresh)
             write_json(fresh / _WRITTEN, self.hashes(fresh.name), _NAMES)

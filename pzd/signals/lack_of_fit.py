@@ -30,7 +30,8 @@ def by_harmonics(error: PureError) -> Array:
 
     Returns
     -------
-    (bands,) probabilities, uniform where nothing is missing
+    (bands,) probabilities, uniform where nothing is missing; those below 1e-5 are too small where the noise is
+    correlated over a tenth of a cycle, for its ends do not meet and leak into all high harmonics at once
     """
     from scipy.special import fdtrc
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from pzd.record import Array, Record
 from pzd.signals.autoregression import Autoregression, autoregression
+from pzd.signals.root_mean_square import rms
 
 HATS = 8
 """Piecewise linear functions over each quantity."""
@@ -101,7 +102,7 @@ def _behind(voltage: Array, samples: float) -> Array:
 
 
 def _scaled(values: Array) -> Array:
-    size = float(np.sqrt(np.mean(values**2)))
+    size = rms(values)
     return values / size if size > 0.0 else values
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.artefacts import AXLE_COLUMNS, AXLES, RIDE_COLUMNS, Ride, SummaryRow, WheelRow
-from pzd.comfort.measures import rms
 from pzd.record import Array
 from pzd.signals.recursion import all_pole
+from pzd.signals.root_mean_square import rms
 from pzd.simulate.loop import A_K, LOAD_1, LOAD_2, LOST, TRAVEL
 from pzd.simulate.window import Window
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from pzd.comfort.measures import rms
 from pzd.comfort.weighting import weighted
+from pzd.signals.root_mean_square import rms
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.dynamic_damper import DynamicDamper
 from pzd.simulate.outcome import Outcome

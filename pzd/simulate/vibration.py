@@ -8,10 +8,10 @@ import numpy as np
 
 from pzd.artefacts import SpectrumRow, WeightedRow
 from pzd.comfort.iso2631_1997 import evaluate
-from pzd.comfort.measures import rms
 from pzd.comfort.spectrum import Components, harmonics, third_octaves
 from pzd.comfort.weighting import WK, weighted
 from pzd.record import Array
+from pzd.signals.root_mean_square import rms
 from pzd.simulate.window import Window
 
 _PERIODIC = 0.98

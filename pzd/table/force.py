@@ -13,7 +13,7 @@ from pzd.damper.compose import steady_force
 from pzd.damper.model import Damper
 from pzd.record import Array
 from pzd.table.config import TableConfig
-from pzd.table.reach import Reach
+from pzd.table.reach import ReachedSpeed
 
 HALVINGS = 5
 """Most often that an interval between two nodes is halved."""
@@ -57,7 +57,7 @@ def temperatures_of(damper: Damper) -> tuple[float | None, ...]:
     return tuple(sorted(nodes)) or (None,)
 
 
-def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | None], reach: Reach) -> TableNodes:
+def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | None], reach: ReachedSpeed) -> TableNodes:
     """Nodes between which straight lines keep to the damper's law within the tolerance."""
     voltages = voltages_of(damper)
     if config.voltages_V is not None and voltages != (None,):
@@ -83,7 +83,7 @@ def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | Non
     )
 
 
-def _speeds(config: TableConfig, reach: Reach) -> Array:
+def _speeds(config: TableConfig, reach: ReachedSpeed) -> Array:
     """Speeds spaced by their square root, and those that the rig reached."""
     fastest = np.unique(reach.speeds[np.isfinite(reach.speeds)])
     largest = max(config.speed_max_m_per_s, *fastest) if fastest.size else config.speed_max_m_per_s
@@ -123,7 +123,7 @@ def _halved(low: float, high: float, law: Callable[[float], Array], allowed: flo
     ]
 
 
-def force_rows(config: TableConfig, damper: Damper, nodes: TableNodes, reach: Reach) -> tuple[ForceRow, ...]:
+def force_rows(config: TableConfig, damper: Damper, nodes: TableNodes, reach: ReachedSpeed) -> tuple[ForceRow, ...]:
     """One row a node; beyond the rig's reach held, empty or the law itself, as the config says."""
     rows: list[ForceRow] = []
     for temperature in nodes.temperatures:

@@ -17,7 +17,7 @@ SAME = 0.95
 
 
 @dataclass(frozen=True, eq=False)
-class Reach:
+class ReachedSpeed:
     """Speed reached over temperature and voltage, NaN where nothing was tested."""
 
     temperatures: Array
@@ -51,7 +51,9 @@ class Reach:
         return bool(nodes[0] - margin <= value <= nodes[-1] + margin)
 
 
-def reached(records: Sequence[Record], temperatures: Sequence[float | None], voltages: Sequence[float | None]) -> Reach:
+def reached(
+    records: Sequence[Record], temperatures: Sequence[float | None], voltages: Sequence[float | None]
+) -> ReachedSpeed:
     """The largest speed of the samples nearest to each temperature and voltage.
 
     Parameters
@@ -73,7 +75,7 @@ def reached(records: Sequence[Record], temperatures: Sequence[float | None], vol
             speeds[i, j] = max(fastest)
     if np.isfinite(speeds).any():
         speeds[speeds >= SAME * np.nanmax(speeds)] = np.nanmax(speeds)
-    return Reach(T, U, speeds)
+    return ReachedSpeed(T, U, speeds)
 
 
 def _numbers(values: Sequence[float | None]) -> Array:

@@ -11,7 +11,7 @@ import pytest
 from pzd.blind.benchmark import Benchmark
 from pzd.blind.case import Places, Scored
 from pzd.blind.diagnosis import Methods
-from pzd.blind.hide import Setup
+from pzd.blind.hide import BenchmarkSetup
 from pzd.config import RunConfig, load
 
 SMALL = """
@@ -45,19 +45,19 @@ def small(tmp_path: Path) -> Callable[..., RunConfig]:
 
 
 @pytest.fixture
-def setup_of() -> Callable[[RunConfig], Setup]:
+def setup_of() -> Callable[[RunConfig], BenchmarkSetup]:
     """What the cases of a config start from."""
 
-    def made(config: RunConfig) -> Setup:
+    def made(config: RunConfig) -> BenchmarkSetup:
         assert config.blind is not None
         assert config.rig.virtual is not None
-        return Setup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
+        return BenchmarkSetup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
 
     return made
 
 
 @pytest.fixture
-def benchmark_of(setup_of: Callable[[RunConfig], Setup]) -> Callable[[RunConfig, Path], Benchmark]:
+def benchmark_of(setup_of: Callable[[RunConfig], BenchmarkSetup]) -> Callable[[RunConfig, Path], Benchmark]:
     """The benchmark of a config in a folder, threads in place of processes, which take long to start."""
 
     def made(config: RunConfig, folder: Path) -> Benchmark:

@@ -24,7 +24,7 @@ from pzd.blind.case import Places, Scored
 from pzd.blind.clean import Clean
 from pzd.blind.cuts import gap_cut, gap_cut_of_truth
 from pzd.blind.diagnosis import COST, diagnose_case
-from pzd.blind.hide import Setup, drawn, hide
+from pzd.blind.hide import BenchmarkSetup, drawn, hide
 from pzd.blind.plan import plan
 from pzd.cli.app import status
 from pzd.config import RunConfig
@@ -37,7 +37,7 @@ from pzd.schema.errors import ConfigError
 ROOT = Path(__file__).resolve().parents[2]
 
 Small = Callable[..., RunConfig]
-SetupOf = Callable[[RunConfig], Setup]
+SetupOf = Callable[[RunConfig], BenchmarkSetup]
 BenchmarkOf = Callable[[RunConfig, Path], Benchmark]
 
 SMALL = """

@@ -14,7 +14,7 @@ from pzd.damper.kernels import row_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance, march
-from pzd.damper.pieces import Step
+from pzd.damper.pieces import TimeStep
 from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
 
 STEP = 1e-3
@@ -204,7 +204,7 @@ def test_a_scheme_of_fixed_steps_is_of_order_five(effects: dict, moving: bool) -
         rows = [tuple(a + s * (b - a) if a != b else a for a, b in zip(first, last, strict=True)) for s in share]
         for i in range(steps):
             ends = (rows[i], rows[i + 1]) if moving else (first, first)
-            advance(state, Step(long / steps, u[i], u[i + 1], *ends, moving), unlimited, False)
+            advance(state, TimeStep(long / steps, u[i], u[i + 1], *ends, moving), unlimited, False)
         return float(state[DEFLECTION])
 
     truth = after(512)
@@ -255,10 +255,10 @@ def test_energy_goes_into_the_spring_the_oil_and_the_valve_and_nowhere_else(effe
             share = 0.5 * (1 + x)
             middle = tuple(a + share * (b - a) if a != b else a for a, b in zip(p0, p1, strict=True))
             probe, u = state.copy(), mean + half * (2 * share - 1)
-            advance(probe, Step(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, False)
+            advance(probe, TimeStep(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, False)
             e = probe[DEFLECTION]
             work += 0.5 * w * STEP * middle[2] * np.sign(e) * max(abs(e) - middle[play] / 2, 0.0) * u
-        advance(state, Step(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, True)
+        advance(state, TimeStep(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, True)
     stored = 0.5 * rows[-1, 2] * max(abs(state[DEFLECTION]) - rows[-1, play] / 2, 0.0) ** 2
     assert state[DISSIPATED] > 0.0
     assert abs(stored + state[DISSIPATED] - state[VALVE_WORK] - work) <= 2e-6 * state[DISSIPATED]

@@ -29,6 +29,7 @@ def test_a_force_that_is_in_no_library_is_not_named_after_the_effect_next_to_it(
     assert told.confidence is None or told.confidence < 0.9
 
 
+@pytest.mark.ci
 def test_an_offset_that_any_test_could_have_is_an_effect_where_every_test_has_it(
     rng: np.random.Generator,
 ) -> None:

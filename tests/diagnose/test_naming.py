@@ -98,6 +98,7 @@ def test_a_spring_that_pushes_away_is_not_called_a_gas_spring(rng: np.random.Gen
     assert "gas_spring" not in told.effects
 
 
+@pytest.mark.ci
 def test_something_that_is_not_in_the_library_is_unexplained(rng: np.random.Generator) -> None:
     def with_flutter(record: Record) -> Record:
         """A force that depends on where the piston stands: damping that doubles towards one end."""

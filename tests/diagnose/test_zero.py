@@ -46,6 +46,7 @@ def stopped(generator_for: Callable[[str], np.random.Generator]) -> tuple[Diagno
     return diagnosed(records), diagnosed(shifted(records))
 
 
+@pytest.mark.ci
 def test_records_shifted_by_50_mm_have_the_same_verdict_effects_and_parameters(
     stopped: tuple[Diagnosed, Diagnosed],
 ) -> None:
@@ -59,6 +60,7 @@ def test_records_shifted_by_50_mm_have_the_same_verdict_effects_and_parameters(
     assert there.damper.zero_m == there.diagnosis.zero_m
 
 
+@pytest.mark.ci
 def test_where_the_gap_lies_is_told_in_the_displacement_as_recorded(stopped: tuple[Diagnosed, Diagnosed]) -> None:
     here, there = (
         [region.region for region in found.diagnosis.where if region.region.startswith("x ")] for found in stopped
@@ -83,8 +85,8 @@ def test_a_gas_spring_and_its_next_test_are_the_same_about_a_shifted_middle(rng:
     assert {k: getattr(other, k) for k in known} == {k: getattr(one, k) for k in known}
 
 
-def test_the_damper_handed_on_gives_the_recorded_force_in_the_recorded_displacement(
-    stopped: tuple[Diagnosed, Diagnosed], rng: np.random.Generator
+def test_a_damper_whose_zero_is_moved_gives_the_same_force_in_the_displacement_so_moved(
+    rng: np.random.Generator,
 ) -> None:
     """Pasted into a stand, or asked by a figure: x_e is counted from the damper's zero."""
     damper = damper_of((0.0,), end_stop=STOPS)
@@ -95,11 +97,18 @@ def test_the_damper_handed_on_gives_the_recorded_force_in_the_recorded_displacem
     assert respond(damper.moved(SHIFT), there) == pytest.approx(respond(damper, here), abs=1e-4)
     framed = force_in_frame(damper.moved(SHIFT), there, 1e7)
     assert framed == pytest.approx(force_in_frame(damper, here, 1e7), abs=1e-4)
+
+
+@pytest.mark.ci
+def test_the_damper_handed_on_gives_the_recorded_force_in_the_recorded_displacement(
+    stopped: tuple[Diagnosed, Diagnosed], rng: np.random.Generator
+) -> None:
     record = shifted(sines(damper_of(TWO, end_stop=STOPS), rng, (150.0,), noise=0.0))[-1]
     again = respond(stopped[1].damper, Motion.of(record), float(record.force[0]))[500:]
     assert np.sqrt(np.mean((again - record.force[500:]) ** 2)) < 0.02 * np.max(np.abs(record.force))
 
 
+@pytest.mark.ci
 def test_stops_that_do_not_lie_evenly_about_what_was_recorded_are_found_where_they_are(
     rng: np.random.Generator,
 ) -> None:
@@ -132,6 +141,7 @@ def off_middle(
     )  # fmt: skip
 
 
+@pytest.mark.ci
 def test_a_force_near_one_end_of_an_absolute_displacement_is_no_end_stop(rng: np.random.Generator) -> None:
     """Tests from 12.7 to 50 mm. Counted from the sensor's zero an end stop begins at 41.4 mm and was named."""
     tests = ((0.5, 0.01), (0.5, 0.0186), (2.0, 0.015), (2.0, 0.0186))

@@ -37,16 +37,23 @@ def test_without_noise_every_row_of_the_tables_comes_back_within_a_hundredth_of_
         assert getattr(fitted, name) == pytest.approx(true, rel=1e-4)
 
 
-def test_with_noise_errors_stay_within_a_percent_and_intervals_hold_the_truth(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize(("draws", "most_missed"), [(10, 6), pytest.param(50, 14, marks=pytest.mark.ci)])
+def test_with_noise_errors_stay_within_a_percent_and_intervals_hold_the_truth(
+    draws: int, most_missed: int, rng: np.random.Generator
+) -> None:
+    """Were the intervals independent, more would miss in six of ten thousand runs of 10, in eight of a thousand of 50.
+
+    The three of one damper are not, so it is somewhat more often.
+    """
     held = 0
-    for draw in rng.spawn(50):
+    for draw in rng.spawn(draws):
         truth, records = acceptance_test(draw)
         fitted = row_for([with_noise(r, draw) for r in records])
         assert fitted.status == "ok"
         for name, true in zip(NAMES, truth, strict=True):
             assert getattr(fitted, name) == pytest.approx(true, rel=0.01)
             held += getattr(fitted, f"{name}_low95") <= true <= getattr(fitted, f"{name}_high95")
-    assert held >= 136
+    assert held >= 3 * draws - most_missed
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])

@@ -63,6 +63,7 @@ def test_intervals_hold_the_truth_where_nothing_repeats(rng: np.random.Generator
     assert found >= 0.87 * 72
 
 
+@pytest.mark.ci
 def test_intervals_hold_the_truth_where_sensors_differ_and_a_little_is_hidden(rng: np.random.Generator) -> None:
     # Noise alone gave intervals of a tenth of the width, which held the truth in one case of five.
     found = ok = 0

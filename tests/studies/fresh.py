@@ -4,7 +4,7 @@ Runs every test that draws on so many new seeds. What failed is run again on the
 whether the seed decides, and on as many new ones, which tells how often. A test that fails more often than the
 comment beside its bound says is wrong, or the code is; the command that is printed shows it again.
 
-    python tests/studies/fresh.py [--seeds 20] [--jobs 2] [tests/diagnose ...]
+    python tests/studies/fresh.py [--seeds 20] [--jobs 2] [--not-ci] [tests/diagnose ...]
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ def say(line: str) -> None:
     print(line, flush=True)  # noqa: T201  # this is what the study is for
 
 
-def options(seed: int) -> list[str]:
+def options(seed: int, which: str = "draws") -> list[str]:
     """What pytest is told so that everything is drawn from one seed: hypothesis takes its own."""
-    return ["-m", "draws", f"--hypothesis-seed={seed}"]
+    return ["-m", which, f"--hypothesis-seed={seed}"]
 
 
-def run(seed: int, tests: Sequence[str], jobs: int) -> dict[str, bool]:
-    """Whether each test that draws passed on a seed."""
+def run(seed: int, tests: Sequence[str], jobs: int, which: str) -> dict[str, bool]:
+    """Whether each of the tests that a marker expression picks passed on a seed."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "results.xml"
         done = subprocess.run(
-            [sys.executable, "-m", "pytest", *options(seed), "-q", "-n", str(jobs), "--tb=no", "-p", "no:cacheprovider",
-             "-o", "junit_family=xunit1", f"--junitxml={path}", *tests],
+            [sys.executable, "-m", "pytest", *options(seed, which), "-q", "-n", str(jobs), "--tb=no",
+             "-p", "no:cacheprovider", "-o", "junit_family=xunit1", f"--junitxml={path}", *tests],
             cwd=ROOT, env={**os.environ, "PZD_SEED": str(seed)}, capture_output=True, text=True, check=False,
         )  # fmt: skip
         if done.returncode not in (0, 1):
@@ -61,8 +61,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--not-ci", action="store_true", help="leave out what takes long")
     parser.add_argument("tests", nargs="*", default=[])
     asked = parser.parse_args()
+    which = "draws and not ci" if asked.not_ci else "draws"
 
     tried: dict[str, int] = defaultdict(int)
     failed: dict[str, list[int]] = defaultdict(list)
@@ -70,7 +72,7 @@ def main() -> int:
     def on_new_seeds(tests: Sequence[str]) -> None:
         for _ in range(asked.seeds):
             seed, begun = secrets.randbits(32), time.monotonic()
-            passed = run(seed, tests, asked.jobs)
+            passed = run(seed, tests, asked.jobs, which)
             for test, well in passed.items():
                 tried[test] += 1
                 if not well:
@@ -82,7 +84,7 @@ def main() -> int:
 
     on_new_seeds(asked.tests)
     held = len(tried) - len(failed)
-    again = {test: run(seeds[0], [test], 1) for test, seeds in failed.items()}
+    again = {test: run(seeds[0], [test], 1, which) for test, seeds in failed.items()}
     if failed:
         say(f"{len(failed)} failed; these on as many seeds more:")
         on_new_seeds(sorted(failed))

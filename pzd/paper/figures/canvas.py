@@ -6,7 +6,7 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from pzd.report.drawing import FINAL, INK, MEASURED, BASELINE, STYLE
+from pzd.report.drawing import BASELINE, FINAL, INK, MEASURED, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +26,7 @@ NUMBERS_OF_OTHERS = {"linestyle": (0, (4, 2)), "linewidth": 1.1}
 """How curves from the paper's own numbers are drawn."""
 DISPLACEMENT, VELOCITY, FORCE = "displacement x [m]", "velocity v [m/s]", "force F [N]"
 
-__all__ = ["COLOURS", "FINAL", "INK", "MEASURED", "BASELINE", "SOFT"]
+__all__ = ["BASELINE", "COLOURS", "FINAL", "INK", "MEASURED", "SOFT"]
 
 
 def panels(width: float = 8.4, height: float = 3.7, ratios: Sequence[float] = (1.0, 1.0)) -> tuple[Figure, list[Axes]]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.paper.figures.canvas import COLOURS, INK, BASELINE, SOFT, key, panels
-from pzd.paper.figures.sources import FigureData
-from pzd.paper.figures.figure import Drawing
 from pzd.paper.car_search import CONTROLLED_PEAKS, CarRow, closest, stored
+from pzd.paper.figures.canvas import BASELINE, COLOURS, INK, SOFT, key, panels
+from pzd.paper.figures.figure import Drawing
+from pzd.paper.figures.sources import FigureData
 from pzd.simulate.minimise import TIE_BREAKS
 
 if TYPE_CHECKING:
@@ -34,9 +34,8 @@ def survey(data: FigureData) -> Drawing:
         captions.append(_described(best))
     key(figure, axes[0])
     count = len({(row.a1_m, row.a2_m, row.pitch_inertia_kgm2, row.x_K_m) for row in rows if row.found == "survey"})
-    caption = (
-        f"{count} plausible cars of a grid that meet both peaks with constant c within 5 %. Closest: {' '.join(captions)}"
-    )
+    said = f"{count} plausible cars of a grid that meet both peaks with constant c within 5 %."
+    caption = f"{said} Closest: {' '.join(captions)}"
     return Drawing("cars", figure, "Controlled peaks of all plausible cars under three tie-breaks.", caption)
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pzd.paper.figures.canvas import PAPER_STYLE, encoded
-from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.figure import PaperFigure
 from pzd.paper.figures.numbered import library
+from pzd.paper.figures.sources import FigureData
 from pzd.quantities import Control
 from pzd.schema.jsonfile import write_json
 from pzd.schema.model import Frozen

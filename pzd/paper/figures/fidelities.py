@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from pzd.artefacts import Rides, SummaryRow, base_of
-from pzd.paper.figures.canvas import COLOURS, BASELINE, SOFT, panels
-from pzd.paper.figures.sources import FigureData
-from pzd.paper.figures.figure import Drawing
+from pzd.comfort.iso2631_1978 import TRUST, Boundary, Exposure, exposure, shortest
 from pzd.paper.car_search import (
     AMPLITUDE,
     BOUNDS,
@@ -20,8 +18,10 @@ from pzd.paper.car_search import (
     constant_peaks,
 )
 from pzd.paper.fidelity import SettingRides, rides_on
+from pzd.paper.figures.canvas import BASELINE, COLOURS, SOFT, panels
+from pzd.paper.figures.figure import Drawing
+from pzd.paper.figures.sources import FigureData
 from pzd.paper.published import LARGE_GAP, SMALL_GAP, published
-from pzd.comfort.iso2631_1978 import TRUST, Boundary, Exposure, exposure, shortest
 from pzd.report.ride_comfort import rated
 from pzd.simulate.linear import harmonic_response
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pzd.artefacts import ParameterRow
 from pzd.damper.model import BaseRow
 from pzd.paper.figures.canvas import COLOURS, NUMBERS_OF_OTHERS
-from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.figures.planes import Curve, both_planes, element, identified, loop
+from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.published import LARGE_GAP, TABLES, table_damper
 
 
@@ -52,7 +52,9 @@ def modelled(part: str, data: FigureData, labels: dict[str, Condition], sine: Si
         ours, theirs = loop(element(identified(row)), sine), loop(element(tabulated(condition)), sine)
         curves.append(Curve(label, ours, colour=colour))
         curves.append(Curve(f"{label}, paper's parameters", theirs, colour=colour, style=NUMBERS_OF_OTHERS))
-        captions.append(f"{label}: {ours.peak:.0f} N, with the paper's parameters {theirs.peak:.0f} N; {parameters(row)}")
+        captions.append(
+            f"{label}: {ours.peak:.0f} N, with the paper's parameters {theirs.peak:.0f} N; {parameters(row)}"
+        )
     figure = both_planes(curves, columns=len(labels))
     return Drawing(part, figure, what, f"{sine}. Peak, " + ". ".join(captions) + ".")
 

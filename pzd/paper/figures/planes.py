@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from pzd.artefacts import ParameterRow
 from pzd.damper.model import BaseRow, Damper
 from pzd.paper.figures.canvas import COLOURS, DISPLACEMENT, FORCE, VELOCITY, key, panels
-from pzd.paper.figures.sources import FigureData, Sine, Test
 from pzd.paper.figures.figure import Drawing
+from pzd.paper.figures.sources import FigureData, Sine, Test
 from pzd.paper.loop import Loop, loop_of
 from pzd.paper.published import published
 from pzd.record import Array

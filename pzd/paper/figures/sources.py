@@ -11,12 +11,13 @@ from pzd.artefacts.matching import Conditions, matching
 from pzd.config import RunConfig, setting_in_use
 from pzd.paper.fidelity import SettingRides, rides_on
 from pzd.paper.loop import Loop
-from pzd.report.reference import Expected
 from pzd.quantities import Control
-from pzd.record import Array, Record
+from pzd.record import Record
+from pzd.report.reference import Expected
 from pzd.runs import Run
 from pzd.simulate.config import SimulateConfig
 from pzd.table.config import TableConfig
+
 
 @dataclass(frozen=True)
 class Sine:

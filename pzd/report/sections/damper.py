@@ -8,7 +8,7 @@ from pzd.artefacts import ParameterRow
 from pzd.damper.competing_forms import known
 from pzd.damper.model import BaseRow
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS, VOLTAGE
-from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
+from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext, effect_in_words
 from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
@@ -49,16 +49,16 @@ def _intro(context: ReportContext) -> str:
     )
 
 
-def _parameters(context: ReportContext) -> Sheet:
+def _parameters(context: ReportContext) -> TextTable:
     """T0, C and k of the damper that everything behind uses."""
     title = "T0, C and k beside what was missing" if context.extended else "T0, C and k of the Bingham element alone"
-    return Sheet(title, _header(context), tuple(_row(context, row) for row in context.final))
+    return TextTable(title, _header(context), tuple(_row(context, row) for row in context.final))
 
 
-def _alone(context: ReportContext) -> Sheet:
+def _alone(context: ReportContext) -> TextTable:
     """T0, C and k of the simple model: alone they also stand in for what it lacks."""
     title = "The simple model: T0, C and k of the Bingham element alone, standing in for what was missing"
-    return Sheet(title, _header(context), tuple(_row(context, row) for row in context.parameters), folded=True)
+    return TextTable(title, _header(context), tuple(_row(context, row) for row in context.parameters), folded=True)
 
 
 def _header(context: ReportContext) -> tuple[str, ...]:
@@ -90,7 +90,7 @@ def parameter(value: float) -> str:
     return number(value if value >= NO_FORCE else 0.0)
 
 
-def _force(context: ReportContext) -> Sheet:
+def _force(context: ReportContext) -> TextTable:
     first = min((row.temperature_degC for row in context.table.force), key=lambda t: -np.inf if t is None else t)
     rows = [row for row in context.table.force if row.temperature_degC == first and row.velocity_m_per_s > 0.0]
     voltages = sorted({row.voltage_V for row in rows}, key=lambda v: v or 0.0)
@@ -100,7 +100,7 @@ def _force(context: ReportContext) -> Sheet:
     cells = tuple((amount(v, "m/s"), *(_cell(at.get((v, volt))) for volt in voltages)) for v in chosen)
     degrees = f" at {amount(first, 'degC')}" if first is not None else ""
     header = ("speed in rebound", *(f"force at {context.voltage(volt)}" for volt in voltages))
-    return Sheet(f"Force{degrees}; in brackets the model beyond what the rig reached", header, cells)
+    return TextTable(f"Force{degrees}; in brackets the model beyond what the rig reached", header, cells)
 
 
 def _cell(row: object) -> str:
@@ -119,7 +119,7 @@ def _spread(speeds: list[float], reached: float) -> list[float]:
     return sorted({min(speeds, key=lambda v: abs(v - target)) for target in wanted})
 
 
-def _responses(context: ReportContext) -> Sheet:
+def _responses(context: ReportContext) -> TextTable:
     rows = tuple(
         (
             context.control.name if r.signal == VOLTAGE.name else r.signal,
@@ -130,7 +130,7 @@ def _responses(context: ReportContext) -> Sheet:
         )
         for r in context.rides.responses
     )
-    return Sheet(
+    return TextTable(
         "Answer to a step at constant speed",
         ("signal", "step", "speed", "to 63 %", "to 90 %", ""),
         rows,
@@ -138,7 +138,7 @@ def _responses(context: ReportContext) -> Sheet:
     )
 
 
-def _measures(context: ReportContext) -> Sheet:
+def _measures(context: ReportContext) -> TextTable:
     conditions = ("record", context.control.name, "temperature", "frequency", "amplitude")
     found = ("peak force", "force at zero velocity", "work per cycle", "equivalent c", "dynamic range")
     rows = tuple(
@@ -157,4 +157,4 @@ def _measures(context: ReportContext) -> Sheet:
         for m in context.identified.measures
         if m.setting == context.chosen
     )
-    return Sheet("Every test as an equivalent viscous damper", conditions + found, rows, folded=True)
+    return TextTable("Every test as an equivalent viscous damper", conditions + found, rows, folded=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pzd.artefacts import ReferenceRow
-from pzd.report.blocks import Paragraph, Section, Sheet
+from pzd.report.blocks import Paragraph, Section, TextTable
 from pzd.report.context import ReportContext
 from pzd.report.wording import DASH, amount, number
 
@@ -20,7 +20,7 @@ def render(context: ReportContext) -> tuple[Section, ...]:
     text = f"Expected numbers in {context.config.reference}: {len(reference)}, of which the run computes {met}."
     rows = tuple(_row(row) for row in reference)
     header = ("number", "expected", "computed", "ratio", "note")
-    sheet = Sheet("Expected and computed", header, rows, folded=len(rows) > _FOLD)
+    sheet = TextTable("Expected and computed", header, rows, folded=len(rows) > _FOLD)
     return (Section("expected", "What was expected", (Paragraph(text), sheet)),)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pzd.artefacts import Diagnosis, NextTest, Prediction, Ranked, Value
 from pzd.damper.competing_forms import known
-from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
+from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext, effect_in_words, effects_in_words
 from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.wording import DASH, amount, interval, listed, number, percent, sentence, unit_of
@@ -70,7 +70,7 @@ def _gap(diagnosis: Diagnosis) -> str:
     return f"{text} {weak[gap.hold_out]}"
 
 
-def _prediction(context: ReportContext, found: Prediction) -> Sheet:
+def _prediction(context: ReportContext, found: Prediction) -> TextTable:
     """W_s of every kept-back test and of every voltage left out, by the plain damper and the one handed on."""
     tests = [
         (
@@ -89,7 +89,7 @@ def _prediction(context: ReportContext, found: Prediction) -> Sheet:
     how = {"tests": "whole tests", "mixed": "whole tests, halves of those that are alone"}.get(
         found.hold_out, f"halves of a test, by {found.hold_out}, which is weak"
     )
-    return Sheet(
+    return TextTable(
         f"What was kept back from the fit ({how}), and how it is predicted",
         ("kept back", context.control.name, "W_s, simple model", "W_s, as handed on"),
         (whole, *tests, *left_out),
@@ -97,14 +97,14 @@ def _prediction(context: ReportContext, found: Prediction) -> Sheet:
     )
 
 
-def _parameters(context: ReportContext, diagnosis: Diagnosis) -> Sheet:
+def _parameters(context: ReportContext, diagnosis: Diagnosis) -> TextTable:
     rows = [
         row
         for effect, values in diagnosis.parameters.items()
         for name, value in values.items()
         for row in _value_rows(context, effect, _measured_from(diagnosis, effect, name), value)
     ]
-    return Sheet("What was added", ("effect", "parameter", "value (95 % interval)", "unit"), tuple(rows))
+    return TextTable("What was added", ("effect", "parameter", "value (95 % interval)", "unit"), tuple(rows))
 
 
 def _measured_from(diagnosis: Diagnosis, effect: str, name: str) -> str:
@@ -133,12 +133,12 @@ def _with_interval(value: float, low: float | None, high: float | None) -> str:
     return f"{number(value)} (edited by hand)" if low is None and high is None else interval(value, low, high)
 
 
-def _ranking(diagnosis: Diagnosis) -> Sheet:
+def _ranking(diagnosis: Diagnosis) -> TextTable:
     rows = tuple(
         (r.effect, number(r.gap_after), number(round(r.delta_bic), 6), _fitted(r), r.reason) for r in diagnosis.ranking
     )
     header = ("effect", "W_s left", "delta BIC", "fitted", "what became of it")
-    return Sheet("Every candidate, best first", header, rows, folded=len(rows) > _FOLD)
+    return TextTable("Every candidate, best first", header, rows, folded=len(rows) > _FOLD)
 
 
 def _fitted(ranked: Ranked) -> str:

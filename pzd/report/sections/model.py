@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pzd.artefacts import Gap
-from pzd.report.blocks import Block, Paragraph, Section, Sheet
+from pzd.report.blocks import Block, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext
 from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.wording import number, percent
@@ -19,7 +19,7 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     where = context.diagnosed.diagnosis.where
     if where:
         rows = tuple((region.region, percent(region.share_of_gap)) for region in where)
-        blocks.append(Sheet("Where the gap lies", ("region", "share of the gap"), rows))
+        blocks.append(TextTable("Where the gap lies", ("region", "share of the gap"), rows))
     return Section("model", "Where the simple model fails", tuple(blocks))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from pzd.artefacts import SummaryRow, WheelRow
 from pzd.comfort import directive, iso2631_1978, iso2631_1997
-from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
+from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import Comparison, ReportContext
 from pzd.report.sections.pictures import Pictures, by_turns
 from pzd.report.wording import DASH, amount, listed, minutes, number, percent
@@ -92,7 +92,7 @@ def _compared(context: ReportContext) -> Iterator[Block]:
     )
     header = ("road", "fidelity", "beside", f"a_w {policy}", "a_w of the other", "a_w", "wheel load", "travel")
     rows = tuple(_comparison_row(context, one, other) for one in found for other in one.others)
-    yield Sheet(f"{policy} beside the others at the same fidelity (a_w: ISO 2631-1:1997)", header, rows)
+    yield TextTable(f"{policy} beside the others at the same fidelity (a_w: ISO 2631-1:1997)", header, rows)
 
 
 def _comparison_row(context: ReportContext, one: Comparison, other: SummaryRow) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ def _all(context: ReportContext) -> list[SummaryRow]:
     return [row for road in context.roads for row in context.cases(road)]
 
 
-def _accelerations(context: ReportContext) -> Sheet:
+def _accelerations(context: ReportContext) -> TextTable:
     header = ("road", "dampers", "peak |a_K|", "r.m.s.", "a_w", "MTVV", "VDV", "crest factor", "likely to be felt as")
     rows = tuple(
         (
@@ -136,7 +136,9 @@ def _accelerations(context: ReportContext) -> Sheet:
         )
         for row in _all(context)
     )
-    return Sheet("Acceleration at K (a_w, MTVV, VDV and crest factor weighted by Wk, ISO 2631-1:1997)", header, rows)
+    return TextTable(
+        "Acceleration at K (a_w, MTVV, VDV and crest factor weighted by Wk, ISO 2631-1:1997)", header, rows
+    )
 
 
 _WEIGHTED = (("a_w", "m/s2"), ("MTVV", "m/s2"), ("VDV", "m/s^1.75"), ("crest_factor", "-"))
@@ -147,7 +149,7 @@ def _weighted_values(context: ReportContext, row: SummaryRow) -> str:
     return DASH if a_w is None else " to ".join(reaction.text for reaction in iso2631_1997.reactions(a_w))
 
 
-def _exposures(context: ReportContext) -> Iterator[Sheet]:
+def _exposures(context: ReportContext) -> Iterator[TextTable]:
     if iso2631_1978.EDITION not in context.config.editions:
         return
     rows = tuple(
@@ -160,7 +162,7 @@ def _exposures(context: ReportContext) -> Iterator[Sheet]:
         for row in _all(context)
     )
     names = (boundary.replace("_", " ") for boundary in iso2631_1978.FACTORS)
-    yield Sheet(
+    yield TextTable(
         f"Exposure times ({iso2631_1978.EDITION}, {iso2631_1978.TRUST})",
         ("road", "dampers", *names, "how (reduced comfort)"),
         rows,
@@ -172,7 +174,7 @@ def _status(context: ReportContext, case: str) -> str:
     return "" if row is None else row.status.removeprefix(f"{iso2631_1978.TRUST}; ")
 
 
-def _suspension(context: ReportContext) -> Sheet:
+def _suspension(context: ReportContext) -> TextTable:
     header = ("road", "dampers", "deflection", "wheel load, r.m.s.", "jerk, r.m.s.", "dissipated")
     rows = tuple(
         (
@@ -185,10 +187,10 @@ def _suspension(context: ReportContext) -> Sheet:
         )
         for row in _all(context)
     )
-    return Sheet("What comfort costs: travel and wheel load", header, rows)
+    return TextTable("What comfort costs: travel and wheel load", header, rows)
 
 
-def _wheels(context: ReportContext) -> Sheet:
+def _wheels(context: ReportContext) -> TextTable:
     """The axles side by side; what is at rest stands in the caption."""
     by_case: dict[str, list[WheelRow]] = {}
     for wheel in context.rides.wheels:
@@ -208,10 +210,10 @@ def _wheels(context: ReportContext) -> Sheet:
     )
     caption = "Force between wheel and road: the static load less the force of spring and damper"
     at = f" (at rest {listed(at_rest)}; pulling: share of the time at 0 or below)" if at_rest else ""
-    return Sheet(f"{caption}{at}", header, rows)
+    return TextTable(f"{caption}{at}", header, rows)
 
 
-def _daily(context: ReportContext) -> Iterator[Sheet]:
+def _daily(context: ReportContext) -> Iterator[TextTable]:
     if directive.EDITION not in context.config.editions:
         return
     header = ("road", "dampers", "A(8)", "VDV of the day", "action value after", "limit value after")
@@ -225,12 +227,12 @@ def _daily(context: ReportContext) -> Iterator[Sheet]:
         )
         for row in _all(context)
     )
-    yield Sheet(
+    yield TextTable(
         f"{directive.EDITION}, {number(context.config.daily_exposure_h)} h a day, vertical direction only", header, rows
     )
 
 
-def _worth(context: ReportContext) -> Sheet:
+def _worth(context: ReportContext) -> TextTable:
     pairs = [(row, other) for row in _all(context) if (other := context.without(row)) is not None]
     rows = tuple(
         (
@@ -243,7 +245,7 @@ def _worth(context: ReportContext) -> Sheet:
         for row, other in pairs
     )
     header = ("road", "dampers", "peak without", "peak with", "a_w without", "a_w with", "time without", "time with")
-    return Sheet("With and without the missing effect (time: reduced comfort)", header, rows)
+    return TextTable("With and without the missing effect (time: reduced comfort)", header, rows)
 
 
 def _beyond(context: ReportContext) -> Iterator[str]:

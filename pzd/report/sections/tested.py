@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.artefacts import RecordEntry
 from pzd.record import Record
-from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
+from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext
 from pzd.report.wording import amount, number
 
@@ -82,7 +82,7 @@ def _span(low: str, high: str) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _records(context: ReportContext) -> Sheet:
+def _records(context: ReportContext) -> TextTable:
     header = (
         "record",
         context.control.name,
@@ -96,7 +96,7 @@ def _records(context: ReportContext) -> Sheet:
     )
     pairs = [(context.entries[r.name], r) for r in context.records if r.name in context.entries]
     rows = tuple(_row(context, entry, record) for entry, record in pairs)
-    return Sheet("Records", header, rows, folded=len(rows) > _FOLD)
+    return TextTable("Records", header, rows, folded=len(rows) > _FOLD)
 
 
 def _row(context: ReportContext, entry: RecordEntry, record: Record) -> tuple[str, ...]:
@@ -113,12 +113,12 @@ def _row(context: ReportContext, entry: RecordEntry, record: Record) -> tuple[st
     )
 
 
-def _findings(context: ReportContext) -> Sheet:
+def _findings(context: ReportContext) -> TextTable:
     rows = tuple(
         (entry.name, finding.check, finding.where, amount(finding.size, finding.unit), finding.follows)
         for entry in context.rig.entries
         for finding in entry.findings
     )
-    return Sheet(
+    return TextTable(
         "Findings of the preflight", ("record", "check", "where", "size", "what follows"), rows, len(rows) > _FOLD
     )

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from pzd.artefacts import ENERGY_LIMIT, ParameterRow
 from pzd.comfort import iso2631_1978
-from pzd.report.blocks import Block, Notes, Paragraph, Section, Sheet
+from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext
 from pzd.report.wording import amount, number, percent
 
@@ -67,11 +67,11 @@ def _cares(context: ReportContext) -> Iterator[str]:
     yield "vibration is judged in the vertical direction at point K only, without a seat"
 
 
-def _balance(context: ReportContext) -> Sheet:
+def _balance(context: ReportContext) -> TextTable:
     rows = tuple(
         (row.case, number(row.energy_error, 2), percent(row.outside_table) if row.outside_table else "0 %")
         for row in context.rides.summary
     )
-    return Sheet(
+    return TextTable(
         "Energy balance and table", ("ride", "energy error / dissipated", "time outside of the rig's range"), rows, True
     )

@@ -12,7 +12,7 @@ from pzd.artefacts import Finding
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Quantity
 from pzd.record import Array
 from pzd.rig.files.layout import LABELS, NEEDED, ChannelSpec, Layout
-from pzd.rig.files.sheet import Sheet, Step
+from pzd.rig.files.sheet import ReadingStep, Sheet
 from pzd.rig.files.units import UnitError, in_header, to_canonical
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.nearest import nearest
@@ -41,7 +41,7 @@ class Channels:
     """Cells that are bad or empty, each with its line."""
     remarks: tuple[Finding, ...] = ()
     """What the file itself says otherwise than the config."""
-    steps: tuple[Step, ...] = ()
+    steps: tuple[ReadingStep, ...] = ()
     """What was renamed, converted and turned."""
 
 
@@ -99,24 +99,24 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
     return Channels(values, remarks=_remarks(sheet, found), steps=tuple(_steps(sheet, found, values)))
 
 
-def _steps(sheet: Sheet, found: list[_Source], values: dict[Quantity, Array]) -> Iterator[Step]:
+def _steps(sheet: Sheet, found: list[_Source], values: dict[Quantity, Array]) -> Iterator[ReadingStep]:
     """What was done to each column; nothing for one that stands there as it is handed on."""
     for source in found:
         spec, own, head = source.spec, source.spec.own, sheet.header[source.column]
         if spec.quantity not in values:
-            yield Step("left out", own.name, f"column {head!r}", "every cell is empty")
+            yield ReadingStep("left out", own.name, f"column {head!r}", "every cell is empty")
             continue
         if head != own.column:
-            yield Step("rename", own.name, f"column {head!r}", own.column)
+            yield ReadingStep("rename", own.name, f"column {head!r}", own.column)
         if source.dated:
-            yield Step("unit", own.name, f"dates and times like {source.unit}", "s since the first")
+            yield ReadingStep("unit", own.name, f"dates and times like {source.unit}", "s since the first")
         elif source.unit != own.unit:
             zero, one = to_canonical(np.array([0.0, 1.0]), source.unit, own)
             offset = f" {zero:+.10g}" if zero else ""
             if offset or one != 1.0:
-                yield Step("unit", own.name, source.unit, f"{own.unit}: times {one - zero:.10g}{offset}")
+                yield ReadingStep("unit", own.name, source.unit, f"{own.unit}: times {one - zero:.10g}{offset}")
         if spec.sign < 0:
-            yield Step("sign", own.name, "as recorded", "times -1")
+            yield ReadingStep("sign", own.name, "as recorded", "times -1")
 
 
 def _remarks(sheet: Sheet, found: list[_Source]) -> tuple[Finding, ...]:

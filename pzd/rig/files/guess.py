@@ -13,7 +13,7 @@ import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
 from pzd.record import Array
-from pzd.rig.config import FilesEntry, NamedLayout, Split
+from pzd.rig.config import FilesEntry, FileSplit, NamedLayout
 from pzd.rig.files.fitting import best_layout
 from pzd.rig.files.formats import TEXT, read_sheet
 from pzd.rig.files.headers import assigned, control_of, is_canonical, unit_of
@@ -240,7 +240,7 @@ def _events(file: _File) -> Iterator[str]:
         return
     wanted = Wanted(texts=frozenset((head,)))
     try:
-        sheet = read_sheet(file.path, _as_sniffed(file, Split(event=head, begins=" ")), wanted, "rig.files")
+        sheet = read_sheet(file.path, _as_sniffed(file, FileSplit(event=head, begins=" ")), wanted, "rig.files")
     except DataError:
         return
     later = [text for text in sheet.texts[sheet.header.index(head)][1:] if _GOES_ON.search(text)]
@@ -248,7 +248,7 @@ def _events(file: _File) -> Iterator[str]:
         yield f"split: {{event: {written(head)}, begins: {written(later[0])}}}"
 
 
-def _as_sniffed(file: _File, split: Split | None = None) -> FilesEntry:
+def _as_sniffed(file: _File, split: FileSplit | None = None) -> FilesEntry:
     dialect = file.dialect
     said: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
     if file.form == TEXT:

@@ -12,7 +12,7 @@ from pzd.quantities import ACCELERATION, PRESSURE, TEMPERATURE, TIME, VELOCITY, 
 from pzd.record import Record
 from pzd.rig.config import Limits
 from pzd.rig.files.fixture import Freed
-from pzd.rig.files.sheet import Step
+from pzd.rig.files.sheet import ReadingStep
 from pzd.rig.files.splitting import Test
 from pzd.rig.preflight import Measured
 from pzd.schema.errors import ConfigError
@@ -51,7 +51,7 @@ def measured(name: str, test: Test, freed: Freed, limits: Limits, control: Contr
 
 def _ingested(name: str, test: Test, freed: Freed) -> tuple[IngestRow, ...]:
     """What was done to the file of a record, as rows of the ingest report."""
-    steps = (*test.steps, *([Step("fixture", None, freed.said, "taken out")] if freed.said else []))
+    steps = (*test.steps, *([ReadingStep("fixture", None, freed.said, "taken out")] if freed.said else []))
     return tuple(
         IngestRow(record=name, file=test.sheet.path.name, step=s.step, quantity=s.quantity, was=s.was, became=s.became)
         for s in steps

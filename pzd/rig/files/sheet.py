@@ -29,7 +29,7 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Step:
+class ReadingStep:
     """One thing that was done on the way from a file to its records, for the ingest report."""
 
     step: Literal["read", "left out", "rename", "unit", "sign", "value", "cut", "fixture"]
@@ -68,7 +68,7 @@ class Sheet:
     """Name of the table that begins at each start; empty where the file is one table."""
     elsewhere: dict[str, str] = field(default_factory=dict)
     """Headers of the tables that are left out, each with its table."""
-    steps: tuple[Step, ...] = ()
+    steps: tuple[ReadingStep, ...] = ()
     """What was read and what was left out."""
 
     @property

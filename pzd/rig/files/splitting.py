@@ -10,10 +10,10 @@ import numpy as np
 from pzd.artefacts import Finding
 from pzd.quantities import FORCE, TIME, Quantity
 from pzd.record import Array
-from pzd.rig.config import Split
+from pzd.rig.config import FileSplit
 from pzd.rig.files.channels import Channels
 from pzd.rig.files.layout import ChannelSpec, Layout, Values
-from pzd.rig.files.sheet import Sheet, Step
+from pzd.rig.files.sheet import ReadingStep, Sheet
 from pzd.schema.errors import ConfigError, DataError
 
 
@@ -39,7 +39,7 @@ class Test:
     """What the force of the cell was multiplied by."""
     whole: bool = True
     """Whether the file is meant to be one test, in which the clock must go on."""
-    steps: tuple[Step, ...] = ()
+    steps: tuple[ReadingStep, ...] = ()
     """What was done to the file on the way here."""
 
     def place(self, row: int) -> str:
@@ -108,7 +108,7 @@ def _given_under(layout: Layout, spec: ChannelSpec) -> str:
     return "split.constants" if entry.split and names & set(entry.split.constants) else "pattern"
 
 
-def _starts(sheet: Sheet, split: Split | None, time: Array, place: str) -> list[int]:
+def _starts(sheet: Sheet, split: FileSplit | None, time: Array, place: str) -> list[int]:
     """First rows of the tests: where the config says, and where the file itself begins another table."""
     begins = np.zeros(sheet.rows, dtype=np.bool_)
     if split is not None and split.gap_s is not None:
@@ -127,10 +127,10 @@ def _starts(sheet: Sheet, split: Split | None, time: Array, place: str) -> list[
 
 def _steps(
     sheet: Sheet, layout: Layout, values: Values, index: int, first: int, last: int, count: int
-) -> Iterator[Step]:
+) -> Iterator[ReadingStep]:
     """Which rows are this test, and the values that no column holds."""
     if count > 1:
-        yield Step(
+        yield ReadingStep(
             "cut", None, f"test {index + 1} of {count}", f"{last - first} rows from {sheet.place_in_file(first)}"
         )
     for spec in layout.channels:
@@ -138,7 +138,7 @@ def _steps(
             given = values[spec.quantity]
             value = given[index if len(given) > 1 else 0]
             under = _given_under(layout, spec)
-            yield Step("value", spec.own.name, f"no column; {under}", f"{value:.6g} {spec.own.unit}")
+            yield ReadingStep("value", spec.own.name, f"no column; {under}", f"{value:.6g} {spec.own.unit}")
 
 
 def _piece(channels: dict[Quantity, Array], values: Values, index: int, first: int, last: int) -> dict[Quantity, Array]:

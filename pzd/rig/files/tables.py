@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array
-from pzd.rig.files.sheet import Sheet, Step, Wanted, table_place
+from pzd.rig.files.sheet import ReadingStep, Sheet, Wanted, table_place
 from pzd.schema.errors import DataError, at
 
 Cells = Array | list[str]
@@ -29,7 +29,7 @@ _UNITS, _VALUES = ("unit", "units"), ("values", "value", "data")
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class FileTable:
     """Named columns of one length."""
 
     name: str
@@ -50,7 +50,7 @@ class Table:
         return len(self.cells[0]) if self.cells else 0
 
 
-def sheet_of(path: Path, tables: Sequence[Table], pattern: str | None, wanted: Wanted) -> Sheet:
+def sheet_of(path: Path, tables: Sequence[FileTable], pattern: str | None, wanted: Wanted) -> Sheet:
     """The wanted columns of every table that holds a recording, one below the other.
 
     Parameters
@@ -95,7 +95,7 @@ def sheet_of(path: Path, tables: Sequence[Table], pattern: str | None, wanted: W
 
 def tables_of_tree(
     tree: Mapping[str, Any], name: str = "", constants: Mapping[str, float] | None = None
-) -> list[Table]:
+) -> list[FileTable]:
     """The tables of a tree of structures: arrays of one length in one structure are the columns of one table.
 
     Parameters
@@ -127,10 +127,10 @@ def tables_of_tree(
     return found
 
 
-def table_of_rows(name: str, rows: Sequence[Mapping[str, Any]]) -> Table:
+def table_of_rows(name: str, rows: Sequence[Mapping[str, Any]]) -> FileTable:
     """The table of a list of rows, each a mapping of header to cell."""
     header = list(dict.fromkeys(head for row in rows for head in row))
-    return Table(name, tuple(header), tuple(cells_of([row.get(head) for row in rows]) for head in header))
+    return FileTable(name, tuple(header), tuple(cells_of([row.get(head) for row in rows]) for head in header))
 
 
 def cells_of(values: Sequence[Any]) -> Cells:
@@ -163,12 +163,12 @@ def number(text: str) -> float:
     return value
 
 
-def equal_lengths(name: str, columns: Mapping[str, tuple[Cells, str]]) -> list[Table]:
+def equal_lengths(name: str, columns: Mapping[str, tuple[Cells, str]]) -> list[FileTable]:
     """Columns of one group as tables, one a length: channels of different rates are not one table."""
     return _by_length(name, columns, {})
 
 
-def _by_length(name: str, columns: Mapping[str, tuple[Cells, str]], numbers: Mapping[str, float]) -> list[Table]:
+def _by_length(name: str, columns: Mapping[str, tuple[Cells, str]], numbers: Mapping[str, float]) -> list[FileTable]:
     lengths = list(dict.fromkeys(len(cells) for cells, _ in columns.values()))
     found = []
     for length in lengths:
@@ -178,7 +178,7 @@ def _by_length(name: str, columns: Mapping[str, tuple[Cells, str]], numbers: Map
         units = tuple(unit for _, unit in every.values())
         said = f"{name} of {length} rows".strip() if len(lengths) > 1 else name
         found.append(
-            Table(said, tuple(every), tuple(cells for cells, _ in every.values()), units if any(units) else None)
+            FileTable(said, tuple(every), tuple(cells for cells, _ in every.values()), units if any(units) else None)
         )
     return found
 
@@ -216,12 +216,12 @@ def _columns(key: str, value: Any) -> Iterator[tuple[str, Cells]]:
         yield key, [str(cell).strip() for cell in value]
 
 
-def _matches(table: Table, wanted: Wanted) -> int:
+def _matches(table: FileTable, wanted: Wanted) -> int:
     """How many of the quantities that a recording must have stand in a table."""
     return sum(bool(heads & set(table.header)) for heads in wanted.needed)
 
 
-def _differences(path: Path, first: Table, other: Table, asked: Iterable[str]) -> Iterator[str]:
+def _differences(path: Path, first: FileTable, other: FileTable, asked: Iterable[str]) -> Iterator[str]:
     """Where a second table cannot be read as the first is."""
     for head in asked:
         if (head in first.header) != (head in other.header):
@@ -237,23 +237,25 @@ def _differences(path: Path, first: Table, other: Table, asked: Iterable[str]) -
             )
 
 
-def _unit(table: Table, head: str) -> str:
+def _unit(table: FileTable, head: str) -> str:
     return "" if table.units is None else table.units[table.header.index(head)]
 
 
-def _steps(tables: Sequence[Table], taken: Sequence[Table], asked: Iterable[str]) -> Iterator[Step]:
+def _steps(tables: Sequence[FileTable], taken: Sequence[FileTable], asked: Iterable[str]) -> Iterator[ReadingStep]:
     """Which tables and columns are read, and which are left out."""
     names = ", ".join(repr(table.name) for table in taken if table.name)
-    yield Step("read", None, f"table {names}".strip(), f"{sum(table.rows for table in taken)} rows")
+    yield ReadingStep("read", None, f"table {names}".strip(), f"{sum(table.rows for table in taken)} rows")
     unread = list(dict.fromkeys(head for table in taken for head in table.header if head not in asked))
     if unread:
-        yield Step("left out", None, f"columns {', '.join(unread)}", "")
+        yield ReadingStep("left out", None, f"columns {', '.join(unread)}", "")
     for table in tables:
         if table not in taken:
-            yield Step("left out", None, f"table {table.name!r}, {table.rows} rows", "no recording, or not asked for")
+            yield ReadingStep(
+                "left out", None, f"table {table.name!r}, {table.rows} rows", "no recording, or not asked for"
+            )
 
 
-def _with_cells(bare: Sheet, tables: Sequence[Table], wanted: Wanted) -> Sheet:
+def _with_cells(bare: Sheet, tables: Sequence[FileTable], wanted: Wanted) -> Sheet:
     """The sheet with the wanted cells of every table, and what is wrong with them."""
     for index, head in enumerate(bare.header):
         unit = bare.units[index] if bare.units else ""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from pzd.artefacts import Finding
 from pzd.rig.preflight import Measured
+from pzd.signals.root_mean_square import rms
 
 GAIN = 0.03
 """Deviation of the ratio of both speeds from one that is said."""
@@ -19,7 +18,7 @@ def check(test: Measured) -> list[Finding]:
     if recorded is derived:
         return []
     gain = float(recorded @ derived / (derived @ derived))
-    rest = float(np.sqrt(np.mean((recorded - gain * derived) ** 2)) / np.sqrt(np.mean(derived**2)))
+    rest = rms(recorded - gain * derived) / rms(derived)
     if abs(gain - 1.0) > GAIN:
         return [
             Finding(

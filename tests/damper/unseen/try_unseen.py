@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from pzd.artefacts import Diagnosed, ForceRow, Table, TableNotes
 from pzd.blind.case import Places
 from pzd.blind.diagnosis import COST, Methods, diagnose_case
-from pzd.blind.hide import Setup, hide
+from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.plan import PlannedCase, hideable
 from pzd.config import load
 from pzd.damper.compose import respond, steady_force
@@ -193,7 +193,7 @@ def named(name: str) -> dict[str, object]:
         path = Path(folder) / "unseen.yaml"
         path.write_text(CONFIG, encoding="utf-8")
         config = load(path, ())
-        setup = Setup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
+        setup = BenchmarkSetup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
         places, planned = Places(Path(folder)), PlannedCase(0, "single", "all", (name,))
         hide(setup, planned, places)
         methods = Methods(config.identify, config.diagnose, config.rig.limits, setup.control, config.seed)

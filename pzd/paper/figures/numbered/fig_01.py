@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.figures.scheme import OIL_COLOUR, Pen
+from pzd.paper.figures.sources import FigureData
 
 
 def draw(data: FigureData) -> Iterator[Drawing]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.figures.planes import measured
+from pzd.paper.figures.sources import FigureData
 
 LABELS = {"F5-0": "0 V", "F5-50": "50 V", "F5-100": "100 V", "F5-150": "150 V"}
 

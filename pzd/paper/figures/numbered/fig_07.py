@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pzd.paper.figures.canvas import FINAL, BASELINE, SOFT, panels
-from pzd.paper.figures.sources import FigureData
+from pzd.paper.figures.canvas import BASELINE, FINAL, SOFT, panels
 from pzd.paper.figures.figure import Drawing, PaperFigure
+from pzd.paper.figures.sources import FigureData
 from pzd.paper.published import published
 
 MASS_KG, HEAT_J_PER_KG_K = 5.0, 500.0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.figures.planes import measured
+from pzd.paper.figures.sources import FigureData
 
 LABELS = {"F8-23": "23 °C", "F8-43": "43 °C"}
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.paper.figures.canvas import MEASURED, BASELINE
-from pzd.paper.figures.sources import Condition, FigureData, Sine
+from pzd.paper.figures.canvas import BASELINE, MEASURED
 from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.figures.planes import Curve, both_planes, fitted, over_last_cycle
+from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.published import SMALL_GAP
 
 AT, SINE = Condition(SMALL_GAP, 100.0), Sine(1.0, 0.022)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.figures.models import modelled
+from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.published import LARGE_GAP
 
 CONDITIONS = {f"{voltage:g} V": Condition(LARGE_GAP, voltage) for voltage in (0.0, 50.0, 100.0, 150.0)}

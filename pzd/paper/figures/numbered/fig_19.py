@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.artefacts import RIDE_COLUMNS, WheelRow
-from pzd.paper.figures.canvas import FINAL, BASELINE, key, panels
+from pzd.paper.car_search import CONSTANT_PEAKS, CONTROLLED_PEAKS, FREQUENCIES
+from pzd.paper.figures.canvas import BASELINE, FINAL, key, panels
 from pzd.paper.figures.cars import survey
-from pzd.paper.figures.sources import FigureData
 from pzd.paper.figures.fidelities import fidelities
 from pzd.paper.figures.figure import Drawing, PaperFigure
-from pzd.paper.car_search import CONSTANT_PEAKS, CONTROLLED_PEAKS, FREQUENCIES
+from pzd.paper.figures.sources import FigureData
 
 _SHOWN = 2.0
 """Length of what is shown of the settled ride [s]."""
@@ -70,8 +70,8 @@ def contact(data: FigureData) -> str:
         )
     return (
         "The car has no unsprung masses, so the force between wheel and road is the static load less the force of "
-        f"spring and damper; under control it falls to {'; '.join(told)}: below 0 the wheels pull on the road, which no "
-        "wheel can."
+        f"spring and damper; under control it falls to {'; '.join(told)}: below 0 the wheels pull on the road, which "
+        "no wheel can."
     )
 
 

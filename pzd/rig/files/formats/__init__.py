@@ -21,7 +21,7 @@ from typing import Any
 
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.sheet import Sheet, Wanted
-from pzd.rig.files.tables import Table, sheet_of
+from pzd.rig.files.tables import FileTable, sheet_of
 from pzd.schema.errors import ConfigError, DataError, FilesError, UserError, at
 
 TEXT = "text"
@@ -92,14 +92,14 @@ def read_sheet(path: Path, entry: FilesEntry, wanted: Wanted, place: str) -> She
     return sheet_of(path, tables_in(path, entry, module), entry.table, wanted)
 
 
-def tables_in(path: Path, entry: FilesEntry, module: ModuleType) -> list[Table]:
+def tables_in(path: Path, entry: FilesEntry, module: ModuleType) -> list[FileTable]:
     """The tables of a file of one format.
 
     Raises
     ------
     DataError : when the library of the format cannot read it
     """
-    found: list[Table] = _by_library(path, module, lambda: module.tables(path, entry))
+    found: list[FileTable] = _by_library(path, module, lambda: module.tables(path, entry))
     return found
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import Table, cells_of, spelled
+from pzd.rig.files.tables import FileTable, cells_of, spelled
 
 KIND = "an Excel file"
 SUFFIXES = (".xlsx", ".xlsm")
@@ -36,13 +36,13 @@ def rows(path: Path) -> dict[str, list[list[str]]]:
     return {name: [["" if v is None else spelled(v) for v in row] for row in found] for name, found in _cells(path)}
 
 
-def tables(path: Path, entry: FilesEntry) -> list[Table]:
+def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
     """Every sheet that has rows below its header."""
     found = (_table(name, cells, entry) for name, cells in _cells(path))
     return [table for table in found if table is not None]
 
 
-def _table(name: str, cells: list[list[Any]], entry: FilesEntry) -> Table | None:
+def _table(name: str, cells: list[list[Any]], entry: FilesEntry) -> FileTable | None:
     """One sheet; None where nothing stands below its header."""
     above = (entry.header is None) + entry.units_row
     heads, body = cells[entry.skip : entry.skip + above], cells[entry.skip + above :]
@@ -51,7 +51,7 @@ def _table(name: str, cells: list[list[Any]], entry: FilesEntry) -> Table | None
     if not width or not body:
         return None
     units = tuple(spelled(v) if v is not None else "" for v in heads[-1][:width]) if entry.units_row else None
-    return Table(
+    return FileTable(
         name,
         tuple("" if head is None else spelled(head) for head in named[:width]),
         tuple(cells_of([row[n] for row in body]) for n in range(width)),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import Table, tables_of_tree
+from pzd.rig.files.tables import FileTable, tables_of_tree
 
 KIND = "an HDF5 file"
 SUFFIXES = (".h5", ".hdf5", ".hdf")
@@ -24,7 +24,7 @@ def holds(path: Path, start: bytes) -> bool:
     return MAGIC in (start[:8], start[512:520], start[1024:1032], start[2048:2056])
 
 
-def tables(path: Path, entry: FilesEntry) -> list[Table]:
+def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
     """The tables of the groups."""
     import h5py
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import Table, table_of_rows, tables_of_tree
+from pzd.rig.files.tables import FileTable, table_of_rows, tables_of_tree
 from pzd.schema.errors import DataError, at
 
 KIND = "a JSON file"
@@ -30,7 +30,7 @@ def holds(path: Path, start: bytes) -> bool:
     return True
 
 
-def tables(path: Path, entry: FilesEntry) -> list[Table]:
+def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
     """The tables of the objects."""
     try:
         read = json.loads(path.read_bytes(), parse_constant=_no_number, object_pairs_hook=_object)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import Table, tables_of_tree
+from pzd.rig.files.tables import FileTable, tables_of_tree
 from pzd.schema.errors import DataError, at
 
 KIND = "a MATLAB file"
@@ -23,7 +23,7 @@ def holds(path: Path, start: bytes) -> bool:
     return start.startswith(b"MATLAB 5.0")
 
 
-def tables(path: Path, entry: FilesEntry) -> list[Table]:
+def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
     """The tables of the variables and structures.
 
     Raises

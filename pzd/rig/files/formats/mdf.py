@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import Cells, Table, equal_lengths
+from pzd.rig.files.tables import Cells, FileTable, equal_lengths
 
 KIND = "an MDF file"
 SUFFIXES = (".mf4", ".mdf")
@@ -27,7 +27,7 @@ def holds(path: Path, start: bytes) -> bool:
     return start.startswith((b"MDF     ", b"UnFinMF "))
 
 
-def tables(path: Path, entry: FilesEntry) -> list[Table]:
+def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
     """The tables of the channel groups, in physical values."""
     found = []
     with path.open("rb") as opened, _opened(opened) as file:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pzd.record import Array
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import text_of
-from pzd.rig.files.tables import Cells, Table, number
+from pzd.rig.files.tables import Cells, FileTable, number
 from pzd.schema.errors import DataError, at
 
 KIND = "a file of MTS's acquisition blocks"
@@ -38,7 +38,7 @@ def holds(path: Path, start: bytes) -> bool:
     return start.removeprefix(b"\xef\xbb\xbf").startswith(SIGNATURE.encode())
 
 
-def tables(path: Path, entry: FilesEntry) -> list[Table]:
+def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
     """One table a block.
 
     Raises
@@ -53,7 +53,7 @@ def tables(path: Path, entry: FilesEntry) -> list[Table]:
         _block(path, lines, first, last, decimal) for first, last in zip(begins, [*begins[1:], len(lines)], strict=True)
     ]
     return [
-        Table(f"block {n + 1}" if len(blocks) > 1 else "", *block)
+        FileTable(f"block {n + 1}" if len(blocks) > 1 else "", *block)
         for n, block in enumerate(blocks)
         if block is not None
     ]

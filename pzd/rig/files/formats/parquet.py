@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import Table, cells_of
+from pzd.rig.files.tables import FileTable, cells_of
 
 KIND = "a Parquet file"
 SUFFIXES = (".parquet", ".pq")
@@ -18,7 +18,7 @@ def holds(path: Path, start: bytes) -> bool:
     return start.startswith(b"PAR1")
 
 
-def tables(path: Path, entry: FilesEntry) -> list[Table]:
+def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
     """The one table of the file."""
     from pyarrow import parquet
 
@@ -30,7 +30,7 @@ def tables(path: Path, entry: FilesEntry) -> list[Table]:
         else column.to_numpy().astype(float)
         for column in table.columns
     )
-    return [Table("", tuple(name.strip() for name in table.column_names), cells, units if any(units) else None)]
+    return [FileTable("", tuple(name.strip() for name in table.column_names), cells, units if any(units) else None)]
 
 
 def _plain(kind: object) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import Cells, Table, cells_of, equal_lengths
+from pzd.rig.files.tables import Cells, FileTable, cells_of, equal_lengths
 from pzd.schema.errors import DataError, at
 
 KIND = "a TDMS file"
@@ -25,7 +25,7 @@ def holds(path: Path, start: bytes) -> bool:
     return start.startswith(b"TDSm")
 
 
-def tables(path: Path, entry: FilesEntry) -> list[Table]:
+def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
     """The tables of the groups.
 
     Raises
@@ -40,7 +40,7 @@ def tables(path: Path, entry: FilesEntry) -> list[Table]:
     return [table for group in file.groups() for table in _group(group.name, group.channels())]
 
 
-def _group(name: str, channels: Sequence[Any]) -> list[Table]:
+def _group(name: str, channels: Sequence[Any]) -> list[FileTable]:
     """The tables of one group: waveforms of one clock stand in one table, with what has no clock of its own."""
     filled = [channel for channel in channels if len(channel)]
     clocks = list(dict.fromkeys(filter(None, map(_clock, filled))))

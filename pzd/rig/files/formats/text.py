@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pzd.record import Array
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import BLANKS, after_lines, field_counts, fields_of, separator_of, text_of, without_blank_end
-from pzd.rig.files.sheet import Sheet, Step, Wanted
+from pzd.rig.files.sheet import ReadingStep, Sheet, Wanted
 from pzd.schema.errors import DataError, at
 
 if TYPE_CHECKING:
@@ -220,17 +220,17 @@ def _sheet(
     return Sheet(path, tuple(header), header_line, units, int(lines.size), lines, numbers, texts, faults, steps=steps)
 
 
-def _steps(entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[np.int64]) -> Iterator[Step]:
+def _steps(entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[np.int64]) -> Iterator[ReadingStep]:
     """What is read of a file, and the lines and columns that are left out."""
     if entry.skip:
-        yield Step("left out", None, f"{entry.skip} lines above the header", "")
+        yield ReadingStep("left out", None, f"{entry.skip} lines above the header", "")
     dropped = int(lines[-1] - lines[0]) + 1 - lines.size
     if dropped:
-        yield Step("left out", None, f"{dropped} lines that begin with {entry.comment!r}", "")
-    yield Step("read", None, f"lines {lines[0]} to {lines[-1]}", f"{lines.size} rows")
+        yield ReadingStep("left out", None, f"{dropped} lines that begin with {entry.comment!r}", "")
+    yield ReadingStep("read", None, f"lines {lines[0]} to {lines[-1]}", f"{lines.size} rows")
     unread = [head for head in header if head not in wanted.numbers | wanted.texts]
     if unread:
-        yield Step("left out", None, f"columns {', '.join(unread)}", "")
+        yield ReadingStep("left out", None, f"columns {', '.join(unread)}", "")
 
 
 def _uneven(
