@@ -9,7 +9,6 @@ from importlib.util import find_spec
 
 from pzd.export.format import Format
 from pzd.schema.errors import ConfigError
-from pzd.schema.nearest import nearest
 
 
 @lru_cache(maxsize=1)
@@ -27,6 +26,8 @@ def format_of(name: str) -> Format:
     ConfigError : when there is none, or its library is not installed
     """
     if name not in formats():
+        from pzd.schema.nearest import nearest
+
         near = nearest(name, formats())
         hint = f"; did you mean {near}?" if near else ""
         raise ConfigError(f"--to: no such format; there are {', '.join(formats())}{hint} (got {name})")
