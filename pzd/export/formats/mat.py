@@ -56,23 +56,16 @@ def _inverse(content: Content) -> dict[str, Any]:
     """The control signal over velocity and share of the range of forces, at each temperature."""
     import numpy as np
 
-    velocities = content.grid.velocities
-    shares = np.linspace(0.0, 1.0, content.force_levels)
-    low, high, signal = [], [], []
-    for lookup in content.lookups:
-        least, most = lookup.range(velocities)
-        least, most = (np.where(least <= most, bound, np.nan) for bound in (least, most))
-        wanted = least[:, np.newaxis] + shares * (most - least)[:, np.newaxis]
-        low.append(least)
-        high.append(most)
-        signal.append(lookup.nearest_voltage_for(wanted, velocities[:, np.newaxis]))
-    several = len(content.lookups) > 1
+    from pzd.export.inverse import inverses
+
+    found = inverses(content)
+    several = len(found) > 1
     return {
-        "inverse_bp1": velocities,
-        "inverse_bp2": shares,
-        "inverse": np.stack(signal, axis=2) if several else signal[0],
-        "inverse_low": np.stack(low, axis=1) if several else low[0],
-        "inverse_high": np.stack(high, axis=1) if several else high[0],
+        "inverse_bp1": content.grid.velocities,
+        "inverse_bp2": found[0].shares,
+        "inverse": np.stack([one.signals for one in found], axis=2) if several else found[0].signals,
+        "inverse_low": np.stack([one.low for one in found], axis=1) if several else found[0].low,
+        "inverse_high": np.stack([one.high for one in found], axis=1) if several else found[0].high,
     }
 
 
