@@ -32,7 +32,7 @@ def single(value: float) -> str:
 
 def double(value: float) -> str:
     """A constant of double precision."""
-    return repr(float(value))
+    return repr(float(value)).replace("inf", "INFINITY")
 
 
 def array(kind: str, name: str, values: ArrayLike, written: Callable[[float], str]) -> str:
