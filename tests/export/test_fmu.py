@@ -10,6 +10,7 @@ import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -24,6 +25,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.export.content import Content
 from pzd.export.dynamics import CARRIED, OF_THE_RIG, Dynamics, data_of
+from pzd.export.format import Files
 from pzd.export.formats import formats
 from pzd.schema.errors import ConfigError
 
@@ -120,23 +122,32 @@ def held_inputs(rng: np.random.Generator) -> Held:
     return Held(step, displacement, velocity, voltage, np.repeat(rng.uniform(10.0, 70.0, STEPS // 20), 20))
 
 
-def inputs_at(content: Content, held: Held, i: int) -> dict[int, float]:
-    """What is set before a step, by value reference."""
-    given = {0: held.displacement[i], 1: held.velocity[i]}
-    given |= {2: held.voltage[i]} if content.controlled else {}
-    return given | ({3: held.temperature[i]} if Dynamics.of(content.damper, "fmu").warms else {})
+@cache
+def exported(name: str) -> tuple[Content, Files]:
+    """One of the exact dampers, and its FMUs."""
+    content = content_of(EXACT[name])
+    return content, formats()["fmu"].files(content)
 
 
-def run_by_fmpy(version: int) -> Callable[[Content, Held, Path], np.ndarray]:
+def inputs_of(name: str, held: Held) -> tuple[list[int], list[list[float]]]:
+    """Value references of the inputs, and what is set before each step."""
+    content, _ = exported(name)
+    columns = {0: held.displacement, 1: held.velocity}
+    columns |= {2: held.voltage} if content.controlled else {}
+    columns |= {3: held.temperature} if Dynamics.of(content.damper, "fmu").warms else {}
+    return list(columns), np.column_stack(list(columns.values())).tolist()
+
+
+def run_by_fmpy(version: int) -> Callable[[str, Held, Path], np.ndarray]:
     """Forces at the end of each step by FMPy, which validates the FMU first."""
 
-    def run(content: Content, held: Held, folder: Path) -> np.ndarray:
+    def run(name: str, held: Held, folder: Path) -> np.ndarray:
         fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install fmpy")
         from fmpy import fmi2, fmi3
         from fmpy.validation import validate_fmu
 
         path = folder / f"my-run-fmi{version}.fmu"
-        path.write_bytes(formats()["fmu"].files(content)[path.name])
+        path.write_bytes(exported(name)[1][path.name])
         assert validate_fmu(path) == []
         description = fmpy.read_model_description(path)
         slave = {2: fmi2.FMU2Slave, 3: fmi3.FMU3Slave}[version](
@@ -150,13 +161,12 @@ def run_by_fmpy(version: int) -> Callable[[Content, Held, Path], np.ndarray]:
         if version == 2:
             slave.setupExperiment(startTime=0.0)
         slave.enterInitializationMode()
-        first = inputs_at(content, held, 0)
-        put(list(first), list(first.values()))
+        references, given = inputs_of(name, held)
+        put(references, given[0])
         slave.exitInitializationMode()
         forces, time = [], 0.0
-        for i, step in enumerate(held.step):
-            given = inputs_at(content, held, i)
-            put(list(given), list(given.values()))
+        for step, values in zip(held.step, given, strict=True):
+            put(references, values)
             slave.doStep(currentCommunicationPoint=time, communicationStepSize=step)
             time += step
             forces.append(got([4])[0])
@@ -167,9 +177,9 @@ def run_by_fmpy(version: int) -> Callable[[Content, Held, Path], np.ndarray]:
     return run
 
 
-def run_by_hand(content: Content, held: Held, folder: Path) -> np.ndarray:
+def run_by_hand(name: str, held: Held, folder: Path) -> np.ndarray:
     """The same through the functions of FMI 3.0, without any other tool."""
-    with zipfile.ZipFile(io.BytesIO(formats()["fmu"].files(content)["my-run-fmi3.fmu"])) as archive:
+    with zipfile.ZipFile(io.BytesIO(exported(name)[1]["my-run-fmi3.fmu"])) as archive:
         token = ET.fromstring(archive.read("modelDescription.xml")).attrib["instantiationToken"].encode()
         (member,) = [name for name in archive.namelist() if name.startswith("binaries/")]
         shared = ctypes.CDLL(archive.extract(member, tempfile.mkdtemp(dir=folder)))
@@ -187,10 +197,10 @@ def run_by_hand(content: Content, held: Held, folder: Path) -> np.ndarray:
     assert shared.fmi3EnterInitializationMode(one, False, 0.0, 0.0, False, 0.0) == 0
     flags, reached, force, wanted = (flag * 3)(), (real * 1)(), (real * 1)(), (ctypes.c_uint32 * 1)(4)
     places, forces, time = [ctypes.addressof(flags) + n for n in range(3)], [], 0.0
+    inputs, given = inputs_of(name, held)
+    count, references = len(inputs), (ctypes.c_uint32 * len(inputs))(*inputs)
     for i, step in enumerate(held.step):
-        given = inputs_at(content, held, i)
-        references, values = (ctypes.c_uint32 * len(given))(*given), (real * len(given))(*given.values())
-        assert shared.fmi3SetFloat64(one, references, len(given), values, len(given)) == 0
+        assert shared.fmi3SetFloat64(one, references, count, (real * count)(*given[i]), count) == 0
         assert i > 0 or shared.fmi3ExitInitializationMode(one) == 0
         assert shared.fmi3DoStep(one, time, step, True, *places, reached) == 0
         assert shared.fmi3GetFloat64(one, wanted, 1, force, 1) == 0
@@ -200,7 +210,7 @@ def run_by_hand(content: Content, held: Held, folder: Path) -> np.ndarray:
     return np.array(forces)
 
 
-RUNS: dict[str, Callable[[Content, Held, Path], np.ndarray]] = {
+RUNS: dict[str, Callable[[str, Held, Path], np.ndarray]] = {
     "FMPy, FMI 2.0": run_by_fmpy(2),
     "FMPy, FMI 3.0": run_by_fmpy(3),
     "by hand": run_by_hand,
@@ -211,9 +221,8 @@ RUNS: dict[str, Callable[[Content, Held, Path], np.ndarray]] = {
 @pytest.mark.parametrize("run", RUNS)
 @pytest.mark.parametrize("name", EXACT)
 def test_the_force_is_that_of_our_own_simulation(name: str, run: str, tmp_path: Path, rng: np.random.Generator) -> None:
-    damper = EXACT[name]
-    content, held = content_of(damper), held_inputs(rng)
-    found = RUNS[run](content, held, tmp_path)
+    damper, held = EXACT[name], held_inputs(rng)
+    found = RUNS[run](name, held, tmp_path)
     motion, ends = held.motion(damper)
     rigless = {effect: values for effect, values in damper.effects.items() if effect not in OF_THE_RIG}
     ours = respond(damper.model_copy(update={"effects": rigless}), motion, tolerance=1e-11)[ends]
@@ -227,7 +236,7 @@ def test_a_constant_signal_is_the_closed_form_of_the_element(tmp_path: Path, rng
     held = replace(held_inputs(rng), voltage=np.full(STEPS, 100.0), temperature=np.full(STEPS, 22.0))
     motion, ends = held.motion(damper)
     ours = respond(damper, motion)[ends]
-    found = run_by_hand(content_of(damper), held, tmp_path)
+    found = run_by_hand("plain", held, tmp_path)
     assert np.max(np.abs(found - ours)) <= 1e-7 * np.max(np.abs(ours))
 
 
@@ -236,22 +245,21 @@ def test_a_constant_signal_is_the_closed_form_of_the_element(tmp_path: Path, rng
 def test_the_size_of_the_step_adds_no_error_while_the_inputs_are_held(
     name: str, tmp_path: Path, rng: np.random.Generator
 ) -> None:
-    content, held = content_of(EXACT[name]), held_inputs(rng)
-    parts = 5
+    held, parts = held_inputs(rng), 5
     share = np.arange(STEPS * parts) % parts * np.repeat(held.step, parts) / parts
     many = {field: np.repeat(getattr(held, field), parts) for field in ("velocity", "voltage", "temperature")}
     cut = Held(
         np.repeat(held.step, parts) / parts, np.repeat(held.displacement, parts) + share * many["velocity"], **many
     )
     whole, pieces = (
-        run_by_hand(content, inputs, tmp_path)[last :: last + 1] for inputs, last in ((held, 0), (cut, parts - 1))
+        run_by_hand(name, inputs, tmp_path)[last :: last + 1] for inputs, last in ((held, 0), (cut, parts - 1))
     )
     assert np.max(np.abs(whole - pieces)) <= 1e-9 * np.max(np.abs(whole))
 
 
 @pytest.mark.parametrize("effect", sorted(set(library()) - set(CARRIED) - set(OF_THE_RIG)))
 def test_an_effect_without_a_closed_form_is_refused_by_name(effect: str) -> None:
-    values = {p.name: p.search.starts[0] * 0.01 or 0.5 for p in library()[effect].parameters}
+    values = {p.name: 0.5 if p.admits(0.5) else p.high for p in library()[effect].parameters}
     damper = with_effects(DAMPERS["plain"], **{effect: values})
     with pytest.raises(ConfigError, match=f"--to fmu: {effect} of the damper has no closed form") as refused:
         formats()["fmu"].files(content_of(damper))
@@ -265,9 +273,7 @@ def test_the_exact_dampers_have_every_effect_that_is_carried() -> None:
 @needs_gcc
 @pytest.mark.parametrize("version", [2, 3])
 def test_the_sources_compile_without_a_warning(version: int, tmp_path: Path) -> None:
-    with zipfile.ZipFile(
-        io.BytesIO(formats()["fmu"].files(content_of(EXACT["all"]))[f"my-run-fmi{version}.fmu"])
-    ) as archive:
+    with zipfile.ZipFile(io.BytesIO(exported("all")[1][f"my-run-fmi{version}.fmu"])) as archive:
         archive.extractall(tmp_path)
     sources = sorted((tmp_path / "sources").glob("*.c"))
     assert [path.name for path in sources] == ["element.c", f"fmi{version}.c", "model.c"]
@@ -278,8 +284,8 @@ def test_the_sources_compile_without_a_warning(version: int, tmp_path: Path) -> 
 
 @needs_gcc
 def test_the_core_runs_without_a_fault_of_memory_or_arithmetic(tmp_path: Path, rng: np.random.Generator) -> None:
-    content, held = content_of(EXACT["all"]), held_inputs(rng)
-    with zipfile.ZipFile(io.BytesIO(formats()["fmu"].files(content)["my-run-fmi2.fmu"])) as archive:
+    held = held_inputs(rng)
+    with zipfile.ZipFile(io.BytesIO(exported("all")[1]["my-run-fmi2.fmu"])) as archive:
         archive.extractall(tmp_path)
     (tmp_path / "sources" / "main.c").write_text(MAIN)
     flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -290,7 +296,7 @@ def test_the_core_runs_without_a_fault_of_memory_or_arithmetic(tmp_path: Path, r
     done = subprocess.run([tmp_path / "sources" / "it"], input=text, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     found = np.array(done.stdout.split(), dtype=float)
-    np.testing.assert_allclose(found, run_by_hand(content, held, tmp_path), rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(found, run_by_hand("all", held, tmp_path), rtol=1e-9, atol=1e-6)
 
 
 MAIN = r"""
@@ -319,8 +325,7 @@ int main(void)
 
 @needs_gcc
 def test_an_fmu_is_the_same_bytes_twice_and_names_version_and_config() -> None:
-    content = content_of(EXACT["all"])
-    written = formats()["fmu"].files(content)
+    content, written = exported("all")
     assert written == formats()["fmu"].files(replace(content))
     for data in written.values():
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -345,9 +350,7 @@ def test_without_a_compiler_the_sources_are_all_there_is_and_that_is_said(
 
 
 def test_a_damper_without_a_control_signal_or_temperature_has_no_such_input() -> None:
-    with zipfile.ZipFile(
-        io.BytesIO(formats()["fmu"].files(content_of(DAMPERS["passive"]))["my-run-fmi2.fmu"])
-    ) as archive:
+    with zipfile.ZipFile(io.BytesIO(exported("passive")[1]["my-run-fmi2.fmu"])) as archive:
         description = archive.read("modelDescription.xml").decode()
     assert "voltage" not in description
     assert 'name="temperature"' not in description
