@@ -35,7 +35,7 @@ typedef struct {
     const fmi2CallbackFunctions *callbacks;
 } instance;
 
-static fmi2Status told(const instance *self, const char *wrong)
+static fmi2Status checked(const instance *self, const char *wrong)
 {
     if (wrong == NULL)
         return fmi2OK;
@@ -111,7 +111,7 @@ EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], si
 {
     fmi2Status status = fmi2OK;
     for (size_t i = 0; i < count && status == fmi2OK; i++)
-        status = told(c, model_get(&((instance *)c)->damper, vr[i], &value[i]));
+        status = checked(c, model_get(&((instance *)c)->damper, vr[i], &value[i]));
     return status;
 }
 
@@ -119,19 +119,19 @@ EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], si
 {
     fmi2Status status = fmi2OK;
     for (size_t i = 0; i < count && status == fmi2OK; i++)
-        status = told(c, model_set(&((instance *)c)->damper, vr[i], value[i]));
+        status = checked(c, model_set(&((instance *)c)->damper, vr[i], value[i]));
     return status;
 }
 
 #define NO_VARIABLES(type)                                                                                       \
     EXPORT fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t count, fmi2##type v[]) \
     {                                                                                                            \
-        return told(c, count > 0 ? "every variable is a Real" : NULL);                                           \
+        return checked(c, count > 0 ? "every variable is a Real" : NULL);                                           \
     }                                                                                                            \
     EXPORT fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t count,                \
                                     const fmi2##type v[])                                                        \
     {                                                                                                            \
-        return told(c, count > 0 ? "every variable is a Real" : NULL);                                           \
+        return checked(c, count > 0 ? "every variable is a Real" : NULL);                                           \
     }
 
 NO_VARIABLES(Integer)
@@ -143,7 +143,7 @@ EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
     if (*state == NULL)
         *state = malloc(sizeof(model));
     if (*state == NULL)
-        return told(c, "there is no memory for the state");
+        return checked(c, "there is no memory for the state");
     *(model *)*state = ((instance *)c)->damper;
     return fmi2OK;
 }
@@ -170,14 +170,14 @@ EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state
 EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 {
     if (size < sizeof(model))
-        return told(c, "the state does not fit");
+        return checked(c, "the state does not fit");
     memcpy(bytes, state, sizeof(model));
     return fmi2OK;
 }
 
 EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
 {
-    const fmi2Status status = size == sizeof(model) ? fmi2GetFMUstate(c, state) : told(c, "this is no state of it");
+    const fmi2Status status = size == sizeof(model) ? fmi2GetFMUstate(c, state) : checked(c, "this is no state of it");
     if (status == fmi2OK)
         memcpy(*state, bytes, sizeof(model));
     return status;
@@ -187,29 +187,29 @@ EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueR
                                                const fmi2ValueReference known[], size_t knowns, const fmi2Real by[],
                                                fmi2Real of[])
 {
-    return told(c, "it has no directional derivatives");
+    return checked(c, "it has no directional derivatives");
 }
 
 EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t count,
                                               const fmi2Integer order[], const fmi2Real value[])
 {
-    return told(c, "inputs are held over a step");
+    return checked(c, "inputs are held over a step");
 }
 
 EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t count,
                                                const fmi2Integer order[], fmi2Real value[])
 {
-    return told(c, "it has no derivatives of its output");
+    return checked(c, "it has no derivatives of its output");
 }
 
 EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean keeps)
 {
-    return told(c, model_step(&((instance *)c)->damper, time, step));
+    return checked(c, model_step(&((instance *)c)->damper, time, step));
 }
 
 EXPORT fmi2Status fmi2CancelStep(fmi2Component c)
 {
-    return told(c, "no step is pending");
+    return checked(c, "no step is pending");
 }
 
 EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)

@@ -46,7 +46,7 @@ typedef struct {
     fmi3LogMessageCallback log;
 } instance;
 
-static fmi3Status told(const instance *self, const char *wrong)
+static fmi3Status checked(const instance *self, const char *wrong)
 {
     if (wrong == NULL)
         return fmi3OK;
@@ -131,18 +131,18 @@ EXPORT fmi3Status fmi3Reset(fmi3Instance c)
 EXPORT fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t count, fmi3Float64 values[],
                                  size_t size)
 {
-    fmi3Status status = told(c, count == size ? NULL : "every variable has one value");
+    fmi3Status status = checked(c, count == size ? NULL : "every variable has one value");
     for (size_t i = 0; i < count && status == fmi3OK; i++)
-        status = told(c, model_get(&((instance *)c)->damper, vr[i], &values[i]));
+        status = checked(c, model_get(&((instance *)c)->damper, vr[i], &values[i]));
     return status;
 }
 
 EXPORT fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t count,
                                  const fmi3Float64 values[], size_t size)
 {
-    fmi3Status status = told(c, count == size ? NULL : "every variable has one value");
+    fmi3Status status = checked(c, count == size ? NULL : "every variable has one value");
     for (size_t i = 0; i < count && status == fmi3OK; i++)
-        status = told(c, model_set(&((instance *)c)->damper, vr[i], values[i]));
+        status = checked(c, model_set(&((instance *)c)->damper, vr[i], values[i]));
     return status;
 }
 
@@ -150,7 +150,7 @@ EXPORT fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step,
                              fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
                              fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
 {
-    const fmi3Status status = told(c, model_step(&((instance *)c)->damper, time, step));
+    const fmi3Status status = checked(c, model_step(&((instance *)c)->damper, time, step));
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
     *lastSuccessfulTime = ((instance *)c)->damper.values[TIME];
     return status;
@@ -161,7 +161,7 @@ EXPORT fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
     if (*state == NULL)
         *state = malloc(sizeof(model));
     if (*state == NULL)
-        return told(c, "there is no memory for the state");
+        return checked(c, "there is no memory for the state");
     *(model *)*state = ((instance *)c)->damper;
     return fmi3OK;
 }
@@ -188,14 +188,14 @@ EXPORT fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state,
 EXPORT fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size)
 {
     if (size < sizeof(model))
-        return told(c, "the state does not fit");
+        return checked(c, "the state does not fit");
     memcpy(bytes, state, sizeof(model));
     return fmi3OK;
 }
 
 EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
 {
-    const fmi3Status status = size == sizeof(model) ? fmi3GetFMUState(c, state) : told(c, "this is no state of it");
+    const fmi3Status status = size == sizeof(model) ? fmi3GetFMUState(c, state) : checked(c, "this is no state of it");
     if (status == fmi3OK)
         memcpy(*state, bytes, sizeof(model));
     return status;
@@ -205,12 +205,12 @@ EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[]
 #define REFUSED(name, ...)                         \
     EXPORT fmi3Status name(fmi3Instance c, __VA_ARGS__) \
     {                                              \
-        return told(c, "it has no " #name);        \
+        return checked(c, "it has no " #name);        \
     }
 #define REFUSED_ALONE(name)                        \
     EXPORT fmi3Status name(fmi3Instance c)         \
     {                                              \
-        return told(c, "it has no " #name);        \
+        return checked(c, "it has no " #name);        \
     }
 #define REFERENCES const fmi3ValueReference vr[], size_t count
 #define NO_VARIABLES(type)                                              \
