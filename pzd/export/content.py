@@ -72,6 +72,11 @@ class Content:
         return any(row.voltage_V is not None for row in self.table.force)
 
     @property
+    def adjustable(self) -> bool:
+        """Whether the table has more than one control signal, so that there is something to interpolate and to set."""
+        return self.lookups[0].voltages.size > 1
+
+    @property
     def held(self) -> bool:
         """Whether the force is held beyond the last speed of the table; otherwise it goes on along the last slope."""
         return self.table.notes.outside == "clamp"

@@ -39,9 +39,10 @@ DAMPERS = {
             (150.0, 60.0, 1000.0, 2100.0, 3.6e5),
         )
     ),
+    "single": Damper(base=CONTROLLED[1:2]),
     "passive": Damper(base=base((None, None, 60.0, 1900.0, 3e5)), effects={"asymmetry": {"alpha": 0.4}}),
 }
-"""Of one temperature and of two, with effects, and one without a control signal."""
+"""Of one temperature and of two, with effects, and with one control signal or none."""
 
 
 def content_of(damper: Damper, **table: Any) -> Content:

@@ -150,7 +150,8 @@ def test_the_source_names_version_and_config_and_is_the_same_twice() -> None:
 
 
 def test_what_a_control_unit_cannot_hold_is_refused() -> None:
-    with pytest.raises(ConfigError, match="has no control signal"):
-        formats()["c"].files(content_of(DAMPERS["passive"]))
+    for name in ("passive", "single"):
+        with pytest.raises(ConfigError, match="the table has no second control signal"):
+            formats()["c"].files(content_of(DAMPERS[name]))
     with pytest.raises(ConfigError, match="cannot hold the empty cells"):
         formats()["c"].files(content_of(DAMPERS["plain"], outside="error"))

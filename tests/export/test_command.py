@@ -101,3 +101,11 @@ def test_a_damper_that_is_not_to_be_trusted_is_written_and_marked(typed) -> None
 def test_help_names_every_format(typed) -> None:
     _, out, _ = typed("export", "--help")
     assert all(f"{name}: " in " ".join(out) for name in formats())
+
+
+def test_a_file_where_the_folder_should_be_is_a_fault_of_the_files(typed) -> None:
+    typed("table", "first.yaml")
+    Path("taken").write_text("mine")
+    code, _, err = typed("export", "first.yaml", "--to", "csv", "--out", "taken")
+    assert (code, len(err)) == (5, 1)
+    assert Path("taken").read_text() == "mine"

@@ -58,6 +58,7 @@ IN_THE_FLOW = {
 EXACT = {
     "plain": DAMPERS["plain"],
     "passive": DAMPERS["passive"],
+    "single": DAMPERS["single"],
     "warm": DAMPERS["warm"],
     "frictionless": Damper(base=tuple(row.model_copy(update={"T0_N": 0.0}) for row in CONTROLLED)),
     "stiff": Damper(base=tuple(row.model_copy(update={"k_N_per_m": 1e9}) for row in CONTROLLED)),
@@ -138,29 +139,35 @@ def inputs_of(name: str, held: Held) -> tuple[list[int], list[list[float]]]:
     return list(columns), np.column_stack(list(columns.values())).tolist()
 
 
+def slave_of(version: int, name: str, folder: Path) -> Any:
+    """An instance by FMPy, which validates the FMU first, before its initialisation."""
+    fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install fmpy")
+    from fmpy import fmi2, fmi3
+    from fmpy.validation import validate_fmu
+
+    path = folder / f"my-run-fmi{version}.fmu"
+    path.write_bytes(exported(name)[1][path.name])
+    assert validate_fmu(path) == []
+    description = fmpy.read_model_description(path)
+    slave = {2: fmi2.FMU2Slave, 3: fmi3.FMU3Slave}[version](
+        guid=description.guid,
+        unzipDirectory=fmpy.extract(path, unzipdir=folder / f"fmi{version}"),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="it",
+    )
+    slave.instantiate()
+    if version == 2:
+        slave.setupExperiment(startTime=0.0)
+    slave.enterInitializationMode()
+    return slave
+
+
 def run_by_fmpy(version: int) -> Callable[[str, Held, Path], np.ndarray]:
-    """Forces at the end of each step by FMPy, which validates the FMU first."""
+    """Forces at the end of each step by FMPy."""
 
     def run(name: str, held: Held, folder: Path) -> np.ndarray:
-        fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install fmpy")
-        from fmpy import fmi2, fmi3
-        from fmpy.validation import validate_fmu
-
-        path = folder / f"my-run-fmi{version}.fmu"
-        path.write_bytes(exported(name)[1][path.name])
-        assert validate_fmu(path) == []
-        description = fmpy.read_model_description(path)
-        slave = {2: fmi2.FMU2Slave, 3: fmi3.FMU3Slave}[version](
-            guid=description.guid,
-            unzipDirectory=fmpy.extract(path, unzipdir=folder / f"fmi{version}"),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="it",
-        )
-        slave.instantiate()
+        slave = slave_of(version, name, folder)
         put, got = (slave.setReal, slave.getReal) if version == 2 else (slave.setFloat64, slave.getFloat64)
-        if version == 2:
-            slave.setupExperiment(startTime=0.0)
-        slave.enterInitializationMode()
         references, given = inputs_of(name, held)
         put(references, given[0])
         slave.exitInitializationMode()
@@ -354,3 +361,53 @@ def test_a_damper_without_a_control_signal_or_temperature_has_no_such_input() ->
         description = archive.read("modelDescription.xml").decode()
     assert "voltage" not in description
     assert 'name="temperature"' not in description
+
+
+@needs_gcc
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_state_that_was_kept_or_written_out_goes_on_as_it_did(version: int, tmp_path: Path) -> None:
+    slave = slave_of(version, "all", tmp_path)
+    put, got = (slave.setReal, slave.getReal) if version == 2 else (slave.setFloat64, slave.getFloat64)
+    kept, written = ("FMUstate", "deSerializeFMUstate") if version == 2 else ("FMUState", "deserializeFMUState")
+    keep, take, free, write = (getattr(slave, f"{verb}{kept}") for verb in ("get", "set", "free", "serialize"))
+    read = getattr(slave, written)
+    slave.exitInitializationMode()
+
+    def forces(start: float) -> list[float]:
+        found = []
+        for i in range(5):
+            slave.doStep(currentCommunicationPoint=start + 0.01 * i, communicationStepSize=0.01)
+            found += got([4])
+        return found
+
+    put([1, 2], [0.2, 60.0])
+    forces(0.0)
+    state = keep()
+    text = write(state)
+    first = forces(0.05)
+    take(state)
+    assert forces(0.05) == first
+    again = read(text)
+    take(again)
+    assert forces(0.05) == first
+    assert first[0] != first[-1]
+    for one in (state, again):
+        free(one)
+    slave.terminate()
+    slave.freeInstance()
+
+
+@needs_gcc
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_fault_of_the_caller_is_an_error_and_not_a_number(version: int, tmp_path: Path) -> None:
+    slave = slave_of(version, "plain", tmp_path)
+    put = slave.setReal if version == 2 else slave.setFloat64
+    put([5, 6], [10.0, 0.0])
+    slave.exitInitializationMode()
+    for references, values in (([5], [10.0]), ([4], [1.0]), ([99], [1.0]), ([1], [float("nan")])):
+        with pytest.raises(Exception, match="failed with status 3"):
+            put(references, values)
+    with pytest.raises(Exception, match="failed with status 3"):
+        slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=-1.0)
+    slave.terminate()
+    slave.freeInstance()

@@ -108,3 +108,13 @@ def test_the_effects_and_the_base_are_structures_of_the_file() -> None:
     parts = dict(zip(names, damper, strict=True))
     assert float(parts["effects"].item()[0].item()[0]) == 2500.0
     assert parts["base"].dtype.names == ("voltage_V", "temperature_degC", "T0_N", "C_Ns_per_m", "k_N_per_m")
+
+
+def test_an_empty_cell_is_no_number_in_table_and_inverse() -> None:
+    found = loaded(content_of(DAMPERS["orifice"], outside="error"))
+    beyond = np.abs(found["bp2"]) > 0.6 * (1.0 + 1e-9)
+    assert beyond.any()
+    assert np.isnan(found["table"][:, beyond]).all()
+    assert np.isnan(found["inverse"][beyond]).all()
+    assert np.isfinite(found["table"][:, ~beyond]).all()
+    assert np.isfinite(found["inverse"][~beyond]).all()

@@ -49,7 +49,7 @@ def test_modelica_interpolates_as_we_do(content: Content, points: tuple[np.ndarr
     assert U.size >= 1000
     for n, lookup in enumerate(content.lookups, 1):
         table = tables[f"force_{n}" if len(content.lookups) > 1 else "force"]
-        read = bilinear(table, U, v) if content.controlled else np.interp(v, *table.T)
+        read = bilinear(table, U, v) if content.adjustable else np.interp(v, *table.T)
         assert np.max(np.abs(read - lookup.force(U, v))) <= 1e-9 * largest(content)
 
 

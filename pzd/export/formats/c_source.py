@@ -17,8 +17,10 @@ def files(content: Content) -> Files:
     from pzd.export.c_text import source
     from pzd.schema.errors import ConfigError
 
-    if not content.controlled:
-        raise ConfigError(f"--to {NAME}: the damper has no control signal, so that there is nothing for a unit to set")
+    if not content.adjustable:
+        raise ConfigError(
+            f"--to {NAME}: the table has no second control signal, so that there is nothing for a unit to set"
+        )
     names = ("damper.h", "damper.c")
     return {name: source(content, name) for name in names} | {"damper_data.h": _data(content).encode()}
 

@@ -1,9 +1,10 @@
 """MATLAB 5: breakpoints and tables as the lookup blocks of Simulink take them.
 
-`table` over `bp1` (control signal) and `bp2` (velocity), with more than one temperature over `bp3` too; without a
-control signal over the velocity alone. `inverse` gives the control signal over `inverse_bp1` (velocity) and
-`inverse_bp2`, the share of the way from the lowest force that the damper gives at that velocity, `inverse_low`, to the
-highest, `inverse_high`: every share has its control signal, and no breakpoint lies out of reach.
+`table` over `bp1` (control signal) and `bp2` (velocity), with more than one temperature over `bp3` too; over the
+velocity alone, as `bp1`, where the table has one control signal or none. `inverse` gives the control signal over
+`inverse_bp1` (velocity) and `inverse_bp2`, the share of the way from the lowest force that the damper gives at that
+velocity, `inverse_low`, to the highest, `inverse_high`: every share has its control signal, and no breakpoint lies out
+of reach.
 """
 
 from __future__ import annotations
@@ -38,17 +39,17 @@ def variables(content: Content) -> dict[str, Any]:
     grid, control = content.grid, content.control
     forces = np.moveaxis(grid.forces, 0, 2)
     found: dict[str, Any] = {"origin": content.origin, "damper": _parameters(content)}
-    found["bp2" if content.controlled else "bp1"] = grid.velocities
+    found["bp2" if content.adjustable else "bp1"] = grid.velocities
     found["units"] = {"velocity": "m/s", "force": "N"}
-    if content.controlled:
+    if content.adjustable:
         found |= {"bp1": grid.voltages} | _inverse(content)
         found["units"][control.name] = control.unit
     if len(grid.temperatures) > 1:
-        found["bp3" if content.controlled else "bp2"] = np.array(grid.temperatures, dtype=np.float64)
+        found["bp3" if content.adjustable else "bp2"] = np.array(grid.temperatures, dtype=np.float64)
         found["units"]["temperature"] = "degC"
     else:
         forces = forces[:, :, 0]
-    found["table"] = forces if content.controlled else forces[0]
+    found["table"] = forces if content.adjustable else forces[0]
     return found
 
 

@@ -1,9 +1,9 @@
 """Modelica: a text file for CombiTable2Ds and CombiTable1Ds of the standard library.
 
 `force` is a CombiTable2Ds with the control signal as u1 and the velocity as u2, and a CombiTable1Ds over the velocity
-where the damper has no control signal; `inverse` one with the velocity as u1 and as u2 the share of the way from the
-lowest force that the damper gives at that velocity to the highest, the columns of the CombiTable1Ds `inverse_range`.
-With several temperatures each has tables of its own, `force_1` and so on.
+where the table has one control signal or none. `inverse` has the velocity as u1, and as u2 the share of the way from
+the lowest force that the damper gives at that velocity to the highest, the columns of the CombiTable1Ds
+`inverse_range`. With several temperatures each has tables of its own, `force_1` and so on.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def files(content: Content) -> Files:
         number = f"_{n}" if len(grid.temperatures) > 1 else ""
         if temperature is not None:
             text.append(comment([f"at {temperature:g} degC:"], "#"))
-        if not content.controlled:
+        if not content.adjustable:
             text.append(_table(f"force{number}", np.column_stack([grid.velocities, forces[0]])))
             continue
         text.append(comment([f"force: u1 {control.name} [{control.unit}], hold beyond its ends; u2 velocity"], "#"))
