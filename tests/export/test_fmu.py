@@ -33,7 +33,7 @@ GCC = shutil.which("gcc")
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed: apt-get install gcc")
 STRICT = ("-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wno-unused-parameter")
 STEPS = 1500
-RAMP = 1e-10
+RAMP = 1e-12
 """Time in which our own simulation, whose inputs move linearly, goes from one held input to the next [s]."""
 
 
