@@ -32,7 +32,7 @@ from pzd.schema.progress import Progress
 
 COMMANDS = [
     *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report"),
-    *("check", "show", "compare", "figures", "blind", "init", "schema", "effects"),
+    *("check", "show", "compare", "export", "figures", "blind", "init", "schema", "effects"),
 ]
 HEAVY = ("numba", "pandas", "scipy", "matplotlib", "pint", "jinja2")
 

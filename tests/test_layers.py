@@ -156,9 +156,13 @@ def sets() -> list[tuple[str, str]]:
 
 
 def test_the_sets_of_the_house_are_found() -> None:
-    assert {"pzd.damper.effects", "pzd.rig.files.formats", "pzd.simulate.cars", "pzd.report.plots"} <= {
-        s for s, _ in sets()
-    }
+    assert {
+        "pzd.damper.effects",
+        "pzd.rig.files.formats",
+        "pzd.simulate.cars",
+        "pzd.report.plots",
+        "pzd.export.formats",
+    } <= {s for s, _ in sets()}
 
 
 @pytest.mark.parametrize(("name", "function"), sets())

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from pzd.compiled import compiled
-from pzd.damper.flow import smooth_force
+from pzd.damper.flow import breakaway, relief, smooth_force
 from pzd.damper.kernels import T0, C, K, Row, interpolate, row_of, stroke_slope
 from pzd.damper.pieces import TimeStep, extension_speed, piece, row_in
 from pzd.damper.regimes import (
@@ -100,9 +100,17 @@ def size_of(step: TimeStep) -> float:
 
 
 @compiled
-def _miss(e: float, p: Row, regime: int, side: float) -> float:
-    """How far the state lies past the edge that is looked for [N], negative before it."""
-    return over_yield(e, p, side) if regime == STICK else beyond(e, p, regime, side)[0]
+def _miss(e: float, p: Row, regime: int, side: float, way: int) -> float:
+    """How far the state lies past the edge that is looked for [N], negative before it.
+
+    In SMOOTH, which has two, that of the `way` alone: a piece may start on the other one.
+    """
+    if regime == STICK:
+        return over_yield(e, p, side)
+    if regime == SMOOTH:
+        above_yield = over_yield(e, p, side)
+        return above_yield + breakaway(p, side) - relief(p, side) if way > 0 else -above_yield
+    return beyond(e, p, regime, side)[0]
 
 
 @compiled
@@ -114,11 +122,11 @@ def _crossing(
     if regime == STICK:
         end, _, _ = piece(e, w, at, dt, regime, side, step)
         side = math.copysign(1.0, end)
-    low, high, below, above = 0.0, dt, min(_miss(e, row_in(step, at), regime, side), 0.0), over
+    low, high, below, above = 0.0, dt, min(_miss(e, row_in(step, at), regime, side, way), 0.0), over
     if regime == STICK and below > -_ON_EDGE * size:  # it starts on this edge: look for where it comes back
         low = _OFF_EDGE * dt
         end, _, _ = piece(e, w, at, low, regime, side, step)
-        below = _miss(end, row_in(step, at + low), regime, side)
+        below = _miss(end, row_in(step, at + low), regime, side, way)
         if below >= 0.0:
             return _SHORTEST_PIECE * dt
     time = (low * above - high * below) / (above - below)
@@ -127,7 +135,7 @@ def _crossing(
             time = 0.5 * (low + high)
         end, speed, _ = piece(e, w, at, time, regime, side, step)
         p = row_in(step, at + time)
-        miss = _miss(end, p, regime, side)
+        miss = _miss(end, p, regime, side, way)
         if abs(miss) <= _ON_EDGE * size or high - low <= 1e-15 * step.h:
             return time
         if miss > 0.0:

@@ -293,3 +293,16 @@ def test_a_stick_that_begins_on_its_edge_finds_the_far_edge(friction: float, rng
     ours = march(x, np.zeros(1), np.array([STEP]), element_rows(weak, None, None), 0.0, TOLERANCE)
     exact = element_force(x, STEP, friction, 2816.0, 1.64e5)
     np.testing.assert_allclose(ours, exact, rtol=0, atol=1e-8 * np.max(np.abs(exact)))
+
+
+def test_a_step_from_one_edge_of_the_smooth_flow_past_the_other_is_cut_at_both(rng: np.random.Generator) -> None:
+    valve, parts, long = {"relief_valve": {"F_r": 1000.0, "C_r": 500.0}}, 64, 4e-3
+    draws = zip(
+        rng.uniform(500.0, 1000.0, 500), rng.uniform(-1800.0, 1800.0, 500), rng.uniform(-1.0, 1.0, 500), strict=True
+    )
+    for friction, force, speed in draws:
+        rows, _ = constant_rows(friction, 2700.0, 4e5, valve)
+        x = np.linspace(0.0, speed * long, parts + 1)
+        whole = march(x[[0, -1]], np.full(2, speed), np.array([long]), rows, force, TOLERANCE)[-1]
+        fine = march(x, np.full(parts + 1, speed), np.array([long / parts]), rows, force, TOLERANCE)[-1]
+        assert whole == pytest.approx(fine, abs=1e-9 * 1800.0)

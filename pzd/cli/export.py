@@ -1,0 +1,55 @@
+"""The command that hands the damper of a run to other tools."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pzd.cli.exits import DONE, UNTRUSTED
+from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose
+from pzd.cli.output import Output, complain
+from pzd.export.formats import formats
+
+To = Annotated[
+    str,
+    typer.Option(
+        "--to",
+        metavar="FORMAT",
+        help="; ".join(f"{name}: {one.meaning}" for name, one in formats().items()) + ".",
+        show_default=False,
+    ),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder of the files; by default `export` in the folder of the run."),
+]
+
+
+def export(
+    config: Config,
+    to: To,
+    out: Out = None,
+    runs: Runs = RUNS,
+    overrides: Set = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> int:
+    """Write the damper of a run in the form that another tool takes."""
+    from pzd.pipeline.command import opened
+    from pzd.pipeline.exporting import exported
+
+    output = Output(quiet=quiet, verbose=verbose)
+    written = exported(opened(config, runs, overrides or ()), to, out)
+    if as_json:
+        files = [path.as_posix() for path in written.files]
+        output.say_json({"format": to, "files": files, "not_to_be_trusted": written.marks})
+    else:
+        output.say(*(f"export: {path}" for path in written.files))
+    complain(f"not to be trusted: {mark}" for mark in written.marks)
+    return UNTRUSTED if written.marks else DONE
+
+
+COMMANDS = (export,)

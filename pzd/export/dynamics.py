@@ -1,0 +1,120 @@
+"""The damper with its dynamics as constants in C: parameters over temperature and control signal, linear between."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from uuid import UUID
+
+import numpy as np
+
+from pzd.damper.columns import NEUTRAL, acting
+from pzd.damper.compose import nodes_of
+from pzd.damper.laws import ELEMENT
+from pzd.damper.material import material
+from pzd.damper.model import Damper
+from pzd.damper.values import columns_of, value_of
+from pzd.export.c_text import array, double, head
+from pzd.export.content import Content
+from pzd.record import Array
+from pzd.schema.errors import ConfigError
+
+CARRIED = (
+    *("asymmetry", "end_stop", "gas_spring", "lash", "orifice_quadratic", "piezo_hysteresis", "preload_offset"),
+    *("relief_valve", "stribeck_friction", "temperature_drift"),
+)
+"""Effects whose path under held inputs is a closed form, piece by piece; `sources/element.c` holds them."""
+OF_THE_RIG = tuple(effect.name for effect in acting("sensor"))
+"""Effects of the channels of a rig, which the damper itself does not have."""
+PLAY = ("piezo_hysteresis", "r")
+COLUMNS = tuple(
+    (effect, parameter) for effect, parameter in NEUTRAL if effect in CARRIED and (effect, parameter) != PLAY
+)
+"""Effect and parameter of each column of a row behind T0, C and k."""
+
+
+@dataclass(frozen=True, eq=False)
+class Dynamics:
+    """A damper that `sources/element.c` can carry exactly."""
+
+    temperatures: Array
+    """(t,) rising [degC]; a single 0 where the damper has no axis of temperature."""
+    signals: Array
+    """(m,) rising, the effective control signal; a single 0 where there is none."""
+    rows: Array
+    """(t, m, columns) T0, C and k without drift, then `COLUMNS`; linear between, held beyond."""
+    play: float
+    """Half-width of the play of the drive, in units of the control signal."""
+    reference: float
+    """T_ref of the drift [degC]."""
+    warms: bool
+    """Whether the temperature matters."""
+
+    @classmethod
+    def of(cls, damper: Damper, name: str) -> Dynamics:
+        """The damper, laid out.
+
+        Parameters
+        ----------
+        damper : with its effects
+        name : of the format
+
+        Raises
+        ------
+        ConfigError : when it has an effect that is not carried exactly
+        """
+        others = [effect for effect in damper.effects if effect not in (*CARRIED, *OF_THE_RIG)]
+        if others:
+            raise ConfigError(
+                f"--to {name}: {', '.join(others)} of the damper has no closed form under held inputs and cannot be "
+                "carried exactly; a table, as --to mat writes, holds its steady force"
+            )
+        drifts = [effect.name for effect in acting("material") if effect.name in damper.effects]
+        still = damper.model_copy(update={"effects": {k: v for k, v in damper.effects.items() if k not in drifts}})
+        known = sorted({row.temperature_degC for row in damper.base if row.temperature_degC is not None})
+        warmth: list[float | None] = [*known] or [None]
+        signals = nodes_of(damper, warmth[0]).voltages
+        extra = np.broadcast_to(columns_of(damper, COLUMNS, signals), (signals.size, len(COLUMNS)))
+        bases = [np.broadcast_to(material(still, signals, T), (signals.size, len(ELEMENT))) for T in warmth]
+        return cls(
+            np.array(known or [0.0]),
+            signals,
+            np.stack([np.hstack([base, extra]) for base in bases]),
+            value_of(damper, *PLAY),
+            damper.reference_temperature_degC or 0.0,
+            len(known) > 1 or bool(drifts),
+        )
+
+
+def start_values(content: Content, dynamics: Dynamics) -> Mapping[str, float]:
+    """What the inputs and parameters begin with, by the name in C."""
+    nearest = float(dynamics.signals[np.argmin(np.abs(dynamics.signals))])
+    temperature = dynamics.reference if dynamics.warms and dynamics.reference else float(dynamics.temperatures[0])
+    return {"START_SIGNAL": nearest, "START_TEMPERATURE": temperature, "START_ZERO": content.damper.zero_m}
+
+
+def data_of(content: Content, dynamics: Dynamics) -> tuple[str, str]:
+    """The constants as text, and the token by which an FMU and its description know each other.
+
+    Parameters
+    ----------
+    content : the damper
+    dynamics : the same, laid out
+    """
+    columns = [*ELEMENT, *(f"{effect}_{parameter}" for effect, parameter in COLUMNS)]
+    numbers = {"PLAY": dynamics.play, "REFERENCE_TEMPERATURE": dynamics.reference, **start_values(content, dynamics)}
+    sizes = {"TEMPERATURE_NODES": dynamics.temperatures.size, "SIGNAL_NODES": dynamics.signals.size}
+    body = "".join(
+        (
+            "enum { " + ", ".join(columns).upper() + ", COLUMNS };\n",
+            *(f"#define {name} {size}\n" for name, size in sizes.items()),
+            *(f"#define {name} {double(number)}\n" for name, number in numbers.items()),
+            array("double", "TEMPERATURES", dynamics.temperatures, double),
+            array("double", "SIGNALS", dynamics.signals, double),
+            array("double", "ROWS", dynamics.rows, double),
+        )
+    )
+    token = str(UUID(bytes=sha256(f"{content.origin}\n{content.name}\n{body}".encode()).digest()[:16]))
+    guard = "#ifndef ELEMENT_DATA_H\n#define ELEMENT_DATA_H\n#include <math.h>\n"
+    return f'{head(content)}{guard}#define TOKEN "{token}"\n{body}#endif\n', token

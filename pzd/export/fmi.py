@@ -1,0 +1,188 @@
+"""What an FMU says of itself: the model descriptions of FMI 2.0 and 3.0."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+from xml.sax.saxutils import quoteattr
+
+from pzd.export.content import Content
+from pzd.export.dynamics import OF_THE_RIG, Dynamics, start_values
+
+IDENTIFIER = "damper"
+"""Name of the model in C, and of the library."""
+Causality = Literal["input", "output", "parameter", "independent"]
+_UNITS: Mapping[str, Mapping[str, float]] = {
+    "s": {"s": 1},
+    "m": {"m": 1},
+    "m/s": {"m": 1, "s": -1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+    "A": {"A": 1},
+    "degC": {"K": 1, "offset": 273.15},
+}
+"""Units by the exponents of the base units."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of the FMU."""
+
+    name: str
+    reference: int
+    """Its place in the list of `sources/model.h`."""
+    causality: Causality
+    unit: str
+    meaning: str
+    start: float | None = None
+
+
+def variables(content: Content, dynamics: Dynamics) -> tuple[Variable, ...]:
+    """The variables; the control signal and the temperature only where the damper has to do with them."""
+    control, start = content.control, start_values(content, dynamics)
+    held = "held over a step"
+    every = (
+        Variable("displacement", 0, "input", "m", f"extension; carried on with the velocity, {held}", 0.0),
+        Variable("velocity", 1, "input", "m/s", f"rate of extension, rebound positive, {held}", 0.0),
+        Variable(control.name, 2, "input", control.unit, f"control signal of the valve, {held}", start["START_SIGNAL"]),
+        Variable("temperature", 3, "input", "degC", f"of the damper, {held}", start["START_TEMPERATURE"]),
+        Variable("force", 4, "output", "N", "damper force; positive in rebound"),
+        Variable("initial_force", 5, "parameter", "N", "force of the oil spring at the start", 0.0),
+        Variable("zero", 6, "parameter", "m", "displacement that effects count from", start["START_ZERO"]),
+    )
+    absent = {2} if not content.controlled else set()
+    absent |= {3} if not dynamics.warms else set()
+    return tuple(one for one in every if one.reference not in absent)
+
+
+def description(content: Content) -> str:
+    """What the model is, in a line."""
+    carried = [name for name in content.damper.effects if name not in OF_THE_RIG]
+    rig = [name for name in content.damper.effects if name in OF_THE_RIG]
+    text = f"Bingham element with oil spring{', ' if carried else ''}{', '.join(carried)}; {content.origin}"
+    return f"{text}; without {', '.join(rig)} of the rig" if rig else text
+
+
+def fmi2(content: Content, dynamics: Dynamics, token: str, sources: Sequence[str]) -> str:
+    """modelDescription.xml of FMI 2.0.
+
+    Parameters
+    ----------
+    content : the damper
+    dynamics : the same, laid out
+    token : by which the library knows the description
+    sources : names of the files to compile
+    """
+    found = variables(content, dynamics)
+    output = next(place for place, one in enumerate(found, 1) if one.causality == "output")
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        _open(
+            "fmiModelDescription",
+            {"fmiVersion": "2.0", "modelName": content.name, "guid": token, "description": description(content)}
+            | {"generationTool": content.origin, "variableNamingConvention": "flat"},
+        ),
+        _open("CoSimulation", _abilities("canGetAndSetFMUstate", "canSerializeFMUstate") | {_NO_MEMORY: "true"}),
+        "<SourceFiles>",
+        *(_alone("File", {"name": name}) for name in sources),
+        "</SourceFiles></CoSimulation>",
+        *_units(found),
+        '<LogCategories><Category name="logStatusError"/></LogCategories>',
+        "<ModelVariables>",
+        *(
+            _open("ScalarVariable", _attributes(one)) + _alone("Real", _number(one)) + "</ScalarVariable>"
+            for one in found
+        ),
+        "</ModelVariables>",
+        "<ModelStructure>",
+        f'<Outputs><Unknown index="{output}"/></Outputs>',
+        f'<InitialUnknowns><Unknown index="{output}"/></InitialUnknowns>',
+        "</ModelStructure>",
+        "</fmiModelDescription>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def fmi3(content: Content, dynamics: Dynamics, token: str) -> str:
+    """modelDescription.xml of FMI 3.0.
+
+    Parameters
+    ----------
+    content : the damper
+    dynamics : the same, laid out
+    token : by which the library knows the description
+    """
+    time = Variable("time", 7, "independent", "s", "simulated time")
+    found = (*variables(content, dynamics), time)
+    output = next(one.reference for one in found if one.causality == "output")
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        _open(
+            "fmiModelDescription",
+            {"fmiVersion": "3.0", "modelName": content.name, "instantiationToken": token}
+            | {"description": description(content), "generationTool": content.origin}
+            | {"variableNamingConvention": "flat"},
+        ),
+        _alone("CoSimulation", _abilities("canGetAndSetFMUState", "canSerializeFMUState")),
+        *_units(found),
+        '<LogCategories><Category name="logStatusError"/></LogCategories>',
+        "<ModelVariables>",
+        *(_alone("Float64", _attributes(one) | _number(one)) for one in found),
+        "</ModelVariables>",
+        "<ModelStructure>",
+        f'<Output valueReference="{output}"/>',
+        f'<InitialUnknown valueReference="{output}"/>',
+        "</ModelStructure>",
+        "</fmiModelDescription>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def build_description(sources: Sequence[str]) -> str:
+    """buildDescription.xml of FMI 3.0: how the sources are compiled."""
+    files = "".join(_alone("SourceFile", {"name": name}) for name in sources)
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<fmiBuildDescription fmiVersion="3.0">\n'
+        f'<BuildConfiguration modelIdentifier="{IDENTIFIER}"><SourceFileSet language="C99">{files}</SourceFileSet>'
+        "</BuildConfiguration>\n</fmiBuildDescription>\n"
+    )
+
+
+_NO_MEMORY = "canNotUseMemoryManagementFunctions"
+
+
+def _abilities(*states: str) -> dict[str, str]:
+    names = ("canHandleVariableCommunicationStepSize", *states)
+    return {"modelIdentifier": IDENTIFIER} | dict.fromkeys(names, "true")
+
+
+def _attributes(one: Variable) -> dict[str, str]:
+    fixed = {"parameter": "fixed"}.get(one.causality, "continuous")
+    found = {"name": one.name, "valueReference": str(one.reference), "description": one.meaning}
+    found |= {"causality": one.causality, "variability": fixed}
+    initial = {"output": "calculated", "parameter": "exact"}.get(one.causality)
+    return found | ({"initial": initial} if initial else {})
+
+
+def _number(one: Variable) -> dict[str, str]:
+    return {"unit": one.unit} | ({"start": repr(float(one.start))} if one.start is not None else {})
+
+
+def _units(found: Sequence[Variable]) -> list[str]:
+    names = list(dict.fromkeys(one.unit for one in found))
+    defined = [
+        _open("Unit", {"name": name})
+        + (_alone("BaseUnit", {k: str(v) for k, v in _UNITS[name].items()}) if name in _UNITS else "")
+        + "</Unit>"
+        for name in names
+    ]
+    return ["<UnitDefinitions>", *defined, "</UnitDefinitions>"]
+
+
+def _open(tag: str, attributes: Mapping[str, str]) -> str:
+    return f"<{tag}{''.join(f' {name}={quoteattr(value)}' for name, value in attributes.items())}>"
+
+
+def _alone(tag: str, attributes: Mapping[str, str]) -> str:
+    return f"{_open(tag, attributes)[:-1]}/>"

@@ -1,0 +1,27 @@
+"""What a file of `formats/` declares: what it is called, what it needs, and how it writes a damper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pzd.export.content import Content
+
+Files = Mapping[str, bytes]
+"""What is to be written, by the name of the file."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """One form in which another tool takes a damper."""
+
+    name: str
+    """As behind `--to`."""
+    meaning: str
+    """What it is for, in a few words."""
+    files: Callable[[Content], Files]
+    """The files; the same bytes for the same damper."""
+    needs: str | None = None
+    """The library that writes it, an extra; None where pzd itself needs it anyway."""

@@ -1,0 +1,69 @@
+"""C for a control unit: the table, its inverse and the comfort law, in single precision and without allocation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pzd.export.format import Files, Format
+
+if TYPE_CHECKING:
+    from pzd.export.content import Content
+
+NAME = "c"
+
+
+def files(content: Content) -> Files:
+    """Header and source, and the data that the source includes."""
+    from pzd.export.c_text import source
+    from pzd.schema.errors import ConfigError
+
+    if not content.adjustable:
+        raise ConfigError(
+            f"--to {NAME}: the table has no second control signal, so that there is nothing for a unit to set"
+        )
+    names = ("damper.h", "damper.c")
+    return {name: source(content, name) for name in names} | {"damper_data.h": _data(content).encode()}
+
+
+def _data(content: Content) -> str:
+    """The table and the car as constants."""
+    import numpy as np
+
+    from pzd.export.c_text import array, head, single
+    from pzd.simulate.minimise import TIE_BREAKS
+
+    content.full_grid(NAME)
+    car, first = content.car, content.lookups[0]
+    forces = [np.stack([at.rebound[:, :-1], at.compression[:, :-1]], axis=1) for at in content.lookups]
+    temperatures = [t or 0.0 for t in content.temperatures]
+    sizes = {
+        "TEMPERATURES": len(temperatures),
+        "SIGNALS": first.voltages.size,
+        "SPEEDS": first.speeds.size - 1,
+        "HELD": int(content.held),
+        **{f"{name.upper()}": number for name, number in TIE_BREAKS.items()},
+        "TIE_BREAK": TIE_BREAKS[content.tie_break],
+    }
+    return "".join(
+        (
+            head(content),
+            "#ifndef DAMPER_DATA_H\n#define DAMPER_DATA_H\n\n",
+            *(f"#define DAMPER_{name} {size}\n" for name, size in sizes.items()),
+            "\n/* Temperatures [degC], control signals, speeds [m/s], and forces [N] by them:\n",
+            " * at each temperature and signal first rebound, then compression. */\n",
+            array("float", "TEMPERATURES", temperatures, single),
+            array("float", "SIGNALS", first.voltages, single),
+            array("float", "SPEEDS", first.speeds[:-1], single),
+            array("float", "FORCES", np.stack(forces), single),
+            "\n/* The car: acceleration at K by the force of each axle D [1/kg], stiffness of its springs [N/m],\n",
+            " * extension of a damper over deflection of its suspension, and number of dampers at each axle. */\n",
+            array("float", "FORCE_TO_COMFORT", car.force_to_comfort(), single),
+            array("float", "SPRING_STIFFNESS", car.stiffnesses, single),
+            array("float", "MOTION_RATIO", car.motion_ratios, single),
+            array("float", "DAMPERS", car.dampers, single),
+            "\n#endif\n",
+        )
+    )
+
+
+FORMAT = Format(NAME, "table, inverse and comfort law for a control unit", files)

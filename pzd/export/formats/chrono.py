@@ -1,0 +1,36 @@
+"""Project Chrono: the nonlinear damper of a TSDA element as JSON, one curve a control signal.
+
+`Damping Curve Data` is what Chrono::Vehicle reads: pairs of velocity [m/s] and force [N], positive in extension.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pzd.export.format import Files, Format
+
+if TYPE_CHECKING:
+    from pzd.export.content import Content
+
+NAME = "chrono"
+
+
+def files(content: Content) -> Files:
+    """A file a curve."""
+    from pzd.export.curves import curves
+    from pzd.schema.jsonfile import json_text
+
+    found = {}
+    for one in curves(content, NAME):
+        pairs = [list(pair) for pair in zip(one.velocities.tolist(), one.forces.tolist(), strict=True)]
+        document = {
+            "Name": one.name,
+            "Type": "TSDA",
+            "Description": "; ".join(filter(None, (content.origin, one.condition))),
+            "Damping Curve Data": pairs,
+        }
+        found[f"{one.name}-chrono.json"] = f"{json_text(document)}\n".encode()
+    return found
+
+
+FORMAT = Format(NAME, "nonlinear dampers for Project Chrono, one curve a control signal", files)

@@ -1,0 +1,64 @@
+"""FMI 2.0 and 3.0 co-simulation: the damper with its dynamics in plain C, with its sources.
+
+Inputs are held over a communication step, and within it the path of the element is a closed form piece by piece, so
+that the size of the step adds no error of its own. An effect for which there is none is refused.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pzd.export.format import Files, Format
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from pzd.export.content import Content
+
+NAME = "fmu"
+_COMMON = ("element.c", "model.c")
+_HEADERS = ("element.h", "model.h")
+
+
+def files(content: Content) -> Files:
+    """An FMU of each version."""
+    from pzd.export.c_text import source
+    from pzd.export.dynamics import Dynamics, data_of
+    from pzd.export.fmi import IDENTIFIER, build_description, fmi2, fmi3
+    from pzd.export.library import compiled_library, folders, suffix
+
+    dynamics = Dynamics.of(content.damper, NAME)
+    data, token = data_of(content, dynamics)
+    found = {}
+    for version, folder in zip((2, 3), folders(), strict=True):
+        to_compile = (f"fmi{version}.c", *_COMMON)
+        sources = {name: source(content, name) for name in (*to_compile, *_HEADERS)} | {"element_data.h": data.encode()}
+        members = {f"sources/{name}": text for name, text in sources.items()}
+        if version == 2:
+            members["modelDescription.xml"] = fmi2(content, dynamics, token, to_compile).encode()
+        else:
+            members["modelDescription.xml"] = fmi3(content, dynamics, token).encode()
+            members["sources/buildDescription.xml"] = build_description(to_compile).encode()
+        library = compiled_library(sources, to_compile) if folder else None
+        if library is not None:
+            members[f"binaries/{folder}/{IDENTIFIER}{suffix()}"] = library
+        found[f"{content.name}-fmi{version}.fmu"] = _archive(members)
+    return found
+
+
+def _archive(members: Mapping[str, bytes]) -> bytes:
+    """A ZIP archive without times of writing."""
+    from io import BytesIO
+    from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+    written = BytesIO()
+    with ZipFile(written, "w") as archive:
+        for name, data in sorted(members.items()):
+            member = ZipInfo(name)  # dated 1980-01-01
+            member.compress_type = ZIP_DEFLATED
+            member.external_attr = 0o644 << 16
+            archive.writestr(member, data)
+    return written.getvalue()
+
+
+FORMAT = Format(NAME, "the damper with its dynamics for co-simulation, FMI 2.0 and 3.0", files)

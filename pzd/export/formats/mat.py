@@ -1,0 +1,88 @@
+"""MATLAB 5: breakpoints and tables as the lookup blocks of Simulink take them.
+
+`table` over `bp1` (control signal) and `bp2` (velocity), with more than one temperature over `bp3` too; over the
+velocity alone, as `bp1`, where the table has one control signal or none. `inverse` gives the control signal over
+`inverse_bp1` (velocity) and `inverse_bp2`, the share of the way from the lowest force that the damper gives at that
+velocity, `inverse_low`, to the highest, `inverse_high`: every share has its control signal, and no breakpoint lies out
+of reach.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pzd.export.format import Files, Format
+
+if TYPE_CHECKING:
+    from pzd.export.content import Content
+
+_TEXT = 116
+"""Bytes of text at the start of a MAT-file of level 5; MATLAB 2023, MAT-file format."""
+
+
+def files(content: Content) -> Files:
+    """One file of level 5."""
+    from io import BytesIO
+
+    from scipy.io import savemat
+
+    written = BytesIO()
+    savemat(written, variables(content), oned_as="row", long_field_names=True)  # type: ignore[arg-type]  # a file will do
+    text = f"MATLAB 5.0 MAT-file, {content.origin}".encode()[:_TEXT].ljust(_TEXT)  # in place of the time of writing
+    return {f"{content.name}.mat": text + written.getvalue()[_TEXT:]}
+
+
+def variables(content: Content) -> dict[str, Any]:
+    """What the file holds, by name."""
+    import numpy as np
+
+    grid, control = content.grid, content.control
+    forces = np.moveaxis(grid.forces, 0, 2)
+    found: dict[str, Any] = {"origin": content.origin, "damper": _parameters(content)}
+    found["bp2" if content.adjustable else "bp1"] = grid.velocities
+    found["units"] = {"velocity": "m/s", "force": "N"}
+    if content.adjustable:
+        found |= {"bp1": grid.voltages} | _inverse(content)
+        found["units"][control.name] = control.unit
+    if len(grid.temperatures) > 1:
+        found["bp3" if content.adjustable else "bp2"] = np.array(grid.temperatures, dtype=np.float64)
+        found["units"]["temperature"] = "degC"
+    else:
+        forces = forces[:, :, 0]
+    found["table"] = forces if content.adjustable else forces[0]
+    return found
+
+
+def _inverse(content: Content) -> dict[str, Any]:
+    """The control signal over velocity and share of the range of forces, at each temperature."""
+    import numpy as np
+
+    from pzd.export.inverse import inverses
+
+    found = inverses(content)
+    several = len(found) > 1
+    return {
+        "inverse_bp1": content.grid.velocities,
+        "inverse_bp2": found[0].shares,
+        "inverse": np.stack([one.signals for one in found], axis=2) if several else found[0].signals,
+        "inverse_low": np.stack([one.low for one in found], axis=1) if several else found[0].low,
+        "inverse_high": np.stack([one.high for one in found], axis=1) if several else found[0].high,
+    }
+
+
+def _parameters(content: Content) -> dict[str, Any]:
+    """T0, C and k by column, and the parameters of the effects, as structures."""
+    import numpy as np
+
+    from pzd.export.tabular import tables
+
+    cells = tables(content)["base"].cells
+    base = {key: np.array([np.nan if cell is None else cell for cell in column]) for key, column in cells.items()}
+    effects = {
+        name: {content.control.renamed(key): np.atleast_1d(value) for key, value in given.items()}
+        for name, given in content.damper.effects.items()
+    }
+    return {"base": base, "effects": effects or np.zeros((0, 0))}
+
+
+FORMAT = Format("mat", "breakpoints and tables for Simulink and Octave", files)

@@ -1,0 +1,44 @@
+"""Property files for codes of vehicle dynamics, in the syntax of .tir and .dpr (TeimOrbit), one curve a control signal.
+
+Velocity and force are positive in rebound, in the units that each file names.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pzd.export.format import Files, Format
+
+if TYPE_CHECKING:
+    from pzd.export.content import Content
+    from pzd.export.curves import Curve
+
+NAME = "tir"
+
+
+def files(content: Content) -> Files:
+    """A file a curve."""
+    from pzd.export.curves import curves
+
+    return {f"{one.name}.dpr": _text(one, content.origin).encode() for one in curves(content, NAME)}
+
+
+def _text(curve: Curve, origin: str) -> str:
+    remarks = [origin, f"{curve.condition or 'one curve'}; rebound positive"]
+    rows = (f"{v!r} {F!r}\n" for v, F in zip(curve.velocities.tolist(), curve.forces.tolist(), strict=True))
+    return "".join(
+        (
+            f"{'$' + '-' * 69}MDI_HEADER\n[MDI_HEADER]\n",
+            "FILE_TYPE = 'dpr'\nFILE_VERSION = 4.0\nFILE_FORMAT = 'ASCII'\n",
+            "(COMMENTS)\n{comment_string}\n",
+            *(f"'{remark.replace(chr(39), ' ')}'\n" for remark in remarks),
+            f"{'$' + '-' * 74}UNITS\n[UNITS]\n",
+            "LENGTH = 'meter'\nANGLE = 'radians'\nFORCE = 'newton'\nMASS = 'kg'\nTIME = 'second'\n",
+            f"{'$' + '-' * 74}CURVE\n[CURVE]\n",
+            "{vel force}\n",
+            *rows,
+        )
+    )
+
+
+FORMAT = Format(NAME, "property files for vehicle dynamics, one curve a control signal", files)

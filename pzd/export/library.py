@@ -1,0 +1,62 @@
+"""A shared library from sources in C, the same bytes each time."""
+
+from __future__ import annotations
+
+import logging
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from pzd.schema.errors import FilesError
+
+log = logging.getLogger(__name__)
+
+_FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
+_PLATFORMS = {
+    ("linux", "x86_64"): ("linux64", "x86_64-linux"),
+    ("linux", "aarch64"): (None, "aarch64-linux"),
+    ("darwin", "x86_64"): ("darwin64", "x86_64-darwin"),
+    ("darwin", "arm64"): ("darwin64", "aarch64-darwin"),
+}
+"""Folder of the library in an FMU of FMI 2.0, where there is one, and of FMI 3.0."""
+
+
+def folders() -> tuple[str | None, str | None]:
+    """Folder of a library of this machine in an FMU of FMI 2.0 and of FMI 3.0; None where neither has one."""
+    return _PLATFORMS.get((sys.platform, platform.machine()), (None, None))
+
+
+def suffix() -> str:
+    """Ending of a shared library on this machine."""
+    return ".dylib" if sys.platform == "darwin" else ".so"
+
+
+def compiled_library(sources: Mapping[str, bytes], to_compile: Sequence[str]) -> bytes | None:
+    """The library; None, with a warning, where this machine has no compiler.
+
+    Parameters
+    ----------
+    sources : every file by name
+    to_compile : those of them that are compiled
+
+    Raises
+    ------
+    FilesError : when the compiler refuses them
+    """
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        log.warning("there is no C compiler (gcc or cc): the FMU holds its sources and no library")
+        return None
+    linked = ["-Wl,--build-id=none"] if sys.platform == "linux" else []
+    with tempfile.TemporaryDirectory() as place:
+        for name, data in sources.items():
+            (Path(place) / name).write_bytes(data)
+        command = [compiler, *_FLAGS, *linked, *to_compile, "-o", "library", "-lm"]
+        done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)  # noqa: S603  # our own sources
+        if done.returncode:
+            raise FilesError(f"{compiler}: {' '.join(done.stderr.split()) or 'it failed'}")
+        return (Path(place) / "library").read_bytes()

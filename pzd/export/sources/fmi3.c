@@ -1,0 +1,269 @@
+/* FMI 3.0 for co-simulation; see https://fmi-standard.org. */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "element_data.h"
+#include "model.h"
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#elif defined(__GNUC__)
+#define EXPORT __attribute__((visibility("default")))
+#else
+#define EXPORT
+#endif
+
+typedef void *fmi3Instance, *fmi3InstanceEnvironment, *fmi3FMUState;
+typedef uint32_t fmi3ValueReference, fmi3UInt32;
+typedef float fmi3Float32;
+typedef double fmi3Float64;
+typedef int8_t fmi3Int8;
+typedef uint8_t fmi3UInt8, fmi3Byte;
+typedef int16_t fmi3Int16;
+typedef uint16_t fmi3UInt16;
+typedef int32_t fmi3Int32;
+typedef int64_t fmi3Int64;
+typedef uint64_t fmi3UInt64;
+typedef bool fmi3Boolean, fmi3Clock;
+typedef const char *fmi3String;
+typedef const fmi3Byte *fmi3Binary;
+typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Status;
+typedef enum { fmi3Independent, fmi3Constant, fmi3Fixed, fmi3Tunable, fmi3Discrete, fmi3Dependent } fmi3DependencyKind;
+typedef enum { fmi3IntervalNotYetKnown, fmi3IntervalUnchanged, fmi3IntervalChanged } fmi3IntervalQualifier;
+typedef void (*fmi3LogMessageCallback)(fmi3InstanceEnvironment, fmi3Status, fmi3String, fmi3String);
+typedef void (*fmi3ClockUpdateCallback)(fmi3InstanceEnvironment);
+typedef void (*fmi3IntermediateUpdateCallback)(fmi3InstanceEnvironment, fmi3Float64, fmi3Boolean, fmi3Boolean,
+                                               fmi3Boolean, fmi3Boolean, fmi3Boolean *, fmi3Float64 *);
+typedef void (*fmi3LockPreemptionCallback)(void);
+typedef void (*fmi3UnlockPreemptionCallback)(void);
+
+typedef struct {
+    model damper;
+    fmi3InstanceEnvironment environment;
+    fmi3LogMessageCallback log;
+} instance;
+
+static fmi3Status checked(const instance *self, const char *wrong)
+{
+    if (wrong == NULL)
+        return fmi3OK;
+    if (self->log != NULL)
+        self->log(self->environment, fmi3Error, "logStatusError", wrong);
+    return fmi3Error;
+}
+
+EXPORT const char *fmi3GetVersion(void)
+{
+    return "3.0";
+}
+
+EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t count, const fmi3String categories[])
+{
+    return fmi3OK;
+}
+
+EXPORT fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
+                                                fmi3Boolean visible, fmi3Boolean logging, fmi3Boolean eventMode,
+                                                fmi3Boolean earlyReturn, const fmi3ValueReference intermediate[],
+                                                size_t count, fmi3InstanceEnvironment environment,
+                                                fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update)
+{
+    instance *self;
+    if (token == NULL || strcmp(token, TOKEN) != 0)
+        return NULL;
+    self = calloc(1, sizeof *self);
+    if (self != NULL) {
+        model_reset(&self->damper);
+        self->environment = environment;
+        self->log = log;
+    }
+    return self;
+}
+
+EXPORT fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
+                                                 fmi3Boolean visible, fmi3Boolean logging,
+                                                 fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
+{
+    return NULL;
+}
+
+EXPORT fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
+                                                      fmi3Boolean visible, fmi3Boolean logging,
+                                                      fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
+                                                      fmi3ClockUpdateCallback update, fmi3LockPreemptionCallback lock,
+                                                      fmi3UnlockPreemptionCallback unlock)
+{
+    return NULL;
+}
+
+EXPORT void fmi3FreeInstance(fmi3Instance c)
+{
+    free(c);
+}
+
+EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
+                                              fmi3Float64 start, fmi3Boolean stopDefined, fmi3Float64 stop)
+{
+    ((instance *)c)->damper.values[TIME] = start;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
+{
+    model_start(&((instance *)c)->damper);
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3Terminate(fmi3Instance c)
+{
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3Reset(fmi3Instance c)
+{
+    model_reset(&((instance *)c)->damper);
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t count, fmi3Float64 values[],
+                                 size_t size)
+{
+    fmi3Status status = checked(c, count == size ? NULL : "every variable has one value");
+    for (size_t i = 0; i < count && status == fmi3OK; i++)
+        status = checked(c, model_get(&((instance *)c)->damper, vr[i], &values[i]));
+    return status;
+}
+
+EXPORT fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t count,
+                                 const fmi3Float64 values[], size_t size)
+{
+    fmi3Status status = checked(c, count == size ? NULL : "every variable has one value");
+    for (size_t i = 0; i < count && status == fmi3OK; i++)
+        status = checked(c, model_set(&((instance *)c)->damper, vr[i], values[i]));
+    return status;
+}
+
+EXPORT fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step, fmi3Boolean keeps,
+                             fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
+                             fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
+{
+    const fmi3Status status = checked(c, model_step(&((instance *)c)->damper, time, step));
+    *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
+    *lastSuccessfulTime = ((instance *)c)->damper.values[TIME];
+    return status;
+}
+
+EXPORT fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
+{
+    if (*state == NULL)
+        *state = malloc(sizeof(model));
+    if (*state == NULL)
+        return checked(c, "there is no memory for the state");
+    *(model *)*state = ((instance *)c)->damper;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
+{
+    ((instance *)c)->damper = *(const model *)state;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
+{
+    free(*state);
+    *state = NULL;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size)
+{
+    *size = sizeof(model);
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size)
+{
+    if (size < sizeof(model))
+        return checked(c, "the state does not fit");
+    memcpy(bytes, state, sizeof(model));
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
+{
+    const fmi3Status status = size == sizeof(model) ? fmi3GetFMUState(c, state) : checked(c, "this is no state of it");
+    if (status == fmi3OK)
+        memcpy(*state, bytes, sizeof(model));
+    return status;
+}
+
+/* What the standard has beyond it, and this damper does not. */
+#define REFUSED(name, ...)                         \
+    EXPORT fmi3Status name(fmi3Instance c, __VA_ARGS__) \
+    {                                              \
+        return checked(c, "it has no " #name);        \
+    }
+#define REFUSED_ALONE(name)                        \
+    EXPORT fmi3Status name(fmi3Instance c)         \
+    {                                              \
+        return checked(c, "it has no " #name);        \
+    }
+#define REFERENCES const fmi3ValueReference vr[], size_t count
+#define NO_VARIABLES(type)                                              \
+    REFUSED(fmi3Get##type, REFERENCES, fmi3##type values[], size_t size) \
+    REFUSED(fmi3Set##type, REFERENCES, const fmi3##type values[], size_t size)
+
+NO_VARIABLES(Float32)
+NO_VARIABLES(Int8)
+NO_VARIABLES(UInt8)
+NO_VARIABLES(Int16)
+NO_VARIABLES(UInt16)
+NO_VARIABLES(Int32)
+NO_VARIABLES(UInt32)
+NO_VARIABLES(Int64)
+NO_VARIABLES(UInt64)
+NO_VARIABLES(Boolean)
+NO_VARIABLES(String)
+REFUSED(fmi3GetBinary, REFERENCES, size_t sizes[], fmi3Binary values[], size_t size)
+REFUSED(fmi3SetBinary, REFERENCES, const size_t sizes[], const fmi3Binary values[], size_t size)
+REFUSED(fmi3GetClock, REFERENCES, fmi3Clock values[])
+REFUSED(fmi3SetClock, REFERENCES, const fmi3Clock values[])
+REFUSED(fmi3GetNumberOfVariableDependencies, fmi3ValueReference vr, size_t *count)
+REFUSED(fmi3GetVariableDependencies, fmi3ValueReference dependent, size_t elements[], fmi3ValueReference independents[],
+        size_t indices[], fmi3DependencyKind kinds[], size_t count)
+REFUSED(fmi3GetDirectionalDerivative, const fmi3ValueReference unknowns[], size_t n, const fmi3ValueReference knowns[],
+        size_t m, const fmi3Float64 seed[], size_t seeds, fmi3Float64 sensitivity[], size_t size)
+REFUSED(fmi3GetAdjointDerivative, const fmi3ValueReference unknowns[], size_t n, const fmi3ValueReference knowns[],
+        size_t m, const fmi3Float64 seed[], size_t seeds, fmi3Float64 sensitivity[], size_t size)
+REFUSED(fmi3GetOutputDerivatives, REFERENCES, const fmi3Int32 orders[], fmi3Float64 values[], size_t size)
+REFUSED(fmi3GetIntervalDecimal, REFERENCES, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+REFUSED(fmi3GetIntervalFraction, REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+        fmi3IntervalQualifier qualifiers[])
+REFUSED(fmi3GetShiftDecimal, REFERENCES, fmi3Float64 shifts[])
+REFUSED(fmi3GetShiftFraction, REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+REFUSED(fmi3SetIntervalDecimal, REFERENCES, const fmi3Float64 intervals[])
+REFUSED(fmi3SetIntervalFraction, REFERENCES, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+REFUSED(fmi3SetShiftDecimal, REFERENCES, const fmi3Float64 shifts[])
+REFUSED(fmi3SetShiftFraction, REFERENCES, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+REFUSED(fmi3UpdateDiscreteStates, fmi3Boolean *again, fmi3Boolean *ends, fmi3Boolean *nominals, fmi3Boolean *states,
+        fmi3Boolean *defined, fmi3Float64 *next)
+REFUSED(fmi3CompletedIntegratorStep, fmi3Boolean keeps, fmi3Boolean *event, fmi3Boolean *ends)
+REFUSED(fmi3SetTime, fmi3Float64 time)
+REFUSED(fmi3SetContinuousStates, const fmi3Float64 states[], size_t count)
+REFUSED(fmi3GetContinuousStateDerivatives, fmi3Float64 derivatives[], size_t count)
+REFUSED(fmi3GetEventIndicators, fmi3Float64 indicators[], size_t count)
+REFUSED(fmi3GetContinuousStates, fmi3Float64 states[], size_t count)
+REFUSED(fmi3GetNominalsOfContinuousStates, fmi3Float64 nominals[], size_t count)
+REFUSED(fmi3GetNumberOfEventIndicators, size_t *count)
+REFUSED(fmi3GetNumberOfContinuousStates, size_t *count)
+REFUSED(fmi3ActivateModelPartition, fmi3ValueReference clock, fmi3Float64 time)
+REFUSED_ALONE(fmi3EnterEventMode)
+REFUSED_ALONE(fmi3EnterConfigurationMode)
+REFUSED_ALONE(fmi3ExitConfigurationMode)
+REFUSED_ALONE(fmi3EvaluateDiscreteStates)
+REFUSED_ALONE(fmi3EnterContinuousTimeMode)
+REFUSED_ALONE(fmi3EnterStepMode)

@@ -1,0 +1,74 @@
+"""The damper as plain tables: force, inverse, T0, C and k, and the parameters of the effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from pzd.artefacts import ForceRow, InverseRow
+from pzd.damper.competing_forms import known
+from pzd.damper.model import BaseRow
+from pzd.export.content import Content
+from pzd.quantities import CHANNELS, DAMPING, FRICTION, STIFFNESS
+from pzd.schema.model import Frozen
+
+Cell = float | int | str | None
+
+
+class EffectRow(Frozen):
+    """One value of a parameter of an adopted effect."""
+
+    effect: str
+    parameter: str
+    voltage_V: float | None
+    """At which it holds; None at every one."""
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Columns:
+    """One table, column by column."""
+
+    cells: Mapping[str, tuple[Cell, ...]]
+    """By the name of the column."""
+    units: Mapping[str, str]
+    """Of the columns that have one."""
+
+
+def tables(content: Content) -> dict[str, Columns]:
+    """The tables of a damper by name; one that would have no row is left out."""
+    damper = content.damper
+    every = {
+        "force": _columns(content, ForceRow, content.table.force),
+        "inverse": _columns(content, InverseRow, content.table.inverse),
+        "base": _columns(content, BaseRow, damper.base),
+        "effects": _columns(content, EffectRow, effect_rows(content)),
+    }
+    return {name: table for name, table in every.items() if any(table.cells.values())}
+
+
+def effect_rows(content: Content) -> tuple[EffectRow, ...]:
+    """A row a value of every parameter of the adopted effects."""
+    rows = []
+    for name, given in content.damper.effects.items():
+        nodes = given.get("at_voltage_V")
+        for parameter in known()[name].parameters:
+            value = given[parameter.name]
+            values = value if isinstance(value, tuple) else (value,)
+            voltages = nodes if isinstance(value, tuple) and isinstance(nodes, tuple) else (None,)
+            rows += [
+                EffectRow(effect=name, parameter=parameter.name, voltage_V=U, value=v, unit=parameter.unit)
+                for U, v in zip(voltages, values, strict=True)
+            ]
+    return tuple(rows)
+
+
+def _columns(content: Content, model: type[Frozen], rows: Sequence[Frozen]) -> Columns:
+    control = content.control
+    quantities = {q.column: q for q in (*CHANNELS, FRICTION, DAMPING, STIFFNESS)}
+    units = {q.column: q.unit for q in quantities.values()} | {control.renamed("voltage_V"): control.unit}
+    left_out = set() if content.controlled else {"voltage_V"}
+    fields = [name for name in model.model_fields if name not in left_out]
+    cells = {control.renamed(name): tuple(getattr(row, name) for row in rows) for name in fields}
+    return Columns(cells, {name: units[name] for name in cells if name in units})

@@ -1,0 +1,94 @@
+"""The damper of a run written for other tools: only where its results are those of the config as it is today."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pzd.artefacts import Diagnosed, Identified, Table
+from pzd.export.content import Content
+from pzd.export.formats import format_of
+from pzd.pipeline.command import Opened, stale_stages
+from pzd.runs.disk import as_files_error, versions
+from pzd.schema.errors import ConfigError
+
+FOLDER = "export"
+"""Where the files stand by default, in the folder of the run."""
+_LAST = "table"
+"""The last stage whose results are exported."""
+_BEHIND = ("simulate", "report")
+"""Stages whose results are not."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written."""
+
+    files: tuple[Path, ...]
+    marks: tuple[str, ...]
+    """Why the damper is not to be trusted, a line a reason."""
+
+
+def exported(given: Opened, to: str, out: Path | None) -> Exported:
+    """Write the damper of a run in one format.
+
+    Parameters
+    ----------
+    given : config and run
+    to : name of the format
+    out : folder of the files; None for `FOLDER` in the folder of the run
+
+    Returns
+    -------
+    the files that were written, and why their numbers are not to be trusted
+
+    Raises
+    ------
+    ConfigError : when there is no such format, it cannot hold this damper, or the run is not there or stale
+    DataError : when a file of the run is at fault
+    FilesError : when the disk does not take the files
+    """
+    wanted = format_of(to)
+    _check_fresh(given)
+    files = wanted.files(content_of(given))
+    folder = out or given.run.folder / FOLDER
+    with as_files_error(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, data in files.items():
+            fresh = folder / f".{name}.new"
+            fresh.write_bytes(data)
+            fresh.replace(folder / name)
+    manifests = (given.run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Table))
+    marks = dict.fromkeys(mark for manifest in manifests if manifest for mark in manifest.marks)
+    return Exported(tuple(folder / name for name in files), tuple(marks))
+
+
+def content_of(given: Opened) -> Content:
+    """What there is to export of a run.
+
+    Raises
+    ------
+    DataError : when a file of the run is at fault
+    """
+    simulate = given.config.simulate
+    return Content(
+        name=given.run.config.stem,
+        version=versions()["pzd"],
+        config=given.run.config.name,
+        control=given.run.control,
+        damper=given.run.read(Diagnosed).damper,
+        table=given.run.read(Table),
+        force_levels=given.config.table.force_levels,
+        car=simulate.car.car(),
+        tie_break=simulate.tie_break,
+    )
+
+
+def _check_fresh(given: Opened) -> None:
+    mends = f"pzd {_LAST} {given.run.config}"
+    for kind in (Diagnosed, Table):
+        if given.run.stage_folder(kind.folder).manifest is None:
+            raise ConfigError(f"{given.run.folder / kind.folder}: there is no result to export yet; {mends} makes it")
+    for stage, reason in stale_stages(given).items():
+        if stage not in _BEHIND:
+            raise ConfigError(f"{given.run.folder}: {stage} is stale: {reason}; {mends} brings it up to date")

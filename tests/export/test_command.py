@@ -1,0 +1,111 @@
+"""`pzd export` writes what a run holds, and refuses in one line where there is nothing to write."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from stub_stages import UNDETERMINED, project
+
+from pzd.cli.app import status
+from pzd.export.formats import formats
+
+
+@pytest.fixture
+def typed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[int, list[str], list[str]]]:
+    """Type a command in a folder with a config; gives the exit code and what was printed."""
+    project(tmp_path, monkeypatch)
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> tuple[int, list[str], list[str]]:
+        capsys.readouterr()
+        code = status(arguments)
+        printed = capsys.readouterr()
+        return code, printed.out.splitlines(), printed.err.splitlines()
+
+    return run
+
+
+def test_the_files_stand_in_the_folder_of_the_run_or_where_out_says(typed) -> None:
+    typed("table", "first.yaml")
+    code, out, err = typed("export", "first.yaml", "--to", "csv")
+    assert (code, err) == (0, [])
+    assert out[0] == "export: runs/first/export/first-force.csv"
+    assert Path("runs/first/export/first-force.csv").read_text().startswith("# pzd ")
+    typed("export", "first.yaml", "--to", "csv", "--out", "elsewhere/far")
+    assert sorted(path.name for path in Path("elsewhere/far").iterdir()) == [Path(line).name for line in sorted(out)]
+    assert typed("show", "first.yaml")[0] == typed("run", "first.yaml")[0] == 0
+
+
+def test_json_lists_the_files(typed) -> None:
+    typed("table", "first.yaml")
+    _, out, _ = typed("export", "first.yaml", "--to", "json", "--json")
+    assert json.loads("\n".join(out)) == {
+        "format": "json",
+        "files": ["runs/first/export/first.json"],
+        "not_to_be_trusted": [],
+    }
+
+
+def test_a_run_that_is_not_there_says_what_to_run(typed) -> None:
+    assert typed("export", "first.yaml", "--to", "csv") == (
+        2,
+        [],
+        ["runs/first/3-diagnose: there is no result to export yet; pzd table first.yaml makes it"],
+    )
+    typed("diagnose", "first.yaml")
+    assert "runs/first/4-table: there is no result" in typed("export", "first.yaml", "--to", "csv")[2][0]
+
+
+def test_a_stale_run_says_why_and_what_to_run_and_a_stale_report_does_not_matter(typed) -> None:
+    typed("run", "first.yaml")
+    code, _, err = typed("export", "first.yaml", "--to", "csv", "--set", "table.speed_points=30")
+    assert code == 2
+    assert len(err) == 1
+    assert err[0].startswith("runs/first: table is stale: ")
+    assert err[0].endswith("; pzd table first.yaml brings it up to date")
+    assert not Path("runs/first/export").exists()
+    assert typed("export", "first.yaml", "--to", "csv", "--set", "report.daily_exposure_h=3")[0] == 0
+
+
+def test_a_format_that_there_is_not_gets_the_nearest(typed) -> None:
+    typed("table", "first.yaml")
+    code, _, err = typed("export", "first.yaml", "--to", "jsom")
+    assert (code, err) == (
+        2,
+        [f"--to: no such format; there are {', '.join(formats())}; did you mean json? (got jsom)"],
+    )
+
+
+def test_without_its_library_a_format_names_the_extra(typed, monkeypatch: pytest.MonkeyPatch) -> None:
+    typed("table", "first.yaml")
+    monkeypatch.setattr("pzd.export.formats.find_spec", lambda name: None if name == "pyarrow" else find_spec(name))
+    code, _, (line,) = typed("export", "first.yaml", "--to", "parquet")
+    assert code == 2
+    assert "pip install 'pzd[formats]'" in line
+
+
+def test_a_damper_that_is_not_to_be_trusted_is_written_and_marked(typed) -> None:
+    seed = ("--set", f"seed={UNDETERMINED}")
+    typed("table", "first.yaml", *seed)
+    code, out, err = typed("export", "first.yaml", "--to", "csv", *seed)
+    assert (code, bool(out)) == (4, True)
+    assert err[0].startswith("not to be trusted: ")
+
+
+def test_help_names_every_format(typed) -> None:
+    _, out, _ = typed("export", "--help")
+    assert all(f"{name}: " in " ".join(out) for name in formats())
+
+
+def test_a_file_where_the_folder_should_be_is_a_fault_of_the_files(typed) -> None:
+    typed("table", "first.yaml")
+    Path("taken").write_text("mine")
+    code, _, err = typed("export", "first.yaml", "--to", "csv", "--out", "taken")
+    assert (code, len(err)) == (5, 1)
+    assert Path("taken").read_text() == "mine"

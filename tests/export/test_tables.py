@@ -1,0 +1,82 @@
+"""The tabular formats, read back by other libraries, hold the numbers of the run and say where they come from."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from exported_dampers import DAMPERS, content_of
+
+from pzd.artefacts import ForceRow
+from pzd.export.content import Content
+from pzd.export.formats import formats
+from pzd.quantities import Control
+
+
+def numbers(content: Content, field: str) -> np.ndarray:
+    """A field of the run's table of force, NaN where a cell is empty."""
+    return np.array([getattr(row, field) for row in content.table.force], dtype=float)
+
+
+@pytest.mark.parametrize("name", sorted(set(formats()) - {"c", "fmu"}))  # these have tests of their own
+def test_a_format_gives_the_same_bytes_twice_and_names_version_and_config(name: str, content: Content) -> None:
+    again = replace(content)
+    written = formats()[name].files(content)
+    assert written == formats()[name].files(again)
+    assert all(content.origin.encode() in data for data in written.values())
+
+
+def test_csv_read_by_pandas_holds_every_cell(content: Content) -> None:
+    written = formats()["csv"].files(content)
+    force = pd.read_csv(io.BytesIO(written["my-run-force.csv"]), comment="#")
+    for field in set(ForceRow.model_fields) & set(force.columns):
+        np.testing.assert_array_equal(force[field].to_numpy(float), numbers(content, field))
+    assert ("voltage_V" in force.columns) == content.controlled
+    base = pd.read_csv(io.BytesIO(written["my-run-base.csv"]), comment="#")
+    assert base["k_N_per_m"].tolist() == [row.k_N_per_m for row in content.damper.base]
+
+
+def test_the_two_sides_of_zero_speed_keep_their_signs() -> None:
+    content = content_of(DAMPERS["plain"])
+    for name in ("csv", "json"):
+        (data,) = [
+            d for file, d in formats()[name].files(content).items() if file in {"my-run-force.csv", "my-run.json"}
+        ]
+        assert b"-0.0" in data
+
+
+def test_json_read_by_the_standard_library_holds_every_cell(content: Content) -> None:
+    document = json.loads(formats()["json"].files(content)["my-run.json"])
+    force = document["force"]["columns"]
+    np.testing.assert_array_equal(np.array(force["force_N"], dtype=float), numbers(content, "force_N"))
+    assert document["force"]["units"]["velocity_m_per_s"] == "m/s"
+    given = {name: dict(values) for name, values in content.damper.effects.items()}
+    effects = document.get("effects", {"columns": {"effect": [], "parameter": [], "value": []}})["columns"]
+    told = zip(effects["effect"], effects["parameter"], effects["value"], strict=True)
+    assert {(effect, parameter): value for effect, parameter, value in told} == {
+        (effect, parameter): value for effect, values in given.items() for parameter, value in values.items()
+    }
+
+
+def test_parquet_read_by_pyarrow_holds_every_cell_and_its_unit(content: Content) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = parquet.read_table(io.BytesIO(formats()["parquet"].files(content)["my-run-force.parquet"]))
+    np.testing.assert_array_equal(table.column("force_N").to_numpy(), numbers(content, "force_N"))
+    assert table.schema.field("velocity_m_per_s").metadata == {b"unit": b"m/s"}
+
+
+def test_a_current_goes_by_its_own_name_and_unit() -> None:
+    content = replace(content_of(DAMPERS["plain"]), control=Control("current", "A"))
+    document = json.loads(formats()["json"].files(content)["my-run.json"])
+    assert document["force"]["units"]["current_A"] == "A"
+    assert "voltage" not in json.dumps(document)
+
+
+def test_a_parameter_that_differs_by_voltage_has_a_row_each() -> None:
+    damper = DAMPERS["plain"].with_effect("orifice_quadratic", {"q": (100.0, 900.0), "at_voltage_V": (0.0, 150.0)})
+    effects = json.loads(formats()["json"].files(content_of(damper))["my-run.json"])["effects"]["columns"]
+    assert (effects["voltage_V"], effects["value"]) == ([0.0, 150.0], [100.0, 900.0])
