@@ -16,6 +16,9 @@ SAMPLES_PER_ORDER = 20
 FLOOR = 1e-12
 """Innovation variance is never below this share of the variance: rounding is no noise model."""
 
+GRID = 4096
+"""Frequencies over which a density is summed: enough for poles within 1e-3 of the unit circle."""
+
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
@@ -55,7 +58,23 @@ class Autoregression:
     @property
     def variance(self) -> float:
         """Variance of the noise itself: the density summed over all frequencies."""
-        return float(np.mean(self.density((np.arange(4096) + 0.5) / 4096)))
+        return float(np.mean(self.density((np.arange(GRID) + 0.5) / GRID)))
+
+    def with_white(self, share: float) -> Autoregression:
+        """The noise together with white noise of a share of its variance, by a model of the same order.
+
+        Equation: R a = r, sigma_w^2 = r_0 - a r, r_0 (1 + share) in place of r_0      Source: Yule 1927, Walker 1931
+        """
+        from scipy.linalg import solve_toeplitz
+
+        p = self.coefficients.size
+        if p == 0 or self.innovation <= 0.0:
+            return self
+        shares = (np.arange(GRID) + 0.5) / GRID
+        r = np.array([np.mean(self.density(shares) * np.cos(2.0 * np.pi * shares * lag)) for lag in range(p + 1)])
+        r[0] *= 1.0 + share
+        a = solve_toeplitz(r[:p], r[1:])
+        return Autoregression(a, float(r[0] - a @ r[1:]))
 
 
 def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autoregression:

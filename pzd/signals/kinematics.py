@@ -12,7 +12,7 @@ import numpy as np
 
 from pzd.record import Array
 from pzd.signals.cycles import Cycles
-from pzd.signals.smoothing import low_pass
+from pzd.signals.smoothing import HIGHEST, low_pass
 
 STANDARD_ERRORS = 4.0
 """A harmonic is kept where its mean exceeds this many standard errors of its scatter over cycles."""
@@ -123,5 +123,5 @@ def _smoothed(time: Array, displacement: Array, highest: float) -> Kinematics:
     regular = bool(np.all(np.abs(steps - step) < 1e-3 * step))
     grid = time if regular else np.arange(time[0], time[-1] + 0.5 * step, step)
     values = displacement if regular else np.interp(grid, time, displacement)
-    smooth = CubicSpline(grid, low_pass(values, min(2.0 * np.pi * highest * step, 20.0)))
+    smooth = CubicSpline(grid, low_pass(values, min(2.0 * np.pi * highest * step, HIGHEST)))
     return Kinematics(smooth(time), smooth(time, 1), smooth(time, 2))

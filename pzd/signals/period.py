@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array
-from pzd.signals.smoothing import low_pass
+from pzd.signals.smoothing import HIGHEST, low_pass
 
 MOST_SAMPLES = 2**18
 """Longer records are thinned to this many samples for the search."""
@@ -36,8 +36,6 @@ RAMPS = 0.15
 """Share of the motion at either end that is left out where the whole shows no period."""
 MOST_CANDIDATES = 40
 """Lags looked at closely, the shortest first."""
-HIGHEST_CORNER = 20.0
-"""Corner of the smoothing [rad/sample] that leaves a record without noise as it is."""
 LEAST_POINTS = 4
 """Fewest samples in a cycle."""
 
@@ -70,7 +68,7 @@ def repeats(time: Array, displacement: Array) -> Repeats | None:
     grid = np.arange(time[0], time[-1] + 0.5 * step, step)
     x = np.interp(grid, time, displacement)
     least = LEAST_SHARE * float(time[last] - time[first]) / step
-    smooth = low_pass(x, HIGHEST_CORNER)
+    smooth = low_pass(x, HIGHEST)
     # Few cycles drown between ramps as long, most of all to one side, whose mean goes up and down: look inside as well.
     outer = int(RAMPS * (last - first) * float(np.median(np.diff(time))) / step)
     inner = x[int((time[first] - time[0]) / step) + outer : int((time[last] - time[0]) / step) - outer]

@@ -4,10 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from pzd.record import Array
+from pzd.record import Array, Complex
 
+HIGHEST = 20.0
+"""Corner of the smoothing [rad/sample] that leaves a record without noise as it is."""
 _CORNERS = 60
 _BINS = 2000
+_HALVINGS = 6
+"""Bands that are asked, the narrowest a sixty-fourth of half the sampling rate: no sensor is recorded faster."""
+CLEAR = 2.0
+"""Corners above which the filter has taken all but a hundredth: what is left there is noise."""
+_FEWEST = 50
+"""Frequencies that show the level of the noise within 15 %."""
+_FAINT = 1e-6
+"""Share of the power of a motion up to which what looks like noise is noise: a thousandth of its r.m.s.
+
+Reason: a displacement sensor is better than that, and a sweep fills its band as evenly as noise."""
+_STANDS_OUT = 3.0
+"""Of white noise the largest of n powers is about ln n times their mean, and beyond three times that once in n^2."""
 
 
 def low_pass(values: Array, highest: float) -> Array:
@@ -25,22 +39,56 @@ def low_pass(values: Array, highest: float) -> Array:
     -------
     (n,) smoothed; the ends are continued by point reflection
     """
-    line = np.linspace(values[0], values[-1], values.size)
-    flat = values - line
-    spectrum = np.fft.rfft(np.concatenate((flat, -flat[-2:0:-1])))
-    s = 2.0 * np.sin(np.pi * np.arange(spectrum.size) / (2 * (values.size - 1)))
-    corner = _corner(s, np.abs(spectrum) ** 2, highest)
-    smooth: Array = np.fft.irfft(spectrum / (1.0 + (s / corner) ** 6), 2 * (values.size - 1))[: values.size]
+    line, spectrum, s = _reflected(values)
+    smooth: Array = np.fft.irfft(
+        spectrum / (1.0 + (s / _corner(s, np.abs(spectrum) ** 2, highest)) ** 6), 2 * (values.size - 1)
+    )[: values.size]
     return smooth + line
 
 
+def motion_below(values: Array) -> float:
+    """Frequency [rad/sample] above which a motion (n,) at a regular step is noise alone; pi where it never is."""
+    _, spectrum, s = _reflected(values)
+    return min(CLEAR * _corner(s, np.abs(spectrum) ** 2, HIGHEST), float(np.pi))
+
+
+def _reflected(values: Array) -> tuple[Array, Complex, Array]:
+    """The line (n,) through both ends, the spectrum (n,) of the rest continued by point reflection, 2 sin(w/2) (n,)."""
+    line = np.linspace(values[0], values[-1], values.size)
+    flat = values - line
+    spectrum = np.fft.rfft(np.concatenate((flat, -flat[-2:0:-1])))
+    return line, spectrum, 2.0 * np.sin(np.pi * np.arange(spectrum.size) / (2 * (values.size - 1)))
+
+
 def _corner(s: Array, power: Array, highest: float) -> float:
-    """The corner [rad/sample] with the least generalised cross-validation."""
+    """The corner [rad/sample] with the least generalised cross-validation, in the widest band of even noise.
+
+    Cross-validation takes noise for white. Where a filter has left none at high frequencies, it takes what lies below
+    for motion. So bands from 0 to a half, a quarter, an eighth ... of the range are asked too: the least corner counts
+    above which nothing stands out of the noise of its band, up to the end of the range, and little is left.
+    """
     edges = np.unique(np.geomspace(1, s.size, _BINS).astype(np.int64))
     edges = edges[edges < s.size]
     binned, counts = np.add.reduceat(power, edges), np.diff(np.append(edges, s.size))
     middle = np.add.reduceat(s, edges) / counts
     corners = np.geomspace(min(np.pi / s.size, highest), highest, _CORNERS)
     taken = 1.0 / (1.0 + (corners[:, None] / middle[None, :]) ** 6)
-    scores = (taken**2 @ binned) / (taken @ counts) ** 2
-    return float(corners[int(np.argmin(scores))])
+    found = float(corners[_least(taken, binned, counts)])
+    for halvings in range(1, _HALVINGS + 1):
+        limit = s[-1] / 2.0**halvings
+        inside = middle <= limit
+        corner = float(corners[_least(taken[:, inside], binned[inside], counts[inside])])
+        noise = (s > CLEAR * corner) & (s <= limit)
+        if np.count_nonzero(noise) < _FEWEST:
+            continue
+        level = float(np.mean(power[noise]))
+        above = power[s > CLEAR * corner]
+        even = float(np.max(above)) <= _STANDS_OUT * np.log(above.size) * level
+        if even and float(np.sum(above)) <= _FAINT * float(np.sum(power)):
+            found = min(found, corner)
+    return found
+
+
+def _least(taken: Array, binned: Array, counts: Array) -> int:
+    """Which corner has the least score; `taken` (corners, bins) is what each takes away."""
+    return int(np.argmin((taken**2 @ binned) / (taken @ counts) ** 2))

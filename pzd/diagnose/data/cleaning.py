@@ -2,7 +2,7 @@
 
 Noise of the displacement goes through a stiff oil spring into the force, and a second derivative
 makes it look like inertia. Where the motion repeats, cycles are averaged and only harmonics well
-above their own scatter are kept; where it does not, the spectrum is cut where it sinks into its floor.
+above their own scatter are kept; where it does not, the spectrum is cut where it sinks into noise.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pzd.record import Array, Record, is_constant, sliced, voltage_scale
 from pzd.signals.between_cycles import pure_error
 from pzd.signals.cycles import Cycles, cycles, drift, settled
+from pzd.signals.smoothing import motion_below
 from pzd.signals.stretches import separate_tests
 
 Motion = tuple[Array, Array, Array]
@@ -33,10 +34,6 @@ DRAWN = 4
 COVERS = 0.5
 """The repeating run must hold this share of the way that the piston travels, else the record counts as not
 repeating; rest before and after does not count."""
-ABOVE_FLOOR = 4.0
-"""The spectrum of a motion that does not repeat is cut where it comes within this factor of its floor."""
-MEDIAN = 0.4549
-"""Median of chi-square with one degree of freedom: a line of a sine transform has one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,25 +213,16 @@ def _drawn(lead: Record, average: Average) -> tuple[Record, ...]:
 
 
 def _smoothed(record: Record) -> Record:
-    """The record with its displacement cut where the spectrum sinks into its floor; derivatives by the spectrum."""
+    """The record with its displacement cut where the spectrum sinks into noise; derivatives by the spectrum."""
     n = record.time.size
     line = np.linspace(record.displacement[0], record.displacement[-1], n)
     odd = record.displacement - line
     spectrum = np.fft.rfft(np.concatenate([odd, -odd[:0:-1]]))
     frequency = np.arange(spectrum.size) * record.rate / (2 * n - 1)
-    spectrum[frequency > _corner(frequency, np.abs(spectrum) ** 2, record.rate)] = 0.0
+    spectrum[frequency > motion_below(record.displacement) * record.rate / (2.0 * np.pi)] = 0.0
     slope = float(line[-1] - line[0]) / ((n - 1) / record.rate)
 
     def derivative(order: int) -> Array:
         return np.fft.irfft(spectrum * (2j * np.pi * frequency) ** order, 2 * n - 1)[:n]
 
     return _moved(record, (derivative(0) + line, derivative(1) + slope, derivative(2)))
-
-
-def _corner(frequency: Array, power: Array, rate: float) -> float:
-    """Frequency beyond which nothing rises above the floor, read on an average over neighbouring lines [Hz]."""
-    floor = float(np.median(power[frequency > 0.3 * rate])) / MEDIAN
-    width = max(power.size // 200, 3)
-    level = np.convolve(power, np.full(width, 1.0 / width), "same")
-    above = np.flatnonzero(level > ABOVE_FLOOR * floor)
-    return float(frequency[above[-1]]) if above.size else float(frequency[-1])

@@ -20,6 +20,7 @@ from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError, pure_error
 from pzd.signals.jumps import jumps, jumps_in_samples
 from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.reversals import reversals
 from pzd.signals.smooth_residual import fit_smooth_residual
 
 RESOLUTION = 3e-4
@@ -94,7 +95,7 @@ def _of_cycles(
     peak = float(np.max(np.abs(cycle)))
     average = _resampled(simulated.mean(axis=0), points)
     left = DISCREPANCY * _left_by(cycle, average, error.sample_variance / len(counted))
-    floor = ((RESOLUTION * peak) ** 2 + left**2) / error.single.size + given.displacement_variance
+    floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.displacement_variance
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
     bare = RecordLikelihood(
@@ -162,10 +163,11 @@ def _of_samples(
     ).noise
     measured = record.force[mask]
     peak = float(np.max(np.abs(measured)))
-    left = DISCREPANCY * _left_by(measured, force[mask], noise.variance)
-    if left**2 > noise.variance:
-        noise = Autoregression(np.zeros(0), noise.variance + left**2)
-    noise = Autoregression(noise.coefficients, max(noise.innovation, (RESOLUTION * peak) ** 2))
+    alike = _samples_alike(record)
+    left = alike * (DISCREPANCY * _left_by(measured, force[mask], noise.variance)) ** 2
+    if left > noise.variance:
+        noise = Autoregression(np.zeros(0), noise.variance + left)
+    noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
     motion, factor = motion_of(record, constant=p.constant)
     rows = int(np.count_nonzero(unbroken(compared, noise)))
     bare = RecordLikelihood(
@@ -183,6 +185,15 @@ def _of_samples(
         np.zeros(0),
     )
     return with_nuisances(bare, given.damper, nuisance, given.timing[mask])
+
+
+def _samples_alike(record: Record) -> float:
+    """Samples that say the same of what a model leaves: it fills as many harmonics of the motion as a cycle shows.
+
+    So what counts as noise has the same density at every sampling rate.
+    """
+    cycles = max(len(reversals(record.displacement)) / 2.0, 1.0)
+    return max(record.time.size / (2.0 * MOST_HARMONICS * cycles), 1.0)
 
 
 def _part(record: Record, start: int, stop: int) -> Record:

@@ -1,0 +1,53 @@
+"""A displacement is freed of its noise whatever colour a filter gave that, and keeps what stands out of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.random import Generator
+
+from pzd.record import Array
+from pzd.signals.autoregression import autoregression
+from pzd.signals.smoothing import HIGHEST, low_pass, motion_below
+
+RATE, NOISE = 1000, 1e-5
+INNER = slice(RATE // 2, -RATE // 2)
+TIME = np.arange(0.0, 10.0, 1.0 / RATE)
+
+
+def filtered(noise: Array, corner: float) -> Array:
+    """White noise (n,) behind a filter of the fourth order at a corner [Hz]."""
+    from scipy.signal import butter, sosfiltfilt
+
+    return np.asarray(sosfiltfilt(butter(4, corner, fs=RATE, output="sos"), noise))
+
+
+def error(motion: Array, noise: Array) -> float:
+    """R.m.s. of what smoothing leaves of the noise and takes of the motion [m]."""
+    left = (low_pass(motion + noise, HIGHEST) - motion)[INNER]
+    return float(np.sqrt(np.mean(left**2)))
+
+
+@pytest.mark.parametrize("corner", [400.0, 200.0, 50.0])
+def test_filtered_noise_is_taken_away_as_well_as_white_noise(corner: float, rng: Generator) -> None:
+    sine, white = 0.02 * np.sin(2.0 * np.pi * 1.03 * TIME), NOISE * rng.standard_normal(TIME.size)
+    assert error(sine, filtered(white, corner)) < 1.3 * error(sine, white)
+    assert 2.0 < motion_below(sine + filtered(white, corner)) * RATE / (2.0 * np.pi) < 40.0
+
+
+def test_a_fast_tone_behind_a_quiet_band_is_kept(rng: Generator) -> None:
+    """Its 0.1 mm lie 2000 times below the slow tone, and a band between them holds noise alone."""
+    both = 0.02 * np.sin(2.0 * np.pi * 1.03 * TIME) + 1e-4 * np.sin(2.0 * np.pi * 40.3 * TIME)
+    noise = NOISE * rng.standard_normal(TIME.size)
+    assert error(both, noise) < 0.5 * NOISE
+    assert error(both, filtered(noise, 200.0)) < NOISE
+
+
+def test_white_noise_added_to_a_model_adds_to_its_density(rng: Generator) -> None:
+    model = autoregression([filtered(rng.standard_normal(TIME.size), 400.0)])
+    shares = np.linspace(0.0, 0.5, 201)
+    wanted = model.density(shares) + 0.05 * model.variance
+    found = model.with_white(0.05)
+    assert found.variance == pytest.approx(1.05 * model.variance, rel=1e-3)
+    assert np.median(np.abs(np.log(found.density(shares) / wanted))) < 0.3  # as well as the same order describes it
+    assert found.density(np.array([0.5]))[0] > 10.0 * model.density(np.array([0.5]))[0]
