@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pzd.cli.exits import DONE
-from pzd.cli.layout import aligned, interval, number
+from pzd.cli.layout import aligned, filled, interval, number
 from pzd.cli.machine import run_as_data
 from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose
 from pzd.cli.output import Output
@@ -74,6 +74,7 @@ def show(
 
     A stage whose numbers are of an older config, of other files or of other code is called stale, with the reason.
     """
+    from pzd.cli.characteristics import characteristics_tables
     from pzd.cli.diagnosis import diagnosis_lines
     from pzd.pipeline.command import opened
     from pzd.pipeline.run_summary import summary_with_stale
@@ -84,6 +85,8 @@ def show(
         output.say_json(run_as_data(found))
         return DONE
     output.say(f"run: {found.folder}", *stale_lines(found))
+    for title, rows in characteristics_tables(found):
+        _section(output, title, rows)
     _section(output, "parameters", _parameters(found))
     _section(
         output,
@@ -109,8 +112,6 @@ def _section(output: Output, title: str, rows: list[list[str]]) -> None:
 
 
 def _parameters(found: RunSummary) -> list[list[str]]:
-    if not found.parameters:
-        return []
     control = found.control
     head = [
         "setting",
@@ -122,7 +123,7 @@ def _parameters(found: RunSummary) -> list[list[str]]:
         "W_s",
         "status",
     ]
-    return [head, *(_parameter_row(row) for row in found.parameters)]
+    return filled(head, [_parameter_row(row) for row in found.parameters], 3)
 
 
 def _parameter_row(row: ParameterRow) -> list[str]:

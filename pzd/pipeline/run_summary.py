@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pzd.artefacts import (
+    Characteristics,
     ComfortRow,
     Diagnosed,
     Diagnosis,
@@ -45,6 +46,8 @@ class RunSummary:
     """What the rides assume since the config does not say it."""
     stale: Mapping[str, str] = field(default_factory=dict)
     """Why results are not those of the config as it is today, by stage."""
+    characteristics: Characteristics = field(default_factory=Characteristics)
+    """What the tests show without any model."""
 
 
 def page_of(run: Run) -> Path:
@@ -67,17 +70,19 @@ def run_summary(run: Run) -> RunSummary:
     at = run.folder
     control = control_of(read_yaml(at / CONFIG).data) if (at / CONFIG).is_file() else run.control
     run = replace(run, control=control)
+    identified = run.read(Identified) if Identified in there else Identified((), ())
     diagnosis = at / Diagnosed.folder / "diagnosis.json"
     comfort = at / Report.folder / "comfort.csv"
     return RunSummary(
         at,
         control,
-        run.read(Identified).rows if Identified in there else (),
+        identified.rows,
         read_json(diagnosis, Diagnosis, control) if Diagnosed in there else None,
         read_rows(at / Rides.folder / "summary.csv", SummaryRow, control) if Rides in there else (),
         read_rows(comfort, ComfortRow, control) if Report in there else (),
         page_of(run) if Report in there else None,
         tuple(dict.fromkeys(mark for manifest in manifests.values() if manifest for mark in manifest.marks)),
+        characteristics=identified.characteristics,
     )
 
 

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from pzd.artefacts import (
+    Characteristics,
     ComfortRow,
     Diagnosed,
     Identified,
@@ -93,6 +94,19 @@ class ReportContext:
         return tuple(row for row in self.identified.rows if row.setting == self.chosen)
 
     @cached_property
+    def characteristics(self) -> Characteristics:
+        """What the tests of the chosen setting show without any model; of every setting where nothing else is set."""
+        found = self.identified.characteristics
+        if all(row.voltage_V is None for row in found.peak_velocity) and not found.steps:
+            return found
+        return Characteristics(
+            tuple(row for row in found.peak_velocity if row.setting == self.chosen),
+            tuple(row for row in found.continuous_velocity if row.setting == self.chosen),
+            tuple(row for row in found.gas_and_friction if row.setting == self.chosen),
+            tuple(row for row in found.steps if row.setting == self.chosen),
+        )
+
+    @cached_property
     def final(self) -> tuple[ParameterRow | BaseRow, ...]:
         """T0, C and k of the damper that everything behind uses; without intervals where somebody edited them since."""
         if not self.extended:
@@ -148,9 +162,12 @@ class ReportContext:
 
     def level(self, record: Record) -> float | None:
         """The identified voltage nearest to that of a record; its own where none was identified."""
-        own = record.median_voltage()
+        return self.nearest_level(record.median_voltage())
+
+    def nearest_level(self, voltage: float | None) -> float | None:
+        """The identified voltage nearest to one [V]; the one given where none was identified."""
         known = [row.voltage_V for row in self.parameters if row.voltage_V is not None]
-        return own if own is None or not known else min(known, key=lambda voltage: abs(voltage - own))
+        return voltage if voltage is None or not known else min(known, key=lambda level: abs(level - voltage))
 
     def middle(self, record: Record) -> slice:
         """Two cycles of a simple swing, ten of any other record, from its middle: it may start and end at rest."""

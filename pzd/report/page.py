@@ -7,10 +7,10 @@ from pzd.report.context import ReportContext
 from pzd.report.drawing import pictures
 from pzd.report.headline import cards
 from pzd.report.plots import library
-from pzd.report.sections import damper, expected, made, missing, model, passenger, tested, trust
+from pzd.report.sections import characteristics, damper, expected, made, missing, model, passenger, tested, trust
 from pzd.report.sections.pictures import Pictures
 
-_PLACES = ("model", "missing", "damper", "passenger")
+_PLACES = ("characteristics", "model", "missing", "damper", "passenger")
 
 
 def page(context: ReportContext, jobs: int = 1) -> str:
@@ -28,6 +28,7 @@ def page(context: ReportContext, jobs: int = 1) -> str:
     drawn = _drawn(context, jobs)
     sections = (
         tested.render(context),
+        *characteristics.render(context, drawn),
         model.render(context, drawn),
         missing.render(context, drawn),
         damper.render(context, drawn),
