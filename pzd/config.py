@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
 
 from pzd.blind.config import BlindConfig
 from pzd.diagnose.config import DiagnoseConfig
@@ -21,6 +21,11 @@ from pzd.schema.yamlfile import Document, read_yaml
 from pzd.simulate.config import SimulateConfig
 from pzd.table.config import TableConfig
 
+StageName = Literal["rig", "identify", "diagnose", "table", "simulate", "report"]
+STAGES: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "simulate", "report")
+WITHOUT_CAR: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "report")
+"""What `stages` of a config may say."""
+
 
 class RunConfig(Frozen):
     """One run: rig files in, comfort report out."""
@@ -31,6 +36,8 @@ class RunConfig(Frozen):
     """The control signal of the valve."""
     setting: str | None = None
     """Which of the rig's settings diagnose and everything behind it use; needed where there are several."""
+    stages: tuple[StageName, ...] = STAGES
+    """What a run consists of. Only `simulate` may be left out: the damper without a car, and its report."""
     rig: RigConfig
     """Where the rig records come from."""
     identify: IdentifyConfig = IdentifyConfig()
@@ -45,6 +52,29 @@ class RunConfig(Frozen):
     """The comfort report."""
     blind: BlindConfig | None = None
     """What `pzd blind` hides in virtual rigs, to see how far the naming can be trusted."""
+
+    @property
+    def with_car(self) -> bool:
+        """Whether the damper is ridden."""
+        return "simulate" in self.stages
+
+    @field_validator("stages")
+    @classmethod
+    def _in_order(cls, stages: tuple[StageName, ...]) -> tuple[StageName, ...]:
+        if stages not in (STAGES, WITHOUT_CAR):
+            raise ValueError(
+                f"must be {', '.join(STAGES)} in this order, of which only simulate may be left out: each of the "
+                "others needs the one before it (to run fewer, give the command of the last, say pzd identify)"
+            )
+        return stages
+
+    @field_validator("simulate")
+    @classmethod
+    def _ridden(cls, simulate: SimulateConfig, info: ValidationInfo) -> SimulateConfig:
+        # The config that a run writes has every block with its defaults, which contradict nothing.
+        if "simulate" not in info.data.get("stages", STAGES) and simulate != SimulateConfig():
+            raise ValueError("stages leaves simulate out; take this block away, or add simulate to stages")
+        return simulate
 
 
 def load(path: Path, overrides: Sequence[str] = ()) -> RunConfig:

@@ -103,6 +103,8 @@ def _check_reference(given: Opened) -> None:
 
 
 def _right_source(line: Sequence[Stage], target: str) -> None:
+    if target == "simulate" and target not in [stage.name for stage in line]:
+        raise ConfigError("pzd simulate: stages leaves simulate out; add it to stages of the config")
     if target not in [stage.name for stage in line]:
         held = "rig.virtual" if line[0].name == "synthesise" else "rig.files"
         raise ConfigError(f"pzd {target}: the config has {held}, so the command is pzd {line[0].name}")

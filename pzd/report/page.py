@@ -32,12 +32,12 @@ def page(context: ReportContext, jobs: int = 1) -> str:
         model.render(context, drawn),
         missing.render(context, drawn),
         damper.render(context, drawn),
-        passenger.render(context, drawn),
+        *([passenger.render(context, drawn)] if context.ridden else []),
         *expected.render(context),
         trust.render(context),
         made.render(context),
     )
-    return render(_title(context), cards(context), context.assumed, sections)
+    return render(_title(context), cards(context), context.assumed if context.ridden else (), sections)
 
 
 def _drawn(context: ReportContext, jobs: int) -> Pictures:
@@ -47,7 +47,8 @@ def _drawn(context: ReportContext, jobs: int) -> Pictures:
 
 
 def _title(context: ReportContext) -> str:
-    return f"Damper and comfort report: {context.chosen}" if context.chosen else "Damper and comfort report"
+    kind = "Damper and comfort report" if context.ridden else "Damper report"
+    return f"{kind}: {context.chosen}" if context.chosen else kind
 
 
 def render(title: str, headline: tuple[Card, ...], assumed: tuple[str, ...], sections: tuple[Section, ...]) -> str:
