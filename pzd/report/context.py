@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 
 from pzd.artefacts import (
-    Characteristics,
     ComfortRow,
     Diagnosed,
     Identified,
@@ -92,19 +91,6 @@ class ReportContext:
     def parameters(self) -> tuple[ParameterRow, ...]:
         """The identified rows of the chosen setting."""
         return tuple(row for row in self.identified.rows if row.setting == self.chosen)
-
-    @cached_property
-    def characteristics(self) -> Characteristics:
-        """What the tests of the chosen setting show without any model; of every setting where nothing else is set."""
-        found = self.identified.characteristics
-        if all(row.voltage_V is None for row in found.peak_velocity) and not found.steps:
-            return found
-        return Characteristics(
-            tuple(row for row in found.peak_velocity if row.setting == self.chosen),
-            tuple(row for row in found.continuous_velocity if row.setting == self.chosen),
-            tuple(row for row in found.gas_and_friction if row.setting == self.chosen),
-            tuple(row for row in found.steps if row.setting == self.chosen),
-        )
 
     @cached_property
     def final(self) -> tuple[ParameterRow | BaseRow, ...]:

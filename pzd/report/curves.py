@@ -1,14 +1,27 @@
-"""Which rows of the characteristics share a colour: those of one value of the control signal, or of one setting."""
+"""Which characteristics the page shows, and which share a colour: those of one control value, or of one setting."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
-from pzd.artefacts import ContinuousVelocityRow, PeakVelocityRow
+from pzd.artefacts import Characteristics, ContinuousVelocityRow, PeakVelocityRow
 from pzd.report.context import ReportContext
 
 Row = TypeVar("Row", PeakVelocityRow, ContinuousVelocityRow)
+
+
+def characteristics_of(context: ReportContext) -> Characteristics:
+    """What the tests of the chosen setting show without any model; of every setting where nothing else is set."""
+    found = context.identified.characteristics
+    if all(row.voltage_V is None for row in found.peak_velocity) and not found.steps:
+        return found
+    return Characteristics(
+        tuple(row for row in found.peak_velocity if row.setting == context.chosen),
+        tuple(row for row in found.continuous_velocity if row.setting == context.chosen),
+        tuple(row for row in found.gas_and_friction if row.setting == context.chosen),
+        tuple(row for row in found.steps if row.setting == context.chosen),
+    )
 
 
 def coloured(context: ReportContext, rows: Sequence[Row]) -> Mapping[str, list[Row]]:

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 
 from pzd.artefacts import ContinuousVelocityRow
 from pzd.report.context import ReportContext
-from pzd.report.curves import coloured, place_of
+from pzd.report.curves import characteristics_of, coloured, place_of
 from pzd.report.drawing import Panel, Plot, axes, legend, shades
 from pzd.report.wording import amount, number
 
 
 def draw(context: ReportContext) -> Iterator[Panel]:
     """The fastest test of each voltage, or of each setting where there is no control signal."""
-    groups = coloured(context, context.characteristics.continuous_velocity)
+    groups = coloured(context, characteristics_of(context).continuous_velocity)
     if not groups:
         return
     named = any(groups)

@@ -7,7 +7,7 @@ from itertools import groupby
 
 from pzd.artefacts import PeakVelocityRow
 from pzd.report.context import ReportContext
-from pzd.report.curves import coloured, place_of
+from pzd.report.curves import characteristics_of, coloured, place_of
 from pzd.report.drawing import Panel, Plot, axes, legend, shades
 
 _MARKERS = {"sine": "o", "constant velocity": "s", "other swing": "D"}
@@ -20,7 +20,7 @@ _PLURALS = {
 
 def draw(context: ReportContext) -> Iterator[Panel]:
     """One colour a voltage, or a setting where there is no control signal; lines join the tests of a condition."""
-    rows = context.characteristics.peak_velocity
+    rows = characteristics_of(context).peak_velocity
     if not rows:
         return
     groups = coloured(context, rows)

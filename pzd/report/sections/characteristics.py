@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pzd.artefacts import PeakVelocityRow
 from pzd.report.blocks import Block, Paragraph, Section, Sheet
 from pzd.report.context import ReportContext
+from pzd.report.curves import characteristics_of
 from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.wording import DASH, amount, number
 
@@ -17,7 +18,7 @@ _PAPER_RESPONSE_MS = 9
 
 def render(context: ReportContext, pictures: Pictures) -> Iterator[Section]:
     """The second section, where there are such tests."""
-    found = context.characteristics
+    found = characteristics_of(context)
     if not found.peak_velocity and not found.steps:
         return
     blocks: list[Block] = [Paragraph(_intro(context)), *galleries(pictures["characteristics"])]
@@ -35,7 +36,7 @@ def _intro(context: ReportContext) -> str:
         "the continuous-velocity plot (CVP) is the force over speed through the average settled cycle of one test. "
         "Forces are as recorded, with the gas force in them."
     )
-    tests, records = len(context.characteristics.peak_velocity), len(context.rig.records)
+    tests, records = len(characteristics_of(context).peak_velocity), len(context.rig.records)
     return f"{text} {tests} such tests were found in the {records} records, by their motion." if tests else text
 
 
@@ -45,16 +46,16 @@ def _places(context: ReportContext, *more: str) -> tuple[str, ...]:
 
 
 def _settings(context: ReportContext) -> tuple[str, ...]:
-    return ("setting",) if len({row.setting for row in context.characteristics.peak_velocity}) > 1 else ()
+    return ("setting",) if len({row.setting for row in characteristics_of(context).peak_velocity}) > 1 else ()
 
 
 def _control(context: ReportContext) -> tuple[str, ...]:
-    controlled = any(row.voltage_V is not None for row in context.characteristics.peak_velocity)
+    controlled = any(row.voltage_V is not None for row in characteristics_of(context).peak_velocity)
     return (context.control.name,) if controlled else ()
 
 
 def _degrees(context: ReportContext) -> tuple[str, ...]:
-    known = any(row.temperature_degC is not None for row in context.characteristics.peak_velocity)
+    known = any(row.temperature_degC is not None for row in characteristics_of(context).peak_velocity)
     return ("temperature",) if known else ()
 
 
@@ -65,7 +66,7 @@ def _place(context: ReportContext, setting: str | None, voltage: float | None, t
 
 
 def _force_at_speed(context: ReportContext) -> Sheet:
-    rows = tuple(_row(context, row) for row in context.characteristics.peak_velocity)
+    rows = tuple(_row(context, row) for row in characteristics_of(context).peak_velocity)
     header = ("speed", *_places(context), "rebound", "compression", "test", "record")
     return Sheet("Force at the peak speed of each test", header, rows, folded=len(rows) > _FOLD)
 
@@ -92,7 +93,7 @@ def _gas_and_friction(context: ReportContext) -> Sheet:
             amount(row.velocity_m_per_s, "m/s"),
             row.method,
         )
-        for row in context.characteristics.gas_and_friction
+        for row in characteristics_of(context).gas_and_friction
     )
     header = (*(_places(context) or ("",)), "gas force", "friction", "slowest speed", "how")
     title = "Static force at mid-stroke: mean of both directions (gas) and half their difference (friction)"
@@ -109,7 +110,7 @@ def _steps(context: ReportContext) -> Sheet:
             row.status,
             f"{row.record}, {amount(row.time_s, 's', 4)}",
         )
-        for row in context.characteristics.steps
+        for row in characteristics_of(context).steps
     )
     header = ("step", "speed", "force", "to 63 %", "to 90 %", "status", "where")
     return Sheet(f"Measured answer to steps of the {context.control.name}", header, rows, folded=len(rows) > _FOLD)
@@ -120,11 +121,11 @@ def _milliseconds(time: float | None) -> str:
 
 
 def _beside_the_paper(context: ReportContext) -> str:
-    times = [row.to_90_percent_s for row in context.characteristics.steps if row.to_90_percent_s is not None]
+    times = [row.to_90_percent_s for row in characteristics_of(context).steps if row.to_90_percent_s is not None]
     ours = "No step gave a time."
     if times:
         low, high = (amount(1000.0 * end(times), "ms") for end in (min, max))
-        ours = f"Of {len(context.characteristics.steps)} steps {len(times)} gave a time: {low} to {high} to 90 %."
+        ours = f"Of {len(characteristics_of(context).steps)} steps {len(times)} gave a time: {low} to {high} to 90 %."
     return (
         f"{ours} Times count from the middle of the step of the recorded {context.control.name}. The paper (Makowski "
         f"and Knap 2021) states {_PAPER_RESPONSE_MS} ms for its damper, over the whole range of force."
