@@ -38,7 +38,7 @@ class Opened:
         path, _, rest = message.partition(": ")
         if not re.fullmatch(r"\w+(\.\w+)*", path) or path.split(".")[0] not in RunConfig.model_fields:
             return message
-        place = self.document.place(path.split("."))
+        place = self.document.place(path.split("."), rest)
         return f"{place}: {rest}" if place == f"--set {path}" else f"{place}: {message}"
 
 
