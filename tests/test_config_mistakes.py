@@ -91,12 +91,12 @@ def sites(name: str) -> tuple[Site, ...]:
         if id(node) in seen:
             return
         seen.add(id(node))
-        shared = shared or any(abs(node.start_mark.index - start) < 15 for start in spans)
         if isinstance(node, yaml.SequenceNode):
             for number, item in enumerate(node.value):
-                yield from walk(item, (*path, str(number)), shared)
+                yield from walk(item, (*path, str(number)), shared or item.start_mark.index in spans)
         elif isinstance(node, yaml.MappingNode):
             for key, value in node.value:
+                own = shared or value.start_mark.index in spans
                 text = getattr(value, "value", "")
                 plain = isinstance(value, yaml.ScalarNode) and value.style is None
                 kind = {"SequenceNode": "list", "MappingNode": "mapping"}.get(type(value).__name__)
@@ -109,9 +109,9 @@ def sites(name: str) -> tuple[Site, ...]:
                     value.end_mark.index,
                     kind,
                     bool(node.flow_style),
-                    shared,
+                    own,
                 )
-                yield from walk(value, (*path, key.value), shared)
+                yield from walk(value, (*path, key.value), own)
 
     return tuple(walk(root, (), False))
 
@@ -296,7 +296,7 @@ def a_tab(pick: Pick) -> Broken:
     return Broken(text[:start] + "\t" + text[site.key :], start)
 
 
-@mistake(r"indented otherwise than those around it")
+@mistake(r"indented otherwise than those around it|it may be indented too far")
 def a_key_too_far_in(pick: Pick) -> Broken:
     text, site = pick(where=lambda s: s.path in (("rig",), ("setting",)) and s.key > 0)
     return Broken(text[: site.key] + "  " + text[site.key :], site.key + 2)

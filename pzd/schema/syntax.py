@@ -74,7 +74,8 @@ def _in_brackets(error: yaml.MarkedYAMLError, lines: list[str], line: int, colum
     if not _closes(lines, mark.line, mark.column):
         say = f"the {opening} that opens here is not closed; put {_CLOSING[opening]} at its end"
         return Fault(mark.line, mark.column, say)
-    word = re.search(r"\S+\s*$", lines[line][:column])
+    # The parser stops at the next entry, or at its colon where it took the key for more of the value before.
+    word = re.search(r"\S+\s*$", lines[line][:column]) if lines[line][column : column + 1] == ":" else None
     return Fault(line, word.start() if word else column, "a comma is missing before this; write it between two entries")
 
 
@@ -131,6 +132,9 @@ def _indent(error: yaml.MarkedYAMLError, lines: list[str], line: int) -> Fault |
     if not any(word in str(error.problem) for word in ("block", "mapping values", "sequence entries", "indent")):
         return None
     say = "the line is indented otherwise than those around it; keys of one block begin in one column"
+    first = next(n for n, each in enumerate(lines) if _uncommented(each).strip())
+    if content[:1] not in (" ", "-") and lines[first][:1] == " ":  # not this line, but the first one is too far in
+        line, content = first, lines[first]
     return Fault(line, len(content) - len(content.lstrip()), say)
 
 

@@ -128,6 +128,8 @@ def _message(faults: list[_Fault], annotation: Any, root: Node, data: Any, contr
         place, got = _key_place(root, path), control.renamed(str(path[-1]))
         now = former_keys(annotation, path[:-1], data).get(str(path[-1]))
         text = _unknown(now or got, valid)
+        if len(path) > 1 and got in keys_at(annotation, (), data):
+            text = f"no such key here; it is one of the first column, so it may be indented too far (got {got})"
     elif "missing" in kind:
         text, got = "is missing", _shown(list(node.value) if isinstance(node.value, Mapping) else [])
     elif kind.startswith("union_tag"):
