@@ -11,13 +11,18 @@ import typer
 from pzd.cli.exits import DONE
 from pzd.cli.layout import aligned, filled, interval, number
 from pzd.cli.machine import run_as_data
-from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose
+from pzd.cli.options import CORES, RUNS, Config, Json, Quiet, Runs, Set, Verbose
 from pzd.cli.output import Output
+from pzd.schema.errors import ConfigError
 
 if TYPE_CHECKING:
     from pzd.artefacts import IngestRow, ParameterRow, RecordEntry
     from pzd.pipeline.run_summary import RunSummary
 
+PlotFile = Annotated[
+    Path | None,
+    typer.Option("--plot", metavar="FILE.html", help="Draw every record on a page, with the findings marked."),
+]
 RunFolders = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of runs, e.g. runs/quickstart.")]
 
 
@@ -25,17 +30,24 @@ def check(
     config: Config,
     runs: Runs = RUNS,
     overrides: Set = None,
+    plot: PlotFile = None,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
-    """Check config and rig records; write nothing."""
+    """Check config and rig records; write nothing but the page of --plot."""
     from pzd.pipeline.command import check_setting, opened, preflight
     from pzd.schema.jsonfile import plain_data
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
-    entries, ingested = preflight(given)
+    _only_a_page(plot)
+    rig = preflight(given)
+    entries, ingested = rig.entries, rig.ingested
+    if plot is not None:
+        from pzd.report.recorded import records_page
+
+        plot.write_text(records_page(rig, given.run.control, CORES), encoding="utf-8", newline="\n")
     if as_json:
         output.say_json(plain_data({"config": config.as_posix(), "records": entries}, given.run.control))
         check_setting(given, entries)
@@ -44,8 +56,15 @@ def check(
         output.say(*_entry(entry), *(_ingested(ingested, entry.name) if verbose else ()))
     check_setting(given, entries)
     found = sum(len(entry.findings) for entry in entries)
-    output.say(f"{len(entries)} records, {found} findings; the config is in order, nothing was written")
+    wrote = f"the records are drawn in {plot}" if plot is not None else "nothing was written"
+    output.say(f"{len(entries)} records, {found} findings; the config is in order, {wrote}")
     return DONE
+
+
+def _only_a_page(plot: Path | None) -> None:
+    """Refuse to write the page over a file of another kind, say a record."""
+    if plot is not None and plot.suffix.lower() != ".html":
+        raise ConfigError(f"--plot {plot}: must end in .html, as it is a page (got {plot.suffix or 'no suffix'})")
 
 
 def _entry(entry: RecordEntry) -> Iterator[str]:

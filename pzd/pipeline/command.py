@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pzd.artefacts import IngestRow, RecordEntry, Rig
+from pzd.artefacts import RecordEntry, Rig
 from pzd.config import RunConfig, setting_in_use, validated
 from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
@@ -115,7 +115,7 @@ def stale_stages(given: Opened) -> dict[str, str]:
     return Pipeline(given.config, given.run, stages(given.config), lambda _: None).stale_stages()
 
 
-def preflight(given: Opened) -> tuple[tuple[RecordEntry, ...], tuple[IngestRow, ...]]:
+def preflight(given: Opened) -> Rig:
     """The rig's records, what the preflight finds in them, and what was done to their files; written nowhere.
 
     Raises
@@ -126,7 +126,7 @@ def preflight(given: Opened) -> tuple[tuple[RecordEntry, ...], tuple[IngestRow, 
     _check_reference(given)
     with given.placed():
         made = Pipeline(given.config, given.run, (first,), lambda _: None).made(first)
-    return (made.entries, made.ingested) if isinstance(made, Rig) else ((), ())
+    return made if isinstance(made, Rig) else Rig((), ())
 
 
 def check_setting(given: Opened, entries: Sequence[RecordEntry]) -> None:

@@ -51,7 +51,16 @@ def _title(context: ReportContext) -> str:
     return f"{kind}: {context.chosen}" if context.chosen else kind
 
 
-def render(title: str, headline: tuple[Card, ...], assumed: tuple[str, ...], sections: tuple[Section, ...]) -> str:
+_FOOTER = "Written by pzd. Every number of this page stands in the CSV and JSON files of the run beside it."
+
+
+def render(
+    title: str,
+    headline: tuple[Card, ...],
+    assumed: tuple[str, ...],
+    sections: tuple[Section, ...],
+    footer: str = _FOOTER,
+) -> str:
     """Fill the template; every text is escaped there."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -64,5 +73,5 @@ def render(title: str, headline: tuple[Card, ...], assumed: tuple[str, ...], sec
         keep_trailing_newline=True,
     )
     return environment.get_template("report.html").render(
-        title=title, cards=headline, assumed=assumed, sections=sections
+        title=title, cards=headline, assumed=assumed, sections=sections, footer=footer
     )
