@@ -23,6 +23,10 @@ PlotFile = Annotated[
     Path | None,
     typer.Option("--plot", metavar="FILE.html", help="Draw every record on a page, with the findings marked."),
 ]
+IsResolved = Annotated[
+    bool,
+    typer.Option("--resolved", help="Print every value of the config with its origin instead: line, --set, default."),
+]
 RunFolders = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of runs, e.g. runs/quickstart.")]
 
 
@@ -85,6 +89,7 @@ def show(
     config: Config,
     runs: Runs = RUNS,
     overrides: Set = None,
+    resolved: IsResolved = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -93,6 +98,8 @@ def show(
 
     A stage whose numbers are of an older config, of other files or of other code is called stale, with the reason.
     """
+    if resolved:
+        return _show_resolved(config, runs, overrides or (), Output(quiet=quiet, verbose=verbose), as_json=as_json)
     from pzd.cli.characteristics import characteristics_tables
     from pzd.cli.diagnosis import diagnosis_lines
     from pzd.pipeline.command import opened
@@ -117,6 +124,21 @@ def show(
     _section(output, "comfort", _comfort(found))
     output.say(*(f"not to be trusted: {mark}" for mark in found.marks))
     output.say(f"report: {found.page or 'not written yet'}")
+    return DONE
+
+
+def _show_resolved(config: Path, runs: Path, overrides: Sequence[str], output: Output, *, as_json: bool) -> int:
+    """Every value of the config with its origin; nothing needs to have run."""
+    from pzd.pipeline.command import opened
+    from pzd.pipeline.resolved import resolved
+    from pzd.schema.scalars import written
+
+    found = resolved(opened(config, runs, overrides))
+    if as_json:
+        output.say_json([vars(one) for one in found])
+        return DONE
+    rows = [[one.path, "[]" if one.value == [] else "{}" if one.value == {} else written(one.value)] for one in found]
+    output.say(*aligned([[*row, one.origin] for row, one in zip(rows, found, strict=True)]))
     return DONE
 
 
