@@ -15,9 +15,10 @@ from pzd.quantities import Control
 from pzd.report.config import ReportConfig
 from pzd.rig.config import ControlConfig, RigConfig
 from pzd.schema.errors import ConfigError
+from pzd.schema.extends import read_extended
 from pzd.schema.model import Frozen
 from pzd.schema.nearest import nearest
-from pzd.schema.yamlfile import Document, read_yaml
+from pzd.schema.yamlfile import Document
 from pzd.simulate.config import SimulateConfig
 from pzd.table.config import TableConfig
 
@@ -30,6 +31,8 @@ WITHOUT_CAR: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "r
 class RunConfig(Frozen):
     """One run: rig files in, comfort report out."""
 
+    extends: str | None = None
+    """A config beside this one that says what this one does not."""
     seed: int = Field(default=1, ge=0)
     """Seed of every random draw."""
     control: ControlConfig = ControlConfig()
@@ -57,6 +60,13 @@ class RunConfig(Frozen):
     def with_car(self) -> bool:
         """Whether the damper is ridden."""
         return "simulate" in self.stages
+
+    @field_validator("extends")
+    @classmethod
+    def _of_a_file(cls, extends: str | None) -> str | None:
+        if extends is not None:  # what stands in the file is taken in when it is read
+            raise ValueError("stands in the config alone, for --set comes after it")
+        return extends
 
     @field_validator("stages")
     @classmethod
@@ -93,7 +103,7 @@ def load(path: Path, overrides: Sequence[str] = ()) -> RunConfig:
     ------
     ConfigError : when anything is wrong with it, with every place
     """
-    return validated(read_yaml(path).overridden(overrides))
+    return validated(read_extended(path).overridden(overrides))
 
 
 def validated(document: Document) -> RunConfig:

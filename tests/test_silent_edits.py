@@ -196,7 +196,7 @@ def diagnosed(*effects: str) -> Diagnosed:
         ("plain.yaml", "k_N_per_m: 200000.0", "k_N_per_m: 0.2", "plain.yaml:6:16: base.0.k_N_per_m: must lie between"),
         ("damper.yaml", "C_Ns_per_m: 2700.0", "C_Ns_per_m: 2.7", "C_Ns_per_m: parameters.csv has 2700 there; is it in"),
         ("damper.yaml", "T0_N: 300.0", "T0_N: 0.3", "damper.yaml:4:11: base.0.T0_N: parameters.csv has 300 there"),
-        ("damper.yaml", "gas_spring:", "gas_sprin:", "no effect is called gas_sprin; is it gas_spring?"),
+        ("damper.yaml", "gas_spring:", "gas_sprin:", "no effect is called gas_sprin; did you mean gas_spring?"),
         ("damper.yaml", "k_g: 5000.0", "k_gas: 5000.0", "gas_spring takes k_g (got k_gas)"),
         (
             "damper.yaml",

@@ -14,8 +14,9 @@ from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
 from pzd.runs import Run
 from pzd.schema.errors import ConfigError
+from pzd.schema.extends import read_extended
 from pzd.schema.progress import Listener, no_listener
-from pzd.schema.yamlfile import Document, read_yaml
+from pzd.schema.yamlfile import Document
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:
     ------
     ConfigError : when the config is wrong, or its run belongs to another config
     """
-    document = read_yaml(path).overridden(overrides)
+    document = read_extended(path).overridden(overrides)
     config = validated(document)
     return Opened(document, config, Run.of(path, runs, config.control.signal()))
 

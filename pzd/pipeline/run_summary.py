@@ -23,6 +23,7 @@ from pzd.quantities import Control
 from pzd.runs import CONFIG, Run
 from pzd.schema.csvfile import read_rows
 from pzd.schema.errors import ConfigError, UserError
+from pzd.schema.extends import read_extended
 from pzd.schema.jsonfile import read_json
 from pzd.schema.yamlfile import read_yaml
 from pzd.simulate.assumed import assumed
@@ -114,7 +115,7 @@ def summary_of(folder: Path) -> RunSummary:
         lost = f"their config {config or ''} is missing, so nobody can say whether these are its numbers"
         return replace(found, stale={"all": lost})
     try:
-        document = read_yaml(config)
+        document = read_extended(config)
         return _beside_its_config(found, Opened(document, validated(document), replace(run, config=config)))
     except UserError as error:
         return replace(found, stale={"all": f"their config would be refused: {'; '.join(error.messages)}"})
