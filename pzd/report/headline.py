@@ -97,6 +97,8 @@ def _next(context: ReportContext) -> Card:
 
 
 def _comfort(context: ReportContext) -> Card:
+    if not context.controlled:
+        return Card("What does the passenger feel?", _uncontrolled(context), "")
     question = "What does control give the passenger?"
     found = {road: compared[0] for road in context.roads if (compared := context.comparisons(road))}
     if not found:

@@ -308,6 +308,27 @@ def test_a_damper_without_control_and_without_a_car_is_told_without_either(run: 
     assert "no temperature was recorded" in read.text
 
 
+def test_a_car_on_dampers_without_control_is_told_without_it(run: Any, words_only: None) -> None:
+    records = tuple(replace(r, voltage=None) for r in run.rig.records)
+    rides = run.rides
+    kept = {row.case for row in rides.summary if row.policy == "constant"}
+    held = {"policy": "passive", "fidelity": "table"}
+    rides = replace(
+        rides,
+        rides=tuple(one for one in rides.rides if one.case in kept),
+        summary=tuple(row.model_copy(update=held) for row in rides.summary if row.case in kept),
+        ridden=tuple(row.model_copy(update={"damping_Ns_per_m": None}) for row in rides.ridden if row.case in kept),
+        responses=(),
+    )
+    text = Reader(replace(run, rig=Rig(records, run.rig.entries), rides=rides).told().page).text
+    head = text.partition("1 What was tested")[0]
+    assert "What does the passenger feel? 2.25 Hz sine: a_w" in head
+    assert "passive: the damper as it is" in text
+    assert "table: the force is that of the table at the speed of the damper" in text
+    for said in ("What does control give", "Nothing controls", "the voltage stays", "the voltage comes"):
+        assert said not in text
+
+
 def test_an_empty_run_still_makes_a_page(run: Any) -> None:
     notes = TableNotes(outside="clamp", reached_m_per_s=0.0, lost=(), not_monotone=())
     empty = replace(
