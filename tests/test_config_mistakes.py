@@ -469,7 +469,8 @@ def an_unknown_layout(pick: Pick) -> Broken:
 @mistake(r"no effect is called orifice_quadratc; did you mean orifice_quadratic\?")
 def an_unknown_effect(pick: Pick) -> Broken:
     text, site = pick("quickstart", where=lambda s: s.name == "orifice_quadratic")
-    return key_becomes(text, site, "orifice_quadratc")
+    first = "valve_lag: {tau: 0.004}\n" + indent(text, site)
+    return Broken(text[: site.key] + first + "orifice_quadratc" + text[site.key_end :], site.key + len(first))
 
 
 @mistake(r"gas_spring takes k_g")

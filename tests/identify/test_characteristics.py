@@ -157,6 +157,18 @@ def test_a_road_and_a_sweep_are_no_such_tests(rng: np.random.Generator) -> None:
         assert of(record) == Characteristics()
 
 
+def test_one_stroke_of_constant_speed_in_another_motion_makes_no_test(rng: np.random.Generator) -> None:
+    ends, turns = np.tile([-0.05, 0.05], 4)[:7], np.append(0.0, np.cumsum(rng.uniform(0.3, 0.9, 6)))
+
+    def course(t: Array) -> Array:
+        stroke = np.clip(np.searchsorted(turns, t, side="right") - 1, 0, 5)
+        share = np.clip((t - turns[stroke]) / (turns[stroke + 1] - turns[stroke]), 0.0, 1.0)
+        share = np.where(stroke == 2, share, 0.5 * (1.0 - np.cos(np.pi * share)))
+        return ends[stroke] + share * (ends[stroke + 1] - ends[stroke])
+
+    assert of(driven(course, float(turns[-1]), TABLE_2[0.0])) == Characteristics()
+
+
 def test_several_tests_without_a_pause_are_told_apart() -> None:
     truth, speeds = TABLE_2[0.0], []
     parts = [(1.0, 6.0), (2.0, 3.0)]
