@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
 
 from pzd.blind.config import BlindConfig
 from pzd.diagnose.config import DiagnoseConfig
@@ -15,22 +15,32 @@ from pzd.quantities import Control
 from pzd.report.config import ReportConfig
 from pzd.rig.config import ControlConfig, RigConfig
 from pzd.schema.errors import ConfigError
+from pzd.schema.extends import read_extended
 from pzd.schema.model import Frozen
 from pzd.schema.nearest import nearest
-from pzd.schema.yamlfile import Document, read_yaml
+from pzd.schema.yamlfile import Document
 from pzd.simulate.config import SimulateConfig
 from pzd.table.config import TableConfig
+
+StageName = Literal["rig", "identify", "diagnose", "table", "simulate", "report"]
+STAGES: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "simulate", "report")
+WITHOUT_CAR: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "report")
+"""What `stages` of a config may say."""
 
 
 class RunConfig(Frozen):
     """One run: rig files in, comfort report out."""
 
+    extends: str | None = None
+    """A config beside this one that says what this one does not."""
     seed: int = Field(default=1, ge=0)
     """Seed of every random draw."""
     control: ControlConfig = ControlConfig()
     """The control signal of the valve."""
     setting: str | None = None
     """Which of the rig's settings diagnose and everything behind it use; needed where there are several."""
+    stages: tuple[StageName, ...] = STAGES
+    """What a run consists of. Only `simulate` may be left out: the damper without a car, and its report."""
     rig: RigConfig
     """Where the rig records come from."""
     identify: IdentifyConfig = IdentifyConfig()
@@ -45,6 +55,36 @@ class RunConfig(Frozen):
     """The comfort report."""
     blind: BlindConfig | None = None
     """What `pzd blind` hides in virtual rigs, to see how far the naming can be trusted."""
+
+    @property
+    def with_car(self) -> bool:
+        """Whether the damper is ridden."""
+        return "simulate" in self.stages
+
+    @field_validator("extends")
+    @classmethod
+    def _of_a_file(cls, extends: str | None) -> str | None:
+        if extends is not None:  # what stands in the file is taken in when it is read
+            raise ValueError("stands in the config alone, for --set comes after it")
+        return extends
+
+    @field_validator("stages")
+    @classmethod
+    def _in_order(cls, stages: tuple[StageName, ...]) -> tuple[StageName, ...]:
+        if stages not in (STAGES, WITHOUT_CAR):
+            raise ValueError(
+                f"must be {', '.join(STAGES)} in this order, of which only simulate may be left out: each of the "
+                "others needs the one before it (to run fewer, give the command of the last, say pzd identify)"
+            )
+        return stages
+
+    @field_validator("simulate")
+    @classmethod
+    def _ridden(cls, simulate: SimulateConfig, info: ValidationInfo) -> SimulateConfig:
+        # The config that a run writes has every block with its defaults, which contradict nothing.
+        if "simulate" not in info.data.get("stages", STAGES) and simulate != SimulateConfig():
+            raise ValueError("stages leaves simulate out; take this block away, or add simulate to stages")
+        return simulate
 
 
 def load(path: Path, overrides: Sequence[str] = ()) -> RunConfig:
@@ -63,7 +103,7 @@ def load(path: Path, overrides: Sequence[str] = ()) -> RunConfig:
     ------
     ConfigError : when anything is wrong with it, with every place
     """
-    return validated(read_yaml(path).overridden(overrides))
+    return validated(read_extended(path).overridden(overrides))
 
 
 def validated(document: Document) -> RunConfig:

@@ -36,7 +36,8 @@ def test_the_smallest_config_names_its_files_and_nothing_else(tmp_path: Path) ->
 
 
 def test_the_config_with_every_default_reads_back_equal(tmp_path: Path) -> None:
-    for text in (SMALLEST, "control: {name: current, unit: A}\n" + SMALLEST):
+    alone = "stages: [rig, identify, diagnose, table, report]\n"
+    for text in (SMALLEST, "control: {name: current, unit: A}\n" + SMALLEST, alone + SMALLEST):
         config = read(tmp_path, text)
         write_yaml_model(tmp_path / "whole.yaml", config, config.control.signal())
         assert load(tmp_path / "whole.yaml") == config

@@ -5,6 +5,13 @@ itself into its stage's folder and reads itself back, checked, with file and lin
 wrong. `control` renames the columns of the control signal.
 """
 
+from pzd.artefacts.characteristics import (
+    Characteristics,
+    ContinuousVelocityRow,
+    GasAndFrictionRow,
+    PeakVelocityRow,
+    StepRow,
+)
 from pzd.artefacts.diagnosed import (
     Diagnosed,
     Diagnosis,
@@ -48,13 +55,16 @@ __all__ = [
     "RIDE_COLUMNS",
     "Artefact",
     "AuxiliaryRow",
+    "Characteristics",
     "ComfortRow",
+    "ContinuousVelocityRow",
     "Diagnosed",
     "Diagnosis",
     "Ending",
     "Finding",
     "ForceRow",
     "Gap",
+    "GasAndFrictionRow",
     "Identified",
     "IngestRow",
     "InverseRow",
@@ -64,6 +74,7 @@ __all__ = [
     "MeasureRow",
     "NextTest",
     "ParameterRow",
+    "PeakVelocityRow",
     "Prediction",
     "Ranked",
     "RecordEntry",
@@ -76,6 +87,7 @@ __all__ = [
     "Rides",
     "Rig",
     "SpectrumRow",
+    "StepRow",
     "SummaryRow",
     "Table",
     "TableNotes",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
+from pzd.artefacts.characteristics import Characteristics
 from pzd.damper.model import PHYSICAL, BaseRow, Damper, unphysical
 from pzd.quantities import Control
 from pzd.schema.csvfile import read_rows, write_rows
@@ -100,12 +101,15 @@ class Identified:
     measures: tuple[MeasureRow, ...]
     auxiliary: tuple[AuxiliaryRow, ...] = ()
     """Of the conditions that show forces beside the element."""
+    characteristics: Characteristics = field(default_factory=Characteristics)
+    """What the tests show without any model."""
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write parameters.csv, measures.csv and auxiliary.csv."""
+        """Write parameters.csv, measures.csv, auxiliary.csv and the files of the characteristics."""
         write_rows(folder / "parameters.csv", ParameterRow, self.rows, control)
         write_rows(folder / "measures.csv", MeasureRow, self.measures, control)
         write_rows(folder / "auxiliary.csv", AuxiliaryRow, self.auxiliary, control)
+        self.characteristics.write(folder, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
@@ -121,6 +125,7 @@ class Identified:
             rows,
             read_rows(folder / "measures.csv", MeasureRow, control),
             read_rows(folder / "auxiliary.csv", AuxiliaryRow, control),
+            Characteristics.read(folder, control),
         )
 
     def untrusted(self, control: Control) -> tuple[str, ...]:

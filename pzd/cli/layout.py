@@ -21,6 +21,19 @@ def interval(value: float | None, low: float | None, high: float | None) -> str:
     return "{} ({} to {})".format(*(supported(each, low, high) for each in (value, low, high)))
 
 
+def filled(head: Sequence[str], rows: Sequence[Sequence[str]], first: int) -> list[list[str]]:
+    """A header and its rows, of whose first columns those are left out that hold nothing but dashes.
+
+    Parameters
+    ----------
+    head : the header
+    rows : the rows, as `number` writes them
+    first : so many columns are conditions, which a rig need not have
+    """
+    kept = [c for c in range(len(head)) if c >= first or any(row[c] != "-" for row in rows)]
+    return [[row[c] for c in kept] for row in (head, *rows)] if rows else []
+
+
 def aligned(rows: Sequence[Sequence[str]], indent: str = "") -> list[str]:
     """Rows as lines whose columns stand below each other."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

@@ -9,15 +9,24 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pzd.cli.exits import DONE
-from pzd.cli.layout import aligned, interval, number
+from pzd.cli.layout import aligned, filled, interval, number
 from pzd.cli.machine import run_as_data
-from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose
+from pzd.cli.options import CORES, RUNS, Config, Json, Quiet, Runs, Set, Verbose
 from pzd.cli.output import Output
+from pzd.schema.errors import ConfigError
 
 if TYPE_CHECKING:
     from pzd.artefacts import IngestRow, ParameterRow, RecordEntry
     from pzd.pipeline.run_summary import RunSummary
 
+PlotFile = Annotated[
+    Path | None,
+    typer.Option("--plot", metavar="FILE.html", help="Draw every record on a page, with the findings marked."),
+]
+IsResolved = Annotated[
+    bool,
+    typer.Option("--resolved", help="Print every value of the config with its origin instead: line, --set, default."),
+]
 RunFolders = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of runs, e.g. runs/quickstart.")]
 
 
@@ -25,17 +34,24 @@ def check(
     config: Config,
     runs: Runs = RUNS,
     overrides: Set = None,
+    plot: PlotFile = None,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
-    """Check config and rig records; write nothing."""
+    """Check config and rig records; write nothing but the page of --plot."""
     from pzd.pipeline.command import check_setting, opened, preflight
     from pzd.schema.jsonfile import plain_data
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
-    entries, ingested = preflight(given)
+    _only_a_page(plot)
+    rig = preflight(given)
+    entries, ingested = rig.entries, rig.ingested
+    if plot is not None:
+        from pzd.report.recorded import records_page
+
+        plot.write_text(records_page(rig, given.run.control, CORES), encoding="utf-8", newline="\n")
     if as_json:
         output.say_json(plain_data({"config": config.as_posix(), "records": entries}, given.run.control))
         check_setting(given, entries)
@@ -44,8 +60,15 @@ def check(
         output.say(*_entry(entry), *(_ingested(ingested, entry.name) if verbose else ()))
     check_setting(given, entries)
     found = sum(len(entry.findings) for entry in entries)
-    output.say(f"{len(entries)} records, {found} findings; the config is in order, nothing was written")
+    wrote = f"the records are drawn in {plot}" if plot is not None else "nothing was written"
+    output.say(f"{len(entries)} records, {found} findings; the config is in order, {wrote}")
     return DONE
+
+
+def _only_a_page(plot: Path | None) -> None:
+    """Refuse to write the page over a file of another kind, say a record."""
+    if plot is not None and plot.suffix.lower() != ".html":
+        raise ConfigError(f"--plot {plot}: must end in .html, as it is a page (got {plot.suffix or 'no suffix'})")
 
 
 def _entry(entry: RecordEntry) -> Iterator[str]:
@@ -66,6 +89,7 @@ def show(
     config: Config,
     runs: Runs = RUNS,
     overrides: Set = None,
+    resolved: IsResolved = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -74,6 +98,9 @@ def show(
 
     A stage whose numbers are of an older config, of other files or of other code is called stale, with the reason.
     """
+    if resolved:
+        return _show_resolved(config, runs, overrides or (), Output(quiet=quiet, verbose=verbose), as_json=as_json)
+    from pzd.cli.characteristics import characteristics_tables
     from pzd.cli.diagnosis import diagnosis_lines
     from pzd.pipeline.command import opened
     from pzd.pipeline.run_summary import summary_with_stale
@@ -84,6 +111,8 @@ def show(
         output.say_json(run_as_data(found))
         return DONE
     output.say(f"run: {found.folder}", *stale_lines(found))
+    for title, rows in characteristics_tables(found):
+        _section(output, title, rows)
     _section(output, "parameters", _parameters(found))
     _section(
         output,
@@ -98,6 +127,21 @@ def show(
     return DONE
 
 
+def _show_resolved(config: Path, runs: Path, overrides: Sequence[str], output: Output, *, as_json: bool) -> int:
+    """Every value of the config with its origin; nothing needs to have run."""
+    from pzd.pipeline.command import opened
+    from pzd.pipeline.resolved import resolved
+    from pzd.schema.scalars import written
+
+    found = resolved(opened(config, runs, overrides))
+    if as_json:
+        output.say_json([vars(one) for one in found])
+        return DONE
+    rows = [[one.path, "[]" if one.value == [] else "{}" if one.value == {} else written(one.value)] for one in found]
+    output.say(*aligned([[*row, one.origin] for row, one in zip(rows, found, strict=True)]))
+    return DONE
+
+
 def stale_lines(found: RunSummary, place: str = "") -> list[str]:
     """A line a stage whose numbers are not those of the config as it is today."""
     return [f"stale: {place}{stage}: {reason}" for stage, reason in found.stale.items()]
@@ -109,8 +153,6 @@ def _section(output: Output, title: str, rows: list[list[str]]) -> None:
 
 
 def _parameters(found: RunSummary) -> list[list[str]]:
-    if not found.parameters:
-        return []
     control = found.control
     head = [
         "setting",
@@ -122,7 +164,7 @@ def _parameters(found: RunSummary) -> list[list[str]]:
         "W_s",
         "status",
     ]
-    return [head, *(_parameter_row(row) for row in found.parameters)]
+    return filled(head, [_parameter_row(row) for row in found.parameters], 3)
 
 
 def _parameter_row(row: ParameterRow) -> list[str]:

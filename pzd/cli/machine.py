@@ -19,6 +19,7 @@ def run_as_data(run: RunSummary) -> dict[str, Any]:
         "run": run.folder.as_posix(),
         "stale": run.stale,
         "not_to_be_trusted": run.marks,
+        "characteristics": vars(run.characteristics),
         "parameters": run.parameters,
         "diagnosis": run.diagnosis,
         "rides": run.summary,

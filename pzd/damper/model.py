@@ -9,6 +9,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from pzd.damper.competing_forms import known
 from pzd.damper.effects import library
+from pzd.schema.errors import InsideError
 from pzd.schema.model import Frozen
 
 EffectValues = Mapping[str, float | tuple[float, ...]]
@@ -102,19 +103,22 @@ def _check_effect(name: str, values: EffectValues) -> None:
     effects = known()
     if name not in effects:
         near = difflib.get_close_matches(name, library(), 1)
-        raise ValueError(f"no effect is called {name}" + (f"; is it {near[0]}?" if near else ""))
+        hint = f"did you mean {near[0]}?" if near else "`pzd effects` lists those there are"
+        raise InsideError(f"no effect is called {name}; {hint}", name, of_key=True)
     wanted = {p.name for p in effects[name].parameters}
     given = set(values) - {"at_voltage_V"}
     if given != wanted:
-        raise ValueError(f"{name} takes {', '.join(sorted(wanted))} (got {', '.join(sorted(given)) or 'nothing'})")
+        unknown = sorted(given - wanted)
+        says = f"{name} takes {', '.join(sorted(wanted))} (got {', '.join(sorted(given)) or 'nothing'})"
+        raise InsideError(says, name, *unknown[:1], of_key=bool(unknown))
     nodes = values.get("at_voltage_V")
     for key in sorted(given):
         value = values[key]
         listed = value if isinstance(value, tuple) else (value,)
         if isinstance(value, tuple) and (not isinstance(nodes, tuple) or len(nodes) != len(value)):
-            raise ValueError(f"{name}.{key} is a list, so at_voltage_V must be a list of the same length")
+            raise InsideError(f"{name}.{key} is a list, so at_voltage_V must be a list of the same length", name, key)
         parameter = effects[name].parameter(key)
         for number in listed:
             if not parameter.admits(number):
                 limits = f"[{parameter.low:g}, {parameter.high:g}] {parameter.unit}"
-                raise ValueError(f"{name}.{key} must lie in {limits} (got {number:g})")
+                raise InsideError(f"{name}.{key} must lie in {limits} (got {number:g})", name, key)

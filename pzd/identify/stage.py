@@ -36,12 +36,14 @@ def identify(
 
     Returns
     -------
-    one row a condition or voltage node, one row of measures a record, one of auxiliaries a condition that shows any
+    one row a condition or voltage node, one row of measures a record, one of auxiliaries a condition that shows any,
+    and the characteristics that the tests show without a model
 
     Raises
     ------
     ConfigError : when `identify.group` makes one condition of all voltages
     """
+    from pzd.identify.characteristics.summary import characteristics
     from pzd.identify.measures import measures
 
     refuse_one_condition(identify, rig, control)
@@ -55,6 +57,7 @@ def identify(
         tuple(rows[labels] for labels in sorted(rows, key=_order)),
         measures(rig.records),
         tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_order)),
+        characteristics(constant, moving),
     )
 
 

@@ -8,15 +8,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pzd.artefacts import IngestRow, RecordEntry, Rig
+from pzd.artefacts import RecordEntry, Rig
 from pzd.config import RunConfig, setting_in_use, validated
 from pzd.identify.stage import refuse_one_condition
 from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
 from pzd.runs import Run
 from pzd.schema.errors import ConfigError
+from pzd.schema.extends import read_extended
 from pzd.schema.progress import Listener, no_listener
-from pzd.schema.yamlfile import Document, read_yaml
+from pzd.schema.yamlfile import Document
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Opened:
         path, _, rest = message.partition(": ")
         if not re.fullmatch(r"\w+(\.\w+)*", path) or path.split(".")[0] not in RunConfig.model_fields:
             return message
-        place = self.document.place(path.split("."))
+        place = self.document.place(path.split("."), rest)
         return f"{place}: {rest}" if place == f"--set {path}" else f"{place}: {message}"
 
 
@@ -56,7 +57,7 @@ def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:
     ------
     ConfigError : when the config is wrong, or its run belongs to another config
     """
-    document = read_yaml(path).overridden(overrides)
+    document = read_extended(path).overridden(overrides)
     config = validated(document)
     return Opened(document, config, Run.of(path, runs, config.control.signal()))
 
@@ -104,6 +105,8 @@ def _check_reference(given: Opened) -> None:
 
 
 def _right_source(line: Sequence[Stage], target: str) -> None:
+    if target == "simulate" and target not in [stage.name for stage in line]:
+        raise ConfigError("pzd simulate: stages leaves simulate out; add it to stages of the config")
     if target not in [stage.name for stage in line]:
         held = "rig.virtual" if line[0].name == "synthesise" else "rig.files"
         raise ConfigError(f"pzd {target}: the config has {held}, so the command is pzd {line[0].name}")
@@ -114,7 +117,7 @@ def stale_stages(given: Opened) -> dict[str, str]:
     return Pipeline(given.config, given.run, stages(given.config), lambda _: None).stale_stages()
 
 
-def preflight(given: Opened) -> tuple[tuple[RecordEntry, ...], tuple[IngestRow, ...]]:
+def preflight(given: Opened) -> Rig:
     """The rig's records, what the preflight finds in them, and what was done to their files; written nowhere.
 
     Raises
@@ -126,9 +129,9 @@ def preflight(given: Opened) -> tuple[tuple[RecordEntry, ...], tuple[IngestRow, 
     with given.placed():
         made = Pipeline(given.config, given.run, (first,), lambda _: None).made(first)
         if not isinstance(made, Rig):
-            return (), ()
+            return Rig((), ())
         refuse_one_condition(given.config.identify, made, given.run.control)
-    return made.entries, made.ingested
+    return made
 
 
 def check_setting(given: Opened, entries: Sequence[RecordEntry]) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pzd.artefacts import (
+    Characteristics,
     ComfortRow,
     Diagnosed,
     Diagnosis,
@@ -22,6 +23,7 @@ from pzd.quantities import Control
 from pzd.runs import CONFIG, Run
 from pzd.schema.csvfile import read_rows
 from pzd.schema.errors import ConfigError, UserError
+from pzd.schema.extends import read_extended
 from pzd.schema.yamlfile import read_yaml
 from pzd.simulate.assumed import assumed
 
@@ -44,6 +46,8 @@ class RunSummary:
     """What the rides assume since the config does not say it."""
     stale: Mapping[str, str] = field(default_factory=dict)
     """Why results are not those of the config as it is today, by stage."""
+    characteristics: Characteristics = field(default_factory=Characteristics)
+    """What the tests show without any model."""
 
 
 def page_of(run: Run) -> Path:
@@ -66,16 +70,18 @@ def run_summary(run: Run) -> RunSummary:
     at = run.folder
     control = control_of(read_yaml(at / CONFIG).data) if (at / CONFIG).is_file() else run.control
     run = replace(run, control=control)
+    identified = run.read(Identified) if Identified in there else Identified((), ())
     comfort = at / Report.folder / "comfort.csv"
     return RunSummary(
         at,
         control,
-        run.read(Identified).rows if Identified in there else (),
+        identified.rows,
         run.read(Diagnosed).diagnosis if Diagnosed in there else None,
         read_rows(at / Rides.folder / "summary.csv", SummaryRow, control) if Rides in there else (),
         read_rows(comfort, ComfortRow, control) if Report in there else (),
         page_of(run) if Report in there else None,
         tuple(dict.fromkeys(mark for manifest in manifests.values() if manifest for mark in manifest.marks)),
+        characteristics=identified.characteristics,
     )
 
 
@@ -107,7 +113,7 @@ def summary_of(folder: Path) -> RunSummary:
         lost = f"their config {config or ''} is missing, so nobody can say whether these are its numbers"
         return replace(found, stale={"all": lost})
     try:
-        document = read_yaml(config)
+        document = read_extended(config)
         return _beside_its_config(found, Opened(document, validated(document), replace(run, config=config)))
     except UserError as error:
         return replace(found, stale={"all": f"their config would be refused: {'; '.join(error.messages)}"})
@@ -118,4 +124,7 @@ def _beside_its_config(found: RunSummary, given: Opened) -> RunSummary:
     effects = found.diagnosis.effects if found.diagnosis else ()
     with_voltage = all(row.voltage_V is not None for row in found.parameters)
     lines = assumed(given.config.simulate, effects, with_voltage) if found.summary else ()
+    if not given.config.with_car:  # rides that an earlier config left in the folder are none of this run
+        found = replace(found, summary=(), comfort=())
+        lines = ()
     return replace(found, stale=stale_stages(given), assumed=lines)

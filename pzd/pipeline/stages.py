@@ -45,16 +45,16 @@ def stages(config: RunConfig) -> tuple[Stage, ...]:
     """The stages of a config, first to last."""
     from pzd.diagnose.stage import diagnose
     from pzd.identify.stage import identify
-    from pzd.report.stage import report
+    from pzd.report.stage import report, report_without_car
     from pzd.rig.stage import ingest, synthesise
     from pzd.simulate.stage import simulate
     from pzd.table.stage import tabulate
 
+    ridden = (Stage("simulate", simulate), Stage(LAST, report))
     return (
         Stage("synthesise", synthesise) if config.rig.virtual else Stage("ingest", ingest),
         Stage("identify", identify),
         Stage("diagnose", diagnose),
         Stage("table", tabulate),
-        Stage("simulate", simulate),
-        Stage(LAST, report),
+        *(ridden if config.with_car else (Stage(LAST, report_without_car),)),
     )

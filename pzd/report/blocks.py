@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+from pzd.report.wording import DASH
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,14 @@ class TextTable:
     folded: bool = False
     """Whether the reader opens it first."""
     kind: str = field(default="table", init=False)
+
+    def without_empty(self, *columns: str) -> TextTable:
+        """The table less those of the named columns that hold nothing but dashes."""
+        kept = [
+            i for i, name in enumerate(self.header) if name not in columns or any(row[i] != DASH for row in self.rows)
+        ]
+        header, *rows = (tuple(row[i] for i in kept) for row in (self.header, *self.rows))
+        return replace(self, header=header, rows=tuple(rows))
 
     @property
     def numeric(self) -> tuple[bool, ...]:

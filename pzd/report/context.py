@@ -148,9 +148,12 @@ class ReportContext:
 
     def level(self, record: Record) -> float | None:
         """The identified voltage nearest to that of a record; its own where none was identified."""
-        own = record.median_voltage()
+        return self.nearest_level(record.median_voltage())
+
+    def nearest_level(self, voltage: float | None) -> float | None:
+        """The identified voltage nearest to one [V]; the one given where none was identified."""
         known = [row.voltage_V for row in self.parameters if row.voltage_V is not None]
-        return own if own is None or not known else min(known, key=lambda voltage: abs(voltage - own))
+        return voltage if voltage is None or not known else min(known, key=lambda level: abs(level - voltage))
 
     def middle(self, record: Record) -> slice:
         """Two cycles of a simple swing, ten of any other record, from its middle: it may start and end at rest."""
@@ -160,17 +163,33 @@ class ReportContext:
         start = round(record.time.size * 0.5 * (1.0 - share))
         return slice(start, record.time.size - start)
 
+    @cached_property
+    def controlled(self) -> bool:
+        """Whether a control signal was recorded; where none was, the page does not speak of one."""
+        return any(record.voltage is not None for record in self.records)
+
+    @property
+    def ridden(self) -> bool:
+        """Whether the damper was ridden in a car."""
+        return bool(self.rides.summary)
+
     def voltage(self, value: float | None) -> str:
-        """A value of the control signal with its unit, in words where there is none."""
-        unit = self.control.unit
-        return f"no {self.control.name}" if value is None else amount(value, unit)
+        """A value of the control signal with its unit, a dash where there is none."""
+        return amount(value, self.control.unit)
 
     def conditions(self, record: Record) -> str:
-        """The conditions of a record; its name where it has none."""
+        """The conditions of a record; its motion where it has none."""
         parts = [self.voltage(self.level(record))] if record.voltage is not None else []
         if record.temperature is not None:
             parts.append(amount(record.median_temperature(), "degC"))
-        return ", ".join(parts) or record.name
+        return ", ".join(parts) or self.motion(record)
+
+    def motion(self, record: Record) -> str:
+        """The frequency and amplitude of a record; its name where it does not repeat, or holds several tests."""
+        found = [m for m in self.identified.measures if m.record == record.name]
+        if len(found) != 1 or found[0].frequency_Hz is None:
+            return record.name
+        return f"{amount(found[0].frequency_Hz, 'Hz')}, {amount(1000.0 * found[0].amplitude_m, 'mm')}"
 
     def road(self, name: str) -> str:
         """A road in words: a sine by its frequency and amplitude, any other by its name."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Place = Literal["model", "missing", "damper", "passenger"]
+Place = Literal["characteristics", "model", "missing", "damper", "passenger"]
 
 MEASURED = "#4d4d4d"
 BASELINE = "#d55e00"
@@ -130,13 +130,14 @@ def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> li
     import matplotlib.figure  # once, before the processes part
 
     def drawn(plot: Plot) -> tuple[Picture, ...]:
-        return tuple(_encoded(panel) for panel in plot.draw(context))
+        return tuple(encoded(panel) for panel in plot.draw(context))
 
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
         return parallel_map(drawn, plots, jobs)
 
 
-def _encoded(panel: Panel) -> Picture:
+def encoded(panel: Panel) -> Picture:
+    """A panel as an SVG in a data URI, the same bytes for the same figure."""
     buffer = io.StringIO()
     panel.figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     text = buffer.getvalue()

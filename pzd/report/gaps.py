@@ -21,7 +21,7 @@ _ROWS = 12
 
 @dataclass(frozen=True, eq=False)
 class GapMap:
-    """R.m.s. gap by row (voltage, or record where the voltage says nothing) and velocity."""
+    """R.m.s. gap by row (voltage, or motion where the voltage says nothing) and velocity."""
 
     rows: tuple[str, ...]
     edges: Array
@@ -63,7 +63,7 @@ def gap_map(context: ReportContext) -> GapMap:
 
 
 def _groups(context: ReportContext) -> dict[str, list[Record]]:
-    """Records by voltage; by name where all share one; those whose voltage moves stand together."""
+    """Records by voltage; by motion where all share one; those whose voltage moves stand together."""
     scale = voltage_scale(context.sampled)
     moving = [r for r in context.sampled if not is_constant(r, scale)]
     still = sorted((r for r in context.sampled if is_constant(r, scale)), key=lambda r: context.level(r) or 0.0)
@@ -71,7 +71,9 @@ def _groups(context: ReportContext) -> dict[str, list[Record]]:
     for record in still:
         found.setdefault(context.voltage(context.level(record)), []).append(record)
     if len(found) < 2:
-        found = {record.name: [record] for record in still[:_ROWS]}
+        found = {}
+        for record in still[:_ROWS]:
+            found.setdefault(context.motion(record), []).append(record)
     if moving:
         found[f"moving {context.control.name}"] = moving
     return found

@@ -13,10 +13,11 @@ from pzd.report.wording import amount, listed, number, percent, sentence
 
 
 def cards(context: ReportContext) -> tuple[Card, ...]:
-    """Damper, missing effect, confidence, next test, comfort: each a question with its answer."""
+    """Damper, missing effect, confidence, next test, and comfort if ridden: each a question with its answer."""
     question = "What is missing from the simple model?"
     missing = Card(question, _missing(context), _meaning(context))
-    return _damper(context), missing, _confidence(context), _next(context), _comfort(context)
+    comfort = (_comfort(context),) if context.ridden else ()
+    return _damper(context), missing, _confidence(context), _next(context), *comfort
 
 
 def _damper(context: ReportContext) -> Card:
@@ -96,6 +97,8 @@ def _next(context: ReportContext) -> Card:
 
 
 def _comfort(context: ReportContext) -> Card:
+    if not context.controlled:
+        return Card("What does the passenger feel?", _uncontrolled(context), "")
     question = "What does control give the passenger?"
     found = {road: compared[0] for road in context.roads if (compared := context.comparisons(road))}
     if not found:

@@ -7,10 +7,10 @@ from pzd.report.context import ReportContext
 from pzd.report.drawing import pictures
 from pzd.report.headline import cards
 from pzd.report.plots import library
-from pzd.report.sections import damper, expected, made, missing, model, passenger, tested, trust
+from pzd.report.sections import characteristics, damper, expected, made, missing, model, passenger, tested, trust
 from pzd.report.sections.pictures import Pictures
 
-_PLACES = ("model", "missing", "damper", "passenger")
+_PLACES = ("characteristics", "model", "missing", "damper", "passenger")
 
 
 def page(context: ReportContext, jobs: int = 1) -> str:
@@ -28,15 +28,16 @@ def page(context: ReportContext, jobs: int = 1) -> str:
     drawn = _drawn(context, jobs)
     sections = (
         tested.render(context),
+        *characteristics.render(context, drawn),
         model.render(context, drawn),
         missing.render(context, drawn),
         damper.render(context, drawn),
-        passenger.render(context, drawn),
+        *([passenger.render(context, drawn)] if context.ridden else []),
         *expected.render(context),
         trust.render(context),
         made.render(context),
     )
-    return render(_title(context), cards(context), context.assumed, sections)
+    return render(_title(context), cards(context), context.assumed if context.ridden else (), sections)
 
 
 def _drawn(context: ReportContext, jobs: int) -> Pictures:
@@ -46,10 +47,20 @@ def _drawn(context: ReportContext, jobs: int) -> Pictures:
 
 
 def _title(context: ReportContext) -> str:
-    return f"Damper and comfort report: {context.chosen}" if context.chosen else "Damper and comfort report"
+    kind = "Damper and comfort report" if context.ridden else "Damper report"
+    return f"{kind}: {context.chosen}" if context.chosen else kind
 
 
-def render(title: str, headline: tuple[Card, ...], assumed: tuple[str, ...], sections: tuple[Section, ...]) -> str:
+_FOOTER = "Written by pzd. Every number of this page stands in the CSV and JSON files of the run beside it."
+
+
+def render(
+    title: str,
+    headline: tuple[Card, ...],
+    assumed: tuple[str, ...],
+    sections: tuple[Section, ...],
+    footer: str = _FOOTER,
+) -> str:
     """Fill the template; every text is escaped there."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -62,5 +73,5 @@ def render(title: str, headline: tuple[Card, ...], assumed: tuple[str, ...], sec
         keep_trailing_newline=True,
     )
     return environment.get_template("report.html").render(
-        title=title, cards=headline, assumed=assumed, sections=sections
+        title=title, cards=headline, assumed=assumed, sections=sections, footer=footer
     )

@@ -45,20 +45,72 @@ def report(
     ConfigError : when there is no such file of expected numbers
     DataError : when it is at fault, with every place
     """
+    return _made(report, simulate, rig, identified, diagnosed, table, rides, control, setting, folder, jobs)
+
+
+def report_without_car(
+    report: ReportConfig,
+    rig: Rig,
+    identified: Identified,
+    diagnosed: Diagnosed,
+    table: Table,
+    control: Control,
+    setting: str | None,
+    folder: Path,
+    jobs: int = 1,
+) -> Report:
+    """Write one page on the damper alone, where `stages` leaves the ride out; there is no comfort to rate.
+
+    Parameters
+    ----------
+    report : what the page shows
+    rig, identified, diagnosed, table : what the stages before made
+    control : the control signal of the valve
+    setting : of the rig's settings, the one in use
+    folder : of the config, from which the path of expected numbers counts
+    jobs : pictures drawn at the same time
+
+    Returns
+    -------
+    the page, and the numbers beside those expected where the config names any
+
+    Raises
+    ------
+    ConfigError : when there is no such file of expected numbers
+    DataError : when it is at fault, with every place
+    """
+    none = Rides((), (), (), (), (), ())
+    return _made(report, SimulateConfig(), rig, identified, diagnosed, table, none, control, setting, folder, jobs)
+
+
+def _made(
+    config: ReportConfig,
+    simulate: SimulateConfig,
+    rig: Rig,
+    identified: Identified,
+    diagnosed: Diagnosed,
+    table: Table,
+    rides: Rides,
+    control: Control,
+    setting: str | None,
+    folder: Path,
+    jobs: int,
+) -> Report:
     from pzd.report.context import ReportContext
     from pzd.report.page import page
     from pzd.report.reference import compared, file_of, read_reference
     from pzd.report.ride_comfort import assess, rated
     from pzd.report.run_numbers import RunNumbers
 
-    expected = read_reference(file_of(report.reference, folder), control) if report.reference else None
+    expected = read_reference(file_of(config.reference, folder), control) if config.reference else None
     log = logging.getLogger(__name__)
     finished = rated(rides)
-    comfort = tuple(row for ride in finished for row in assess(ride, report))
-    log.info("%d comfort values of %d rides", len(comfort), len(finished))
+    comfort = tuple(row for ride in finished for row in assess(ride, config))
+    if finished:
+        log.info("%d comfort values of %d rides", len(comfort), len(finished))
     found = compared(expected, RunNumbers(identified, rides, comfort, simulate, control)) if expected else None
     context = ReportContext(
-        config=report,
+        config=config,
         simulate=simulate,
         rig=rig,
         identified=identified,

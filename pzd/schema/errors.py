@@ -37,3 +37,20 @@ class FilesError(UserError):
 def at(path: object, line: int | None = None, column: int | None = None) -> str:
     """The place of an error as ``file:line:column``, as far as it is known."""
     return ":".join(str(part) for part in (path, line, column) if part is not None)
+
+
+class InsideError(ValueError):
+    """What a validator of a whole value finds wrong with one key or item of it."""
+
+    def __init__(self, message: str, *path: str | int, of_key: bool = False) -> None:
+        """Say what is wrong.
+
+        Parameters
+        ----------
+        message : what the key or item must be
+        path : keys and indices that lead to it from the value
+        of_key : whether the last key itself is wrong, and not what stands under it
+        """
+        super().__init__(message)
+        self.path = path
+        self.of_key = of_key

@@ -15,6 +15,7 @@ import yaml
 
 from pzd.schema.errors import UserError, at
 from pzd.schema.scalars import Scalar, scalar_of
+from pzd.schema.syntax import explained
 
 DEEPEST = 100
 """Nesting of lists and mappings beyond which a file is refused."""
@@ -81,7 +82,7 @@ def compose(text: str, name: object, error: type[UserError]) -> Node:
     except _RefusedError:
         raise error(composer.faults) from None
     except yaml.MarkedYAMLError as fault:
-        raise error([*composer.faults, _syntax(fault, name)]) from None
+        raise error([*composer.faults, _syntax(fault, text, name)]) from None
     except yaml.reader.ReaderError as fault:
         line, column = text.count("\n", 0, fault.position) + 1, fault.position - text.rfind("\n", 0, fault.position)
         code = f"U+{ord(text[fault.position]):04X}"
@@ -91,13 +92,9 @@ def compose(text: str, name: object, error: type[UserError]) -> Node:
     return root
 
 
-def _syntax(fault: yaml.MarkedYAMLError, name: object) -> str:
-    mark = fault.problem_mark or fault.context_mark
-    place = at(name, mark.line + 1, mark.column + 1) if mark else at(name)
-    problem = str(fault.problem)
-    if "\\t" in problem:
-        problem = "a tab where YAML wants spaces"
-    return f"{place}: {problem}" + (f" ({fault.context})" if fault.context else "")
+def _syntax(fault: yaml.MarkedYAMLError, text: str, name: object) -> str:
+    found = explained(fault, text)
+    return f"{at(name, found.line + 1, found.column + 1)}: {found.message}" if found else f"{at(name)}: {fault.problem}"
 
 
 class _RefusedError(Exception):

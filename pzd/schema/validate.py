@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from pzd.quantities import Control
-from pzd.schema.errors import UserError
+from pzd.schema.errors import InsideError, UserError
 from pzd.schema.nearest import Path, former_keys, keys_at, nearest
 from pzd.schema.nodes import Node
 from pzd.schema.wording import worded
@@ -63,6 +63,8 @@ class _Fault:
     detail: Mapping[str, Any]
     in_union: bool
     """Whether it is the complaint of one member of a union."""
+    of_key: bool = False
+    """Whether the last key of the path is at fault."""
 
 
 def _fault(detail: Mapping[str, Any], root: Node) -> _Fault:
@@ -79,7 +81,16 @@ def _fault(detail: Mapping[str, Any], root: Node) -> _Fault:
             path.append(part)
         else:
             skipped = True
-    return _Fault(tuple(path), node, detail, skipped)
+    inside = detail.get("ctx", {}).get("error")
+    if not isinstance(inside, InsideError):
+        return _Fault(tuple(path), node, detail, skipped)
+    for part in inside.path:
+        below = _below(node, part)
+        if below is None:
+            return _Fault(tuple(path), node, detail, skipped)
+        node = below
+        path.append(part)
+    return _Fault(tuple(path), node, detail, skipped, inside.of_key)
 
 
 def _below(node: Node, part: str | int) -> Node | None:
@@ -117,6 +128,8 @@ def _message(faults: list[_Fault], annotation: Any, root: Node, data: Any, contr
         place, got = _key_place(root, path), control.renamed(str(path[-1]))
         now = former_keys(annotation, path[:-1], data).get(str(path[-1]))
         text = _unknown(now or got, valid)
+        if len(path) > 1 and got in keys_at(annotation, (), data):
+            text = f"no such key here; it is one of the first column, so it may be indented too far (got {got})"
     elif "missing" in kind:
         text, got = "is missing", _shown(list(node.value) if isinstance(node.value, Mapping) else [])
     elif kind.startswith("union_tag"):
@@ -127,6 +140,8 @@ def _message(faults: list[_Fault], annotation: Any, root: Node, data: Any, contr
         text = _one_of(context.get("expected_tags", ""), context.get("tag"))
     else:
         text = _alternatives([_worded(each) for each in faults])
+        if fault.of_key:
+            place, got = _key_place(root, path), control.renamed(str(path[-1]))
     shown = ".".join(control.renamed(str(part)) for part in path)
     shown = "" if place == f"--set {shown}" else shown
     return ": ".join(part for part in (place, shown, text) if part) + ("" if "(got" in text else f" (got {got})")

@@ -33,8 +33,15 @@ class Document:
         """The document as plain Python data."""
         return self.root.data()
 
-    def place(self, path: Iterable[str]) -> str:
-        """The place of a value by its keys and indices, or of the last thing on the way to it that is there."""
+    def place(self, path: Iterable[str], message: str = "") -> str:
+        """The place of a value by its keys and indices, or of the last thing on the way to it that is there.
+
+        Parameters
+        ----------
+        path : keys and indices
+        message : what is wrong there; where it begins with a key of the value, the place is that of what stands under
+            this key, or of the key itself where the message ends with it, as in ``mas: no such key (got 'mas')``
+        """
         node = self.root
         for part in path:
             below = node.value.get(part) if isinstance(node.value, Mapping) else None
@@ -42,7 +49,11 @@ class Document:
                 node = below.node
             elif isinstance(node.value, tuple) and part.isdecimal() and int(part) < len(node.value):
                 node = node.value[int(part)]
-        return node.place
+        key = message.partition(": ")[0]
+        if not isinstance(node.value, Mapping) or key not in node.value:
+            return node.place
+        entry = node.value[key]
+        return entry.place if message.endswith((f"(got {key!r})", f"(got {key})")) else entry.node.place
 
     def overridden(self, overrides: Iterable[str]) -> Self:
         """The document with ``a.b=VALUE`` set, VALUE one YAML scalar; items of lists by index.

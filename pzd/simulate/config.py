@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from pzd.schema.errors import InsideError
 from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 from pzd.simulate.cars import cars
@@ -159,9 +160,10 @@ class SimulateConfig(Frozen):
     @field_validator("policies")
     @classmethod
     def _known_policies(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
-        for name in names or ():
+        for number, name in enumerate(names or ()):
             if name not in policies():
-                raise ValueError(f"no policy is called {name}; there are {', '.join(sorted(policies()))}")
+                says = f"no policy is called {name}; there are {', '.join(sorted(policies()))}"
+                raise InsideError(says, number)
         return names
 
     @model_validator(mode="after")

@@ -94,7 +94,7 @@ def test_values_beyond_the_limits_are_refused_with_the_unit(name: str) -> None:
 
 
 def test_a_misspelt_effect_is_named_with_the_nearest_one() -> None:
-    with pytest.raises(ValueError, match="is it gas_spring"):
+    with pytest.raises(ValueError, match="did you mean gas_spring"):
         PLAIN.with_effect("gas_sprng", {"k_g": 1.0})
 
 

@@ -31,6 +31,7 @@ from pzd.artefacts import (
     RideRow,
     Rides,
     Rig,
+    StepRow,
     SummaryRow,
     Table,
     TableNotes,
@@ -40,8 +41,9 @@ from pzd.artefacts import (
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.identify.characteristics.summary import characteristics
 from pzd.quantities import Control
-from pzd.record import Record
+from pzd.record import Record, conditions
 from pzd.report.config import ReportConfig
 from pzd.report.ride_comfort import RatedRide, rated
 from pzd.report.stage import report
@@ -58,6 +60,20 @@ PLAIN = Damper(
 FINAL = PLAIN.with_effect("orifice_quadratic", {"q": 1510.0})
 SETTLE_S, RATE_HZ, DURATION_S = 4.0, 500.0, 20.0
 VOLTS = Control()
+STEP = StepRow(
+    record="r09",
+    setting="gap 0.25 mm",
+    temperature_degC=22.0,
+    time_s=1.5,
+    from_voltage_V=0.0,
+    to_voltage_V=150.0,
+    velocity_m_per_s=0.1,
+    from_force_N=400.0,
+    to_force_N=1400.0,
+    to_63_percent_s=0.0041,
+    to_90_percent_s=0.0123,
+    status="ok",
+)
 
 
 @dataclass(frozen=True)
@@ -160,7 +176,8 @@ def identified() -> Identified:
             dynamic_range=None,
         ),
     )
-    return Identified(rows, measures)
+    shown = characteristics(*conditions(rig().records))
+    return Identified(rows, measures, characteristics=replace(shown, steps=(STEP,)))
 
 
 def diagnosis() -> Diagnosis:

@@ -15,14 +15,17 @@ from typing import Any
 
 import pytest
 
-from pzd.artefacts import Identified, Rides, Rig, Table, TableNotes
+from pzd.artefacts import Characteristics, Identified, Rides, Rig, Table, TableNotes
 from pzd.damper.model import BaseRow, Damper
+from pzd.identify.characteristics.summary import characteristics
 from pzd.quantities import Control
+from pzd.record import conditions
 from pzd.report.config import ReportConfig
 from pzd.report.plots import library
 
+NO_RIDES = Rides((), (), (), (), (), ())
 HERE = Path(__file__).parent
-ORDER = ["tested", "model", "missing", "damper", "passenger", "trust", "made"]
+ORDER = ["tested", "characteristics", "model", "missing", "damper", "passenger", "trust", "made"]
 FETCHES = {"src", "href", "srcset", "data", "action", "poster"}
 
 
@@ -104,6 +107,25 @@ def test_styles_and_pictures_fetch_nothing(page: str, read: Reader) -> None:
 def test_every_picture_says_what_it_shows(read: Reader) -> None:
     assert len(read.pictures()) >= len(library())
     assert all(len(picture.get("alt") or "") > 20 for picture in read.pictures())
+
+
+def test_force_over_speed_is_told_as_damper_people_chart_it(read: Reader, run: Any) -> None:
+    part = read.text.partition("2 Force over speed, as measured")[2].partition("3 Where the simple model fails")[0]
+    assert "Rebound is extension: its speed and force are positive, those of compression negative." in part
+    assert "4 such tests were found in the 4 records, by their motion." in part
+    for row in run.identified.characteristics.peak_velocity:
+        assert f"{row.rebound_force_N:.3g}"[:2] in part.replace("\u2212", "")
+        assert row.record in part
+    assert "0 V to 150 V 0.1 m/s 400 to 1 400 N 4.1 ms 12.3 ms ok r09, 1.5 s" in part.replace("\u00a0", " ")
+    assert "states 9 ms for its damper" in part
+    titles = [picture["alt"] for picture in read.pictures()]
+    assert any("Force over peak speed of 4 tests, rebound above zero" in (alt or "") for alt in titles)
+    assert any("one average settled cycle, one test each for 0" in (alt or "") for alt in titles)
+
+
+def test_without_such_tests_there_is_no_such_section(run: Any, words_only: None) -> None:
+    bare = replace(run.identified, characteristics=Characteristics())
+    assert "characteristics" not in Reader(replace(run, identified=bare).told().page).sections()
 
 
 def test_the_headline_answers_five_questions(read: Reader) -> None:
@@ -255,7 +277,7 @@ def test_a_control_that_is_a_current_is_called_so(words_only: None, run: Any) ->
     assert "150 V" not in read.text.replace("abs(v) > 0.25 m/s, 150 V", "")
 
 
-def test_a_rig_without_voltage_or_temperature_is_told(run: Any) -> None:
+def test_a_damper_without_control_and_without_a_car_is_told_without_either(run: Any) -> None:
     plain = Damper(base=(BaseRow(T0_N=474.0, C_Ns_per_m=2260.0, k_N_per_m=263000.0),))
     records = tuple(replace(r, voltage=None, temperature=None) for r in run.rig.records[::2])
     blank = {"voltage_V": None, "temperature_degC": None}
@@ -265,13 +287,39 @@ def test_a_rig_without_voltage_or_temperature_is_told(run: Any) -> None:
     bare = replace(
         run.with_diagnosis(verdict="none", effects=(), parameters={}),
         rig=Rig(records, entries),
-        identified=Identified(rows, ()),
+        identified=Identified(rows, (), characteristics=characteristics(*conditions(records))),
         table=Table(force, (), run.table.notes),
+        rides=NO_RIDES,
     )
-    bare = replace(bare, diagnosed=replace(bare.diagnosed, damper=plain, plain=plain))
+    diagnosis = bare.diagnosed.diagnosis.model_copy(update={"where": (), "prediction": None, "next_test": None})
+    bare = replace(bare, diagnosed=replace(bare.diagnosed, diagnosis=diagnosis, damper=plain, plain=plain))
     read = Reader(bare.told().page)
-    assert "no voltage was recorded" in read.text
+    assert read.sections() == [name for name in ORDER if name != "passenger"]
+    said = " ".join([read.text, *(picture["alt"] or "" for picture in read.pictures())])
+    assert re.findall(r"(?i)volt|control|valve|\bV\b|\bride|comfort|passenger", said) == []
     assert "It gives 1 540 N" in read.text
+    assert "no temperature was recorded" in read.text
+
+
+def test_a_car_on_dampers_without_control_is_told_without_it(run: Any, words_only: None) -> None:
+    records = tuple(replace(r, voltage=None) for r in run.rig.records)
+    rides = run.rides
+    kept = {row.case for row in rides.summary if row.policy == "constant"}
+    held = {"policy": "passive", "fidelity": "table"}
+    rides = replace(
+        rides,
+        rides=tuple(one for one in rides.rides if one.case in kept),
+        summary=tuple(row.model_copy(update=held) for row in rides.summary if row.case in kept),
+        ridden=tuple(row.model_copy(update={"damping_Ns_per_m": None}) for row in rides.ridden if row.case in kept),
+        responses=(),
+    )
+    text = Reader(replace(run, rig=Rig(records, run.rig.entries), rides=rides).told().page).text
+    head = text.partition("1 What was tested")[0]
+    assert "What does the passenger feel? 2.25 Hz sine: a_w" in head
+    assert "passive: the damper as it is" in text
+    assert "table: the force is that of the table at the speed of the damper" in text
+    for said in ("What does control give", "Nothing controls", "the voltage stays", "the voltage comes"):
+        assert said not in text
 
 
 def test_an_empty_run_still_makes_a_page(run: Any) -> None:
@@ -281,9 +329,9 @@ def test_an_empty_run_still_makes_a_page(run: Any) -> None:
         rig=Rig((), ()),
         identified=Identified((), ()),
         table=Table((), (), notes),
-        rides=Rides((), (), (), (), (), ()),
+        rides=NO_RIDES,
     )
-    assert Reader(empty.told().page).sections() == ORDER
+    assert Reader(empty.told().page).sections() == ["tested", "model", "missing", "damper", "trust", "made"]
 
 
 def test_without_the_standard_of_1978_the_gain_is_told_in_acceleration(words_only: None, run: Any) -> None:

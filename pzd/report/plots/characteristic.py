@@ -18,19 +18,21 @@ def draw(context: ReportContext) -> Iterator[Panel]:
         return
     rows = [row for row in context.table.force if row.temperature_degC == temperatures[0] and row.force_N is not None]
     voltages = sorted({row.voltage_V for row in rows}, key=lambda v: v or 0.0)
-    figure, ax = axes(key=(len(voltages) + 3) // 4)
+    figure, ax = axes(key=(len(voltages) + 3) // 4 if context.controlled else 0)
     for voltage, colour in zip(voltages, shades(len(voltages)), strict=True):
         points = np.array([(r.velocity_m_per_s, r.force_N, r.inside) for r in rows if r.voltage_V == voltage])
         inside = np.where(points[:, 2] > 0, points[:, 1], np.nan) / 1000.0
         ax.plot(points[:, 0], points[:, 1] / 1000.0, color=colour, linewidth=1.0, linestyle=":")
-        ax.plot(points[:, 0], inside, color=colour, label=context.voltage(voltage))
+        ax.plot(points[:, 0], inside, color=colour, label=None if voltage is None else context.voltage(voltage))
     ax.locator_params(axis="x", nbins=6)
     ax.set_xlabel("velocity [m/s]")
     ax.set_ylabel("force [kN]")
-    legend(figure, 4)
+    if context.controlled:
+        legend(figure, 4)
     at = f" at {amount(temperatures[0], 'degC')}" if temperatures[0] is not None else ""
     reached = context.table.notes.reached_m_per_s
-    alt = f"Force of the damper over velocity for {len(voltages)} values of the {context.control.name}{at}."
+    each = f" for {len(voltages)} values of the {context.control.name}" if context.controlled else ""
+    alt = f"Force of the damper over velocity{each}{at}."
     yield Panel(
         figure, f"Force of the damper{at}", alt, f"Dotted: beyond the {number(reached)} m/s that the rig reached."
     )

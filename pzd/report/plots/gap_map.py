@@ -18,12 +18,13 @@ def draw(context: ReportContext) -> Iterator[Panel]:
         return
     found = gap_map(context)
     top = float(np.nanmax(found.before))
-    yield _panel(found, found.before, top, "simple model")
+    by = context.control.name if context.controlled else "test"
+    yield _panel(found, found.before, top, "simple model", by)
     if context.extended:
-        yield _panel(found, found.after, top, "with what was missing")
+        yield _panel(found, found.after, top, "with what was missing", by)
 
 
-def _panel(found: GapMap, values: Array, top: float, which: str) -> Panel:
+def _panel(found: GapMap, values: Array, top: float, which: str, by: str) -> Panel:
     figure, ax = axes(1.5 + 0.3 * max(len(found.rows), 4), found.rows, key=0, right=0.75)
     cells = np.arange(len(found.rows) + 1)
     mesh = ax.pcolormesh(found.edges, cells, values, cmap=MAP, vmin=0.0, vmax=top, edgecolors="face", linewidth=0.9)
@@ -36,7 +37,7 @@ def _panel(found: GapMap, values: Array, top: float, which: str) -> Panel:
     )
     title = f"Gap, {which}"
     largest = f"largest {np.nanmax(values):.2g} % of the peak force"
-    alt = f"Map of the r.m.s. gap by voltage and velocity, {which}; {largest}."
+    alt = f"Map of the r.m.s. gap by {by} and velocity, {which}; {largest}."
     return Panel(figure, title, alt, "R.m.s. of measured minus simulated force, in % of the largest measured force.")
 
 

@@ -52,18 +52,25 @@ def _intro(context: ReportContext) -> str:
 def _parameters(context: ReportContext) -> TextTable:
     """T0, C and k of the damper that everything behind uses."""
     title = "T0, C and k beside what was missing" if context.extended else "T0, C and k of the Bingham element alone"
-    return TextTable(title, _header(context), tuple(_row(context, row) for row in context.final))
+    rows = tuple(_row(context, row) for row in context.final)
+    return TextTable(title, _header(context), rows).without_empty(*_conditions(context))
 
 
 def _alone(context: ReportContext) -> TextTable:
     """T0, C and k of the simple model: alone they also stand in for what it lacks."""
     title = "The simple model: T0, C and k of the Bingham element alone, standing in for what was missing"
-    return TextTable(title, _header(context), tuple(_row(context, row) for row in context.parameters), folded=True)
+    rows = tuple(_row(context, row) for row in context.parameters)
+    return TextTable(title, _header(context), rows, folded=True).without_empty(*_conditions(context))
+
+
+def _conditions(context: ReportContext) -> tuple[str, str]:
+    """Headers of what a rig need not have recorded."""
+    return context.control.name, "temperature"
 
 
 def _header(context: ReportContext) -> tuple[str, ...]:
     units = [f"{q.symbol} [{unit_of(q.unit)}]" for q in _QUANTITIES]
-    return (context.control.name, "temperature", *units, "W_s", "r.m.s. error", "status")
+    return (*_conditions(context), *units, "W_s", "r.m.s. error", "status")
 
 
 def _row(context: ReportContext, row: ParameterRow | BaseRow) -> tuple[str, ...]:
@@ -99,7 +106,8 @@ def _force(context: ReportContext) -> TextTable:
     chosen = _spread(speeds, context.table.notes.reached_m_per_s)
     cells = tuple((amount(v, "m/s"), *(_cell(at.get((v, volt))) for volt in voltages)) for v in chosen)
     degrees = f" at {amount(first, 'degC')}" if first is not None else ""
-    header = ("speed in rebound", *(f"force at {context.voltage(volt)}" for volt in voltages))
+    columns = ["force" if volt is None else f"force at {context.voltage(volt)}" for volt in voltages]
+    header = ("speed in rebound", *columns)
     return TextTable(f"Force{degrees}; in brackets the model beyond what the rig reached", header, cells)
 
 
@@ -139,7 +147,7 @@ def _responses(context: ReportContext) -> TextTable:
 
 
 def _measures(context: ReportContext) -> TextTable:
-    conditions = ("record", context.control.name, "temperature", "frequency", "amplitude")
+    conditions = ("record", *_conditions(context), "frequency", "amplitude")
     found = ("peak force", "force at zero velocity", "work per cycle", "equivalent c", "dynamic range")
     rows = tuple(
         (
@@ -157,4 +165,5 @@ def _measures(context: ReportContext) -> TextTable:
         for m in context.identified.measures
         if m.setting == context.chosen
     )
-    return TextTable("Every test as an equivalent viscous damper", conditions + found, rows, folded=True)
+    title = "Every test as an equivalent viscous damper"
+    return TextTable(title, conditions + found, rows, folded=True).without_empty(*_conditions(context), "dynamic range")

@@ -6,13 +6,11 @@ from pzd.comfort import directive, iso2631_1978, iso2631_1997
 from pzd.report.blocks import Notes, Paragraph, Section
 from pzd.report.context import ReportContext
 
+_RIDE = "simulate: the half-car of the paper, equations (5) to (12), with an energy balance (5-simulate)"
 _STAGES = (
     "rig: records in SI units, checked, never corrected unasked (1-rig)",
     "identify: T0, C and k of every condition by the global optimum of the paper's criterion (4) (2-identify)",
     "diagnose: where the gap lies and which effect of the library closes it, judged on held-out data (3-diagnose)",
-    "table: force over temperature, control signal and velocity, and its inverse (4-table)",
-    "simulate: the half-car of the paper, equations (5) to (12), with an energy balance (5-simulate)",
-    "report: this page and comfort.csv (6-report)",
 )
 _SOURCES = {
     iso2631_1997.EDITION: "weighting Wk by its exact frequency response over the whole ride from rest, so that neither "
@@ -30,6 +28,17 @@ _SIGNS = (
 
 def render(context: ReportContext) -> Section:
     """The last section."""
+    axes = (
+        "temperature, control signal and velocity, and its inverse"
+        if context.controlled
+        else "temperature and velocity"
+    )
+    stages = (
+        *_STAGES,
+        f"table: force over {axes} (4-table)",
+        *([_RIDE] if context.ridden else []),
+        f"report: this page{' and comfort.csv' if context.ridden else ''} (6-report)",
+    )
     sources = tuple(f"{edition}: {_SOURCES[edition]}" for edition in context.config.editions)
-    blocks = (Paragraph(_LINE), Notes(_STAGES), Paragraph("Standards:"), Notes(sources), Paragraph(_SIGNS))
-    return Section("made", "How it was made", blocks)
+    standards = (Paragraph("Standards:"), Notes(sources)) if context.ridden else ()
+    return Section("made", "How it was made", (Paragraph(_LINE), Notes(stages), *standards, Paragraph(_SIGNS)))

@@ -94,7 +94,7 @@ def _prediction(context: ReportContext, found: Prediction) -> TextTable:
         ("kept back", context.control.name, "W_s, simple model", "W_s, as handed on"),
         (whole, *tests, *left_out),
         folded=len(tests) > _FOLD,
-    )
+    ).without_empty(context.control.name)
 
 
 def _parameters(context: ReportContext, diagnosis: Diagnosis) -> TextTable:

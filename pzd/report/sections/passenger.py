@@ -43,15 +43,23 @@ _FIDELITIES = {
     "table": "the voltage comes from the table of force, and the force from the voltage",
     "dynamic": "as table, with the lag of the valve and the damper's own dynamics",
 }
+_UNCONTROLLED_FIDELITIES = {
+    "ideal": "the demanded force is there at once",
+    "table": "the force is that of the table at the speed of the damper",
+    "dynamic": "as table, with the damper's own dynamics",
+}
+"""The same of a damper without a control signal."""
 
 
 def _meanings(context: ReportContext) -> tuple[Notes, ...]:
     """What the names of policies and fidelities stand for."""
     rows = _all(context)
     used = {row.policy for row in rows}
-    names = [f"{name}: {policy.meaning}" for name, policy in policies().items() if name in used]
+    as_it_is = {} if context.controlled else {"passive": "the damper as it is"}
+    names = [f"{name}: {as_it_is.get(name, policy.meaning)}" for name, policy in policies().items() if name in used]
     exact = {row.fidelity for row in rows}
-    names += [f"{name}: {text}" for name, text in _FIDELITIES.items() if name in exact]
+    fidelities = _FIDELITIES if context.controlled else _UNCONTROLLED_FIDELITIES
+    names += [f"{name}: {text}" for name, text in fidelities.items() if name in exact]
     return (Notes(tuple(names)),) if names else ()
 
 

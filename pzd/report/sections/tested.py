@@ -63,8 +63,6 @@ def _conditions(context: ReportContext) -> list[str]:
     if volts:
         span = number(min(volts)), number(max(volts))
         found.append(f"{context.control.name} {_span(*span)} {context.control.unit}")
-    else:
-        found.append(f"no {context.control.name} was recorded")
     degrees = [
         float(t)
         for r in context.records
@@ -96,7 +94,9 @@ def _records(context: ReportContext) -> TextTable:
     )
     pairs = [(context.entries[r.name], r) for r in context.records if r.name in context.entries]
     rows = tuple(_row(context, entry, record) for entry, record in pairs)
-    return TextTable("Records", header, rows, folded=len(rows) > _FOLD)
+    return TextTable("Records", header, rows, folded=len(rows) > _FOLD).without_empty(
+        context.control.name, "temperature"
+    )
 
 
 def _row(context: ReportContext, entry: RecordEntry, record: Record) -> tuple[str, ...]:

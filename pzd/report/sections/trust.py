@@ -15,18 +15,19 @@ _MUCH = 0.01
 
 def render(context: ReportContext) -> Section:
     """The sixth section."""
+    ridden = context.ridden
     marks = (*context.identified.untrusted(context.control), *context.rides.untrusted(context.control))
     blocks: list[Block] = []
     if marks:
         blocks += [Paragraph("These results are not to be trusted as they stand:"), Notes(marks, "care")]
     else:
-        balance = f"the energy of every ride balances to {number(ENERGY_LIMIT)} or better"
-        text = f"T0 and C are determined everywhere, and {balance}."
+        balance = f", and the energy of every ride balances to {number(ENERGY_LIMIT)} or better" if ridden else ""
+        text = f"T0 and C are determined everywhere{balance}."
         blocks.append(Notes((text,), "good"))
     cares = tuple(_cares(context))
     if cares:
         blocks += [Paragraph("To be kept in mind:"), Notes(cares, "care")]
-    blocks.append(_balance(context))
+    blocks += [_balance(context)] if ridden else []
     return Section("trust", "How far to trust it", tuple(blocks))
 
 
@@ -35,9 +36,11 @@ def _cares(context: ReportContext) -> Iterator[str]:
     if weak:
         yield f"{len(weak)} of {len(context.final)} conditions hold a parameter that the data determine weakly"
     if context.diagnosed.diagnosis.verdict == "unexplained":
-        yield "part of the measured force is repeatable and not explained; the rides carry that gap"
+        carry = "rides carry" if context.ridden else "table carries"
+        yield f"part of the measured force is repeatable and not explained; the {carry} that gap"
     if context.diagnosed.diagnosis.verdict == "ambiguous":
-        yield "which effect is missing is not settled; another one would change the rides"
+        change = "rides" if context.ridden else "table"
+        yield f"which effect is missing is not settled; another one would change the {change}"
     beyond = [row for row in context.rides.summary if row.outside_table > _MUCH]
     if beyond:
         worst = max(beyond, key=lambda row: row.outside_table)
@@ -59,12 +62,13 @@ def _cares(context: ReportContext) -> Iterator[str]:
             f"axle {axle.axle} of {axle.case}: {amount(axle.min_contact_force_N, 'N')}, and "
             f"{percent(axle.pulling)} of its time; a real wheel would leave the road"
         )
-    if iso2631_1978.EDITION in context.config.editions:
+    if context.ridden and iso2631_1978.EDITION in context.config.editions:
         yield f"the exposure times of {iso2631_1978.EDITION}, withdrawn in 1997, rest on an {iso2631_1978.TRUST}"
     findings = sum(len(entry.findings) for entry in context.rig.entries)
     if findings:
         yield f"the preflight left {findings} finding{'s' if findings > 1 else ''} on the records"
-    yield "vibration is judged in the vertical direction at point K only, without a seat"
+    if context.ridden:
+        yield "vibration is judged in the vertical direction at point K only, without a seat"
 
 
 def _balance(context: ReportContext) -> TextTable:

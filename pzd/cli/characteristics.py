@@ -1,0 +1,75 @@
+"""Force over speed, gas force, friction and response to steps, as rows of text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from pzd.cli.layout import filled, number
+
+if TYPE_CHECKING:
+    from pzd.pipeline.run_summary import RunSummary
+
+
+def characteristics_tables(found: RunSummary) -> Iterator[tuple[str, list[list[str]]]]:
+    """Titles and rows of what the tests show without a model; no rows where there are no such tests."""
+    here, control = found.characteristics, found.control
+    signal = f"{control.name} [{control.unit}]"
+    places = ["setting", signal, "T [degC]"]
+    yield (
+        "force at peak speed (PVP), rebound is extension and positive",
+        filled(
+            [*places, "test", "speed [m/s]", "rebound [N]", "compression [N]", "record"],
+            [
+                [
+                    *_place(row.setting, row.voltage_V, row.temperature_degC),
+                    row.kind,
+                    number(row.speed),
+                    number(row.rebound_force_N),
+                    number(row.compression_force_N),
+                    row.record,
+                ]
+                for row in here.peak_velocity
+            ],
+            len(places),
+        ),
+    )
+    yield (
+        "gas force and friction at mid-stroke",
+        filled(
+            [*places, "gas force [N]", "friction [N]", "from"],
+            [
+                [
+                    *_place(row.setting, row.voltage_V, row.temperature_degC),
+                    number(row.gas_force_N),
+                    number(row.friction_N),
+                    f"{number(row.velocity_m_per_s)} m/s, {row.method}",
+                ]
+                for row in here.gas_and_friction
+            ],
+            len(places),
+        ),
+    )
+    yield (
+        f"steps of the {control.name}",
+        filled(
+            ["setting", "T [degC]", "step", "speed [m/s]", "to 63 % [ms]", "to 90 % [ms]", "record", "status"],
+            [
+                [
+                    number(row.setting),
+                    number(row.temperature_degC),
+                    f"{number(row.from_voltage_V)} to {number(row.to_voltage_V)} {control.unit}",
+                    number(row.velocity_m_per_s),
+                    *(number(None if t is None else 1000.0 * t) for t in (row.to_63_percent_s, row.to_90_percent_s)),
+                    f"{row.record} at {number(row.time_s)} s",
+                    row.status,
+                ]
+                for row in here.steps
+            ],
+            2,
+        ),
+    )
+
+
+def _place(setting: str | None, voltage: float | None, temperature: float | None) -> list[str]:
+    return [number(setting), number(voltage), number(temperature)]

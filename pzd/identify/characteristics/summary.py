@@ -1,0 +1,31 @@
+"""All of the tests of the trade that a rig recorded, summarised condition by condition."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pzd.artefacts.characteristics import Characteristics
+from pzd.identify.characteristics.continuous_velocity import continuous_velocity
+from pzd.identify.characteristics.gas_and_friction import gas_and_friction
+from pzd.identify.characteristics.peak_velocity import peak_velocity
+from pzd.identify.characteristics.recognition import speed_tests
+from pzd.identify.characteristics.step_response import step_responses
+from pzd.record import Condition, Record
+
+
+def characteristics(constant: Sequence[Condition], moving: Sequence[Record]) -> Characteristics:
+    """Peak- and continuous-velocity plots, gas force and friction of every condition, and the response to steps.
+
+    Parameters
+    ----------
+    constant : the conditions, in each of which the control signal stands still
+    moving : the records in which it moves
+    """
+    found = [(condition, [(r, test) for r in condition.records for test in speed_tests(r)]) for condition in constant]
+    peaks = tuple(row for condition, tests in found for row in peak_velocity(condition, tests))
+    return Characteristics(
+        peak_velocity=peaks,
+        continuous_velocity=tuple(row for condition, tests in found for row in continuous_velocity(condition, tests)),
+        gas_and_friction=gas_and_friction(peaks),
+        steps=step_responses(moving),
+    )

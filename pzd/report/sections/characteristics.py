@@ -1,0 +1,132 @@
+"""What the tests show without any model: force over speed, gas force, friction, response to steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pzd.artefacts import PeakVelocityRow
+from pzd.report.blocks import Block, Paragraph, Section, TextTable
+from pzd.report.context import ReportContext
+from pzd.report.curves import characteristics_of
+from pzd.report.sections.pictures import Pictures, galleries
+from pzd.report.wording import DASH, amount, number
+
+_FOLD = 12
+_PAPER_RESPONSE_MS = 9
+"""Stated by Makowski and Knap 2021 for the whole range of force of their piezoelectric damper, without a criterion."""
+
+
+def render(context: ReportContext, pictures: Pictures) -> Iterator[Section]:
+    """The second section, where there are such tests."""
+    found = characteristics_of(context)
+    if not found.peak_velocity and not found.steps:
+        return
+    blocks: list[Block] = [Paragraph(_intro(context)), *galleries(pictures["characteristics"])]
+    blocks += [_force_at_speed(context)] if found.peak_velocity else []
+    blocks += [_gas_and_friction(context)] if found.gas_and_friction else []
+    if found.steps:
+        blocks += [_steps(context), Paragraph(_beside_the_paper(context))]
+    yield Section("characteristics", "Force over speed, as measured", tuple(blocks))
+
+
+def _intro(context: ReportContext) -> str:
+    text = (
+        "No model is used here. Rebound is extension: its speed and force are positive, those of compression negative. "
+        "The peak-velocity plot (PVP) has one point a test and direction, the force at the peak speed of the stroke; "
+        "the continuous-velocity plot (CVP) is the force over speed through the average settled cycle of one test. "
+        "Forces are as recorded, with the gas force in them."
+    )
+    tests, records = len(characteristics_of(context).peak_velocity), len(context.rig.records)
+    return f"{text} {tests} such tests were found in the {records} records, by their motion." if tests else text
+
+
+def _places(context: ReportContext, *more: str) -> tuple[str, ...]:
+    """Header of what sets conditions apart: only what the rig varied or recorded."""
+    return (*_settings(context), *_control(context), *_degrees(context), *more)
+
+
+def _settings(context: ReportContext) -> tuple[str, ...]:
+    return ("setting",) if len({row.setting for row in characteristics_of(context).peak_velocity}) > 1 else ()
+
+
+def _control(context: ReportContext) -> tuple[str, ...]:
+    controlled = any(row.voltage_V is not None for row in characteristics_of(context).peak_velocity)
+    return (context.control.name,) if controlled else ()
+
+
+def _degrees(context: ReportContext) -> tuple[str, ...]:
+    known = any(row.temperature_degC is not None for row in characteristics_of(context).peak_velocity)
+    return ("temperature",) if known else ()
+
+
+def _place(context: ReportContext, setting: str | None, voltage: float | None, temperature: float | None) -> list[str]:
+    cells = [setting or DASH] if _settings(context) else []
+    cells += [amount(voltage, context.control.unit)] if _control(context) else []
+    return cells + ([amount(temperature, "degC")] if _degrees(context) else [])
+
+
+def _force_at_speed(context: ReportContext) -> TextTable:
+    rows = tuple(_row(context, row) for row in characteristics_of(context).peak_velocity)
+    header = ("speed", *_places(context), "rebound", "compression", "test", "record")
+    return TextTable("Force at the peak speed of each test", header, rows, folded=len(rows) > _FOLD)
+
+
+def _row(context: ReportContext, row: PeakVelocityRow) -> tuple[str, ...]:
+    swing = f", {number(1000.0 * row.amplitude_m)} mm"
+    swing += f", {amount(row.frequency_Hz, 'Hz')}" if row.frequency_Hz is not None else ""
+    return (
+        amount(row.speed, "m/s"),
+        *_place(context, row.setting, row.voltage_V, row.temperature_degC),
+        amount(row.rebound_force_N, "N"),
+        amount(row.compression_force_N, "N"),
+        row.kind + swing,
+        row.record,
+    )
+
+
+def _gas_and_friction(context: ReportContext) -> TextTable:
+    rows = tuple(
+        (
+            *(_place(context, row.setting, row.voltage_V, row.temperature_degC) or ["all tests"]),
+            amount(row.gas_force_N, "N"),
+            amount(row.friction_N, "N"),
+            amount(row.velocity_m_per_s, "m/s"),
+            row.method,
+        )
+        for row in characteristics_of(context).gas_and_friction
+    )
+    header = (*(_places(context) or ("",)), "gas force", "friction", "slowest speed", "how")
+    title = "Static force at mid-stroke: mean of both directions (gas) and half their difference (friction)"
+    return TextTable(title, header, rows, folded=len(rows) > _FOLD)
+
+
+def _steps(context: ReportContext) -> TextTable:
+    rows = tuple(
+        (
+            f"{context.voltage(row.from_voltage_V)} to {context.voltage(row.to_voltage_V)}",
+            amount(row.velocity_m_per_s, "m/s"),
+            f"{number(row.from_force_N)} to {amount(row.to_force_N, 'N')}" if row.to_force_N is not None else DASH,
+            *(_milliseconds(t) for t in (row.to_63_percent_s, row.to_90_percent_s)),
+            row.status,
+            f"{row.record}, {amount(row.time_s, 's', 4)}",
+        )
+        for row in characteristics_of(context).steps
+    )
+    header = ("step", "speed", "force", "to 63 %", "to 90 %", "status", "where")
+    return TextTable(f"Measured answer to steps of the {context.control.name}", header, rows, folded=len(rows) > _FOLD)
+
+
+def _milliseconds(time: float | None) -> str:
+    return DASH if time is None else amount(1000.0 * time, "ms")
+
+
+def _beside_the_paper(context: ReportContext) -> str:
+    times = [row.to_90_percent_s for row in characteristics_of(context).steps if row.to_90_percent_s is not None]
+    ours = "No step gave a time."
+    if times:
+        low, high = (amount(1000.0 * end(times), "ms") for end in (min, max))
+        ours = f"Of {len(characteristics_of(context).steps)} steps {len(times)} gave a time: {low} to {high} to 90 %."
+    return (
+        f"{ours} Times count from the middle of the step of the recorded {context.control.name}. The paper (Makowski "
+        f"and Knap 2021) states {_PAPER_RESPONSE_MS} ms for its damper, over the whole range of force."
+    )
