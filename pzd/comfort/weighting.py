@@ -13,6 +13,8 @@ _MEMORY_S = 20.0
 """The 0.4 Hz high-pass forgets as exp(-1.8 t): after 20 s nothing is left that could wrap round."""
 _RAMP_S = 1.0
 """The last value runs out over this time: a drop to zero would ring at the Nyquist frequency."""
+_ON_THE_CIRCLE = 64
+"""Points of the mean over a circle; the nearest other pole is four radii away, so 4^-64 is left out."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,11 @@ def response(weighting: Weighting, frequency: Array) -> NDArray[np.complex128]:
     -------
     (n,) H, a pure number
     """
-    s = 1j * np.asarray(frequency, dtype=np.float64)
+    return _transfer(weighting, np.asarray(1j * np.asarray(frequency, dtype=np.float64), dtype=np.complex128))
+
+
+def _transfer(weighting: Weighting, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """H at complex frequencies s / (2 pi) [Hz]."""
     high, low = s / weighting.f1, s / weighting.f2
     p4 = s / weighting.f4
     band = high**2 / (1.0 + np.sqrt(2.0) * high + high**2) / (1.0 + np.sqrt(2.0) * low + low**2)
@@ -66,6 +72,30 @@ def response(weighting: Weighting, frequency: Array) -> NDArray[np.complex128]:
         h = h * (1.0 + p5 / q5 + p5**2) / (1.0 + p6 / q6 + p6**2) * (f5 / f6) ** 2
     result: NDArray[np.complex128] = h
     return result
+
+
+def modes(weighting: Weighting) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """The weighting as a sum of first-order lags, for recursions of any step.
+
+    Equation: H = 2 Re sum_j r_j / (s - p_j) over the poles above the real axis; r_j is the mean of
+    H (s - p_j) over a circle about p_j        Source: partial fractions; residue theorem
+
+    Parameters
+    ----------
+    weighting : the curve
+
+    Returns
+    -------
+    (m,) poles p [rad/s] and (m,) residues r [rad/s], m = 3, or 4 for a curve with a step
+    """
+    pairs = [(weighting.f1, np.sqrt(0.5)), (weighting.f2, np.sqrt(0.5)), (weighting.f4, weighting.Q4)]
+    if weighting.step is not None:
+        pairs.append(weighting.step[2:])
+    poles: NDArray[np.complex128] = np.array([f * (-0.5 / q + 1j * np.sqrt(1.0 - 0.25 / q**2)) for f, q in pairs])
+    circle = np.exp(2j * np.pi * np.arange(_ON_THE_CIRCLE) / _ON_THE_CIRCLE)
+    radii = [0.25 * min(abs(p - o) for o in (*poles, *poles.conj()) if o != p) for p in poles]
+    around = [r * np.mean(_transfer(weighting, p + r * circle) * circle) for p, r in zip(poles, radii, strict=True)]
+    return (2.0 * np.pi * poles).astype(np.complex128), (2.0 * np.pi * np.array(around)).astype(np.complex128)
 
 
 def weighted(acceleration: Array, rate: float, weighting: Weighting = WK) -> Array:

@@ -14,6 +14,7 @@ from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 from pzd.simulate.cars import cars
 from pzd.simulate.policies import policies
+from pzd.simulate.policies.comfort_predictive import ComfortPredictive
 from pzd.simulate.road import Road
 from pzd.simulate.roads import roads
 from pzd.simulate.roads.sine import Sine
@@ -125,6 +126,8 @@ class SimulateConfig(Frozen):
     passive_voltage_V: float | None = None
     """Voltage of the policy `passive`, and of every valve before the ride, within those of the table. By
     default that of the table which is nearest to 0."""
+    comfort_predictive: ComfortPredictive = ComfortPredictive()
+    """Parameters of the policy `comfort_predictive`."""
     response_speed_m_per_s: float = Field(default=0.2, gt=0.0)
     """Speed at which the response of the damper's force to a step of voltage is computed."""
     bounds: Literal["coefficients", "table"] | None = None
@@ -182,6 +185,11 @@ class SimulateConfig(Frozen):
             raise ValueError("settle_s must be shorter than duration_s")
         for field in ("control_period_s", "duration_s", "settle_s"):
             self._whole_steps(field, getattr(self, field))
+        periods = self.comfort_predictive.hold_s / self.control_period_s
+        if abs(periods - round(periods)) > 1e-6 * periods or round(periods) < 1:
+            raise ValueError(
+                f"comfort_predictive.hold_s must be a whole number of control_period_s (got {periods:g} periods)"
+            )
         self._whole_steps("1 / output_rate_Hz", 1.0 / self.output_rate_Hz)
         return self
 

@@ -13,6 +13,7 @@ from pzd.simulate.demand import bounds_of, demand, spring_acceleration
 from pzd.simulate.dynamic_damper import effective_voltage, place, stored
 from pzd.simulate.equations import motion
 from pzd.simulate.minimise import LARGEST, farther_end
+from pzd.simulate.prediction.choice import predict
 from pzd.simulate.ride_model import (
     ASKED,
     BEHIND,
@@ -26,6 +27,7 @@ from pzd.simulate.ride_model import (
     LOW,
     MINIMISE,
     OIL_1,
+    PREDICT,
     RATE,
     SET,
     SIDE,
@@ -72,18 +74,28 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
         control[TIE_END, 1] = farther_end(a0, car.comfort, workspace[LOW], workspace[HIGH])
     if control_spec.fidelity == IDEAL:
         return
-    if control_spec.aim != VOLTAGE:
+    if control_spec.aim == PREDICT:
+        predict(time, y, model, control, workspace)
+    elif control_spec.aim != VOLTAGE:
         demand(control_spec, car, y, workspace, int(control[TIE_END, 1]))
     for i in range(2):
-        voltage = control_spec.voltage
-        if control_spec.aim != VOLTAGE:
-            control[ASKED, i] = workspace[FORCE, i]
-            voltage = _voltage_for(model, i, workspace[FORCE, i], workspace[RATE, i], control[SET, i])
-        _set_voltage(time, y, model, control, i, voltage)
+        _set_voltage(time, y, model, control, i, _wanted_voltage(model, control, workspace, i))
     control[SINCE, 0] = time
     for i in range(2):
         if control[SIDE, i] == 0.0:
             choose_side(i, time, y, model, control, workspace, scratch)
+
+
+@inlined
+def _wanted_voltage(model: RideModel, control: Array, workspace: Array, axle: int) -> float:
+    """The voltage that the policy asks of an axle [V]; a force that it asks is noted."""
+    aim = model.control_spec.aim
+    if aim == VOLTAGE:
+        return model.control_spec.voltage
+    if aim == PREDICT:
+        return float(model.predictor.candidates[model.predictor.chosen[axle]])
+    control[ASKED, axle] = workspace[FORCE, axle]
+    return _voltage_for(model, axle, workspace[FORCE, axle], workspace[RATE, axle], control[SET, axle])
 
 
 @inlined

@@ -70,6 +70,8 @@ def cases(config: SimulateConfig, with_voltage: bool, changed: bool) -> tuple[Ca
 
 
 def _possible(policy: Policy, fidelity: Fidelity, with_voltage: bool) -> bool:
+    if policy.aim == "predict":  # what it predicts is the damper with its dynamics
+        return fidelity == "dynamic"
     if policy.aim == "voltage":
         return fidelity != "ideal" and (with_voltage or policy.tuned is None)
     return with_voltage or fidelity == "ideal"

@@ -9,8 +9,9 @@ from typing import Literal
 from pzd.record import Array
 from pzd.simulate.car import HalfCar
 
-Aim = Literal["damping", "feedback", "minimise", "voltage"]
-"""Constant damping; a force proportional to the state; the smallest |a_K|; or no force but a voltage."""
+Aim = Literal["damping", "feedback", "minimise", "voltage", "predict"]
+"""Constant damping; a force proportional to the state; the smallest |a_K|; or no force but a voltage: one that is
+held, or the best of many tried ahead."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from pzd.damper.columns import acting
 from pzd.record import Array
 from pzd.simulate.car import HalfCar
 from pzd.simulate.dynamic_damper import DynamicDamper
+from pzd.simulate.prediction.predictor import Predictor
 from pzd.simulate.profile import Profile
 
 HEAVE, PITCH, HEAVE_RATE, PITCH_RATE, OIL_1, OIL_2, DISSIPATED, ROAD_WORK, VALVE_WORK, PARALLEL_WORK = range(10)
@@ -19,7 +20,7 @@ IDEAL, TABLE, DYNAMIC = range(3)
 """How a demanded force comes about."""
 UNBOUNDED, BY_COEFFICIENTS, BY_TABLE = range(3)
 """What bounds a demanded force."""
-FEEDBACK, MINIMISE, VOLTAGE = range(3)
+FEEDBACK, MINIMISE, VOLTAGE, PREDICT = range(4)
 """What the policy asks for."""
 SENSED = 8
 """Deflection 1, 2, its rate 1, 2, z, phi, dz, dphi: what a feedback policy reads."""
@@ -128,6 +129,7 @@ class RideModel(NamedTuple):
     control_spec: ControlSpec
     grid: TableArrays
     damper: DynamicDamper
+    predictor: Predictor
 
 
 def vehicle(car: HalfCar, speed: float) -> Vehicle:

@@ -18,6 +18,7 @@ from pzd.simulate.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALL
 from pzd.simulate.minimise import TIE_BREAKS
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.plan import Case
+from pzd.simulate.prediction.planning import LEVELS, predictor_of
 from pzd.simulate.profile import Profile
 from pzd.simulate.ride_model import (
     BY_COEFFICIENTS,
@@ -26,6 +27,7 @@ from pzd.simulate.ride_model import (
     FEEDBACK,
     IDEAL,
     MINIMISE,
+    PREDICT,
     SENSED,
     STATES,
     TABLE,
@@ -41,7 +43,10 @@ from pzd.simulate.ride_model import (
 )
 
 _FIDELITIES = {"ideal": IDEAL, "table": TABLE, "dynamic": DYNAMIC}
-_AIMS = {"damping": FEEDBACK, "feedback": FEEDBACK, "minimise": MINIMISE, "voltage": VOLTAGE}
+_AIMS = {"damping": FEEDBACK, "feedback": FEEDBACK, "minimise": MINIMISE, "voltage": VOLTAGE, "predict": PREDICT}
+_SWITCHED = 0.1
+"""Share of the tolerance where voltages jump by half their range: on a single bump, which dissipates little, the work
+of the valve was else 3e-6 of it off."""
 
 
 @dataclass(frozen=True)
@@ -156,8 +161,18 @@ def ride_case(
         control_spec_of(config, case, car, damper, held),
         grid,
         own,
+        predictor_of(
+            config.comfort_predictive,
+            config.control_period_s,
+            own,
+            car,
+            speed,
+            grid.voltages,
+            LEVELS if case.policy.aim == "predict" else 1,
+        ),
     )
-    return ride_of_model(model, clock, config.tolerance, case.name, ends)
+    sharper = _SWITCHED if case.policy.aim == "predict" else 1.0
+    return ride_of_model(model, clock, sharper * config.tolerance, case.name, ends)
 
 
 def ride_of_model(model: RideModel, clock: Clock, tolerance: float, name: str, ends: bool) -> Outcome:

@@ -180,7 +180,10 @@ def test_with_an_instant_valve_the_force_takes_the_time_of_the_oil_spring(damper
         ({"bounds": "table", "c_min_Ns_per_m": 1.0, "c_max_Ns_per_m": 2.0}, "leave one of them out"),
         ({"c_min_Ns_per_m": 2.0, "c_max_Ns_per_m": 1.0}, "at least c_min"),
         ({"car": {"x_K_m": 50.0}}, r"x_K_m must lie within the car.*from -4\.749 to 4\.116 m \(got 50\)"),
-        ({"controlled": "passive"}, "passive does not control; these do: comfort, skyhook, wheel_load"),
+        (
+            {"controlled": "passive"},
+            "passive does not control; these do: comfort, comfort_predictive, skyhook, wheel_load",
+        ),
         ({"controlled": "skyhook"}, "skyhook is none of policies"),
         ({"policies": ["skyhook", "wheel_load"]}, "say which one the report is about: skyhook, wheel_load"),
         ({"settle_s": 1.0}, "shorter than duration_s"),

@@ -1,0 +1,64 @@
+"""Predictive comfort: of many voltages, tried ahead on the identified dampers in the car, the most comfortable.
+
+Every `hold_s` each pair (U_1, U_2) out of a few `voltages` is held on a plant of the car and its dampers for `hold_s`,
+followed by each pair out of a few `tails` until `horizon_s`. The pair is set with which J is least:
+
+    J = integral a_w^2 + sum_i lambda_i L_i^2 dt,   lambda_i = load_weight A / B (B_i / B)^4
+
+a_w = Wk a_K, the weighting of ISO 2631-1:1997 with what it remembers; L_i = S_i + T_i, the dynamic load of each wheel;
+B_i the mean square of L_i of late; A and B those of a_w and of the larger load at the fixed voltage with the least A,
+which ride along on the plant over the road that was met. So one weight serves roads of any height, and loads that
+leave those of the fixed voltage soon cost more than comfort brings.
+
+The plant has the state of the oil, the lag of the valve and the adopted effects (`pzd.simulate.prediction.plant`).
+Body, oil and acceleration are sensed exactly. The road ahead is known, or forecast from what has passed under the
+front axle (`pzd.simulate.prediction.road_ahead`); the rear axle meets it (a1 + a2) / speed later. What the forecasts
+missed of late may come again: the ride is tried with it added and subtracted, and a choice must beat the best voltage
+held on by `margin`, times the share of the road's motion that was not foreseen.
+
+Source: rollout of base policies, those that hold a voltage: Bertsekas 2017, Dynamic Programming and Optimal Control I,
+section 6.4; cost and road are ours.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from pzd.schema.model import Frozen
+from pzd.simulate.policy import Policy
+
+
+class ComfortPredictive(Frozen):
+    """Parameters of the policy."""
+
+    road: Literal["known", "unknown"] = "unknown"
+    """Whether the road ahead is known, or forecast from the motion of the front axle."""
+    load_weight: float = Field(default=0.16, ge=0.0)
+    """Weight of the wheel loads beside a_w, both in relation to those at the best fixed voltage."""
+    margin: float = Field(default=0.04, ge=0.0, lt=1.0)
+    """Share of its cost by which a choice must beat that of a voltage held on, where nothing of the road can be
+    forecast; less where more can."""
+    hold_s: float = Field(default=0.01, gt=0.0)
+    """The voltages are chosen this often; a whole number of control periods."""
+    horizon_s: float = Field(default=0.31, gt=0.0)
+    """How far ahead the ride is tried."""
+    voltages: int = Field(default=3, ge=2, le=9)
+    """Voltages that may be held, evenly spaced over those of the table."""
+    tails: int = Field(default=2, ge=1, le=5)
+    """Voltages that may follow, evenly spaced; the lowest alone where it is 1."""
+
+    @model_validator(mode="after")
+    def _looks_beyond(self) -> ComfortPredictive:
+        if self.horizon_s < 2.0 * self.hold_s:
+            raise ValueError(f"horizon_s must be twice hold_s or more (got {self.horizon_s:g} and {self.hold_s:g} s)")
+        return self
+
+
+POLICY = Policy(
+    "comfort_predictive",
+    "of many voltages ahead, tried on a model of car and dampers, those with the least weighted acceleration",
+    "predict",
+    controlled=True,
+)

@@ -1,0 +1,226 @@
+"""Which voltages to hold next: every pair is tried on the plant, followed by every pair of tails."""
+
+from __future__ import annotations
+
+import math
+
+from pzd.compiled import compiled, inlined
+from pzd.damper.kernels import effective_voltage_after, keep_voltage
+from pzd.record import Array
+from pzd.simulate.dynamic_damper import DynamicDamper
+from pzd.simulate.prediction.fixed import ride_fixed, weigh_loads
+from pzd.simulate.prediction.plant import predicted, weigh
+from pzd.simulate.prediction.predictor import (
+    ACCELERATION,
+    BODY_AND_OIL,
+    HELD,
+    MEAN_LOAD_1,
+    MODES,
+    OBSERVATIONS,
+    OBSERVED,
+    TAIL,
+    Predictor,
+)
+from pzd.simulate.prediction.road_ahead import EXPECTED, fill_forecast, fill_known, learn, unforeseen
+from pzd.simulate.ride_model import (
+    BEHIND,
+    COMFORT,
+    DEFLECTION,
+    FLOW,
+    FORCE,
+    HEAVE,
+    OIL_2,
+    PITCH,
+    SET,
+    SINCE,
+    SPRINGS,
+    RideModel,
+)
+
+NOW, END, HOLDING = range(3)
+"""Rows of `Predictor.states`."""
+
+
+@compiled
+def observe(y: Array, model: RideModel, workspace: Array) -> bool:
+    """Take note of acceleration and road once a control period; whether it is time to choose.
+
+    Parameters
+    ----------
+    y : (STATES,) state
+    model : the ride; the memory of its predictor is changed
+    workspace : as `motion` left it
+    """
+    plan = model.predictor
+    number = int(plan.felt[OBSERVATIONS])
+    felt = workspace[COMFORT, 0]
+    weigh(plan.felt, 0, plan.felt[ACCELERATION], felt, plan.modes[OBSERVED], plan.residues)
+    plan.felt[ACCELERATION] = felt
+    for i in range(2):
+        load = workspace[SPRINGS, i] + workspace[FORCE, i]
+        plan.met[i, 0] = plan.met[i, 1]
+        plan.met[i, 1] = y[HEAVE] + model.car.arms[i] * y[PITCH] - workspace[DEFLECTION, i]
+        plan.felt[MEAN_LOAD_1 + i] += (1.0 - plan.forgotten) * (load * load - plan.felt[MEAN_LOAD_1 + i])
+    plan.felt[OBSERVATIONS] = number + 1
+    rise = plan.met[0, 1] - plan.met[0, 0] - plan.observation_s * plan.speeds[EXPECTED]
+    plan.surprises[(number + 1) % plan.surprises.size] = rise
+    plan.past[(number + 1) % plan.past.size] = plan.met[0, 1]
+    if number > 0:
+        ride_fixed(model.car, plan)
+    return number % plan.every == 0
+
+
+@compiled
+def predict(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+    """Observe, and choose anew where it is time; see `choose`."""
+    if observe(y, model, workspace):
+        choose(time, y, model, control, workspace)
+
+
+@compiled
+def choose(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+    """Choose the voltages with which the ride ahead costs least; they are left in `Predictor.chosen`.
+
+    Equation: (U_1, U_2) = Arg min over U, W in finite sets of J(U for the hold, then W), J of `predicted`
+    Source: rollout of base policies, here those that hold W; Bertsekas 2017, Dynamic Programming I, sec. 6.4
+
+    Parameters
+    ----------
+    time : [s]
+    y : (STATES,) state
+    model : the ride; the rooms of its predictor are filled
+    control, workspace : what the controller last set, and the workspace as `motion` left it, see `ride_model`
+    """
+    plan = model.predictor
+    _look_ahead(time, model)
+    weigh_loads(plan)
+    _fill_levels(time, model.damper, plan, control)
+    for n in range(OIL_2 + 1):
+        plan.states[NOW, n] = y[n]
+    for i in range(2):
+        plan.states[NOW, OIL_2 + 1 + i] = workspace[FLOW, i]
+    for n in range(2 * MODES):
+        plan.states[NOW, BODY_AND_OIL + n] = plan.felt[n]
+    held, tails, best = plan.candidates.size, plan.tails.size, math.inf
+    if not plan.known:
+        best = _best_held_on(model) * (1.0 - plan.margin * unforeseen(plan))
+    last1, last2, after1, after2 = plan.chosen[0], plan.chosen[1], plan.chosen[2], plan.chosen[3]
+    for m in range(held * held):  # the last choice first: what costs more is not followed to its end
+        i, j = (last1 + m // held) % held, (last2 + m % held) % held
+        first = _held_cost(model, i, j, best)
+        if first >= best:
+            continue
+        for n in range(tails * tails):
+            a, b = (after1 + n // tails) % tails, (after2 + n % tails) % tails
+            cost = _tail_cost(model, i * tails + a, j * tails + b, first, best)
+            if cost < best:
+                best = cost
+                plan.chosen[0], plan.chosen[1], plan.chosen[2], plan.chosen[3] = i, j, a, b
+
+
+@compiled
+def _best_held_on(model: RideModel) -> float:
+    """Cost of the best voltage that is also a tail, held on at both axles; it is left in `Predictor.chosen`."""
+    plan, best = model.predictor, math.inf
+    held, tails = plan.candidates.size, plan.tails.size
+    for a in range(tails):
+        i = int(a * (held - 1.0) / max(tails - 1, 1) + 0.5)
+        cost = _tail_cost(model, i * tails + a, i * tails + a, _held_cost(model, i, i, best), best)
+        if cost < best:
+            best = cost
+            plan.chosen[0], plan.chosen[1], plan.chosen[2], plan.chosen[3] = i, i, a, a
+    return best
+
+
+@compiled
+def _look_ahead(time: float, model: RideModel) -> None:
+    """Fill the road ahead in every course that it may take."""
+    plan, car, road = model.predictor, model.car, model.road_coefficients
+    hold = plan.hold_steps * plan.steps[HELD]
+    if plan.known:
+        fill_known(time, car, road, plan.steps[HELD], plan.hold_heights[0])
+        fill_known(time + hold, car, road, plan.steps[TAIL], plan.tail_heights[0])
+        return
+    learn(plan, plan.past[int(plan.felt[OBSERVATIONS]) % plan.past.size])
+    delay = (road.behind[1] - road.behind[0]) / car.speed
+    for course in range(plan.courses):
+        fill_forecast(plan, course, 0.0, delay, plan.steps[HELD], plan.hold_heights[course])
+        fill_forecast(plan, course, hold, delay, plan.steps[TAIL], plan.tail_heights[course])
+
+
+@inlined
+def _held_cost(model: RideModel, i: int, j: int, most: float) -> float:
+    """Cost of holding a pair of candidates in all courses together; their states are left in `Predictor.states`."""
+    plan, cost = model.predictor, 0.0
+    for course in range(plan.courses):
+        state, levels = plan.states[HOLDING + course], plan.hold_levels
+        _copy(plan.states[NOW], state)
+        heights = plan.hold_heights[course]
+        cost += predicted(
+            model.car,
+            plan,
+            state,
+            levels[0, i],
+            levels[1, j],
+            heights,
+            HELD,
+            most - cost,
+        )
+    return cost
+
+
+@inlined
+def _tail_cost(model: RideModel, a: int, b: int, cost: float, most: float) -> float:
+    """Cost of what was held and of a pair of tails behind it, in all courses together."""
+    plan = model.predictor
+    for course in range(plan.courses):
+        if cost < most:
+            state, levels = plan.states[END], plan.tail_levels
+            _copy(plan.states[HOLDING + course], state)
+            heights = plan.tail_heights[course]
+            cost += predicted(
+                model.car,
+                plan,
+                state,
+                levels[0, a],
+                levels[1, b],
+                heights,
+                TAIL,
+                most - cost,
+            )
+    return cost
+
+
+@inlined
+def _copy(origin: Array, target: Array) -> None:
+    for n in range(origin.size):
+        target[n] = origin[n]
+
+
+@compiled
+def _fill_levels(time: float, damper: DynamicDamper, plan: Predictor, control: Array) -> None:
+    """Fill the levels of the effective voltage under every candidate, and under every tail behind it."""
+    hold = plan.hold_steps * plan.steps[HELD]
+    for axle in range(2):
+        now, behind = plan.kept[0, axle], plan.kept[1, axle]
+        _copy(control[BEHIND:, axle], now)
+        keep_voltage(control[SET, axle], time - control[SINCE, 0], now, damper.drive)
+        for i in range(plan.candidates.size):
+            _follow(plan, damper, plan.candidates[i], plan.steps[HELD], now, plan.hold_levels[axle, i])
+            for j in range(plan.tails.size):
+                _copy(now, behind)
+                keep_voltage(plan.candidates[i], hold, behind, damper.drive)
+                levels = plan.tail_levels[axle, i * plan.tails.size + j]
+                _follow(plan, damper, plan.tails[j], plan.steps[TAIL], behind, levels)
+
+
+@inlined
+def _follow(plan: Predictor, damper: DynamicDamper, voltage: float, h: float, kept: Array, levels: Array) -> None:
+    """Fill the (2 n + 1,) levels of the effective voltage while a voltage is held, a half step apart."""
+    level = 0
+    for n in range(levels.size):
+        if n == 0 or (n - 1) * 0.5 * h < plan.settled:
+            effective, _ = effective_voltage_after(voltage, 0.5 * n * h, kept, damper.drive)
+            place = (effective - plan.lowest) / plan.spacing
+            level = min(max(int(place + 0.5), 0), plan.rows.shape[0] - 1)
+        levels[n] = level

@@ -1,0 +1,218 @@
+"""`comfort_predictive`: its plant against ours, what it knows of the road, and what it may do."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from simulate_dampers import table_of
+
+from pzd.artefacts import Diagnosed
+from pzd.comfort.measures import rms
+from pzd.comfort.weighting import WK, modes, response, weighted
+from pzd.damper.dormand_prince import STAGES
+from pzd.damper.model import Damper
+from pzd.quantities import Control
+from pzd.schema.errors import ConfigError
+from pzd.simulate.config import KM_PER_H, SimulateConfig
+from pzd.simulate.dampers import dynamic_damper_of, grid_of
+from pzd.simulate.equations import motion
+from pzd.simulate.loop import set_control
+from pzd.simulate.plan import Case
+from pzd.simulate.policies import policies
+from pzd.simulate.prediction.choice import NOW, choose
+from pzd.simulate.prediction.planning import predictor_of
+from pzd.simulate.prediction.plant import predicted
+from pzd.simulate.prediction.predictor import HELD
+from pzd.simulate.ride_model import (
+    COMFORT,
+    OIL_2,
+    STATES,
+    RideModel,
+    control,
+    road_coefficients,
+    vehicle,
+    workspace,
+)
+from pzd.simulate.riding import Held, control_spec_of
+from pzd.simulate.road import Way
+from pzd.simulate.stage import simulate
+from pzd.simulate.stepper import advance
+
+SHORT = {"duration_s": 4.0, "settle_s": 1.0, "output_rate_Hz": 1000.0}
+TIME, A_K, VOLTAGE_1, VOLTAGE_2 = 0, 3, 9, 15
+STEP = 1e-3
+EFFECTS = {
+    "plain": {},
+    "orifice and lash": {"orifice_quadratic": {"q": 2500.0}, "lash": {"delta": 3e-4}},
+    "thinning, by direction": {"shear_thinning": {"n": 0.8}, "asymmetry": {"alpha": 0.1}},
+    "beside the element": {"gas_spring": {"k_g": 3000.0}, "preload_offset": {"F_0": 200.0}},
+    "relief": {"relief_valve": {"F_r": 1000.0, "C_r": 900.0}, "rounded_yield": {"w_s": 0.005}},
+}
+
+
+def settings(**given: object) -> SimulateConfig:
+    return SimulateConfig.model_validate_json(json.dumps({"policies": ["comfort_predictive"], **given}))
+
+
+def model_of(damper: Damper, policy: str, voltage: float, **given: object) -> RideModel:
+    """A ride on the paper's first road."""
+    config = settings(**given)
+    speed, car = config.vehicle_speed_km_per_h * KM_PER_H, config.car.car()
+    case = Case(config.roads[0], policies()[policy], "dynamic", plain=False)
+    dynamic, grid = dynamic_damper_of(damper, 22.0, config.valve_response_s), grid_of(table_of(damper), None)
+    return RideModel(
+        vehicle(car, speed),
+        road_coefficients(case.road.profile(Way(speed, speed * config.duration_s, 1, Path())), car.wheelbase),
+        control_spec_of(config, case, car, dynamic, Held(voltage, 0.0)),
+        grid,
+        dynamic,
+        predictor_of(config.comfort_predictive, config.control_period_s, dynamic, car, speed, grid.voltages),
+    )
+
+
+def ahead(model: RideModel, y, acts, room, start: float, seconds: float) -> np.ndarray:
+    """Bring a ride forward by the integrator of the loop, its voltage set once at the start; the largest motion."""
+    peak = np.abs(y)
+    scratch, stages, end = np.zeros(STATES), np.zeros((STAGES + 1, STATES)), np.zeros(STATES)
+    set_control(start, y, model, acts, room, scratch)
+    for n in range(round(seconds / STEP)):
+        advance(start + n * STEP, STEP, y, model, acts, room, 1e-9, STEP, stages, end)
+        peak = np.maximum(peak, np.abs(y))
+    motion(start + seconds, y, model, acts, room, scratch)
+    return peak[: OIL_2 - 1]
+
+
+@pytest.mark.parametrize("effects", list(EFFECTS))
+@pytest.mark.parametrize("candidate", [0, 2])
+def test_the_plant_goes_where_the_ride_goes_for_20_ms(damper, effects, candidate) -> None:
+    """From a moment of a ride, a voltage set anew: the body within 2e-3 of its largest motion, a_K within 2 %."""
+    for name, values in EFFECTS[effects].items():
+        damper = damper.with_effect(name, values)
+    road = [{"kind": "iso8608", "road_class": "C", "seed": 1}]
+    given = {"roads": road, "comfort_predictive": {"road": "known", "hold_s": 0.02, "horizon_s": 0.04}}
+    before, room, acts, y = model_of(damper, "passive", 75.0, **given), workspace(), control(75.0), np.zeros(STATES)
+    peak = ahead(before, y, acts, room, 0.0, 1.5)
+    predicting = model_of(damper, "comfort_predictive", 75.0, **given)
+    choose(1.5, y, predicting, acts, room)
+    plan, state = predicting.predictor, np.array(predicting.predictor.states[NOW])
+    levels = plan.hold_levels
+    predicted(predicting.car, plan, state, levels[0, candidate], levels[1, candidate], plan.hold_heights[0], HELD, 1e9)
+    after = model_of(damper, "passive", float(plan.candidates[candidate]), **given)
+    ahead(after, y, acts, room, 1.5, 0.02)
+    assert np.max(np.abs(state[: OIL_2 - 1] - y[: OIL_2 - 1]) / peak) < 2e-3
+    a_K = predicting.car.comfort[0] * state[-2] + predicting.car.comfort[1] * state[-1]
+    assert a_K == pytest.approx(room[COMFORT, 0], abs=0.02)
+
+
+def test_the_modes_of_the_weighting_are_the_weighting() -> None:
+    """Against the response of the standard from 0.05 to 400 Hz."""
+    poles, residues = modes(WK)
+    frequency = np.geomspace(0.05, 400.0, 300)
+    s = 2j * np.pi * frequency[:, np.newaxis]
+    summed = np.sum(residues / (s - poles) + residues.conj() / (s - poles.conj()), axis=1)
+    assert np.max(np.abs(summed - response(WK, frequency))) < 1e-12
+
+
+@pytest.mark.parametrize("road", ["known", "unknown"])
+@pytest.mark.parametrize("kind", [0, 1])
+def test_it_sets_voltages_of_the_table_once_a_hold_and_the_energies_balance(ride, road, kind) -> None:
+    roads = [{"kind": "sine", "frequency_Hz": 4.5}, {"kind": "iso8608", "road_class": "C", "seed": 1}]
+    given = {"roads": roads, "road": kind, "comfort_predictive": {"road": road}}
+    outcome = ride("comfort_predictive", "dynamic", **SHORT, **given)
+    assert abs(outcome.energy_error) < 1e-6
+    for column in (VOLTAGE_1, VOLTAGE_2):
+        voltage = outcome.history[:, column]
+        assert set(np.unique(voltage)) <= {0.0, 75.0, 150.0}
+        changed = np.flatnonzero(np.diff(voltage)) + 1
+        assert changed.size >= 2
+        assert np.all(changed % 10 == 0)
+
+
+def test_on_a_known_sine_it_beats_both_ends_of_the_voltage_without_more_load(ride) -> None:
+    """4.5 Hz, where the softest voltage is the best of those held."""
+    given = {**SHORT, "roads": [{"kind": "sine", "frequency_Hz": 4.5}], "comfort_predictive": {"road": "known"}}
+    found = {}
+    for policy, voltage in (("passive", 0.0), ("passive", 150.0), ("comfort_predictive", 0.0)):
+        outcome = ride(policy, "dynamic", passive_voltage_V=voltage, **given)
+        a_w = rms(weighted(outcome.comfort, 1.0 / outcome.step)[1000:])
+        found[policy, voltage] = a_w, max(rms(load[1000:]) for load in outcome.loads.T)
+    best = min(a_w for (policy, _), (a_w, _) in found.items() if policy == "passive")
+    assert found["comfort_predictive", 0.0][0] < 0.95 * best
+    assert found["comfort_predictive", 0.0][1] < 1.1 * found["passive", 0.0][1]
+
+
+def test_a_road_is_never_seen_before_it_is_met_where_it_is_unknown(ride, tmp_path) -> None:
+    """A bump or a hole behind another bump: the voltages are the same until axle 1 meets it; not where it is known."""
+    spacing, place = 0.05, 50.0
+    along = np.arange(0.0, 101.0, spacing)
+
+    def rises(at: float, height: float) -> np.ndarray:
+        share = np.clip((along - at) / 2.0, 0.0, 1.0)
+        return 0.5 * height * (1.0 - np.cos(2.0 * np.pi * share))
+
+    for known, alike in (("unknown", True), ("known", False)):
+        voltages = []
+        for height in (0.05, -0.05):
+            heights = rises(40.0, 0.03) + rises(place, height)
+            rows = "".join(f"{d},{h}\n" for d, h in zip(along, heights, strict=True))
+            path = tmp_path / f"{height}.csv"
+            path.write_text(f"distance_m,height_m\n{rows}", encoding="utf-8")
+            given = {"roads": [{"kind": "file", "path": str(path)}], "comfort_predictive": {"road": known}, **SHORT}
+            history = ride("comfort_predictive", "dynamic", **given).history
+            voltages.append(history[history[:, TIME] < (place - 1.0) / 25.0, VOLTAGE_1])
+        assert np.array_equal(*voltages) == alike
+
+
+def test_a_sine_is_forecast_from_what_has_passed(ride) -> None:
+    """Unknown or known, a road that repeats is ridden alike: a_w within 3 %."""
+    road = [{"kind": "sine", "frequency_Hz": 4.5}]
+    found = []
+    for known in ("known", "unknown"):
+        outcome = ride("comfort_predictive", "dynamic", roads=road, **SHORT, comfort_predictive={"road": known})
+        found.append(rms(weighted(outcome.comfort, 1.0 / outcome.step)[2000:]))
+    assert found[1] == pytest.approx(found[0], rel=0.03)
+
+
+def test_the_same_bytes_for_any_number_of_jobs(damper, tmp_path) -> None:
+    roads = [{"kind": "sine", "frequency_Hz": f} for f in (2.25, 4.5)]
+    given = settings(roads=roads, duration_s=1.0, settle_s=0.2)
+    texts = []
+    for jobs in (1, 2):
+        rides = simulate(given, Diagnosed.undiagnosed(damper), table_of(damper), 1, Path(), jobs)
+        folder = tmp_path / str(jobs)
+        folder.mkdir()
+        rides.write(folder, Control())
+        texts.append({path.name: path.read_bytes() for path in folder.iterdir()})
+    assert texts[0] == texts[1]
+    assert any(b"comfort_predictive-dynamic" in text for text in texts[0].values())
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"road": "guessed"}, "comfort_predictive.road"),
+        ({"hold_s": 0.0105}, r"hold_s must be a whole number of control_period_s \(got 10.5 periods\)"),
+        ({"hold_s": 0.0}, "comfort_predictive.hold_s"),
+        ({"horizon_s": 0.015}, r"horizon_s must be twice hold_s or more \(got 0.015 and 0.01 s\)"),
+        ({"load_weight": -1.0}, "comfort_predictive.load_weight"),
+        ({"voltages": 1}, "comfort_predictive.voltages"),
+        ({"tails": 9}, "comfort_predictive.tails"),
+        ({"weight": 1.0}, "comfort_predictive.weight"),
+    ],
+)
+def test_parameters_that_make_no_sense_are_refused_with_what_would(given, message) -> None:
+    with pytest.raises(ValidationError, match=message):
+        settings(comfort_predictive=given)
+
+
+def test_it_needs_the_dynamic_damper_and_a_voltage(damper) -> None:
+    with pytest.raises(ConfigError, match="add table or dynamic"):
+        simulate(settings(fidelities=["ideal", "table"]), Diagnosed.undiagnosed(damper), table_of(damper), 1, Path())
+    row = damper.base[0].model_copy(update={"voltage_V": None})
+    without = damper.model_copy(update={"base": (row,)})
+    with pytest.raises(ConfigError, match="comfort_predictive sets the voltage"):
+        simulate(settings(), Diagnosed.undiagnosed(without), table_of(without), 1, Path())
