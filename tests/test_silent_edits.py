@@ -225,7 +225,7 @@ OUT_OF_ANY_DAMPER = [
 BESIDE_ITS_DIAGNOSIS = [
     ("C_Ns_per_m: 2700.0", "C_Ns_per_m: 2.7", "C_Ns_per_m: parameters.csv has 2700 there; is it in"),
     ("T0_N: 300.0", "T0_N: 0.3", "damper.yaml:4:11: base.0.T0_N: parameters.csv has 300 there"),
-    ("gas_spring:", "gas_sprin:", "no effect is called gas_sprin; is it gas_spring?"),
+    ("gas_spring:", "gas_sprin:", "no effect is called gas_sprin; did you mean gas_spring?"),
     ("k_g: 5000.0", "k_gas: 5000.0", "gas_spring takes k_g (got k_gas)"),
     (
         "k_g: 5000.0",
@@ -337,7 +337,7 @@ def test_the_check_refuses_such_a_group_too(tmp_path: Path) -> None:
     config = tmp_path / "lab.yaml"
     two = VIRTUAL.replace("{voltage_V: 0, T0_N: 6", "{voltage_V: 150, T0_N: 6").replace("[0]", "[0, 150]")
     config.write_text(two)
-    assert len(preflight(opened(config, tmp_path))[0]) == 2
+    assert len(preflight(opened(config, tmp_path)).entries) == 2
     config.write_text(f"{two}identify: {{group: {{voltage_V: 1000}}}}\n")
     with pytest.raises(ConfigError, match=r"lab\.yaml:9:31: identify\.group\.voltage_V: merges every"):
         preflight(opened(config, tmp_path))

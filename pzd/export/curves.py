@@ -10,7 +10,7 @@ from pzd.record import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class ForceCurve:
     """Force over velocity at one control signal and temperature."""
 
     name: str
@@ -23,7 +23,7 @@ class Curve:
     """(n,) [N]."""
 
 
-def curves(content: Content, name: str) -> Iterator[Curve]:
+def curves(content: Content, name: str) -> Iterator[ForceCurve]:
     """Every curve of the table.
 
     Parameters
@@ -44,4 +44,4 @@ def curves(content: Content, name: str) -> Iterator[Curve]:
                 words.append(f"{temperature:.12g} degC")
             if len(grid.temperatures) > 1:
                 labels.append(f"{temperature:.12g}degC")
-            yield Curve("-".join([content.name, *labels]), ", ".join(words), grid.velocities, force)
+            yield ForceCurve("-".join([content.name, *labels]), ", ".join(words), grid.velocities, force)

@@ -47,9 +47,9 @@ def low_pass(values: Array, highest: float) -> Array:
 
 
 def motion_below(values: Array) -> float:
-    """Frequency [rad/sample] above which a motion (n,) at a regular step is noise alone; pi where it never is."""
+    """Frequency [rad/sample] at which a motion (n,) at a regular step sinks into its noise; pi where it never does."""
     _, spectrum, s = _reflected(values)
-    return min(CLEAR * _corner(s, np.abs(spectrum) ** 2, HIGHEST), float(np.pi))
+    return min(_corner(s, np.abs(spectrum) ** 2, HIGHEST), float(np.pi))
 
 
 def _reflected(values: Array) -> tuple[Array, Complex, Array]:
@@ -77,6 +77,8 @@ def _corner(s: Array, power: Array, highest: float) -> float:
     for halvings in range(1, _HALVINGS + 1):
         limit = s[-1] / 2.0**halvings
         inside = middle <= limit
+        if np.count_nonzero(s <= limit) < _FEWEST:
+            break
         corner = float(corners[_least(taken[:, inside], binned[inside], counts[inside])])
         noise = (s > CLEAR * corner) & (s <= limit)
         if np.count_nonzero(noise) < _FEWEST:

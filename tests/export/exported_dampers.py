@@ -14,7 +14,7 @@ from pzd.simulate.cars import cars
 from pzd.table.config import TableConfig
 from pzd.table.force import force_rows, grid, temperatures_of, voltages_of
 from pzd.table.inverse import inverse_rows
-from pzd.table.reach import Reach
+from pzd.table.reach import ReachedSpeed
 
 POINTS = 2000
 """Points at which a second implementation is held to ours."""
@@ -49,7 +49,7 @@ def content_of(damper: Damper, **table: Any) -> Content:
     """What is exported of a damper whose rig reached 0.6 m/s."""
     config = TableConfig(**table)
     temperatures, voltages = temperatures_of(damper), voltages_of(damper)
-    reach = Reach(
+    reach = ReachedSpeed(
         np.array([t or 0.0 for t in temperatures]),
         np.array([u or 0.0 for u in voltages]),
         np.full((len(temperatures), len(voltages)), 0.6),

@@ -11,7 +11,7 @@ from pzd.export.format import Files, Format
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
-    from pzd.export.curves import Curve
+    from pzd.export.curves import ForceCurve
 
 NAME = "tir"
 
@@ -23,7 +23,7 @@ def files(content: Content) -> Files:
     return {f"{one.name}.dpr": _text(one, content.origin).encode() for one in curves(content, NAME)}
 
 
-def _text(curve: Curve, origin: str) -> str:
+def _text(curve: ForceCurve, origin: str) -> str:
     remarks = [origin, f"{curve.condition or 'one curve'}; rebound positive"]
     rows = (f"{v!r} {F!r}\n" for v, F in zip(curve.velocities.tolist(), curve.forces.tolist(), strict=True))
     return "".join(

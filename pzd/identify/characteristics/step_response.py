@@ -31,7 +31,7 @@ STEADY = (0.05, 0.95)
 
 
 @dataclass(frozen=True)
-class Step:
+class ControlStep:
     """One step of the control signal."""
 
     before: int
@@ -55,7 +55,7 @@ def step_responses(records: Sequence[Record]) -> tuple[StepRow, ...]:
     return tuple(row for record in records for row in _rows(record))
 
 
-def steps_of(time: Array, voltage: Array) -> Iterator[Step]:
+def steps_of(time: Array, voltage: Array) -> Iterator[ControlStep]:
     """The steps of a signal from one level that it dwells on to another.
 
     Parameters
@@ -75,7 +75,7 @@ def steps_of(time: Array, voltage: Array) -> Iterator[Step]:
         low, high = float(levels[nearest[before]]), float(levels[nearest[after]])
         way = (voltage[before : after + 1] - low) / (high - low)
         middle = float(np.interp(0.5, np.maximum.accumulate(way), time[before : after + 1]))
-        yield Step(int(before), int(after), middle, low, high)
+        yield ControlStep(int(before), int(after), middle, low, high)
 
 
 def _rows(record: Record) -> Iterator[StepRow]:
@@ -89,7 +89,7 @@ def _rows(record: Record) -> Iterator[StepRow]:
         yield _row(record, step, strokes, float(record.time[since]), float(record.time[until]))
 
 
-def _row(record: Record, step: Step, strokes: Sequence[Stroke], since: float, until: float) -> StepRow:
+def _row(record: Record, step: ControlStep, strokes: Sequence[Stroke], since: float, until: float) -> StepRow:
     """One step between the one before it and the one behind it [s]."""
     here = [s for s in strokes if s.time[0] <= step.time <= s.time[-1] and s.kind == "constant velocity"]
     forces: tuple[float, float] | None = None
