@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pzd.artefacts import Diagnosed, Table
-from pzd.comfort.measures import rms
 from pzd.comfort.weighting import weighted
 from pzd.pipeline.command import execute, opened
+from pzd.signals.root_mean_square import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.dampers import dynamic_damper_of, grid_of
 from pzd.simulate.limits import checked_temperature
