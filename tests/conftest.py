@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +44,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if generator_for.__name__ in getattr(item, "fixturenames", ()) or item.get_closest_marker("hypothesis"):
             item.add_marker("draws")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Fail instead of skipping for want of a Debian package where PZD_REQUIRE_PACKAGES says that all are installed."""
+    report = yield
+    if report.skipped and "apt-get install" in str(report.longrepr) and os.environ.get("PZD_REQUIRE_PACKAGES"):
+        report.outcome, report.longrepr = "failed", f"skipped although PZD_REQUIRE_PACKAGES is set: {report.longrepr}"
+    return report
 
 
 def name_of(item: pytest.Item) -> str:
