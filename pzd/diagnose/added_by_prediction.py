@@ -2,8 +2,8 @@
 
 Where a law is missing that no name accounts for, evidence weighed by noise misleads: each law is bent towards what is
 missing, and takes other values on other tests. What counts there is what the damper is for, to predict tests. An effect
-is added if whole tests that no fit has seen are predicted better with it, beyond chance, and at no voltage worse. That
-makes no name of it: the verdict stays `unexplained`.
+is added if whole tests that no fit has seen are predicted better with it, beyond chance, and at no voltage worse, those
+included that are predicted from the voltages around them. That makes no name of it: the verdict stays `unexplained`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import Fitted
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.kept_back import Trials
-from pzd.diagnose.missed import Missed
+from pzd.diagnose.missed import Missed, worse
 from pzd.diagnose.search.candidates import Candidate, by_voltage, candidate, seen_in
 from pzd.diagnose.search.selection import Selection
 from pzd.diagnose.search.starts import most_promising
@@ -92,7 +92,11 @@ def _best(
         predicted = trials.missed_by_criterion(each.fitted.damper)
         if _predicts_better(predicted, missed, trials):
             better.append((each, predicted))
-    return min(better, key=lambda pair: pair[1].criterion or 0.0, default=None)
+    between = trials.missed_between(fitted.damper) if better else None
+    for each, predicted in sorted(better, key=lambda pair: pair[1].criterion or 0.0):
+        if between is None or not worse(trials.missed_between(each.fitted.damper), between):
+            return each, predicted
+    return None
 
 
 def _tried(problem: Problem, fitted: Fitted, config: DiagnoseConfig) -> Iterator[Candidate]:

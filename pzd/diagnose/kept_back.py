@@ -70,6 +70,11 @@ class Trials:
         whole = self.fitted_by_criterion(damper, self.nothing)
         return self._missed(self._by_criterion(whole[1].damper if whole else damper))
 
+    def missed_between(self, damper: Damper) -> Missed:
+        """What a damper misses of every voltage between two others, fitted by criterion (4) without that voltage."""
+        refit = self._by_criterion(damper)
+        return self._joined([self._without_voltage(i, refit) for i in self.between()])
+
     def fitted_by_criterion(self, damper: Damper, kept_back: Sequence[Mask]) -> tuple[Problem, Fitted] | None:
         """A damper, its effects too, fitted by criterion (4) to all but what is kept back, and to what it is fitted.
 
@@ -131,29 +136,34 @@ class Trials:
         return "segments" if self.campaign.prepared[group[0]].cycles is None else "cycles"
 
     def _left_out(self, group: int, refit: _Refit | None) -> LeftOut | None:
-        """One voltage predicted from those around it; nothing of which the voltage moves is fitted either."""
-        mine, voltage = self.groups[group], self.voltages[group]
-        moving = {i for v, members in zip(self.voltages, self.groups, strict=True) if v is None for i in members}
-        sizes = [p.record.time.size for p in self.campaign.prepared]
-        without = tuple(np.full(n, i in mine or i in moving) for i, n in enumerate(sizes))
-        asked = tuple(np.full(n, i in mine) for i, n in enumerate(sizes))
-
-        def criterion(fitted: _Refit) -> float | None:
-            found = fitted(without)
-            return None if found is None else self._of_fold(found, asked).criterion
-
-        plain = criterion(self._by_criterion(self.plain))
-        other = plain if refit is None else criterion(refit)
+        """One voltage predicted from those around it."""
+        voltage = self.voltages[group]
+        plain = self._without_voltage(group, self._by_criterion(self.plain)).criterion
+        other = plain if refit is None else self._without_voltage(group, refit).criterion
         if voltage is None or plain is None or other is None:
             return None
         return LeftOut(voltage=voltage, W_s_plain=plain, W_s=other)
+
+    def _without_voltage(self, group: int, fitted: _Refit) -> Missed:
+        """What is missed of one voltage, with neither it nor any test fitted of which the voltage moves."""
+        mine = self.groups[group]
+        moving = {i for v, members in zip(self.voltages, self.groups, strict=True) if v is None for i in members}
+        sizes = [p.record.time.size for p in self.campaign.prepared]
+        found = fitted(tuple(np.full(n, i in mine or i in moving) for i, n in enumerate(sizes)))
+        asked = tuple(np.full(n, i in mine) for i, n in enumerate(sizes))
+        return _NOTHING if found is None else self._of_fold(found, asked)
 
     def _missed(self, fitted: _Refit) -> Missed:
         def of_fold(kept_back: Sequence[Mask]) -> Missed:
             found = fitted(kept_back)
             return _NOTHING if found is None else self._of_fold(found, self._known(found, kept_back))
 
-        parts = self.campaign.each(of_fold, self.folds)
+        return self._joined(self.campaign.each(of_fold, self.folds))
+
+    @staticmethod
+    def _joined(parts: Sequence[Missed]) -> Missed:
+        if not parts:
+            return _NOTHING
         return Missed(
             tuple(i for part in parts for i in part.record),
             *(np.concatenate([getattr(part, name) for part in parts]) for name in ("error", "energy", "limit")),

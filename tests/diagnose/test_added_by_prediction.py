@@ -77,6 +77,30 @@ def test_what_only_a_sensor_shows_is_not_added(rng: np.random.Generator) -> None
     assert found is None or "sensor_delay" not in found.added
 
 
+@pytest.mark.parametrize(("offsets", "added"), [((0.0, 150.0, 300.0), True), ((200.0, -200.0, 200.0), False)])
+def test_what_is_worse_between_the_voltages_is_not_added(
+    offsets: tuple[float, ...], added: bool, rng: np.random.Generator
+) -> None:
+    """An offset that grows with the voltage is known between two voltages, one that comes and goes is not."""
+    three = (0.0, 50.0, 100.0)
+    by_voltage_V: dict[str, float | tuple[float, ...]] = {"F_0": offsets, "at_voltage_V": three}
+    truth = damper_of(three).model_copy(update={"effects": {"preload_offset": by_voltage_V}})
+    records = sines(truth, rng, three, tests=TESTS, cycles=3, noise=2e-3)
+    campaign = campaign_of(records)
+    evidence = evidence_of(campaign, damper_of(three, preload_offset={"F_0": 10.0}))
+    plain = fit(evidence.whole, (), evidence.whole.start())
+    fitted = fit(
+        evidence.whole,
+        ("preload_offset",),
+        evidence.whole.start_with(truth.with_effect("preload_offset", {"F_0": 10.0})),
+    )
+    config = DiagnoseConfig(most_effects=1)
+    trials = trials_of(campaign, plain.damper, config.visible)
+    selection = Selection(plain, fitted, (), {"preload_offset": "adopted"}, evidence, evidence)
+    found = with_predictive_effects(selection, trials.missed_by_criterion(fitted.damper), trials, config)
+    assert (found is not None and found.added == ("preload_offset by voltage",)) == added
+
+
 # ---------------------------------------------------------------- nothing impossible
 
 
