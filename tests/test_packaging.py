@@ -192,6 +192,7 @@ def test_the_wheel_alone_runs_every_command(elsewhere: Path) -> None:
     assert "index.html" in pzd("figures", "first.yaml")
     assert pzd("blind", "blind.yaml", "--set", "blind.cases=2")
     assert pzd("show", "first.yaml")
+    assert pzd("export", "first.yaml", "--to", "csv")
     assert pzd("compare", "runs/first", "runs/second")
     assert "orifice_quadratic" in pzd("effects")
     assert "properties" in json.loads(pzd("schema"))
