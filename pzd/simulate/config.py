@@ -186,7 +186,8 @@ class SimulateConfig(Frozen):
         for field in ("control_period_s", "duration_s", "settle_s"):
             self._whole_steps(field, getattr(self, field))
         periods = self.comfort_predictive.hold_s / self.control_period_s
-        if abs(periods - round(periods)) > 1e-6 * periods or round(periods) < 1:
+        asked = "comfort_predictive" in (self.policies or ())
+        if asked and (abs(periods - round(periods)) > 1e-6 * periods or round(periods) < 1):
             raise ValueError(
                 f"comfort_predictive.hold_s must be a whole number of control_period_s (got {periods:g} periods)"
             )

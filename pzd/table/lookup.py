@@ -115,7 +115,7 @@ class Lookup:
 
 def _broadcast(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array, Array]:
     a, b = np.broadcast_arrays(np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64))
-    return np.ascontiguousarray(a), np.ascontiguousarray(b), np.empty(a.shape)
+    return a.copy(), b.copy(), np.empty(a.shape)
 
 
 def _drawn_out(speeds: Array, forces: Array, held: bool) -> Array:
