@@ -33,6 +33,7 @@ GCC = shutil.which("gcc")
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed: apt-get install gcc")
 STRICT = ("-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wno-unused-parameter")
 STEPS = 1500
+INPUTS = ("displacement", "velocity", "acceleration", "voltage", "temperature")
 RAMP = 1e-12
 """Time in which our own simulation, whose inputs move linearly, goes from one held input to the next [s]."""
 
@@ -45,6 +46,7 @@ def with_effects(damper: Damper, **effects: dict[str, Any]) -> Damper:
 
 
 BESIDE = {
+    "fluid_inertia": {"m": 12.0},
     "gas_spring": {"k_g": 3000.0},
     "preload_offset": {"F_0": -80.0},
     "end_stop": {"k_e": 3e6, "x_e": 0.02},
@@ -88,6 +90,7 @@ class Held:
     step: np.ndarray
     displacement: np.ndarray
     velocity: np.ndarray
+    acceleration: np.ndarray
     voltage: np.ndarray
     temperature: np.ndarray
 
@@ -97,13 +100,13 @@ class Held:
         time = np.column_stack([start[:-1] + RAMP, start[1:]]).ravel()
         time[0] = 0.0
         gone = np.column_stack([np.append(0.0, np.full(n - 1, RAMP)), self.step]) * self.velocity[:, np.newaxis]
-        twice = {name: np.repeat(getattr(self, name), 2) for name in ("velocity", "voltage", "temperature")}
+        twice = {name: np.repeat(getattr(self, name), 2) for name in INPUTS[1:]}
         controlled = damper.base[0].voltage_V is not None
         return Motion(
             time,
             (self.displacement[:, np.newaxis] + gone).ravel(),
             twice["velocity"],
-            np.zeros(2 * n),
+            twice["acceleration"],
             twice["voltage"] if controlled else None,
             twice["temperature"] if controlled else None,
         ), np.arange(1, 2 * n, 2)
@@ -120,7 +123,8 @@ def held_inputs(rng: np.random.Generator) -> Held:
     velocity = np.where(np.abs(displacement) > 0.05, -np.sign(displacement) * np.abs(velocity), velocity)
     displacement = np.concatenate([[0.001], 0.001 + np.cumsum(velocity * step)[:-1]])
     voltage = np.repeat(rng.uniform(-20.0, 170.0, STEPS // 5), 5)
-    return Held(step, displacement, velocity, voltage, np.repeat(rng.uniform(10.0, 70.0, STEPS // 20), 20))
+    temperature = np.repeat(rng.uniform(10.0, 70.0, STEPS // 20), 20)
+    return Held(step, displacement, velocity, rng.normal(0.0, 20.0, STEPS), voltage, temperature)
 
 
 @cache
@@ -136,6 +140,7 @@ def inputs_of(name: str, held: Held) -> tuple[list[int], list[list[float]]]:
     columns = {0: held.displacement, 1: held.velocity}
     columns |= {2: held.voltage} if content.controlled else {}
     columns |= {3: held.temperature} if Dynamics.of(content.damper, "fmu").warms else {}
+    columns |= {8: held.acceleration} if "fluid_inertia" in content.damper.effects else {}
     return list(columns), np.column_stack(list(columns.values())).tolist()
 
 
@@ -254,7 +259,7 @@ def test_the_size_of_the_step_adds_no_error_while_the_inputs_are_held(
 ) -> None:
     held, parts = held_inputs(rng), 5
     share = np.arange(STEPS * parts) % parts * np.repeat(held.step, parts) / parts
-    many = {field: np.repeat(getattr(held, field), parts) for field in ("velocity", "voltage", "temperature")}
+    many = {field: np.repeat(getattr(held, field), parts) for field in INPUTS[1:]}
     cut = Held(
         np.repeat(held.step, parts) / parts, np.repeat(held.displacement, parts) + share * many["velocity"], **many
     )
@@ -298,7 +303,7 @@ def test_the_core_runs_without_a_fault_of_memory_or_arithmetic(tmp_path: Path, r
     flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
     command = [str(GCC), *STRICT, *flags, "main.c", "model.c", "element.c", "-o", "it", "-lm"]
     subprocess.run(command, cwd=tmp_path / "sources", check=True)
-    columns = (held.step, held.displacement, held.velocity, held.voltage, held.temperature)
+    columns = (held.step, *(getattr(held, name) for name in INPUTS))
     text = "\n".join(" ".join(map(repr, row)) for row in np.column_stack(columns).tolist())
     done = subprocess.run([tmp_path / "sources" / "it"], input=text, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -311,16 +316,16 @@ MAIN = r"""
 #include "model.h"
 int main(void)
 {
+    static const unsigned inputs[] = {DISPLACEMENT, VELOCITY, ACCELERATION, SIGNAL, TEMPERATURE}, output[] = {FORCE};
     model m;
-    double step, value[4], time = 0.0, force;
+    double step, value[5], time = 0.0, force;
     model_reset(&m);
-    while (scanf("%lf %lf %lf %lf %lf", &step, &value[0], &value[1], &value[2], &value[3]) == 5) {
-        for (unsigned i = 0; i < 4; i++)
-            if (model_set(&m, i, value[i]) != NULL)
-                return 1;
+    while (scanf("%lf %lf %lf %lf %lf %lf", &step, &value[0], &value[1], &value[2], &value[3], &value[4]) == 6) {
+        if (model_set(&m, inputs, 5, value) != NULL)
+            return 1;
         if (!m.running)
             model_start(&m);
-        if (model_step(&m, time, step) != NULL || model_get(&m, FORCE, &force) != NULL)
+        if (model_step(&m, time, step) != NULL || model_get(&m, output, 1, &force) != NULL)
             return 1;
         time += step;
         printf("%.17g\n", force);
@@ -411,3 +416,46 @@ def test_a_fault_of_the_caller_is_an_error_and_not_a_number(version: int, tmp_pa
         slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=-1.0)
     slave.terminate()
     slave.freeInstance()
+
+
+@needs_gcc
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_fault_of_the_caller_is_told(version: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    slave = slave_of(version, "plain", tmp_path)
+    slave.exitInitializationMode()
+    with pytest.raises(Exception, match="failed with status 3"):
+        slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=-1.0)
+    slave.freeInstance()
+    assert capsys.readouterr().out == "[ERROR] a step must be finite and above 0\n"
+
+
+@needs_gcc
+def test_a_fault_is_told_in_the_name_of_the_instance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fmi2 = pytest.importorskip("fmpy.fmi2", reason="FMPy is not installed: pip install fmpy")
+    told: list[tuple[bytes, bytes]] = []
+    logger = fmi2.fmi2CallbackLoggerTYPE(lambda _, name, status, category, message: told.append((name, message)))
+    monkeypatch.setattr(fmi2.defaultCallbacks, "logger", logger)
+    slave = slave_of(2, "plain", tmp_path)
+    with pytest.raises(Exception, match="failed with status 3"):
+        slave.setReal([4], [1.0])
+    slave.freeInstance()
+    assert told == [(b"it", b"no variable of this value reference can be set")]
+
+
+@needs_gcc
+def test_the_time_that_was_reached_is_known_and_no_step_is_pending(tmp_path: Path) -> None:
+    slave = slave_of(2, "plain", tmp_path)
+    slave.exitInitializationMode()
+    slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.25)
+    ok, discarded, answered = 0, 2, {}
+    kinds = {"": ctypes.c_int, "Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int}
+    for name, kind in {**kinds, "String": ctypes.c_char_p}.items():
+        ask = getattr(slave.dll, f"fmi2Get{name}Status")
+        for asked in range(4):
+            value = kind(1) if kind is not ctypes.c_char_p else kind()
+            status = ask(ctypes.c_void_p(slave.component), asked, ctypes.byref(value))
+            assert status in (ok, discarded)
+            answered |= {(name, asked): value.value} if status == ok else {}
+    slave.freeInstance()
+    last_successful_time, terminated = 2, 3
+    assert answered == {("Real", last_successful_time): 0.25, ("Boolean", terminated): 0}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 NAME = "fmu"
 _COMMON = ("element.c", "model.c")
-_HEADERS = ("element.h", "model.h")
+_HEADERS = ("element.h", "export.h", "model.h")
 
 
 def files(content: Content) -> Files:

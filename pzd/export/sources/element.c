@@ -159,10 +159,10 @@ static double deflection_after(double deflection, double u, double step, const d
 }
 
 /* Force [N] beside the element. */
-static double parallel(double x, double v, const double *p)
+static double parallel(double x, double v, double a, const double *p)
 {
     const double beyond = fmax(fabs(x) - p[END_STOP_X_E], 0.0), slow = v / p[STRIBECK_FRICTION_V_S];
-    double force = p[PRELOAD_OFFSET_F_0] + p[GAS_SPRING_K_G] * x;
+    double force = p[PRELOAD_OFFSET_F_0] + p[GAS_SPRING_K_G] * x + p[FLUID_INERTIA_M] * a;
     if (beyond > 0.0)
         force += copysign(p[END_STOP_K_E] * beyond * beyond, x);
     if (p[STRIBECK_FRICTION_F_S] != 0.0 && v != 0.0)
@@ -193,5 +193,5 @@ double element_force(element_state state, const element_inputs *inputs)
 {
     double p[COLUMNS];
     parameters(felt(state.effective, inputs->signal), inputs->temperature, p);
-    return spring(state.deflection, p) + parallel(inputs->displacement, inputs->velocity, p);
+    return spring(state.deflection, p) + parallel(inputs->displacement, inputs->velocity, inputs->acceleration, p);
 }
