@@ -27,7 +27,7 @@ from pzd.export.content import Content
 from pzd.export.dynamics import CARRIED, OF_THE_RIG, Dynamics, data_of
 from pzd.export.format import Files
 from pzd.export.formats import formats
-from pzd.schema.errors import ConfigError
+from pzd.schema.errors import ConfigError, FilesError
 
 GCC = shutil.which("gcc")
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed: apt-get install gcc")
@@ -358,7 +358,33 @@ def test_without_a_compiler_the_sources_are_all_there_is_and_that_is_said(
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             assert not any(name.startswith("binaries/") for name in archive.namelist())
             assert "sources/element.c" in archive.namelist()
-    assert "there is no C compiler" in caplog.text
+    assert caplog.text.count("there is no C compiler") == len(caplog.records) == 1
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("system", "machine", "without"), [("linux", "aarch64", ["2.0"]), ("freebsd14", "amd64", ["2.0", "3.0"])]
+)
+def test_a_version_that_has_no_library_on_this_machine_is_said(
+    system: str, machine: str, without: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("pzd.export.library.sys.platform", system)
+    monkeypatch.setattr("pzd.export.library.platform.machine", lambda: machine)
+    written = formats()["fmu"].files(content_of(DAMPERS["plain"]))
+    told = [f"pzd builds no library for FMI {version} on {system} {machine}" for version in without]
+    assert [record.getMessage().partition(":")[0] for record in caplog.records] == told
+    for version in ("2.0", "3.0"):
+        with zipfile.ZipFile(io.BytesIO(written[f"my-run-fmi{version[0]}.fmu"])) as archive:
+            assert any(name.startswith("binaries/") for name in archive.namelist()) == (version not in without)
+
+
+@needs_gcc
+def test_sources_that_the_compiler_refuses_are_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pzd.export.library._FLAGS", ("-std=none",))
+    with pytest.raises(FilesError, match="does not compile the sources of the FMU; mend or remove it") as refused:
+        formats()["fmu"].files(content_of(DAMPERS["plain"]))
+    assert len(refused.value.messages) == 1
+    assert "\n" not in refused.value.messages[0]
 
 
 def test_a_damper_without_a_control_signal_or_temperature_has_no_such_input() -> None:

@@ -41,7 +41,7 @@ def _data(content: Content) -> str:
         "SIGNALS": first.voltages.size,
         "SPEEDS": first.speeds.size - 1,
         "HELD": int(content.held),
-        **{f"{name.upper()}": number for name, number in TIE_BREAKS.items()},
+        **{name.upper(): number for name, number in TIE_BREAKS.items()},
         "TIE_BREAK": TIE_BREAKS[content.tie_break],
     }
     return "".join(

@@ -39,9 +39,8 @@ def files(content: Content) -> Files:
         else:
             members["modelDescription.xml"] = fmi3(content, dynamics, token).encode()
             members["sources/buildDescription.xml"] = build_description(to_compile).encode()
-        library = compiled_library(sources, to_compile) if folder else None
-        if library is not None:
-            members[f"binaries/{folder}/{IDENTIFIER}{suffix()}"] = library
+        if folder is not None:
+            members[f"binaries/{folder}/{IDENTIFIER}{suffix()}"] = compiled_library(sources, to_compile)
         found[f"{content.name}-fmi{version}.fmu"] = _archive(members)
     return found
 
