@@ -26,7 +26,7 @@ class EffectRow(Frozen):
     unit: str
 
 
-class ReferenceRow(Frozen):
+class ReferencePointRow(Frozen):
     """What the laws of the effects count temperature and displacement from."""
 
     reference_temperature_degC: float | None
@@ -47,13 +47,13 @@ class Columns:
 def tables(content: Content) -> dict[str, Columns]:
     """The tables of a damper by name; one that would have no row is left out."""
     damper = content.damper
-    reference = ReferenceRow(reference_temperature_degC=damper.reference_temperature_degC, zero_m=damper.zero_m)
+    reference = ReferencePointRow(reference_temperature_degC=damper.reference_temperature_degC, zero_m=damper.zero_m)
     every = {
         "force": _columns(content, ForceRow, content.table.force),
         "inverse": _columns(content, InverseRow, content.table.inverse),
         "base": _columns(content, BaseRow, damper.base),
         "effects": _columns(content, EffectRow, effect_rows(content)),
-        "reference": _columns(content, ReferenceRow, (reference,) if damper.effects else ()),
+        "reference": _columns(content, ReferencePointRow, (reference,) if damper.effects else ()),
     }
     return {name: table for name, table in every.items() if any(table.cells.values())}
 

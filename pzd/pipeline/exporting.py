@@ -14,7 +14,7 @@ from pzd.schema.errors import ConfigError
 
 FOLDER = "export"
 """Where the files stand by default, in the folder of the run."""
-_LAST = "table"
+LAST = "table"
 """The last stage whose results are exported."""
 _BEHIND = ("simulate", "report")
 """Stages whose results are not."""
@@ -29,7 +29,7 @@ class Exported:
     """Why the damper is not to be trusted, a line a reason."""
 
 
-def exported(given: Opened, to: str, out: Path | None) -> Exported:
+def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
     """Write the damper of a run in one format.
 
     Parameters
@@ -37,6 +37,7 @@ def exported(given: Opened, to: str, out: Path | None) -> Exported:
     given : config and run
     to : name of the format
     out : folder of the files; None for `FOLDER` in the folder of the run
+    remedy : the command that brings the run up to date, as far as `LAST`
 
     Returns
     -------
@@ -49,8 +50,9 @@ def exported(given: Opened, to: str, out: Path | None) -> Exported:
     FilesError : when the disk does not take the files
     """
     wanted = format_of(to)
-    _check_fresh(given)
-    files = wanted.files(content_of(given))
+    _check_fresh(given, remedy)
+    with given.placed():
+        files = wanted.files(content_of(given))
     folder = out or given.run.folder / FOLDER
     with as_files_error(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -84,11 +86,10 @@ def content_of(given: Opened) -> Content:
     )
 
 
-def _check_fresh(given: Opened) -> None:
-    mends = f"pzd {_LAST} {given.run.config}"
+def _check_fresh(given: Opened, remedy: str) -> None:
     for kind in (Diagnosed, Table):
         if given.run.stage_folder(kind.folder).manifest is None:
-            raise ConfigError(f"{given.run.folder / kind.folder}: there is no result to export yet; {mends} makes it")
+            raise ConfigError(f"{given.run.folder / kind.folder}: there is no result to export yet; {remedy} makes it")
     for stage, reason in stale_stages(given).items():
         if stage not in _BEHIND:
-            raise ConfigError(f"{given.run.folder}: {stage} is stale: {reason}; {mends} brings it up to date")
+            raise ConfigError(f"{given.run.folder}: {stage} is stale: {reason}; {remedy} brings it up to date")

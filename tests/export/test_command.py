@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from exported_dampers import DAMPERS, content_of
 from stub_stages import UNDETERMINED, project
 
 from pzd.cli.app import status
@@ -68,9 +71,32 @@ def test_a_stale_run_says_why_and_what_to_run_and_a_stale_report_does_not_matter
     assert code == 2
     assert len(err) == 1
     assert err[0].startswith("runs/first: table is stale: ")
-    assert err[0].endswith("; pzd table first.yaml brings it up to date")
+    assert err[0].endswith("; pzd table first.yaml --set table.speed_points=30 brings it up to date")
     assert not Path("runs/first/export").exists()
     assert typed("export", "first.yaml", "--to", "csv", "--set", "report.daily_exposure_h=3")[0] == 0
+
+
+def test_what_it_says_to_type_makes_the_run_and_brings_it_up_to_date(typed) -> None:
+    for given in ((), ("--set", "table.speed_points=30")):
+        export = ("export", "first.yaml", "--to", "csv", "--runs", "my results", *given)
+        code, _, (line,) = typed(*export)
+        says = re.search(r"; pzd (.*) (?:makes it|brings it up to date)$", line)
+        assert code == 2
+        assert typed(*shlex.split(says[1]))[0] == 0
+        assert typed(*export)[0] == 0
+
+
+def test_a_table_that_a_format_cannot_hold_is_refused_with_its_place_in_the_config(
+    typed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Path("first.yaml").open("a") as config:
+        config.write("table: {outside: error}\n")
+    typed("table", "first.yaml")
+    empty = content_of(DAMPERS["plain"], outside="error")
+    monkeypatch.setattr("pzd.pipeline.exporting.content_of", lambda _: empty)
+    code, out, (line,) = typed("export", "first.yaml", "--to", "c")
+    assert (code, out) == (2, [])
+    assert line.startswith("first.yaml:4:18: table.outside: --to c cannot hold the empty cells")
 
 
 def test_a_format_that_there_is_not_gets_the_nearest(typed) -> None:

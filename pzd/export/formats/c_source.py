@@ -19,7 +19,8 @@ def files(content: Content) -> Files:
 
     if not content.adjustable:
         raise ConfigError(
-            f"--to {NAME}: the table has no second control signal, so that there is nothing for a unit to set"
+            f"--to {NAME}: the table has no second control signal, so that there is nothing for a unit to set; "
+            "--to mat holds its force over velocity"
         )
     names = ("damper.h", "damper.c")
     return {name: source(content, name) for name in names} | {"damper_data.h": _data(content).encode()}
