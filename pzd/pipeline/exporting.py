@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from pzd.export.formats import format_of
 from pzd.pipeline.command import Opened, stale_stages
 from pzd.runs.disk import as_files_error, versions
 from pzd.schema.errors import ConfigError
+
+log = logging.getLogger(__name__)
 
 FOLDER = "export"
 """Where the files stand by default, in the folder of the run."""
@@ -51,8 +54,11 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
     """
     wanted = format_of(to)
     _check_fresh(given, remedy)
+    content = content_of(given)
+    if content.edited:
+        log.warning("%s: edited by hand: %s; exported as it is", given.run.folder, ", ".join(content.edited))
     with given.placed():
-        files = wanted.files(content_of(given))
+        files = wanted.files(content)
     folder = out or given.run.folder / FOLDER
     with as_files_error(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -83,6 +89,11 @@ def content_of(given: Opened) -> Content:
         force_levels=given.config.table.force_levels,
         car=simulate.car.car(),
         tie_break=simulate.tie_break,
+        edited=tuple(
+            f"{kind.folder}/{name}"
+            for kind in (Diagnosed, Table)
+            for name in given.run.stage_folder(kind.folder).edited
+        ),
     )
 
 

@@ -116,6 +116,17 @@ def test_without_its_library_a_format_names_the_extra(typed, monkeypatch: pytest
     assert "pip install 'pzd[formats]'" in line
 
 
+def test_a_table_that_was_edited_by_hand_says_so_on_the_screen_and_in_the_file(typed) -> None:
+    typed("table", "first.yaml")
+    table = Path("runs/first/4-table/force.csv")
+    head, *rows = table.read_text().splitlines()
+    table.write_text("\n".join([head, rows[0].replace(",0.1,", ",0.2,"), *rows[1:]]) + "\n")
+    code, _, err = typed("export", "first.yaml", "--to", "csv")
+    assert (code, err) == (0, ["runs/first: edited by hand: 4-table/force.csv; exported as it is"])
+    first_line = Path("runs/first/export/first-force.csv").read_text().splitlines()[0]
+    assert first_line.endswith(", config first.yaml, edited by hand: 4-table/force.csv: force")
+
+
 def test_a_damper_that_is_not_to_be_trusted_is_written_and_marked(typed) -> None:
     seed = ("--set", f"seed={UNDETERMINED}")
     typed("table", "first.yaml", *seed)
