@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,8 @@ from pzd.simulate.car import HalfCar
 from pzd.simulate.minimise import TieBreak
 from pzd.table.lookup import Lookup
 
+WRITTEN_BY_PZD = re.compile(rb"pzd \S+, config ")
+"""How `Content.origin` begins, which every file holds: what has no such bytes is not from an export."""
 NEAR_ZERO = 1e-9
 """Speed that stands for -0 and +0 where a tool wants velocities that rise strictly [m/s].
 

@@ -52,9 +52,9 @@ class Dynamics:
     """Half-width of the play of the drive, in units of the control signal."""
     reference: float
     """T_ref of the drift, the lowest temperature without one [degC]."""
-    warms: bool
+    depends_on_temperature: bool
     """Whether the temperature matters."""
-    inert: bool
+    depends_on_acceleration: bool
     """Whether the acceleration matters."""
 
     @classmethod
@@ -79,11 +79,11 @@ class Dynamics:
         drifts = [effect.name for effect in acting("material") if effect.name in damper.effects]
         still = damper.model_copy(update={"effects": {k: v for k, v in damper.effects.items() if k not in drifts}})
         known = sorted({row.temperature_degC for row in damper.base if row.temperature_degC is not None})
-        warmth: list[float | None] = [*known] or [None]
+        at_temperatures: list[float | None] = [*known] or [None]
         temperatures, reference = np.array(known or [0.0]), damper.reference_temperature_degC
-        signals = nodes_of(damper, warmth[0]).voltages
+        signals = nodes_of(damper, at_temperatures[0]).voltages
         extra = np.broadcast_to(columns_of(damper, COLUMNS, signals), (signals.size, len(COLUMNS)))
-        bases = [np.broadcast_to(material(still, signals, T), (signals.size, len(ELEMENT))) for T in warmth]
+        bases = [np.broadcast_to(material(still, signals, T), (signals.size, len(ELEMENT))) for T in at_temperatures]
         return cls(
             temperatures,
             signals,

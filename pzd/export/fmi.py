@@ -58,9 +58,9 @@ def variables(content: Content, dynamics: Dynamics) -> tuple[Variable, ...]:
     ]
     if content.controlled:
         found.append(_input("signal", content.control.quantity, start["START_SIGNAL"]))
-    if dynamics.warms:
+    if dynamics.depends_on_temperature:
         found.append(_input("temperature", TEMPERATURE, start["START_TEMPERATURE"]))
-    if dynamics.inert:
+    if dynamics.depends_on_acceleration:
         found.append(_input("acceleration", ACCELERATION, 0.0))
     return tuple(sorted(found, key=lambda one: one.reference))
 

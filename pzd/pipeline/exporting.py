@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from pzd.artefacts import Diagnosed, Identified, Table
-from pzd.export.content import Content
+from pzd.export.content import WRITTEN_BY_PZD, Content
 from pzd.export.formats import format_of
 from pzd.pipeline.command import Opened, stale_stages
 from pzd.runs.disk import as_files_error, versions
-from pzd.schema.errors import ConfigError
+from pzd.schema.errors import ConfigError, FilesError
 
 log = logging.getLogger(__name__)
 
@@ -50,7 +51,7 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
     ------
     ConfigError : when there is no such format, it cannot hold this damper, or the run is not there or stale
     DataError : when a file of the run is at fault
-    FilesError : when the disk does not take the files
+    FilesError : when the disk does not take the files, or one stands there that is not from an export
     """
     wanted = format_of(to)
     _check_fresh(given, remedy)
@@ -61,6 +62,7 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
         files = wanted.files(content)
     folder = out or given.run.folder / FOLDER
     with as_files_error(folder):
+        _check_own(folder / name for name in files)
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():
             fresh = folder / f".{name}.new"
@@ -69,6 +71,16 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
     manifests = (given.run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Table))
     marks = dict.fromkeys(mark for manifest in manifests if manifest for mark in manifest.marks)
     return Exported(tuple(folder / name for name in files), tuple(marks))
+
+
+def _check_own(files: Iterable[Path]) -> None:
+    """Refuse to write over what is not from an export."""
+    foreign = [path for path in files if path.is_file() and not WRITTEN_BY_PZD.search(path.read_bytes())]
+    if foreign:
+        raise FilesError(
+            f"{path}: pzd export did not write this; move it away, or choose another folder by --out"
+            for path in foreign
+        )
 
 
 def content_of(given: Opened) -> Content:

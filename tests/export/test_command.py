@@ -140,6 +140,22 @@ def test_help_names_every_format(typed) -> None:
     assert all(f"{name}: " in " ".join(out) for name in formats())
 
 
+def test_what_is_not_from_an_export_is_not_written_over(typed) -> None:
+    typed("table", "first.yaml")
+    export = ("export", "first.yaml", "--to", "csv", "--out", "elsewhere")
+    assert typed(*export)[0] == typed(*export)[0] == 0
+    mine = [Path("elsewhere/first-base.csv"), Path("elsewhere/first-force.csv")]
+    before = Path("elsewhere/first-inverse.csv").stat().st_mtime_ns
+    for path in mine:
+        path.write_text("mine")
+    code, out, err = typed(*export)
+    assert (code, out) == (5, [])
+    says = "pzd export did not write this; move it away, or choose another folder by --out"
+    assert sorted(err) == [f"{path}: {says}" for path in mine]
+    assert [path.read_text() for path in mine] == ["mine", "mine"]
+    assert Path("elsewhere/first-inverse.csv").stat().st_mtime_ns == before
+
+
 def test_a_file_where_the_folder_should_be_is_a_fault_of_the_files(typed) -> None:
     typed("table", "first.yaml")
     Path("taken").write_text("mine")

@@ -49,7 +49,7 @@ BESIDE = {
     "fluid_inertia": {"m": 12.0},
     "gas_spring": {"k_g": 3000.0},
     "preload_offset": {"F_0": -80.0},
-    "end_stop": {"k_e": 3e6, "x_e": 0.02},
+    "end_stop": {"k_e": 3e4, "x_e": 0.02},
     "stribeck_friction": {"F_s": 120.0, "v_s": 0.05},
 }
 IN_THE_FLOW = {
@@ -139,7 +139,7 @@ def inputs_of(name: str, held: Held) -> tuple[list[int], list[list[float]]]:
     content, _ = exported(name)
     columns = {0: held.displacement, 1: held.velocity}
     columns |= {2: held.voltage} if content.controlled else {}
-    columns |= {3: held.temperature} if Dynamics.of(content.damper, "fmu").warms else {}
+    columns |= {3: held.temperature} if Dynamics.of(content.damper, "fmu").depends_on_temperature else {}
     columns |= {8: held.acceleration} if "fluid_inertia" in content.damper.effects else {}
     return list(columns), np.column_stack(list(columns.values())).tolist()
 
@@ -340,6 +340,7 @@ def test_an_fmu_is_the_same_bytes_twice_and_names_version_and_config() -> None:
     content, written = exported("all")
     assert written == formats()["fmu"].files(replace(content))
     for data in written.values():
+        assert content.origin.encode() in data
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             texts = [name for name in archive.namelist() if not name.startswith("binaries/") and "build" not in name]
             assert all(content.origin.encode() in archive.read(name) for name in texts)

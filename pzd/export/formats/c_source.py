@@ -13,7 +13,12 @@ NAME = "c"
 
 
 def files(content: Content) -> Files:
-    """Header and source, and the data that the source includes."""
+    """Header and source, and the data that the source includes.
+
+    Raises
+    ------
+    ConfigError : when the table has fewer than two control signals, or empty cells
+    """
     from pzd.export.c_text import source
     from pzd.schema.errors import ConfigError
 

@@ -21,7 +21,13 @@ _HEADERS = ("element.h", "export.h", "model.h")
 
 
 def files(content: Content) -> Files:
-    """An FMU of each version."""
+    """An FMU of each version.
+
+    Raises
+    ------
+    ConfigError : when the damper has an effect that is not carried exactly
+    FilesError : when the compiler refuses the sources
+    """
     from pzd.export.c_text import source
     from pzd.export.dynamics import Dynamics, data_of
     from pzd.export.fmi import IDENTIFIER, build_description, fmi2, fmi3
@@ -41,17 +47,18 @@ def files(content: Content) -> Files:
             members["sources/buildDescription.xml"] = build_description(to_compile).encode()
         if folder is not None:
             members[f"binaries/{folder}/{IDENTIFIER}{suffix()}"] = compiled_library(sources, to_compile)
-        found[f"{content.name}-fmi{version}.fmu"] = _archive(members)
+        found[f"{content.name}-fmi{version}.fmu"] = _archive(members, content.origin)
     return found
 
 
-def _archive(members: Mapping[str, bytes]) -> bytes:
+def _archive(members: Mapping[str, bytes], comment: str) -> bytes:
     """A ZIP archive without times of writing."""
     from io import BytesIO
     from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
     written = BytesIO()
     with ZipFile(written, "w") as archive:
+        archive.comment = comment.encode()
         for name, data in sorted(members.items()):
             member = ZipInfo(name)  # dated 1980-01-01
             member.compress_type = ZIP_DEFLATED

@@ -20,7 +20,12 @@ NAME = "modelica"
 
 
 def files(content: Content) -> Files:
-    """One text file with every table."""
+    """One text file with every table.
+
+    Raises
+    ------
+    ConfigError : when the table has empty cells
+    """
     import numpy as np
 
     from pzd.export.content import comment
