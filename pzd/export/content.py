@@ -63,14 +63,17 @@ class Content:
     """Whose comfort law a control unit follows."""
     tie_break: TieBreak
     """Which of the forces that make |a_K| smallest."""
+    setting: str | None = None
+    """Setting of the damper, where the config says of which one it is."""
     edited: tuple[str, ...] = ()
     """Files of the run that somebody edited by hand since it was written."""
 
     @property
     def origin(self) -> str:
         """Where the damper comes from: what each header says."""
+        setting = f", setting {' '.join(self.setting.split())}" if self.setting else ""
         by_hand = f", edited by hand: {', '.join(self.edited)}" if self.edited else ""
-        return f"pzd {self.version}, config {self.config}{by_hand}"
+        return f"pzd {self.version}, config {self.config}{setting}{by_hand}"
 
     @property
     def controlled(self) -> bool:

@@ -101,6 +101,7 @@ def content_of(given: Opened) -> Content:
         force_levels=given.config.table.force_levels,
         car=simulate.car.car(),
         tie_break=simulate.tie_break,
+        setting=given.config.setting,
         edited=tuple(
             f"{kind.folder}/{name}"
             for kind in (Diagnosed, Table)

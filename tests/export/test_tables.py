@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,14 @@ def test_a_format_gives_the_same_bytes_twice_and_names_version_and_config(name: 
     written = formats()[name].files(content)
     assert written == formats()[name].files(again)
     assert all(content.origin.encode() in data for data in written.values())
+
+
+@pytest.mark.parametrize("name", sorted(formats()))
+def test_a_format_names_the_setting_whatever_stands_in_it(name: str) -> None:
+    content = replace(content_of(DAMPERS["plain"]), setting="gap\n1 */ 'wide'")
+    for data in formats()[name].files(content).values():
+        assert re.search(rb"config my-run.yaml, setting gap 1 (\*/|\* /)", data)
+        assert name != "c" or data.count(b"*/") == data.count(b"/*")
 
 
 def test_csv_read_by_pandas_holds_every_cell(content: Content) -> None:
