@@ -49,7 +49,8 @@ def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit:
     """Take back what makes the prediction of kept-back tests worse, until the damper does no harm or is the plain one.
 
     An effect goes without which the damper predicts better; and the last adopted one for as long as the plain damper,
-    as identify finds it without the kept-back tests, predicts better at any voltage, or a voltage between two others.
+    as identify finds it without the kept-back tests, predicts better at any voltage, or much better a voltage between
+    two others.
 
     Parameters
     ----------
@@ -65,18 +66,18 @@ def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit:
         missed, by_criterion = _best(kept, trials)
         between = trials.missed_between(kept.fitted.damper, by_criterion=by_criterion)
         ours = [name for name in kept.adopted if name not in forced]
-        compared = (missed, plain)
+        compared, kind = (missed, plain), "kept-back ones"
         worse = trials.worse(*compared)
         if not worse:
-            compared = (between, trials.plain_missed_between)
-            worse = trials.worse(*compared)
+            compared, kind = (between, trials.plain_missed_between), "those of a voltage left out"
+            worse = trials.worse_between(between)
         harmful = _harmful(kept, trials, missed, ours, by_criterion=by_criterion) or (
             ours[-1] if worse and ours else None
         )
         if harmful is None:
             break
         if worse and len(kept.adopted) == 1:
-            refused = _refused(selection, compared, trials, worse, unit)
+            refused = _refused(selection, f"{kind} are predicted", compared, trials, worse, unit)
         kept = _without(kept, harmful)
     if not kept.adopted:
         return HandedOn(kept, plain, plain, trials.plain_missed_between, refused)
@@ -184,7 +185,12 @@ def _without(selection: Selection, effect: str, reason: str = HARMFUL) -> Select
 
 
 def _refused(
-    selection: Selection, missed: tuple[Missed, Missed], trials: Trials, worse: Sequence[float | None], unit: str
+    selection: Selection,
+    predicted: str,
+    missed: tuple[Missed, Missed],
+    trials: Trials,
+    worse: Sequence[float | None],
+    unit: str,
 ) -> str:
     """Why nothing that was adopted is handed on, with the figures where it is worst."""
     groups = dict(zip(trials.voltages, trials.groups, strict=True))
@@ -197,6 +203,6 @@ def _refused(
     adopted, plain = figures(worst)
     at = "" if worst is None or len(groups) == 1 else f" at {worst:.4g} {unit}"
     return (
-        f"{' and '.join(selection.adopted)} would fit the tests, but kept-back ones are predicted worse than by the "
+        f"{' and '.join(selection.adopted)} would fit the tests, but {predicted} worse than by the "
         f"plain damper (W_s {adopted:.2g} against {plain:.2g}{at}), which is handed on"
     )

@@ -26,6 +26,7 @@ from pzd.diagnose.fit.weights import record_likelihood, unweighted
 from pzd.diagnose.folds import deal
 from pzd.diagnose.missed import Missed, worse
 from pzd.diagnose.search.evidence import evidence_of
+from pzd.diagnose.thresholds import WORSE_BETWEEN
 from pzd.record import Mask
 from pzd.signals.nuisance import NuisanceConfig, columns_of
 
@@ -101,6 +102,15 @@ class Trials:
             v for v, group in zip(self.voltages, self.groups, strict=True) if worse(one.of(group), other.of(group))
         )
         return found or (self.voltages if worse(one, other) else ())
+
+    def worse_between(self, between: Missed) -> tuple[float | None, ...]:
+        """The voltages [V] between others at which a damper misses visibly and much more than the plain one does."""
+
+        def much_more(one: Missed, plain: Missed) -> bool:
+            return plain.less_than(one) and (one.criterion or 0.0) > WORSE_BETWEEN * (plain.criterion or 0.0)
+
+        pairs = {i: (each.of(self.groups[i]) for each in (between, self.plain_missed_between)) for i in self.between()}
+        return tuple(self.voltages[i] for i, pair in pairs.items() if much_more(*pair))
 
     def between(self) -> tuple[int, ...]:
         """The groups whose voltage lies between two others."""

@@ -138,6 +138,18 @@ def test_worse_by_less_than_can_be_seen_is_not_worse(rng: np.random.Generator) -
     assert asked.worse(replace(plain, error=plain.error + 2e-2), plain) == TWO
 
 
+def test_much_worse_between_is_visible_and_half_as_much_again(rng: np.random.Generator) -> None:
+    """The tests of one voltage all miss what the line misses: that they agree is no evidence."""
+    damper = damper_of((0.0, 50.0, 100.0))
+    asked = trials(sines(damper, rng, (0.0, 50.0, 100.0), tests=OTHER_TESTS, cycles=4), damper)
+    plain = asked.plain_missed_between
+    assert asked.worse_between(plain) == ()
+    assert asked.worse_between(replace(plain, error=1.4 * plain.error)) == ()
+    assert asked.worse_between(replace(plain, error=1.6 * plain.error)) == (50.0,)
+    small = replace(asked, visible=1.0)
+    assert small.worse_between(replace(small.plain_missed_between, error=1.6 * plain.error)) == ()
+
+
 @dataclass
 class FixedPredictions:
     """Stands for the tests of a campaign: by effects, what a damper misses at two voltages."""
@@ -150,6 +162,9 @@ class FixedPredictions:
     between: dict[frozenset[str], float] = field(default_factory=dict)
     """What is missed of the voltages between others; where nothing is given as much as by the plain damper."""
     plain_missed_between: float = 1.0
+
+    def worse_between(self, between: float) -> tuple[float | None, ...]:
+        return (150.0,) if between > 1.5 * self.plain_missed_between else ()
 
     def missed_between(self, damper: Damper, *, by_criterion: bool) -> float:
         return self.between.get(frozenset(damper.effects), self.plain_missed_between)
@@ -216,14 +231,14 @@ def test_effects_that_harm_the_prediction_are_taken_back(
         assert "W_s 1.2 against 1 at 150 V" in found.refused
 
 
-@pytest.mark.parametrize(("only_a", "kept"), [(0.9, (A,)), (1.2, ())], ids=["the second harms", "both harm"])
+@pytest.mark.parametrize(("only_a", "kept"), [(1.1, (A,)), (1.7, ())], ids=["the second harms", "both harm"])
 def test_effects_that_harm_the_prediction_of_voltages_between_are_taken_back(
     rng: np.random.Generator, only_a: float, kept: tuple[str, ...]
 ) -> None:
     fixed = FixedPredictions(
         {frozenset((A, B)): _Figure(0.2), frozenset((A,)): _Figure(0.5), frozenset((B,)): _Figure(0.6)},
         plain=_Figure(1.0),
-        between={frozenset((A, B)): _Figure(1.5), frozenset((A,)): _Figure(only_a)},
+        between={frozenset((A, B)): _Figure(1.6), frozenset((A,)): _Figure(only_a)},
         plain_missed_between=_Figure(1.0),
     )
     named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
@@ -232,7 +247,8 @@ def test_effects_that_harm_the_prediction_of_voltages_between_are_taken_back(
     assert cast("float", found.between) == (only_a if kept else 1.0)
     assert (found.refused is None) == bool(kept)
     if found.refused is not None:
-        assert "W_s 1.2 against 1" in found.refused
+        assert "those of a voltage left out are predicted worse" in found.refused
+        assert "W_s 1.7 against 1 at 150 V" in found.refused
 
 
 def test_what_the_config_asks_for_is_handed_on_whatever_it_does(rng: np.random.Generator) -> None:
