@@ -67,13 +67,16 @@ class Content:
     """Setting of the damper, where the config says of which one it is."""
     edited: tuple[str, ...] = ()
     """Files of the run that somebody edited by hand since it was written."""
+    marks: tuple[str, ...] = ()
+    """Why the damper is not to be trusted."""
 
     @property
     def origin(self) -> str:
-        """Where the damper comes from: what each header says."""
+        """Where the damper comes from, and what speaks against it: what each header says."""
         setting = f", setting {' '.join(self.setting.split())}" if self.setting else ""
         by_hand = f", edited by hand: {', '.join(self.edited)}" if self.edited else ""
-        return f"pzd {self.version}, config {self.config}{setting}{by_hand}"
+        marks = f", not to be trusted: {'; '.join(self.marks)}" if self.marks else ""
+        return f"pzd {self.version}, config {self.config}{setting}{by_hand}{marks}"
 
     @property
     def controlled(self) -> bool:

@@ -69,9 +69,7 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
             fresh = folder / f".{name}.new"
             fresh.write_bytes(data)
             fresh.replace(folder / name)
-    manifests = (given.run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Table))
-    marks = dict.fromkeys(mark for manifest in manifests if manifest for mark in manifest.marks)
-    return Exported(tuple(folder / name for name in files), tuple(marks))
+    return Exported(tuple(folder / name for name in files), content.marks)
 
 
 def _check_own(files: Iterable[Path]) -> None:
@@ -92,6 +90,7 @@ def content_of(given: Opened) -> Content:
     DataError : when a file of the run is at fault
     """
     simulate = given.config.simulate
+    stages = {kind: given.run.stage_folder(kind.folder) for kind in (Identified, Diagnosed, Table)}
     return Content(
         name=given.run.config.stem,
         version=versions()["pzd"],
@@ -103,10 +102,9 @@ def content_of(given: Opened) -> Content:
         car=simulate.car.car(),
         tie_break=simulate.tie_break,
         setting=given.config.setting,
-        edited=tuple(
-            f"{kind.folder}/{name}"
-            for kind in (Diagnosed, Table)
-            for name in given.run.stage_folder(kind.folder).edited
+        edited=tuple(f"{kind.folder}/{name}" for kind in (Diagnosed, Table) for name in stages[kind].edited),
+        marks=tuple(
+            dict.fromkeys(mark for stage in stages.values() if stage.manifest for mark in stage.manifest.marks)
         ),
     )
 

@@ -133,6 +133,8 @@ def test_a_damper_that_is_not_to_be_trusted_is_written_and_marked(typed) -> None
     code, out, err = typed("export", "first.yaml", "--to", "csv", *seed)
     assert (code, bool(out)) == (4, True)
     assert err[0].startswith("not to be trusted: ")
+    first_line = Path("runs/first/export/first-force.csv").read_text().splitlines()[0]
+    assert first_line.endswith(f", config first.yaml, {'; '.join(err)}: force")
 
 
 def test_help_names_every_format(typed) -> None:
