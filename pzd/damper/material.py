@@ -63,6 +63,30 @@ def by_voltage(rows: Sequence[BaseRow]) -> list[tuple[float, list[BaseRow]]]:
     return groups
 
 
+def with_rows(damper: Damper, rows: Sequence[BaseRow]) -> Damper:
+    """The damper with some of its base rows alone, its effects at their voltages.
+
+    Parameters
+    ----------
+    damper : whose effects may have parameters by voltage
+    rows : one or more of its base rows
+    """
+    if len(rows) == len(damper.base):
+        return damper
+    kept = {voltage for voltage, of_it in by_voltage(damper.base) if any(row in rows for row in of_it)}
+    effects = {name: _at(values, kept) for name, values in damper.effects.items()}
+    return damper.model_copy(update={"base": tuple(rows), "effects": effects})
+
+
+def _at(values: dict[str, float | tuple[float, ...]], voltages: set[float]) -> dict[str, float | tuple[float, ...]]:
+    """The parameters of an effect without those at other voltages."""
+    nodes = values.get("at_voltage_V")
+    if not isinstance(nodes, tuple):
+        return values
+    kept = [i for i, node in enumerate(nodes) if node in voltages]
+    return {n: tuple(v[i] for i in kept) if isinstance(v, tuple) else v for n, v in values.items()}
+
+
 def _over_temperature(rows: Sequence[BaseRow], temperature: Array | float | None) -> Array:
     rows = sorted(rows, key=lambda row: row.temperature_degC or 0.0)
     if temperature is None and len(rows) > 1:

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from pzd.artefacts import KeptBack, LeftOut, Prediction
-from pzd.damper.material import by_voltage
+from pzd.damper.material import by_voltage, with_rows
 from pzd.damper.model import Damper
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.data.split import TRAINING, Split
@@ -24,9 +24,8 @@ from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.prediction import counted, predicted_force
 from pzd.diagnose.fit.weights import record_likelihood, unweighted
 from pzd.diagnose.folds import deal
-from pzd.diagnose.missed import Missed, worse
+from pzd.diagnose.missed import Missed, much_worse, worse
 from pzd.diagnose.search.evidence import evidence_of
-from pzd.diagnose.thresholds import WORSE_BETWEEN
 from pzd.record import Mask
 from pzd.signals.nuisance import NuisanceConfig, columns_of
 
@@ -105,12 +104,8 @@ class Trials:
 
     def worse_between(self, between: Missed) -> tuple[float | None, ...]:
         """The voltages [V] between others at which a damper misses visibly and much more than the plain one does."""
-
-        def much_more(one: Missed, plain: Missed) -> bool:
-            return plain.less_than(one) and (one.criterion or 0.0) > WORSE_BETWEEN * (plain.criterion or 0.0)
-
         pairs = {i: (each.of(self.groups[i]) for each in (between, self.plain_missed_between)) for i in self.between()}
-        return tuple(self.voltages[i] for i, pair in pairs.items() if much_more(*pair))
+        return tuple(self.voltages[i] for i, pair in pairs.items() if much_worse(*pair))
 
     def between(self) -> tuple[int, ...]:
         """The groups whose voltage lies between two others."""
@@ -274,7 +269,8 @@ def _refitted(problem: Problem | None, damper: Damper) -> Damper | None:
     """A damper fitted anew, without the base rows that no test is left for."""
     if problem is None:
         return None
-    return _shown(_fit(problem, damper, EVALUATIONS).damper, {o.place for o in problem.observations})
+    found, places = _fit(problem, damper, EVALUATIONS).damper, {o.place for o in problem.observations}
+    return found if -1 in places else with_rows(found, [found.base[i] for i in sorted(places)])
 
 
 def trials_of(campaign: Campaign, plain: Damper, visible: float) -> Trials:
@@ -291,22 +287,3 @@ def trials_of(campaign: Campaign, plain: Damper, visible: float) -> Trials:
     whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs)
     dealt = deal(prepared, plain)
     return Trials(whole, plain, visible, dealt.groups, dealt.voltages, dealt.folds)
-
-
-def _shown(damper: Damper, places: set[int]) -> Damper:
-    """The damper without the base rows, and the voltages of its effects, for which no test is left."""
-    if -1 in places or len(places) == len(damper.base):
-        return damper
-    rows = tuple(row for i, row in enumerate(damper.base) if i in places)
-    kept = {voltage for voltage, of_it in by_voltage(damper.base) if any(row in rows for row in of_it)}
-    effects = {name: _at(values, kept) for name, values in damper.effects.items()}
-    return damper.model_copy(update={"base": rows, "effects": effects})
-
-
-def _at(values: dict[str, float | tuple[float, ...]], voltages: set[float]) -> dict[str, float | tuple[float, ...]]:
-    """The parameters of an effect without those at other voltages."""
-    nodes = values.get("at_voltage_V")
-    if not isinstance(nodes, tuple):
-        return values
-    kept = [i for i, node in enumerate(nodes) if node in voltages]
-    return {n: tuple(v[i] for i in kept) if isinstance(v, tuple) else v for n, v in values.items()}

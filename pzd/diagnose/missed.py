@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.diagnose.thresholds import PREDICTS_WORSE
+from pzd.diagnose.thresholds import PREDICTS_WORSE, WORSE_BETWEEN
 from pzd.record import Array
 
 
@@ -54,3 +54,8 @@ def worse(one: Missed, other: Missed) -> bool:
     difference = (one.error - other.error) / one.energy
     error = float(np.std(difference, ddof=1) / np.sqrt(difference.size)) if difference.size > 1 else 0.0
     return other.less_than(one) and float(difference.mean()) > PREDICTS_WORSE * error
+
+
+def much_worse(one: Missed, other: Missed) -> bool:
+    """Whether one damper predicts tests of a voltage left out visibly worse than another one, and by half or more."""
+    return other.less_than(one) and (one.criterion or 0.0) > WORSE_BETWEEN * (other.criterion or 0.0)

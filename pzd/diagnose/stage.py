@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from pzd.artefacts import Diagnosed, Diagnosis, Identified, Rig, base_of
+from pzd.artefacts import Diagnosed, Diagnosis, Identified, NextTest, Rig, base_of
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
+
+if TYPE_CHECKING:
+    from pzd.damper.model import Damper
+    from pzd.diagnose.data.cleaning import Prepared
+    from pzd.diagnose.handed_on import HandedOn
+    from pzd.diagnose.kept_back import Trials
+    from pzd.diagnose.next_test import Reach
 
 log = logging.getLogger(__name__)
 
@@ -48,11 +57,10 @@ def diagnose(
     from pzd.diagnose.data.split import split
     from pzd.diagnose.held_out import held_out_gap
     from pzd.diagnose.kept_back import trials_of
-    from pzd.diagnose.next_test import next_test, reach_of
+    from pzd.diagnose.next_test import reach_of
     from pzd.diagnose.search.forward_selection import select_effects
     from pzd.diagnose.too_short import too_short, undecided
     from pzd.diagnose.verdict import parameters_of, ranking_of, unpredicted, weak
-    from pzd.diagnose.voltage_between import next_voltage
     from pzd.diagnose.where import regions
 
     records, cut_off = whole_records(rig, setting)
@@ -71,18 +79,7 @@ def diagnose(
     selection, prediction = handed.selection, handed.prediction(trials)
     before = campaign.checks(selection.plain.damper)
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
-    rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
-    offsets = [campaign.offset(damper) for _, damper in selection.rivalling]
-    model = selection.fitted.damper if selection.adopted else plain
-    found = model.moved(zero) if selection.adopted else plain
-    warmth = selection.first.whole.reference
-    test = (
-        next_test(rivals, reach, warmth, offsets)
-        if rivals
-        else next_voltage(
-            (found, campaign.offset(model)), trials, (handed.missed, handed.between), recorded, reach, warmth
-        )
-    )
+    found = selection.fitted.damper.moved(zero) if selection.adopted else plain
     diagnosis = Diagnosis(
         verdict=decision.verdict,
         reason=decision.reason + weak(parts.hold_out) + unpredicted(prediction) + without(cut_off),
@@ -95,8 +92,24 @@ def diagnose(
         ranking=ranking_of(selection, selection.first),
         rivals=selection.rivals,
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),
-        next_test=test,
+        next_test=_next_test(handed, found, zero, trials, recorded, reach),
     )
     if selection.adopted:
         rows = base_parameters(selection, decision.verdict, setting)
     return Diagnosed(diagnosis, found, plain, rows)
+
+
+def _next_test(
+    handed: HandedOn, found: Damper, zero: float, trials: Trials, recorded: Sequence[Prepared], reach: Reach
+) -> NextTest | None:
+    """The test that tells rivals apart; without rivals one at a voltage at which the force is known least."""
+    from pzd.diagnose.next_test import next_test
+    from pzd.diagnose.voltage_between import next_voltage
+
+    selection = handed.selection
+    warmth, campaign = selection.first.whole.reference, selection.first.campaign
+    if selection.rivalling:
+        rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
+        return next_test(rivals, reach, warmth, [campaign.offset(damper) for _, damper in selection.rivalling])
+    offset = campaign.offset(found.moved(-zero) if selection.adopted else found)
+    return next_voltage((found, offset), trials, (handed.missed, handed.between), recorded, reach, warmth)
