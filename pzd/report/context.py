@@ -122,17 +122,6 @@ class ReportContext:
     def _forces(self) -> dict[str, tuple[Array, Array]]:
         return {}
 
-    def static_force(self, voltage: float | None) -> float:
-        """What the damper pushes with at rest, such as a gas force [N]: not in the table, but in every record."""
-        from pzd.damper.compose import static_force
-
-        return float(static_force(self.diagnosed.damper, voltage))
-
-    def at_rest(self, voltages: Sequence[float | None]) -> str:
-        """The static force at so many values of the control signal, `90 N` or `80 N to 90 N`; empty where it is 0."""
-        forces = [self.static_force(voltage) for voltage in voltages]
-        return " to ".join(dict.fromkeys(amount(end(forces), "N") for end in (min, max))) if any(forces) else ""
-
     @property
     def extended(self) -> bool:
         """Whether diagnose changed the damper."""

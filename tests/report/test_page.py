@@ -21,7 +21,7 @@ from pzd.identify.characteristics.summary import characteristics
 from pzd.quantities import Control
 from pzd.record import conditions
 from pzd.report.config import ReportConfig
-from pzd.report.plots import library
+from pzd.report.plots import characteristic, library
 
 HERE = Path(__file__).parent
 ORDER = ["tested", "characteristics", "model", "missing", "damper", "passenger", "trust", "made"]
@@ -316,6 +316,18 @@ def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any) -> Non
     told = "ith the 90 N at rest that the table (4-table) leaves out"
     assert [text.count(f"{start}{told}") for start in "wW"] == [1, 1]
     assert "leaves out" not in without
+
+
+def test_the_curve_of_the_damper_holds_what_is_there_at_rest(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    curves = []
+    monkeypatch.setattr(
+        "pzd.report.page.pictures",
+        lambda plots, context, jobs: curves.append(next(iter(characteristic.draw(context)))) or [()] * len(plots),
+    )
+    for damper in (run.diagnosed.damper, run.diagnosed.damper.with_effect("preload_offset", {"F_0": 90.0})):
+        replace(run, diagnosed=replace(run.diagnosed, damper=damper)).told()
+    without, charged = (panel.figure.axes[0].lines[0].get_ydata() for panel in curves)
+    assert charged - without == pytest.approx(0.09)  # kN
 
 
 def test_a_car_on_dampers_without_control_is_told_without_it(run: Any, words_only: None) -> None:

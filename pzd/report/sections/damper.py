@@ -11,6 +11,7 @@ from pzd.quantities import DAMPING, FRICTION, STIFFNESS, VOLTAGE
 from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext, effect_in_words
 from pzd.report.sections.pictures import Pictures, galleries
+from pzd.report.static_force import at_rest, told_at_rest
 from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
 
 _QUANTITIES = (FRICTION, DAMPING, STIFFNESS)
@@ -104,12 +105,12 @@ def _force(context: ReportContext) -> TextTable:
     speeds = sorted({row.velocity_m_per_s for row in rows})
     at = {(row.velocity_m_per_s, row.voltage_V): row for row in rows}
     chosen = _spread(speeds, context.table.notes.reached_m_per_s)
-    static = {volt: context.static_force(volt) for volt in voltages}
+    static = {volt: at_rest(context, volt) for volt in voltages}
     cells = tuple((amount(v, "m/s"), *(_cell(at.get((v, volt)), static[volt]) for volt in voltages)) for v in chosen)
     degrees = f" at {amount(first, 'degC')}" if first is not None else ""
     columns = ["force" if volt is None else f"force at {context.voltage(volt)}" for volt in voltages]
     header = ("speed in rebound", *columns)
-    rest = context.at_rest(voltages)
+    rest = told_at_rest(context, voltages)
     rest = f", with the {rest} at rest that the table (4-table) leaves out" if rest else ""
     return TextTable(f"Force{degrees}{rest}; in brackets the model beyond what the rig reached", header, cells)
 
