@@ -132,7 +132,7 @@ class Response(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class Rides:
-    """Every ride, its summary, and how quickly the damper answers a step of voltage."""
+    """Every ride, its summary, and how quickly the damper responds to a step of voltage."""
 
     folder: ClassVar[str] = "5-simulate"
 

@@ -9,7 +9,7 @@ from pzd.report.blocks import Card
 from pzd.report.context import BASELINES, Comparison, ReportContext, effect_in_words
 from pzd.report.sections.missing import rig_test, verdict
 from pzd.report.sections.passenger import change
-from pzd.report.static_force import at_rest, told_at_rest
+from pzd.report.static_force import static_force_at, static_force_in_words
 from pzd.report.wording import amount, listed, number, percent, sentence
 
 
@@ -32,7 +32,7 @@ def _damper(context: ReportContext) -> Card:
     here = [row for row in rows if row.velocity_m_per_s == speed and row.temperature_degC == first]
     low, high = (end(here, key=lambda row: row.voltage_V or 0.0) for end in (min, max))
     at = f"In rebound at {amount(speed, 'm/s')}" + (f" and {amount(first, 'degC')}" if first is not None else "")
-    rest = told_at_rest(context, (low.voltage_V, high.voltage_V))
+    rest = static_force_in_words(context, (low.voltage_V, high.voltage_V))
     at += f"; {rest} of it at rest as well." if rest else "."
     if low.voltage_V == high.voltage_V:
         return Card(question, f"It gives {_force(context, low)}", at)
@@ -42,7 +42,7 @@ def _damper(context: ReportContext) -> Card:
 
 def _force(context: ReportContext, row: ForceRow) -> str:
     """As a rig would measure it, with what is there at rest."""
-    return amount((row.force_N or 0.0) + at_rest(context, row.voltage_V), "N")
+    return amount((row.force_N or 0.0) + static_force_at(context, row.voltage_V), "N")
 
 
 def _missing(context: ReportContext) -> str:

@@ -9,12 +9,12 @@ from pzd.report.context import ReportContext
 from pzd.report.wording import amount
 
 
-def at_rest(context: ReportContext, voltage: float | None) -> float:
+def static_force_at(context: ReportContext, voltage: float | None) -> float:
     """What the damper handed on pushes with at rest, at a value of the control signal [N]."""
     return float(static_force(context.diagnosed.damper, voltage))
 
 
-def told_at_rest(context: ReportContext, voltages: Sequence[float | None]) -> str:
+def static_force_in_words(context: ReportContext, voltages: Sequence[float | None]) -> str:
     """The same over several values, `90 N` or `80 N to 90 N`; empty where it is 0 at all."""
-    forces = [at_rest(context, voltage) for voltage in voltages]
+    forces = [static_force_at(context, voltage) for voltage in voltages]
     return " to ".join(dict.fromkeys(amount(end(forces), "N") for end in (min, max))) if any(forces) else ""

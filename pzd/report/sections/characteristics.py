@@ -114,7 +114,9 @@ def _steps(context: ReportContext) -> TextTable:
         for row in characteristics_of(context).steps
     )
     header = ("step", "speed", "force", "to 63 %", "to 90 %", "status", "where")
-    return TextTable(f"Measured answer to steps of the {context.control.name}", header, rows, folded=len(rows) > _FOLD)
+    return TextTable(
+        f"Measured response to steps of the {context.control.name}", header, rows, folded=len(rows) > _FOLD
+    )
 
 
 def _milliseconds(time: float | None) -> str:

@@ -11,7 +11,7 @@ from pzd.quantities import DAMPING, FRICTION, STIFFNESS, VOLTAGE
 from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext, effect_in_words
 from pzd.report.sections.pictures import Pictures, galleries
-from pzd.report.static_force import at_rest, told_at_rest
+from pzd.report.static_force import static_force_at, static_force_in_words
 from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
 
 _QUANTITIES = (FRICTION, DAMPING, STIFFNESS)
@@ -105,12 +105,12 @@ def _force(context: ReportContext) -> TextTable:
     speeds = sorted({row.velocity_m_per_s for row in rows})
     at = {(row.velocity_m_per_s, row.voltage_V): row for row in rows}
     chosen = _spread(speeds, context.table.notes.reached_m_per_s)
-    static = {volt: at_rest(context, volt) for volt in voltages}
+    static = {volt: static_force_at(context, volt) for volt in voltages}
     cells = tuple((amount(v, "m/s"), *(_cell(at.get((v, volt)), static[volt]) for volt in voltages)) for v in chosen)
     degrees = f" at {amount(first, 'degC')}" if first is not None else ""
     columns = ["force" if volt is None else f"force at {context.voltage(volt)}" for volt in voltages]
     header = ("speed in rebound", *columns)
-    rest = told_at_rest(context, voltages)
+    rest = static_force_in_words(context, voltages)
     rest = f", with the {rest} at rest that the table (4-table) leaves out" if rest else ""
     return TextTable(f"Force{degrees}{rest}; in brackets the model beyond what the rig reached", header, cells)
 
@@ -143,7 +143,7 @@ def _responses(context: ReportContext) -> TextTable:
         for r in context.rides.responses
     )
     return TextTable(
-        "Answer to a step at constant speed",
+        "Response to a step at constant speed",
         ("signal", "step", "speed", "to 63 %", "to 90 %", ""),
         rows,
         len(rows) > _FOLD,
