@@ -457,9 +457,6 @@ value_of(
     config="utfsm",
     wrong="displacment",
 )
-value_of(
-    "a_sign_that_is_none", "{force: 2}", "must be one of|must be 1 or -1", *_FILE, "sign", config="utfsm", wrong="2"
-)
 value_of("a_current_without_its_unit", "{name: current}", "the unit of a current is missing; say it", "control")
 value_of("an_unknown_waveform", "sinus", "did you mean sine", "rig", "virtual", "0", "tests", "0", "waveform", "kind")
 

@@ -114,9 +114,8 @@ def _steps(context: ReportContext) -> TextTable:
         for row in characteristics_of(context).steps
     )
     header = ("step", "speed", "force", "to 63 %", "to 90 %", "status", "where")
-    return TextTable(
-        f"Measured response to steps of the {context.control.name}", header, rows, folded=len(rows) > _FOLD
-    )
+    title = f"Measured response to steps of the {context.control.name}"
+    return TextTable(title, header, rows, folded=len(rows) > _FOLD)
 
 
 def _milliseconds(time: float | None) -> str:

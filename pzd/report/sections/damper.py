@@ -1,4 +1,4 @@
-"""What the damper is: its parameters, its force, how quickly it answers."""
+"""What the damper is: its parameters, its force, how quickly it responds."""
 
 from __future__ import annotations
 
