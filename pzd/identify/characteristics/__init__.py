@@ -1,1 +1,1 @@
-"""What a test of a damper usually shows: peak- and continuous-velocity plot, gas force, friction, response to a step."""
+"""What a test of a damper usually shows: peak- and continuous-velocity plot, gas force, friction, step response."""
