@@ -33,7 +33,7 @@ def _damper(context: ReportContext) -> Card:
     low, high = (end(here, key=lambda row: row.voltage_V or 0.0) for end in (min, max))
     at = f"In rebound at {amount(speed, 'm/s')}" + (f" and {amount(first, 'degC')}" if first is not None else "")
     rest = static_force_in_words(context, (low.voltage_V, high.voltage_V))
-    at += f"; {rest} of it at rest as well." if rest else "."
+    at += f"; {rest} of it act at rest as well." if rest else "."
     if low.voltage_V == high.voltage_V:
         return Card(question, f"It gives {_force(context, low)}", at)
     ends = [f"{_force(context, row)} at {context.voltage(row.voltage_V)}" for row in (low, high)]

@@ -312,7 +312,7 @@ def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any) -> Non
 
     without, text = (Reader(each.told().page).text.replace("\xa0", " ") for each in (run, charged))
     assert forces(text) == [pytest.approx(force + 90.0, rel=5e-3) for force in forces(without)]
-    assert "In rebound at 0.377 m/s and 22 °C; 90 N of it at rest as well." in text
+    assert "In rebound at 0.377 m/s and 22 °C; 90 N of it act at rest as well." in text
     told = "ith the 90 N at rest that the table (4-table) leaves out"
     assert [text.count(f"{start}{told}") for start in "wW"] == [1, 1]
     assert "leaves out" not in without
