@@ -149,8 +149,16 @@ def test_diagnose_tells_the_story(typed: Terminal) -> None:
         (["run"], 2, "pzd run: Missing argument"),
         (["run", "first.yaml", "second.yaml"], 2, "pzd run: Got unexpected extra argument"),
         (["run", "first.yaml", "--frce"], 2, "pzd run: No such option: --frce"),
-        (["run", "first.yaml", "--jobs", "many"], 2, "pzd run: Invalid value for '--jobs'"),
-        (["run", "first.yaml", "--jobs", "0"], 2, "pzd run: Invalid value for '--jobs'"),
+        (
+            ["run", "first.yaml", "--jobs", "many"],
+            2,
+            "pzd run: Invalid value for '--jobs': must be a whole number, 1 or more (got many)",
+        ),
+        (
+            ["run", "first.yaml", "--jobs", "0"],
+            2,
+            "pzd run: Invalid value for '--jobs': must be a whole number, 1 or more (got 0)",
+        ),
         (["run", "first.yaml", "--set"], 2, "pzd: Option '--set' requires an argument"),
         (["run", "absent.yaml"], 2, "absent.yaml: the file is missing; check the path"),
         (["run", "data"], 2, "data: this is a folder, a file is needed"),
@@ -163,9 +171,17 @@ def test_diagnose_tells_the_story(typed: Terminal) -> None:
         (["show", "first.yaml"], 2, "runs/first: there are no results yet; pzd run first.yaml makes them"),
         (["show", "absent.yaml"], 2, "absent.yaml: the file is missing"),
         (["check", "absent.yaml"], 2, "absent.yaml: the file is missing"),
-        (["compare", "runs/first"], 2, "runs/first: this folder holds no run, it has no config.yaml"),
+        (["compare", "runs/first"], 2, "runs/first: there is no such folder; give the folder of a run"),
+        (["compare", "."], 2, ".: this folder holds no run, it has no config.yaml"),
+        (["compare", "first.yaml"], 2, "first.yaml: this is a file; give the folder of a run"),
         (["compare"], 2, "pzd compare: Missing argument"),
-        (["init", "absent.csv"], 2, "absent.csv: no such file"),
+        (["init", "absent.csv"], 2, "absent.csv: no such file; check the path"),
+        (["init", "data"], 2, "data: this is a folder; name the files in it, e.g. data/*.csv"),
+        (
+            ["check", "first.yaml", "--plot", "no/such/page.html"],
+            2,
+            "--plot no/such/page.html: there is no folder no/such; make it, or name another one",
+        ),
         (["init"], 2, "pzd init: Missing argument"),
         (["schema", "first.yaml"], 2, "pzd schema: Got unexpected extra argument"),
     ],
@@ -176,6 +192,13 @@ def test_a_mistake_is_one_plain_line_on_stderr(typed: Terminal, arguments: list[
     assert len(typed.err) == 1
     assert typed.err[0].startswith(message)
     assert "Traceback" not in typed.err[0]
+
+
+def test_a_record_in_the_place_of_the_config_is_told_what_makes_one(typed: Terminal, tmp_path: Path) -> None:
+    (tmp_path / "record.csv").write_text("time_s,displacement_m,force_N\n0,0,0\n", encoding="utf-8")
+    assert typed("check", "record.csv") == 2
+    assert typed.err[-1].startswith("record.csv: is this a config?")
+    assert typed.err[-1].endswith("pzd init prints one for files of a rig")
 
 
 def test_a_path_that_matches_no_file_is_a_wrong_config(typed: Terminal) -> None:

@@ -48,6 +48,7 @@ def test_the_config_with_every_default_reads_back_equal(tmp_path: Path) -> None:
     [
         ("{}\n", "c.yaml:1:1: rig: is missing"),
         ("sed: 2\n" + SMALLEST, "c.yaml:1:1: sed: no such key; did you mean seed? (got sed)"),
+        (SMALLEST + "      sign: {force: 2}\n", "c.yaml:4:21: rig.files.0.sign.force: must be one of 1 or -1 (got 2)"),
         ("seed: '2'\n" + SMALLEST, "c.yaml:1:7: seed: must be a whole number (got 2)"),
         ("seed: 1.5\n" + SMALLEST, "c.yaml:1:7: seed: must be a whole number (got 1.5)"),
         ("seed: true\n" + SMALLEST, "c.yaml:1:7: seed: must be a whole number (got true)"),

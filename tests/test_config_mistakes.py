@@ -457,6 +457,7 @@ value_of(
     config="utfsm",
     wrong="displacment",
 )
+value_of("a_current_without_its_unit", "{name: current}", "the unit of a current is missing; say it", "control")
 value_of("an_unknown_waveform", "sinus", "did you mean sine", "rig", "virtual", "0", "tests", "0", "waveform", "kind")
 
 

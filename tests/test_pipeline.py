@@ -231,6 +231,11 @@ def test_a_comment_in_what_a_stage_imports_reruns_it(
     assert bench() == ran
 
 
+def test_a_page_about_the_code_reruns_nothing(bench: Bench, copied: Path) -> None:
+    edited(copied / "README.md")
+    assert bench() == []
+
+
 def test_a_new_member_of_a_set_reruns_what_uses_the_set(bench: Bench, copied: Path) -> None:
     edited(copied / "report" / "plots" / "another.py")
     assert bench() == ["report"]
@@ -250,6 +255,7 @@ def test_the_code_of_a_stage_is_all_that_it_may_import_and_the_data_beside(tmp_p
         ("identify/alone.py", "import pzd.report.page\n"),
         ("identify/numbers.csv", "1\n"),
         ("identify/templates/page.html", "1\n"),
+        ("identify/README.md", "1\n"),
         ("damper/element.py", "def f():\n    from pzd.quantities import x\n    find(f'pzd.damper.laws.{name}')\n"),
         ("damper/laws/__init__.py", ""),
         ("damper/laws/lash.py", ""),
@@ -275,6 +281,7 @@ def test_the_code_of_a_stage_is_all_that_it_may_import_and_the_data_beside(tmp_p
     assert changed("damper/laws/lash.py") == ["identify.stage", "report.stage"]
     assert changed("identify/numbers.csv") == ["identify.stage", "report.stage"]
     assert changed("identify/templates/page.html") == ["identify.stage", "report.stage"]
+    assert changed("identify/README.md") == []
     assert changed("identify/stage.py") == ["identify.stage"]
     assert changed("identify/alone.py") == []
     assert changed("report/page.py") == ["report.stage"]

@@ -81,7 +81,7 @@ class GasAndFrictionRow(Frozen):
 
 
 class StepRow(Frozen):
-    """How quickly the force answered one step of the control signal."""
+    """How quickly the force followed one step of the control signal."""
 
     record: str
     setting: str | None

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TypeVar
 
+from pzd.artefacts.characteristics import Characteristics, GasAndFrictionRow
 from pzd.artefacts.identified import MeasureRow, ParameterRow
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE
 
@@ -42,6 +43,23 @@ ANY = Conditions()
 def same_motion(a: float, b: float) -> bool:
     """Whether two frequencies, amplitudes or speeds are the same, within `SAME_MOTION` of the larger."""
     return abs(a - b) <= SAME_MOTION * max(abs(a), abs(b))
+
+
+def force_behind(found: Characteristics, row: GasAndFrictionRow) -> float:
+    """The largest force of the slowest tests of a condition [N]: gas force and friction were read from them.
+
+    The two are a mean and half a difference of such forces, so no digit below the last one of these tells anything.
+
+    Parameters
+    ----------
+    found : with the tests
+    row : gas force and friction of a condition
+    """
+    condition = (row.setting, row.voltage_V, row.temperature_degC)
+    mine = [r for r in found.peak_velocity if (r.setting, r.voltage_V, r.temperature_degC) == condition]
+    slowest = [r for r in mine if same_motion(r.speed, row.velocity_m_per_s)]
+    forces = [force for r in slowest for force in (r.rebound_force_N, r.compression_force_N) if force is not None]
+    return max(map(abs, forces), default=0.0)
 
 
 def voltage_margin(rows: Sequence[MeasureRow] | Sequence[ParameterRow]) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
@@ -132,17 +132,17 @@ class Response(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class Rides:
-    """Every ride, its summary, and how quickly the damper answers a step of voltage."""
+    """Every ride, its summary, and how quickly the damper responds to a step of voltage."""
 
     folder: ClassVar[str] = "5-simulate"
 
-    rides: tuple[Ride, ...]
-    summary: tuple[SummaryRow, ...]
-    ridden: tuple[RideRow, ...]
-    wheels: tuple[WheelRow, ...]
-    weighted: tuple[WeightedRow, ...]
-    spectrum: tuple[SpectrumRow, ...]
-    responses: tuple[Response, ...] = field(default=())
+    rides: tuple[Ride, ...] = ()
+    summary: tuple[SummaryRow, ...] = ()
+    ridden: tuple[RideRow, ...] = ()
+    wheels: tuple[WheelRow, ...] = ()
+    weighted: tuple[WeightedRow, ...] = ()
+    spectrum: tuple[SpectrumRow, ...] = ()
+    responses: tuple[Response, ...] = ()
 
     def write(self, folder: Path, control: Control, jobs: int = 1) -> None:
         """Write one CSV a case, so many at the same time, and one table of each kind over all cases."""

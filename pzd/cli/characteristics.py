@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from pzd.cli.layout import filled, number
+from pzd.artefacts.matching import force_behind
+from pzd.cli.layout import filled, number, number_as
 
 if TYPE_CHECKING:
     from pzd.pipeline.run_summary import RunSummary
@@ -41,8 +42,7 @@ def characteristics_tables(found: RunSummary) -> Iterator[tuple[str, list[list[s
             [
                 [
                     *_place(row.setting, row.voltage_V, row.temperature_degC),
-                    number(row.gas_force_N),
-                    number(row.friction_N),
+                    *(number_as(force, force_behind(here, row)) for force in (row.gas_force_N, row.friction_N)),
                     f"{number(row.velocity_m_per_s)} m/s, {row.method}",
                 ]
                 for row in here.gas_and_friction

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pzd.schema.wording import supported
+from pzd.schema.wording import rounded_as, supported
+
+DIGITS = 4
+"""Significant digits of a number without an interval."""
 
 
 def number(value: float | str | None) -> str:
     """A number with the digits that matter; a dash where there is none."""
     if value is None or value == "":
         return "-"
-    return value if isinstance(value, str) else f"{value:.4g}"
+    return value if isinstance(value, str) else f"{value:.{DIGITS}g}"
+
+
+def number_as(value: float, other: float) -> str:
+    """A number to the decimal place to which another one is told, from which it was read."""
+    return number(rounded_as(value, other, DIGITS))
 
 
 def interval(value: float | None, low: float | None, high: float | None) -> str:

@@ -66,7 +66,9 @@ def check(
 
 
 def _only_a_page(plot: Path | None) -> None:
-    """Refuse to write the page over a file of another kind, say a record."""
+    """Refuse to write the page over a file of another kind, say a record, or into a folder that is not there."""
+    if plot is not None and not plot.parent.is_dir():
+        raise ConfigError(f"--plot {plot}: there is no folder {plot.parent}; make it, or name another one")
     if plot is not None and plot.suffix.lower() != ".html":
         raise ConfigError(f"--plot {plot}: must end in .html, as it is a page (got {plot.suffix or 'no suffix'})")
 

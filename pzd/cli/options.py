@@ -24,7 +24,23 @@ Set = Annotated[
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Run the stage even if it is fresh; with run, every stage.")]
-Jobs = Annotated[int, typer.Option("--jobs", metavar="N", min=1, help="Threads or processes that a stage may use.")]
+
+
+def _jobs(given: str) -> int:
+    """The value of --jobs.
+
+    Raises
+    ------
+    BadParameter : when it is no whole number above 0
+    """
+    if not str(given).isdecimal() or int(given) < 1:
+        raise typer.BadParameter(f"must be a whole number, 1 or more (got {given})")
+    return int(given)
+
+
+Jobs = Annotated[
+    int, typer.Option("--jobs", metavar="N", parser=_jobs, help="Threads or processes that a stage may use.")
+]
 CORES = os.cpu_count() or 1
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print what the stages report, and tracebacks.")]

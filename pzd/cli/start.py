@@ -28,9 +28,15 @@ def init(files: RigFiles, layout: LayoutName = None, verbose: Verbose = False) -
     output = Output(quiet=False, verbose=verbose)
     absent = [path for path in files if not path.is_file()]
     if absent:
-        raise ConfigError(f"{path}: no such file" for path in absent)
+        raise ConfigError(map(_absent, absent))
     output.say(*guessed(files, layout))
     return DONE
+
+
+def _absent(path: Path) -> str:
+    if path.is_dir():
+        return f"{path}: this is a folder; name the files in it, e.g. {path}/*.csv"
+    return f"{path}: no such file; check the path"
 
 
 def schema(verbose: Verbose = False) -> int:

@@ -185,8 +185,8 @@ def steady_force(
 ) -> Array:
     """Force at steady slip: what a table of force over voltage and velocity can carry.
 
-    The oil spring has settled, so w = |v|. A force that is there at rest (a preload) is carried by
-    the static balance and left out, as are forces by displacement and acceleration.
+    The oil spring has settled, so w = |v|. A force that is there at rest (a preload, `static_force`) is
+    carried by the static balance and left out, as are forces by displacement and acceleration.
 
     Parameters
     ----------
@@ -211,8 +211,26 @@ def steady_force(
     parallel = columns_of(damper, PARALLEL, effective)
     rest = np.zeros(v.size)
     moving = np.where(v == 0.0, side * np.finfo(np.float64).tiny, v)
-    force += parallel_forces(rest, moving, rest, parallel) - parallel_forces(rest, rest, rest, parallel)
+    force += parallel_forces(rest, moving, rest, parallel) - static_force(damper, effective)
     return force.reshape(speeds.shape)
+
+
+def static_force(damper: Damper, voltage: Array | float | None) -> Array:
+    """Force at rest in the middle of the stroke, such as a preload: what `steady_force` leaves out.
+
+    Parameters
+    ----------
+    damper : the damper
+    voltage : voltage [V]; None where the damper has a single one
+
+    Returns
+    -------
+    force [N] in the shape of the voltage
+    """
+    u = np.asarray(0.0 if voltage is None else voltage, dtype=np.float64)
+    rest = np.zeros(u.size)
+    rows = columns_of(damper, PARALLEL, None if voltage is None else u.ravel())
+    return parallel_forces(rest, rest, rest, rows).reshape(u.shape)
 
 
 @dataclass(frozen=True, eq=False)

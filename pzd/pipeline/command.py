@@ -19,6 +19,9 @@ from pzd.schema.extends import read_extended
 from pzd.schema.progress import Listener, no_listener
 from pzd.schema.yamlfile import Document
 
+_SUFFIXES = (".yaml", ".yml", ".json")
+"""Of a config; JSON is YAML too."""
+
 
 @dataclass(frozen=True)
 class Opened:
@@ -57,8 +60,14 @@ def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:
     ------
     ConfigError : when the config is wrong, or its run belongs to another config
     """
-    document = read_extended(path).overridden(overrides)
-    config = validated(document)
+    try:
+        document = read_extended(path).overridden(overrides)
+        config = validated(document)
+    except ConfigError as error:
+        if path.suffix.lower() in _SUFFIXES or not path.is_file():
+            raise
+        hint = f"{path}: is this a config? it would be a YAML file; pzd init prints one for files of a rig"
+        raise ConfigError([*error.messages, hint]) from error
     return Opened(document, config, Run.of(path, runs, config.control.signal()))
 
 

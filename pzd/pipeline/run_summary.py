@@ -105,6 +105,9 @@ def summary_of(folder: Path) -> RunSummary:
     DataError : when a file of it is at fault
     """
     written = folder / CONFIG
+    if not folder.is_dir():
+        what = "this is a file" if folder.exists() else "there is no such folder"
+        raise ConfigError(f"{folder}: {what}; give the folder of a run, like runs/quickstart")
     if not written.is_file():
         raise ConfigError(f"{folder}: this folder holds no run, it has no {CONFIG}; give a folder like runs/quickstart")
     run = Run(folder, written, control_of(read_yaml(written).data))

@@ -111,10 +111,10 @@ def _file(name: str, package: Path) -> Path | None:
 
 
 def _data(folder: Path) -> Iterator[Path]:
-    """The files of a package that are no modules, also in folders that hold no modules."""
+    """The files of a package that are no modules and no pages for people, also in folders that hold no modules."""
     for path in folder.iterdir():
         if path.is_dir():
             if path.name != "__pycache__" and not any(path.glob("*.py")):
                 yield from _data(path)
-        elif path.suffix != ".py":
+        elif path.suffix not in (".py", ".md"):
             yield path

@@ -9,6 +9,7 @@ from pzd.report.blocks import Card
 from pzd.report.context import BASELINES, Comparison, ReportContext, effect_in_words
 from pzd.report.sections.missing import rig_test, verdict
 from pzd.report.sections.passenger import change
+from pzd.report.static_force import static_force_at, static_force_in_words
 from pzd.report.wording import amount, listed, number, percent, sentence
 
 
@@ -30,14 +31,18 @@ def _damper(context: ReportContext) -> Card:
     first = min((row.temperature_degC for row in rows), key=lambda t: float("-inf") if t is None else t)
     here = [row for row in rows if row.velocity_m_per_s == speed and row.temperature_degC == first]
     low, high = (end(here, key=lambda row: row.voltage_V or 0.0) for end in (min, max))
-    at = f"In rebound at {amount(speed, 'm/s')}" + (f" and {amount(first, 'degC')}." if first is not None else ".")
+    at = f"In rebound at {amount(speed, 'm/s')}" + (f" and {amount(first, 'degC')}" if first is not None else "")
+    rest = static_force_in_words(context, (low.voltage_V, high.voltage_V))
+    at += f"; {rest} of it act at rest as well." if rest else "."
     if low.voltage_V == high.voltage_V:
-        return Card(question, f"It gives {amount(low.force_N, 'N')}", at)
-    return Card(question, f"{_force(context, low)} to {_force(context, high)}", at)
+        return Card(question, f"It gives {_force(context, low)}", at)
+    ends = [f"{_force(context, row)} at {context.voltage(row.voltage_V)}" for row in (low, high)]
+    return Card(question, " to ".join(ends), at)
 
 
 def _force(context: ReportContext, row: ForceRow) -> str:
-    return f"{amount(row.force_N, 'N')} at {context.voltage(row.voltage_V)}"
+    """As a rig would measure it, with what is there at rest."""
+    return amount((row.force_N or 0.0) + static_force_at(context, row.voltage_V), "N")
 
 
 def _missing(context: ReportContext) -> str:

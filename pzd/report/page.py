@@ -51,7 +51,7 @@ def _title(context: ReportContext) -> str:
     return f"{kind}: {context.chosen}" if context.chosen else kind
 
 
-_FOOTER = "Written by pzd. Every number of this page stands in the CSV and JSON files of the run beside it."
+_FOOTER = "Written by pzd. Every number of this page stands in the files of the run beside it, or follows from them."
 
 
 def render(

@@ -12,7 +12,7 @@ from pzd.simulate.config import SimulateConfig
 
 
 def report(
-    report: ReportConfig,
+    config: ReportConfig,
     simulate: SimulateConfig,
     rig: Rig,
     identified: Identified,
@@ -28,7 +28,7 @@ def report(
 
     Parameters
     ----------
-    report : editions, and what the page shows
+    config : editions, and what the page shows
     simulate : the ride that was driven
     rig, identified, diagnosed, table, rides : what the stages before made
     control : the control signal of the valve
@@ -45,57 +45,6 @@ def report(
     ConfigError : when there is no such file of expected numbers
     DataError : when it is at fault, with every place
     """
-    return _made(report, simulate, rig, identified, diagnosed, table, rides, control, setting, folder, jobs)
-
-
-def report_without_car(
-    report: ReportConfig,
-    rig: Rig,
-    identified: Identified,
-    diagnosed: Diagnosed,
-    table: Table,
-    control: Control,
-    setting: str | None,
-    folder: Path,
-    jobs: int = 1,
-) -> Report:
-    """Write one page on the damper alone, where `stages` leaves the ride out; there is no comfort to rate.
-
-    Parameters
-    ----------
-    report : what the page shows
-    rig, identified, diagnosed, table : what the stages before made
-    control : the control signal of the valve
-    setting : of the rig's settings, the one in use
-    folder : of the config, from which the path of expected numbers counts
-    jobs : pictures drawn at the same time
-
-    Returns
-    -------
-    the page, and the numbers beside those expected where the config names any
-
-    Raises
-    ------
-    ConfigError : when there is no such file of expected numbers
-    DataError : when it is at fault, with every place
-    """
-    none = Rides((), (), (), (), (), ())
-    return _made(report, SimulateConfig(), rig, identified, diagnosed, table, none, control, setting, folder, jobs)
-
-
-def _made(
-    config: ReportConfig,
-    simulate: SimulateConfig,
-    rig: Rig,
-    identified: Identified,
-    diagnosed: Diagnosed,
-    table: Table,
-    rides: Rides,
-    control: Control,
-    setting: str | None,
-    folder: Path,
-    jobs: int,
-) -> Report:
     from pzd.report.context import ReportContext
     from pzd.report.page import page
     from pzd.report.reference import compared, file_of, read_reference
@@ -124,3 +73,38 @@ def _made(
         expected=found,
     )
     return Report(comfort=comfort, page=page(context, jobs), reference=found)
+
+
+def report_without_car(
+    config: ReportConfig,
+    rig: Rig,
+    identified: Identified,
+    diagnosed: Diagnosed,
+    table: Table,
+    control: Control,
+    setting: str | None,
+    folder: Path,
+    jobs: int = 1,
+) -> Report:
+    """Write one page on the damper alone, where `stages` leaves the ride out; there is no comfort to rate.
+
+    Parameters
+    ----------
+    config : what the page shows
+    rig, identified, diagnosed, table : what the stages before made
+    control : the control signal of the valve
+    setting : of the rig's settings, the one in use
+    folder : of the config, from which the path of expected numbers counts
+    jobs : pictures drawn at the same time
+
+    Returns
+    -------
+    the page, and the numbers beside those expected where the config names any
+
+    Raises
+    ------
+    ConfigError : when there is no such file of expected numbers
+    DataError : when it is at fault, with every place
+    """
+    none = Rides()
+    return report(config, SimulateConfig(), rig, identified, diagnosed, table, none, control, setting, folder, jobs)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from pzd.comfort.iso2631_1978 import LONGEST_MIN
+from pzd.schema.wording import rounded_as
 
 THIN = "\u202f"
 MINUS = "\u2212"
@@ -57,6 +58,11 @@ def amount(value: float | None, unit: str, digits: int = 3) -> str:
     """A number with its unit; a dash alone where there is none."""
     text, shown = number(value, digits), unit_of(unit)
     return text if text == DASH or not shown else f"{text}{KEPT}{shown}"
+
+
+def amount_as(value: float, other: float, unit: str, digits: int = 3) -> str:
+    """A number with its unit, to the decimal place to which another one is told, from which it was read."""
+    return amount(rounded_as(value, other, digits), unit, digits)
 
 
 def interval(value: float | None, low: float | None, high: float | None) -> str:

@@ -45,6 +45,13 @@ class ControlConfig(Frozen):
     unit: str = Field(default=VOLTAGE.unit, pattern=r'^[^\s,;"]+$')
     """Its unit."""
 
+    @model_validator(mode="after")
+    def _says_its_unit(self) -> ControlConfig:
+        """Volts are the unit of a voltage, and a guess for anything else."""
+        if self.name != VOLTAGE.name and "unit" not in self.model_fields_set:
+            raise ValueError(f"the unit of a {self.name} is missing; say it, e.g. {{name: {self.name}, unit: A}}")
+        return self
+
     @field_validator("name")
     @classmethod
     def _not_another_channel(cls, name: str) -> str:
@@ -109,7 +116,7 @@ class FilesEntry(Frozen):
     For time also a format of date and time (`%m/%d/%Y %H:%M:%S.%f`)."""
     constants: dict[str, WithUnit] = Field(default={})
     """Quantity -> value with unit (`100 V`) that no column holds."""
-    sign: dict[str, int] = Field(default={})
+    sign: dict[str, Literal[1, -1]] = Field(default={})
     """Quantity -> 1 or -1; -1 turns a channel that counts compression positive."""
     pattern: str | None = None
     """Regular expression searched in the file's name, its groups named after quantities or `setting`,
@@ -140,13 +147,6 @@ class FilesEntry(Frozen):
     """Encoding of the text."""
     source: str | None = None
     """Where the files can be had: shown when they are absent."""
-
-    @field_validator("sign")
-    @classmethod
-    def _one_or_minus_one(cls, sign: dict[str, int]) -> dict[str, int]:
-        if any(value not in (1, -1) for value in sign.values()):
-            raise ValueError("a sign is 1 or -1")
-        return sign
 
     @field_validator("pattern")
     @classmethod

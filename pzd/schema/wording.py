@@ -31,6 +31,13 @@ def supported(value: float, low: float, high: float) -> str:
     return f"{round(value, 1 - math.floor(math.log10(width))) + 0.0:.{MOST_DIGITS}g}"
 
 
+def rounded_as(value: float, other: float, digits: int) -> float:
+    """A value to the decimal place of the last of so many digits of another one, from which it was read."""
+    if other == 0.0 or not math.isfinite(other):
+        return value
+    return round(value, digits - 1 - math.floor(math.log10(abs(other)))) + 0.0
+
+
 def worded(kind: str, message: str) -> str:
     """What a value must be, by pydantic's kind of error and its message."""
     plain = re.sub(r"^(Input|String|Tuple|List|Dictionary|Value) should", "must", message.removeprefix("Value error, "))

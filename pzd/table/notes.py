@@ -7,6 +7,7 @@ from itertools import groupby, pairwise
 import numpy as np
 
 from pzd.damper.competing_forms import known
+from pzd.damper.compose import static_force
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.record import Array
@@ -19,7 +20,7 @@ FALLS = 1e-6
 
 
 def lost(damper: Damper, temperatures: tuple[float | None, ...], velocity: Array) -> tuple[str, ...]:
-    """What the table drops: the oil spring's memory, and every effect that steady slip does not show.
+    """What the table drops: the oil spring's memory, what steady slip does not show, and forces that act at rest too.
 
     Parameters
     ----------
@@ -28,13 +29,20 @@ def lost(damper: Damper, temperatures: tuple[float | None, ...], velocity: Array
     velocity : (n,) of the table [m/s]
     """
     lags = [1e3 * row.C_Ns_per_m / row.k_N_per_m for row in damper.base]
-    memory = f"memory of the oil spring k: the force lags by C/k = {min(lags):.3g} to {max(lags):.3g} ms"
-    return (memory, *(_words(name) for name in damper.effects if not _carried(damper, name, temperatures, velocity)))
+    ends = " to ".join(dict.fromkeys(f"{lag:.3g}" for lag in (min(lags), max(lags))))
+    memory = f"memory of the oil spring k: the force lags by C/k = {ends} ms"
+    return (
+        memory,
+        *(_words(damper, name) for name in damper.effects if not _carried(damper, name, temperatures, velocity)),
+    )
 
 
-def _words(name: str) -> str:
+def _words(damper: Damper, name: str) -> str:
     effect = known()[name]
-    return f"{name}: {effect.law} (steady slip does not show it)"
+    alone = damper.model_copy(update={"effects": {name: damper.effects[name]}})
+    rests = any(static_force(alone, voltage) != 0.0 for voltage in voltages_of(damper))
+    why = "it acts at rest too, and is left to the static balance" if rests else "steady slip does not show it"
+    return f"{name}: {effect.law} ({why})"
 
 
 def _carried(damper: Damper, name: str, temperatures: tuple[float | None, ...], velocity: Array) -> bool:

@@ -8,7 +8,15 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from pzd.damper.columns import STROKE_AND_FLOW
-from pzd.damper.compose import TOLERANCE, constant_rows, element_rows, integrated_force, respond, steady_force
+from pzd.damper.compose import (
+    TOLERANCE,
+    constant_rows,
+    element_rows,
+    integrated_force,
+    respond,
+    static_force,
+    steady_force,
+)
 from pzd.damper.element import element_force
 from pzd.damper.kernels import row_of
 from pzd.damper.model import BaseRow, Damper
@@ -277,6 +285,11 @@ def test_a_long_even_stroke_ends_at_the_steady_force(effects: dict) -> None:
 def test_at_rest_the_steady_force_has_two_sides_and_a_preload_is_left_to_the_balance() -> None:
     damper = PLAIN.with_effect("preload_offset", {"F_0": 50.0})
     np.testing.assert_allclose(steady_force(damper, 0.0, None, np.array([-0.0, 0.0])), [-300.0, 300.0])
+    assert static_force(damper, 0.0) == 50.0
+    beside = {"gas_spring": {"k_g": 3e3}, "fluid_inertia": {"m": 9.0}, "stribeck_friction": {"F_s": 80.0, "v_s": 0.04}}
+    assert static_force(with_effects(beside), 0.0) == 0.0
+    by_voltage = PLAIN.with_effect("preload_offset", {"F_0": (50.0, 90.0), "at_voltage_V": (0.0, 100.0)})
+    np.testing.assert_allclose(static_force(by_voltage, np.array([0.0, 25.0, 100.0])), [50.0, 60.0, 90.0])
 
 
 def test_a_voltage_that_is_needed_and_not_given_is_said() -> None:

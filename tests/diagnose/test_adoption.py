@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from campaign import damper_of, sine, sines
-from test_naming import TWO, diagnosed
+from test_naming import TWO
+from whole_diagnosis import diagnosed
 
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 from campaign import damper_of, sine
-from test_naming import diagnosed
+from whole_diagnosis import diagnosed
 
 
 def test_a_name_never_rests_on_a_gap_of_nothing(rng: np.random.Generator) -> None:

@@ -6,32 +6,23 @@ from typing import Any
 import numpy as np
 import pytest
 from campaign import coloured, damper_of, sine, sines, waveform
+from whole_diagnosis import diagnosed
 
 from pzd.artefacts import Diagnosed, Rig, base_of
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import TRAINING, UNTOUCHED, VALIDATION, split
 from pzd.diagnose.fit.input_uncertainty import expected
 from pzd.diagnose.residual_check import check_residual
-from pzd.diagnose.stage import diagnose
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.stage import identify
 from pzd.quantities import Control
 from pzd.record import Array, Record
-from pzd.rig.config import FilesEntry, RigConfig
 from pzd.signals.nuisance import NuisanceConfig, nuisance
 
 TWO = (0.0, 150.0)
-STAND = RigConfig(files=(FilesEntry(path="*.csv"),))
-
-
-def diagnosed(records: tuple[Record, ...]) -> Diagnosed:
-    rig = Rig(records, ())
-    identified = identify(IdentifyConfig(), rig, 1)
-    return diagnose(DiagnoseConfig(), IdentifyConfig(), STAND, rig, identified, Control(), None, 1)
 
 
 def road(damper: Damper, rng: np.random.Generator, voltage: float, displacement_noise: float = 0.0) -> Record:

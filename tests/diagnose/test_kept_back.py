@@ -8,8 +8,9 @@ from typing import cast
 import numpy as np
 import pytest
 from campaign import TABLE_2, damper_of, sine, sines
+from whole_diagnosis import diagnosed
 
-from pzd.artefacts import Diagnosed, Prediction, Rig
+from pzd.artefacts import Prediction
 from pzd.damper.model import Damper
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import DiagnoseConfig
@@ -21,13 +22,8 @@ from pzd.diagnose.kept_back import Trials, trials_of
 from pzd.diagnose.missed import Missed
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.diagnose.search.selection import Selection
-from pzd.diagnose.stage import diagnose
 from pzd.diagnose.verdict import unpredicted
-from pzd.identify.config import IdentifyConfig
-from pzd.identify.stage import identify
-from pzd.quantities import Control
 from pzd.record import Record
-from pzd.rig.config import FilesEntry, RigConfig
 from pzd.signals.nuisance import NuisanceConfig
 
 TWO = (0.0, 150.0)
@@ -50,12 +46,6 @@ def predicted(records: tuple[Record, ...], plain: Damper, damper: Damper) -> Pre
     found = asked.prediction(asked.plain_missed(), asked.missed(damper), between)
     assert found is not None
     return found
-
-
-def diagnosed(records: tuple[Record, ...]) -> Diagnosed:
-    stand, rig = RigConfig(files=(FilesEntry(path="*.csv"),)), Rig(records, ())
-    identified = identify(IdentifyConfig(), rig, 1)
-    return diagnose(DiagnoseConfig(), IdentifyConfig(), stand, rig, identified, Control(), None, 1)
 
 
 def test_nothing_is_fitted_to_a_kept_back_test(rng: np.random.Generator) -> None:

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from campaign import damper_of, sines
-from test_naming import TWO, diagnosed
+from test_naming import TWO
+from whole_diagnosis import diagnosed
 
 from pzd.artefacts import Rig
 from pzd.artefacts.rig import Finding, RecordEntry

@@ -11,18 +11,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.random import Generator
+from whole_diagnosis import diagnosed
 
-from pzd.artefacts import Diagnosis, Rig
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.config import DiagnoseConfig
-from pzd.diagnose.stage import diagnose
-from pzd.identify.config import IdentifyConfig
-from pzd.identify.stage import identify
-from pzd.quantities import Control
 from pzd.record import Array, Record
-from pzd.rig.config import FilesEntry, RigConfig
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
@@ -38,7 +32,6 @@ PLAIN = Damper(
         BaseRow(voltage_V=100.0, T0_N=1100.0, C_Ns_per_m=2900.0, k_N_per_m=4.4e5),
     )
 )
-STAND = RigConfig(files=(FilesEntry(path="*.csv"),))
 
 
 def tones(*parts: tuple[float, float]) -> Callable[[Array], Array]:
@@ -99,15 +92,9 @@ def records(damper: Damper, motion: Callable[[Array], Array], rng: Generator) ->
     return tuple(found)
 
 
-def diagnosed(tests: tuple[Record, ...]) -> Diagnosis:
-    rig = Rig(tests, ())
-    identified = identify(IdentifyConfig(), rig, 1)
-    return diagnose(DiagnoseConfig(), IdentifyConfig(), STAND, rig, identified, Control(), None, 1).diagnosis
-
-
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_nothing_is_missed_in_a_plain_damper(motion: str, rng: Generator) -> None:
-    assert diagnosed(records(PLAIN, MOTIONS[motion], rng)).verdict == "none"
+    assert diagnosed(records(PLAIN, MOTIONS[motion], rng)).diagnosis.verdict == "none"
 
 
 @pytest.mark.parametrize("effect", SIZES)
@@ -115,7 +102,7 @@ def test_nothing_is_missed_in_a_plain_damper(motion: str, rng: Generator) -> Non
 def test_what_is_hidden_is_named_with_its_size(motion: str, effect: str, rng: Generator) -> None:
     parameter, sizes = SIZES[effect]
     size = dict(zip(MOTIONS, sizes, strict=True))[motion]
-    found = diagnosed(records(PLAIN.with_effect(effect, {parameter: size}), MOTIONS[motion], rng))
+    found = diagnosed(records(PLAIN.with_effect(effect, {parameter: size}), MOTIONS[motion], rng)).diagnosis
     assert (found.verdict, found.effects) == ("named", (effect,))
     assert found.parameters[effect][parameter].value == pytest.approx(size, rel=0.05)
 
@@ -126,7 +113,7 @@ def two_speeds(t: Array) -> Array:
 
 
 def test_two_speeds_in_one_record_are_two_tests_of_one_name(rng: Generator) -> None:
-    assert diagnosed(records(PLAIN, two_speeds, rng)).verdict == "none"
-    found = diagnosed(records(PLAIN.with_effect("orifice_quadratic", {"q": 5000.0}), two_speeds, rng))
+    assert diagnosed(records(PLAIN, two_speeds, rng)).diagnosis.verdict == "none"
+    found = diagnosed(records(PLAIN.with_effect("orifice_quadratic", {"q": 5000.0}), two_speeds, rng)).diagnosis
     assert (found.verdict, found.effects) == ("named", ("orifice_quadratic",))
     assert len(set(found.gap.held_out)) == len(found.gap.held_out)

@@ -5,22 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from campaign import coloured, damper_of, sine, sines
+from whole_diagnosis import diagnosed
 
-from pzd.artefacts import Diagnosed, Rig
+from pzd.artefacts import Diagnosed
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.config import DiagnoseConfig
-from pzd.diagnose.stage import diagnose
-from pzd.identify.config import IdentifyConfig
-from pzd.identify.stage import identify
-from pzd.quantities import Control
 from pzd.record import Record
-from pzd.rig.config import FilesEntry, RigConfig
 
 TWO = (0.0, 150.0)
-STAND = RigConfig(files=(FilesEntry(path="*.csv"),))
-
 TRUTHS = {
     "orifice_quadratic": {"q": 2500.0},
     "shear_thinning": {"n": 0.8},
@@ -35,12 +28,6 @@ TRUTHS = {
     "end_stop": {"k_e": 1.5e6, "x_e": 0.018},
     "sensor_delay": {"tau": 0.004},
 }
-
-
-def diagnosed(records: tuple[Record, ...], **config: object) -> Diagnosed:
-    rig = Rig(records, ())
-    settings = DiagnoseConfig.model_validate(config)
-    return diagnose(settings, IdentifyConfig(), STAND, rig, identify(IdentifyConfig(), rig, 1), Control(), None, 2)
 
 
 ENOUGH = 9

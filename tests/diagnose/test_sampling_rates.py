@@ -7,18 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from numpy.random import Generator
+from whole_diagnosis import diagnosed
 
-from pzd.artefacts import Diagnosis, Rig
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.config import DiagnoseConfig
-from pzd.diagnose.stage import diagnose
-from pzd.identify.config import IdentifyConfig
-from pzd.identify.stage import identify
-from pzd.quantities import Control
 from pzd.record import Array, Record
-from pzd.rig.config import FilesEntry, RigConfig
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
@@ -77,16 +71,9 @@ def decimated(tests: list[tuple[str, Array]], rate: int) -> Iterator[Record]:
         yield Record(name, None, t, x, clean.velocity, clean.acceleration, force, U)
 
 
-def diagnosed(tests: list[tuple[str, Array]], rate: int) -> Diagnosis:
-    rig = Rig(tuple(decimated(tests, rate)), ())
-    identified = identify(IdentifyConfig(), rig, 1)
-    stand = RigConfig(files=(FilesEntry(path="*.csv"),))
-    return diagnose(DiagnoseConfig(), IdentifyConfig(), stand, rig, identified, Control(), None, 1).diagnosis
-
-
 def test_evidence_does_not_grow_with_the_sampling_rate(rng: Generator) -> None:
     tests = recorded(PLAIN.with_effect("gas_spring", {"k_g": 2000.0}), SINES, rng)
-    found = {rate: diagnosed(tests, rate) for rate in (250, 1000, 8000)}
+    found = {rate: diagnosed(decimated(tests, rate)).diagnosis for rate in (250, 1000, 8000)}
     assert {(d.verdict, d.effects) for d in found.values()} == {("named", ("gas_spring",))}
     pays = {rate: d.ranking[0].delta_bic for rate, d in found.items()}
     assert pays[8000] == pytest.approx(pays[1000], rel=0.1)
@@ -95,5 +82,6 @@ def test_evidence_does_not_grow_with_the_sampling_rate(rng: Generator) -> None:
 
 @pytest.mark.parametrize("rate", [500, 2000])
 def test_a_filter_against_aliasing_is_no_missing_effect(rate: int, rng: Generator) -> None:
-    found = diagnosed(recorded(PLAIN, [rough(rng), [(0.5 * a, f, p) for a, f, p in rough(rng)]], rng), rate)
+    tests = recorded(PLAIN, [rough(rng), [(0.5 * a, f, p) for a, f, p in rough(rng)]], rng)
+    found = diagnosed(decimated(tests, rate)).diagnosis
     assert (found.verdict, found.effects) == ("none", ())

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from campaign import damper_of, sines
-from test_naming import TRUTHS, TWO, diagnosed
+from test_naming import TRUTHS, TWO
+from whole_diagnosis import diagnosed
 
 from pzd.artefacts import Diagnosed, ParameterRow
 from pzd.damper.effects import library

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaign import damper_of, sine
-from test_naming import diagnosed
+from whole_diagnosis import diagnosed
 
 from pzd.damper.model import Damper
 from pzd.record import Record, sliced

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from campaign import damper_of, sine, sines
-from test_kept_back import TWO, campaign_of, diagnosed
+from test_kept_back import TWO, campaign_of
+from whole_diagnosis import diagnosed
 
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.config import DiagnoseConfig

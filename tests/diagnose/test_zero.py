@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from whole_diagnosis import diagnosed
 
 from pzd.artefacts import Diagnosed, Value
 from pzd.cli.diagnosis import diagnosis_lines
@@ -18,7 +19,6 @@ from pzd.quantities import Control
 from pzd.record import Record
 from pzd.rig.stand.frame import force_in_frame
 from tests.diagnose.campaign import coloured, damper_of, sines
-from tests.diagnose.test_naming import diagnosed
 
 TWO = (0.0, 150.0)
 STOPS = {"k_e": 1.5e6, "x_e": 0.018}

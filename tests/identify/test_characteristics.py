@@ -1,4 +1,4 @@
-"""The tests of the trade against closed forms: force over speed, gas force, friction and response to a step."""
+"""What tests show without a model, against closed forms: force over speed, gas force, friction, response to a step."""
 
 from __future__ import annotations
 

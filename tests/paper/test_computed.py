@@ -108,7 +108,7 @@ def test_the_stroke_is_what_the_calibration_leaves_of_it(beside: dict[str, Refer
 
 
 def test_a_run_without_the_papers_tests_says_so(config: RunConfig) -> None:
-    empty = RunNumbers(Identified((), ()), Rides((), (), (), (), (), ()), (), config.simulate, Control())
+    empty = RunNumbers(Identified((), ()), Rides(), (), config.simulate, Control())
     for row in compared(tuple(published().values()), empty):
         assert row.note, row.id
         if row.kind not in ("input", "stated"):

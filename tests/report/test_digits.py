@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from pzd.artefacts import Gap, Identified, ParameterRow
+from pzd.artefacts import Characteristics, Gap, GasAndFrictionRow, Identified, ParameterRow, PeakVelocityRow
+from pzd.cli.characteristics import characteristics_tables
 from pzd.cli.diagnosis import diagnosis_lines
 from pzd.cli.layout import interval
 from pzd.damper.model import BaseRow, Damper
@@ -13,9 +17,10 @@ from pzd.diagnose.verdict import weak
 from pzd.quantities import Control
 from pzd.report import wording
 from pzd.report.context import effect_in_words
+from pzd.report.sections.characteristics import render as characteristics_section
 from pzd.report.sections.damper import parameter
 from pzd.schema.wording import supported
-from pzd.table.notes import not_monotone
+from pzd.table.notes import lost, not_monotone
 from tests.test_cli import diagnosis
 
 PRESSURE = Control("pressure", "bar")
@@ -62,6 +67,39 @@ def test_a_friction_of_nothing_is_zero_on_the_page() -> None:
     assert parameter(0.25) == "0.25"
 
 
+def static(gas: float) -> Characteristics:
+    """A friction of 120.34 N beside a gas force, read from forces of 445.67 N."""
+    place = {"setting": None, "voltage_V": None, "temperature_degC": None}
+    tests = tuple(
+        PeakVelocityRow(
+            record="r", kind="sine", frequency_Hz=1.0, amplitude_m=0.025, middle_m=0.0, **place,
+            rebound_velocity_m_per_s=speed, rebound_force_N=force + gas,
+            compression_velocity_m_per_s=-speed, compression_force_N=gas - force,
+        )
+        for speed, force in ((0.131, 445.67), (0.524, 1063.5))
+    )  # fmt: skip
+    row = GasAndFrictionRow(gas_force_N=gas, friction_N=120.34, velocity_m_per_s=0.131, middle_m=0.0,
+                            method="extrapolated to rest", **place)  # fmt: skip
+    return Characteristics(peak_velocity=tests, gas_and_friction=(row,))
+
+
+@pytest.mark.parametrize(
+    ("gas", "printed", "drawn"),
+    [(0.0235, ("0", "120.3"), ("0", "120")), (-0.04, ("0", "120.3"), ("0", "120")),
+     (90.24, ("90.2", "120.3"), ("90", "120"))],
+)  # fmt: skip
+def test_a_static_force_has_the_digits_of_the_forces_that_it_was_read_from(
+    run: Any, gas: float, printed: tuple[str, str], drawn: tuple[str, str]
+) -> None:
+    found = static(gas)
+    tables = dict(characteristics_tables(SimpleNamespace(characteristics=found, control=Control())))
+    assert tuple(tables["gas force and friction at mid-stroke"][1][:2]) == printed
+    context = SimpleNamespace(identified=SimpleNamespace(characteristics=found), control=Control(), rig=run.rig)
+    (section,) = characteristics_section(context, {"characteristics": ()})
+    (table,) = (block for block in section.blocks if getattr(block, "header", ("",))[-1] == "how")
+    assert tuple(cell.replace("\xa0N", "") for cell in table.rows[0][1:3]) == drawn
+
+
 def test_what_was_held_out_is_told_in_words() -> None:
     assert weak("records") == ""
     assert "held out were cycles of tests that were also fitted" in weak("cycles")
@@ -98,3 +136,15 @@ def test_the_table_is_about_the_control_of_the_config() -> None:
     notes = not_monotone(dips, (None,), speeds, PRESSURE)
     assert notes
     assert all("from 0 to 50 bar; the lowest pressure that gives the force is taken" in note for note in notes)
+
+
+def test_what_the_table_drops_is_told_with_its_reason() -> None:
+    row = BaseRow(T0_N=300.0, C_Ns_per_m=1800.0, k_N_per_m=4e5)
+    effects = {"preload_offset": {"F_0": 90.0}, "gas_spring": {"k_g": 3e3}, "orifice_quadratic": {"q": 500.0}}
+    assert lost(Damper(base=(row,), effects=effects), (None,), np.array([-1.0, -0.0, 0.0, 1.0])) == (
+        "memory of the oil spring k: the force lags by C/k = 4.5 ms",
+        "preload_offset: F_0 (it acts at rest too, and is left to the static balance)",
+        "gas_spring: k_g x (steady slip does not show it)",
+    )
+    two = (row, row.model_copy(update={"voltage_V": 150.0, "C_Ns_per_m": 3600.0}))
+    assert lost(Damper(base=two), (None,), np.array([-1.0, 1.0]))[0].endswith("C/k = 4.5 to 9 ms")

@@ -21,9 +21,8 @@ from pzd.identify.characteristics.summary import characteristics
 from pzd.quantities import Control
 from pzd.record import conditions
 from pzd.report.config import ReportConfig
-from pzd.report.plots import library
+from pzd.report.plots import characteristic, library
 
-NO_RIDES = Rides((), (), (), (), (), ())
 HERE = Path(__file__).parent
 ORDER = ["tested", "characteristics", "model", "missing", "damper", "passenger", "trust", "made"]
 FETCHES = {"src", "href", "srcset", "data", "action", "poster"}
@@ -289,7 +288,7 @@ def test_a_damper_without_control_and_without_a_car_is_told_without_either(run: 
         rig=Rig(records, entries),
         identified=Identified(rows, (), characteristics=characteristics(*conditions(records))),
         table=Table(force, (), run.table.notes),
-        rides=NO_RIDES,
+        rides=Rides(),
     )
     diagnosis = bare.diagnosed.diagnosis.model_copy(update={"where": (), "prediction": None, "next_test": None})
     bare = replace(bare, diagnosed=replace(bare.diagnosed, diagnosis=diagnosis, damper=plain, plain=plain))
@@ -299,6 +298,36 @@ def test_a_damper_without_control_and_without_a_car_is_told_without_either(run: 
     assert re.findall(r"(?i)volt|control|valve|\bV\b|\bride|comfort|passenger", said) == []
     assert "It gives 1 540 N" in read.text
     assert "no temperature was recorded" in read.text
+
+
+def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any) -> None:
+    """The table leaves it to the static balance; a rig measures it, and the page tells what a rig measures."""
+    damper = run.diagnosed.damper.with_effect("preload_offset", {"F_0": 90.0})
+    charged = replace(run, diagnosed=replace(run.diagnosed, damper=damper))
+
+    def forces(text: str) -> list[float]:
+        (ends,) = re.findall(r"([\d ]+) N at 0 V to ([\d ]+) N at 150 V", text)
+        (row,) = re.findall(r"0\.377 m/s ([\d ]+) N ([\d ]+) N ", text)
+        return [float(force.replace(" ", "")) for force in (*ends, *row)]
+
+    without, text = (Reader(each.told().page).text.replace("\xa0", " ") for each in (run, charged))
+    assert forces(text) == [pytest.approx(force + 90.0, rel=5e-3) for force in forces(without)]
+    assert "In rebound at 0.377 m/s and 22 °C; 90 N of it act at rest as well." in text
+    told = "ith the 90 N at rest that the table (4-table) leaves out"
+    assert [text.count(f"{start}{told}") for start in "wW"] == [1, 1]
+    assert "leaves out" not in without
+
+
+def test_the_curve_of_the_damper_holds_what_is_there_at_rest(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    curves = []
+    monkeypatch.setattr(
+        "pzd.report.page.pictures",
+        lambda plots, context, jobs: curves.append(next(iter(characteristic.draw(context)))) or [()] * len(plots),
+    )
+    for damper in (run.diagnosed.damper, run.diagnosed.damper.with_effect("preload_offset", {"F_0": 90.0})):
+        replace(run, diagnosed=replace(run.diagnosed, damper=damper)).told()
+    without, charged = (panel.figure.axes[0].lines[0].get_ydata() for panel in curves)
+    assert charged - without == pytest.approx(0.09)  # kN
 
 
 def test_a_car_on_dampers_without_control_is_told_without_it(run: Any, words_only: None) -> None:
@@ -329,7 +358,7 @@ def test_an_empty_run_still_makes_a_page(run: Any) -> None:
         rig=Rig((), ()),
         identified=Identified((), ()),
         table=Table((), (), notes),
-        rides=NO_RIDES,
+        rides=Rides(),
     )
     assert Reader(empty.told().page).sections() == ["tested", "model", "missing", "damper", "trust", "made"]
 

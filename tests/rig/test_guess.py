@@ -72,6 +72,12 @@ FILES: dict[str, tuple[list[str], str, str, str]] = {
     "blanks": (["Time[s] Disp[mm] Force[kN]"], " ", ".", "utf-8"),
     "german": (["Zeit [s];Weg [mm];Kraft [kN]"], ";", ",", "latin-1"),
     "german units row": (["Prüfling 7", "", "Zeit;Weg;Kraft", "s;mm;kN"], ";", ",", "latin-1"),
+    "german logger": (
+        ["Nr;12", "Datum;22.11.2026", "", "Zeit [s];Weg [mm];Kraft [kN]"],
+        ";",
+        ",",
+        "latin-1",
+    ),
     "french": (["temps (s)\tcourse (mm)\teffort (kN)"], "\t", ",", "utf-8"),
     "spanish": (["tiempo [s],carrera [mm],fuerza [kN]"], ",", ".", "utf-8"),
     "underscores": (["time_s,pos_mm,load_kN"], ",", ".", "utf-8"),

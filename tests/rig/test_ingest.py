@@ -242,7 +242,7 @@ BREAKS: dict[str, tuple[Any, str]] = {
     "no rows": (lambda t: t[:1], ":1: no data rows"),
     "decimal comma": (lambda t: [line.replace(",", ";").replace(".", ",") for line in t], "decimal: ','"),
     "zero byte": (lambda t: [*t[:4], t[4] + "\0", *t[5:]], ":5: not a text file"),
-    "empty file": (lambda t: [""], "no header line"),
+    "empty file": (lambda t: [""], "no header line; say skip: N where N lines stand above it"),
 }
 
 

@@ -49,7 +49,7 @@ EFFECTS = {
     "plain": {},
     "orifice and lash": {"orifice_quadratic": {"q": 2500.0}, "lash": {"delta": 3e-4}},
     "thinning, by direction": {"shear_thinning": {"n": 0.8}, "asymmetry": {"alpha": 0.1}},
-    "beside the element": {"gas_spring": {"k_g": 3000.0}, "preload_offset": {"F_0": 200.0}},
+    "beside the element": {"gas_spring": {"k_g": 20e3}, "preload_offset": {"F_0": 200.0}},
     "relief": {"relief_valve": {"F_r": 1000.0, "C_r": 900.0}, "rounded_yield": {"w_s": 0.005}},
 }
 
@@ -88,8 +88,16 @@ def ahead(model: RideModel, y, acts, room, start: float, seconds: float) -> np.n
 
 @pytest.mark.parametrize("effects", list(EFFECTS))
 @pytest.mark.parametrize("candidate", [0, 2])
-def test_the_plant_goes_where_the_ride_goes_for_20_ms(damper, effects, candidate) -> None:
-    """From a moment of a ride, a voltage set anew: the body within 2e-3 of its largest motion, a_K within 2 %."""
+@pytest.mark.parametrize(("step", "motion_off", "a_K_off"), [(1e-3, 2e-3, 0.02), (1.25e-4, 3e-4, 4e-3)])
+def test_the_plant_goes_where_the_ride_goes_for_20_ms(
+    damper, effects, candidate, step, motion_off, a_K_off, monkeypatch
+) -> None:
+    """From a moment of a ride, a voltage set anew: body [share of its largest motion] and a_K [m/s2] at the end.
+
+    In the steps of the policy, where the oil may stick or slip up to a step late, and in an eighth of them, where about
+    a sixth of the error is left: it comes of the step, and of no equation.
+    """
+    monkeypatch.setattr("pzd.simulate.prediction.planning.HOLD_STEP", step)
     for name, values in EFFECTS[effects].items():
         damper = damper.with_effect(name, values)
     road = [{"kind": "iso8608", "road_class": "C", "seed": 1}]
@@ -103,9 +111,9 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(damper, effects, candidate
     predicted(predicting.car, plan, state, levels[0, candidate], levels[1, candidate], plan.hold_heights[0], HELD, 1e9)
     after = model_of(damper, "passive", float(plan.candidates[candidate]), **given)
     ahead(after, y, acts, room, 1.5, 0.02)
-    assert np.max(np.abs(state[: OIL_2 - 1] - y[: OIL_2 - 1]) / peak) < 2e-3
+    assert np.max(np.abs(state[: OIL_2 - 1] - y[: OIL_2 - 1]) / peak) < motion_off
     a_K = predicting.car.comfort[0] * state[-2] + predicting.car.comfort[1] * state[-1]
-    assert a_K == pytest.approx(room[COMFORT, 0], abs=0.02)
+    assert a_K == pytest.approx(room[COMFORT, 0], abs=a_K_off)
 
 
 def test_the_modes_of_the_weighting_are_the_weighting() -> None:
@@ -124,11 +132,13 @@ def test_it_sets_voltages_of_the_table_once_a_hold_and_the_energies_balance(ride
     given = {"roads": roads, "road": kind, "comfort_predictive": {"road": road}}
     outcome = ride("comfort_predictive", "dynamic", **SHORT, **given)
     assert abs(outcome.energy_error) < 1e-6
+    # Whoever foresees the road changes at least as often as the rod turns round on the sine; else nearly all is chance.
+    least = 2 * 4.5 * SHORT["duration_s"] if road == "known" or kind == 0 else 2
     for column in (VOLTAGE_1, VOLTAGE_2):
         voltage = outcome.history[:, column]
         assert set(np.unique(voltage)) <= {0.0, 75.0, 150.0}
         changed = np.flatnonzero(np.diff(voltage)) + 1
-        assert changed.size >= 2
+        assert changed.size >= least
         assert np.all(changed % 10 == 0)
 
 

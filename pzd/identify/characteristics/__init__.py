@@ -1,1 +1,1 @@
-"""The tests of the trade: peak- and continuous-velocity plots, gas force, friction, response to a step."""
+"""What a test of a damper usually shows: peak- and continuous-velocity plot, gas force, friction, step response."""

@@ -1,4 +1,4 @@
-"""All of the tests of the trade that a rig recorded, summarised condition by condition."""
+"""What the tests of a rig show without any model, condition by condition."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from pzd.report.context import ReportContext
 from pzd.report.drawing import Panel, Plot, axes, legend, shades
+from pzd.report.static_force import static_force_at, static_force_in_words
 from pzd.report.wording import amount, number
 
 
@@ -21,6 +22,7 @@ def draw(context: ReportContext) -> Iterator[Panel]:
     figure, ax = axes(key=(len(voltages) + 3) // 4 if context.controlled else 0)
     for voltage, colour in zip(voltages, shades(len(voltages)), strict=True):
         points = np.array([(r.velocity_m_per_s, r.force_N, r.inside) for r in rows if r.voltage_V == voltage])
+        points[:, 1] += static_force_at(context, voltage)
         inside = np.where(points[:, 2] > 0, points[:, 1], np.nan) / 1000.0
         ax.plot(points[:, 0], points[:, 1] / 1000.0, color=colour, linewidth=1.0, linestyle=":")
         ax.plot(points[:, 0], inside, color=colour, label=None if voltage is None else context.voltage(voltage))
@@ -33,9 +35,10 @@ def draw(context: ReportContext) -> Iterator[Panel]:
     reached = context.table.notes.reached_m_per_s
     each = f" for {len(voltages)} values of the {context.control.name}" if context.controlled else ""
     alt = f"Force of the damper over velocity{each}{at}."
-    yield Panel(
-        figure, f"Force of the damper{at}", alt, f"Dotted: beyond the {number(reached)} m/s that the rig reached."
-    )
+    said = f"Dotted: beyond the {number(reached)} m/s that the rig reached."
+    if rest := static_force_in_words(context, voltages):
+        said = f"With the {rest} at rest that the table (4-table) leaves out. {said}"
+    yield Panel(figure, f"Force of the damper{at}", alt, said)
 
 
 PLOT = Plot("characteristic", "damper", 1, draw)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pzd.artefacts import PeakVelocityRow
+from pzd.artefacts.matching import force_behind
 from pzd.report.blocks import Block, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext
 from pzd.report.curves import characteristics_of
 from pzd.report.sections.pictures import Pictures, galleries
-from pzd.report.wording import DASH, amount, number
+from pzd.report.wording import DASH, amount, amount_as, number
 
 _FOLD = 12
 _PAPER_RESPONSE_MS = 9
@@ -85,15 +86,15 @@ def _row(context: ReportContext, row: PeakVelocityRow) -> tuple[str, ...]:
 
 
 def _gas_and_friction(context: ReportContext) -> TextTable:
+    found = characteristics_of(context)
     rows = tuple(
         (
             *(_place(context, row.setting, row.voltage_V, row.temperature_degC) or ["all tests"]),
-            amount(row.gas_force_N, "N"),
-            amount(row.friction_N, "N"),
+            *(amount_as(force, force_behind(found, row), "N") for force in (row.gas_force_N, row.friction_N)),
             amount(row.velocity_m_per_s, "m/s"),
             row.method,
         )
-        for row in characteristics_of(context).gas_and_friction
+        for row in found.gas_and_friction
     )
     header = (*(_places(context) or ("",)), "gas force", "friction", "slowest speed", "how")
     title = "Static force at mid-stroke: mean of both directions (gas) and half their difference (friction)"
@@ -113,7 +114,8 @@ def _steps(context: ReportContext) -> TextTable:
         for row in characteristics_of(context).steps
     )
     header = ("step", "speed", "force", "to 63 %", "to 90 %", "status", "where")
-    return TextTable(f"Measured answer to steps of the {context.control.name}", header, rows, folded=len(rows) > _FOLD)
+    title = f"Measured response to steps of the {context.control.name}"
+    return TextTable(title, header, rows, folded=len(rows) > _FOLD)
 
 
 def _milliseconds(time: float | None) -> str:

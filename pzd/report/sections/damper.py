@@ -1,16 +1,17 @@
-"""What the damper is: its parameters, its force, how quickly it answers."""
+"""What the damper is: its parameters, its force, how quickly it responds."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pzd.artefacts import ParameterRow
+from pzd.artefacts import ForceRow, ParameterRow
 from pzd.damper.competing_forms import known
 from pzd.damper.model import BaseRow
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS, VOLTAGE
 from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext, effect_in_words
 from pzd.report.sections.pictures import Pictures, galleries
+from pzd.report.static_force import static_force_at, static_force_in_words
 from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
 
 _QUANTITIES = (FRICTION, DAMPING, STIFFNESS)
@@ -104,19 +105,22 @@ def _force(context: ReportContext) -> TextTable:
     speeds = sorted({row.velocity_m_per_s for row in rows})
     at = {(row.velocity_m_per_s, row.voltage_V): row for row in rows}
     chosen = _spread(speeds, context.table.notes.reached_m_per_s)
-    cells = tuple((amount(v, "m/s"), *(_cell(at.get((v, volt))) for volt in voltages)) for v in chosen)
+    static = {volt: static_force_at(context, volt) for volt in voltages}
+    cells = tuple((amount(v, "m/s"), *(_cell(at.get((v, volt)), static[volt]) for volt in voltages)) for v in chosen)
     degrees = f" at {amount(first, 'degC')}" if first is not None else ""
     columns = ["force" if volt is None else f"force at {context.voltage(volt)}" for volt in voltages]
     header = ("speed in rebound", *columns)
-    return TextTable(f"Force{degrees}; in brackets the model beyond what the rig reached", header, cells)
+    rest = static_force_in_words(context, voltages)
+    rest = f", with the {rest} at rest that the table (4-table) leaves out" if rest else ""
+    return TextTable(f"Force{degrees}{rest}; in brackets the model beyond what the rig reached", header, cells)
 
 
-def _cell(row: object) -> str:
-    force = getattr(row, "force_N", None)
-    if force is None:
+def _cell(row: ForceRow | None, static: float) -> str:
+    """A force of the table and what is there at rest."""
+    if row is None or row.force_N is None:
         return DASH
-    text = amount(force, "N")
-    return text if getattr(row, "inside", 0) else f"({text})"
+    text = amount(row.force_N + static, "N")
+    return text if row.inside else f"({text})"
 
 
 def _spread(speeds: list[float], reached: float) -> list[float]:
@@ -139,7 +143,7 @@ def _responses(context: ReportContext) -> TextTable:
         for r in context.rides.responses
     )
     return TextTable(
-        "Answer to a step at constant speed",
+        "Response to a step at constant speed",
         ("signal", "step", "speed", "to 63 %", "to 90 %", ""),
         rows,
         len(rows) > _FOLD,

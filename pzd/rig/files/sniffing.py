@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -127,6 +128,9 @@ def _table(
     rows = [[cell.strip('"') for cell in row] for row in cells]
     numbers = [_numbers(row, decimal) for row in rows]
     data = [n for n, row in enumerate(rows) if len(row) > 1 and 2 * numbers[n] >= len(row) and numbers[n]]
+    # A line of the preamble, say one of a date, may hold numbers too, but it is narrower than the table.
+    usual = Counter(len(rows[n]) for n in data).most_common(1)[0][0] if data else 0
+    data = [n for n in data if len(rows[n]) >= usual]
     if not data or data[0] == 0:
         return None
     first = data[0]

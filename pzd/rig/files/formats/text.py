@@ -201,7 +201,10 @@ def _sheet(
     header = list(entry.header) if entry.header is not None else (heads[0] if heads else [])
     header_line = None if entry.header is not None else int(lines[0]) - len(heads) if lines.size else entry.skip + 1
     if not any(header):
-        raise DataError(f"{at(path, entry.skip + 1)}: no header line")
+        raise DataError(
+            f"{at(path, entry.skip + 1)}: no header line; say skip: N where N lines stand above it, or "
+            f"header: [...] where there is none (got skip: {entry.skip})"
+        )
     if lines.size == 0:
         raise DataError(f"{at(path, header_line)}: no data rows below the header")
     uneven = fields != len(header)

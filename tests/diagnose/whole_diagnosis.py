@@ -1,0 +1,24 @@
+"""The diagnosis of records, as a run makes it: identified first, then diagnosed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pzd.artefacts import Diagnosed, Rig
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.stage import diagnose
+from pzd.identify.config import IdentifyConfig
+from pzd.identify.stage import identify
+from pzd.quantities import Control
+from pzd.record import Record
+from pzd.rig.config import FilesEntry, RigConfig
+
+STAND = RigConfig(files=(FilesEntry(path="*.csv"),))
+"""A rig whose files say nothing of the stand."""
+
+
+def diagnosed(records: Iterable[Record], jobs: int = 2, **config: object) -> Diagnosed:
+    """What diagnose says of records of one setting; `config` is its block."""
+    rig = Rig(tuple(records), ())
+    settings = DiagnoseConfig.model_validate(config)
+    return diagnose(settings, IdentifyConfig(), STAND, rig, identify(IdentifyConfig(), rig, 1), Control(), None, jobs)
