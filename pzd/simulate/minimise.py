@@ -8,13 +8,12 @@ says nothing about the segment: the tie-break picks its point.
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 from pzd.compiled import compiled
 from pzd.record import Array
+from pzd.simulate.policy import TieBreak
 
 Pair = tuple[float, float]
-TieBreak = Literal["smallest", "equal_share", "largest"]
 
 SMALLEST, EQUAL_SHARE, LARGEST = range(3)
 TIE_BREAKS: dict[TieBreak, int] = {"smallest": SMALLEST, "equal_share": EQUAL_SHARE, "largest": LARGEST}
