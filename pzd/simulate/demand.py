@@ -7,7 +7,7 @@ import math
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.admissible import coefficient_bounds, table_bounds
-from pzd.simulate.minimise import least_acceleration_forces
+from pzd.simulate.minimise import LEAST_LOAD, least_acceleration_forces, least_load_forces
 from pzd.simulate.ride_model import (
     BODY,
     BY_COEFFICIENTS,
@@ -94,6 +94,10 @@ def wanted_force(control_spec: ControlSpec, axle: int, y: Array, control: Array,
 @compiled
 def demand(control_spec: ControlSpec, car: Vehicle, y: Array, control: Array, workspace: Array) -> None:
     """Fill the workspace's forces with what the policy asks of both axles within the workspace's bounds [N]."""
+    if control_spec.aim == MINIMISE and control_spec.tie == LEAST_LOAD:
+        springs = (car.stiffness[0] * workspace[DEFLECTION, 0], car.stiffness[1] * workspace[DEFLECTION, 1])
+        least_load_forces(springs, car.comfort, workspace[LOW], workspace[HIGH], workspace[FORCE])
+        return
     if control_spec.aim == MINIMISE:
         a0 = spring_acceleration(car, workspace[DEFLECTION])
         least_acceleration_forces(

@@ -37,7 +37,7 @@ class Policy:
     aim: Aim
     controlled: bool = False
     """Whether it answers to the ride, so that the report sets it beside the others; False for what stays as it is."""
-    tie_break: TieBreak | None = None
+    tie_break: TieBreak | Literal["least_load"] | None = None
     """Which forces the aim `minimise` takes of many; by default those that `tie_break` of the config says."""
     tuned: Literal["voltage", "damping"] | None = None
     """What is held constant at the value with which a_w is least, for each road and fidelity by itself."""

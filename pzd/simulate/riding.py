@@ -15,7 +15,7 @@ from pzd.simulate.dynamic_damper import DynamicDamper
 from pzd.simulate.energy import balance_error, stored_energy
 from pzd.simulate.linear import ride_exactly
 from pzd.simulate.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALLIES, ride
-from pzd.simulate.minimise import TIE_BREAKS
+from pzd.simulate.minimise import LEAST_LOAD, TIE_BREAKS
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.plan import Case
 from pzd.simulate.prediction.planning import LEVELS, predictor_of
@@ -113,7 +113,7 @@ def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: Dy
         fidelity,
         _AIMS[policy.aim],
         bounds,
-        TIE_BREAKS[policy.tie_break or config.tie_break],
+        LEAST_LOAD if policy.tie_break == "least_load" else TIE_BREAKS[policy.tie_break or config.tie_break],
         *(config.coefficients or (0.0, np.inf)),
         held.voltage,
         jumps,

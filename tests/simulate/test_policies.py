@@ -15,7 +15,7 @@ from pzd.schema.model import Frozen
 from pzd.simulate.car import GRAVITY, HalfCar
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.dampers import dynamic_damper_of, grid_of
-from pzd.simulate.minimise import TIE_BREAKS, farther_end, least_acceleration_forces
+from pzd.simulate.minimise import SMALLEST, TIE_BREAKS, farther_end, least_acceleration_forces, least_load_forces
 from pzd.simulate.plan import Case
 from pzd.simulate.policies import clipped_lqr, policies, wheel_load
 from pzd.simulate.policies.clipped_lqr import ClippedLqr, regulator
@@ -261,6 +261,28 @@ def test_a_tie_break_by_name_of_the_policy_goes_before_that_of_the_config(ride, 
     named = ride(f"comfort_{tie_break}", tie_break="equal_share", **SHORT)
     assert np.array_equal(named.history, ride("comfort", tie_break=tie_break, **SHORT).history)
     assert not np.allclose(named.history, ride("comfort", tie_break="equal_share", **SHORT).history)
+
+
+def test_least_load_is_so_among_all_that_reach_the_least_acceleration(rng) -> None:
+    """Against a fine scan of the line a_K = 0 through the box; where a_K = 0 is out of reach, the law has no choice."""
+    compared = 0
+    for _ in range(300):
+        D, v, springs = tuple(rng.normal(size=2) / 600.0), rng.normal(size=2), tuple(rng.normal(size=2) * 1500.0)
+        ends = np.stack([C_MIN * v, C_MAX * v]) * 0.2
+        low, high, found, smallest = ends.min(axis=0), ends.max(axis=0), np.empty(2), np.empty(2)
+        least_load_forces(springs, D, low, high, found)
+        a0 = float(np.dot(D, springs))
+        least_acceleration_forces(a0, D, low, high, SMALLEST, 0, smallest)
+        assert abs(a0 + np.dot(D, found)) == pytest.approx(abs(a0 + np.dot(D, smallest)), abs=1e-9)
+        assert np.all((low <= found) & (found <= high))
+        first = np.linspace(low[0], high[0], 4001)
+        second = (-a0 - D[0] * first) / D[1]
+        within = (second >= low[1]) & (second <= high[1])
+        loads = np.hypot(first + springs[0], second + springs[1])[within]
+        if loads.size:
+            assert np.hypot(*(found + springs)) <= loads.min() + 1e-6
+            compared += np.hypot(*(found + springs)) < np.hypot(*(smallest + springs)) - 1.0
+    assert compared > 30
 
 
 def test_a_groundhook_is_refused_with_the_reason() -> None:
