@@ -591,10 +591,10 @@ def test_the_story_tells_every_kept_back_test_where_it_is_asked_to() -> None:
     whole = "prediction of whole tests kept back: W_s 0.011 plain, 0.004 as handed on"
     each = [
         "kept back: r03 at 100 V, W_s 0.012 plain, 0.003 as handed on",
-        "left out: 50 V, between its neighbours W_s 0.02 plain, 0.01 as handed on",
+        "left out: 50 V, predicted from its neighbours with W_s 0.02 plain, 0.01 as handed on",
     ]
     plain = diagnosis_lines(diagnosis(), Control())
-    assert diagnosis_lines(predicted, Control()) == [*plain[:3], whole, *plain[3:]]
+    assert diagnosis_lines(predicted, Control()) == [*plain[:3], whole, each[-1], *plain[3:]]
     assert diagnosis_lines(predicted, Control(), every_test=True) == [*plain[:3], whole, *each, *plain[3:]]
 
 

@@ -103,7 +103,7 @@ class Region(Frozen):
 
 
 class NextTest(Frozen):
-    """The rig test that would separate the rivals best."""
+    """The rig test that would separate the rivals best; without rivals, one where the force is known least."""
 
     waveform: str
     frequency_Hz: float | None
@@ -118,6 +118,8 @@ class NextTest(Frozen):
     """Largest speed of the motion."""
     peak_force_N: float | None = None
     """Largest force that any of the rivals would reach in it."""
+    between_voltage_V: tuple[float, float] | None = None
+    """The tested voltages between which the force is known least, which the test is to show; None with rivals."""
 
 
 class Diagnosis(Frozen):

@@ -65,14 +65,14 @@ def _gap(diagnosis: Diagnosis) -> str:
 def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[str]:
     kept_back = {"tests": "whole tests", "mixed": "whole tests, or halves"}.get(found.hold_out, f"{found.hold_out}")
     yield f"prediction of {kept_back} kept back: W_s {number(found.W_s_plain)} plain, {number(found.W_s)} as handed on"
-    if not every_test:
-        return
-    for each in found.by:
-        at = "" if each.voltage is None else f" at {number(each.voltage)} {unit}"
-        yield f"kept back: {each.record}{at}, W_s {number(each.W_s_plain)} plain, {number(each.W_s)} as handed on"
-    for left in found.left_out_voltages:
+    if every_test:
+        for each in found.by:
+            at = "" if each.voltage is None else f" at {number(each.voltage)} {unit}"
+            yield f"kept back: {each.record}{at}, W_s {number(each.W_s_plain)} plain, {number(each.W_s)} as handed on"
+    listed = sorted(found.left_out_voltages, key=lambda left: -left.W_s)
+    for left in listed if every_test else listed[:1]:
         figures = f"W_s {number(left.W_s_plain)} plain, {number(left.W_s)} as handed on"
-        yield f"left out: {number(left.voltage)} {unit}, between its neighbours {figures}"
+        yield f"left out: {number(left.voltage)} {unit}, predicted from its neighbours with {figures}"
 
 
 def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:
@@ -121,5 +121,8 @@ def _next(test: NextTest, unit: str) -> str:
         if value is not None
     ]
     far = f", up to {' and '.join(reached)}" if reached else ""
-    between = f" to tell {' from '.join(test.separates)}" if test.separates else ""
-    return f"next test: {' '.join(part for part in parts if part)}{far}{between}"
+    aim = f" to tell {' from '.join(test.separates)}" if test.separates else ""
+    if test.between_voltage_V is not None:
+        low, high = (number(voltage) for voltage in test.between_voltage_V)
+        aim = f", since between {low} and {high} {unit} the force is known least"
+    return f"next test: {' '.join(part for part in parts if part)}{far}{aim}"

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from pzd.cli.exits import DONE, UNTRUSTED
-from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose
+from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose, command_line
 from pzd.cli.output import Output, complain
 from pzd.export.formats import formats
 
@@ -39,10 +39,11 @@ def export(
 ) -> int:
     """Write the damper of a run in the form that another tool takes."""
     from pzd.pipeline.command import opened
-    from pzd.pipeline.exporting import exported
+    from pzd.pipeline.exporting import LAST, exported
 
     output = Output(quiet=quiet, verbose=verbose)
-    written = exported(opened(config, runs, overrides or ()), to, out)
+    remedy = command_line(LAST, config, runs, overrides or ())
+    written = exported(opened(config, runs, overrides or ()), to, out, remedy)
     if as_json:
         files = [path.as_posix() for path in written.files]
         output.say_json({"format": to, "files": files, "not_to_be_trusted": written.marks})

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -29,3 +31,9 @@ Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print what the s
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for other programs.")]
 
 RUNS = Path("runs")
+
+
+def command_line(name: str, config: Path, runs: Path, overrides: Sequence[str]) -> str:
+    """What to type for another command on the same config, with the same results folder and values."""
+    options = ["--runs", str(runs)] if runs != RUNS else []
+    return shlex.join(["pzd", name, str(config), *options, *(word for one in overrides for word in ("--set", one))])

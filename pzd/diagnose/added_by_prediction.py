@@ -2,8 +2,9 @@
 
 Where a law is missing that no name accounts for, evidence weighed by noise misleads: each law is bent towards what is
 missing, and takes other values on other tests. What counts there is what the damper is for, to predict tests. An effect
-is added if whole tests that no fit has seen are predicted better with it, beyond chance, and at no voltage worse, those
-included that are predicted from the voltages around them. That makes no name of it: the verdict stays `unexplained`.
+is added if whole tests that no fit has seen are predicted better with it, beyond chance, and at no voltage worse; and
+if voltages left out are predicted no worse from those around them, beyond chance or not, since a law that takes other
+values there is none. That makes no name of it: the verdict stays `unexplained`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import Fitted
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.kept_back import Trials
-from pzd.diagnose.missed import Missed, worse
+from pzd.diagnose.missed import Missed
 from pzd.diagnose.search.candidates import Candidate, by_voltage, candidate, seen_in
 from pzd.diagnose.search.selection import Selection
 from pzd.diagnose.search.starts import most_promising
@@ -36,12 +37,14 @@ class Extended:
     selection: Selection
     missed: Missed
     """What it misses of kept-back tests."""
+    between: Missed
+    """What it misses of the voltages between others."""
     added: tuple[str, ...]
     """What was added, best first, in words."""
 
 
 def with_predictive_effects(
-    selection: Selection, missed: Missed, trials: Trials, config: DiagnoseConfig
+    selection: Selection, missed: Missed, between: Missed, trials: Trials, config: DiagnoseConfig
 ) -> Extended | None:
     """The damper with the effects that improve its prediction of kept-back tests, added one after another.
 
@@ -50,7 +53,7 @@ def with_predictive_effects(
     Parameters
     ----------
     selection : what was adopted
-    missed : what the damper misses of kept-back tests
+    missed, between : what the damper misses of kept-back tests, and of the voltages between others
     trials : the tests, dealt into folds
     config : how many effects there may be, which are forbidden, what is visible
 
@@ -61,10 +64,10 @@ def with_predictive_effects(
     added: list[Candidate] = []
     at = trials.fitted_by_criterion(selection.fitted.damper, trials.nothing)
     while at is not None:
-        found = _best(*at, missed, trials, config)
+        found = _best(*at, (missed, between), trials, config)
         if found is None:
             break
-        chosen, missed = found
+        chosen, missed, between = found
         added.append(chosen)
         log.info("diagnose: %s added, W_s of kept-back tests %.4g", _in_words(chosen), missed.criterion)
         at = trials.fitted_by_criterion(chosen.fitted.damper, trials.nothing)
@@ -74,7 +77,10 @@ def with_predictive_effects(
     reasons = {**selection.reasons, **{each.effect: ADDED for each in added if not each.varies}}
     last = replace(selection.last, whole=problem)
     return Extended(
-        replace(selection, fitted=fitted, last=last, reasons=reasons), missed, tuple(_in_words(each) for each in added)
+        replace(selection, fitted=fitted, last=last, reasons=reasons),
+        missed,
+        between,
+        tuple(_in_words(each) for each in added),
     )
 
 
@@ -83,19 +89,19 @@ def _in_words(added: Candidate) -> str:
 
 
 def _best(
-    problem: Problem, fitted: Fitted, missed: Missed, trials: Trials, config: DiagnoseConfig
-) -> tuple[Candidate, Missed] | None:
+    problem: Problem, fitted: Fitted, before: tuple[Missed, Missed], trials: Trials, config: DiagnoseConfig
+) -> tuple[Candidate, Missed, Missed] | None:
     """Of the candidates that fit best, the one that predicts best; None where none predicts better than without it."""
     promising = sorted(_tried(problem, fitted, config), key=lambda c: c.delta_bic)[:PREDICTED_AT_ONCE]
     better = []
     for each in promising:
         predicted = trials.missed_by_criterion(each.fitted.damper)
-        if _predicts_better(predicted, missed, trials):
+        if _predicts_better(predicted, before[0], trials):
             better.append((each, predicted))
-    between = trials.missed_between(fitted.damper) if better else None
     for each, predicted in sorted(better, key=lambda pair: pair[1].criterion or 0.0):
-        if between is None or not worse(trials.missed_between(each.fitted.damper), between):
-            return each, predicted
+        between = trials.missed_between(each.fitted.damper, by_criterion=True)
+        if not before[1].less_than(between):
+            return each, predicted, between
     return None
 
 

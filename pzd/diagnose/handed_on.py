@@ -31,6 +31,8 @@ class HandedOn:
     """What the plain damper misses of kept-back tests."""
     missed: Missed
     """What the damper handed on misses of them."""
+    between: Missed
+    """What it misses of the voltages between others, each left out of the fit."""
     refused: str | None
     """Why the plain damper is handed on although effects fitted the tests; None where it is not."""
     by_criterion: bool = False
@@ -40,15 +42,15 @@ class HandedOn:
 
     def prediction(self, trials: Trials) -> Prediction | None:
         """What is predicted of kept-back tests and voltages, for diagnosis.json; None where nothing could be."""
-        damper = self.selection.fitted.damper if self.selection.adopted else None
-        return trials.prediction(self.plain, self.missed, damper, by_criterion=self.by_criterion)
+        return trials.prediction(self.plain, self.missed, self.between)
 
 
 def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit: str) -> HandedOn:
     """Take back what makes the prediction of kept-back tests worse, until the damper does no harm or is the plain one.
 
     An effect goes without which the damper predicts better; and the last adopted one for as long as the plain damper,
-    as identify finds it without the kept-back tests, predicts better at any voltage.
+    as identify finds it without the kept-back tests, predicts better at any voltage, or much better a voltage between
+    two others.
 
     Parameters
     ----------
@@ -59,25 +61,30 @@ def handed_on(selection: Selection, trials: Trials, forced: Sequence[str], unit:
     """
     plain = trials.plain_missed()
     kept, refused = _without_impossible(selection, forced)
-    missed, by_criterion = plain, False
+    missed, between, by_criterion = plain, trials.plain_missed_between, False
     while kept.adopted:
         missed, by_criterion = _best(kept, trials)
+        between = trials.missed_between(kept.fitted.damper, by_criterion=by_criterion)
         ours = [name for name in kept.adopted if name not in forced]
-        worse = trials.worse(missed, plain)
+        compared, kind = (missed, plain), "kept-back ones"
+        worse = trials.worse(*compared)
+        if not worse:
+            compared, kind = (between, trials.plain_missed_between), "those of a voltage left out"
+            worse = trials.worse_between(between)
         harmful = _harmful(kept, trials, missed, ours, by_criterion=by_criterion) or (
             ours[-1] if worse and ours else None
         )
         if harmful is None:
             break
         if worse and len(kept.adopted) == 1:
-            refused = _refused(selection, (missed, plain), trials, worse, unit)
+            refused = _refused(selection, f"{kind} are predicted", compared, trials, worse, unit)
         kept = _without(kept, harmful)
     if not kept.adopted:
-        return HandedOn(kept, plain, plain, refused)
+        return HandedOn(kept, plain, plain, trials.plain_missed_between, refused)
     found = trials.fitted_by_criterion(kept.fitted.damper, trials.nothing) if by_criterion else None
     if found is not None:
         kept = replace(kept, fitted=found[1], last=replace(kept.last, whole=found[0]))
-    return HandedOn(kept, plain, missed, None, by_criterion)
+    return HandedOn(kept, plain, missed, between, None, by_criterion)
 
 
 def with_additions(handed: HandedOn, trials: Trials, config: DiagnoseConfig) -> HandedOn:
@@ -89,11 +96,17 @@ def with_additions(handed: HandedOn, trials: Trials, config: DiagnoseConfig) -> 
     trials : the tests, dealt into folds
     config : how many effects there may be, which are forbidden, what is visible
     """
-    more = with_predictive_effects(handed.selection, handed.missed, trials, config)
+    more = with_predictive_effects(handed.selection, handed.missed, handed.between, trials, config)
     if more is None:
         return handed
     return replace(
-        handed, selection=more.selection, missed=more.missed, refused=None, by_criterion=True, added=more.added
+        handed,
+        selection=more.selection,
+        missed=more.missed,
+        between=more.between,
+        refused=None,
+        by_criterion=True,
+        added=more.added,
     )
 
 
@@ -172,7 +185,12 @@ def _without(selection: Selection, effect: str, reason: str = HARMFUL) -> Select
 
 
 def _refused(
-    selection: Selection, missed: tuple[Missed, Missed], trials: Trials, worse: Sequence[float | None], unit: str
+    selection: Selection,
+    predicted: str,
+    missed: tuple[Missed, Missed],
+    trials: Trials,
+    worse: Sequence[float | None],
+    unit: str,
 ) -> str:
     """Why nothing that was adopted is handed on, with the figures where it is worst."""
     groups = dict(zip(trials.voltages, trials.groups, strict=True))
@@ -185,6 +203,6 @@ def _refused(
     adopted, plain = figures(worst)
     at = "" if worst is None or len(groups) == 1 else f" at {worst:.4g} {unit}"
     return (
-        f"{' and '.join(selection.adopted)} would fit the tests, but kept-back ones are predicted worse than by the "
+        f"{' and '.join(selection.adopted)} would fit the tests, but {predicted} worse than by the "
         f"plain damper (W_s {adopted:.2g} against {plain:.2g}{at}), which is handed on"
     )

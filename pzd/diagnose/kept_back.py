@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -25,6 +26,7 @@ from pzd.diagnose.fit.weights import record_likelihood, unweighted
 from pzd.diagnose.folds import deal
 from pzd.diagnose.missed import Missed, worse
 from pzd.diagnose.search.evidence import evidence_of
+from pzd.diagnose.thresholds import WORSE_BETWEEN
 from pzd.record import Mask
 from pzd.signals.nuisance import NuisanceConfig, columns_of
 
@@ -70,9 +72,20 @@ class Trials:
         whole = self.fitted_by_criterion(damper, self.nothing)
         return self._missed(self._by_criterion(whole[1].damper if whole else damper))
 
-    def missed_between(self, damper: Damper) -> Missed:
-        """What a damper misses of every voltage between two others, fitted by criterion (4) without that voltage."""
-        refit = self._by_criterion(damper)
+    @cached_property
+    def plain_missed_between(self) -> Missed:
+        """What the plain damper misses of every voltage between two others, fitted by criterion (4) without it."""
+        return self.missed_between(self.plain, by_criterion=True)
+
+    def missed_between(self, damper: Damper, *, by_criterion: bool) -> Missed:
+        """What a damper misses of every voltage between two others, fitted without that voltage.
+
+        Parameters
+        ----------
+        damper : the one handed on, or tried
+        by_criterion : whether it is fitted by criterion (4), else by the likelihood
+        """
+        refit = self._by_criterion(damper) if by_criterion else self._by_likelihood(damper)
         return self._joined([self._without_voltage(i, refit) for i in self.between()])
 
     def fitted_by_criterion(self, damper: Damper, kept_back: Sequence[Mask]) -> tuple[Problem, Fitted] | None:
@@ -90,23 +103,28 @@ class Trials:
         )
         return found or (self.voltages if worse(one, other) else ())
 
+    def worse_between(self, between: Missed) -> tuple[float | None, ...]:
+        """The voltages [V] between others at which a damper misses visibly and much more than the plain one does."""
+
+        def much_more(one: Missed, plain: Missed) -> bool:
+            return plain.less_than(one) and (one.criterion or 0.0) > WORSE_BETWEEN * (plain.criterion or 0.0)
+
+        pairs = {i: (each.of(self.groups[i]) for each in (between, self.plain_missed_between)) for i in self.between()}
+        return tuple(self.voltages[i] for i, pair in pairs.items() if much_more(*pair))
+
     def between(self) -> tuple[int, ...]:
         """The groups whose voltage lies between two others."""
         constant = sorted((v, i) for i, v in enumerate(self.voltages) if v is not None)
         return tuple(i for _, i in constant[1:-1])
 
-    def prediction(
-        self, plain: Missed, missed: Missed, damper: Damper | None, *, by_criterion: bool = False
-    ) -> Prediction | None:
+    def prediction(self, plain: Missed, missed: Missed, between: Missed) -> Prediction | None:
         """The figures of diagnosis.json; None where no test could be kept back.
 
         Parameters
         ----------
-        plain, missed : what the plain damper and the one handed on miss
-        damper : the one handed on where it is not the plain one
-        by_criterion : whether that is fitted by criterion (4)
+        plain, missed : what the plain damper and the one handed on miss of kept-back tests
+        between : what the one handed on misses of the voltages between others
         """
-        refit = self._by_criterion if by_criterion else self._by_likelihood
         whole = plain.criterion, missed.criterion
         if whole[0] is None or whole[1] is None:
             return None
@@ -117,7 +135,7 @@ class Trials:
                 if simple is not None and handed is not None:
                     name, at = self.campaign.prepared[i].record.name, voltage if controlled else None
                     by.append(KeptBack(record=name, voltage=at, W_s_plain=simple, W_s=handed))
-        left_out = [self._left_out(i, refit(damper) if damper else None) for i in self.between()]
+        left_out = [self._left_out(i, between) for i in self.between()]
         return Prediction(
             hold_out=self._hold_out(),
             by=tuple(sorted(by, key=lambda each: each.record)),
@@ -135,11 +153,10 @@ class Trials:
             return "tests"
         return "segments" if self.campaign.prepared[group[0]].cycles is None else "cycles"
 
-    def _left_out(self, group: int, refit: _Refit | None) -> LeftOut | None:
+    def _left_out(self, group: int, between: Missed) -> LeftOut | None:
         """One voltage predicted from those around it."""
         voltage = self.voltages[group]
-        plain = self._without_voltage(group, self._by_criterion(self.plain)).criterion
-        other = plain if refit is None else self._without_voltage(group, refit).criterion
+        plain, other = (each.of(self.groups[group]).criterion for each in (self.plain_missed_between, between))
         if voltage is None or plain is None or other is None:
             return None
         return LeftOut(voltage=voltage, W_s_plain=plain, W_s=other)

@@ -72,7 +72,7 @@ def reach_of(limits: Limits, prepared: Sequence[Prepared], voltages: Sequence[fl
         middle,
         amplitude,
         limits.speed_m_per_s or max(float(np.max(np.abs(r.velocity))) for r in records),
-        limits.frequency_Hz or max(_frequency(p) for p in prepared),
+        limits.frequency_Hz or max(frequency_of(p) for p in prepared),
         force if limits.force_N is None else (-limits.force_N, limits.force_N),
         _within(limits.voltage_V or _recorded_voltages(records), voltages),
     )
@@ -84,10 +84,10 @@ def _range(channels: Sequence[Array]) -> tuple[float, float]:
 
 def _tidy(middle: float, amplitude: float) -> float:
     """A middle that can be set: to a digit that is a hundredth of the amplitude's first digit or less."""
-    return round(middle, 3 - math.floor(math.log10(amplitude)))
+    return round(middle, 3 - math.floor(math.log10(amplitude))) + 0.0  # no minus before a zero
 
 
-def _frequency(prepared: Prepared) -> float:
+def frequency_of(prepared: Prepared) -> float:
     """Frequency of a record [Hz]; where it does not repeat, that of a sine with its stroke and speed."""
     if prepared.cycles is not None:
         return 1.0 / prepared.cycles.period
@@ -147,7 +147,7 @@ def next_test(
 
 def _plans(reach: Reach, temperature: float | None) -> Iterator[tuple[NextTest, Motion]]:
     shapes: tuple[tuple[str, Callable[[Array], Array], float], ...] = (
-        ("sine", _sine, 1.0),
+        ("sine", sine, 1.0),
         ("triangle", _triangle, 3.0),
     )
     voltages: list[float | tuple[float, ...] | None] = [*reach.voltages] or [None]
@@ -167,7 +167,7 @@ def _plans(reach: Reach, temperature: float | None) -> Iterator[tuple[NextTest, 
             voltage_V=voltage,
             separates=(),
         )
-        motion = _motion(shape, f, amplitude, voltage, temperature)
+        motion = motion_of(shape, f, amplitude, voltage, temperature)
         yield plan, replace(motion, displacement=reach.middle + motion.displacement)
 
 
@@ -177,13 +177,23 @@ def rounded_down(value: float) -> float:
     return round(math.floor(value * (1.0 + ROUND_OFF) * 10.0**digits) / 10.0**digits, max(digits, 0))
 
 
-def _motion(
+def motion_of(
     shape: Callable[[Array], Array],
     frequency: float,
     amplitude: float,
     voltage: float | tuple[float, ...] | None,
     temperature: float | None,
 ) -> Motion:
+    """Two cycles of a test about zero, the voltage constant, stepped between two, or none.
+
+    Parameters
+    ----------
+    shape : of a cycle of amplitude one, over the phase (n,) in cycles
+    frequency : [Hz]
+    amplitude : [m]
+    voltage : one, or two between which it steps [V]
+    temperature : [degC]
+    """
     time = np.arange(CYCLES * POINTS) / (POINTS * frequency)
     phase = frequency * time
     cycle = amplitude * shape(phase[:POINTS])
@@ -199,7 +209,8 @@ def _motion(
     return Motion(time, channels[0], channels[1], channels[2], signal, warmth)
 
 
-def _sine(phase: Array) -> Array:
+def sine(phase: Array) -> Array:
+    """A cycle of a sine of amplitude one over the phase (n,) in cycles."""
     return np.asarray(np.sin(2.0 * np.pi * phase))
 
 

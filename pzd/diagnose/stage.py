@@ -52,6 +52,7 @@ def diagnose(
     from pzd.diagnose.search.forward_selection import select_effects
     from pzd.diagnose.too_short import too_short, undecided
     from pzd.diagnose.verdict import parameters_of, ranking_of, unpredicted, weak
+    from pzd.diagnose.voltage_between import next_voltage
     from pzd.diagnose.where import regions
 
     records, cut_off = whole_records(rig, setting)
@@ -72,7 +73,16 @@ def diagnose(
     log.info("diagnose: %s, %s", decision.verdict, decision.reason)
     rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
     offsets = [campaign.offset(damper) for _, damper in selection.rivalling]
-    found = selection.fitted.damper.moved(zero) if selection.adopted else plain
+    model = selection.fitted.damper if selection.adopted else plain
+    found = model.moved(zero) if selection.adopted else plain
+    warmth = selection.first.whole.reference
+    test = (
+        next_test(rivals, reach, warmth, offsets)
+        if rivals
+        else next_voltage(
+            (found, campaign.offset(model)), trials, (handed.missed, handed.between), recorded, reach, warmth
+        )
+    )
     diagnosis = Diagnosis(
         verdict=decision.verdict,
         reason=decision.reason + weak(parts.hold_out) + unpredicted(prediction) + without(cut_off),
@@ -85,7 +95,7 @@ def diagnose(
         ranking=ranking_of(selection, selection.first),
         rivals=selection.rivals,
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),
-        next_test=next_test(rivals, reach, selection.first.whole.reference, offsets),
+        next_test=test,
     )
     if selection.adopted:
         rows = base_parameters(selection, decision.verdict, setting)

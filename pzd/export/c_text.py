@@ -22,7 +22,7 @@ def source(content: Content, name: str) -> bytes:
 
 def head(content: Content) -> str:
     """The comment that begins every file."""
-    return f"/* {content.origin} */\n"
+    return f"/* {content.origin.replace('*/', '* /')} */\n"
 
 
 def single(value: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,8 @@ from pzd.simulate.car import HalfCar
 from pzd.simulate.policy import TieBreak
 from pzd.table.lookup import Lookup
 
+WRITTEN_BY_PZD = re.compile(rb"pzd \S+, config ")
+"""How `Content.origin` begins, which every file holds: what has no such bytes is not from an export."""
 NEAR_ZERO = 1e-9
 """Speed that stands for -0 and +0 where a tool wants velocities that rise strictly [m/s].
 
@@ -60,11 +63,20 @@ class Content:
     """Whose comfort law a control unit follows."""
     tie_break: TieBreak
     """Which of the forces that make |a_K| smallest."""
+    setting: str | None = None
+    """Setting of the damper, where the config says of which one it is."""
+    edited: tuple[str, ...] = ()
+    """Files of the run that somebody edited by hand since it was written."""
+    marks: tuple[str, ...] = ()
+    """Why the damper is not to be trusted."""
 
     @property
     def origin(self) -> str:
-        """Where the damper comes from: what each header says."""
-        return f"pzd {self.version}, config {self.config}"
+        """Where the damper comes from, and what speaks against it: what each header says."""
+        setting = f", setting {' '.join(self.setting.split())}" if self.setting else ""
+        by_hand = f", edited by hand: {', '.join(self.edited)}" if self.edited else ""
+        marks = f", not to be trusted: {'; '.join(self.marks)}" if self.marks else ""
+        return f"pzd {self.version}, config {self.config}{setting}{by_hand}{marks}"
 
     @property
     def controlled(self) -> bool:

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pzd.export.content import Content
+from pzd.quantities import TEMPERATURE
 from pzd.record import Array
+from pzd.schema.filename import safe_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +40,10 @@ def curves(content: Content, name: str) -> Iterator[ForceCurve]:
     grid, control = content.full_grid(name), content.control
     for temperature, forces in zip(grid.temperatures, grid.forces, strict=True):
         for signal, force in zip(grid.voltages, forces, strict=True):
-            labels = [f"{signal:.12g}{control.unit}"] if content.controlled else []
+            labels = [safe_name(f"{signal:.12g}{control.unit}")] if content.controlled else []
             words = [f"{control.name} {signal:.12g} {control.unit}"] if content.controlled else []
             if temperature is not None:
-                words.append(f"{temperature:.12g} degC")
+                words.append(f"{temperature:.12g} {TEMPERATURE.unit}")
             if len(grid.temperatures) > 1:
-                labels.append(f"{temperature:.12g}degC")
+                labels.append(f"{temperature:.12g}{TEMPERATURE.unit}")
             yield ForceCurve("-".join([content.name, *labels]), ", ".join(words), grid.velocities, force)

@@ -21,10 +21,14 @@ from pzd.record import Array
 from pzd.schema.errors import ConfigError
 
 CARRIED = (
-    *("asymmetry", "end_stop", "gas_spring", "lash", "orifice_quadratic", "piezo_hysteresis", "preload_offset"),
-    *("relief_valve", "stribeck_friction", "temperature_drift"),
+    *("asymmetry", "end_stop", "fluid_inertia", "gas_spring", "lash", "orifice_quadratic", "piezo_hysteresis"),
+    *("preload_offset", "relief_valve", "stribeck_friction", "temperature_drift"),
 )
 """Effects whose path under held inputs is a closed form, piece by piece; `sources/element.c` holds them."""
+VARIABLES = (
+    *("displacement", "velocity", "signal", "temperature", "force", "initial_force", "zero", "time", "acceleration"),
+)
+"""What `sources/model.c` sets and gets, in the order of the value references of an FMU."""
 OF_THE_RIG = tuple(effect.name for effect in acting("sensor"))
 """Effects of the channels of a rig, which the damper itself does not have."""
 PLAY = ("piezo_hysteresis", "r")
@@ -47,9 +51,11 @@ class Dynamics:
     play: float
     """Half-width of the play of the drive, in units of the control signal."""
     reference: float
-    """T_ref of the drift [degC]."""
-    warms: bool
+    """T_ref of the drift, the lowest temperature without one [degC]."""
+    depends_on_temperature: bool
     """Whether the temperature matters."""
+    depends_on_acceleration: bool
+    """Whether the acceleration matters."""
 
     @classmethod
     def of(cls, damper: Damper, name: str) -> Dynamics:
@@ -73,25 +79,30 @@ class Dynamics:
         drifts = [effect.name for effect in acting("material") if effect.name in damper.effects]
         still = damper.model_copy(update={"effects": {k: v for k, v in damper.effects.items() if k not in drifts}})
         known = sorted({row.temperature_degC for row in damper.base if row.temperature_degC is not None})
-        warmth: list[float | None] = [*known] or [None]
-        signals = nodes_of(damper, warmth[0]).voltages
+        at_temperatures: list[float | None] = [*known] or [None]
+        temperatures, reference = np.array(known or [0.0]), damper.reference_temperature_degC
+        signals = nodes_of(damper, at_temperatures[0]).voltages
         extra = np.broadcast_to(columns_of(damper, COLUMNS, signals), (signals.size, len(COLUMNS)))
-        bases = [np.broadcast_to(material(still, signals, T), (signals.size, len(ELEMENT))) for T in warmth]
+        bases = [np.broadcast_to(material(still, signals, T), (signals.size, len(ELEMENT))) for T in at_temperatures]
         return cls(
-            np.array(known or [0.0]),
+            temperatures,
             signals,
             np.stack([np.hstack([base, extra]) for base in bases]),
             value_of(damper, *PLAY),
-            damper.reference_temperature_degC or 0.0,
+            float(temperatures[0]) if reference is None else reference,
             len(known) > 1 or bool(drifts),
+            "fluid_inertia" in damper.effects,
         )
 
 
 def start_values(content: Content, dynamics: Dynamics) -> Mapping[str, float]:
     """What the inputs and parameters begin with, by the name in C."""
     nearest = float(dynamics.signals[np.argmin(np.abs(dynamics.signals))])
-    temperature = dynamics.reference if dynamics.warms and dynamics.reference else float(dynamics.temperatures[0])
-    return {"START_SIGNAL": nearest, "START_TEMPERATURE": temperature, "START_ZERO": content.damper.zero_m}
+    return {
+        "START_SIGNAL": nearest,
+        "START_TEMPERATURE": dynamics.reference,
+        "START_ZERO": content.damper.zero_m,
+    }
 
 
 def data_of(content: Content, dynamics: Dynamics) -> tuple[str, str]:
@@ -107,7 +118,8 @@ def data_of(content: Content, dynamics: Dynamics) -> tuple[str, str]:
     sizes = {"TEMPERATURE_NODES": dynamics.temperatures.size, "SIGNAL_NODES": dynamics.signals.size}
     body = "".join(
         (
-            "enum { " + ", ".join(columns).upper() + ", COLUMNS };\n",
+            f"enum {{ {', '.join(VARIABLES).upper()}, VARIABLES }};\n",
+            f"enum {{ {', '.join(columns).upper()}, COLUMNS }};\n",
             *(f"#define {name} {size}\n" for name, size in sizes.items()),
             *(f"#define {name} {double(number)}\n" for name, number in numbers.items()),
             array("double", "TEMPERATURES", dynamics.temperatures, double),

@@ -8,7 +8,8 @@ from typing import Literal
 from xml.sax.saxutils import quoteattr
 
 from pzd.export.content import Content
-from pzd.export.dynamics import OF_THE_RIG, Dynamics, start_values
+from pzd.export.dynamics import OF_THE_RIG, VARIABLES, Dynamics, start_values
+from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, TEMPERATURE, TIME, VELOCITY, Quantity
 
 IDENTIFIER = "damper"
 """Name of the model in C, and of the library."""
@@ -17,6 +18,7 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "s": {"s": 1},
     "m": {"m": 1},
     "m/s": {"m": 1, "s": -1},
+    "m/s2": {"m": 1, "s": -2},
     "N": {"kg": 1, "m": 1, "s": -2},
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
     "A": {"A": 1},
@@ -31,7 +33,7 @@ class Variable:
 
     name: str
     reference: int
-    """Its place in the list of `sources/model.h`."""
+    """Its place in `VARIABLES`."""
     causality: Causality
     unit: str
     meaning: str
@@ -39,21 +41,41 @@ class Variable:
 
 
 def variables(content: Content, dynamics: Dynamics) -> tuple[Variable, ...]:
-    """The variables; the control signal and the temperature only where the damper has to do with them."""
-    control, start = content.control, start_values(content, dynamics)
-    held = "held over a step"
-    every = (
-        Variable("displacement", 0, "input", "m", f"extension; carried on with the velocity, {held}", 0.0),
-        Variable("velocity", 1, "input", "m/s", f"rate of extension, rebound positive, {held}", 0.0),
-        Variable(control.name, 2, "input", control.unit, f"control signal of the valve, {held}", start["START_SIGNAL"]),
-        Variable("temperature", 3, "input", "degC", f"of the damper, {held}", start["START_TEMPERATURE"]),
-        Variable("force", 4, "output", "N", "damper force; positive in rebound"),
-        Variable("initial_force", 5, "parameter", "N", "force of the oil spring at the start", 0.0),
-        Variable("zero", 6, "parameter", "m", "displacement that effects count from", start["START_ZERO"]),
-    )
-    absent = {2} if not content.controlled else set()
-    absent |= {3} if not dynamics.warms else set()
-    return tuple(one for one in every if one.reference not in absent)
+    """The variables; an input only where the damper has to do with it.
+
+    Parameters
+    ----------
+    content : the damper
+    dynamics : the same, laid out
+    """
+    start = start_values(content, dynamics)
+    found = [
+        _input("displacement", DISPLACEMENT, 0.0, "; carried on with the velocity"),
+        _input("velocity", VELOCITY, 0.0),
+        Variable("force", _reference("force"), "output", FORCE.unit, "damper force, positive in rebound"),
+        _parameter("initial_force", FORCE, 0.0, "force of the oil spring at the start"),
+        _parameter("zero", DISPLACEMENT, start["START_ZERO"], "displacement that effects count from"),
+    ]
+    if content.controlled:
+        found.append(_input("signal", content.control.quantity, start["START_SIGNAL"]))
+    if dynamics.depends_on_temperature:
+        found.append(_input("temperature", TEMPERATURE, start["START_TEMPERATURE"]))
+    if dynamics.depends_on_acceleration:
+        found.append(_input("acceleration", ACCELERATION, 0.0))
+    return tuple(sorted(found, key=lambda one: one.reference))
+
+
+def _reference(place: str) -> int:
+    return VARIABLES.index(place)
+
+
+def _input(place: str, quantity: Quantity, start: float, more: str = "") -> Variable:
+    meaning = f"{quantity.meaning}{more}, held over a step"
+    return Variable(quantity.name, _reference(place), "input", quantity.unit, meaning, start)
+
+
+def _parameter(name: str, quantity: Quantity, start: float, meaning: str) -> Variable:
+    return Variable(name, _reference(name), "parameter", quantity.unit, meaning, start)
 
 
 def description(content: Content) -> str:
@@ -113,7 +135,7 @@ def fmi3(content: Content, dynamics: Dynamics, token: str) -> str:
     dynamics : the same, laid out
     token : by which the library knows the description
     """
-    time = Variable("time", 7, "independent", "s", "simulated time")
+    time = Variable(TIME.name, _reference("time"), "independent", TIME.unit, "simulated time")
     found = (*variables(content, dynamics), time)
     output = next(one.reference for one in found if one.causality == "output")
     lines = [

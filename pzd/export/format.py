@@ -22,6 +22,9 @@ class Format:
     meaning: str
     """What it is for, in a few words."""
     files: Callable[[Content], Files]
-    """The files; the same bytes for the same damper."""
+    """The files; the same bytes for the same damper, and `Content.origin` in each, uncompressed.
+
+    Raises ConfigError where the format cannot hold the damper.
+    """
     needs: str | None = None
     """The library that writes it, an extra; None where pzd itself needs it anyway."""

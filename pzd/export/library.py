@@ -26,8 +26,16 @@ _PLATFORMS = {
 
 
 def folders() -> tuple[str | None, str | None]:
-    """Folder of a library of this machine in an FMU of FMI 2.0 and of FMI 3.0; None where neither has one."""
-    return _PLATFORMS.get((sys.platform, platform.machine()), (None, None))
+    """Folder of the library in an FMU of FMI 2.0 and of FMI 3.0; None, with a warning, where it will hold none."""
+    machine = (sys.platform, platform.machine())
+    found = _PLATFORMS.get(machine, (None, None))
+    without = [version for version, folder in zip(("2.0", "3.0"), found, strict=True) if folder is None]
+    if _compiler() is None:
+        found, without = (None, None), []
+        log.warning("there is no C compiler (gcc or cc): the FMUs hold their sources and no library")
+    for version in without:
+        log.warning("pzd builds no library for FMI %s on %s %s: that FMU holds its sources alone", version, *machine)
+    return found
 
 
 def suffix() -> str:
@@ -35,8 +43,8 @@ def suffix() -> str:
     return ".dylib" if sys.platform == "darwin" else ".so"
 
 
-def compiled_library(sources: Mapping[str, bytes], to_compile: Sequence[str]) -> bytes | None:
-    """The library; None, with a warning, where this machine has no compiler.
+def compiled_library(sources: Mapping[str, bytes], to_compile: Sequence[str]) -> bytes:
+    """The library.
 
     Parameters
     ----------
@@ -45,12 +53,11 @@ def compiled_library(sources: Mapping[str, bytes], to_compile: Sequence[str]) ->
 
     Raises
     ------
-    FilesError : when the compiler refuses them
+    FilesError : when there is no compiler, or it refuses them
     """
-    compiler = shutil.which("gcc") or shutil.which("cc")
+    compiler = _compiler()
     if compiler is None:
-        log.warning("there is no C compiler (gcc or cc): the FMU holds its sources and no library")
-        return None
+        raise FilesError("there is no C compiler (gcc or cc)")
     linked = ["-Wl,--build-id=none"] if sys.platform == "linux" else []
     with tempfile.TemporaryDirectory() as place:
         for name, data in sources.items():
@@ -58,5 +65,10 @@ def compiled_library(sources: Mapping[str, bytes], to_compile: Sequence[str]) ->
         command = [compiler, *_FLAGS, *linked, *to_compile, "-o", "library", "-lm"]
         done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)  # noqa: S603  # our own sources
         if done.returncode:
-            raise FilesError(f"{compiler}: {' '.join(done.stderr.split()) or 'it failed'}")
+            said = " ".join(done.stderr.split()) or f"exit code {done.returncode}"
+            raise FilesError(f"{compiler}: it does not compile the sources of the FMU; mend or remove it ({said})")
         return (Path(place) / "library").read_bytes()
+
+
+def _compiler() -> str | None:
+    return shutil.which("gcc") or shutil.which("cc")

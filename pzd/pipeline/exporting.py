@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from pzd.artefacts import Diagnosed, Identified, Table
-from pzd.export.content import Content
+from pzd.export.content import WRITTEN_BY_PZD, Content
 from pzd.export.formats import format_of
 from pzd.pipeline.command import Opened, stale_stages
 from pzd.runs.disk import as_files_error, versions
-from pzd.schema.errors import ConfigError
+from pzd.schema.errors import ConfigError, FilesError
+
+log = logging.getLogger(__name__)
 
 FOLDER = "export"
 """Where the files stand by default, in the folder of the run."""
-_LAST = "table"
+LAST = "table"
 """The last stage whose results are exported."""
 _BEHIND = ("simulate", "report")
 """Stages whose results are not."""
@@ -29,7 +33,7 @@ class Exported:
     """Why the damper is not to be trusted, a line a reason."""
 
 
-def exported(given: Opened, to: str, out: Path | None) -> Exported:
+def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
     """Write the damper of a run in one format.
 
     Parameters
@@ -37,6 +41,7 @@ def exported(given: Opened, to: str, out: Path | None) -> Exported:
     given : config and run
     to : name of the format
     out : folder of the files; None for `FOLDER` in the folder of the run
+    remedy : the command that brings the run up to date, as far as `LAST`
 
     Returns
     -------
@@ -46,21 +51,35 @@ def exported(given: Opened, to: str, out: Path | None) -> Exported:
     ------
     ConfigError : when there is no such format, it cannot hold this damper, or the run is not there or stale
     DataError : when a file of the run is at fault
-    FilesError : when the disk does not take the files
+    FilesError : when the disk does not take the files, or one stands there that is not from an export
     """
     wanted = format_of(to)
-    _check_fresh(given)
-    files = wanted.files(content_of(given))
+    _check_fresh(given, remedy)
+    content = content_of(given)
+    if content.edited:
+        log.warning("%s: edited by hand: %s; exported as it is", given.run.folder, ", ".join(content.edited))
+    with given.placed():
+        files = wanted.files(content)
     folder = out or given.run.folder / FOLDER
     with as_files_error(folder):
+        if out is not None:  # that of the run is pzd's own
+            _check_own(folder / name for name in files)
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():
             fresh = folder / f".{name}.new"
             fresh.write_bytes(data)
             fresh.replace(folder / name)
-    manifests = (given.run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Table))
-    marks = dict.fromkeys(mark for manifest in manifests if manifest for mark in manifest.marks)
-    return Exported(tuple(folder / name for name in files), tuple(marks))
+    return Exported(tuple(folder / name for name in files), content.marks)
+
+
+def _check_own(files: Iterable[Path]) -> None:
+    """Refuse to write over what is not from an export."""
+    foreign = [path for path in files if path.is_file() and not WRITTEN_BY_PZD.search(path.read_bytes())]
+    if foreign:
+        raise FilesError(
+            f"{path}: pzd export did not write this; move it away, or choose another folder by --out"
+            for path in foreign
+        )
 
 
 def content_of(given: Opened) -> Content:
@@ -71,6 +90,7 @@ def content_of(given: Opened) -> Content:
     DataError : when a file of the run is at fault
     """
     simulate = given.config.simulate
+    stages = {kind: given.run.stage_folder(kind.folder) for kind in (Identified, Diagnosed, Table)}
     return Content(
         name=given.run.config.stem,
         version=versions()["pzd"],
@@ -81,14 +101,18 @@ def content_of(given: Opened) -> Content:
         force_levels=given.config.table.force_levels,
         car=simulate.car.car(),
         tie_break=simulate.tie_break,
+        setting=given.config.setting,
+        edited=tuple(f"{kind.folder}/{name}" for kind in (Diagnosed, Table) for name in stages[kind].edited),
+        marks=tuple(
+            dict.fromkeys(mark for stage in stages.values() if stage.manifest for mark in stage.manifest.marks)
+        ),
     )
 
 
-def _check_fresh(given: Opened) -> None:
-    mends = f"pzd {_LAST} {given.run.config}"
+def _check_fresh(given: Opened, remedy: str) -> None:
     for kind in (Diagnosed, Table):
         if given.run.stage_folder(kind.folder).manifest is None:
-            raise ConfigError(f"{given.run.folder / kind.folder}: there is no result to export yet; {mends} makes it")
+            raise ConfigError(f"{given.run.folder / kind.folder}: there is no result to export yet; {remedy} makes it")
     for stage, reason in stale_stages(given).items():
         if stage not in _BEHIND:
-            raise ConfigError(f"{given.run.folder}: {stage} is stale: {reason}; {mends} brings it up to date")
+            raise ConfigError(f"{given.run.folder}: {stage} is stale: {reason}; {remedy} brings it up to date")

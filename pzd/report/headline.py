@@ -91,9 +91,11 @@ def _next(context: ReportContext) -> Card:
     if test is None:
         return Card("Which test next?", "None is proposed", "")
     names = listed([_name(effect) for effect in test.separates])
-    return Card(
-        "Which test next?", _capital(rig_test(context, test)), sentence(f"it separates {names}") if names else ""
-    )
+    why = sentence(f"it separates {names}") if names else ""
+    if test.between_voltage_V is not None:
+        low, high = (context.voltage(voltage) for voltage in test.between_voltage_V)
+        why = f"Between {low} and {high} the force is known least."
+    return Card("Which test next?", _capital(rig_test(context, test)), why)
 
 
 def _comfort(context: ReportContext) -> Card:

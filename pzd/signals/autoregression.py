@@ -71,7 +71,8 @@ class Autoregression:
         if p == 0 or self.innovation <= 0.0:
             return self
         shares = (np.arange(GRID) + 0.5) / GRID
-        r = np.array([np.mean(self.density(shares) * np.cos(2.0 * np.pi * shares * lag)) for lag in range(p + 1)])
+        density = self.density(shares)
+        r = np.array([np.mean(density * np.cos(2.0 * np.pi * shares * lag)) for lag in range(p + 1)])
         r[0] *= 1.0 + share
         a = solve_toeplitz(r[:p], r[1:])
         return Autoregression(a, float(r[0] - a @ r[1:]))

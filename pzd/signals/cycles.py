@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array
-from pzd.signals.departure import TOLERATED, departure
+from pzd.signals.departure import FEW, TOLERATED, departure
 from pzd.signals.edges import ROUNDS, averaged, force_span, motion_span
 from pzd.signals.period import Repeats, repeats
+from pzd.signals.smoothing import HIGHEST, low_pass
 
 FITTED_POINTS = 1000
 """Points of a cycle that the period is fitted to, at least, as far as there are samples."""
@@ -107,7 +108,7 @@ def cycles(time: Array, displacement: Array) -> Cycles | None:
     if found is None:
         return None
     run = _refined(time, displacement, found)
-    folded = run.fold(time, displacement)
+    folded = run.fold(time, displacement if run.count >= FEW else low_pass(displacement, HIGHEST))
     return None if departure(_without_hum(folded - drift(folded), run.period)) > TOLERATED else run
 
 

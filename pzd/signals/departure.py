@@ -2,7 +2,8 @@
 
 Two tones without a common period look alike from one cycle to the next, and yet their average
 holds but one of them. Noise differs between neighbouring cycles as much as between distant ones;
-a second tone, a beat or an amplitude that grows differs least between some neighbours.
+a second tone, a beat or an amplitude that grows differs least between some neighbours. Two or three
+cycles do not show that; of them the smoothed motion is compared, in which there is next to no noise.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ PARTS = (64, 16, 4)
 """Changes of the motion are compared over these parts of a cycle, so that quick motion of small size counts."""
 SIGNIFICANT = 5.0
 """Standard errors by which a departure must exceed the noise."""
+FEW = 4
+"""With fewer cycles than these, a tone that gains on each cycle is not told from noise by what neighbours differ."""
 INDEPENDENT = 20
 """Samples of a cycle that count as independent, at least, where its noise is coloured."""
 
@@ -32,16 +35,14 @@ def departure(folded: Array) -> float:
 
     Parameters
     ----------
-    folded : (n, points) displacement, one row a cycle, slow drift taken off
+    folded : (n, points) displacement, one row a cycle, slow drift taken off; of fewer than FEW cycles smoothed
 
     Returns
     -------
     r.m.s. as a share of that of the motion, the largest over the motion itself and its changes within parts of a
-    cycle; 0 within the noise, and with fewer than three cycles, which tell noise and motion not apart
+    cycle; 0 within the noise
     """
-    count, points = folded.shape
-    if count < 3:
-        return 0.0
+    points = folded.shape[1]
     steps = [points // part for part in PARTS if points >= 2 * part]
     return max(_excess(of) for of in (folded, *(folded[:, step:] - folded[:, :-step] for step in steps)))
 
@@ -49,8 +50,8 @@ def departure(folded: Array) -> float:
 def _excess(cycles: Array) -> float:
     count = len(cycles)
     about_mean = float(np.mean((cycles - cycles.mean(axis=0)) ** 2)) * count / (count - 1)
-    lags = range(1, min(NEIGHBOURS, count - 1) + 1)
-    noise = min(0.5 * float(np.mean((cycles[lag:] - cycles[:-lag]) ** 2)) for lag in lags)
+    lags = range(1, min(NEIGHBOURS, count - 1) + 1) if count >= FEW else ()
+    noise = min((0.5 * float(np.mean((cycles[lag:] - cycles[:-lag]) ** 2)) for lag in lags), default=0.0)
     excess = about_mean - noise
     if excess <= SIGNIFICANT * noise * np.sqrt(3.0 / (count * INDEPENDENT)):
         return 0.0

@@ -42,7 +42,7 @@ def extended(records: tuple[Record, ...], config: DiagnoseConfig) -> tuple[Exten
     selection, trials = plain_selection(records, config)
     missed = trials.plain_missed()
     assert missed.criterion is not None
-    return with_predictive_effects(selection, missed, trials, config), missed.criterion
+    return with_predictive_effects(selection, missed, trials.plain_missed_between, trials, config), missed.criterion
 
 
 def test_what_is_missing_is_added_one_effect_after_another(rng: np.random.Generator) -> None:
@@ -77,12 +77,15 @@ def test_what_only_a_sensor_shows_is_not_added(rng: np.random.Generator) -> None
     assert found is None or "sensor_delay" not in found.added
 
 
-@pytest.mark.parametrize(("offsets", "added"), [((0.0, 150.0, 300.0), True), ((200.0, -200.0, 200.0), False)])
+@pytest.mark.parametrize(("offsets", "added"), [((0.0, 150.0, 450.0), True), ((0.0, -100.0, 450.0), False)])
 def test_what_is_worse_between_the_voltages_is_not_added(
     offsets: tuple[float, ...], added: bool, rng: np.random.Generator
 ) -> None:
-    """An offset that grows with the voltage is known between two voltages, one that comes and goes is not."""
-    three = (0.0, 50.0, 100.0)
+    """An offset in proportion to the voltage is known between two voltages; of one that bends, the mean misses less.
+
+    At a third of the way from 0 to 450 N the line says 150 N; the mean of both ends is nearer to -100 N.
+    """
+    three = (0.0, 50.0, 150.0)
     by_voltage_V: dict[str, float | tuple[float, ...]] = {"F_0": offsets, "at_voltage_V": three}
     truth = damper_of(three).model_copy(update={"effects": {"preload_offset": by_voltage_V}})
     records = sines(truth, rng, three, tests=TESTS, cycles=3, noise=2e-3)
@@ -97,7 +100,9 @@ def test_what_is_worse_between_the_voltages_is_not_added(
     config = DiagnoseConfig(most_effects=1)
     trials = trials_of(campaign, plain.damper, config.visible)
     selection = Selection(plain, fitted, (), {"preload_offset": "adopted"}, evidence, evidence)
-    found = with_predictive_effects(selection, trials.missed_by_criterion(fitted.damper), trials, config)
+    missed = trials.missed_by_criterion(fitted.damper)
+    between = trials.missed_between(fitted.damper, by_criterion=True)
+    found = with_predictive_effects(selection, missed, between, trials, config)
     assert (found is not None and found.added == ("preload_offset by voltage",)) == added
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -46,7 +46,8 @@ def trials(records: tuple[Record, ...], plain: Damper) -> Trials:
 
 def predicted(records: tuple[Record, ...], plain: Damper, damper: Damper) -> Prediction:
     asked = trials(records, plain)
-    found = asked.prediction(asked.plain_missed(), asked.missed(damper), damper)
+    between = asked.missed_between(damper, by_criterion=False)
+    found = asked.prediction(asked.plain_missed(), asked.missed(damper), between)
     assert found is not None
     return found
 
@@ -104,7 +105,7 @@ def test_a_test_alone_at_its_voltage_keeps_back_its_cycles(
 def test_too_little_to_keep_a_test_back_is_told(rng: np.random.Generator) -> None:
     damper = damper_of((0.0,))
     asked = trials((sine(damper, 0.0, 1.0, 0.03, rng, cycles=1, rate=1000.0),), damper)
-    assert asked.prediction(asked.plain_missed(), asked.missed(damper), damper) is None
+    assert asked.prediction(asked.plain_missed(), asked.missed(damper), asked.plain_missed_between) is None
     assert "too little to keep a test back" in unpredicted(None)
 
 
@@ -137,6 +138,18 @@ def test_worse_by_less_than_can_be_seen_is_not_worse(rng: np.random.Generator) -
     assert asked.worse(replace(plain, error=plain.error + 2e-2), plain) == TWO
 
 
+def test_much_worse_between_is_visible_and_half_as_much_again(rng: np.random.Generator) -> None:
+    """The tests of one voltage all miss what the line misses: that they agree is no evidence."""
+    damper = damper_of((0.0, 50.0, 100.0))
+    asked = trials(sines(damper, rng, (0.0, 50.0, 100.0), tests=OTHER_TESTS, cycles=4), damper)
+    plain = asked.plain_missed_between
+    assert asked.worse_between(plain) == ()
+    assert asked.worse_between(replace(plain, error=1.4 * plain.error)) == ()
+    assert asked.worse_between(replace(plain, error=1.6 * plain.error)) == (50.0,)
+    small = replace(asked, visible=1.0)
+    assert small.worse_between(replace(small.plain_missed_between, error=1.6 * plain.error)) == ()
+
+
 @dataclass
 class FixedPredictions:
     """Stands for the tests of a campaign: by effects, what a damper misses at two voltages."""
@@ -146,6 +159,15 @@ class FixedPredictions:
     groups: tuple[tuple[int, ...], ...] = ((0, 1), (2, 3))
     plain: float = 1.0
     visible: float = 0.0025
+    between: dict[frozenset[str], float] = field(default_factory=dict)
+    """What is missed of the voltages between others; where nothing is given as much as by the plain damper."""
+    plain_missed_between: float = 1.0
+
+    def worse_between(self, between: float) -> tuple[float | None, ...]:
+        return (150.0,) if between > 1.5 * self.plain_missed_between else ()
+
+    def missed_between(self, damper: Damper, *, by_criterion: bool) -> float:
+        return self.between.get(frozenset(damper.effects), self.plain_missed_between)
 
     def plain_missed(self) -> float:
         return self.plain
@@ -207,6 +229,26 @@ def test_effects_that_harm_the_prediction_are_taken_back(
     else:
         assert found.refused is not None
         assert "W_s 1.2 against 1 at 150 V" in found.refused
+
+
+@pytest.mark.parametrize(("only_a", "kept"), [(1.1, (A,)), (1.7, ())], ids=["the second harms", "both harm"])
+def test_effects_that_harm_the_prediction_of_voltages_between_are_taken_back(
+    rng: np.random.Generator, only_a: float, kept: tuple[str, ...]
+) -> None:
+    fixed = FixedPredictions(
+        {frozenset((A, B)): _Figure(0.2), frozenset((A,)): _Figure(0.5), frozenset((B,)): _Figure(0.6)},
+        plain=_Figure(1.0),
+        between={frozenset((A, B)): _Figure(1.6), frozenset((A,)): _Figure(only_a)},
+        plain_missed_between=_Figure(1.0),
+    )
+    named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
+    found = handed_on(named, cast("Trials", fixed), (), "V")
+    assert found.selection.adopted == kept
+    assert cast("float", found.between) == (only_a if kept else 1.0)
+    assert (found.refused is None) == bool(kept)
+    if found.refused is not None:
+        assert "those of a voltage left out are predicted worse" in found.refused
+        assert "W_s 1.7 against 1 at 150 V" in found.refused
 
 
 def test_what_the_config_asks_for_is_handed_on_whatever_it_does(rng: np.random.Generator) -> None:

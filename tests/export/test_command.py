@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from exported_dampers import DAMPERS, content_of
 from stub_stages import UNDETERMINED, project
 
 from pzd.cli.app import status
@@ -68,9 +71,32 @@ def test_a_stale_run_says_why_and_what_to_run_and_a_stale_report_does_not_matter
     assert code == 2
     assert len(err) == 1
     assert err[0].startswith("runs/first: table is stale: ")
-    assert err[0].endswith("; pzd table first.yaml brings it up to date")
+    assert err[0].endswith("; pzd table first.yaml --set table.speed_points=30 brings it up to date")
     assert not Path("runs/first/export").exists()
     assert typed("export", "first.yaml", "--to", "csv", "--set", "report.daily_exposure_h=3")[0] == 0
+
+
+def test_what_it_says_to_type_makes_the_run_and_brings_it_up_to_date(typed) -> None:
+    for given in ((), ("--set", "table.speed_points=30")):
+        export = ("export", "first.yaml", "--to", "csv", "--runs", "my results", *given)
+        code, _, (line,) = typed(*export)
+        says = re.search(r"; pzd (.*) (?:makes it|brings it up to date)$", line)
+        assert code == 2
+        assert typed(*shlex.split(says[1]))[0] == 0
+        assert typed(*export)[0] == 0
+
+
+def test_a_table_that_a_format_cannot_hold_is_refused_with_its_place_in_the_config(
+    typed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Path("first.yaml").open("a") as config:
+        config.write("table: {outside: error}\n")
+    typed("table", "first.yaml")
+    empty = content_of(DAMPERS["plain"], outside="error")
+    monkeypatch.setattr("pzd.pipeline.exporting.content_of", lambda _: empty)
+    code, out, (line,) = typed("export", "first.yaml", "--to", "c")
+    assert (code, out) == (2, [])
+    assert line.startswith("first.yaml:4:18: table.outside: --to c cannot hold the empty cells")
 
 
 def test_a_format_that_there_is_not_gets_the_nearest(typed) -> None:
@@ -90,17 +116,46 @@ def test_without_its_library_a_format_names_the_extra(typed, monkeypatch: pytest
     assert "pip install 'pzd[formats]'" in line
 
 
+def test_a_table_that_was_edited_by_hand_says_so_on_the_screen_and_in_the_file(typed) -> None:
+    typed("table", "first.yaml")
+    table = Path("runs/first/4-table/force.csv")
+    head, *rows = table.read_text().splitlines()
+    table.write_text("\n".join([head, rows[0].replace(",0.1,", ",0.2,"), *rows[1:]]) + "\n")
+    code, _, err = typed("export", "first.yaml", "--to", "csv")
+    assert (code, err) == (0, ["runs/first: edited by hand: 4-table/force.csv; exported as it is"])
+    first_line = Path("runs/first/export/first-force.csv").read_text().splitlines()[0]
+    assert first_line.endswith(", config first.yaml, edited by hand: 4-table/force.csv: force")
+
+
 def test_a_damper_that_is_not_to_be_trusted_is_written_and_marked(typed) -> None:
     seed = ("--set", f"seed={UNDETERMINED}")
     typed("table", "first.yaml", *seed)
     code, out, err = typed("export", "first.yaml", "--to", "csv", *seed)
     assert (code, bool(out)) == (4, True)
     assert err[0].startswith("not to be trusted: ")
+    first_line = Path("runs/first/export/first-force.csv").read_text().splitlines()[0]
+    assert first_line.endswith(f", config first.yaml, {'; '.join(err)}: force")
 
 
 def test_help_names_every_format(typed) -> None:
     _, out, _ = typed("export", "--help")
     assert all(f"{name}: " in " ".join(out) for name in formats())
+
+
+def test_what_is_not_from_an_export_is_not_written_over(typed) -> None:
+    typed("table", "first.yaml")
+    export = ("export", "first.yaml", "--to", "csv", "--out", "elsewhere")
+    assert typed(*export)[0] == typed(*export)[0] == 0
+    mine = [Path("elsewhere/first-base.csv"), Path("elsewhere/first-force.csv")]
+    before = Path("elsewhere/first-inverse.csv").stat().st_mtime_ns
+    for path in mine:
+        path.write_text("mine")
+    code, out, err = typed(*export)
+    assert (code, out) == (5, [])
+    says = "pzd export did not write this; move it away, or choose another folder by --out"
+    assert sorted(err) == [f"{path}: {says}" for path in mine]
+    assert [path.read_text() for path in mine] == ["mine", "mine"]
+    assert Path("elsewhere/first-inverse.csv").stat().st_mtime_ns == before
 
 
 def test_a_file_where_the_folder_should_be_is_a_fault_of_the_files(typed) -> None:

@@ -27,12 +27,13 @@ from pzd.export.content import Content
 from pzd.export.dynamics import CARRIED, OF_THE_RIG, Dynamics, data_of
 from pzd.export.format import Files
 from pzd.export.formats import formats
-from pzd.schema.errors import ConfigError
+from pzd.schema.errors import ConfigError, FilesError
 
 GCC = shutil.which("gcc")
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed: apt-get install gcc")
 STRICT = ("-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wno-unused-parameter")
 STEPS = 1500
+INPUTS = ("displacement", "velocity", "acceleration", "voltage", "temperature")
 RAMP = 1e-12
 """Time in which our own simulation, whose inputs move linearly, goes from one held input to the next [s]."""
 
@@ -45,9 +46,10 @@ def with_effects(damper: Damper, **effects: dict[str, Any]) -> Damper:
 
 
 BESIDE = {
+    "fluid_inertia": {"m": 12.0},
     "gas_spring": {"k_g": 3000.0},
     "preload_offset": {"F_0": -80.0},
-    "end_stop": {"k_e": 3e6, "x_e": 0.02},
+    "end_stop": {"k_e": 3e4, "x_e": 0.02},
     "stribeck_friction": {"F_s": 120.0, "v_s": 0.05},
 }
 IN_THE_FLOW = {
@@ -88,6 +90,7 @@ class Held:
     step: np.ndarray
     displacement: np.ndarray
     velocity: np.ndarray
+    acceleration: np.ndarray
     voltage: np.ndarray
     temperature: np.ndarray
 
@@ -97,13 +100,13 @@ class Held:
         time = np.column_stack([start[:-1] + RAMP, start[1:]]).ravel()
         time[0] = 0.0
         gone = np.column_stack([np.append(0.0, np.full(n - 1, RAMP)), self.step]) * self.velocity[:, np.newaxis]
-        twice = {name: np.repeat(getattr(self, name), 2) for name in ("velocity", "voltage", "temperature")}
+        twice = {name: np.repeat(getattr(self, name), 2) for name in INPUTS[1:]}
         controlled = damper.base[0].voltage_V is not None
         return Motion(
             time,
             (self.displacement[:, np.newaxis] + gone).ravel(),
             twice["velocity"],
-            np.zeros(2 * n),
+            twice["acceleration"],
             twice["voltage"] if controlled else None,
             twice["temperature"] if controlled else None,
         ), np.arange(1, 2 * n, 2)
@@ -120,7 +123,8 @@ def held_inputs(rng: np.random.Generator) -> Held:
     velocity = np.where(np.abs(displacement) > 0.05, -np.sign(displacement) * np.abs(velocity), velocity)
     displacement = np.concatenate([[0.001], 0.001 + np.cumsum(velocity * step)[:-1]])
     voltage = np.repeat(rng.uniform(-20.0, 170.0, STEPS // 5), 5)
-    return Held(step, displacement, velocity, voltage, np.repeat(rng.uniform(10.0, 70.0, STEPS // 20), 20))
+    temperature = np.repeat(rng.uniform(10.0, 70.0, STEPS // 20), 20)
+    return Held(step, displacement, velocity, rng.normal(0.0, 20.0, STEPS), voltage, temperature)
 
 
 @cache
@@ -135,7 +139,8 @@ def inputs_of(name: str, held: Held) -> tuple[list[int], list[list[float]]]:
     content, _ = exported(name)
     columns = {0: held.displacement, 1: held.velocity}
     columns |= {2: held.voltage} if content.controlled else {}
-    columns |= {3: held.temperature} if Dynamics.of(content.damper, "fmu").warms else {}
+    columns |= {3: held.temperature} if Dynamics.of(content.damper, "fmu").depends_on_temperature else {}
+    columns |= {8: held.acceleration} if "fluid_inertia" in content.damper.effects else {}
     return list(columns), np.column_stack(list(columns.values())).tolist()
 
 
@@ -254,7 +259,7 @@ def test_the_size_of_the_step_adds_no_error_while_the_inputs_are_held(
 ) -> None:
     held, parts = held_inputs(rng), 5
     share = np.arange(STEPS * parts) % parts * np.repeat(held.step, parts) / parts
-    many = {field: np.repeat(getattr(held, field), parts) for field in ("velocity", "voltage", "temperature")}
+    many = {field: np.repeat(getattr(held, field), parts) for field in INPUTS[1:]}
     cut = Held(
         np.repeat(held.step, parts) / parts, np.repeat(held.displacement, parts) + share * many["velocity"], **many
     )
@@ -298,7 +303,7 @@ def test_the_core_runs_without_a_fault_of_memory_or_arithmetic(tmp_path: Path, r
     flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
     command = [str(GCC), *STRICT, *flags, "main.c", "model.c", "element.c", "-o", "it", "-lm"]
     subprocess.run(command, cwd=tmp_path / "sources", check=True)
-    columns = (held.step, held.displacement, held.velocity, held.voltage, held.temperature)
+    columns = (held.step, *(getattr(held, name) for name in INPUTS))
     text = "\n".join(" ".join(map(repr, row)) for row in np.column_stack(columns).tolist())
     done = subprocess.run([tmp_path / "sources" / "it"], input=text, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -311,16 +316,16 @@ MAIN = r"""
 #include "model.h"
 int main(void)
 {
+    static const unsigned inputs[] = {DISPLACEMENT, VELOCITY, ACCELERATION, SIGNAL, TEMPERATURE}, output[] = {FORCE};
     model m;
-    double step, value[4], time = 0.0, force;
+    double step, value[5], time = 0.0, force;
     model_reset(&m);
-    while (scanf("%lf %lf %lf %lf %lf", &step, &value[0], &value[1], &value[2], &value[3]) == 5) {
-        for (unsigned i = 0; i < 4; i++)
-            if (model_set(&m, i, value[i]) != NULL)
-                return 1;
+    while (scanf("%lf %lf %lf %lf %lf %lf", &step, &value[0], &value[1], &value[2], &value[3], &value[4]) == 6) {
+        if (model_set(&m, inputs, 5, value) != NULL)
+            return 1;
         if (!m.running)
             model_start(&m);
-        if (model_step(&m, time, step) != NULL || model_get(&m, FORCE, &force) != NULL)
+        if (model_step(&m, time, step) != NULL || model_get(&m, output, 1, &force) != NULL)
             return 1;
         time += step;
         printf("%.17g\n", force);
@@ -335,6 +340,7 @@ def test_an_fmu_is_the_same_bytes_twice_and_names_version_and_config() -> None:
     content, written = exported("all")
     assert written == formats()["fmu"].files(replace(content))
     for data in written.values():
+        assert content.origin.encode() in data
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             texts = [name for name in archive.namelist() if not name.startswith("binaries/") and "build" not in name]
             assert all(content.origin.encode() in archive.read(name) for name in texts)
@@ -353,7 +359,33 @@ def test_without_a_compiler_the_sources_are_all_there_is_and_that_is_said(
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             assert not any(name.startswith("binaries/") for name in archive.namelist())
             assert "sources/element.c" in archive.namelist()
-    assert "there is no C compiler" in caplog.text
+    assert caplog.text.count("there is no C compiler") == len(caplog.records) == 1
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("system", "machine", "without"), [("linux", "aarch64", ["2.0"]), ("freebsd14", "amd64", ["2.0", "3.0"])]
+)
+def test_a_version_that_has_no_library_on_this_machine_is_said(
+    system: str, machine: str, without: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("pzd.export.library.sys.platform", system)
+    monkeypatch.setattr("pzd.export.library.platform.machine", lambda: machine)
+    written = formats()["fmu"].files(content_of(DAMPERS["plain"]))
+    told = [f"pzd builds no library for FMI {version} on {system} {machine}" for version in without]
+    assert [record.getMessage().partition(":")[0] for record in caplog.records] == told
+    for version in ("2.0", "3.0"):
+        with zipfile.ZipFile(io.BytesIO(written[f"my-run-fmi{version[0]}.fmu"])) as archive:
+            assert any(name.startswith("binaries/") for name in archive.namelist()) == (version not in without)
+
+
+@needs_gcc
+def test_sources_that_the_compiler_refuses_are_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pzd.export.library._FLAGS", ("-std=none",))
+    with pytest.raises(FilesError, match="does not compile the sources of the FMU; mend or remove it") as refused:
+        formats()["fmu"].files(content_of(DAMPERS["plain"]))
+    assert len(refused.value.messages) == 1
+    assert "\n" not in refused.value.messages[0]
 
 
 def test_a_damper_without_a_control_signal_or_temperature_has_no_such_input() -> None:
@@ -411,3 +443,46 @@ def test_a_fault_of_the_caller_is_an_error_and_not_a_number(version: int, tmp_pa
         slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=-1.0)
     slave.terminate()
     slave.freeInstance()
+
+
+@needs_gcc
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_fault_of_the_caller_is_told(version: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    slave = slave_of(version, "plain", tmp_path)
+    slave.exitInitializationMode()
+    with pytest.raises(Exception, match="failed with status 3"):
+        slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=-1.0)
+    slave.freeInstance()
+    assert capsys.readouterr().out == "[ERROR] a step must be finite and above 0\n"
+
+
+@needs_gcc
+def test_a_fault_is_told_in_the_name_of_the_instance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fmi2 = pytest.importorskip("fmpy.fmi2", reason="FMPy is not installed: pip install fmpy")
+    told: list[tuple[bytes, bytes]] = []
+    logger = fmi2.fmi2CallbackLoggerTYPE(lambda _, name, status, category, message: told.append((name, message)))
+    monkeypatch.setattr(fmi2.defaultCallbacks, "logger", logger)
+    slave = slave_of(2, "plain", tmp_path)
+    with pytest.raises(Exception, match="failed with status 3"):
+        slave.setReal([4], [1.0])
+    slave.freeInstance()
+    assert told == [(b"it", b"no variable of this value reference can be set")]
+
+
+@needs_gcc
+def test_the_time_that_was_reached_is_known_and_no_step_is_pending(tmp_path: Path) -> None:
+    slave = slave_of(2, "plain", tmp_path)
+    slave.exitInitializationMode()
+    slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.25)
+    ok, discarded, answered = 0, 2, {}
+    kinds = {"": ctypes.c_int, "Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int}
+    for name, kind in {**kinds, "String": ctypes.c_char_p}.items():
+        ask = getattr(slave.dll, f"fmi2Get{name}Status")
+        for asked in range(4):
+            value = kind(1) if kind is not ctypes.c_char_p else kind()
+            status = ask(ctypes.c_void_p(slave.component), asked, ctypes.byref(value))
+            assert status in (ok, discarded)
+            answered |= {(name, asked): value.value} if status == ok else {}
+    slave.freeInstance()
+    last_successful_time, terminated = 2, 3
+    assert answered == {("Real", last_successful_time): 0.25, ("Boolean", terminated): 0}

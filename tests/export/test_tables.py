@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from exported_dampers import DAMPERS, content_of
+from scipy.io import loadmat
 
 from pzd.artefacts import ForceRow
 from pzd.export.content import Content
@@ -28,6 +30,14 @@ def test_a_format_gives_the_same_bytes_twice_and_names_version_and_config(name: 
     written = formats()[name].files(content)
     assert written == formats()[name].files(again)
     assert all(content.origin.encode() in data for data in written.values())
+
+
+@pytest.mark.parametrize("name", sorted(formats()))
+def test_a_format_names_the_setting_whatever_stands_in_it(name: str) -> None:
+    content = replace(content_of(DAMPERS["plain"]), setting="gap\n1 */ 'wide'")
+    for data in formats()[name].files(content).values():
+        assert re.search(rb"config my-run.yaml, setting gap 1 (\*/|\* /)", data)
+        assert name != "c" or data.count(b"*/") == data.count(b"/*")
 
 
 def test_csv_read_by_pandas_holds_every_cell(content: Content) -> None:
@@ -80,3 +90,17 @@ def test_a_parameter_that_differs_by_voltage_has_a_row_each() -> None:
     damper = DAMPERS["plain"].with_effect("orifice_quadratic", {"q": (100.0, 900.0), "at_voltage_V": (0.0, 150.0)})
     effects = json.loads(formats()["json"].files(content_of(damper))["my-run.json"])["effects"]["columns"]
     assert (effects["voltage_V"], effects["value"]) == ([0.0, 150.0], [100.0, 900.0])
+
+
+def test_what_the_effects_count_from_goes_with_them() -> None:
+    damper = DAMPERS["plain"].model_copy(update={"reference_temperature_degC": 30.0, "zero_m": 0.004})
+    content = content_of(damper.with_effect("temperature_drift", {"beta_T0": 0.01, "beta_C": 0.02}))
+    told = {"reference_temperature_degC": 30.0, "zero_m": 0.004}
+    written = {name: formats()[name].files(content) for name in ("csv", "json", "mat")}
+    csv = pd.read_csv(io.BytesIO(written["csv"]["my-run-reference.csv"]), comment="#")
+    assert csv.to_dict("records") == [told]
+    document = json.loads(written["json"]["my-run.json"])["reference"]
+    assert document["columns"] == {name: [value] for name, value in told.items()}
+    assert document["units"] == {"reference_temperature_degC": "degC", "zero_m": "m"}
+    damper = loadmat(io.BytesIO(written["mat"]["my-run.mat"]), simplify_cells=True)["damper"]
+    assert {name: damper[name] for name in told} == told

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from exported_dampers import DAMPERS, POINTS, content_of, largest
 
 from pzd.export.content import Content
 from pzd.export.formats import formats
+from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
 
 
@@ -131,3 +133,11 @@ def test_nothing_is_said_of_a_voltage_where_there_is_none(name: str) -> None:
 def test_empty_cells_are_refused(name: str) -> None:
     with pytest.raises(ConfigError, match=f"--to {name} cannot hold the empty cells"):
         formats()[name].files(content_of(DAMPERS["plain"], outside="error"))
+
+
+@pytest.mark.parametrize("name", ["tir", "chrono"])
+def test_the_unit_of_the_signal_makes_no_folder_in_the_name_of_a_file(name: str) -> None:
+    content = replace(content_of(DAMPERS["plain"]), control=Control("pump_speed", "1/min"))
+    written = formats()[name].files(content)
+    assert len(written) == len(conditions(content))
+    assert all(re.fullmatch(r"my-run-[0-9]+1_min[a-z.-]+", file) for file in written)

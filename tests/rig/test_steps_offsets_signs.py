@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from stepped_motions import NO_STEPS, STEPS, TIME, sine
+from test_preflight import record
 from written_files import lines, refused, run, write
 
 from pzd.record import Array
@@ -49,6 +50,32 @@ def test_an_offset_alike_in_all_files_is_a_preload_and_one_that_changes_a_tare(t
     said = offsets(tmp_path / "tare", [0.0, 0.0, 0.0, 120.0])
     assert said[:3] == ["", "", ""]
     assert "a tare that changed" in said[3]
+
+
+def delays(folder: Path) -> list[float]:
+    return [f.size for entry in run(folder).entries for f in entry.findings if f.check == "delay"]
+
+
+def test_a_hysteresis_is_no_delay_for_that_is_the_same_in_all_files(tmp_path: Path) -> None:
+    """Kwok et al. 2006, eq. (1): alpha tanh(beta v + delta sign(x)); each file by itself would take it for a delay."""
+    for frequency, amplitude in ((2.0, 0.01), (4.0, 0.005)):
+        x = sine(amplitude, frequency)
+        v = np.gradient(x, TIME)
+        force = 500.0 * v + 150.0 * np.tanh(60.0 * v + 0.2 * np.tanh(x / 0.002))
+        for folder in (tmp_path / "all", tmp_path / f"{frequency:g} Hz"):
+            stored(folder, f"{frequency:g} Hz", x, force)
+    alone = [delay for name in ("2 Hz", "4 Hz") for delay in delays(tmp_path / name)]
+    assert len(alone) == 2
+    assert abs(alone[0] - alone[1]) > 0.005
+    assert delays(tmp_path / "all") == []
+
+
+def test_a_delay_that_is_the_same_in_all_files_is_said(tmp_path: Path, rng: np.random.Generator) -> None:
+    for name in ("a", "b", "c"):
+        one = record("random", rng, noise=0.01, delay=0.008)
+        columns = {"time_s": one.time, "displacement_m": one.displacement, "force_N": one.force}
+        write(tmp_path / f"{name}.csv", lines(columns))
+    assert delays(tmp_path) == pytest.approx([0.008] * 3, abs=0.0015)
 
 
 def test_a_file_with_force_and_displacement_both_turned_over_is_said(tmp_path: Path) -> None:

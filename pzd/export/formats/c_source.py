@@ -13,13 +13,19 @@ NAME = "c"
 
 
 def files(content: Content) -> Files:
-    """Header and source, and the data that the source includes."""
+    """Header and source, and the data that the source includes.
+
+    Raises
+    ------
+    ConfigError : when the table has fewer than two control signals, or empty cells
+    """
     from pzd.export.c_text import source
     from pzd.schema.errors import ConfigError
 
     if not content.adjustable:
         raise ConfigError(
-            f"--to {NAME}: the table has no second control signal, so that there is nothing for a unit to set"
+            f"--to {NAME}: the table has no second control signal, so that there is nothing for a unit to set; "
+            "--to mat holds its force over velocity"
         )
     names = ("damper.h", "damper.c")
     return {name: source(content, name) for name in names} | {"damper_data.h": _data(content).encode()}
@@ -41,7 +47,7 @@ def _data(content: Content) -> str:
         "SIGNALS": first.voltages.size,
         "SPEEDS": first.speeds.size - 1,
         "HELD": int(content.held),
-        **{f"{name.upper()}": number for name, number in TIE_BREAKS.items()},
+        **{name.upper(): number for name, number in TIE_BREAKS.items()},
         "TIE_BREAK": TIE_BREAKS[content.tie_break],
     }
     return "".join(

@@ -16,7 +16,12 @@ NAME = "chrono"
 
 
 def files(content: Content) -> Files:
-    """A file a curve."""
+    """A file a curve.
+
+    Raises
+    ------
+    ConfigError : when the table has empty cells
+    """
     from pzd.export.curves import curves
     from pzd.schema.jsonfile import json_text
 

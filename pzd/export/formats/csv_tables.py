@@ -1,4 +1,4 @@
-"""CSV: the table of force, its inverse, T0, C and k, and the effects, each behind a line that says where it is from."""
+"""CSV: a file for each table of `pzd.export.tabular`, behind a line that says where it is from."""
 
 from __future__ import annotations
 

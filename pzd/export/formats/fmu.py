@@ -17,11 +17,17 @@ if TYPE_CHECKING:
 
 NAME = "fmu"
 _COMMON = ("element.c", "model.c")
-_HEADERS = ("element.h", "model.h")
+_HEADERS = ("element.h", "export.h", "model.h")
 
 
 def files(content: Content) -> Files:
-    """An FMU of each version."""
+    """An FMU of each version.
+
+    Raises
+    ------
+    ConfigError : when the damper has an effect that is not carried exactly
+    FilesError : when the compiler refuses the sources
+    """
     from pzd.export.c_text import source
     from pzd.export.dynamics import Dynamics, data_of
     from pzd.export.fmi import IDENTIFIER, build_description, fmi2, fmi3
@@ -39,20 +45,20 @@ def files(content: Content) -> Files:
         else:
             members["modelDescription.xml"] = fmi3(content, dynamics, token).encode()
             members["sources/buildDescription.xml"] = build_description(to_compile).encode()
-        library = compiled_library(sources, to_compile) if folder else None
-        if library is not None:
-            members[f"binaries/{folder}/{IDENTIFIER}{suffix()}"] = library
-        found[f"{content.name}-fmi{version}.fmu"] = _archive(members)
+        if folder is not None:
+            members[f"binaries/{folder}/{IDENTIFIER}{suffix()}"] = compiled_library(sources, to_compile)
+        found[f"{content.name}-fmi{version}.fmu"] = _archive(members, content.origin)
     return found
 
 
-def _archive(members: Mapping[str, bytes]) -> bytes:
+def _archive(members: Mapping[str, bytes], comment: str) -> bytes:
     """A ZIP archive without times of writing."""
     from io import BytesIO
     from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
     written = BytesIO()
     with ZipFile(written, "w") as archive:
+        archive.comment = comment.encode()
         for name, data in sorted(members.items()):
             member = ZipInfo(name)  # dated 1980-01-01
             member.compress_type = ZIP_DEFLATED

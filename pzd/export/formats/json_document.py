@@ -19,10 +19,6 @@ def files(content: Content) -> Files:
         name: {"units": dict(table.units), "columns": {key: list(cells) for key, cells in table.cells.items()}}
         for name, table in tables(content).items()
     }
-    document["damper"] = {
-        "reference_temperature_degC": content.damper.reference_temperature_degC,
-        "zero_m": content.damper.zero_m,
-    }
     return {f"{content.name}.json": f"{json_text(document)}\n".encode()}
 
 

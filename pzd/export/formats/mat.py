@@ -27,26 +27,28 @@ def files(content: Content) -> Files:
     from scipy.io import savemat
 
     written = BytesIO()
-    savemat(written, variables(content), oned_as="row", long_field_names=True)  # type: ignore[arg-type]  # a file will do
+    savemat(written, _variables(content), oned_as="row", long_field_names=True)  # type: ignore[arg-type]  # a file will do
     text = f"MATLAB 5.0 MAT-file, {content.origin}".encode()[:_TEXT].ljust(_TEXT)  # in place of the time of writing
     return {f"{content.name}.mat": text + written.getvalue()[_TEXT:]}
 
 
-def variables(content: Content) -> dict[str, Any]:
+def _variables(content: Content) -> dict[str, Any]:
     """What the file holds, by name."""
     import numpy as np
+
+    from pzd.quantities import FORCE, TEMPERATURE, VELOCITY
 
     grid, control = content.grid, content.control
     forces = np.moveaxis(grid.forces, 0, 2)
     found: dict[str, Any] = {"origin": content.origin, "damper": _parameters(content)}
     found["bp2" if content.adjustable else "bp1"] = grid.velocities
-    found["units"] = {"velocity": "m/s", "force": "N"}
+    found["units"] = {q.name: q.unit for q in (VELOCITY, FORCE)}
     if content.adjustable:
         found |= {"bp1": grid.voltages} | _inverse(content)
         found["units"][control.name] = control.unit
     if len(grid.temperatures) > 1:
         found["bp3" if content.adjustable else "bp2"] = np.array(grid.temperatures, dtype=np.float64)
-        found["units"]["temperature"] = "degC"
+        found["units"][TEMPERATURE.name] = TEMPERATURE.unit
     else:
         forces = forces[:, :, 0]
     found["table"] = forces if content.adjustable else forces[0]
@@ -71,18 +73,23 @@ def _inverse(content: Content) -> dict[str, Any]:
 
 
 def _parameters(content: Content) -> dict[str, Any]:
-    """T0, C and k by column, and the parameters of the effects, as structures."""
+    """T0, C and k by column, the parameters of the effects, and what these count from, as structures."""
     import numpy as np
 
     from pzd.export.tabular import tables
 
-    cells = tables(content)["base"].cells
-    base = {key: np.array([np.nan if cell is None else cell for cell in column]) for key, column in cells.items()}
+    numbers = {
+        name: {
+            key: np.array([np.nan if cell is None else cell for cell in column]) for key, column in table.cells.items()
+        }
+        for name, table in tables(content).items()
+        if name in ("base", "reference")
+    }
     effects = {
         name: {content.control.renamed(key): np.atleast_1d(value) for key, value in given.items()}
         for name, given in content.damper.effects.items()
     }
-    return {"base": base, "effects": effects or np.zeros((0, 0))}
+    return {"base": numbers["base"], "effects": effects or np.zeros((0, 0)), **numbers.get("reference", {})}
 
 
 FORMAT = Format("mat", "breakpoints and tables for Simulink and Octave", files)

@@ -20,24 +20,34 @@ NAME = "modelica"
 
 
 def files(content: Content) -> Files:
-    """One text file with every table."""
+    """One text file with every table.
+
+    Raises
+    ------
+    ConfigError : when the table has empty cells
+    """
     import numpy as np
 
     from pzd.export.content import comment
     from pzd.export.inverse import inverses
+    from pzd.quantities import FORCE, TEMPERATURE, VELOCITY
 
     grid, control = content.full_grid(NAME), content.control
-    text = ["#1\n", comment([content.origin, "velocity [m/s], rebound positive; force [N]"], "#")]
-    for n, (temperature, forces) in enumerate(zip(grid.temperatures, grid.forces, strict=True), 1):
-        number = f"_{n}" if len(grid.temperatures) > 1 else ""
+    text = [
+        "#1\n",
+        comment([content.origin, f"velocity [{VELOCITY.unit}], rebound positive; force [{FORCE.unit}]"], "#"),
+    ]
+    inverse_tables = inverses(content)
+    for n, (temperature, forces) in enumerate(zip(grid.temperatures, grid.forces, strict=True)):
+        number = f"_{n + 1}" if len(grid.temperatures) > 1 else ""
         if temperature is not None:
-            text.append(comment([f"at {temperature:g} degC:"], "#"))
+            text.append(comment([f"at {temperature:.12g} {TEMPERATURE.unit}:"], "#"))
         if not content.adjustable:
             text.append(_table(f"force{number}", np.column_stack([grid.velocities, forces[0]])))
             continue
         text.append(comment([f"force: u1 {control.name} [{control.unit}], hold beyond its ends; u2 velocity"], "#"))
         text.append(_table(f"force{number}", _bordered(grid.voltages, grid.velocities, forces)))
-        inverse = inverses(content)[n - 1]
+        inverse = inverse_tables[n]
         text.append(comment([f"inverse: u1 velocity, u2 share of inverse_range; {control.name} [{control.unit}]"], "#"))
         text.append(_table(f"inverse{number}", _bordered(grid.velocities, inverse.shares, inverse.signals)))
         columns = np.column_stack([grid.velocities, inverse.low, inverse.high])

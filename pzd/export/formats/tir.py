@@ -17,7 +17,12 @@ NAME = "tir"
 
 
 def files(content: Content) -> Files:
-    """A file a curve."""
+    """A file a curve.
+
+    Raises
+    ------
+    ConfigError : when the table has empty cells
+    """
     from pzd.export.curves import curves
 
     return {f"{one.name}.dpr": _text(one, content.origin).encode() for one in curves(content, NAME)}

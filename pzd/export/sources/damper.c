@@ -28,14 +28,14 @@ static struct place place_of(const float *nodes, int count, float value)
     return at;
 }
 
-static struct place warmth(float temperature)
+static struct place place_of_temperature(float temperature)
 {
     struct place at = place_of(TEMPERATURES, DAMPER_TEMPERATURES, temperature);
     at.share = clamped(at.share, 0.0f, 1.0f);
     return at;
 }
 
-static struct place speed(float velocity)
+static struct place place_of_speed(float velocity)
 {
     struct place at = place_of(SPEEDS, DAMPER_SPEEDS, fabsf(velocity));
     if (DAMPER_HELD)
@@ -64,7 +64,7 @@ static int side_of(float velocity)
 
 float damper_force(float temperature, float signal, float velocity)
 {
-    const struct place warm = warmth(temperature), fast = speed(velocity);
+    const struct place warm = place_of_temperature(temperature), fast = place_of_speed(velocity);
     const struct place at = place_of(SIGNALS, DAMPER_SIGNALS, signal);
     const int side = side_of(velocity);
     return between(at_node(warm, at.low, fast, side), at_node(warm, at.high, fast, side),
@@ -73,7 +73,7 @@ float damper_force(float temperature, float signal, float velocity)
 
 void damper_range(float temperature, float velocity, float *low, float *high)
 {
-    const struct place warm = warmth(temperature), fast = speed(velocity);
+    const struct place warm = place_of_temperature(temperature), fast = place_of_speed(velocity);
     const int side = side_of(velocity);
     *low = *high = at_node(warm, 0, fast, side);
     for (int i = 1; i < DAMPER_SIGNALS; i++) {
@@ -85,7 +85,7 @@ void damper_range(float temperature, float velocity, float *low, float *high)
 
 float damper_signal(float temperature, float force, float velocity)
 {
-    const struct place warm = warmth(temperature), fast = speed(velocity);
+    const struct place warm = place_of_temperature(temperature), fast = place_of_speed(velocity);
     const int side = side_of(velocity);
     float before = at_node(warm, 0, fast, side);
     float found = SIGNALS[0], nearest = fabsf(force - before);

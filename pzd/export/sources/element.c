@@ -39,13 +39,13 @@ static double felt(double effective, double signal)
 /* The parameters now: linear over temperature and effective signal, held beyond, T0 and C as the drift has them. */
 static void parameters(double effective, double temperature, double *p)
 {
-    double warm, share;
-    const int t = place_of(TEMPERATURES, TEMPERATURE_NODES, temperature, &warm);
-    const int s = place_of(SIGNALS, SIGNAL_NODES, effective, &share);
+    double warmer, higher; /* shares of the nodes above */
+    const int t = place_of(TEMPERATURES, TEMPERATURE_NODES, temperature, &warmer);
+    const int s = place_of(SIGNALS, SIGNAL_NODES, effective, &higher);
     const int t1 = t + 1 < TEMPERATURE_NODES ? t + 1 : t, s1 = s + 1 < SIGNAL_NODES ? s + 1 : s;
     for (int n = 0; n < COLUMNS; n++)
-        p[n] = between(between(ROWS[t][s][n], ROWS[t1][s][n], warm), between(ROWS[t][s1][n], ROWS[t1][s1][n], warm),
-                       share);
+        p[n] = between(between(ROWS[t][s][n], ROWS[t1][s][n], warmer),
+                       between(ROWS[t][s1][n], ROWS[t1][s1][n], warmer), higher);
     p[T0] *= exp(-p[TEMPERATURE_DRIFT_BETA_T0] * (temperature - REFERENCE_TEMPERATURE));
     p[C] *= exp(-p[TEMPERATURE_DRIFT_BETA_C] * (temperature - REFERENCE_TEMPERATURE));
 }
@@ -159,10 +159,10 @@ static double deflection_after(double deflection, double u, double step, const d
 }
 
 /* Force [N] beside the element. */
-static double parallel(double x, double v, const double *p)
+static double parallel(double x, double v, double a, const double *p)
 {
     const double beyond = fmax(fabs(x) - p[END_STOP_X_E], 0.0), slow = v / p[STRIBECK_FRICTION_V_S];
-    double force = p[PRELOAD_OFFSET_F_0] + p[GAS_SPRING_K_G] * x;
+    double force = p[PRELOAD_OFFSET_F_0] + p[GAS_SPRING_K_G] * x + p[FLUID_INERTIA_M] * a;
     if (beyond > 0.0)
         force += copysign(p[END_STOP_K_E] * beyond * beyond, x);
     if (p[STRIBECK_FRICTION_F_S] != 0.0 && v != 0.0)
@@ -193,5 +193,5 @@ double element_force(element_state state, const element_inputs *inputs)
 {
     double p[COLUMNS];
     parameters(felt(state.effective, inputs->signal), inputs->temperature, p);
-    return spring(state.deflection, p) + parallel(inputs->displacement, inputs->velocity, p);
+    return spring(state.deflection, p) + parallel(inputs->displacement, inputs->velocity, inputs->acceleration, p);
 }

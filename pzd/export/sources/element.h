@@ -13,6 +13,7 @@ typedef struct {
 typedef struct {
     double displacement; /* of the rod, counted from the zero of the effects [m] */
     double velocity;     /* [m/s] */
+    double acceleration; /* for the inertia of the fluid alone [m/s2] */
     double signal;       /* control signal */
     double temperature;  /* [degC] */
 } element_inputs;

@@ -3,15 +3,8 @@
 #include <string.h>
 
 #include "element_data.h"
+#include "export.h"
 #include "model.h"
-
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#elif defined(__GNUC__)
-#define EXPORT __attribute__((visibility("default")))
-#else
-#define EXPORT
-#endif
 
 typedef void *fmi2Component, *fmi2ComponentEnvironment, *fmi2FMUstate;
 typedef unsigned int fmi2ValueReference;
@@ -33,6 +26,7 @@ typedef struct {
 typedef struct {
     model damper;
     const fmi2CallbackFunctions *callbacks;
+    char name[];
 } instance;
 
 static fmi2Status checked(const instance *self, const char *wrong)
@@ -40,8 +34,13 @@ static fmi2Status checked(const instance *self, const char *wrong)
     if (wrong == NULL)
         return fmi2OK;
     if (self->callbacks != NULL && self->callbacks->logger != NULL)
-        self->callbacks->logger(self->callbacks->componentEnvironment, "damper", fmi2Error, "logStatusError", "%s", wrong);
+        self->callbacks->logger(self->callbacks->componentEnvironment, self->name, fmi2Error, "logStatusError", wrong);
     return fmi2Error;
+}
+
+static model *damper_of(fmi2Component c)
+{
+    return &((instance *)c)->damper;
 }
 
 EXPORT const char *fmi2GetTypesPlatform(void)
@@ -63,12 +62,13 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
                                      const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging)
 {
     instance *self;
-    if (type != fmi2CoSimulation || guid == NULL || strcmp(guid, TOKEN) != 0)
+    if (type != fmi2CoSimulation || name == NULL || guid == NULL || strcmp(guid, TOKEN) != 0)
         return NULL;
-    self = calloc(1, sizeof *self);
+    self = calloc(1, sizeof *self + strlen(name) + 1);
     if (self != NULL) {
         model_reset(&self->damper);
         self->callbacks = callbacks;
+        strcpy(self->name, name);
     }
     return self;
 }
@@ -81,7 +81,7 @@ EXPORT void fmi2FreeInstance(fmi2Component c)
 EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real start,
                                       fmi2Boolean stopDefined, fmi2Real stop)
 {
-    ((instance *)c)->damper.values[TIME] = start;
+    damper_of(c)->values[TIME] = start;
     return fmi2OK;
 }
 
@@ -92,7 +92,7 @@ EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 
 EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
-    model_start(&((instance *)c)->damper);
+    model_start(damper_of(c));
     return fmi2OK;
 }
 
@@ -103,24 +103,18 @@ EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 
 EXPORT fmi2Status fmi2Reset(fmi2Component c)
 {
-    model_reset(&((instance *)c)->damper);
+    model_reset(damper_of(c));
     return fmi2OK;
 }
 
 EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t count, fmi2Real value[])
 {
-    fmi2Status status = fmi2OK;
-    for (size_t i = 0; i < count && status == fmi2OK; i++)
-        status = checked(c, model_get(&((instance *)c)->damper, vr[i], &value[i]));
-    return status;
+    return checked(c, model_get(damper_of(c), vr, count, value));
 }
 
 EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t count, const fmi2Real value[])
 {
-    fmi2Status status = fmi2OK;
-    for (size_t i = 0; i < count && status == fmi2OK; i++)
-        status = checked(c, model_set(&((instance *)c)->damper, vr[i], value[i]));
-    return status;
+    return checked(c, model_set(damper_of(c), vr, count, value));
 }
 
 #define NO_VARIABLES(type)                                                                                       \
@@ -140,24 +134,18 @@ NO_VARIABLES(String)
 
 EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    if (*state == NULL)
-        *state = malloc(sizeof(model));
-    if (*state == NULL)
-        return checked(c, "there is no memory for the state");
-    *(model *)*state = ((instance *)c)->damper;
-    return fmi2OK;
+    return checked(c, model_keep(damper_of(c), state));
 }
 
 EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
-    ((instance *)c)->damper = *(const model *)state;
+    model_take(damper_of(c), state);
     return fmi2OK;
 }
 
 EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    free(*state);
-    *state = NULL;
+    model_free(state);
     return fmi2OK;
 }
 
@@ -169,18 +157,12 @@ EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state
 
 EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 {
-    if (size < sizeof(model))
-        return checked(c, "the state does not fit");
-    memcpy(bytes, state, sizeof(model));
-    return fmi2OK;
+    return checked(c, model_write(state, bytes, size));
 }
 
 EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
 {
-    const fmi2Status status = size == sizeof(model) ? fmi2GetFMUstate(c, state) : checked(c, "this is no state of it");
-    if (status == fmi2OK)
-        memcpy(*state, bytes, sizeof(model));
-    return status;
+    return checked(c, model_read(bytes, size, state));
 }
 
 EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t unknowns,
@@ -204,7 +186,7 @@ EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueR
 
 EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean keeps)
 {
-    return checked(c, model_step(&((instance *)c)->damper, time, step));
+    return checked(c, model_step(damper_of(c), time, step));
 }
 
 EXPORT fmi2Status fmi2CancelStep(fmi2Component c)
@@ -212,33 +194,23 @@ EXPORT fmi2Status fmi2CancelStep(fmi2Component c)
     return checked(c, "no step is pending");
 }
 
-EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
-{
-    return fmi2Discard;
-}
+/* What can be told of a step, which is never pending. */
+#define STATUS(name, type, asked, told)                                                       \
+    EXPORT fmi2Status fmi2Get##name(fmi2Component c, const fmi2StatusKind kind, type *value) \
+    {                                                                                         \
+        if (kind != asked)                                                                    \
+            return fmi2Discard;                                                               \
+        *value = told;                                                                        \
+        return fmi2OK;                                                                        \
+    }
+#define NO_STATUS(name, type)                                                                 \
+    EXPORT fmi2Status fmi2Get##name(fmi2Component c, const fmi2StatusKind kind, type *value) \
+    {                                                                                         \
+        return fmi2Discard;                                                                   \
+    }
 
-EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
-{
-    if (kind != fmi2LastSuccessfulTime)
-        return fmi2Discard;
-    *value = ((instance *)c)->damper.values[TIME];
-    return fmi2OK;
-}
-
-EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
-{
-    return fmi2Discard;
-}
-
-EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
-{
-    if (kind != fmi2Terminated)
-        return fmi2Discard;
-    *value = 0;
-    return fmi2OK;
-}
-
-EXPORT fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
-{
-    return fmi2Discard;
-}
+STATUS(RealStatus, fmi2Real, fmi2LastSuccessfulTime, damper_of(c)->values[TIME])
+STATUS(BooleanStatus, fmi2Boolean, fmi2Terminated, 0)
+NO_STATUS(Status, fmi2Status)
+NO_STATUS(IntegerStatus, fmi2Integer)
+NO_STATUS(StringStatus, fmi2String)

@@ -6,15 +6,8 @@
 #include <string.h>
 
 #include "element_data.h"
+#include "export.h"
 #include "model.h"
-
-#if defined(_WIN32)
-#define EXPORT __declspec(dllexport)
-#elif defined(__GNUC__)
-#define EXPORT __attribute__((visibility("default")))
-#else
-#define EXPORT
-#endif
 
 typedef void *fmi3Instance, *fmi3InstanceEnvironment, *fmi3FMUState;
 typedef uint32_t fmi3ValueReference, fmi3UInt32;
@@ -46,6 +39,8 @@ typedef struct {
     fmi3LogMessageCallback log;
 } instance;
 
+static const char *const ONE_VALUE = "every variable has one value";
+
 static fmi3Status checked(const instance *self, const char *wrong)
 {
     if (wrong == NULL)
@@ -53,6 +48,11 @@ static fmi3Status checked(const instance *self, const char *wrong)
     if (self->log != NULL)
         self->log(self->environment, fmi3Error, "logStatusError", wrong);
     return fmi3Error;
+}
+
+static model *damper_of(fmi3Instance c)
+{
+    return &((instance *)c)->damper;
 }
 
 EXPORT const char *fmi3GetVersion(void)
@@ -107,13 +107,13 @@ EXPORT void fmi3FreeInstance(fmi3Instance c)
 EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                               fmi3Float64 start, fmi3Boolean stopDefined, fmi3Float64 stop)
 {
-    ((instance *)c)->damper.values[TIME] = start;
+    damper_of(c)->values[TIME] = start;
     return fmi3OK;
 }
 
 EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
 {
-    model_start(&((instance *)c)->damper);
+    model_start(damper_of(c));
     return fmi3OK;
 }
 
@@ -124,58 +124,46 @@ EXPORT fmi3Status fmi3Terminate(fmi3Instance c)
 
 EXPORT fmi3Status fmi3Reset(fmi3Instance c)
 {
-    model_reset(&((instance *)c)->damper);
+    model_reset(damper_of(c));
     return fmi3OK;
 }
 
 EXPORT fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t count, fmi3Float64 values[],
                                  size_t size)
 {
-    fmi3Status status = checked(c, count == size ? NULL : "every variable has one value");
-    for (size_t i = 0; i < count && status == fmi3OK; i++)
-        status = checked(c, model_get(&((instance *)c)->damper, vr[i], &values[i]));
-    return status;
+    return checked(c, count == size ? model_get(damper_of(c), vr, count, values) : ONE_VALUE);
 }
 
 EXPORT fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t count,
                                  const fmi3Float64 values[], size_t size)
 {
-    fmi3Status status = checked(c, count == size ? NULL : "every variable has one value");
-    for (size_t i = 0; i < count && status == fmi3OK; i++)
-        status = checked(c, model_set(&((instance *)c)->damper, vr[i], values[i]));
-    return status;
+    return checked(c, count == size ? model_set(damper_of(c), vr, count, values) : ONE_VALUE);
 }
 
 EXPORT fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step, fmi3Boolean keeps,
                              fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
                              fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
 {
-    const fmi3Status status = checked(c, model_step(&((instance *)c)->damper, time, step));
+    const fmi3Status status = checked(c, model_step(damper_of(c), time, step));
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
-    *lastSuccessfulTime = ((instance *)c)->damper.values[TIME];
+    *lastSuccessfulTime = damper_of(c)->values[TIME];
     return status;
 }
 
 EXPORT fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
 {
-    if (*state == NULL)
-        *state = malloc(sizeof(model));
-    if (*state == NULL)
-        return checked(c, "there is no memory for the state");
-    *(model *)*state = ((instance *)c)->damper;
-    return fmi3OK;
+    return checked(c, model_keep(damper_of(c), state));
 }
 
 EXPORT fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
 {
-    ((instance *)c)->damper = *(const model *)state;
+    model_take(damper_of(c), state);
     return fmi3OK;
 }
 
 EXPORT fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
 {
-    free(*state);
-    *state = NULL;
+    model_free(state);
     return fmi3OK;
 }
 
@@ -187,18 +175,12 @@ EXPORT fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state,
 
 EXPORT fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size)
 {
-    if (size < sizeof(model))
-        return checked(c, "the state does not fit");
-    memcpy(bytes, state, sizeof(model));
-    return fmi3OK;
+    return checked(c, model_write(state, bytes, size));
 }
 
 EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
 {
-    const fmi3Status status = size == sizeof(model) ? fmi3GetFMUState(c, state) : checked(c, "this is no state of it");
-    if (status == fmi3OK)
-        memcpy(*state, bytes, sizeof(model));
-    return status;
+    return checked(c, model_read(bytes, size, state));
 }
 
 /* What the standard has beyond it, and this damper does not. */

@@ -1,13 +1,13 @@
 #include "model.h"
 
 #include <math.h>
-
-#include "element_data.h"
+#include <stdlib.h>
+#include <string.h>
 
 static element_inputs inputs_of(const model *m)
 {
     const element_inputs inputs = {m->values[DISPLACEMENT] + m->travel - m->values[ZERO], m->values[VELOCITY],
-                                   m->values[SIGNAL], m->values[TEMPERATURE]};
+                                   m->values[ACCELERATION], m->values[SIGNAL], m->values[TEMPERATURE]};
     return inputs;
 }
 
@@ -27,22 +27,26 @@ void model_start(model *m)
     m->running = 1;
 }
 
-const char *model_get(const model *m, unsigned variable, double *value)
+static double force_of(const model *m)
 {
-    if (variable >= VARIABLES)
-        return "there is no variable of this value reference";
-    *value = m->values[variable];
-    if (variable == FORCE) {
-        model now = *m;
-        if (!now.running)
-            model_start(&now);
-        const element_inputs inputs = inputs_of(&now);
-        *value = element_force(now.state, &inputs);
-    }
-    return 0;
+    model now = *m;
+    if (!now.running)
+        model_start(&now);
+    const element_inputs inputs = inputs_of(&now);
+    return element_force(now.state, &inputs);
 }
 
-const char *model_set(model *m, unsigned variable, double value)
+const char *model_get(const model *m, const unsigned variables[], size_t count, double values[])
+{
+    for (size_t i = 0; i < count; i++) {
+        if (variables[i] >= VARIABLES)
+            return "there is no variable of this value reference";
+        values[i] = variables[i] == FORCE ? force_of(m) : m->values[variables[i]];
+    }
+    return NULL;
+}
+
+static const char *set_one(model *m, unsigned variable, double value)
 {
     if (variable >= VARIABLES || variable == FORCE || variable == TIME)
         return "no variable of this value reference can be set";
@@ -53,7 +57,15 @@ const char *model_set(model *m, unsigned variable, double value)
     m->values[variable] = value;
     if (variable == DISPLACEMENT)
         m->travel = 0.0;
-    return 0;
+    return NULL;
+}
+
+const char *model_set(model *m, const unsigned variables[], size_t count, const double values[])
+{
+    const char *wrong = NULL;
+    for (size_t i = 0; i < count && wrong == NULL; i++)
+        wrong = set_one(m, variables[i], values[i]);
+    return wrong;
 }
 
 const char *model_step(model *m, double time, double step)
@@ -64,5 +76,43 @@ const char *model_step(model *m, double time, double step)
     m->state = element_after(m->state, &inputs, step);
     m->travel += m->values[VELOCITY] * step;
     m->values[TIME] = time + step;
-    return 0;
+    return NULL;
+}
+
+const char *model_keep(const model *m, void **state)
+{
+    if (*state == NULL)
+        *state = malloc(sizeof *m);
+    if (*state == NULL)
+        return "there is no memory for the state";
+    memcpy(*state, m, sizeof *m);
+    return NULL;
+}
+
+const char *model_write(const void *state, void *bytes, size_t size)
+{
+    if (size < sizeof(model))
+        return "the state does not fit";
+    memcpy(bytes, state, sizeof(model));
+    return NULL;
+}
+
+const char *model_read(const void *bytes, size_t size, void **state)
+{
+    model read;
+    if (size != sizeof read)
+        return "this is no state of it";
+    memcpy(&read, bytes, sizeof read);
+    return model_keep(&read, state);
+}
+
+void model_take(model *m, const void *state)
+{
+    memcpy(m, state, sizeof *m);
+}
+
+void model_free(void **state)
+{
+    free(*state);
+    *state = NULL;
 }

@@ -1,10 +1,11 @@
-/* The damper as variables with numbers, which both versions of FMI set, get and step. */
+/* The damper as variables with numbers, `VARIABLES` of `element_data.h`, which both versions of FMI set, get and step. */
 #ifndef MODEL_H
 #define MODEL_H
 
-#include "element.h"
+#include <stddef.h>
 
-enum { DISPLACEMENT, VELOCITY, SIGNAL, TEMPERATURE, FORCE, INITIAL_FORCE, ZERO, TIME, VARIABLES };
+#include "element.h"
+#include "element_data.h"
 
 typedef struct {
     double values[VARIABLES];
@@ -14,10 +15,17 @@ typedef struct {
 } model;
 
 /* Each of these gives NULL, or what is wrong. */
-const char *model_get(const model *m, unsigned variable, double *value);
-const char *model_set(model *m, unsigned variable, double value);
+const char *model_get(const model *m, const unsigned variables[], size_t count, double values[]);
+const char *model_set(model *m, const unsigned variables[], size_t count, const double values[]);
 const char *model_step(model *m, double time, double step);
 
+/* A state is a copy of the whole model, of its size in memory and in bytes; none is made where `*state` is one. */
+const char *model_keep(const model *m, void **state);
+const char *model_write(const void *state, void *bytes, size_t size);
+const char *model_read(const void *bytes, size_t size, void **state);
+
+void model_take(model *m, const void *state);
+void model_free(void **state);
 void model_reset(model *m);
 void model_start(model *m);
 

@@ -159,6 +159,9 @@ def next_test(context: ReportContext, test: NextTest | None) -> str:
         return "Next test: none is proposed."
     names = [effect_in_words(name) if name in known() else name for name in test.separates]
     aim = f". It separates: {'; '.join(names)}" if names else ""
+    if test.between_voltage_V is not None:
+        low, high = (context.voltage(voltage) for voltage in test.between_voltage_V)
+        aim = f". Between {low} and {high} the force is known least"
     far = (
         f". They differ there by {number(test.distance_percent, 2)} % of the peak force"
         if test.distance_percent

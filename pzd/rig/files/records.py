@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,6 +15,7 @@ from pzd.rig.files.sheet import ReadingStep
 from pzd.rig.files.splitting import Test
 from pzd.rig.preflight import Measured
 from pzd.schema.errors import ConfigError
+from pzd.schema.filename import safe_name
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
@@ -74,7 +74,7 @@ def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:
     ConfigError : when two records would have one name
     """
     files = list(dict.fromkeys(path for path, _ in tests))
-    stems = Counter(_safe(path.stem) for path in files)
+    stems = Counter(safe_name(path.stem) for path in files)
     called = [_called(path, number, stems) for path, number in tests]
     first: dict[str, Path] = {}
     faults: list[str] = []
@@ -88,10 +88,6 @@ def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:
 
 
 def _called(path: Path, number: int | None, stems: Counter[str]) -> str:
-    stem = _safe(path.stem)
-    whole = stem if stems[stem] == 1 else _safe(f"{path.resolve().parent.name}-{path.stem}")
+    stem = safe_name(path.stem)
+    whole = stem if stems[stem] == 1 else safe_name(f"{path.resolve().parent.name}-{path.stem}")
     return whole if number is None else f"{whole}-{number}"
-
-
-def _safe(name: str) -> str:
-    return re.sub(r"[^A-Za-z0-9._-]", "_", name)

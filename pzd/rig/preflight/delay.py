@@ -7,13 +7,16 @@ of the reversal. Tried on eleven laws with 0.5 and 2 Hz, 20 and 30 mm and 1 % of
 -0.3 to 1.4 ms without and 1.8 to 3.4 ms with a delay of 2 ms, but 13 and 15 ms under `rounded_yield`, whose lag is a
 speed, reached after w / a. With a term for that as well, four tests leave the time known to +-3 ms only (-8 to 4 ms
 without a delay). So nothing is said here; a diagnosis, which fits whole laws to all tests, names `sensor_delay`.
+
+The other way round, what one test takes for a delay is none where other tests ask for another one: a recorder is late
+by the same time in all, a hysteresis by an angle or a displacement.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from pzd.artefacts import Finding
+from pzd.artefacts import Finding, RecordEntry
 from pzd.record import is_constant, voltage_scale
 from pzd.rig.preflight import Measured
 from pzd.rig.reference_fit import VISIBLE, Piece, fit_reference, fitted
@@ -29,6 +32,8 @@ SIGMOIDS = (0.01, 0.03, 0.1, 0.3)
 LONGEST = 0.03
 """Largest delay looked for [s], or a twentieth of the cycle where that is less."""
 TRIES = 31
+ALIKE = 0.25
+"""Delays further than this share from the usual one are no recorder's: those tried lie 2 ms from one to the next."""
 
 
 def check(test: Measured) -> list[Finding]:
@@ -54,6 +59,23 @@ def check(test: Measured) -> list[Finding]:
             follows=f"it takes {1.0 - best.left / undelayed.left:.0%} of what a Bingham element leaves; not corrected",
         )
     ]
+
+
+def compared(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
+    """The same entries, without delays in settings whose records ask for different ones."""
+    found: dict[str | None, list[float]] = {}
+    for entry in entries:
+        found.setdefault(entry.setting, []).extend(f.size for f in entry.findings if f.check == "delay")
+    different = {
+        setting
+        for setting, delays in found.items()
+        if delays and np.ptp(delays) > 2.0 * max(ALIKE * abs(np.median(delays)), LEAST_DELAY)
+    }
+    return tuple(_without_delay(entry) if entry.setting in different else entry for entry in entries)
+
+
+def _without_delay(entry: RecordEntry) -> RecordEntry:
+    return entry.model_copy(update={"findings": tuple(f for f in entry.findings if f.check != "delay")})
 
 
 def _left_by_rigid(part: Piece) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import operator
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import reduce
@@ -17,6 +16,7 @@ from pzd.quantities import Control
 from pzd.rig.stand.programmes import Temperature, Voltage
 from pzd.rig.stand.waveform import Waveform
 from pzd.rig.stand.waveforms import waveforms
+from pzd.schema.filename import safe_name
 from pzd.schema.model import Frozen
 
 if TYPE_CHECKING:
@@ -245,7 +245,7 @@ class VirtualEntry(Frozen):
     ) -> str:
         parts = [self.setting or "", test.waveform.name, _voltage_name(voltage, unit), _temperature_name(temperature)]
         parts += [str(number)] if test.repeats > 1 else []
-        return re.sub(r"[^A-Za-z0-9._-]", "_", "-".join(part for part in parts if part))
+        return safe_name("-".join(part for part in parts if part))
 
 
 def _voltage_name(voltage: Voltage | None, unit: str) -> str:
