@@ -15,7 +15,7 @@ from pzd.quantities import Control
 from pzd.record import Array
 from pzd.schema.errors import ConfigError
 from pzd.simulate.car import HalfCar
-from pzd.simulate.minimise import TieBreak
+from pzd.simulate.policy import TieBreak
 from pzd.table.lookup import Lookup
 
 WRITTEN_BY_PZD = re.compile(rb"pzd \S+, config ")

@@ -24,7 +24,7 @@ from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 from pzd.simulate.config import KM_PER_H
 from pzd.simulate.linear import harmonic_response
-from pzd.simulate.minimise import TieBreak
+from pzd.simulate.policy import TieBreak
 
 _PRINTED = published()
 FREQUENCIES = (2.25, 4.5)

@@ -22,7 +22,8 @@ from pzd.simulate.car import HalfCar
 from pzd.simulate.demand import spring_acceleration
 from pzd.simulate.equations import body_acceleration
 from pzd.simulate.kinematics import suspension
-from pzd.simulate.minimise import LARGEST, TIE_BREAKS, TieBreak, farther_end, least_acceleration_forces
+from pzd.simulate.minimise import LARGEST, TIE_BREAKS, farther_end, least_acceleration_forces
+from pzd.simulate.policy import TieBreak
 from pzd.simulate.profile import Profile
 from pzd.simulate.ride_model import (
     DEFLECTION,

@@ -40,7 +40,7 @@ _OF_A_SINE = 1.5
 """A motion whose peak speed stays within so many times that of a sine is a simple swing."""
 _MOST_SAMPLES = 300_000
 """A map of the gap is made from about so many samples."""
-_REALISTIC = ("dynamic", "table", "ideal")
+REALISTIC = ("dynamic", "table", "ideal")
 """Fidelities, the one nearest to the road first."""
 
 
@@ -230,7 +230,7 @@ class ReportContext:
     def comparisons(self, road: str) -> tuple[Comparison, ...]:
         """The controlled policy beside the others over a road, a fidelity each, the one nearest to a real car first."""
         found = []
-        for fidelity in _REALISTIC:
+        for fidelity in REALISTIC:
             rows = {row.policy: row for row in self.cases(road) if row.fidelity == fidelity}
             controlled = [row for policy, row in rows.items() if self.simulate.is_controlled(policy)]
             others = tuple(rows[policy] for policy in BASELINES if policy in rows)
@@ -243,8 +243,8 @@ class ReportContext:
         compared = self.comparisons(road)
         if compared:
             return (compared[0].controlled, *compared[0].others)
-        best = min((_REALISTIC.index(row.fidelity) for row in self.cases(road)), default=0)
-        return tuple(row for row in self.cases(road) if row.fidelity == _REALISTIC[best])
+        best = min((REALISTIC.index(row.fidelity) for row in self.cases(road)), default=0)
+        return tuple(row for row in self.cases(road) if row.fidelity == REALISTIC[best])
 
     def policy(self, row: SummaryRow) -> str:
         """What drove the dampers, with what it held constant."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Place = Literal["characteristics", "model", "missing", "damper", "passenger"]
+Place = Literal["characteristics", "model", "missing", "damper", "passenger", "policies"]
 
 MEASURED = "#4d4d4d"
 BASELINE = "#d55e00"

@@ -10,7 +10,7 @@ from pzd.report.plots import library
 from pzd.report.sections import characteristics, damper, expected, made, missing, model, passenger, tested, trust
 from pzd.report.sections.pictures import Pictures
 
-_PLACES = ("characteristics", "model", "missing", "damper", "passenger")
+_PLACES = ("characteristics", "model", "missing", "damper", "passenger", "policies")
 
 
 def page(context: ReportContext, jobs: int = 1) -> str:

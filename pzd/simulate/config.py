@@ -14,13 +14,15 @@ from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 from pzd.simulate.cars import cars
 from pzd.simulate.policies import policies
+from pzd.simulate.policies.clipped_lqr import ClippedLqr
 from pzd.simulate.policies.comfort_predictive import ComfortPredictive
+from pzd.simulate.policies.skyhook_add import SkyhookAdd
+from pzd.simulate.policy import TieBreak
 from pzd.simulate.road import Road
 from pzd.simulate.roads import roads
 from pzd.simulate.roads.sine import Sine
 
 Fidelity = Literal["ideal", "table", "dynamic"]
-TieBreak = Literal["smallest", "equal_share", "largest"]
 
 if TYPE_CHECKING:
     RoadBlock = Road
@@ -32,6 +34,8 @@ KM_PER_H = 1.0 / 3.6
 """[m/s]"""
 DEFAULT_CONTROLLED = "comfort"
 """The policy that the report sets beside the others where the config does not say."""
+
+_NO_WHEELS = "; a groundhook damps the motion of wheels with mass, and those of this car have none"
 
 
 class CarBlock(Frozen):
@@ -128,6 +132,10 @@ class SimulateConfig(Frozen):
     default that of the table which is nearest to 0."""
     comfort_predictive: ComfortPredictive = ComfortPredictive()
     """Parameters of the policy `comfort_predictive`."""
+    clipped_lqr: ClippedLqr = ClippedLqr()
+    """Parameters of the policy `clipped_lqr`."""
+    skyhook_add: SkyhookAdd = SkyhookAdd()
+    """Parameters of the policy `skyhook_add`."""
     response_speed_m_per_s: float = Field(default=0.2, gt=0.0)
     """Speed at which the response of the damper's force to a step of voltage is computed."""
     bounds: Literal["coefficients", "table"] | None = None
@@ -166,7 +174,7 @@ class SimulateConfig(Frozen):
         for number, name in enumerate(names or ()):
             if name not in policies():
                 says = f"no policy is called {name}; there are {', '.join(sorted(policies()))}"
-                raise InsideError(says, number)
+                raise InsideError(says + (_NO_WHEELS if "ground" in name else ""), number)
         return names
 
     @model_validator(mode="after")
@@ -225,6 +233,11 @@ class SimulateConfig(Frozen):
         """Whether a policy is the controlled one that the report sets beside the others."""
         names = [name for name in self.policies or () if policies()[name].controlled]
         return policy == (self.controlled or (names[0] if len(names) == 1 else DEFAULT_CONTROLLED))
+
+    def own_block(self, policy: str) -> Frozen:
+        """The parameters of a policy's own; an empty block where it has none."""
+        found = getattr(self, policy, None)
+        return found if isinstance(found, Frozen) else Frozen()
 
     def _whole_steps(self, name: str, time: float) -> None:
         steps = time / self.integration_step_s

@@ -7,12 +7,14 @@ import math
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.admissible import coefficient_bounds, table_bounds
-from pzd.simulate.minimise import least_acceleration_forces
+from pzd.simulate.minimise import LEAST_LOAD, least_acceleration_forces, least_load_forces
 from pzd.simulate.ride_model import (
+    BODY,
     BY_COEFFICIENTS,
     BY_TABLE,
     DEFLECTION,
     FORCE,
+    HARD,
     HEAVE,
     HEAVE_RATE,
     HIGH,
@@ -21,10 +23,14 @@ from pzd.simulate.ride_model import (
     PITCH,
     PITCH_RATE,
     RATE,
+    SIDED_RATE,
+    SWITCH,
+    TIE_END,
     ControlSpec,
     TableArrays,
     Vehicle,
 )
+from pzd.simulate.switching import is_hard, switched_force
 
 
 @inlined
@@ -47,7 +53,7 @@ def bounds_of(
 
 @inlined
 def feedback_force(gains: Array, y: Array, workspace: Array) -> float:
-    """Force of one axle that is proportional to what a policy senses: gains (8,) on `SENSED` [N]."""
+    """What a policy makes of what it senses at one axle: gains (8,) on `SENSED`; a force [N], or what switches."""
     force = gains[4] * y[HEAVE] + gains[5] * y[PITCH] + gains[6] * y[HEAVE_RATE] + gains[7] * y[PITCH_RATE]
     for i in range(2):
         force += gains[i] * workspace[DEFLECTION, i] + gains[2 + i] * workspace[RATE, i]
@@ -67,15 +73,42 @@ def spring_acceleration(car: Vehicle, deflection: Array) -> float:
 
 
 @compiled
-def demand(control_spec: ControlSpec, car: Vehicle, y: Array, workspace: Array, branch: int) -> None:
+def choose_hardness(control_spec: ControlSpec, car: Vehicle, y: Array, control: Array, workspace: Array) -> None:
+    """Fill whether each damper is to be hard, by the workspace as the motion left it."""
+    for i in range(2):
+        signal = feedback_force(control_spec.gains[i], y, workspace)
+        acceleration = workspace[BODY, 0] + car.arms[i] * workspace[BODY, 1]
+        hard = is_hard(workspace[RATE, i], signal, acceleration, control_spec.crossover)
+        control[HARD, i] = 1.0 if hard else 0.0
+
+
+@inlined
+def wanted_force(control_spec: ControlSpec, axle: int, y: Array, control: Array, workspace: Array) -> float:
+    """What a feedback or a switch asks of one axle within the workspace's bounds [N]."""
+    low, high = workspace[LOW, axle], workspace[HIGH, axle]
+    if control_spec.aim == SWITCH:
+        return switched_force(control[HARD, axle] > 0.0, workspace[SIDED_RATE, axle], low, high)
+    return float(min(max(feedback_force(control_spec.gains[axle], y, workspace), low), high))
+
+
+@compiled
+def demand(control_spec: ControlSpec, car: Vehicle, y: Array, control: Array, workspace: Array) -> None:
     """Fill the workspace's forces with what the policy asks of both axles within the workspace's bounds [N]."""
+    if control_spec.aim == MINIMISE and control_spec.tie == LEAST_LOAD:
+        springs = (car.stiffness[0] * workspace[DEFLECTION, 0], car.stiffness[1] * workspace[DEFLECTION, 1])
+        least_load_forces(springs, car.comfort, workspace[LOW], workspace[HIGH], workspace[FORCE])
+        return
     if control_spec.aim == MINIMISE:
         a0 = spring_acceleration(car, workspace[DEFLECTION])
         least_acceleration_forces(
-            a0, car.comfort, workspace[LOW], workspace[HIGH], control_spec.tie, branch, workspace[FORCE]
+            a0,
+            car.comfort,
+            workspace[LOW],
+            workspace[HIGH],
+            control_spec.tie,
+            int(control[TIE_END, 1]),
+            workspace[FORCE],
         )
         return
     for i in range(2):
-        workspace[FORCE, i] = min(
-            max(feedback_force(control_spec.gains[i], y, workspace), workspace[LOW, i]), workspace[HIGH, i]
-        )
+        workspace[FORCE, i] = wanted_force(control_spec, i, y, control, workspace)

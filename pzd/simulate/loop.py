@@ -9,7 +9,7 @@ from pzd.damper.dormand_prince import STAGES
 from pzd.damper.kernels import keep_voltage
 from pzd.damper.rows import row_at
 from pzd.record import Array
-from pzd.simulate.demand import bounds_of, demand, spring_acceleration
+from pzd.simulate.demand import bounds_of, choose_hardness, demand, spring_acceleration
 from pzd.simulate.dynamic_damper import effective_voltage, place, stored
 from pzd.simulate.equations import motion
 from pzd.simulate.minimise import LARGEST, farther_end
@@ -31,11 +31,14 @@ from pzd.simulate.ride_model import (
     RATE,
     SET,
     SIDE,
+    SIDED_RATE,
     SINCE,
     SPRINGS,
+    SWITCH,
     TIE_END,
     VALVE_WORK,
     VOLTAGE,
+    ControlSpec,
     RideModel,
 )
 from pzd.simulate.stepper import advance, choose_side
@@ -52,6 +55,27 @@ COLUMNS = 16
 """time, z, phi, a_K, and per axle deflection, rate, spring, damper and demanded force, voltage."""
 
 
+@inlined
+def _acts_at_once(control_spec: ControlSpec) -> bool:
+    """Whether nothing is left to the clock: `ideal` forces are, but for the choice between two that lie apart."""
+    chooses = control_spec.aim == SWITCH or (control_spec.aim == MINIMISE and control_spec.tie == LARGEST)
+    return control_spec.fidelity == IDEAL and not chooses
+
+
+@inlined
+def _choose_ends(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+    """Fill the bounds of both axles, and what stays as it is until the controller acts again."""
+    control_spec, car = model.control_spec, model.car
+    for i in range(2):
+        workspace[LOW, i], workspace[HIGH, i] = bounds_of(control_spec, car, model.grid, i, workspace[RATE, i])
+        workspace[SIDED_RATE, i] = workspace[RATE, i]
+    if control_spec.aim == SWITCH:
+        choose_hardness(control_spec, car, y, control, workspace)
+    if control_spec.aim == MINIMISE and control_spec.tie == LARGEST:
+        a0 = spring_acceleration(car, workspace[DEFLECTION])
+        control[TIE_END, 1] = farther_end(a0, car.comfort, workspace[LOW], workspace[HIGH])
+
+
 @compiled
 def set_control(time: float, y: Array, model: RideModel, control: Array, workspace: Array, scratch: Array) -> None:
     """Let the controller act once: what it asks of each axle, and the voltage that gives it by the table.
@@ -64,20 +88,16 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
     scratch : (STATES,) to work in
     """
     control_spec, car = model.control_spec, model.car
-    if control_spec.fidelity == IDEAL and (control_spec.aim != MINIMISE or control_spec.tie != LARGEST):
+    if _acts_at_once(control_spec):
         return
     motion(time, y, model, control, workspace, scratch)
-    for i in range(2):
-        workspace[LOW, i], workspace[HIGH, i] = bounds_of(control_spec, car, model.grid, i, workspace[RATE, i])
-    if control_spec.aim == MINIMISE and control_spec.tie == LARGEST:
-        a0 = spring_acceleration(car, workspace[DEFLECTION])
-        control[TIE_END, 1] = farther_end(a0, car.comfort, workspace[LOW], workspace[HIGH])
+    _choose_ends(y, model, control, workspace)
     if control_spec.fidelity == IDEAL:
         return
     if control_spec.aim == PREDICT:
         predict(time, y, model, control, workspace)
     elif control_spec.aim != VOLTAGE:
-        demand(control_spec, car, y, workspace, int(control[TIE_END, 1]))
+        demand(control_spec, car, y, control, workspace)
     for i in range(2):
         _set_voltage(time, y, model, control, i, _wanted_voltage(model, control, workspace, i))
     control[SINCE, 0] = time

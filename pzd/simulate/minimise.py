@@ -8,15 +8,14 @@ says nothing about the segment: the tie-break picks its point.
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 from pzd.compiled import compiled
 from pzd.record import Array
+from pzd.simulate.policy import TieBreak
 
 Pair = tuple[float, float]
-TieBreak = Literal["smallest", "equal_share", "largest"]
 
-SMALLEST, EQUAL_SHARE, LARGEST = range(3)
+SMALLEST, EQUAL_SHARE, LARGEST, LEAST_LOAD = range(4)
 TIE_BREAKS: dict[TieBreak, int] = {"smallest": SMALLEST, "equal_share": EQUAL_SHARE, "largest": LARGEST}
 
 
@@ -52,6 +51,30 @@ def least_acceleration_forces(
         nearest = -a0 * D[i] / (D[0] * D[0] + D[1] * D[1])
         forces[i] = min(max(nearest, first), last)
     forces[j] = min(max((-a0 - D[i] * forces[i]) / D[j], low[j]), high[j])
+
+
+@compiled
+def least_load_forces(springs: Pair, D: Pair, low: Array, high: Array, forces: Array) -> None:
+    """Fill `forces` (2,) with those of the least wheel loads that make |a_K| smallest within the box.
+
+    Equation: a_K = D^T L, L = S + T: the smallest Euclidean norm of L in the box Omega(V) + S
+    Source: Makowski and Knap 2021, eq. (9)-(12); section 6 has the wheel load as another criterion
+
+    Parameters
+    ----------
+    springs : S_i of both axles [N]
+    D : acceleration at K by each force [1/kg]
+    low, high : (2,) the box Omega(V), shifted meanwhile [N]
+    forces : (2,) filled [N]
+    """
+    for i in range(2):
+        low[i] += springs[i]
+        high[i] += springs[i]
+    least_acceleration_forces(0.0, D, low, high, SMALLEST, 0, forces)
+    for i in range(2):
+        low[i] -= springs[i]
+        high[i] -= springs[i]
+        forces[i] = min(max(forces[i] - springs[i], low[i]), high[i])
 
 
 @compiled

@@ -4,14 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from pzd.record import Array
+from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 
-Aim = Literal["damping", "feedback", "minimise", "voltage", "predict"]
-"""Constant damping; a force proportional to the state; the smallest |a_K|; or no force but a voltage: one that is
-held, or the best of many tried ahead."""
+Aim = Literal["damping", "feedback", "switch", "minimise", "voltage", "predict"]
+"""Constant damping; a force proportional to the state; the hardest or the softest damper; the smallest |a_K|; or no
+force but a voltage: one that is held, or the best of many tried ahead."""
+TieBreak = Literal["smallest", "equal_share", "largest"]
+"""Which of the forces that make |a_K| smallest, see `pzd.simulate.minimise`."""
+
+
+class Switch(NamedTuple):
+    """When a damper is to be hard, see `pzd.simulate.switching.is_hard`."""
+
+    gains: Array
+    """(2, 8) of the signal s of each axle, as those of a feedback."""
+    crossover: float
+    """w_c [rad/s]: s decides where |d2z_i/dt2| <= w_c |s|, the acceleration of the body where it is larger."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +37,12 @@ class Policy:
     aim: Aim
     controlled: bool = False
     """Whether it answers to the ride, so that the report sets it beside the others; False for what stays as it is."""
+    tie_break: TieBreak | Literal["least_load"] | None = None
+    """Which forces the aim `minimise` takes of many; by default those that `tie_break` of the config says."""
     tuned: Literal["voltage", "damping"] | None = None
     """What is held constant at the value with which a_w is least, for each road and fidelity by itself."""
-    feedback: Callable[[HalfCar, float], Array] | None = None
-    """(car, constant damping) -> (2, 8) gains on (deflection 1, 2, its rate 1, 2, z, phi, dz, dphi):
-    the force that the aims `damping` and `feedback` ask of each axle."""
+    feedback: Callable[[HalfCar, float, Frozen], Array] | None = None
+    """(car, constant damping, its block of the config) -> (2, 8) gains on (deflection 1, 2, its rate 1, 2, z, phi, dz,
+    dphi): the force that the aims `damping` and `feedback` ask of each axle."""
+    switch: Callable[[HalfCar, Frozen], Switch] | None = None
+    """(car, its block of the config) -> when the aim `switch` asks for a hard damper."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
-from pzd.simulate.demand import bounds_of, demand, feedback_force, one_sided, spring_acceleration
+from pzd.simulate.demand import bounds_of, demand, one_sided, spring_acceleration, wanted_force
 from pzd.simulate.ride_model import (
     DEFLECTION,
     FORCE,
@@ -18,7 +18,6 @@ from pzd.simulate.ride_model import (
     SIDED_RATE,
     SPRINGS,
     TABLE,
-    TIE_END,
     RideModel,
     TableArrays,
     Vehicle,
@@ -57,7 +56,7 @@ def quasistatic_forces(y: Array, model: RideModel, control: Array, workspace: Ar
         if control[SIDE, 0] != control[SIDE, 1]:
             _force_outside_sticking(y, model, control, workspace)
         return
-    demand(control_spec, model.car, y, workspace, int(control[TIE_END, 1]))
+    demand(control_spec, model.car, y, control, workspace)
 
 
 @inlined
@@ -71,6 +70,6 @@ def _force_outside_sticking(y: Array, model: RideModel, control: Array, workspac
         a0 = spring_acceleration(car, workspace[DEFLECTION]) + car.comfort[stuck] * alone
         slope = car.comfort[free] + car.comfort[stuck] * holding_share(car, stuck)
         wanted = -a0 / slope if slope != 0.0 else 0.0
+        workspace[FORCE, free] = min(max(wanted, workspace[LOW, free]), workspace[HIGH, free])
     else:
-        wanted = feedback_force(control_spec.gains[free], y, workspace)
-    workspace[FORCE, free] = min(max(wanted, workspace[LOW, free]), workspace[HIGH, free])
+        workspace[FORCE, free] = wanted_force(control_spec, free, y, control, workspace)

@@ -20,7 +20,7 @@ IDEAL, TABLE, DYNAMIC = range(3)
 """How a demanded force comes about."""
 UNBOUNDED, BY_COEFFICIENTS, BY_TABLE = range(3)
 """What bounds a demanded force."""
-FEEDBACK, MINIMISE, VOLTAGE, PREDICT = range(4)
+FEEDBACK, SWITCH, MINIMISE, VOLTAGE, PREDICT = range(5)
 """What the policy asks for."""
 SENSED = 8
 """Deflection 1, 2, its rate 1, 2, z, phi, dz, dphi: what a feedback policy reads."""
@@ -56,12 +56,12 @@ mass that the dampers add [kg]; of one damper: oil spring [N], flow [m/s], elast
 the element [N], power of the valve [W]; speed on its side of zero, lowest and highest force; acceleration
 of z and phi; acceleration at K (first column); of an axle that sticks, dV/dt away from V = 0, were it to
 slip to either side."""
-ASKED, SET, SIDE, SINCE, BEHIND = range(5)
+ASKED, SET, SIDE, SINCE, HARD, BEHIND = range(6)
 TIE_END = SINCE
 """Rows of the control (BEHIND + d, 2), a column an axle: force asked [N], voltage set [V]; side of V = 0 (+1 rebound,
 -1 compression, 0 sticking); when the voltage was set [s] (first column), and the end of the segment of minimisers
-that `largest` takes (TIE_END, second column); from BEHIND on the voltages behind the d drive effects, in the order
-in which they act, when the voltage was set [V]."""
+that `largest` takes (TIE_END, second column); whether a damper is to be hard (1) or soft (0); from BEHIND on the
+voltages behind the d drive effects, in the order in which they act, when the voltage was set [V]."""
 
 Two = tuple[float, float]
 
@@ -117,8 +117,10 @@ class ControlSpec(NamedTuple):
     """Of the aim `VOLTAGE` [V], and where the valves stand at the start."""
     jumps: bool
     """Whether the force jumps where the suspension speed crosses zero, so that an axle can stick."""
+    crossover: float
+    """Of the aim `SWITCH` [rad/s]."""
     gains: Array
-    """(2, SENSED) of the aim `FEEDBACK`."""
+    """(2, SENSED) of the aims `FEEDBACK` and `SWITCH`."""
 
 
 class RideModel(NamedTuple):

@@ -15,7 +15,7 @@ from pzd.simulate.dynamic_damper import DynamicDamper
 from pzd.simulate.energy import balance_error, stored_energy
 from pzd.simulate.linear import ride_exactly
 from pzd.simulate.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALLIES, ride
-from pzd.simulate.minimise import TIE_BREAKS
+from pzd.simulate.minimise import LEAST_LOAD, TIE_BREAKS
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.plan import Case
 from pzd.simulate.prediction.planning import LEVELS, predictor_of
@@ -30,6 +30,7 @@ from pzd.simulate.ride_model import (
     PREDICT,
     SENSED,
     STATES,
+    SWITCH,
     TABLE,
     UNBOUNDED,
     VOLTAGE,
@@ -43,10 +44,17 @@ from pzd.simulate.ride_model import (
 )
 
 _FIDELITIES = {"ideal": IDEAL, "table": TABLE, "dynamic": DYNAMIC}
-_AIMS = {"damping": FEEDBACK, "feedback": FEEDBACK, "minimise": MINIMISE, "voltage": VOLTAGE, "predict": PREDICT}
-_SWITCHED = 0.1
-"""Share of the tolerance where voltages jump by half their range: on a single bump, which dissipates little, the work
-of the valve was else 3e-6 of it off."""
+_AIMS = {
+    "damping": FEEDBACK,
+    "feedback": FEEDBACK,
+    "switch": SWITCH,
+    "minimise": MINIMISE,
+    "voltage": VOLTAGE,
+    "predict": PREDICT,
+}
+_SWITCHED = 0.01
+"""Share of the tolerance where the voltage of a damper with dynamics jumps once in a control period: on a single bump,
+which dissipates little, the work of the valve was else up to 7e-6 of it off, and 6e-7 at a tenth."""
 
 
 @dataclass(frozen=True)
@@ -95,18 +103,21 @@ def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: Dy
         bounds = BY_TABLE if config.coefficients is None else BY_COEFFICIENTS
         if policy.aim == "damping":
             bounds = UNBOUNDED
-    gains = np.zeros((2, SENSED))
+    gains, crossover, own = np.zeros((2, SENSED)), 0.0, config.own_block(policy.name)
     if policy.feedback is not None:
-        gains = np.ascontiguousarray(policy.feedback(car, held.damping))
+        gains = np.ascontiguousarray(policy.feedback(car, held.damping, own))
+    if policy.switch is not None:
+        gains, crossover = policy.switch(car, own)
     jumps = rubs(damper) if fidelity == DYNAMIC else bounds == BY_TABLE
     return ControlSpec(
         fidelity,
         _AIMS[policy.aim],
         bounds,
-        TIE_BREAKS[config.tie_break],
+        LEAST_LOAD if policy.tie_break == "least_load" else TIE_BREAKS[policy.tie_break or config.tie_break],
         *(config.coefficients or (0.0, np.inf)),
         held.voltage,
         jumps,
+        crossover,
         gains,
     )
 
@@ -171,7 +182,7 @@ def ride_case(
             LEVELS if case.policy.aim == "predict" else 1,
         ),
     )
-    sharper = _SWITCHED if case.policy.aim == "predict" else 1.0
+    sharper = _SWITCHED if case.policy.aim != "voltage" and case.fidelity == "dynamic" else 1.0
     return ride_of_model(model, clock, sharper * config.tolerance, case.name, ends)
 
 

@@ -171,7 +171,7 @@ def test_with_an_instant_valve_the_force_takes_the_time_of_the_oil_spring(damper
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"policies": ["comfy"]}, "no policy is called comfy; there are best_constant_c, best_fixed"),
+        ({"policies": ["comfy"]}, "no policy is called comfy; there are add, balance, best_constant_c, best_fixed"),
         ({"car": {"model": "fiat"}}, "no car is called fiat; there are makowski2021"),
         ({"car": {"motion_ratio": [1.0, 0.0]}}, "above zero"),
         ({"control_period_s": 0.0015}, "whole number of integration_step_s"),
@@ -182,7 +182,7 @@ def test_with_an_instant_valve_the_force_takes_the_time_of_the_oil_spring(damper
         ({"car": {"x_K_m": 50.0}}, r"x_K_m must lie within the car.*from -4\.749 to 4\.116 m \(got 50\)"),
         (
             {"controlled": "passive"},
-            "passive does not control; these do: comfort, comfort_predictive, skyhook, wheel_load",
+            "passive does not control; these do: add, balance, clipped_lqr, comfort, comfort_largest",
         ),
         ({"controlled": "skyhook"}, "skyhook is none of policies"),
         ({"policies": ["skyhook", "wheel_load"]}, "say which one the report is about: skyhook, wheel_load"),

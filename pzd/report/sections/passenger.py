@@ -8,6 +8,7 @@ from pzd.artefacts import SummaryRow, WheelRow
 from pzd.comfort import directive, iso2631_1978, iso2631_1997
 from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import Comparison, ReportContext
+from pzd.report.sections import trade_off
 from pzd.report.sections.pictures import Pictures, by_turns
 from pzd.report.wording import DASH, amount, listed, minutes, number, percent
 from pzd.simulate.policies import policies
@@ -24,6 +25,7 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     blocks: list[Block] = [Paragraph(_ride(context)), *_meanings(context)]
     blocks += _compared(context)
     blocks += by_turns(pictures["passenger"])
+    blocks += trade_off.blocks(context, pictures)
     blocks += [_accelerations(context), _suspension(context), _wheels(context), *_exposures(context), *_daily(context)]
     worth = _worth(context)
     if worth.rows:

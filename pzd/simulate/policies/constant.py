@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.record import Array
+from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 from pzd.simulate.policy import Policy
 
 
-def feedback(car: HalfCar, damping: float) -> Array:  # the signature of every feedback
+def feedback(car: HalfCar, damping: float, own: Frozen) -> Array:  # the signature of every feedback
     """T_i = c V_i at both axles.
 
     Source: Makowski and Knap 2021, section 5 (c = const.)

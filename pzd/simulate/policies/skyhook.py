@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.record import Array
+from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 from pzd.simulate.policy import Policy
 
 
-def feedback(car: HalfCar, damping: float) -> Array:
+def feedback(car: HalfCar, damping: float, own: Frozen) -> Array:
     """T_i = c times the velocity of the body above axle i, H^T dX/dt.
 
     Source: Karnopp, Crosby and Harwood 1974

@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.record import Array
+from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 from pzd.simulate.policy import Policy
 
 
-def feedback(car: HalfCar, damping: float) -> Array:  # the signature of every feedback
+def feedback(car: HalfCar, damping: float, own: Frozen) -> Array:  # the signature of every feedback
     """T_i = -k_i U_i: the dynamic load S_i + T_i of each wheel goes to zero where that is within reach.
+
+    Where the wheels have no mass this is also the power-driven damper, which lets no more power into the body than it
+    must (Morselli and Zanasi 2008, Mechatronics 18).
 
     Source: Makowski and Knap 2021, section 6 (criterion of wheel dynamic load change)
     """

@@ -1,0 +1,76 @@
+"""All policies beside each other: at which fidelity, which of them none beats, and when there is nothing to choose."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html import unescape
+from typing import Any
+
+import pytest
+
+from pzd.artefacts import Rides
+
+ROAD = "sine-2.25Hz"
+RIDDEN = {
+    "comfort": (1.00, 1000.0),
+    "skyhook": (0.80, 900.0),
+    "add": (0.90, 700.0),
+    "wheel_load": (0.95, 950.0),
+    "passive": (1.20, 600.0),
+}
+"""Peak of a_K [m/s2] and r.m.s. wheel load [N], at `dynamic`; wheel_load is beaten by skyhook, comfort by three."""
+
+
+def rides_of(made_ride: Any, chosen: dict[str, tuple[float, float]], fidelity: str) -> list[Any]:
+    found = []
+    for policy, (peak, load) in chosen.items():
+        one = made_ride(f"{ROAD}-{policy}-{fidelity}", ROAD, policy, fidelity, {2.25: peak}, 2.25)
+        found.append(replace(one, row=one.row.model_copy(update={"rms_wheel_load_N": load})))
+    return found
+
+
+def page_of(run: Any, made: list[Any]) -> str:
+    rides = Rides(
+        tuple(one.ride for one in made),
+        tuple(one.row for one in made),
+        tuple(one.ridden for one in made),
+        tuple(wheel for one in made for wheel in one.wheels),
+        tuple(one.felt.weighted for one in made),
+        tuple(line for one in made for line in one.felt.spectrum),
+    )
+    return unescape(replace(run, rides=rides).told().page).replace("\u00a0", " ").replace("\u202f", " ")
+
+
+@pytest.fixture(scope="module")
+def page(run: Any, made_ride: Any) -> str:
+    """At `ideal` all are alike, so that whatever is told apart comes from `dynamic`."""
+    alike = dict.fromkeys(RIDDEN, (0.5, 500.0))
+    return page_of(run, [*rides_of(made_ride, alike, "ideal"), *rides_of(made_ride, RIDDEN, "dynamic")])
+
+
+def test_the_page_names_the_policies_that_none_beats_in_both(page: str) -> None:
+    assert f"<li>{ROAD}, dynamic: skyhook, add and passive</li>" in page
+
+
+def test_the_picture_tells_every_policy_in_the_order_of_comfort(page: str) -> None:
+    alt = re.search(r'alt="a_w and r\.m\.s\. wheel load on 2\.25 Hz sine: ([^"]*)"', page)
+    assert alt is not None
+    told = alt[1].split("; ")
+    assert [text.split(" 0.")[0] for text in told] == ["skyhook", "add", "wheel load", "comfort", "passive"]
+    assert [text.split("and ")[1].rstrip(".") for text in told] == ["900 N", "700 N", "950 N", "1 000 N", "600 N"]
+
+
+def test_the_table_holds_every_policy_at_every_fidelity(page: str) -> None:
+    table = page.partition("Comfort and r.m.s. wheel load of every policy, by fidelity (5)")[2]
+    assert all(f">{name}<" in table for name in ("a_w, ideal", "a_w, dynamic", "load, ideal", "load, dynamic"))
+    assert "wheel load" in table
+    assert "500 N" in table
+    assert "950 N" in table
+
+
+def test_where_one_policy_controls_there_is_nothing_to_choose(run: Any, made_ride: Any) -> None:
+    alone = {name: RIDDEN[name] for name in ("comfort", "passive")}
+    page = page_of(run, rides_of(made_ride, alone, "dynamic"))
+    assert "All policies beside each other" not in page
+    assert "Comfort against wheel load" not in page
