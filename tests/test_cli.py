@@ -602,6 +602,13 @@ def diagnosis() -> Diagnosis:
     )
 
 
+def test_the_story_tells_what_a_test_between_two_voltages_is_for() -> None:
+    test = NEXT_TEST.model_copy(update={"separates": (), "voltage_V": 75.0, "between_voltage_V": (50.0, 100.0)})
+    told = diagnosis_lines(diagnosis().model_copy(update={"next_test": test}), Control())[-1]
+    assert told.startswith("next test: ")
+    assert told.endswith("since between 50 and 100 V the force is known least")
+
+
 def test_the_story_tells_every_kept_back_test_where_it_is_asked_to() -> None:
     kept_back = Prediction(
         hold_out="tests",

@@ -113,7 +113,7 @@ WORSE_BETWEEN = 1.5
 
 Reason: there the line between voltages misses more than any law, and with a true law, when T0 and C become those of the
 damper, it may miss a little more than without; nor do the tests of one voltage, which all miss the same, tell chance.
-A tenth more was seen with a true name, 2.9 times with a wrong one; not tuned."""
+7 % more was seen with a true name, 2.9 times with a wrong one; not tuned."""
 
 # When an effect is added for what it predicts alone (added_by_prediction.py)
 

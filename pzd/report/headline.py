@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pzd.artefacts import ForceRow, Gap
 from pzd.report.blocks import Card
 from pzd.report.context import BASELINES, Comparison, ReportContext, effect_in_words
-from pzd.report.sections.missing import rig_test, verdict
+from pzd.report.sections.missing import least_known, rig_test, verdict
 from pzd.report.sections.passenger import change
 from pzd.report.static_force import static_force_at, static_force_in_words
 from pzd.report.wording import amount, listed, number, percent, sentence
@@ -97,10 +97,7 @@ def _next(context: ReportContext) -> Card:
         return Card("Which test next?", "None is proposed", "")
     names = listed([_name(effect) for effect in test.separates])
     why = sentence(f"it separates {names}") if names else ""
-    if test.between_voltage_V is not None:
-        low, high = (context.voltage(voltage) for voltage in test.between_voltage_V)
-        why = f"Between {low} and {high} the force is known least."
-    return Card("Which test next?", _capital(rig_test(context, test)), why)
+    return Card("Which test next?", _capital(rig_test(context, test)), sentence(least_known(context, test)) or why)
 
 
 def _comfort(context: ReportContext) -> Card:

@@ -174,7 +174,7 @@ class SimulateConfig(Frozen):
         for number, name in enumerate(names or ()):
             if name not in policies():
                 says = f"no policy is called {name}; there are {', '.join(sorted(policies()))}"
-                raise InsideError(says + (_NO_WHEELS if "ground" in name else ""), number)
+                raise InsideError(says + (_NO_WHEELS if "groundhook" in name else ""), number)
         return names
 
     @model_validator(mode="after")

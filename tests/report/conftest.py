@@ -99,6 +99,10 @@ class Run:
         diagnosis = self.diagnosed.diagnosis.model_copy(update=changes)
         return replace(self, diagnosed=Diagnosed(diagnosis, damper, PLAIN))
 
+    def with_rides(self, made: Sequence[Made]) -> Run:
+        """The same run with other rides."""
+        return replace(self, rides=rides_of(made))
+
 
 def record(name: str, frequency: float, amplitude: float, voltage: float | None) -> Record:
     """A sine on the final damper, four cycles, with a little of what no model knows."""

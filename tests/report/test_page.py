@@ -257,6 +257,17 @@ def test_every_verdict_is_told(words_only: None, run: Any, changes: dict[str, An
         assert "None is proposed" in read.text
 
 
+def test_a_test_at_a_voltage_between_two_others_is_told_with_what_it_is_for(words_only: None, run: Any) -> None:
+    test = run.diagnosed.diagnosis.next_test.model_copy(
+        update={"separates": (), "voltage_V": 75.0, "between_voltage_V": (0.0, 150.0)}
+    )
+    read = Reader(run.with_diagnosis(next_test=test).told().page)
+    assert (
+        read.text.count("Between 0 V and 150 V the force is known least.") == 2
+    )  # in the headline and where it belongs
+    assert "at 75 V" in read.text
+
+
 def test_an_unchanged_damper_shows_no_second_curve(run: Any) -> None:
     page = run.with_diagnosis(verdict="none", effects=(), parameters={}).told().page
     assert "with what was missing" not in page

@@ -9,8 +9,6 @@ from typing import Any
 
 import pytest
 
-from pzd.artefacts import Rides
-
 ROAD = "sine-2.25Hz"
 RIDDEN = {
     "comfort": (1.00, 1000.0),
@@ -31,15 +29,7 @@ def rides_of(made_ride: Any, chosen: dict[str, tuple[float, float]], fidelity: s
 
 
 def page_of(run: Any, made: list[Any]) -> str:
-    rides = Rides(
-        tuple(one.ride for one in made),
-        tuple(one.row for one in made),
-        tuple(one.ridden for one in made),
-        tuple(wheel for one in made for wheel in one.wheels),
-        tuple(one.felt.weighted for one in made),
-        tuple(line for one in made for line in one.felt.spectrum),
-    )
-    return unescape(replace(run, rides=rides).told().page).replace("\u00a0", " ").replace("\u202f", " ")
+    return unescape(run.with_rides(made).told().page).replace("\u00a0", " ").replace("\u202f", " ")
 
 
 @pytest.fixture(scope="module")

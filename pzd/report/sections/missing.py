@@ -159,15 +159,22 @@ def next_test(context: ReportContext, test: NextTest | None) -> str:
         return "Next test: none is proposed."
     names = [effect_in_words(name) if name in known() else name for name in test.separates]
     aim = f". It separates: {'; '.join(names)}" if names else ""
-    if test.between_voltage_V is not None:
-        low, high = (context.voltage(voltage) for voltage in test.between_voltage_V)
-        aim = f". Between {low} and {high} the force is known least"
+    if least := least_known(context, test):
+        aim = f". {least}"
     far = (
         f". They differ there by {number(test.distance_percent, 2)} % of the peak force"
         if test.distance_percent
         else ""
     )
     return f"Next test: {rig_test(context, test)}{_reached(test)}{aim}{far}."
+
+
+def least_known(context: ReportContext, test: NextTest) -> str:
+    """Between which voltages the force is known least, which the test is to show; empty where it tells rivals apart."""
+    if test.between_voltage_V is None:
+        return ""
+    low, high = (context.voltage(voltage) for voltage in test.between_voltage_V)
+    return f"Between {low} and {high} the force is known least"
 
 
 def _reached(test: NextTest) -> str:
