@@ -13,7 +13,7 @@ import numpy as np
 from pzd.blind.case import Scored
 from pzd.blind.outside import FORMS
 from pzd.blind.rates import among, visible
-from pzd.damper.effects import library
+from pzd.damper.effects import nameable
 from pzd.record import Array
 
 SAID = ("several", "ambiguous, truth among", "ambiguous, truth not", "none", "unexplained", "failed")
@@ -37,8 +37,8 @@ def confusion(cases: Sequence[Scored]) -> Confusion:
     Effects and pairs whose visible gap is below 0.5 % of the peak have rows of their own.
     """
     found = Counter((true_row(case), said(case)) for case in cases)
-    rows = (*library(), "pair", "invisible effect", "invisible pair", "none", *FORMS, "invisible form")
-    columns = (*library(), *SAID)
+    rows = (*nameable(), "pair", "invisible effect", "invisible pair", "none", *FORMS, "invisible form")
+    columns = (*nameable(), *SAID)
     kept = tuple(row for row in rows if any(found[row, column] for column in columns))
     return Confusion(kept, columns, np.array([[float(found[row, column]) for column in columns] for row in kept]))
 

@@ -10,7 +10,7 @@ from typing import Literal, TypeVar
 from pzd.blind.config import BlindConfig, TestPlan
 from pzd.blind.outside import FORMS
 from pzd.damper.effect import Need
-from pzd.damper.effects import library
+from pzd.damper.effects import nameable
 
 Kind = Literal["single", "pair", "none", "outside"]
 KINDS: tuple[Kind, ...] = ("single", "none", "outside", "pair")
@@ -35,7 +35,7 @@ class PlannedCase:
 
     def needs(self, what: Need) -> bool:
         """Whether something hidden shows only where this moves inside a test."""
-        return any(name in library() and library()[name].needs == what for name in self.hidden)
+        return any(name in nameable() and nameable()[name].needs == what for name in self.hidden)
 
 
 def plan(config: BlindConfig) -> tuple[PlannedCase, ...]:
@@ -66,7 +66,7 @@ def hideable(campaign: TestPlan, kind: Kind) -> list[tuple[str, ...]]:
         return [()]
     if kind == "outside":
         return [(name,) for name in FORMS]
-    effects = [name for name, e in library().items() if e.needs != "voltage" or campaign.moves_voltage]
+    effects = [name for name, e in nameable().items() if e.needs != "voltage" or campaign.moves_voltage]
     if kind == "single":
         return [(name,) for name in effects]
     place = {name: i for i, name in enumerate(effects)}

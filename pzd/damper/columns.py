@@ -22,7 +22,7 @@ DRIVE = _columns("drive")
 """Columns of a row of the drive."""
 STROKE_AND_FLOW = _columns("stroke", "flow")
 """Columns of a row of the element, behind T0, C and k."""
-PARALLEL = _columns("parallel")
-"""Columns of a row of the forces beside the element."""
+PARALLEL = _columns("parallel", "branch")
+"""Columns of a row of the forces beside the element, those without memory first."""
 NEUTRAL = {(e.name, p.name): p.neutral for e in known().values() for p in e.parameters}
 """The value of every column where a damper lacks the effect."""

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pzd.damper.branch import any_slips, branch_forces
 from pzd.damper.columns import DRIVE, NEUTRAL, PARALLEL, STROKE_AND_FLOW, Column, acting
 from pzd.damper.competing_forms import module_of
 from pzd.damper.drive import effective_voltage
 from pzd.damper.element import element_force
 from pzd.damper.flow import flow_force
-from pzd.damper.kernels import T0, C, K, parallel_forces, plain, row_of
+from pzd.damper.kernels import T0, C, K, branch_steady, parallel_forces, plain, row_of
 from pzd.damper.laws import arguments, functions
 from pzd.damper.material import base_voltages, material
 from pzd.damper.model import Damper
@@ -81,12 +82,16 @@ def with_parallel(force: Array, parallel: Array | None, motion: Motion) -> Array
     Parameters
     ----------
     force : (n,) of the element [N]
-    parallel : (n, m) or (1, m) rows of the parallel effects; None without any
+    parallel : (n, m) or (1, m) rows of the forces beside it; None without any
     motion : (n,) sampled motion
     """
-    if parallel is None:
-        return force
-    return force + parallel_forces(motion.displacement, motion.velocity, motion.acceleration, parallel)
+    return force if parallel is None else force + forces_beside(motion, parallel)
+
+
+def forces_beside(motion: Motion, parallel: Array) -> Array:
+    """(n,) force [N] of what stands beside the element, with memory and without; see `with_parallel`."""
+    force = parallel_forces(motion.displacement, motion.velocity, motion.acceleration, parallel)
+    return force + branch_forces(motion, parallel) if any_slips(parallel) else force
 
 
 def constant_rows(
@@ -212,6 +217,8 @@ def steady_force(
     rest = np.zeros(v.size)
     moving = np.where(v == 0.0, side * np.finfo(np.float64).tiny, v)
     force += parallel_forces(rest, moving, rest, parallel) - static_force(damper, effective)
+    rows_beside = np.broadcast_to(parallel, (v.size, parallel.shape[1]))
+    force += [branch_steady(s, row) for s, row in zip(side, rows_beside, strict=True)]
     return force.reshape(speeds.shape)
 
 

@@ -26,8 +26,12 @@ flow
     a closed form. `opens_at`, `slope_beyond`: force from which the slope is another. All rise with w.
 parallel
     `law`: force beside the element by x, v and a of the piston, `about_zero` where a fit looks for the zero of x too.
-    It has no memory: a further slip branch (k_2, T0_2,
-    C_2) or a Bouc-Wen force has a state of its own, which no place allows yet.
+    It has no memory.
+branch
+    A force beside the element that remembers which way the rod went, whatever its speed: a spring behind a slip, a
+    force of Dahl or of Bouc and Wen. `advance`: its elastic deflection after a travel of the rod to one side alone,
+    from the deflection before; it has a limit for an infinite travel, which is steady slip. `law`: force by the
+    deflection, 0 at 0; `rate`: derivative of the deflection by the travel, to a side (+1 or -1).
 sensor
     `law`: the moment whose force the channel shows.
 """
@@ -42,7 +46,7 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     import numpy as np
 
-Place = Literal["drive", "material", "stroke", "flow", "parallel", "sensor"]
+Place = Literal["drive", "material", "stroke", "flow", "parallel", "branch", "sensor"]
 """Where in the damper something can be missing, in physical order."""
 
 Need = Literal["voltage", "temperature"]
@@ -153,7 +157,10 @@ class Effect:
     needs: Need | None = None
     """What must move in a test for the effect to be seen at all."""
     hidden: Hiding | None = None
-    """How the blind benchmark draws it; None for what it never hides, a competing form."""
+    """How the blind benchmark draws it; None for what it never hides: a competing form, or what is never named."""
+    never_named: str | None = None
+    """Why no verdict names it, so that a damper has it where kept-back tests are predicted better with it, or where the
+    config forces it, alone; None where it is a name like others."""
     order: int = 0
     """Where it acts among the effects of its place: those of a smaller number come first."""
     about_zero: bool = False

@@ -197,15 +197,33 @@ def _parallel() -> Iterator[str]:
     )
 
 
+def _branch() -> Iterator[str]:
+    """Each has its own elastic deflection, `state[i]`; all go with the rod, and their forces add."""
+    follow, stored, steady = [], [], []
+    force: list[str] = []
+    for i, effect in enumerate(acting("branch")):
+        own, law = f"state[{i}]", _call(effect, "law", deflection="e")
+        after = f"e = {_call(effect, 'advance', deflection=own, travel='travel')}"
+        follow += _guarded(effect, after, f"{own} = e")
+        force += _guarded(effect, after, f"force += {law}")
+        stored += _guarded(effect, after, f"force += {law} * {_call(effect, 'rate', deflection='e', side='side')}")
+        slipping = _call(effect, "advance", deflection="0.0", travel="side * inf")
+        steady += _guarded(effect, f"e = {slipping}", f"force += {law}")
+    yield from _function("branches_follow(travel, state, p)", *follow, "return")
+    yield from _function("branch_force(travel, state, p)", "force = 0.0", *force, "return force")
+    yield from _function("branch_stored(travel, side, state, p)", "force = 0.0", *stored, "return force")
+    yield from _function("branch_steady(side, p)", "force = 0.0", *steady, "return force")
+
+
 def source() -> str:
     """The text of the module."""
     lines = ["import math", "from math import inf", "from pzd.compiled import compiled"]
-    for place in ("drive", "stroke", "flow", "parallel"):
+    for place in ("drive", "stroke", "flow", "parallel", "branch"):
         for effect in acting(place):
             module = module_of(effect)
             lines.append(f"import {module.__name__} as _{effect.name}")
             lines += [f"_{effect.name}_{name} = compiled(_{effect.name}.{name})" for name in functions(effect, module)]
-    return "\n".join([*lines, *_rows(), *_drive(), *_stroke(), *_flow(), *_parallel(), ""])
+    return "\n".join([*lines, *_rows(), *_drive(), *_stroke(), *_flow(), *_parallel(), *_branch(), ""])
 
 
 # ---------------------------------------------------------------- the module
@@ -287,11 +305,20 @@ relief_of: Callable[[float, Row], tuple[float, float]] = _MODULE.relief_of
 """Force from which a valve is open [N] and the slope beyond [N s/m], at a T0 [N]; the first to open counts."""
 
 parallel_force: Callable[[float, float, float, Array], float] = _MODULE.parallel_force
-"""Force [N] beside the element at one x [m], v [m/s], a [m/s2] and one row of parameters."""
+"""Force [N] of what has no memory beside the element, at one x [m], v [m/s], a [m/s2] and one row of parameters."""
+
+branches_follow: Callable[[float, Array, Array], None] = _MODULE.branches_follow
+"""Bring the (b,) deflections of the branches [m] through a travel of the rod to one side [m], in place; one row."""
+branch_force: Callable[[float, Array, Array], float] = _MODULE.branch_force
+"""Force of the branches [N] after a travel [m] from (b,) deflections [m], which stay as they are; one row."""
+branch_stored: Callable[[float, float, Array, Array], float] = _MODULE.branch_stored
+"""The part of `branch_force` [N] whose work on a rod that goes on to a side is stored; the rest slips."""
+branch_steady: Callable[[float, Array], float] = _MODULE.branch_steady
+"""Force of the branches [N] at steady slip to a side; one row."""
 
 
 def parallel_forces(x: Array, v: Array, a: Array, rows: Array) -> Array:
-    """(n,) force [N] beside the element at (n,) x [m], v [m/s], a [m/s2] and (n, m) or (1, m) rows."""
+    """(n,) force [N] of what has no memory beside the element; (n,) x [m], v [m/s], a [m/s2], (n, m) or (1, m) rows."""
     force = np.empty(x.size)
     _MODULE.fill_parallel(x, v, a, rows, force)
     return force

@@ -55,6 +55,11 @@ LAWS: Mapping[Place, Mapping[str, Law]] = {
         "slope_beyond": Law((), alone=False),
     },
     "parallel": {"law": Law(("x", "v", "a"))},
+    "branch": {
+        "advance": Law(("deflection", "travel"), ("law", "rate")),
+        "law": Law(("deflection",), ("advance",)),
+        "rate": Law(("deflection", "side"), alone=False),
+    },
     "sensor": {"law": Law(("time",))},
 }
 """By place and name; `pzd.damper.effect` says what each gives."""

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from pzd.damper.effect import Effect, Scales
-from pzd.damper.effects import library
+from pzd.damper.effects import nameable
 from pzd.damper.model import BaseRow, Damper
 from pzd.paper.loop import loop_in, loop_of
 from pzd.paper.published import AT_ZERO, LARGE_GAP, PEAK, TABLES, WARM_DEGC, rig_tests, span, table_damper
@@ -102,12 +102,12 @@ def attempts() -> tuple[Attempt, ...]:
 
 def candidates() -> tuple[Effect, ...]:
     """The effects that can act at a constant voltage and temperature."""
-    return tuple(effect for effect in library().values() if effect.needs is None)
+    return tuple(effect for effect in nameable().values() if effect.needs is None)
 
 
 def excluded() -> tuple[str, ...]:
     """The effects that cannot: what they need does not move inside any published test."""
-    return tuple(effect.name for effect in library().values() if effect.needs is not None)
+    return tuple(effect.name for effect in nameable().values() if effect.needs is not None)
 
 
 def _attempt(base: Base, effect: Effect | None) -> Attempt:

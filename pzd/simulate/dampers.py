@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import ForceRow, Table
+from pzd.damper.branch import BRANCHES, any_slips
 from pzd.damper.columns import DRIVE
 from pzd.damper.compose import nodes_of, steady_force
 from pzd.damper.kernels import C, K, parallel_force
@@ -72,8 +73,10 @@ def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -
     if "valve_lag" not in damper.effects:
         drive[DRIVE.index(("valve_lag", "tau"))] = valve
     parallel = np.ascontiguousarray(nodes.parallel)
-    alone = not any(_is_parallel(row) for row in parallel)
-    return DynamicDamper(nodes.voltages, rows, parallel, drive, alone, np.zeros(parallel.shape[1]))
+    remembers = any_slips(parallel)
+    alone = not (remembers or any(_is_parallel(row) for row in parallel))
+    room, memory = np.zeros(parallel.shape[1]), np.zeros((2, 1 + BRANCHES))
+    return DynamicDamper(nodes.voltages, rows, parallel, drive, alone, room, remembers, memory)
 
 
 def rubs(dynamic: DynamicDamper) -> bool:

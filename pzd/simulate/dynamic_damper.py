@@ -7,7 +7,18 @@ from typing import NamedTuple
 
 from pzd.compiled import compiled, inlined
 from pzd.damper.flow import flow_speed
-from pzd.damper.kernels import K, Row, effective_voltage_after, parallel_force, row_of, stroke_moves, with_stroke_of
+from pzd.damper.kernels import (
+    K,
+    Row,
+    branch_force,
+    branch_stored,
+    branches_follow,
+    effective_voltage_after,
+    parallel_force,
+    row_of,
+    stroke_moves,
+    with_stroke_of,
+)
 from pzd.damper.regimes import spring_energy, spring_force
 from pzd.damper.rows import row_at
 from pzd.record import Array
@@ -28,6 +39,11 @@ class DynamicDamper(NamedTuple):
     """Whether nothing stands beside the element."""
     scratch: Array
     """A row of parallel effects to work in."""
+    slips: bool
+    """Whether a branch beside the element remembers which way the rod went."""
+    memory: Array
+    """(2, 1 + b) of one damper at each axle: the extension at the last step of integration, and what each of the b
+    branches was deflected by there [m]."""
 
 
 @inlined
@@ -139,3 +155,29 @@ def elastic_force(x: float, row: Array) -> float:
 def inertance(row: Array) -> float:
     """Force beside the element for each acceleration [kg]."""
     return float(parallel_force(0.0, 0.0, 1.0, row) - parallel_force(0.0, 0.0, 0.0, row))
+
+
+@inlined
+def slipping_forces(damper: DynamicDamper, axle: int, x: float, v: float, row: Array) -> tuple[float, float]:
+    """Force [N] of the branches beside the element: the part whose work is stored, and the part that slips.
+
+    Parameters
+    ----------
+    damper : the damper, its memory of the last step
+    axle : 0 or 1
+    x : extension [m], reached from there without turning round
+    v : its speed [m/s]; the sign bit of 0 picks the side
+    row : of the parallel effects
+    """
+    memory = damper.memory[axle]
+    travel = x - memory[0]
+    stored = branch_stored(travel, math.copysign(1.0, v), memory[1:], row)
+    return stored, branch_force(travel, memory[1:], row) - stored
+
+
+@inlined
+def remember(damper: DynamicDamper, axle: int, x: float, row: Array) -> None:
+    """Bring the branches of an axle to an extension [m], reached without turning round; by a row of parallel effects."""
+    memory = damper.memory[axle]
+    branches_follow(x - memory[0], memory[1:], row)
+    memory[0] = x

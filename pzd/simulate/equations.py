@@ -12,7 +12,9 @@ from pzd.simulate.dynamic_damper import (
     flowing,
     inertance,
     parallel_at,
+    remember,
     rubbing_force,
+    slipping_forces,
     valve_power,
 )
 from pzd.simulate.kinematics import suspension
@@ -86,7 +88,21 @@ def dynamic_forces(time: float, y: Array, model: RideModel, control: Array, work
         workspace[ELASTIC, i] = elastic_force(ratio * workspace[DEFLECTION, i], parallel)
         workspace[RUBBING, i] = rubbing_force(ratio * speed, parallel)
         workspace[INERTANCE, i] = n * ratio * ratio * inertance(parallel)
+        if damper.slips:
+            stored, slipped = slipping_forces(damper, i, ratio * workspace[DEFLECTION, i], ratio * speed, parallel)
+            workspace[ELASTIC, i] += stored
+            workspace[RUBBING, i] += slipped
         workspace[FORCE, i] = n * ratio * (workspace[OIL_FORCE, i] + workspace[ELASTIC, i] + workspace[RUBBING, i])
+
+
+@compiled
+def remember_step(time: float, model: RideModel, control: Array, workspace: Array) -> None:
+    """Bring what remembers beside the elements to the end of a step [s] in which no axle turned round; see `motion`."""
+    damper = model.damper
+    for i in range(2):
+        voltage, _ = effective_voltage(damper, control[SET, i], control[BEHIND:, i], time - control[SINCE, 0])
+        parallel_at(damper, voltage, damper.scratch)
+        remember(damper, i, model.car.ratio[i] * workspace[DEFLECTION, i], damper.scratch)
 
 
 @compiled

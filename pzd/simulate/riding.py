@@ -108,7 +108,7 @@ def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: Dy
         gains = np.ascontiguousarray(policy.feedback(car, held.damping, own))
     if policy.switch is not None:
         gains, crossover = policy.switch(car, own)
-    jumps = rubs(damper) if fidelity == DYNAMIC else bounds == BY_TABLE
+    jumps = rubs(damper) or damper.slips if fidelity == DYNAMIC else bounds == BY_TABLE
     return ControlSpec(
         fidelity,
         _AIMS[policy.aim],
@@ -165,7 +165,9 @@ def ride_case(
             clock.per_output,
             float(np.max(grid.reach)),
         )
-    own = damper._replace(scratch=np.zeros_like(damper.scratch))  # rides at the same time work in rooms of their own
+    own = damper._replace(  # rides at the same time work in rooms of their own
+        scratch=np.zeros_like(damper.scratch), memory=np.zeros_like(damper.memory)
+    )
     model = RideModel(
         vehicle(car, speed),
         road_coefficients(profile, car.wheelbase),

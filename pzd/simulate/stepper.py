@@ -14,9 +14,10 @@ import numpy as np
 from pzd.compiled import compiled, inlined
 from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
 from pzd.record import Array
-from pzd.simulate.equations import motion
+from pzd.simulate.equations import motion, remember_step
 from pzd.simulate.ride_model import (
     COMPRESSION_PUSH,
+    DYNAMIC,
     HEAVE_RATE,
     PITCH_RATE,
     RATE,
@@ -151,6 +152,8 @@ def advance(
         for n in range(STATES):
             y[n] = end[n]
         done += dt
+        if model.damper.slips and model.control_spec.fidelity == DYNAMIC:
+            remember_step(time + done, model, control, workspace)
         dt *= min(growth, 5.0)
         if axle >= 0:
             cuts += 1

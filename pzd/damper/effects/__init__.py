@@ -11,7 +11,7 @@ from pathlib import Path
 from pzd.damper.effect import Effect
 from pzd.damper.laws import declared
 
-_PLACES = ("drive", "material", "stroke", "flow", "parallel", "sensor")
+_PLACES = ("drive", "material", "stroke", "flow", "parallel", "branch", "sensor")
 
 
 @cache
@@ -23,10 +23,16 @@ def library() -> dict[str, Effect]:
     ImportError : when a file breaks a rule of `pzd.damper.effect`, or two files declare one name
     """
     found = sorted(effects_in(__name__, pkgutil.iter_modules(__path__)), key=lambda e: (_PLACES.index(e.place), e.name))
-    unhidden = [effect.name for effect in found if effect.hidden is None]
+    unhidden = [effect.name for effect in found if effect.hidden is None and effect.never_named is None]
     if unhidden:
         raise ImportError(f"{__path__[0]}/{unhidden[0]}.py: says not how the benchmark hides it (`hidden`)")
     return {effect.name: effect for effect in found}
+
+
+@cache
+def nameable() -> dict[str, Effect]:
+    """Those of them that a verdict may name and the benchmark hides."""
+    return {name: effect for name, effect in library().items() if effect.never_named is None}
 
 
 def effects_in(package: str, modules: Iterable[pkgutil.ModuleInfo]) -> list[Effect]:

@@ -1,4 +1,4 @@
-"""Every effect of the library fitted to the data, one at a time, together with those already adopted."""
+"""Every effect that can be named fitted to the data, one at a time, together with those already adopted."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from pzd.damper.competing_forms import competing_forms, known
 from pzd.damper.effect import Effect
-from pzd.damper.effects import library
+from pzd.damper.effects import library, nameable
 from pzd.diagnose.fit.least_squares import MOST_EVALUATIONS, Fitted, fit
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.prediction import WARMS, ends
@@ -27,7 +27,7 @@ from pzd.diagnose.thresholds import (
 )
 from pzd.record import Array
 
-VARIES = ("stroke", "flow", "parallel")
+VARIES = ("stroke", "flow", "parallel", "branch")
 """Places of effects whose parameters may differ by voltage."""
 
 
@@ -75,7 +75,7 @@ def candidates(
     *,
     silent: bool = False,
 ) -> tuple[Candidate, ...]:
-    """Every effect that the tests could show, fitted beside those of `before`, best first.
+    """Every effect with a name that the tests could show, fitted beside those of `before`, best first.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def candidates(
     """
     tried = [
         effect
-        for effect in library().values()
+        for effect in nameable().values()
         if effect.name not in (*before.effects, *forbidden) and seen_in(problem, effect)
     ]
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from pzd.damper.compose import (
     element_rows,
+    forces_beside,
     integrated_force,
     parallel_rows,
     recorded,
@@ -16,7 +17,7 @@ from pzd.damper.compose import (
     sensors_of,
     voltage_at_valve,
 )
-from pzd.damper.kernels import K, parallel_forces, row_of, stroke_straight
+from pzd.damper.kernels import K, row_of, stroke_straight
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.damper.path import deflections
@@ -95,7 +96,7 @@ def _by_rounds(
         total, last = element + more, (more, bend)
         if parallel is not None:
             at = motion.displacement - total / frame_stiffness
-            more = parallel_forces(at, velocity, motion.acceleration, parallel)
+            more = forces_beside(replace(motion, displacement=at, velocity=velocity), parallel)
         if bent:
             bend = deflections(element, rows) - deflections(element, own) - element / frame_stiffness
         change = max(np.max(np.abs(more - last[0])), frame_stiffness * np.max(np.abs(bend - last[1])))

@@ -11,7 +11,7 @@ import math
 
 from pzd.compiled import compiled, inlined
 from pzd.damper.flow import breakaway, flow_force
-from pzd.damper.kernels import C, K, parallel_force, row_of
+from pzd.damper.kernels import C, K, branch_steady, parallel_force, row_of
 from pzd.damper.regimes import spring_force
 from pzd.record import Array
 from pzd.simulate.prediction.predictor import BODY_AND_OIL, LOAD_1, LOAD_2, MODES, WEIGHTED, Predictor
@@ -73,10 +73,13 @@ def spring(plan: Predictor, level: int, e: float) -> float:
 
 @inlined
 def parallel_load(x: float, v: float, row: Array) -> float:
-    """Force beside the element [N] at an extension [m] and a speed [m/s], without what is there at rest."""
+    """Force beside the element [N] at an extension [m] and a speed [m/s], without what is there at rest.
+
+    A branch that remembers is taken as the friction of its steady slip.
+    """
     rest = parallel_force(0.0, 0.0, 0.0, row)
     elastic = parallel_force(x, 0.0, 0.0, row) - rest
-    rubbing = parallel_force(0.0, v, 0.0, row) - rest
+    rubbing = parallel_force(0.0, v, 0.0, row) - rest + branch_steady(math.copysign(1.0, v), row)
     return float(elastic + rubbing * min(abs(v) / _ROUNDED, 1.0))
 
 

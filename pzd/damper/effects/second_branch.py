@@ -1,0 +1,59 @@
+"""A further elasto-plastic element beside the first (Maxwell slip): a spring that slips at a force of its own.
+
+Law: dF_2/dt = k_2 dx/dt, |F_2| <= T0_2, whatever the speed. Softer than the oil spring, it makes the shelf that
+measured magneto-rheological dampers show behind a reversal, T0_2/k_2 wide on either side: range 0.3-10 mm, T0_2 up to a
+quarter of the peak. Its nearest neighbours are told from it by two tests. At an amplitude below T0_2/k_2 it is a spring
+and nothing is lost: `rounded_yield` loses as much for each speed as ever, `lash` shows no force at all. And one
+speed reached at two amplitudes: a shelf that is as wide in millimetres in both is this one, one that is as wide in
+m/s is a rounded yield. A stiffer or softer oil spring k bends the whole way to T0, not its second part alone.
+"""
+
+from __future__ import annotations
+
+from pzd.damper.effect import Effect, Parameter, Search
+
+EFFECT = Effect(
+    name="second_branch",
+    place="branch",
+    law="dF_2/dt = k_2 dx/dt, |F_2| <= T0_2",
+    parameters=(
+        Parameter(
+            "T0_2", "N", 0.0, 0.0, 1.0e6, "force at which the branch slips", Search(lambda s: s.force, (0.05, 0.2))
+        ),
+        Parameter(
+            "k_2",
+            "N/m",
+            1.0e5,
+            1.0,
+            1.0e9,
+            "stiffness of the branch before it slips",
+            Search(lambda s: s.force / s.stroke, (1.0, 5.0), logarithmic=True),
+        ),
+    ),
+    source="Iwan 1966, J. Appl. Mech. 33(4); generalized Maxwell slip: Al-Bender, Lampaert and Swevers 2005, "
+    "IEEE Trans. Automatic Control 50(11)",
+    tests=(
+        ({"deflection": 0.0, "travel": 1.0e-3, "T0_2": 100.0, "k_2": 5.0e4}, 1.0e-3),
+        ({"deflection": 1.5e-3, "travel": 1.0e-3, "T0_2": 100.0, "k_2": 5.0e4}, 2.0e-3),
+        ({"deflection": 2.0e-3, "travel": -5.0e-3, "T0_2": 100.0, "k_2": 5.0e4}, -2.0e-3),
+        ({"deflection": 1.5e-3, "k_2": 5.0e4}, 75.0),
+    ),
+    never_named="the tests of a usual rig cannot tell it from a rubber seat or a rounded yield: that takes tests of an "
+    "amplitude below its shelf",
+)
+
+
+def advance(deflection: float, travel: float, T0_2: float, k_2: float) -> float:
+    """Elastic deflection [m] after a travel of the rod to one side [m]."""
+    most = T0_2 / k_2
+    return max(-most, min(most, deflection + travel))
+
+
+def law(deflection: float, k_2: float) -> float:
+    """Force [N] beside the element at an elastic deflection [m]."""
+    return k_2 * deflection
+
+
+def rate(deflection: float, side: float, T0_2: float, k_2: float) -> float:
+    """Derivative of the deflection by the travel to a side [-]: 1 where the spring is wound, 0 where it slips."""
+    return 0.0 if side * deflection >= T0_2 / k_2 else 1.0
