@@ -177,7 +177,7 @@ def slipping_forces(damper: DynamicDamper, axle: int, x: float, v: float, row: A
 
 @inlined
 def remember(damper: DynamicDamper, axle: int, x: float, row: Array) -> None:
-    """Bring the branches of an axle to an extension [m], reached without turning round; by a row of parallel effects."""
+    """Bring the branches of an axle to an extension [m], reached without turning round; by one row."""
     memory = damper.memory[axle]
     branches_follow(x - memory[0], memory[1:], row)
     memory[0] = x

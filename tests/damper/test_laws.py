@@ -12,7 +12,7 @@ import pytest
 
 from pzd.damper.competing_forms import known, module_of
 from pzd.damper.effect import Scales
-from pzd.damper.effects import effects_in, library
+from pzd.damper.effects import effects_in, library, nameable
 from pzd.damper.laws import functions
 
 GOOD = """
@@ -36,6 +36,15 @@ def extra_force(w, q):
 def extra_slope(w, q):
     return 3.0 * q * w**2
 """
+
+BRANCH = (
+    GOOD.replace("NAME", "cubic").replace("PLACE", "branch").partition("def extra_force")[0]
+    + """
+def advance(deflection, travel): ...
+def law(deflection, q): ...
+def rate(deflection, side): ...
+"""
+)
 
 Effects = Callable[..., list[str]]
 
@@ -81,6 +90,8 @@ def test_a_good_file_is_an_effect(effects: Effects) -> None:
         (text('"q"', '"k"').replace("w, q", "w, k"), "cubic.py: parameter k has a name of the element's.*model.py"),
         (text('"q"', '"w"').replace("w, q", "w"), "cubic.py: parameter w has the name of a quantity"),
         (text("),),\n", "),) * 2,\n"), "cubic.py: parameter q is declared twice"),
+        (BRANCH.replace("def rate", "def slope"), "cubic.py: rate must stand beside advance"),
+        (BRANCH.replace("def law", "def force"), "cubic.py: law must stand beside advance"),
         (text(name="other"), "cubic.py: declares the effect other, so it must be called other.py"),
     ],
 )
@@ -114,7 +125,7 @@ def hidden(name: str, strength: float, rng: np.random.Generator) -> dict[str, fl
     return hiding(rng, SCALES)(strength)
 
 
-@pytest.mark.parametrize("name", library())
+@pytest.mark.parametrize("name", nameable())
 @pytest.mark.parametrize("strength", [1e-3, 1.0])
 def test_an_effect_is_hidden_with_admissible_values_of_all_its_parameters(
     name: str, strength: float, rng: np.random.Generator

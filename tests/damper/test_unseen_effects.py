@@ -1,4 +1,4 @@
-"""An effect is one file: four that nobody has seen, put into a copy of the package, act everywhere and are named."""
+"""An effect is one file: five that nobody has seen, put into a copy of the package, act everywhere and are named."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ import pytest
 import pzd
 
 UNSEEN = Path(__file__).with_name("unseen")
-EFFECTS = ("choked_port", "hardening_spring", "slew_limit", "detent")
+EFFECTS = ("choked_port", "hardening_spring", "slew_limit", "detent", "dahl_friction")
 
 pytestmark = pytest.mark.ci
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
-    """Run Python in a copy of the package with the four effect files added and nothing else changed."""
+    """Run Python in a copy of the package with the five effect files added and nothing else changed."""
     folder = tmp_path_factory.mktemp("unseen")
     shutil.copytree(Path(pzd.__file__).parent, folder / "pzd", ignore=shutil.ignore_patterns("__pycache__"))
     for name in EFFECTS:
@@ -65,7 +65,9 @@ def test_an_unseen_effect_acts_on_the_stand_and_in_the_car(name: str, acts: dict
 
 def test_the_table_carries_what_steady_slip_shows(acts: dict[str, dict[str, float]]) -> None:
     assert acts["choked_port"]["steady"] > 0.1
-    assert {name: acts[name]["steady"] for name in EFFECTS if name != "choked_port"} == dict.fromkeys(
+    assert acts["dahl_friction"]["steady"] > 0.05
+    steady = {"choked_port", "dahl_friction"}
+    assert {name: acts[name]["steady"] for name in EFFECTS if name not in steady} == dict.fromkeys(
         ("hardening_spring", "slew_limit", "detent"), 0.0
     )
 

@@ -51,6 +51,7 @@ BESIDE = {
     "preload_offset": {"F_0": -80.0},
     "end_stop": {"k_e": 3e4, "x_e": 0.02},
     "stribeck_friction": {"F_s": 120.0, "v_s": 0.05},
+    "second_branch": {"T0_2": (60.0, 300.0), "k_2": (9e4, 4e4), "at_voltage_V": (0.0, 150.0)},
 }
 IN_THE_FLOW = {
     "asymmetry": {"alpha": -0.3},

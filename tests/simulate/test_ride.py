@@ -10,6 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from pzd.damper.compose import respond
 from pzd.damper.motion import Motion
+from pzd.simulate.loop import LOST
 from pzd.simulate.outcome import low_passed_jerk
 
 DEFLECTION, RATE, SPRING, DAMPER, DEMANDED, VOLTAGE = range(4, 10)
@@ -25,6 +26,7 @@ EFFECTS = {
     "lash": {"delta": 3e-4},
     "asymmetry": {"alpha": 0.1},
     "end_stop": {"k_e": 1e7, "x_e": 0.02},
+    "second_branch": {"T0_2": (60.0, 300.0), "k_2": (9e4, 4e4), "at_voltage_V": (0.0, 150.0)},
 }
 
 
@@ -65,6 +67,22 @@ def test_the_energies_balance_with_every_effect_on_the_damper(ride, damper, valv
         full = full.with_effect(name, values)
     outcome = ride("comfort", "dynamic", on=full, valve_response_s=valve, **SHORT)
     assert abs(outcome.energy_error) < 5e-7
+
+
+def test_a_branch_that_never_slips_is_a_spring_in_the_car_and_a_stiff_one_is_friction(ride, damper) -> None:
+    """The friction is wound up within 10 um, and differs from a jump where the rod turns round."""
+    spring, never = {"gas_spring": {"k_g": 8000.0}}, {"second_branch": {"T0_2": 1e6, "k_2": 8000.0}}
+    friction, stiff = {"guide_friction": {"F_g": 100.0}}, {"second_branch": {"T0_2": 100.0, "k_2": 1e7}}
+    for limit, branch, within in ((spring, never, 1e-7), (friction, stiff, 2e-2)):
+        one, other = (
+            ride("passive", "dynamic", on=damper.model_copy(update={"effects": effects}), **SHORT)
+            for effects in (limit, branch)
+        )
+        apart, scale = (np.sqrt(np.mean(a**2)) for a in (one.history[:, 3] - other.history[:, 3], one.history[:, 3]))
+        assert apart < within * scale
+        lost = [outcome.course[-1, LOST] for outcome in (one, other)]
+        assert lost[1] == pytest.approx(lost[0], rel=within)
+        assert abs(other.energy_error) < 2e-7
 
 
 @pytest.mark.parametrize(("policy", "fidelity"), [case for case in ALL if case[1] != "dynamic"])

@@ -170,10 +170,17 @@ static double parallel(double x, double v, double a, const double *p)
     return force;
 }
 
+/* Elastic deflection of the second branch [m] after a travel of the rod to one side. */
+static double wound(double branch, double travel, const double *p)
+{
+    const double most = p[SECOND_BRANCH_T0_2] / p[SECOND_BRANCH_K_2];
+    return fmax(-most, fmin(most, branch + travel));
+}
+
 element_state element_start(const element_inputs *inputs, double force)
 {
     double p[COLUMNS];
-    element_state state = {0.0, inputs->signal};
+    element_state state = {0.0, inputs->signal, 0.0};
     parameters(state.effective, inputs->temperature, p);
     if (force != 0.0)
         state.deflection = deflection_at(force, copysign(1.0, force), p);
@@ -186,6 +193,7 @@ element_state element_after(element_state state, const element_inputs *inputs, d
     state.effective = felt(state.effective, inputs->signal);
     parameters(state.effective, inputs->temperature, p);
     state.deflection = deflection_after(state.deflection, inputs->velocity, step, p);
+    state.branch = wound(wound(state.branch, 0.0, p), inputs->velocity * step, p);
     return state;
 }
 
@@ -193,5 +201,6 @@ double element_force(element_state state, const element_inputs *inputs)
 {
     double p[COLUMNS];
     parameters(felt(state.effective, inputs->signal), inputs->temperature, p);
-    return spring(state.deflection, p) + parallel(inputs->displacement, inputs->velocity, inputs->acceleration, p);
+    return spring(state.deflection, p) + p[SECOND_BRANCH_K_2] * wound(state.branch, 0.0, p) +
+           parallel(inputs->displacement, inputs->velocity, inputs->acceleration, p);
 }

@@ -8,6 +8,7 @@
 typedef struct {
     double deflection; /* elastic deflection x - y of the oil spring [m] */
     double effective;  /* control signal as the valve feels it */
+    double branch;     /* elastic deflection of the second branch [m] */
 } element_state;
 
 typedef struct {

@@ -13,7 +13,7 @@ static element_inputs inputs_of(const model *m)
 
 void model_reset(model *m)
 {
-    const model fresh = {{0.0}, 0.0, {0.0, 0.0}, 0};
+    const model fresh = {{0.0}, 0.0, {0.0, 0.0, 0.0}, 0};
     *m = fresh;
     m->values[SIGNAL] = START_SIGNAL;
     m->values[TEMPERATURE] = START_TEMPERATURE;

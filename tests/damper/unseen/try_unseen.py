@@ -33,6 +33,7 @@ VALUES = {
     "hardening_spring": {"c": 2.0e4},
     "slew_limit": {"R": 800.0},
     "detent": {"F_d": 80.0},
+    "dahl_friction": {"F_c": 120.0},
 }
 PLAIN = Damper(
     base=(
@@ -52,6 +53,7 @@ def independent(name: str, frame: float | None = None) -> np.ndarray:
     """Force by a solver of another kind, from the laws written out by hand."""
     values = VALUES[name]
     q, c, F_d = values.get("q", 0.0), values.get("c", 0.0), values.get("F_d", 0.0)
+    F_c = values.get("F_c", 0.0)
 
     def speed(force: float, T0: float, C: float) -> float:
         over = max(abs(force) - T0, 0.0)
@@ -84,10 +86,11 @@ def independent(name: str, frame: float | None = None) -> np.ndarray:
 
     def rate(t: float, e: np.ndarray) -> list[float]:
         T0, C, _ = parameters(t)
-        return [OMEGA * 0.02 * np.cos(OMEGA * t) - speed(force(t, e[0]), T0, C)]
+        v = OMEGA * 0.02 * np.cos(OMEGA * t)
+        return [v - speed(force(t, e[0]), T0, C), (v * F_c - e[1] * abs(v)) / 5e-4]
 
-    run = solve_ivp(rate, (0.0, TIME[-1]), [0.0], "RK45", TIME, rtol=1e-8, atol=1e-12, max_step=2.5e-4)
-    found = np.array([force(t, e) for t, e in zip(TIME, run.y[0], strict=True)])
+    run = solve_ivp(rate, (0.0, TIME[-1]), [0.0, 0.0], "RK45", TIME, rtol=1e-8, atol=1e-12, max_step=2.5e-4)
+    found = np.array([force(t, e) for t, e in zip(TIME, run.y[0], strict=True)]) + run.y[1]
     return found + F_d * np.sin(2.0 * np.pi * X / 0.015)
 
 

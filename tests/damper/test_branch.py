@@ -1,0 +1,168 @@
+"""The second branch: closed forms, how it is told from its neighbours, and that sampling and frame change nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pzd.damper.branch import branch_forces
+from pzd.damper.competing_forms import module_of
+from pzd.damper.compose import constant_rows, respond, static_force, steady_force
+from pzd.damper.effects import library, nameable
+from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
+from pzd.rig.stand.frame import force_in_frame
+
+PLAIN = Damper(
+    base=(
+        BaseRow(voltage_V=0.0, T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e6),
+        BaseRow(voltage_V=150.0, T0_N=1300.0, C_Ns_per_m=2500.0, k_N_per_m=4e6),
+    )
+)
+SLIPS, STIFFNESS = 100.0, 5e4
+SHELF = SLIPS / STIFFNESS
+BRANCH = PLAIN.with_effect("second_branch", {"T0_2": SLIPS, "k_2": STIFFNESS})
+BY_VOLTAGE = {"T0_2": (60.0, 250.0), "k_2": (9e4, 4e4), "at_voltage_V": (0.0, 150.0)}
+
+
+def sine(amplitude: float, frequency: float = 1.5, samples: int = 2000, voltage: float | np.ndarray = 0.0) -> Motion:
+    """Three cycles of a sine about zero."""
+    time = np.linspace(0.0, 3.0 / frequency, 3 * samples + 1)
+    omega = 2.0 * np.pi * frequency
+    x, v = amplitude * np.sin(omega * time), amplitude * omega * np.cos(omega * time)
+    return Motion(time, x, v, -(omega**2) * x, np.broadcast_to(voltage, time.shape).copy())
+
+
+def beside(motion: Motion, damper: Damper = BRANCH) -> np.ndarray:
+    """(n,) what the branch adds to the force [N]."""
+    return respond(damper, motion) - respond(PLAIN, motion)
+
+
+def lost(motion: Motion, force: np.ndarray) -> float:
+    """Work over the last cycle [J]."""
+    last = slice(2 * (motion.time.size - 1) // 3, None)
+    return float(np.trapezoid(force[last], motion.displacement[last]))
+
+
+def test_inside_its_shelf_it_is_a_spring_and_loses_nothing() -> None:
+    motion = sine(0.9 * SHELF)
+    np.testing.assert_allclose(beside(motion), STIFFNESS * motion.displacement, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("frequency", [0.1, 10.0])
+@pytest.mark.parametrize("amplitude", [1.5, 4.0, 20.0])
+def test_beyond_it_loses_four_times_its_force_over_what_it_slips_whatever_the_speed(
+    amplitude: float, frequency: float
+) -> None:
+    """Masing's loop: each half cycle winds it through 2 T0_2/k_2 and slips through the rest of 2 A."""
+    motion = sine(amplitude * SHELF, frequency)
+    force = beside(motion)
+    assert np.max(np.abs(force)) == pytest.approx(SLIPS, rel=1e-12)
+    assert lost(motion, force) == pytest.approx(4.0 * SLIPS * (amplitude - 1.0) * SHELF, rel=1e-5)
+
+
+def test_a_small_amplitude_tells_it_from_a_rounded_yield_and_a_lash() -> None:
+    """Inside the shelf a rounded yield loses as much as its speed says, and behind a lash nothing pulls at all."""
+    motion = sine(0.9 * SHELF)
+    slippery = Damper(base=(BaseRow(T0_N=SLIPS, C_Ns_per_m=1.0, k_N_per_m=1e7),))
+    rounded = respond(slippery.with_effect("rounded_yield", {"w_s": 0.01}), motion)
+    assert lost(motion, rounded) > 0.5 * SLIPS * 4.0 * 0.9 * SHELF
+    loose = respond(slippery.with_effect("lash", {"delta": 2.0 * SHELF}), motion)
+    assert np.max(np.abs(loose)) == 0.0
+    assert abs(lost(motion, beside(motion))) < 1e-6 * SLIPS * SHELF
+
+
+def test_one_speed_at_two_amplitudes_tells_a_shelf_in_millimetres_from_one_in_metres_per_second() -> None:
+    """Where the force comes up to half its way behind a reversal: at the same travel, not at the same speed."""
+    fast = 0.2
+
+    def half_way(amplitude: float, damper: Damper, plain: Damper) -> tuple[float, float]:
+        motion = sine(amplitude, fast / (2.0 * np.pi * amplitude), 20000)
+        force = respond(damper, motion) - respond(plain, motion)
+        rising = slice(round(1.75 * 20000), round(2.0 * 20000))
+        i = rising.start + int(np.argmax(force[rising] >= 0.5 * SLIPS))
+        return float(motion.displacement[i] + amplitude), float(motion.velocity[i])
+
+    shelf = [half_way(amplitude, BRANCH, PLAIN) for amplitude in (0.01, 0.03)]
+    assert shelf[1][0] == pytest.approx(shelf[0][0], rel=1e-3)
+    assert shelf[1][0] == pytest.approx(1.5 * SHELF, rel=1e-3)
+    assert shelf[0][1] > 1.5 * shelf[1][1]
+    rigid = Damper(base=(BaseRow(T0_N=SLIPS, C_Ns_per_m=1e-3, k_N_per_m=1e9),))
+    nothing = Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=1e-3, k_N_per_m=1e9),))
+    rounded = [half_way(a, rigid.with_effect("rounded_yield", {"w_s": 0.02}), nothing) for a in (0.01, 0.03)]
+    assert rounded[1][1] == pytest.approx(rounded[0][1], rel=2e-2)
+    assert rounded[1][0] > 2.0 * rounded[0][0]
+
+
+def zigzag(rng: np.random.Generator, parts: int) -> Motion:
+    """Speeds at random, linear in between, each interval sampled so often: every displacement is a parabola."""
+    corners = rng.normal(0.0, 0.2, 400)
+    time = np.arange(corners.size) * 0.01
+    fine = np.linspace(0.0, time[-1], (corners.size - 1) * parts + 1)
+    v = np.interp(fine, time, corners)
+    x = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(fine))])
+    return Motion(fine, x, v, np.zeros_like(v), np.interp(fine, time, 75.0 + 70.0 * np.sin(5.0 * time)))
+
+
+def test_a_step_is_cut_where_the_rod_turns_round(rng: np.random.Generator) -> None:
+    """Against the same motion in steps that turn round nearly at their ends alone: the parabola adds no error."""
+    seed = int(rng.integers(1 << 31))
+    whole, fine = (zigzag(np.random.default_rng(seed), parts) for parts in (1, 400))
+    rows = steady_row(SLIPS, STIFFNESS)
+    assert np.sum(np.diff(np.sign(whole.velocity)) != 0.0) > 100
+    np.testing.assert_allclose(branch_forces(whole, rows), branch_forces(fine, rows)[::400], atol=2e-6 * SLIPS)
+
+
+def steady_row(slips: float, stiffness: float) -> np.ndarray:
+    """(1, m) row of what stands beside the element: this branch alone."""
+    _, row = constant_rows(1.0, 1.0, 1.0, {"second_branch": {"T0_2": slips, "k_2": stiffness}})
+    assert row is not None
+    return row
+
+
+def test_where_its_parameters_move_the_error_falls_with_the_sampling() -> None:
+    damper, errors = PLAIN.with_effect("second_branch", BY_VOLTAGE), list[float]()
+    moving = [sine(0.02, 3.0, n, 75.0 + 70.0 * np.sin(np.linspace(0.0, 13.0, 3 * n + 1))) for n in (100, 400, 25600)]
+    truth = beside(moving[-1], damper)
+    for motion in moving[:-1]:
+        apart = beside(motion, damper) - truth[:: 3 * 25600 // (motion.time.size - 1)]
+        errors += [float(np.max(np.abs(apart)))]
+    assert errors[0] < 0.02 * 250.0
+    assert errors[1] < 0.3 * errors[0]
+
+
+def test_steady_slip_is_a_dry_friction_and_at_rest_there_is_nothing() -> None:
+    speeds = np.array([-0.3, -0.0, 0.0, 0.3])
+    damper = PLAIN.with_effect("second_branch", BY_VOLTAGE)
+    for voltage, slips in ((0.0, 60.0), (75.0, 155.0), (150.0, 250.0)):
+        more = steady_force(damper, voltage, None, speeds) - steady_force(PLAIN, voltage, None, speeds)
+        np.testing.assert_allclose(more, slips * np.copysign(1.0, speeds), rtol=1e-12)
+        assert static_force(damper, voltage) == 0.0
+    time = np.arange(2000) * 1e-3
+    even = Motion(time, 0.1 * time, np.full(2000, 0.1), np.zeros(2000), np.full(2000, 75.0))
+    assert respond(damper, even)[-1] == pytest.approx(float(steady_force(damper, 75.0, None, 0.1)), rel=1e-9)
+
+
+def test_behind_a_frame_it_is_wound_by_the_damper_s_own_extension() -> None:
+    """Inside its shelf as a spring beside the element is; a frame that gives takes part of the travel."""
+    motion, never = sine(0.01), {"T0_2": 1e6, "k_2": 8000.0}
+    spring, branch = PLAIN.with_effect("gas_spring", {"k_g": 8000.0}), PLAIN.with_effect("second_branch", never)
+    behind = force_in_frame(branch, motion, 2e6)
+    np.testing.assert_allclose(behind, force_in_frame(spring, motion, 2e6), rtol=0, atol=1e-6)
+    assert np.max(np.abs(behind - respond(branch, motion))) > 1.0
+
+
+def test_the_rate_is_the_derivative_of_what_a_travel_makes() -> None:
+    """The half-car books by it what is stored and what slips."""
+    for effect in (effect for effect in library().values() if effect.place == "branch"):
+        laws = module_of(effect)
+        values = {p.name: p.neutral or 100.0 for p in effect.parameters}
+        for side in (-1.0, 1.0):
+            for deflection in (0.0, 0.5e-3, laws.advance(0.0, side * np.inf, **values)):
+                moved = laws.advance(deflection, side * 1e-9, **values) - deflection
+                assert moved / (side * 1e-9) == pytest.approx(laws.rate(deflection, side, **values), abs=1e-6)
+
+
+def test_no_verdict_names_it() -> None:
+    assert "second_branch" in library()
+    assert "second_branch" not in nameable()
