@@ -10,7 +10,7 @@ import pytest
 from campaign import damper_of, sines
 from test_kept_back import TWO, campaign_of
 
-from pzd.damper.effects import library
+from pzd.damper.effects import library, nameable
 from pzd.damper.model import Damper
 from pzd.damper.nature import against_nature
 from pzd.diagnose.added_by_prediction import Extended, with_predictive_effects
@@ -18,7 +18,7 @@ from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.handed_on import handed_on
 from pzd.diagnose.kept_back import Trials, trials_of
-from pzd.diagnose.search.candidates import by_voltage
+from pzd.diagnose.search.candidates import by_voltage, candidates
 from pzd.diagnose.search.evidence import evidence_of
 from pzd.diagnose.search.selection import Selection
 from pzd.record import Record
@@ -55,6 +55,21 @@ def test_what_is_missing_is_added_one_effect_after_another(rng: np.random.Genera
     values = found.selection.fitted.damper.effects
     assert values["preload_offset"]["F_0"] == pytest.approx(150.0, rel=0.05)
     assert values["gas_spring"]["k_g"] == pytest.approx(8000.0, rel=0.05)
+
+
+@pytest.mark.ci
+def test_a_branch_that_no_verdict_names_is_added_with_its_values(rng: np.random.Generator) -> None:
+    records = records_of(damper_of(TWO, second_branch={"T0_2": 300.0, "k_2": 3e4}), rng)
+    found, before = extended(records, DiagnoseConfig(most_effects=1))
+    assert found is not None
+    assert found.added[0] == "second_branch"
+    assert found.missed.criterion is not None
+    assert found.missed.criterion < 0.05 * before
+    values = found.selection.fitted.damper.effects["second_branch"]
+    assert values == pytest.approx({"T0_2": 300.0, "k_2": 3e4}, rel=0.02)
+    selection, _ = plain_selection(records, DiagnoseConfig())
+    tried = candidates(selection.first.whole, selection.plain, silent=True)
+    assert {c.effect for c in tried} <= nameable().keys()
 
 
 def test_nothing_is_added_to_a_damper_that_lacks_nothing(rng: np.random.Generator) -> None:
