@@ -29,7 +29,7 @@ from pzd.blind.plan import plan
 from pzd.cli.app import status
 from pzd.config import RunConfig
 from pzd.damper.compose import respond
-from pzd.damper.effects import library
+from pzd.damper.effects import nameable
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.schema.errors import ConfigError
@@ -165,7 +165,7 @@ def test_the_first_cases_are_fairly_mixed(small: Small) -> None:
         assert found == {"single": 0.45 * count, "pair": 0.1 * count, "none": 0.25 * count, "outside": 0.2 * count}
     singles = Counter(case.hidden for case in cases if case.kind == "single")
     assert max(singles.values()) - min(singles.values()) <= 1
-    assert len(singles) == len([effect for effect in library().values() if effect.needs != "voltage"])
+    assert len(singles) == len([effect for effect in nameable().values() if effect.needs != "voltage"])
 
 
 def test_a_seed_that_was_tuned_on_gives_no_result(small: Small) -> None:
