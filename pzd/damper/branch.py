@@ -18,7 +18,7 @@ def branch_forces(motion: Motion, rows: Array) -> Array:
     """Force of the branches along a motion, from rest at its first sample.
 
     The extension is a parabola inside each step, cut where the rod turns round: from there to there the laws are exact
-    where the parameters stand still. Where they move they are taken as at the end of each part.
+    where the parameters stand still. Where they move they are taken as at the end of each step, of order two.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def branch_forces(motion: Motion, rows: Array) -> Array:
     (n,) force [N]
     """
     force = np.zeros(motion.time.size)
-    _fill(motion.displacement, motion.velocity, motion.time, rows, np.zeros(rows.shape[1]), np.zeros(BRANCHES), force)
+    _fill(motion.displacement, motion.velocity, motion.time, rows, np.zeros(BRANCHES), force)
     return force
 
 
@@ -44,20 +44,17 @@ def any_slips(rows: Array) -> bool:
 
 
 @compiled
-def _fill(x: Array, v: Array, time: Array, rows: Array, row: Array, state: Array, force: Array) -> None:
-    """Fill `force`, working in a row and in the deflections."""
+def _fill(x: Array, v: Array, time: Array, rows: Array, state: Array, force: Array) -> None:
+    """Fill `force`, and change the deflections in place."""
     last = rows.shape[0] - 1
     for i in range(1, x.size):
-        before, now = rows[min(i - 1, last)], rows[min(i, last)]
+        now = rows[min(i, last)]
         travel, h = x[i] - x[i - 1], time[i] - time[i - 1]
         half = 0.5 * (v[i] - v[i - 1])
         u0, u1 = travel / h - half, travel / h + half
         if u0 * u1 < 0.0:
-            share = u0 / (u0 - u1)
-            way = 0.5 * u0 * share * h
-            for j in range(row.size):
-                row[j] = before[j] + share * (now[j] - before[j])
-            branches_follow(way, state, row)
+            way = 0.5 * u0 * u0 / (u0 - u1) * h
+            branches_follow(way, state, now)
             travel -= way
         branches_follow(travel, state, now)
         force[i] = branch_force(0.0, state, now)

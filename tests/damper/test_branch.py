@@ -7,7 +7,7 @@ import pytest
 
 from pzd.damper.branch import branch_forces
 from pzd.damper.competing_forms import module_of
-from pzd.damper.compose import constant_rows, respond, static_force, steady_force
+from pzd.damper.compose import constant_rows, parallel_rows, respond, static_force, steady_force
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
@@ -119,15 +119,19 @@ def row_of_branch(slips: float, stiffness: float) -> np.ndarray:
     return row
 
 
-def test_where_its_parameters_move_the_error_falls_with_the_sampling() -> None:
-    damper, errors = PLAIN.with_effect("second_branch", BY_VOLTAGE), list[float]()
-    moving = [sine(0.02, 3.0, n, 75.0 + 70.0 * np.sin(np.linspace(0.0, 13.0, 3 * n + 1))) for n in (100, 400, 25600)]
-    truth = beside(moving[-1], damper)
-    for motion in moving[:-1]:
-        apart = beside(motion, damper) - truth[:: 3 * 25600 // (motion.time.size - 1)]
-        errors += [float(np.max(np.abs(apart)))]
-    assert errors[0] < 0.02 * 250.0
-    assert errors[1] < 0.3 * errors[0]
+def test_where_its_parameters_move_the_error_falls_with_the_square_of_the_step() -> None:
+    damper, samples, most = PLAIN.with_effect("second_branch", BY_VOLTAGE), (90, 270, 810), 21870
+
+    def force(count: int) -> np.ndarray:
+        motion = sine(0.02, 3.0, count, 75.0 + 70.0 * np.sin(np.linspace(0.3, 40.3, 3 * count + 1)))
+        rows = parallel_rows(damper, motion.voltage)
+        assert rows is not None
+        return branch_forces(motion, rows)
+
+    truth = force(most)
+    errors = [float(np.sqrt(np.mean((force(count) - truth[:: most // count]) ** 2))) for count in samples]
+    assert errors[0] < 2e-3 * 250.0
+    assert errors[2] < 2.0 / 81.0 * errors[0]
 
 
 def test_steady_slip_is_a_dry_friction_and_at_rest_there_is_nothing() -> None:
