@@ -131,6 +131,8 @@ class Parameter:
     """Smallest value that the effect has in nature; a fit may go below, and is then something that looks alike."""
     natural_to: float = math.inf
     """Largest value that the effect has in nature; a fit may go beyond, and is then something that looks alike."""
+    with_friction: bool = False
+    """Whether it goes with T0 from voltage to voltage, so that it is looked for by voltage, in proportion to T0."""
 
     def admits(self, value: float) -> bool:
         """Whether the value lies within the limits."""

@@ -74,7 +74,7 @@ def with_predictive_effects(
     if at is None or not added:
         return None
     problem, fitted = at
-    reasons = {**selection.reasons, **{each.effect: ADDED for each in added if not each.varies}}
+    reasons = {**selection.reasons, **{each.effect: ADDED for each in added if each.effect not in selection.adopted}}
     last = replace(selection.last, whole=problem)
     return Extended(
         replace(selection, fitted=fitted, last=last, reasons=reasons),
@@ -121,7 +121,9 @@ def _tried(problem: Problem, fitted: Fitted, config: DiagnoseConfig) -> Iterator
             and not effect.about_zero
             and seen_in(problem, effect)
         ]
-        found += [candidate(problem, fitted, effect) for effect in most_promising(problem, fitted, new, SCREENED)]
+        for effect in most_promising(problem, fitted, new, SCREENED):
+            own = problem.growing(effect)
+            found.append(replace(candidate(own, fitted, effect), varies=own is not problem))
     return (c for c in found if c.explained >= config.visible and not against_nature(c.fitted.damper))
 
 

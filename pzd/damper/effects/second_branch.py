@@ -18,7 +18,14 @@ EFFECT = Effect(
     law="dF_2/dt = k_2 dx/dt, |F_2| <= T0_2",
     parameters=(
         Parameter(
-            "T0_2", "N", 0.0, 0.0, 1.0e6, "force at which the branch slips", Search(lambda s: s.force, (0.05, 0.2))
+            "T0_2",
+            "N",
+            0.0,
+            0.0,
+            1.0e6,
+            "force at which the branch slips",
+            Search(lambda s: s.force, (0.05, 0.2)),
+            with_friction=True,
         ),
         Parameter(
             "k_2",
@@ -27,7 +34,8 @@ EFFECT = Effect(
             1.0,
             1.0e9,
             "stiffness of the branch before it slips",
-            Search(lambda s: s.force / s.stroke, (1.0, 5.0), logarithmic=True),
+            Search(lambda s: s.force / s.stroke, (1.0, 5.0, 20.0), logarithmic=True),
+            with_friction=True,
         ),
     ),
     source="Iwan 1966, J. Appl. Mech. 33(4); generalized Maxwell slip: Al-Bender, Lampaert and Swevers 2005, "

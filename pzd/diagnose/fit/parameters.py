@@ -11,7 +11,7 @@ import numpy as np
 
 from pzd.damper.competing_forms import known
 from pzd.damper.compose import constant_rows, with_parallel
-from pzd.damper.effect import Parameter, Scales, Search
+from pzd.damper.effect import Effect, Parameter, Scales, Search
 from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.fit.likelihood import RecordLikelihood, response
@@ -113,6 +113,16 @@ class Problem:
         place = {id(row): i for i, rows in enumerate(groups) for row in rows}
         moved = tuple(o if o.place < 0 else replace(o, place=place[id(self.base[o.place])]) for o in self.observations)
         return replace(self, observations=moved, base=tuple(_mean_row(rows) for rows in groups))
+
+    def growing(self, effect: Effect) -> Problem:
+        """The same with an effect by voltage where its parameters go with T0."""
+        by_voltage = len(self.voltages) > 1 and any(parameter.with_friction for parameter in effect.parameters)
+        return replace(self, varying=self.varying | {effect.name}) if by_voltage else self
+
+    def friction_at(self, node: int) -> float:
+        """Where T0 of the base rows starts at one of the voltages, as a share of the largest."""
+        here = max(row.T0_N for row, at in zip(self.base, self.nodes, strict=True) if at == node)
+        return here / (max(row.T0_N for row in self.base) or 1.0)
 
     def unknowns(self, effects: Sequence[str]) -> tuple[Unknown, ...]:
         """The parameters of some effects, in the order of the search, and the zero behind the first that needs it."""

@@ -42,7 +42,7 @@ class Candidate:
     explained: float
     """R.m.s. by which it moves the simulated force, as a share of each record's peak."""
     varies: bool = False
-    """Whether it is an effect adopted before, its parameters now by voltage."""
+    """Whether its parameters are by voltage: an effect adopted before, or one that is only looked for so."""
 
 
 def seen_in(problem: Problem, effect: Effect) -> bool:

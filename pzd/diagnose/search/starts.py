@@ -9,7 +9,7 @@ import numpy as np
 
 from pzd.damper.effect import Effect
 from pzd.diagnose.fit.least_squares import DIFFERENCE, Fitted
-from pzd.diagnose.fit.parameters import Problem, Unknown, simulated
+from pzd.diagnose.fit.parameters import BOUND, Problem, Unknown, simulated
 from pzd.diagnose.thresholds import FAINT, LEAST_PROMISE
 from pzd.record import Array
 
@@ -31,10 +31,11 @@ def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[A
 def most_promising(problem: Problem, before: Fitted, effects: Sequence[Effect], count: int) -> list[Effect]:
     """The effects from whose starting values one linearised step promises the smallest misfits, best first."""
     frame, _ = np.linalg.qr(before.slopes)
-    promised = [
-        min(_promised_misfit(problem, before, effect, start, frame) for start in starts_of(problem, before, effect))
-        for effect in effects
-    ]
+    promised = []
+    for effect in effects:
+        own = problem.growing(effect)
+        starts = starts_of(own, before, effect)
+        promised.append(min(_promised_misfit(own, before, effect, start, frame) for start in starts))
     return [effects[i] for i in np.argsort(promised, kind="stable")[:count]]
 
 
@@ -50,10 +51,21 @@ def without_promise(problem: Problem, before: Fitted, effect: Effect) -> bool:
 
 
 def starts_of(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
-    """All combinations of the starting values of an effect, each (parameters,) in the units of the search."""
+    """All combinations of the starting values of an effect, each (unknowns,) in the units of the search.
+
+    What is looked for by voltage starts at every one of them alike, or in proportion to T0.
+    """
     unknowns = _new(problem, before, effect)
-    grid = itertools.product(*(u.parameter.search.starts for u in unknowns))
-    return [np.array([_searched(u, value) for u, value in zip(unknowns, values, strict=True)]) for values in grid]
+    own = {u.parameter.name: u.parameter for u in unknowns}
+    grid = itertools.product(*(parameter.search.starts for parameter in own.values()))
+    starts = [dict(zip(own, values, strict=True)) for values in grid]
+    return [np.array([_searched(u, s[u.parameter.name] * _share(problem, u)) for u in unknowns]) for s in starts]
+
+
+def _share(problem: Problem, unknown: Unknown) -> float:
+    """The share of its largest value at which an unknown starts at its voltage."""
+    scaled = unknown.node is not None and unknown.parameter.with_friction
+    return problem.friction_at(unknown.node or 0) if scaled else 1.0
 
 
 def fainter(problem: Problem, before: Fitted, effect: Effect, start: Array, share: float) -> Array:
@@ -68,7 +80,7 @@ def _new(problem: Problem, before: Fitted, effect: Effect) -> tuple[Unknown, ...
 
 
 def _searched(unknown: Unknown, start: float) -> float:
-    return float(np.log(start)) if unknown.parameter.search.logarithmic else start
+    return float(np.log(max(start, 1.0 / BOUND))) if unknown.parameter.search.logarithmic else start
 
 
 def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Array, frame: Array) -> float:
