@@ -13,7 +13,7 @@ from test_kept_back import TWO, campaign_of
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import Damper
 from pzd.damper.nature import against_nature
-from pzd.diagnose.added_by_prediction import Extended, with_predictive_effects
+from pzd.diagnose.added_by_prediction import ADDED, Extended, with_predictive_effects
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.handed_on import handed_on
@@ -21,6 +21,7 @@ from pzd.diagnose.kept_back import Trials, trials_of
 from pzd.diagnose.search.candidates import by_voltage, candidates
 from pzd.diagnose.search.evidence import evidence_of
 from pzd.diagnose.search.selection import Selection
+from pzd.diagnose.search.starts import starts_of
 from pzd.record import Record
 
 TESTS = ((0.5, 0.03), (1.0, 0.02), (2.0, 0.03))
@@ -59,17 +60,35 @@ def test_what_is_missing_is_added_one_effect_after_another(rng: np.random.Genera
 
 @pytest.mark.ci
 def test_a_branch_that_no_verdict_names_is_added_with_its_values(rng: np.random.Generator) -> None:
-    records = records_of(damper_of(TWO, second_branch={"T0_2": 300.0, "k_2": 3e4}), rng)
+    """Looked for by voltage, in proportion to T0: 301 N and 1325 N."""
+    by_voltage_V = {"T0_2": (150.0, 500.0), "k_2": (3e4, 8e4), "at_voltage_V": TWO}
+    records = records_of(damper_of(TWO).with_effect("second_branch", by_voltage_V), rng)
     found, before = extended(records, DiagnoseConfig(most_effects=1))
     assert found is not None
-    assert found.added[0] == "second_branch"
+    assert found.added == ("second_branch by voltage",)
+    assert found.selection.reasons["second_branch"] == ADDED
     assert found.missed.criterion is not None
     assert found.missed.criterion < 0.05 * before
     values = found.selection.fitted.damper.effects["second_branch"]
-    assert values == pytest.approx({"T0_2": 300.0, "k_2": 3e4}, rel=0.02)
+    for name in ("T0_2", "k_2"):
+        assert values[name] == pytest.approx(by_voltage_V[name], rel=0.05)
     selection, _ = plain_selection(records, DiagnoseConfig())
     tried = candidates(selection.first.whole, selection.plain, silent=True)
     assert {c.effect for c in tried} <= nameable().keys()
+
+
+def test_what_goes_with_t0_starts_in_proportion_to_it_at_each_voltage(rng: np.random.Generator) -> None:
+    selection, _ = plain_selection(records_of(damper_of(TWO), rng), DiagnoseConfig())
+    whole, effect = selection.first.whole, library()["second_branch"]
+    assert whole.growing(library()["gas_spring"]) is whole
+    wider = whole.growing(effect)
+    for start in starts_of(wider, selection.plain, effect):
+        point = wider.point(np.concatenate([selection.plain.searched, start]), wider.unknowns(("second_branch",)))
+        values = point.effects["second_branch"]
+        share = whole.base[0].T0_N / whole.base[1].T0_N
+        for name in ("T0_2", "k_2"):
+            soft, hard = values[name]
+            assert soft / hard == pytest.approx(share, rel=1e-9)
 
 
 def test_nothing_is_added_to_a_damper_that_lacks_nothing(rng: np.random.Generator) -> None:

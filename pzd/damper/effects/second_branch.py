@@ -46,8 +46,8 @@ EFFECT = Effect(
         ({"deflection": 2.0e-3, "travel": -5.0e-3, "T0_2": 100.0, "k_2": 5.0e4}, -2.0e-3),
         ({"deflection": 1.5e-3, "k_2": 5.0e4}, 75.0),
     ),
-    never_named="the tests of a usual rig cannot tell it from a rubber seat or a rounded yield: that takes tests of an "
-    "amplitude below its shelf",
+    never_named="how often its name would be right has not been through a whole blind benchmark, in which the same law "
+    "(`rubber`) stands for what is outside the library",
 )
 
 
