@@ -4,8 +4,8 @@ Equation: y(t + h) = y + h phi_1(Z) r + h^2 phi_2(Z) v + h (2 a phi_3(Z) + 6 b p
 Source: Luan and Ostermann 2014, J. Comput. Appl. Math. 255, 417-431, method exprb53s3
 
 Z = h J, J and v the derivatives of the rate r by y and by time. What the rate does beside r + J (y - y0) + v t is
-taken as a theta^2 + b theta^3 over the step, a and b from two stages, and the end found puts a theta^4 to it; the method
-is exact where that is all there is, however stiff J is.
+taken as a theta^2 + b theta^3 over the step, a and b from two stages, and the end found puts a theta^4 to it; this is
+exact where that is all there is, however stiff J is.
 """
 
 from __future__ import annotations
