@@ -96,7 +96,7 @@ def advance(state: Array, step: TimeStep, tolerance: float, booked: bool) -> Non
 @compiled
 def _growth(error: float, allowed: float) -> float:
     """By which factor a piece may be longer for the error that is allowed, its error being of fifth order."""
-    return 0.9 * (allowed / max(error, 1e-9 * allowed)) ** 0.2
+    return 0.9 * math.pow(allowed / max(error, 1e-9 * allowed), 0.2)
 
 
 @compiled
