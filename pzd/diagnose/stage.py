@@ -81,9 +81,10 @@ def diagnose(
     before = campaign.checks(selection.plain.damper)
     log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.work.spent)
     found = selection.fitted.damper.moved(zero) if selection.adopted else plain
+    notes = (campaign.work.words, weak(parts.hold_out), unpredicted(prediction), without(cut_off))
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + campaign.work.words + weak(parts.hold_out) + unpredicted(prediction) + without(cut_off),
+        reason=decision.reason + "".join(notes),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, trials if handed.by_criterion else None),
