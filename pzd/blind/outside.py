@@ -1,7 +1,8 @@
 """Forces that are not in the library, each a formula of the motion that stands beside the damper.
 
-None of the fifteen effects has their shape: position enters the damping, or friction, or a force that
-is no function rising with x, or the force changes from one cycle to the next without a temperature.
+None of the fifteen effects that a verdict names has their shape (`rubber` is a `second_branch`, which none names):
+position enters the damping, or friction, or a force that is no function rising with x, or the force changes from one
+cycle to the next without a temperature.
 (Shapes that an effect of the library nearly has, as x^3 is nearly an end stop that begins early, v^3 nearly
 a quadratic orifice, and a chamber that fills late on one side nearly a lash, are left out: to name that
 effect is no mistake.) At 10 % of the peak, in two tests of two frequencies each, the effect that follows
