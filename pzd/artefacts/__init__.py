@@ -24,7 +24,8 @@ from pzd.artefacts.diagnosed import (
     Region,
     Value,
 )
-from pzd.artefacts.identified import FALLBACK, AuxiliaryRow, Identified, MeasureRow, ParameterRow, base_of
+from pzd.artefacts.identified import FALLBACK, AuxiliaryRow, Identified, MeasureRow, ParameterRow, base_of, identified_damper
+from pzd.artefacts.knee import KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, knee_damper
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
 from pzd.artefacts.rides import (
@@ -70,11 +71,16 @@ __all__ = [
     "InverseRow",
     "KeptBack",
     "LeftOut",
+    "KneeForceRow",
+    "KneeRow",
+    "Knees",
+    "LawRow",
     "Manifest",
     "MeasureRow",
     "NextTest",
     "ParameterRow",
     "PeakVelocityRow",
+    "PredictedRow",
     "Prediction",
     "Ranked",
     "RecordEntry",
@@ -96,4 +102,6 @@ __all__ = [
     "WheelRow",
     "base_of",
     "extent",
+    "identified_damper",
+    "knee_damper",
 ]

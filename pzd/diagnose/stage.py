@@ -47,8 +47,9 @@ def diagnose(
 
     Returns
     -------
-    the verdict, and the damper with what was adopted; unchanged where nothing was
+    the verdict, and the damper with what was adopted; unchanged where nothing was, and under the knee law
     """
+    from pzd.diagnose.as_fitted import as_fitted
     from pzd.diagnose.base_parameters import base_parameters
     from pzd.diagnose.campaign import Campaign
     from pzd.diagnose.conclusion import concluded
@@ -63,6 +64,8 @@ def diagnose(
     from pzd.diagnose.verdict import parameters_of, ranking_of, unpredicted, weak
     from pzd.diagnose.where import regions
 
+    if identified.knees.law_of(setting) == "knee":
+        return as_fitted(identified, setting, diagnose)
     records, cut_off = whole_records(rig, setting)
     recorded = prepare(records)
     zero = mid_stroke(recorded)

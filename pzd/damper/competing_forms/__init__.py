@@ -13,6 +13,7 @@ from types import ModuleType
 
 from pzd.damper.effect import Effect
 from pzd.damper.effects import effects_in, library
+from pzd.damper.fitted_laws import fitted_laws
 
 
 @cache
@@ -23,18 +24,23 @@ def competing_forms() -> dict[str, Effect]:
 
 @cache
 def known() -> dict[str, Effect]:
-    """Everything that a damper can be computed with: the library, and the competing forms.
+    """Everything that a damper can be computed with: the library, the competing forms and the fitted laws.
 
     Raises
     ------
-    ImportError : when a competing form has the name of an effect of the library
+    ImportError : when two of them have one name
     """
-    for name in competing_forms().keys() & library().keys():
-        raise ImportError(f"{module_of(library()[name]).__file__} and {__path__[0]}/{name}.py both declare {name}")
-    return {**library(), **competing_forms()}
+    found: dict[str, Effect] = {}
+    for effect in (*library().values(), *competing_forms().values(), *fitted_laws().values()):
+        if effect.name in found:
+            files = (module_of(each).__file__ for each in (found[effect.name], effect))
+            raise ImportError(f"{' and '.join(str(file) for file in files)} both declare {effect.name}")
+        found[effect.name] = effect
+    return found
 
 
 def module_of(effect: Effect) -> ModuleType:
-    """The file that declares an effect or a competing form, imported."""
-    package = "effects" if library().get(effect.name) is effect else "competing_forms"
+    """The file that declares an effect, a competing form or a fitted law, imported."""
+    sets = {"effects": library(), "fitted_laws": fitted_laws()}
+    package = next((name for name, found in sets.items() if found.get(effect.name) is effect), "competing_forms")
     return importlib.import_module(f"pzd.damper.{package}.{effect.name}")
