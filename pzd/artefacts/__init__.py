@@ -24,8 +24,16 @@ from pzd.artefacts.diagnosed import (
     Region,
     Value,
 )
-from pzd.artefacts.identified import FALLBACK, AuxiliaryRow, Identified, MeasureRow, ParameterRow, base_of, identified_damper
-from pzd.artefacts.knee import KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, knee_damper
+from pzd.artefacts.identified import (
+    FALLBACK,
+    AuxiliaryRow,
+    Identified,
+    MeasureRow,
+    ParameterRow,
+    base_of,
+    identified_damper,
+)
+from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, knee_damper
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
 from pzd.artefacts.rides import (
@@ -57,6 +65,7 @@ __all__ = [
     "Artefact",
     "AuxiliaryRow",
     "Characteristics",
+    "ClickRow",
     "ComfortRow",
     "ContinuousVelocityRow",
     "Diagnosed",
@@ -70,11 +79,11 @@ __all__ = [
     "IngestRow",
     "InverseRow",
     "KeptBack",
-    "LeftOut",
     "KneeForceRow",
     "KneeRow",
     "Knees",
     "LawRow",
+    "LeftOut",
     "Manifest",
     "MeasureRow",
     "NextTest",

@@ -50,22 +50,26 @@ def _effects_apart(diagnosis: Diagnosis, damper: Damper, plain: Damper, folder: 
     told, acting = diagnosis.effects, damper.effects
     names = ("damper.yaml", "diagnosis.json", "plain.yaml")
     of_damper, of_diagnosis, of_plain = (read_yaml(folder / name, DataError) for name in names)
-    return [
-        f"{of_damper.place(('effects', name))}: effects.{name}: diagnosis.json does not have it among its effects; "
-        "add it there too, or take it out here"
-        for name in acting
-        if name not in {*told, *plain.effects}
-    ] + [
-        f"{of_diagnosis.place(('effects', str(number)))}: effects.{number}: damper.yaml has no {name}; "
-        "add it there too, or take it out here"
-        for number, name in enumerate(told)
-        if name not in acting
-    ] + [
-        f"{of_plain.place(('effects', name))}: effects.{name}: damper.yaml has no {name}; "
-        "add it there too, or take it out here"
-        for name in plain.effects
-        if name not in acting
-    ]
+    return (
+        [
+            f"{of_damper.place(('effects', name))}: effects.{name}: diagnosis.json does not have it among its effects; "
+            "add it there too, or take it out here"
+            for name in acting
+            if name not in {*told, *plain.effects}
+        ]
+        + [
+            f"{of_diagnosis.place(('effects', str(number)))}: effects.{number}: damper.yaml has no {name}; "
+            "add it there too, or take it out here"
+            for number, name in enumerate(told)
+            if name not in acting
+        ]
+        + [
+            f"{of_plain.place(('effects', name))}: effects.{name}: damper.yaml has no {name}; "
+            "add it there too, or take it out here"
+            for name in plain.effects
+            if name not in acting
+        ]
+    )
 
 
 def _base_apart(damper: Damper, rows: Sequence[ParameterRow], document: Document, control: Control) -> Iterator[str]:

@@ -19,6 +19,15 @@ from pzd.schema.model import Frozen
 LawName = Literal["bingham", "knee"]
 
 
+Direction = Literal["rebound", "compression"]
+DIRECTIONS: tuple[Direction, ...] = ("rebound", "compression")
+OF_A_DIRECTION = ("bleed_Ns_per_m", "knee_force_N", "knee_velocity_m_per_s", "blow_off_Ns_per_m")
+"""The columns of a direction, behind its name."""
+OF_BOTH = ("gas_force_N", "friction_N")
+"""The columns that both directions share and the trade names with them."""
+Interval = tuple[float | None, float | None, float | None]
+
+
 class KneeRow(Frozen):
     """The knee law of one condition; a direction without a knee has empty cells, and its bleed goes on.
 
@@ -83,6 +92,11 @@ class KneeRow(Frozen):
     status: str = Field(pattern=r"^(ok|weak: .*)$")
     """`ok`, or `weak: ...` with the parameters and the reason."""
 
+    def interval(self, quantity: str) -> Interval:
+        """A quantity, by its column, with its 95 % interval; None where the direction has no knee."""
+        value, low, high = (getattr(self, f"{quantity}{end}") for end in ("", "_low95", "_high95"))
+        return value, low, high
+
 
 class KneeForceRow(Frozen):
     """Force of the knee law at one of the trade's speeds, as a rig records it: with the gas force at mid-stroke."""
@@ -94,8 +108,26 @@ class KneeForceRow(Frozen):
     """Of either direction."""
     rebound_force_N: float
     compression_force_N: float
+    gas_force_N: float
+    """What of both the gas makes."""
     inside: int = Field(ge=0, le=1)
     """1 where a test was as fast, 0 where the law is the model beyond."""
+
+
+class ClickRow(Frozen):
+    """How much of the force one click makes at one of the trade's speeds, between two neighbouring positions."""
+
+    setting: str | None
+    """With # for the number of the clicker, where that stands in the setting and not in the control signal."""
+    voltage_V: float | None
+    """Of the condition, where the clicker stands in the setting."""
+    temperature_degC: float | None
+    from_click: float
+    to_click: float
+    velocity_m_per_s: float = Field(gt=0.0)
+    rebound_N_per_click: float
+    """By how much the magnitude of the force rises a click; below zero where it falls."""
+    compression_N_per_click: float
 
 
 class PredictedRow(Frozen):
@@ -124,19 +156,40 @@ class LawRow(Frozen):
 
 
 @dataclass(frozen=True)
+class DirectionOfCondition:
+    """What the trade says of one direction of one condition."""
+
+    row: KneeRow
+    direction: Direction
+    forces: tuple[float | None, ...]
+    """(s,) force as a rig records it, at the speeds of `Knees.speeds` [N]; None where the row has none."""
+    inside: tuple[bool, ...]
+    """(s,) whether a test was as fast."""
+
+    @property
+    def intervals(self) -> tuple[Interval, ...]:
+        """Those of `OF_A_DIRECTION`, then those of `OF_BOTH`."""
+        return tuple(
+            self.row.interval(name) for name in (*(f"{self.direction}_{name}" for name in OF_A_DIRECTION), *OF_BOTH)
+        )
+
+
+@dataclass(frozen=True)
 class Knees:
     """What identify found of the knee law; empty where the config asks for Bingham alone."""
 
     rows: tuple[KneeRow, ...] = ()
     forces: tuple[KneeForceRow, ...] = ()
+    clicks: tuple[ClickRow, ...] = ()
     predicted: tuple[PredictedRow, ...] = ()
     laws: tuple[LawRow, ...] = ()
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write knee.csv, knee_force.csv, kept_back.csv and law.csv where there is anything to write."""
+        """Write knee.csv, knee_force.csv, clicks.csv, kept_back.csv and law.csv where there is anything to write."""
         if self.laws:
             write_rows(folder / "knee.csv", KneeRow, self.rows, control)
             write_rows(folder / "knee_force.csv", KneeForceRow, self.forces, control)
+            write_rows(folder / "clicks.csv", ClickRow, self.clicks, control)
             write_rows(folder / "kept_back.csv", PredictedRow, self.predicted, control)
             write_rows(folder / "law.csv", LawRow, self.laws, control)
 
@@ -148,8 +201,29 @@ class Knees:
         return cls(
             read_rows(folder / "knee.csv", KneeRow, control),
             read_rows(folder / "knee_force.csv", KneeForceRow, control),
+            read_rows(folder / "clicks.csv", ClickRow, control),
             read_rows(folder / "kept_back.csv", PredictedRow, control),
             read_rows(folder / "law.csv", LawRow, control),
+        )
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """(s,) the trade's speeds at which a force is told, rising [m/s]."""
+        return tuple(sorted({row.velocity_m_per_s for row in self.forces}))
+
+    def directions(self) -> tuple[DirectionOfCondition, ...]:
+        """Every direction of every condition, rebound first."""
+        at = {(r.setting, r.voltage_V, r.temperature_degC, r.velocity_m_per_s): r for r in self.forces}
+        return tuple(
+            DirectionOfCondition(
+                row,
+                direction,
+                tuple(None if f is None else float(getattr(f, f"{direction}_force_N")) for f in here),
+                tuple(f is not None and f.inside == 1 for f in here),
+            )
+            for row in self.rows
+            for here in [[at.get((row.setting, row.voltage_V, row.temperature_degC, v)) for v in self.speeds]]
+            for direction in DIRECTIONS
         )
 
     def law_of(self, setting: str | None) -> LawName:
@@ -216,10 +290,9 @@ def _mean(values: Sequence[dict[str, float]]) -> dict[str, float]:
     return {name: float(np.mean([each[name] for each in values])) for name in values[0]}
 
 
-def _by_voltage(
-    values: Sequence[dict[str, float]], voltages: Sequence[float]
-) -> dict[str, float | tuple[float, ...]]:
+def _by_voltage(values: Sequence[dict[str, float]], voltages: Sequence[float]) -> dict[str, float | tuple[float, ...]]:
     """One number each, or lists beside `at_voltage_V` where there are several voltages."""
     if len(values) == 1:
         return dict(values[0])
-    return {name: tuple(each[name] for each in values) for name in values[0]} | {"at_voltage_V": tuple(voltages)}
+    lists = {name: tuple(each[name] for each in values) for name in values[0]}
+    return {**lists, "at_voltage_V": tuple(voltages)}

@@ -23,7 +23,13 @@ EFFECT = Effect(
     law="C times (1 + beta sign(F)); beyond max(F_reb or F_comp, T0) the slope is C_reb or C_comp",
     parameters=(
         Parameter(
-            "beta", "-", 0.0, -0.999, 0.999, "share by which the bleed of rebound is steeper", Search(lambda _: 1.0, (0.0,))
+            "beta",
+            "-",
+            0.0,
+            -0.999,
+            0.999,
+            "share by which the bleed of rebound is steeper",
+            Search(lambda _: 1.0, (0.0,)),
         ),
         Parameter("F_reb", "N", inf, 0.0, NO_KNEE, "force of the knee in rebound", _FORCES),
         Parameter("C_reb", "N s/m", 0.0, 1.0e-3, 1.0e8, "blow-off slope in rebound", _SLOPES),

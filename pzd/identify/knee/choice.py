@@ -44,9 +44,7 @@ def kept_back(labels: Labels, tests: Tests, knee: KneeFit, bingham: KneeFit) -> 
     for fold in range(min(FOLDS, count)):
         out = order[fold::FOLDS].tolist()
         rest = tests.some([i for i in range(count) if i not in out])
-        fits = [
-            descend(rest, fit.form, fit.curve, fit.gas, REFIT) for fit in (bingham, knee)
-        ]
+        fits = [descend(rest, fit.form, fit.curve, fit.gas, REFIT) for fit in (bingham, knee)]
         for i in out:
             one = tests.some([i])
             left = [one.measured - fit.predicted(one) for fit in fits]
@@ -91,7 +89,9 @@ def law_row(
     if asked == "knee":
         return _law(setting, "knee", count, pooled, f"as the config asks for; {told or 'no test could be kept back'}")
     if count < FEWEST:
-        why = f"{count} tests could be kept back, and {FEWEST} are needed to choose a law; record several in a condition"
+        why = (
+            f"{count} tests could be kept back, and {FEWEST} are needed to choose a law; record several in a condition"
+        )
         return _law(setting, "bingham", count, pooled, why)
     apart = np.array([row.W_s_bingham - row.W_s_knee for row, _ in found])
     mean, error = float(apart.mean()), float(np.std(apart, ddof=1) / np.sqrt(count))
@@ -100,10 +100,6 @@ def law_row(
     return _law(setting, law, count, pooled, f"{told}; {measure}")
 
 
-def _law(
-    setting: str | None, law: LawName, tests: int, pooled: tuple[float, float] | None, reason: str
-) -> LawRow:
+def _law(setting: str | None, law: LawName, tests: int, pooled: tuple[float, float] | None, reason: str) -> LawRow:
     bingham, knee = pooled or (None, None)
     return LawRow(setting=setting, law=law, tests=tests, W_s_bingham=bingham, W_s_knee=knee, reason=reason)
-
-

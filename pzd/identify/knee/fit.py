@@ -1,4 +1,4 @@
-"""The knee law by least squares: criterion (4) over all tests of a condition, gas force and gas spring solved inside."""
+"""The knee law by least squares: criterion (4) over the tests of a condition, gas force and spring solved inside."""
 
 from __future__ import annotations
 

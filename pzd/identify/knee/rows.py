@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from pzd.artefacts import KneeForceRow, KneeRow
-from pzd.artefacts.knee import knee_damper
+from pzd.artefacts.knee import DIRECTIONS, knee_damper
 from pzd.damper.compose import static_force, steady_force
 from pzd.identify.intervals import half_widths
-from pzd.identify.knee.curve import COMPRESSION, REBOUND
 from pzd.identify.knee.data import Tests
 from pzd.identify.knee.fit import KneeFit
 from pzd.identify.misfit import Misfit, misfit_of
@@ -30,7 +29,6 @@ TRADE_SPEEDS = tuple(float(np.round(np.pi * 0.1 * turns / 60.0, 3)) for turns in
 BEYOND = 1.001
 """A test is as fast as a speed within this factor, which its rounding to millimetres a second takes."""
 _NONE = Misfit(0.0, 0.0)
-_WAYS = ("rebound", "compression")
 
 
 def knee_row(labels: Labels, tests: Tests, fit: KneeFit, nuisance: NuisanceConfig) -> KneeRow:
@@ -47,12 +45,12 @@ def knee_row(labels: Labels, tests: Tests, fit: KneeFit, nuisance: NuisanceConfi
     curve, (force, spring) = fit.curve, fit.gas.tolist()
     values: dict[str, float] = {"friction_N": curve.friction, "gas_force_N": force, "gas_spring_N_per_m": spring}
     values["k_N_per_m"] = curve.stiffness
-    for way, name in enumerate(_WAYS):
-        values[f"{name}_bleed_Ns_per_m"] = curve.bleed[way]
+    for way, direction in enumerate(DIRECTIONS):
+        values[f"{direction}_bleed_Ns_per_m"] = curve.bleed[way]
         if fit.form.bent[way]:
-            values[f"{name}_knee_force_N"] = curve.knee_force(way)
-            values[f"{name}_knee_velocity_m_per_s"] = curve.knee_speed[way]
-            values[f"{name}_blow_off_Ns_per_m"] = curve.blow_off[way]
+            values[f"{direction}_knee_force_N"] = curve.knee_force(way)
+            values[f"{direction}_knee_velocity_m_per_s"] = curve.knee_speed[way]
+            values[f"{direction}_blow_off_Ns_per_m"] = curve.blow_off[way]
     cells: dict[str, float | None] = {}
     for name in _quantities():
         cells |= _with_interval(name, values.get(name), widths.get(name))
@@ -84,6 +82,7 @@ def knee_forces(row: KneeRow) -> Iterator[KneeForceRow]:
             velocity_m_per_s=speed,
             rebound_force_N=float(rebound),
             compression_force_N=float(compression),
+            gas_force_N=rest,
             inside=int(inside),
         )
         if not inside:
@@ -103,24 +102,26 @@ def _half_widths(tests: Tests, fit: KneeFit, nuisance: NuisanceConfig) -> tuple[
     tests would give; what the law misses of the curve stands in the status and widens none.
     """
     form, curve = fit.form, fit.curve
-    columns = ["friction_N", *(f"{name}_bleed_Ns_per_m" for name in _WAYS), "k_N_per_m"]
+    columns = ["friction_N", *(f"{name}_bleed_Ns_per_m" for name in DIRECTIONS), "k_N_per_m"]
     for way in form.ways:
-        columns += [f"{_WAYS[way]}_knee_velocity_m_per_s", f"{_WAYS[way]}_blow_off_Ns_per_m"]
+        columns += [f"{DIRECTIONS[way]}_knee_velocity_m_per_s", f"{DIRECTIONS[way]}_blow_off_Ns_per_m"]
     columns += ["gas_force_N", "gas_spring_N_per_m"]
     by_force, forces = fit.slopes.copy(), list(columns)
     for way in form.ways:
-        place, C = columns.index(f"{_WAYS[way]}_knee_velocity_m_per_s"), curve.bleed[way]
+        place, C = columns.index(f"{DIRECTIONS[way]}_knee_velocity_m_per_s"), curve.bleed[way]
         slope = fit.slopes[:, place] / C
         by_force[:, place] = slope
         by_force[:, 0] -= slope
         by_force[:, 1 + way] -= slope * curve.knee_speed[way]
-        forces[place] = f"{_WAYS[way]}_knee_force_N"
+        forces[place] = f"{DIRECTIONS[way]}_knee_force_N"
     records = [test.record for test in tests.tests]
     trials = [trial_of(record) for record in records]
     misfit = misfit_of(parts_of(records, trials, (fit.residuals, fit.slopes), nuisance))
     # Told not to be constant, a part takes the speed of the rod for that of the flow: here no one C stands for it.
     widths, of_force = (
-        half_widths([replace(p, constant=False) for p in parts_of(records, trials, (fit.residuals, s), nuisance)], _NONE)
+        half_widths(
+            [replace(p, constant=False) for p in parts_of(records, trials, (fit.residuals, s), nuisance)], _NONE
+        )
         for s in (fit.slopes, by_force)
     )
     return misfit, dict(zip(columns, widths.tolist(), strict=True)) | {

@@ -1,4 +1,4 @@
-"""Where the fit of the knee law begins: the curve by linear least squares, the knees on a grid, the oil spring apart."""
+"""Where the fit of the knee law begins: the curve by linear least squares, the knees on a grid, no oil spring."""
 
 from __future__ import annotations
 

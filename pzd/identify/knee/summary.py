@@ -9,10 +9,12 @@ from typing import Literal
 from pzd.artefacts import KneeForceRow, KneeRow, Knees, ParameterRow
 from pzd.artefacts.identified import FALLBACK
 from pzd.identify.knee.choice import kept_back, law_row
+from pzd.identify.knee.clicks import clicks
 from pzd.identify.knee.data import Tests
 from pzd.identify.knee.fit import fit_bingham, fit_knee
 from pzd.identify.knee.rows import knee_forces, knee_row
 from pzd.record import Condition
+from pzd.schema.errors import ConfigError
 from pzd.schema.progress import Listener, Progress
 from pzd.signals.nuisance import NuisanceConfig
 from pzd.signals.stretches import separate_tests
@@ -36,6 +38,10 @@ def knees(
     settings : of the rig
     nuisance : what the sensors may differ by from test to test
     progress : hears of every condition that is done
+
+    Raises
+    ------
+    ConfigError : when the config asks for the knee law and a setting has no test at a constant control signal
     """
     rows: list[KneeRow] = []
     forces: list[KneeForceRow] = []
@@ -51,11 +57,17 @@ def knees(
         progress(Progress(number, len(conditions), f"knee law: {_line(row)}"))
     laws = []
     for setting in settings:
+        if asked == "knee" and not any(row.setting == setting for row in rows):
+            of = f" of setting {setting}" if setting else ""
+            raise ConfigError(
+                f"identify.law: needs tests{of} at a constant control signal; in all of them it moves: record some, or "
+                "say bingham (got knee)"
+            )
         mine = [each for each in found if each[0].setting == setting]
         law = law_row(asked, setting, mine, sum(row.setting == setting for row in rows))
         log.info("identify: law %s%s, %s", law.law, f" of {setting}" if setting else "", law.reason)
         laws.append(law)
-    return Knees(tuple(rows), tuple(forces), tuple(row for row, _ in found), tuple(laws))
+    return Knees(tuple(rows), tuple(forces), clicks(forces), tuple(row for row, _ in found), tuple(laws))
 
 
 def _line(row: KneeRow) -> str:
