@@ -128,6 +128,11 @@ class ReportContext:
         return any(name in fitted_laws() for name in self.diagnosed.plain.effects)
 
     @property
+    def model(self) -> str:
+        """What the damper before diagnose is called."""
+        return "knee law" if self.fitted_law else "simple model"
+
+    @property
     def extended(self) -> bool:
         """Whether diagnose changed the damper."""
         return self.diagnosed.damper != self.diagnosed.plain

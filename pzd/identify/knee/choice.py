@@ -12,6 +12,7 @@ from pzd.artefacts.knee import LawName
 from pzd.identify.knee.data import Tests
 from pzd.identify.knee.fit import REFIT, KneeFit, descend
 from pzd.identify.knee.rows import Labels
+from pzd.identify.misfit import VISIBLE
 from pzd.record import Array
 from pzd.signals.criterion import criterion
 
@@ -34,7 +35,8 @@ def kept_back(labels: Labels, tests: Tests, knee: KneeFit, bingham: KneeFit) -> 
 
     Returns
     -------
-    the rows, each with (3,) the squared errors of Bingham and knee and the square of the measured force [N2]
+    the rows, each with (4,) sums over its samples [N2]: the squared errors of Bingham and of the knee, the squares of
+    the measured force, and of what is too small to see
     """
     count = len(tests.tests)
     if count < 2:
@@ -48,7 +50,8 @@ def kept_back(labels: Labels, tests: Tests, knee: KneeFit, bingham: KneeFit) -> 
         for i in out:
             one = tests.some([i])
             left = [one.measured - fit.predicted(one) for fit in fits]
-            squares = np.array([float(r @ r) for r in (*left, one.measured)])
+            unseen = np.full(one.measured.size, VISIBLE * one.peak)
+            squares = np.array([float(r @ r) for r in (*left, one.measured, unseen)])
             found[i] = _predicted(labels, one, left), squares
     return [found[i] for i in range(count)]
 
@@ -69,8 +72,8 @@ def law_row(
 ) -> LawRow:
     """The law of one setting, and why.
 
-    Equation: knee where mean d > 2 s_d / sqrt(n), d_i = W_s,i of Bingham less that of the knee
-                                                                                Source: paired differences
+    Equation: knee where mean d > 2 s_d / sqrt(n), d_i = W_s,i of Bingham less that of the knee, and where all tests
+    together are missed visibly less                                            Source: paired differences
 
     Parameters
     ----------
@@ -95,8 +98,10 @@ def law_row(
         return _law(setting, "bingham", count, pooled, why)
     apart = np.array([row.W_s_bingham - row.W_s_knee for row, _ in found])
     mean, error = float(apart.mean()), float(np.std(apart, ddof=1) / np.sqrt(count))
+    visible = squares is not None and float(squares[0] - squares[1]) > float(squares[3])
     measure = f"mean difference {mean:.2g}, its standard error {error:.2g}"
-    law: LawName = "knee" if mean > ERRORS * error else "bingham"
+    measure += "" if visible or mean <= 0.0 else f", less than {VISIBLE:.2%} of peak"
+    law: LawName = "knee" if mean > ERRORS * error and visible else "bingham"
     return _law(setting, law, count, pooled, f"{told}; {measure}")
 
 

@@ -146,12 +146,21 @@ _WIDEST = 20.0
 """Half width of an interval in the logarithm at most: it then says that nothing is known."""
 
 
+_UNITS = ("_Ns_per_m", "_N_per_m", "_m_per_s", "_N")
+
+
+def _words(column: str) -> str:
+    """A column as a sentence names it: without its unit."""
+    unit = next(unit for unit in _UNITS if column.endswith(unit))
+    return column.removesuffix(unit).replace("_", " ")
+
+
 def _status(values: Mapping[str, float], widths: Mapping[str, float], misfit: Misfit, measured: Array) -> str:
     """`ok`, or which parameters are weak and why; the gas is judged against the friction's scale."""
     least = {"friction_N": friction_scale(values["friction_N"], measured)}
     least["gas_force_N"] = max(abs(values["gas_force_N"]), least["friction_N"])
     wide = [
-        f"{name} to +-{min(widths[name] / least.get(name, value), 9.99):.0%}"
+        f"{_words(name)} to +-{min(widths[name] / least.get(name, value), 9.99):.0%}"
         for name, value in values.items()
         if name != "gas_spring_N_per_m" and widths[name] > WEAK_WIDTH * least.get(name, value)
     ]

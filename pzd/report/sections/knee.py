@@ -62,7 +62,7 @@ def _direction(context: ReportContext, each: DirectionOfCondition) -> tuple[str,
         each.direction,
         *(text if inside or text == DASH else f"({text})" for text, inside in zip(forces, each.inside, strict=True)),
         *(interval(*bounds) for bounds in each.intervals),
-        row.status,
+        row.status if each.direction == "rebound" else "as in rebound",
     )
 
 
