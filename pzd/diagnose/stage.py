@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, NextTest, Rig, base_of
+from pzd.diagnose.as_fitted import as_fitted
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
@@ -49,7 +50,6 @@ def diagnose(
     -------
     the verdict, and the damper with what was adopted; unchanged where nothing was, and under the knee law
     """
-    from pzd.diagnose.as_fitted import as_fitted
     from pzd.diagnose.base_parameters import base_parameters
     from pzd.diagnose.campaign import Campaign
     from pzd.diagnose.conclusion import concluded

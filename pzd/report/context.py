@@ -291,8 +291,7 @@ def _fitted(base: BaseRow, rows: Sequence[ParameterRow]) -> ParameterRow | None:
 
 def effect_in_words(name: str) -> str:
     """What an effect is, in the first sentence of its own documentation."""
-    text = module_of(known()[name]).__doc__ or name
-    first = text.split("\n")[0].rstrip(".")
+    first = (module_of(known()[name]).__doc__ or name).split("\n")[0].rstrip(".")
     return first[0].lower() + first[1:]
 
 

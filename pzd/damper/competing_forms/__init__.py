@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from functools import cache
+from pathlib import Path
 from types import ModuleType
 
 from pzd.damper.effect import Effect
@@ -30,13 +31,14 @@ def known() -> dict[str, Effect]:
     ------
     ImportError : when two of them have one name
     """
-    found: dict[str, Effect] = {}
-    for effect in (*library().values(), *competing_forms().values(), *fitted_laws().values()):
-        if effect.name in found:
-            files = (module_of(each).__file__ for each in (found[effect.name], effect))
-            raise ImportError(f"{' and '.join(str(file) for file in files)} both declare {effect.name}")
-        found[effect.name] = effect
-    return found
+    folder, files = Path(__file__).parent.parent, dict[str, Path]()
+    sets = {"effects": library(), "competing_forms": competing_forms(), "fitted_laws": fitted_laws()}
+    for package, name in ((package, name) for package, found in sets.items() for name in found):
+        file = folder / package / f"{name}.py"
+        if name in files:
+            raise ImportError(f"{files[name]} and {file} both declare {name}")
+        files[name] = file
+    return {name: effect for found in sets.values() for name, effect in found.items()}
 
 
 def module_of(effect: Effect) -> ModuleType:

@@ -18,7 +18,7 @@ REBOUND, COMPRESSION = 0, 1
 """The directions, in this order wherever there are two of something."""
 
 
-class Curve(NamedTuple):
+class KneeCurve(NamedTuple):
     """The parameters of the element; pairs are of rebound and compression."""
 
     friction: float
@@ -54,7 +54,7 @@ class Curve(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Form:
+class KneeForm:
     """Which of the parameters are free."""
 
     alike: bool = False
@@ -67,13 +67,13 @@ class Form:
         """The directions with a knee."""
         return tuple(way for way in (REBOUND, COMPRESSION) if self.bent[way])
 
-    def natural(self, curve: Curve) -> Array:
+    def natural(self, curve: KneeCurve) -> Array:
         """(p,) the free parameters in their own units: T0, the bleeds, k, then w_k and B of each knee."""
         bleeds = curve.bleed[:1] if self.alike else curve.bleed
         knees = [value for way in self.ways for value in (curve.knee_speed[way], curve.blow_off[way])]
         return np.array([curve.friction, *bleeds, curve.stiffness, *knees])
 
-    def curve(self, natural: Array) -> Curve:
+    def curve(self, natural: Array) -> KneeCurve:
         """The curve that they stand for."""
         friction, *rest = natural.tolist()
         bleed = (rest[0], rest[0]) if self.alike else (rest[0], rest[1])
@@ -81,17 +81,17 @@ class Form:
         speed, slope = [np.inf, np.inf], [*bleed]
         for place, way in enumerate(self.ways):
             speed[way], slope[way] = knees[2 * place : 2 * place + 2]
-        return Curve(friction, bleed, stiffness, (speed[0], speed[1]), (slope[0], slope[1]))
+        return KneeCurve(friction, bleed, stiffness, (speed[0], speed[1]), (slope[0], slope[1]))
 
-    def searched(self, curve: Curve, force: float) -> Array:
+    def searched(self, curve: KneeCurve, force: float) -> Array:
         """(p,) what least squares searches: T0 as a share of a force [N], the logarithms of all others."""
         natural = self.natural(curve)
         return np.concatenate([natural[:1] / force, np.log(natural[1:])])
 
-    def found(self, searched: Array, force: float) -> Curve:
+    def found(self, searched: Array, force: float) -> KneeCurve:
         """The curve at a point of the search."""
         return self.curve(np.concatenate([searched[:1] * force, np.exp(searched[1:])]))
 
 
-BINGHAM = Form(alike=True, bent=(False, False))
+BINGHAM = KneeForm(alike=True, bent=(False, False))
 """One T0 and C."""

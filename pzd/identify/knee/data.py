@@ -10,7 +10,7 @@ import numpy as np
 
 from pzd.damper.compose import constant_rows, integrated_force, sampling_steps
 from pzd.damper.motion import Motion
-from pzd.identify.knee.curve import Curve
+from pzd.identify.knee.curve import KneeCurve
 from pzd.identify.trial import in_motion
 from pzd.record import Array, Mask, Record
 
@@ -36,12 +36,12 @@ class Test:
         return self.record.force[self.counted]
 
     @property
-    def beside(self) -> Array:
+    def of_gas(self) -> Array:
         """(m, 2) force of F_0 = 1 N and k_g = 1 N/m at the counted samples."""
         x = self.motion.displacement[self.counted]
         return np.column_stack([np.ones(x.size), x])
 
-    def simulated(self, curve: Curve, gas: Array) -> Array:
+    def simulated(self, curve: KneeCurve, gas: Array) -> Array:
         """(m,) force of the element [N], begun at the measured force less that of the gas, (2,) F_0 and k_g."""
         rows, _ = constant_rows(curve.friction, curve.damping, curve.stiffness, {"knee": curve.effect()})
         first = float(self.record.force[0] - gas[0] - gas[1] * self.motion.displacement[0])
@@ -76,9 +76,9 @@ class Tests:
         return np.concatenate([t.measured for t in self.tests])
 
     @cached_property
-    def beside(self) -> Array:
+    def of_gas(self) -> Array:
         """(N, 2) force of F_0 = 1 N and k_g = 1 N/m."""
-        return np.vstack([t.beside for t in self.tests])
+        return np.vstack([t.of_gas for t in self.tests])
 
     @cached_property
     def speed(self) -> Array:
@@ -95,6 +95,6 @@ class Tests:
         """Largest force [N]."""
         return float(np.max(np.abs(self.measured)))
 
-    def simulated(self, curve: Curve, gas: Array) -> Array:
+    def simulated(self, curve: KneeCurve, gas: Array) -> Array:
         """(N,) force of the element [N]."""
         return np.concatenate([t.simulated(curve, gas) for t in self.tests])

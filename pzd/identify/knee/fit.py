@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.identify.knee.curve import BINGHAM, Curve, Form
+from pzd.identify.knee.curve import BINGHAM, KneeCurve, KneeForm
 from pzd.identify.knee.data import Tests
 from pzd.identify.knee.starts import start_of
 from pzd.identify.misfit import VISIBLE
@@ -36,8 +36,8 @@ SPRINGS = (1e-1, 1e5)
 class KneeFit:
     """An optimum of criterion (4)."""
 
-    form: Form
-    curve: Curve
+    form: KneeForm
+    curve: KneeCurve
     gas: Array
     """(2,) F_0 at mid-stroke [N] and k_g [N/m]."""
     residuals: Array
@@ -48,7 +48,7 @@ class KneeFit:
 
     def predicted(self, tests: Tests) -> Array:
         """(N,) force of other tests of the damper [N]."""
-        return tests.simulated(self.curve, self.gas) + tests.beside @ self.gas
+        return tests.simulated(self.curve, self.gas) + tests.of_gas @ self.gas
 
 
 def fit_knee(tests: Tests, stiffness: float) -> KneeFit:
@@ -59,10 +59,10 @@ def fit_knee(tests: Tests, stiffness: float) -> KneeFit:
     tests : of the condition
     stiffness : of the oil spring where the search begins [N/m]
     """
-    best = descend(tests, Form(), *start_of(tests, stiffness))
+    best = descend(tests, KneeForm(), *start_of(tests, stiffness))
     for way in best.form.ways:
         bent = tuple(each and other != way for other, each in enumerate(best.form.bent))
-        form = Form(bent=(bent[0], bent[1]))
+        form = KneeForm(bent=(bent[0], bent[1]))
         straight = descend(tests, form, best.curve, best.gas, GLANCE)
         if not _bends(tests, best, straight):
             best = descend(tests, form, straight.curve, straight.gas)
@@ -82,7 +82,7 @@ def _bends(tests: Tests, bent: KneeFit, straight: KneeFit) -> bool:
     return gained > (VISIBLE * tests.peak) ** 2
 
 
-def descend(tests: Tests, form: Form, start: Curve, gas: Array, evaluations: int = EVALUATIONS) -> KneeFit:
+def descend(tests: Tests, form: KneeForm, start: KneeCurve, gas: Array, evaluations: int = EVALUATIONS) -> KneeFit:
     """The optimum reached from a curve, by trust-region least squares within bounds.
 
     Equation: min over the curve of |P (F - F_sim)|^2, P what F_0 and k_g cannot make up
@@ -98,7 +98,7 @@ def descend(tests: Tests, form: Form, start: Curve, gas: Array, evaluations: int
     """
     from scipy.optimize import least_squares
 
-    basis, _ = np.linalg.qr(tests.beside)
+    basis, _ = np.linalg.qr(tests.of_gas)
     norm, peak = float(np.linalg.norm(tests.measured)), tests.peak
 
     def without_gas(values: Array) -> Array:
@@ -130,12 +130,12 @@ def descend(tests: Tests, form: Form, start: Curve, gas: Array, evaluations: int
     )
     curve = form.found(found.x, peak)
     left = tests.measured - tests.simulated(curve, gas)
-    beside = np.asarray(np.linalg.lstsq(tests.beside, left, rcond=None)[0])
-    left = left - tests.beside @ beside
+    beside = np.asarray(np.linalg.lstsq(tests.of_gas, left, rcond=None)[0])
+    left = left - tests.of_gas @ beside
     return KneeFit(form, curve, beside, left, _slopes(tests, form, curve, beside), criterion(left, tests.measured))
 
 
-def _bounds(tests: Tests, form: Form) -> tuple[Array, Array]:
+def _bounds(tests: Tests, form: KneeForm) -> tuple[Array, Array]:
     """(p,) bounds of the search coordinates."""
     unit = tests.peak / tests.fastest
     stroke = 2.0 * max(float(np.max(np.abs(t.motion.displacement))) for t in tests.tests)
@@ -147,7 +147,7 @@ def _bounds(tests: Tests, form: Form) -> tuple[Array, Array]:
     return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
 
 
-def _slopes(tests: Tests, form: Form, curve: Curve, gas: Array) -> Array:
+def _slopes(tests: Tests, form: KneeForm, curve: KneeCurve, gas: Array) -> Array:
     """(N, p + 2) derivatives of the force by the natural parameters, F_0 and k_g."""
     natural = form.natural(curve)
     steps = DIFFERENCE * np.where(natural > 0.0, natural, tests.peak)
@@ -156,4 +156,4 @@ def _slopes(tests: Tests, form: Form, curve: Curve, gas: Array) -> Array:
         (tests.simulated(form.curve(natural + step * unit), gas) - at) / step
         for step, unit in zip(steps, np.eye(natural.size), strict=True)
     ]
-    return np.column_stack([*moved, tests.beside])
+    return np.column_stack([*moved, tests.of_gas])

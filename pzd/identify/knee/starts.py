@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from pzd.identify.knee.curve import COMPRESSION, REBOUND, Curve
+from pzd.identify.knee.curve import COMPRESSION, REBOUND, KneeCurve
 from pzd.identify.knee.data import Tests
 from pzd.record import Array
 
@@ -22,7 +22,7 @@ MOST_SLOPE = 50.0
 """Largest slope of a start, likewise."""
 
 
-def start_of(tests: Tests, stiffness: float) -> tuple[Curve, Array]:
+def start_of(tests: Tests, stiffness: float) -> tuple[KneeCurve, Array]:
     """The best curve of the grid, and (2,) the gas force and gas spring beside it.
 
     Equation: F = F_0 + k_g x + T0 sign(v) + sum over the directions of C min(|v|, w_k) + B max(|v| - w_k, 0)
@@ -35,8 +35,8 @@ def start_of(tests: Tests, stiffness: float) -> tuple[Curve, Array]:
     v, fastest = tests.speed, tests.fastest
     kept = np.flatnonzero(np.abs(v) > TURNING * fastest)
     kept = kept[:: max(1, kept.size // SAMPLES)]
-    v, measured, beside = v[kept], tests.measured[kept], tests.beside[kept]
-    found: list[tuple[float, Curve, Array]] = []
+    v, measured, beside = v[kept], tests.measured[kept], tests.of_gas[kept]
+    found: list[tuple[float, KneeCurve, Array]] = []
     for knees in product((share * fastest for share in KNEES), repeat=2):
         terms = np.column_stack([beside, np.sign(v), *(t for way in (0, 1) for t in _terms(v, way, knees[way]))])
         size = np.linalg.norm(terms, axis=0)
@@ -55,11 +55,11 @@ def _terms(v: Array, way: int, knee: float) -> tuple[Array, Array]:
     return sign * np.minimum(w, knee), sign * np.maximum(w - knee, 0.0)
 
 
-def _curve(values: Array, knees: tuple[float, ...], stiffness: float, tests: Tests) -> Curve:
+def _curve(values: Array, knees: tuple[float, ...], stiffness: float, tests: Tests) -> KneeCurve:
     """The curve of a linear fit, its values brought to what a damper may have."""
     unit = tests.peak / tests.fastest
     slopes = np.clip(values[1:], LEAST_SLOPE * unit, MOST_SLOPE * unit).tolist()
-    return Curve(
+    return KneeCurve(
         float(np.clip(values[0], 1e-3 * tests.peak, 0.5 * tests.peak)),
         (slopes[0], slopes[2]),
         stiffness,
