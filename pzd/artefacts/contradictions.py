@@ -42,7 +42,7 @@ def contradictions(
     if {*diagnosis.effects, *plain.effects} != set(damper.effects):
         return _effects_apart(diagnosis, damper, plain, folder)
     document = read_yaml(folder / "damper.yaml", DataError)
-    return [*_base_apart(damper, rows, document, control), *_values_apart(diagnosis, damper, document)]
+    return [*_base_apart(damper, rows, document, control), *_values_apart(diagnosis, damper, plain, document)]
 
 
 def _effects_apart(diagnosis: Diagnosis, damper: Damper, plain: Damper, folder: Path) -> list[str]:
@@ -87,12 +87,14 @@ def _base_apart(damper: Damper, rows: Sequence[ParameterRow], document: Document
                 )
 
 
-def _values_apart(diagnosis: Diagnosis, damper: Damper, document: Document) -> Iterator[str]:
+def _values_apart(diagnosis: Diagnosis, damper: Damper, plain: Damper, document: Document) -> Iterator[str]:
     """Values of effects that diagnosis.json has in another unit or with another sign, or that none has in nature."""
     impossible = against_nature(damper)
     for name, values in damper.effects.items():
         diagnosed = diagnosis.parameters.get(name, {})
         acting = {key: value for key, value in values.items() if key != "at_voltage_V"}
+        if values == plain.effects.get(name):
+            continue
         edited = {key: value for key, value in acting.items() if key not in diagnosed or diagnosed[key].value != value}
         if name in impossible and edited:
             got = ", ".join(f"{key} = {_shown(value)}" for key, value in acting.items())

@@ -238,7 +238,8 @@ class Knees:
 def knee_damper(rows: Sequence[KneeRow]) -> Damper:
     """The damper of one setting with the knee law: a base row a condition, the knee and the gas as effects beside it.
 
-    Effects know no temperature: where a voltage was tested at several, theirs are the mean; T0, C and k are of each.
+    Gas force and gas spring are left out where the interval of every condition holds zero. Effects know no temperature:
+    where a voltage was tested at several, theirs are the mean; T0, C and k are of each.
 
     Parameters
     ----------
@@ -252,6 +253,11 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
         "preload_offset": [_mean([{"F_0": _gas_force(row, zero)} for row in part]) for part in parts],
         "gas_spring": [_mean([{"k_g": row.gas_spring_N_per_m} for row in part]) for part in parts],
     }
+    shown = {
+        "knee": True,
+        "preload_offset": any(row.gas_force_N_low95 * row.gas_force_N_high95 > 0.0 for row in rows),
+        "gas_spring": any(row.gas_spring_N_per_m_low95 * row.gas_spring_N_per_m_high95 > 0.0 for row in rows),
+    }
     given = [voltage for voltage in voltages if voltage is not None]
     return Damper(
         base=tuple(
@@ -264,7 +270,7 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
             )
             for row in rows
         ),
-        effects={name: _by_voltage(values, given) for name, values in effects.items()},
+        effects={name: _by_voltage(values, given) for name, values in effects.items() if shown[name]},
         zero_m=zero,
     )
 

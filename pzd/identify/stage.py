@@ -58,7 +58,7 @@ def identify(
         measures(rig.records),
         tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_order)),
         characteristics(constant, moving),
-        _knees(identify, known, [r.setting for r in rig.records], progress),
+        _knees(identify, known, [r.setting for r in rig.records], control, progress),
     )
 
 
@@ -66,6 +66,7 @@ def _knees(
     config: IdentifyConfig,
     known: Sequence[tuple[Condition, ParameterRow]],
     settings: Sequence[str | None],
+    control: Control,
     progress: Listener,
 ) -> Knees:
     """The knee law of every condition, where the config asks for it."""
@@ -73,7 +74,7 @@ def _knees(
         return Knees()
     from pzd.identify.knee.summary import knees
 
-    return knees(config.law, known, tuple(dict.fromkeys(settings)), config.nuisance, progress)
+    return knees(known, tuple(dict.fromkeys(settings)), config, control, progress)
 
 
 def refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> None:

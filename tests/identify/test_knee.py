@@ -8,7 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pzd.artefacts import Diagnosed, Identified, KneeForceRow, KneeRow, Knees, PredictedRow, Rig, identified_damper
+from pzd.artefacts import (
+    Diagnosed,
+    Identified,
+    KneeForceRow,
+    KneeRow,
+    Knees,
+    LawRow,
+    PredictedRow,
+    Rig,
+    identified_damper,
+)
 from pzd.artefacts.knee import knee_damper
 from pzd.damper.compose import respond, static_force, steady_force
 from pzd.damper.model import BaseRow, Damper
@@ -25,7 +35,6 @@ from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.progress import no_listener
-from pzd.signals.nuisance import NuisanceConfig
 
 RATE = 400.0
 TESTS = ((0.5, 0.02), (1.0, 0.02), (2.0, 0.02), (3.0, 0.02), (5.0, 0.012))
@@ -193,8 +202,8 @@ def test_what_the_law_misses_visibly_is_unexplained_and_not_nothing(with_round_k
 
 def test_a_setting_whose_control_signal_always_moves_has_no_knee_law() -> None:
     with pytest.raises(ConfigError, match=r"law: needs tests of setting soft at a constant control.*\(got knee\)"):
-        knees("knee", (), ("soft",), NuisanceConfig(), no_listener)
-    (law,) = knees("auto", (), ("soft",), NuisanceConfig(), no_listener).laws
+        knees((), ("soft",), IdentifyConfig(law="knee"), Control(), no_listener)
+    (law,) = knees((), ("soft",), IdentifyConfig(law="auto"), Control(), no_listener).laws
     assert law.law == "bingham"
     assert "constant control signal" in law.reason
 
@@ -266,6 +275,23 @@ def test_the_damper_of_several_conditions_has_the_law_of_each_at_its_voltage_and
     assert float(steady_force(damper, 0.0, None, -0.3)) == pytest.approx(-50.0 - 500.0 * 0.3)
 
 
+def test_a_gas_that_no_condition_shows_is_no_effect_of_the_damper() -> None:
+    rows = [
+        knee_row(u).model_copy(update={"gas_force_N_high95": 5.0, "gas_spring_N_per_m_low95": -1.0}) for u in (0.0, 2.0)
+    ]
+    assert set(knee_damper(rows).effects) == {"knee"}
+    assert set(knee_damper([rows[0], knee_row(2.0)]).effects) == {"knee", "preload_offset", "gas_spring"}
+
+
+def test_a_spring_below_zero_that_the_tests_show_is_read_back(tmp_path: Path) -> None:
+    ends = {f"gas_spring_N_per_m{end}": value for end, value in (("", -900.0), ("_low95", -950.0), ("_high95", -850.0))}
+    law = LawRow(setting=None, law="knee", tests=0, W_s_bingham=None, W_s_knee=None, reason="as the config asks for")
+    here = Identified((), (), knees=Knees((knee_row().model_copy(update=ends),), laws=(law,)))
+    handed = as_fitted(here, None, DiagnoseConfig())
+    handed.write(tmp_path, Control())
+    assert Diagnosed.read(tmp_path, Control()).damper.effects["gas_spring"] == {"k_g": -900.0}
+
+
 def test_the_gas_force_counts_from_one_zero_of_the_displacement_in_all_conditions() -> None:
     damper = knee_damper([knee_row(0.0, zero=-0.01), knee_row(2.0, zero=0.01)])
     assert damper.zero_m == 0.0
@@ -286,19 +312,25 @@ def force_row(setting: str | None, voltage: float | None, force: float, gas: flo
 
 
 def test_a_click_is_the_force_between_neighbouring_positions_over_their_distance_without_the_gas() -> None:
-    rows = clicks([force_row(None, 4.0, 460.0, gas=-150.0), force_row(None, 0.0, 300.0), force_row(None, 1.0, 310.0)])
+    forces = [force_row(None, 4.0, 460.0, gas=-150.0), force_row(None, 0.0, 300.0), force_row(None, 1.0, 310.0)]
+    rows = clicks(forces, Control("rebound", "clicks"))
     assert [(row.from_click, row.to_click) for row in rows] == [(0.0, 1.0), (1.0, 4.0)]
     assert [row.rebound_N_per_click for row in rows] == pytest.approx([10.0, 50.0])
     assert [row.compression_N_per_click for row in rows] == pytest.approx([5.0, 25.0])
 
 
 def test_clickers_in_the_name_of_a_setting_are_told_apart() -> None:
-    rows = clicks([force_row("R3 C8", None, 300.0), force_row("R5 C8", None, 340.0), force_row("R3 C9", None, 303.0)])
+    forces = [force_row("R3 C8", None, 300.0), force_row("R5 C8", None, 340.0), force_row("R3 C9", None, 303.0)]
+    rows = clicks(forces, Control())
     assert {(row.setting, row.rebound_N_per_click) for row in rows} == {("R# C8", 20.0), ("R3 C#", 3.0)}
 
 
 def test_settings_without_a_number_have_no_clicks() -> None:
-    assert clicks([force_row("soft", None, 300.0), force_row("hard", None, 600.0)]) == ()
+    assert clicks([force_row("soft", None, 300.0), force_row("hard", None, 600.0)], Control()) == ()
+
+
+def test_a_volt_is_no_click() -> None:
+    assert clicks([force_row(None, 0.0, 300.0), force_row(None, 1.0, 310.0)], Control()) == ()
 
 
 def test_the_trade_reads_its_forces_at_the_speeds_of_a_crank_of_100_mm() -> None:

@@ -68,7 +68,10 @@ def _predicted(labels: Labels, one: Tests, left: Sequence[Array]) -> PredictedRo
 
 
 def law_row(
-    asked: Literal["knee", "auto"], setting: str | None, found: Sequence[tuple[PredictedRow, Array]], conditions: int
+    asked: Literal["bingham", "knee", "auto"],
+    setting: str | None,
+    found: Sequence[tuple[PredictedRow, Array]],
+    conditions: int,
 ) -> LawRow:
     """The law of one setting, and why.
 

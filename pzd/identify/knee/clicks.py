@@ -1,6 +1,7 @@
 """Force a click: what one position of a clicker more makes of the force at the trade's speeds, the gas apart.
 
-The position of a clicker is a number: that of the control signal, or one in the name of the setting, as in "R 3 C 12".
+The position of a clicker is a number: the control signal where its name or unit says click, as in
+`control: {name: rebound, unit: clicks}`, or a number in the name of the setting, as in "R 3 C 12".
 """
 
 from __future__ import annotations
@@ -11,30 +12,33 @@ from collections.abc import Hashable, Iterator, Sequence
 from itertools import pairwise
 
 from pzd.artefacts import ClickRow, KneeForceRow
+from pzd.quantities import Control
 from pzd.record import SAME_TEMPERATURE
 
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
-def clicks(forces: Sequence[KneeForceRow]) -> tuple[ClickRow, ...]:
+def clicks(forces: Sequence[KneeForceRow], control: Control) -> tuple[ClickRow, ...]:
     """The force a click between neighbouring positions of every clicker, all other things equal.
 
     Parameters
     ----------
     forces : of every condition at the trade's speeds
+    control : the control signal
     """
-    return tuple(row for place, rows in _clickers(forces).items() for row in _of_one(place, rows))
+    clicked = "click" in f"{control.name} {control.unit}".lower()
+    return tuple(row for place, rows in _clickers(forces, clicked=clicked).items() for row in _of_one(place, rows))
 
 
 Place = tuple[str | None, float | None]
 """Setting with # for the clicker, and voltage where that is not the clicker itself."""
 
 
-def _clickers(forces: Sequence[KneeForceRow]) -> dict[Place, list[tuple[float, KneeForceRow]]]:
+def _clickers(forces: Sequence[KneeForceRow], *, clicked: bool) -> dict[Place, list[tuple[float, KneeForceRow]]]:
     """The rows that differ by one clicker alone, each with its position."""
     found: dict[Place, list[tuple[float, KneeForceRow]]] = defaultdict(list)
     for row in forces:
-        if row.voltage_V is not None:
+        if clicked and row.voltage_V is not None:
             found[row.setting, None].append((row.voltage_V, row))
         for number in _NUMBER.finditer(row.setting or ""):
             text = f"{(row.setting or '')[: number.start()]}#{(row.setting or '')[number.end() :]}"

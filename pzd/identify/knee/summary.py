@@ -4,39 +4,39 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from typing import Literal
 
 from pzd.artefacts import KneeForceRow, KneeRow, Knees, ParameterRow
 from pzd.artefacts.identified import FALLBACK
+from pzd.identify.config import IdentifyConfig
 from pzd.identify.knee.choice import kept_back, law_row
 from pzd.identify.knee.clicks import clicks
 from pzd.identify.knee.data import Tests
 from pzd.identify.knee.fit import fit_bingham, fit_knee
 from pzd.identify.knee.rows import knee_forces, knee_row
+from pzd.quantities import Control
 from pzd.record import Condition
 from pzd.schema.errors import ConfigError
 from pzd.schema.progress import Listener, Progress
-from pzd.signals.nuisance import NuisanceConfig
 from pzd.signals.stretches import separate_tests
 
 log = logging.getLogger(__name__)
 
 
 def knees(
-    asked: Literal["knee", "auto"],
     conditions: Sequence[tuple[Condition, ParameterRow]],
     settings: Sequence[str | None],
-    nuisance: NuisanceConfig,
+    config: IdentifyConfig,
+    control: Control,
     progress: Listener,
 ) -> Knees:
     """The knee law of every condition, and the law that each setting hands on.
 
     Parameters
     ----------
-    asked : what the config asks for
     conditions : in each of which the control signal stands still, with its Bingham parameters
     settings : of the rig
-    nuisance : what the sensors may differ by from test to test
+    config : the config's block: which law it asks for, and what the sensors may differ by from test to test
+    control : the control signal, which may be a clicker
     progress : hears of every condition that is done
 
     Raises
@@ -50,24 +50,24 @@ def knees(
         tests = Tests.of([test for record in condition.records for test in separate_tests(record)])
         labels = (condition.setting, condition.voltage, condition.temperature)
         fit = fit_knee(tests, bingham.k_N_per_m or FALLBACK["k_N_per_m"])
-        row = knee_row(labels, tests, fit, nuisance)
+        row = knee_row(labels, tests, fit, config.nuisance)
         rows.append(row)
         forces += knee_forces(row)
         found += kept_back(labels, tests, fit, fit_bingham(tests, fit))
         progress(Progress(number, len(conditions), f"knee law: {_line(row)}"))
     laws = []
     for setting in settings:
-        if asked == "knee" and not any(row.setting == setting for row in rows):
+        if config.law == "knee" and not any(row.setting == setting for row in rows):
             of = f" of setting {setting}" if setting else ""
             raise ConfigError(
                 f"identify.law: needs tests{of} at a constant control signal; in all of them it moves: record some, or "
                 "say bingham (got knee)"
             )
         mine = [each for each in found if each[0].setting == setting]
-        law = law_row(asked, setting, mine, sum(row.setting == setting for row in rows))
+        law = law_row(config.law, setting, mine, sum(row.setting == setting for row in rows))
         log.info("identify: law %s%s, %s", law.law, f" of {setting}" if setting else "", law.reason)
         laws.append(law)
-    return Knees(tuple(rows), tuple(forces), clicks(forces), tuple(row for row, _ in found), tuple(laws))
+    return Knees(tuple(rows), tuple(forces), clicks(forces, control), tuple(row for row, _ in found), tuple(laws))
 
 
 def _line(row: KneeRow) -> str:
