@@ -33,7 +33,8 @@ from pzd.artefacts.identified import (
     base_of,
     identified_damper,
 )
-from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, knee_damper
+from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow
+from pzd.artefacts.knee_as_damper import knee_damper
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
 from pzd.artefacts.rides import (

@@ -19,7 +19,7 @@ from pzd.artefacts import (
     Rig,
     identified_damper,
 )
-from pzd.artefacts.knee import knee_damper
+from pzd.artefacts.knee_as_damper import knee_damper
 from pzd.damper.compose import respond, static_force, steady_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion

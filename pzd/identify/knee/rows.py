@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from pzd.artefacts import KneeForceRow, KneeRow
-from pzd.artefacts.knee import DIRECTIONS, knee_damper
+from pzd.artefacts.knee import DIRECTIONS
+from pzd.artefacts.knee_as_damper import knee_damper
 from pzd.damper.compose import static_force, steady_force
 from pzd.identify.intervals import half_widths
 from pzd.identify.knee.data import Tests
