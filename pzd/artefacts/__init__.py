@@ -24,7 +24,16 @@ from pzd.artefacts.diagnosed import (
     Region,
     Value,
 )
-from pzd.artefacts.identified import FALLBACK, AuxiliaryRow, Identified, MeasureRow, ParameterRow, base_of
+from pzd.artefacts.identified import (
+    FALLBACK,
+    AuxiliaryRow,
+    Identified,
+    MeasureRow,
+    ParameterRow,
+    base_of,
+    identified_damper,
+)
+from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, knee_damper
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
 from pzd.artefacts.rides import (
@@ -56,6 +65,7 @@ __all__ = [
     "Artefact",
     "AuxiliaryRow",
     "Characteristics",
+    "ClickRow",
     "ComfortRow",
     "ContinuousVelocityRow",
     "Diagnosed",
@@ -69,12 +79,17 @@ __all__ = [
     "IngestRow",
     "InverseRow",
     "KeptBack",
+    "KneeForceRow",
+    "KneeRow",
+    "Knees",
+    "LawRow",
     "LeftOut",
     "Manifest",
     "MeasureRow",
     "NextTest",
     "ParameterRow",
     "PeakVelocityRow",
+    "PredictedRow",
     "Prediction",
     "Ranked",
     "RecordEntry",
@@ -96,4 +111,6 @@ __all__ = [
     "WheelRow",
     "base_of",
     "extent",
+    "identified_damper",
+    "knee_damper",
 ]

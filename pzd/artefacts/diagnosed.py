@@ -197,16 +197,17 @@ class Diagnosed:
         diagnosis = read_json(folder / "diagnosis.json", Diagnosis, control)
         damper = read_yaml_model(folder / "damper.yaml", Damper, control)
         rows = read_rows(folder / "parameters.csv", ParameterRow, control)
-        if faults := contradictions(diagnosis, damper, rows, folder, control):
+        plain = read_yaml_model(folder / "plain.yaml", Damper, control)
+        if faults := contradictions(diagnosis, (damper, plain), rows, folder, control):
             raise DataError(faults)
         told = diagnosis.model_copy(update={"parameters": _as_acting(diagnosis, damper), "zero_m": damper.zero_m})
-        return cls(told, damper, read_yaml_model(folder / "plain.yaml", Damper, control), rows)
+        return cls(told, damper, plain, rows)
 
 
 def _as_acting(diagnosis: Diagnosis, damper: Damper) -> dict[str, dict[str, Value]]:
-    """The parameters of the effects as the damper has them, without intervals where somebody edited them since."""
+    """The parameters of the adopted effects as the damper has them, without intervals where somebody edited them."""
     found: dict[str, dict[str, Value]] = {}
-    for name, values in damper.effects.items():
+    for name, values in ((name, values) for name, values in damper.effects.items() if name in diagnosis.effects):
         nodes = values.get("at_voltage_V")
         for parameter in known()[name].parameters:
             diagnosed, acting = diagnosis.parameters.get(name, {}).get(parameter.name), values[parameter.name]

@@ -104,6 +104,7 @@ def show(
         return _show_resolved(config, runs, overrides or (), Output(quiet=quiet, verbose=verbose), as_json=as_json)
     from pzd.cli.characteristics import characteristics_tables
     from pzd.cli.diagnosis import diagnosis_lines
+    from pzd.cli.knee import knee_tables
     from pzd.pipeline.command import opened
     from pzd.pipeline.run_summary import summary_with_stale
 
@@ -114,6 +115,8 @@ def show(
         return DONE
     output.say(f"run: {found.folder}", *stale_lines(found))
     for title, rows in characteristics_tables(found):
+        _section(output, title, rows)
+    for title, rows in knee_tables(found):
         _section(output, title, rows)
     _section(output, "parameters", _parameters(found))
     _section(

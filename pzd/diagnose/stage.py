@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, NextTest, Rig, base_of
+from pzd.diagnose.as_fitted import as_fitted
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
@@ -47,7 +48,7 @@ def diagnose(
 
     Returns
     -------
-    the verdict, and the damper with what was adopted; unchanged where nothing was
+    the verdict, and the damper with what was adopted; unchanged where nothing was, and under the knee law
     """
     from pzd.diagnose.base_parameters import base_parameters
     from pzd.diagnose.campaign import Campaign
@@ -64,6 +65,8 @@ def diagnose(
     from pzd.diagnose.where import regions
     from pzd.diagnose.work import Work
 
+    if identified.knees.law_of(setting) == "knee":
+        return as_fitted(identified, setting, diagnose)
     records, cut_off = whole_records(rig, setting)
     recorded = prepare(records)
     zero = mid_stroke(recorded)

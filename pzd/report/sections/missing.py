@@ -20,7 +20,7 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     sure = (
         "" if diagnosis.confidence is None else f" The confidence in this verdict is {percent(diagnosis.confidence)}."
     )
-    blocks: list[Block] = [Paragraph(f"{verdict(diagnosis)}{sure}")]
+    blocks: list[Block] = [Paragraph(f"{verdict(context)}{sure}")]
     blocks += [Paragraph(text) for text in (sentence(diagnosis.reason), _gap(diagnosis)) if text]
     blocks += [*galleries(pictures["missing"])]
     if diagnosis.parameters:
@@ -33,18 +33,21 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     return Section("missing", "What is missing, and how sure that is", tuple(blocks))
 
 
-def verdict(diagnosis: Diagnosis) -> str:
+def verdict(context: ReportContext) -> str:
     """The verdict in plain words."""
+    diagnosis = context.diagnosed.diagnosis
     adopted = listed(effects_in_words(diagnosis.effects))
     if diagnosis.verdict == "named":
-        text = f"Missing from the simple model: {adopted}"
+        text = f"Missing from the {context.model}: {adopted}"
     elif diagnosis.verdict == "ambiguous" and not diagnosis.effects:
         text = "These tests do not settle whether anything is missing"
     elif diagnosis.verdict == "ambiguous":
         rivals = listed(effects_in_words(diagnosis.rivals), "or")
         text = f"These tests do not settle what is missing. Best: {adopted or DASH}; also possible: {rivals or DASH}"
     elif diagnosis.verdict == "none":
-        text = "Nothing is missing: what the simple model leaves is within the noise and the scatter between tests"
+        text = f"Nothing is missing: what the {context.model} leaves is within the noise and the scatter between tests"
+    elif context.fitted_law:
+        text = "The knee law leaves a gap that repeats, and no effect was looked for beside it"
     else:
         found = f"; {adopted} is part of it" if adopted else ""
         text = f"Something is missing that the library of effects does not explain{found}"
