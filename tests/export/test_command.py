@@ -108,6 +108,14 @@ def test_a_format_that_there_is_not_gets_the_nearest(typed) -> None:
     )
 
 
+def test_two_formats_at_once_are_refused(typed) -> None:
+    typed("table", "first.yaml")
+    code, out, (line,) = typed("export", "first.yaml", "--to", "csv", "--to", "c")
+    assert (code, out) == (2, [])
+    assert "'--to': takes one format, and so one command each (got csv, c)" in line
+    assert not Path("runs/first/export").exists()
+
+
 def test_without_its_library_a_format_names_the_extra(typed, monkeypatch: pytest.MonkeyPatch) -> None:
     typed("table", "first.yaml")
     monkeypatch.setattr("pzd.export.formats.find_spec", lambda name: None if name == "pyarrow" else find_spec(name))

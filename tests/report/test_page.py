@@ -111,7 +111,7 @@ def test_every_picture_says_what_it_shows(read: Reader) -> None:
 def test_force_over_speed_is_told_as_damper_people_chart_it(read: Reader, run: Any) -> None:
     part = read.text.partition("2 Force over speed, as measured")[2].partition("3 Where the simple model fails")[0]
     assert "Rebound is extension: its speed and force are positive, those of compression negative." in part
-    assert "4 such tests were found in the 4 records, by their motion." in part
+    assert "Found by their motion: 4 such tests in 4 records." in part
     for row in run.identified.characteristics.peak_velocity:
         assert f"{row.rebound_force_N:.3g}"[:2] in part.replace("\u2212", "")
         assert row.record in part

@@ -11,6 +11,7 @@ from pzd.report.context import ReportContext
 from pzd.report.curves import characteristics_of
 from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.wording import DASH, amount, amount_as, number
+from pzd.schema.wording import counted
 
 _FOLD = 12
 _PAPER_RESPONSE_MS = 9
@@ -38,7 +39,8 @@ def _intro(context: ReportContext) -> str:
         "Forces are as recorded, with the gas force in them."
     )
     tests, records = len(characteristics_of(context).peak_velocity), len(context.rig.records)
-    return f"{text} {tests} such tests were found in the {records} records, by their motion." if tests else text
+    found = f"{counted(tests, 'such test')} in {counted(records, 'record')}"
+    return f"{text} Found by their motion: {found}." if tests else text
 
 
 def _places(context: ReportContext, *more: str) -> tuple[str, ...]:
