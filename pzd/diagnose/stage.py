@@ -62,6 +62,7 @@ def diagnose(
     from pzd.diagnose.too_short import too_short, undecided
     from pzd.diagnose.verdict import parameters_of, ranking_of, unpredicted, weak
     from pzd.diagnose.where import regions
+    from pzd.diagnose.work import Work
 
     records, cut_off = whole_records(rig, setting)
     recorded = prepare(records)
@@ -69,7 +70,7 @@ def diagnose(
     prepared = about(recorded, zero)
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
-    campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
+    campaign = Campaign(prepared, parts, diagnose.nuisance, jobs, Work(diagnose.most_evaluations))
     rows = tuple(row for row in identified.rows if row.setting == setting)
     reach = reach_of(stand.limits, recorded, [row.voltage_V for row in plain.base if row.voltage_V is not None])
     if too_short(campaign):
@@ -78,11 +79,12 @@ def diagnose(
     handed, decision = concluded(select_effects(campaign, plain, diagnose, jobs), trials, diagnose, control.unit)
     selection, prediction = handed.selection, handed.prediction(trials)
     before = campaign.checks(selection.plain.damper)
-    log.info("diagnose: %s, %s", decision.verdict, decision.reason)
+    log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.work.spent)
     found = selection.fitted.damper.moved(zero) if selection.adopted else plain
+    notes = (campaign.work.words, weak(parts.hold_out), unpredicted(prediction), without(cut_off))
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + weak(parts.hold_out) + unpredicted(prediction) + without(cut_off),
+        reason=decision.reason + "".join(notes),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, trials if handed.by_criterion else None),
