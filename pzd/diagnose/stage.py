@@ -91,7 +91,7 @@ def diagnose(
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, trials if handed.by_criterion else None),
-        parameters=parameters_of(selection),
+        parameters=parameters_of(selection, control),
         prediction=prediction,
         zero_m=found.zero_m,
         ranking=ranking_of(selection, selection.first),
@@ -109,7 +109,7 @@ def _next_test(
 ) -> NextTest | None:
     """The test that tells rivals apart; without rivals one at a voltage at which the force is known least."""
     from pzd.diagnose.next_test import next_test
-    from pzd.diagnose.voltage_between import next_voltage
+    from pzd.diagnose.voltage_between import PredictingDamper, next_voltage
 
     selection = handed.selection
     warmth, campaign = selection.first.whole.reference, selection.first.campaign
@@ -117,4 +117,5 @@ def _next_test(
         rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
         return next_test(rivals, reach, warmth, [campaign.offset(damper) for _, damper in selection.rivalling])
     offset = campaign.offset(found.moved(-zero) if selection.adopted else found)
-    return next_voltage((found, offset), trials, (handed.missed, handed.between), recorded, reach, warmth)
+    predicting = PredictingDamper(found, offset, handed.missed, handed.between)
+    return next_voltage(predicting, trials, recorded, reach, warmth)
