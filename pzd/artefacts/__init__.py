@@ -11,6 +11,7 @@ from pzd.artefacts.characteristics import (
     GasAndFrictionRow,
     PeakVelocityRow,
     StepRow,
+    WarmUpRow,
 )
 from pzd.artefacts.diagnosed import (
     Diagnosed,
@@ -108,6 +109,7 @@ __all__ = [
     "Table",
     "TableNotes",
     "Value",
+    "WarmUpRow",
     "WeightedRow",
     "WheelRow",
     "base_of",

@@ -14,6 +14,7 @@ from pzd.cli.machine import run_as_data
 from pzd.cli.options import CORES, RUNS, Config, Json, Quiet, Runs, Set, Verbose
 from pzd.cli.output import Output
 from pzd.schema.errors import ConfigError
+from pzd.schema.wording import counted
 
 if TYPE_CHECKING:
     from pzd.artefacts import IngestRow, ParameterRow, RecordEntry
@@ -61,7 +62,7 @@ def check(
     check_setting(given, entries)
     found = sum(len(entry.findings) for entry in entries)
     wrote = f"the records are drawn in {plot}" if plot is not None else "nothing was written"
-    output.say(f"{len(entries)} records, {found} findings; the config is in order, {wrote}")
+    output.say(f"{counted(len(entries), 'record')}, {counted(found, 'finding')}; the config is in order, {wrote}")
     return DONE
 
 

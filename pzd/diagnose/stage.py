@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, NextTest, Rig, base_of
 from pzd.diagnose.as_fitted import as_fitted
 from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.work import Work
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
@@ -68,11 +69,10 @@ def diagnose(
         return as_fitted(identified, setting, diagnose)
     records, cut_off = whole_records(rig, setting)
     recorded = prepare(records)
-    zero = mid_stroke(recorded)
-    prepared = about(recorded, zero)
+    prepared = about(recorded, zero := mid_stroke(recorded))
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
-    campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
+    campaign = Campaign(prepared, parts, diagnose.nuisance, jobs, Work(diagnose.most_evaluations))
     rows = tuple(row for row in identified.rows if row.setting == setting)
     reach = reach_of(stand.limits, recorded, [row.voltage_V for row in plain.base if row.voltage_V is not None])
     if too_short(campaign):
@@ -81,15 +81,16 @@ def diagnose(
     handed, decision = concluded(select_effects(campaign, plain, diagnose, jobs), trials, diagnose, control.unit)
     selection, prediction = handed.selection, handed.prediction(trials)
     before = campaign.checks(selection.plain.damper)
-    log.info("diagnose: %s, %s", decision.verdict, decision.reason)
+    log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.work.spent)
     found = selection.fitted.damper.moved(zero) if selection.adopted else plain
+    notes = (campaign.work.words, weak(parts.hold_out), unpredicted(prediction), without(cut_off))
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + weak(parts.hold_out) + unpredicted(prediction) + without(cut_off),
+        reason=decision.reason + "".join(notes),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, trials if handed.by_criterion else None),
-        parameters=parameters_of(selection),
+        parameters=parameters_of(selection, control),
         prediction=prediction,
         zero_m=found.zero_m,
         ranking=ranking_of(selection, selection.first),
@@ -107,7 +108,7 @@ def _next_test(
 ) -> NextTest | None:
     """The test that tells rivals apart; without rivals one at a voltage at which the force is known least."""
     from pzd.diagnose.next_test import next_test
-    from pzd.diagnose.voltage_between import next_voltage
+    from pzd.diagnose.voltage_between import PredictingDamper, next_voltage
 
     selection = handed.selection
     warmth, campaign = selection.first.whole.reference, selection.first.campaign
@@ -115,4 +116,5 @@ def _next_test(
         rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
         return next_test(rivals, reach, warmth, [campaign.offset(damper) for _, damper in selection.rivalling])
     offset = campaign.offset(found.moved(-zero) if selection.adopted else found)
-    return next_voltage((found, offset), trials, (handed.missed, handed.between), recorded, reach, warmth)
+    predicting = PredictingDamper(found, offset, handed.missed, handed.between)
+    return next_voltage(predicting, trials, recorded, reach, warmth)
