@@ -13,8 +13,6 @@ from pzd.schema.csvfile import read_rows, write_rows
 from pzd.schema.model import Frozen
 
 LawName = Literal["bingham", "knee"]
-
-
 Direction = Literal["rebound", "compression"]
 DIRECTIONS: tuple[Direction, ...] = ("rebound", "compression")
 OF_A_DIRECTION = ("bleed_Ns_per_m", "knee_force_N", "knee_velocity_m_per_s", "blow_off_Ns_per_m")

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from pzd.artefacts import Diagnosed, Diagnosis, Identified, NextTest, Rig, base_of
+from pzd.artefacts import Diagnosed, Diagnosis, Identified, NextTest, Prediction, Rig, base_of
 from pzd.diagnose.as_fitted import as_fitted
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.work import Work
@@ -16,6 +16,7 @@ from pzd.rig.config import RigConfig
 
 if TYPE_CHECKING:
     from pzd.damper.model import Damper
+    from pzd.diagnose.campaign import Campaign
     from pzd.diagnose.data.cleaning import Prepared
     from pzd.diagnose.handed_on import HandedOn
     from pzd.diagnose.kept_back import Trials
@@ -55,14 +56,14 @@ def diagnose(
     from pzd.diagnose.campaign import Campaign
     from pzd.diagnose.conclusion import concluded
     from pzd.diagnose.data.cleaning import about, mid_stroke, prepare
-    from pzd.diagnose.data.exclusions import whole_records, without
+    from pzd.diagnose.data.exclusions import whole_records
     from pzd.diagnose.data.split import split
     from pzd.diagnose.held_out import held_out_gap
     from pzd.diagnose.kept_back import trials_of
     from pzd.diagnose.next_test import reach_of
     from pzd.diagnose.search.forward_selection import select_effects
     from pzd.diagnose.too_short import too_short, undecided
-    from pzd.diagnose.verdict import parameters_of, ranking_of, unpredicted, weak
+    from pzd.diagnose.verdict import parameters_of, ranking_of
     from pzd.diagnose.where import regions
 
     if identified.knees.law_of(setting) == "knee":
@@ -83,10 +84,9 @@ def diagnose(
     before = campaign.checks(selection.plain.damper)
     log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.work.spent)
     found = selection.fitted.damper.moved(zero) if selection.adopted else plain
-    notes = (campaign.work.words, weak(parts.hold_out), unpredicted(prediction), without(cut_off))
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + "".join(notes),
+        reason=decision.reason + _notes(campaign, prediction, cut_off),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, trials if handed.by_criterion else None),
@@ -101,6 +101,14 @@ def diagnose(
     if selection.adopted:
         rows = base_parameters(selection, decision.verdict, setting)
     return Diagnosed(diagnosis, found, plain, rows)
+
+
+def _notes(campaign: Campaign, prediction: Prediction | None, cut_off: Sequence[str]) -> str:
+    """What limits a verdict: a search that was ended, and tests that were few or left out."""
+    from pzd.diagnose.data.exclusions import without
+    from pzd.diagnose.verdict import unpredicted, weak
+
+    return campaign.work.words + weak(campaign.parts.hold_out) + unpredicted(prediction) + without(cut_off)
 
 
 def _next_test(
