@@ -109,16 +109,17 @@ def _stroke() -> Iterator[str]:
 
 def _flow() -> Iterator[str]:
     effects = acting("flow")
-    factors = [f"factor *= {_call(e, 'direction_factor', side='side')}" for e in _has(effects, "direction_factor")]
-    yield from _function("direction_factor(side, p)", "factor = 1.0", *factors, "return factor")
+    for name in ("direction_factor", "bleed_factor"):
+        factors = [f"factor *= {_call(e, name, side='side')}" for e in _has(effects, name)]
+        yield from _function(f"{name}(side, p)", "factor = 1.0", *factors, "return factor")
     yield from _yield(_has(effects, "yield_force"))
     yield from _viscous(_has(effects, "viscous_force"))
     yield from _extra(_has(effects, "extra_force"))
     lines = ["edge, slope = math.inf, 1.0"]
     for effect in _has(effects, "opens_at"):
-        opens, beyond = _call(effect, "opens_at", T0="T0"), _call(effect, "slope_beyond")
+        opens, beyond = (_call(effect, name, T0="T0", side="side") for name in ("opens_at", "slope_beyond"))
         lines += _guarded(effect, f"at = {opens}", "if at < edge:", f"    edge, slope = at, {beyond}")
-    yield from _function("relief_of(T0, p)", *lines, "return edge, slope")
+    yield from _function("relief_of(T0, side, p)", *lines, "return edge, slope")
 
 
 def _yield(effects: Sequence[Effect]) -> Iterator[str]:

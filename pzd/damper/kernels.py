@@ -78,6 +78,8 @@ stroke_straight: Callable[[Row], bool] = _MODULE.stroke_straight
 
 direction_factor: Callable[[float, Row], float] = _MODULE.direction_factor
 """Factor on T0 and C by the sign of the force."""
+bleed_factor: Callable[[float, Row], float] = _MODULE.bleed_factor
+"""Factor on C alone by the sign of the force."""
 yield_force: Callable[[float, float, Row], float] = _MODULE.yield_force
 """Friction [N] at a flow speed [m/s] and T0 [N]."""
 yield_slope: Callable[[float, float, Row], float] = _MODULE.yield_slope
@@ -100,8 +102,8 @@ extra_speed: Callable[[float, float, Row], float] = _MODULE.extra_speed
 """Flow speed [m/s] at which C w and the extra force together take a force [N]; -1 where there is no closed form."""
 extra_none: Callable[[Row], bool] = _MODULE.extra_none
 """Whether there is no extra force."""
-relief_of: Callable[[float, Row], tuple[float, float]] = _MODULE.relief_of
-"""Force from which a valve is open [N] and the slope beyond [N s/m], at a T0 [N]; the first to open counts."""
+relief_of: Callable[[float, float, Row], tuple[float, float]] = _MODULE.relief_of
+"""Force from which a valve is open [N] and the slope beyond [N s/m], by T0 [N] and side; the first to open counts."""
 
 parallel_force: Callable[[float, float, float, Array], float] = _MODULE.parallel_force
 """Force [N] of what has no memory beside the element, at one x [m], v [m/s], a [m/s2] and one row of parameters."""

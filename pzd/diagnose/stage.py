@@ -6,14 +6,17 @@ import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from pzd.artefacts import Diagnosed, Diagnosis, Identified, NextTest, Rig, base_of
+from pzd.artefacts import Diagnosed, Diagnosis, Identified, NextTest, Prediction, Rig, base_of
+from pzd.diagnose.as_fitted import as_fitted
 from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.work import Work
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
 
 if TYPE_CHECKING:
     from pzd.damper.model import Damper
+    from pzd.diagnose.campaign import Campaign
     from pzd.diagnose.data.cleaning import Prepared
     from pzd.diagnose.handed_on import HandedOn
     from pzd.diagnose.kept_back import Trials
@@ -47,27 +50,27 @@ def diagnose(
 
     Returns
     -------
-    the verdict, and the damper with what was adopted; unchanged where nothing was
+    the verdict, and the damper with what was adopted; unchanged where nothing was, and under the knee law
     """
     from pzd.diagnose.base_parameters import base_parameters
     from pzd.diagnose.campaign import Campaign
     from pzd.diagnose.conclusion import concluded
     from pzd.diagnose.data.cleaning import about, mid_stroke, prepare
-    from pzd.diagnose.data.exclusions import whole_records, without
+    from pzd.diagnose.data.exclusions import whole_records
     from pzd.diagnose.data.split import split
     from pzd.diagnose.held_out import held_out_gap
     from pzd.diagnose.kept_back import trials_of
     from pzd.diagnose.next_test import reach_of
     from pzd.diagnose.search.forward_selection import select_effects
     from pzd.diagnose.too_short import too_short, undecided
-    from pzd.diagnose.verdict import parameters_of, ranking_of, unpredicted, weak
+    from pzd.diagnose.verdict import parameters_of, ranking_of
     from pzd.diagnose.where import regions
-    from pzd.diagnose.work import Work
 
+    if identified.knees.law_of(setting) == "knee":
+        return as_fitted(identified, setting, diagnose)
     records, cut_off = whole_records(rig, setting)
     recorded = prepare(records)
-    zero = mid_stroke(recorded)
-    prepared = about(recorded, zero)
+    prepared = about(recorded, zero := mid_stroke(recorded))
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs, Work(diagnose.most_evaluations))
@@ -81,14 +84,13 @@ def diagnose(
     before = campaign.checks(selection.plain.damper)
     log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.work.spent)
     found = selection.fitted.damper.moved(zero) if selection.adopted else plain
-    notes = (campaign.work.words, weak(parts.hold_out), unpredicted(prediction), without(cut_off))
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + "".join(notes),
+        reason=decision.reason + _notes(campaign, prediction, cut_off),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, trials if handed.by_criterion else None),
-        parameters=parameters_of(selection),
+        parameters=parameters_of(selection, control),
         prediction=prediction,
         zero_m=found.zero_m,
         ranking=ranking_of(selection, selection.first),
@@ -101,12 +103,20 @@ def diagnose(
     return Diagnosed(diagnosis, found, plain, rows)
 
 
+def _notes(campaign: Campaign, prediction: Prediction | None, cut_off: Sequence[str]) -> str:
+    """What limits a verdict: a search that was ended, and tests that were few or left out."""
+    from pzd.diagnose.data.exclusions import without
+    from pzd.diagnose.verdict import unpredicted, weak
+
+    return campaign.work.words + weak(campaign.parts.hold_out) + unpredicted(prediction) + without(cut_off)
+
+
 def _next_test(
     handed: HandedOn, found: Damper, zero: float, trials: Trials, recorded: Sequence[Prepared], reach: Reach
 ) -> NextTest | None:
     """The test that tells rivals apart; without rivals one at a voltage at which the force is known least."""
     from pzd.diagnose.next_test import next_test
-    from pzd.diagnose.voltage_between import next_voltage
+    from pzd.diagnose.voltage_between import PredictingDamper, next_voltage
 
     selection = handed.selection
     warmth, campaign = selection.first.whole.reference, selection.first.campaign
@@ -114,4 +124,5 @@ def _next_test(
         rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
         return next_test(rivals, reach, warmth, [campaign.offset(damper) for _, damper in selection.rivalling])
     offset = campaign.offset(found.moved(-zero) if selection.adopted else found)
-    return next_voltage((found, offset), trials, (handed.missed, handed.between), recorded, reach, warmth)
+    predicting = PredictingDamper(found, offset, handed.missed, handed.between)
+    return next_voltage(predicting, trials, recorded, reach, warmth)
