@@ -52,6 +52,7 @@ SMALL: dict[str, Any] = {
     "table": {"speed_points": 8, "tolerance": 0.01},
     "simulate": {
         "roads": [{"kind": "sine", "frequency_Hz": 2.25, "amplitude_m": 0.02}],
+        "policies": ["passive", "comfort"],
         "fidelities": ["table"],
         "duration_s": 4,
         "settle_s": 2,
