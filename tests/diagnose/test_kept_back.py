@@ -52,9 +52,9 @@ def test_nothing_is_fitted_to_a_kept_back_test(rng: np.random.Generator) -> None
     records[2] = replace(records[2], force=1.05 * records[2].force)
     found = predicted(tuple(records), damper_of(TWO), damper_of(TWO))
     (odd,) = (each for each in found.by if each.record == records[2].name)
-    # A gain of 5 % of one test is within the priors of nuisances, and here it is missed all the same; a damper fitted to
-    # this test beside the three others of its voltage would miss half of it. The noise scatters the one by 0.6 % (one
-    # standard deviation). The fit that leaves each test a gain of its own sees friction and damping part by the shape
+    # A gain of 5 % of one test is within the priors of nuisances, and here it is missed all the same; a damper fitted
+    # to this test beside the three others of its voltage would miss about half. Noise scatters the one by 0.6 %, one
+    # standard deviation. The fit that leaves each test a gain of its own sees friction and damping part by the shape
     # of each loop alone, which scatters the other by 3 %.
     assert odd.W_s_plain == pytest.approx((0.05 / 1.05) ** 2, rel=0.04)
     assert odd.W_s == pytest.approx((0.05 / 1.05) ** 2, rel=0.2)
