@@ -72,6 +72,10 @@ class Control:
             return VOLTAGE
         return Quantity(self.name, self.name, self.unit, "control signal of the valve")
 
+    def own_unit(self, unit: str) -> str:
+        """A unit as it is under this control: that of the control signal in the place of V."""
+        return self.unit if unit == VOLTAGE.unit else unit
+
     def renamed(self, column: str) -> str:
         """The name a canonical column has under this control: voltage_1_V -> current_1_A."""
         if VOLTAGE.name not in column or self == Control():

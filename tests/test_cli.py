@@ -31,7 +31,7 @@ from pzd.runs import Run
 from pzd.schema.progress import Progress
 
 COMMANDS = [
-    *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report"),
+    *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report", "watch"),
     *("check", "show", "compare", "export", "figures", "blind", "init", "schema", "effects"),
 ]
 HEAVY = ("numba", "pandas", "scipy", "matplotlib", "pint", "jinja2")
@@ -159,8 +159,16 @@ def test_diagnose_tells_the_story(typed: Terminal) -> None:
             2,
             "pzd run: Invalid value for '--jobs': must be a whole number, 1 or more (got 0)",
         ),
-        (["run", "first.yaml", "--set"], 2, "pzd: Option '--set' requires an argument"),
+        (["run", "first.yaml", "--set"], 2, "pzd run: Option '--set' requires an argument; see pzd run --help"),
+        (
+            ["-v", "diagnose", "first.yaml"],
+            2,
+            "pzd diagnose: options of a command stand behind it: pzd diagnose ... -v",
+        ),
+        (["--frce"], 2, "pzd: No such option: --frce"),
         (["run", "absent.yaml"], 2, "absent.yaml: the file is missing; check the path"),
+        (["run", "first"], 2, "first: the file is missing; did you mean first.yaml?"),
+        (["run", "frist.yml"], 2, "frist.yml: the file is missing; did you mean first.yaml?"),
         (["run", "data"], 2, "data: this is a folder, a file is needed"),
         (["run", "first.yaml", "--set", "sed=1"], 2, "--set sed: no such key; did you mean seed? (got sed)"),
         (["run", "first.yaml", "--set", "seed"], 2, "--set seed: must read a.b=VALUE (got seed)"),
@@ -199,6 +207,22 @@ def test_a_record_in_the_place_of_the_config_is_told_what_makes_one(typed: Termi
     assert typed("check", "record.csv") == 2
     assert typed.err[-1].startswith("record.csv: is this a config?")
     assert typed.err[-1].endswith("pzd init prints one for files of a rig")
+
+
+def test_the_folder_of_a_run_in_the_place_of_its_config_is_told_which_one(typed: Terminal) -> None:
+    typed("ingest", "first.yaml")
+    assert typed("show", "runs/first") == 2
+    assert typed.err == ["runs/first: these are the results of first.yaml; give first.yaml"]
+
+
+def test_init_of_a_folder_names_the_ending_of_most_of_its_files(typed: Terminal) -> None:
+    for name in ("a.txt", "b.txt", "c.tdms"):
+        Path("data", name).write_text("")
+    Path("data/deep").mkdir()
+    for name in ("a", "b"):
+        Path(f"data/{name}.csv").unlink()
+    assert typed("init", "data") == 2
+    assert typed.err == ["data: this is a folder; name the files in it, e.g. data/*.txt"]
 
 
 def test_a_path_that_matches_no_file_is_a_wrong_config(typed: Terminal) -> None:

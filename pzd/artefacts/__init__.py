@@ -11,6 +11,7 @@ from pzd.artefacts.characteristics import (
     GasAndFrictionRow,
     PeakVelocityRow,
     StepRow,
+    WarmUpRow,
 )
 from pzd.artefacts.diagnosed import (
     Diagnosed,
@@ -24,7 +25,16 @@ from pzd.artefacts.diagnosed import (
     Region,
     Value,
 )
-from pzd.artefacts.identified import FALLBACK, AuxiliaryRow, Identified, MeasureRow, ParameterRow, base_of
+from pzd.artefacts.identified import (
+    FALLBACK,
+    AuxiliaryRow,
+    Identified,
+    MeasureRow,
+    ParameterRow,
+    base_of,
+    identified_damper,
+)
+from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, knee_damper
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
 from pzd.artefacts.rides import (
@@ -56,6 +66,7 @@ __all__ = [
     "Artefact",
     "AuxiliaryRow",
     "Characteristics",
+    "ClickRow",
     "ComfortRow",
     "ContinuousVelocityRow",
     "Diagnosed",
@@ -69,12 +80,17 @@ __all__ = [
     "IngestRow",
     "InverseRow",
     "KeptBack",
+    "KneeForceRow",
+    "KneeRow",
+    "Knees",
+    "LawRow",
     "LeftOut",
     "Manifest",
     "MeasureRow",
     "NextTest",
     "ParameterRow",
     "PeakVelocityRow",
+    "PredictedRow",
     "Prediction",
     "Ranked",
     "RecordEntry",
@@ -92,8 +108,11 @@ __all__ = [
     "Table",
     "TableNotes",
     "Value",
+    "WarmUpRow",
     "WeightedRow",
     "WheelRow",
     "base_of",
     "extent",
+    "identified_damper",
+    "knee_damper",
 ]

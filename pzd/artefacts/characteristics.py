@@ -1,7 +1,8 @@
-"""What the tests of the rig show without any model: force over speed, gas force, friction, response to a step."""
+"""What the tests of the rig show without any model: force over speed, gas force, friction, step response, warm-up."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Self
@@ -100,30 +101,89 @@ class StepRow(Frozen):
     """`ok`, or why there are no times."""
 
 
+class WarmUpRow(Frozen):
+    """One cycle of a test that was run for long, or whose temperature changed: its force at the peak speed."""
+
+    record: str
+    setting: str | None
+    voltage_V: float | None
+    """Of the condition, as in `parameters.csv`."""
+    cycle: int = Field(ge=1)
+    """Running number within the test; a record of several tests begins anew with each."""
+    time_s: float
+    """Middle of the cycle, in the time as recorded."""
+    temperature_degC: float | None
+    """Mean over the cycle."""
+    velocity_m_per_s: float = Field(gt=0.0)
+    """Peak speed, the mean of both directions."""
+    rebound_force_N: float
+    compression_force_N: float
+
+
+@dataclass(frozen=True)
+class Course:
+    """From where to where a warm-up goes: means of its first cycles and of its last."""
+
+    first: WarmUpRow
+    """Of the test, with the means of the first cycles in it."""
+    last: WarmUpRow
+    cycles: int
+
+
+AVERAGED = 3
+"""Cycles at either end of a warm-up over which its course is averaged."""
+
+
+def courses(rows: Sequence[WarmUpRow]) -> tuple[Course, ...]:
+    """The course of every test of a warm-up.
+
+    Parameters
+    ----------
+    rows : cycle by cycle, test by test
+    """
+    tests: list[list[WarmUpRow]] = []
+    for row in rows:
+        if not tests or row.cycle <= tests[-1][-1].cycle or row.record != tests[-1][-1].record:
+            tests.append([])
+        tests[-1].append(row)
+    return tuple(Course(_mean(mine[:AVERAGED]), _mean(mine[-AVERAGED:]), len(mine)) for mine in tests)
+
+
+def _mean(rows: Sequence[WarmUpRow]) -> WarmUpRow:
+    names = ("time_s", "temperature_degC", "velocity_m_per_s", "rebound_force_N", "compression_force_N")
+    values = {name: [getattr(row, name) for row in rows] for name in names}
+    known = {name: sum(all_of) / len(all_of) for name, all_of in values.items() if None not in all_of}
+    return rows[0].model_copy(update=known)
+
+
 @dataclass(frozen=True)
 class Characteristics:
-    """Force over speed, gas force, friction and response as the tests of the rig show them, without any model."""
+    """Force over speed, gas force, friction, response, warm-up as the tests of the rig show them, without any model."""
 
     peak_velocity: tuple[PeakVelocityRow, ...] = ()
     continuous_velocity: tuple[ContinuousVelocityRow, ...] = ()
     gas_and_friction: tuple[GasAndFrictionRow, ...] = ()
     steps: tuple[StepRow, ...] = ()
+    warm_up: tuple[WarmUpRow, ...] = ()
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write pvp.csv, cvp.csv, gas_and_friction.csv and steps.csv."""
+        """Write pvp.csv, cvp.csv, gas_and_friction.csv, steps.csv and warm_up.csv."""
         write_rows(folder / "pvp.csv", PeakVelocityRow, self.peak_velocity, control)
         write_rows(folder / "cvp.csv", ContinuousVelocityRow, self.continuous_velocity, control)
         write_rows(folder / "gas_and_friction.csv", GasAndFrictionRow, self.gas_and_friction, control)
         write_rows(folder / "steps.csv", StepRow, self.steps, control)
+        write_rows(folder / "warm_up.csv", WarmUpRow, self.warm_up, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
         """Read and check them again; a run of an earlier version has none of them."""
         if not (folder / "pvp.csv").is_file():
             return cls()
+        warm_up = folder / "warm_up.csv"  # an earlier version wrote the others alone
         return cls(
             read_rows(folder / "pvp.csv", PeakVelocityRow, control),
             read_rows(folder / "cvp.csv", ContinuousVelocityRow, control),
             read_rows(folder / "gas_and_friction.csv", GasAndFrictionRow, control),
             read_rows(folder / "steps.csv", StepRow, control),
+            read_rows(warm_up, WarmUpRow, control) if warm_up.is_file() else (),
         )

@@ -26,39 +26,50 @@ Acting = float | tuple[float, ...]
 
 
 def contradictions(
-    diagnosis: Diagnosis, damper: Damper, rows: Sequence[ParameterRow], folder: Path, control: Control
+    diagnosis: Diagnosis, dampers: tuple[Damper, Damper], rows: Sequence[ParameterRow], folder: Path, control: Control
 ) -> list[str]:
     """Every fault of a damper beside its diagnosis and its T0, C and k, each with its place.
 
     Parameters
     ----------
     diagnosis : of diagnosis.json
-    damper : of damper.yaml
+    dampers : of damper.yaml and of plain.yaml; the law that identify fits may bring effects of its own
     rows : of parameters.csv
     folder : where the three stand
     control : the control signal, which names the voltage in messages
     """
-    if set(diagnosis.effects) != set(damper.effects):
-        return _effects_apart(diagnosis, damper, folder)
+    damper, plain = dampers
+    if {*diagnosis.effects, *plain.effects} != set(damper.effects):
+        return _effects_apart(diagnosis, damper, plain, folder)
     document = read_yaml(folder / "damper.yaml", DataError)
-    return [*_base_apart(damper, rows, document, control), *_values_apart(diagnosis, damper, document)]
+    return [*_base_apart(damper, rows, document, control), *_values_apart(diagnosis, damper, plain, document)]
 
 
-def _effects_apart(diagnosis: Diagnosis, damper: Damper, folder: Path) -> list[str]:
-    """Effects that only one of damper.yaml and diagnosis.json has."""
+def _effects_apart(diagnosis: Diagnosis, damper: Damper, plain: Damper, folder: Path) -> list[str]:
+    """Effects that damper.yaml has and neither diagnosis.json nor plain.yaml, or the other way round."""
     told, acting = diagnosis.effects, damper.effects
-    of_damper, of_diagnosis = (read_yaml(folder / name, DataError) for name in ("damper.yaml", "diagnosis.json"))
-    return [
-        f"{of_damper.place(('effects', name))}: effects.{name}: diagnosis.json does not have it among its effects; "
-        "add it there too, or take it out here"
-        for name in acting
-        if name not in told
-    ] + [
-        f"{of_diagnosis.place(('effects', str(number)))}: effects.{number}: damper.yaml has no {name}; "
-        "add it there too, or take it out here"
-        for number, name in enumerate(told)
-        if name not in acting
-    ]
+    names = ("damper.yaml", "diagnosis.json", "plain.yaml")
+    of_damper, of_diagnosis, of_plain = (read_yaml(folder / name, DataError) for name in names)
+    return (
+        [
+            f"{of_damper.place(('effects', name))}: effects.{name}: diagnosis.json does not have it among its effects; "
+            "add it there too, or take it out here"
+            for name in acting
+            if name not in {*told, *plain.effects}
+        ]
+        + [
+            f"{of_diagnosis.place(('effects', str(number)))}: effects.{number}: damper.yaml has no {name}; "
+            "add it there too, or take it out here"
+            for number, name in enumerate(told)
+            if name not in acting
+        ]
+        + [
+            f"{of_plain.place(('effects', name))}: effects.{name}: damper.yaml has no {name}; "
+            "add it there too, or take it out here"
+            for name in plain.effects
+            if name not in acting
+        ]
+    )
 
 
 def _base_apart(damper: Damper, rows: Sequence[ParameterRow], document: Document, control: Control) -> Iterator[str]:
@@ -76,12 +87,14 @@ def _base_apart(damper: Damper, rows: Sequence[ParameterRow], document: Document
                 )
 
 
-def _values_apart(diagnosis: Diagnosis, damper: Damper, document: Document) -> Iterator[str]:
+def _values_apart(diagnosis: Diagnosis, damper: Damper, plain: Damper, document: Document) -> Iterator[str]:
     """Values of effects that diagnosis.json has in another unit or with another sign, or that none has in nature."""
     impossible = against_nature(damper)
     for name, values in damper.effects.items():
         diagnosed = diagnosis.parameters.get(name, {})
         acting = {key: value for key, value in values.items() if key != "at_voltage_V"}
+        if values == plain.effects.get(name):
+            continue
         edited = {key: value for key, value in acting.items() if key not in diagnosed or diagnosed[key].value != value}
         if name in impossible and edited:
             got = ", ".join(f"{key} = {_shown(value)}" for key, value in acting.items())

@@ -197,21 +197,25 @@ class Diagnosed:
         diagnosis = read_json(folder / "diagnosis.json", Diagnosis, control)
         damper = read_yaml_model(folder / "damper.yaml", Damper, control)
         rows = read_rows(folder / "parameters.csv", ParameterRow, control)
-        if faults := contradictions(diagnosis, damper, rows, folder, control):
+        plain = read_yaml_model(folder / "plain.yaml", Damper, control)
+        if faults := contradictions(diagnosis, (damper, plain), rows, folder, control):
             raise DataError(faults)
-        told = diagnosis.model_copy(update={"parameters": _as_acting(diagnosis, damper), "zero_m": damper.zero_m})
-        return cls(told, damper, read_yaml_model(folder / "plain.yaml", Damper, control), rows)
+        told = diagnosis.model_copy(
+            update={"parameters": _as_acting(diagnosis, damper, control), "zero_m": damper.zero_m}
+        )
+        return cls(told, damper, plain, rows)
 
 
-def _as_acting(diagnosis: Diagnosis, damper: Damper) -> dict[str, dict[str, Value]]:
-    """The parameters of the effects as the damper has them, without intervals where somebody edited them since."""
+def _as_acting(diagnosis: Diagnosis, damper: Damper, control: Control) -> dict[str, dict[str, Value]]:
+    """The parameters of the adopted effects as the damper has them, without intervals where somebody edited them."""
     found: dict[str, dict[str, Value]] = {}
-    for name, values in damper.effects.items():
+    for name, values in ((name, values) for name, values in damper.effects.items() if name in diagnosis.effects):
         nodes = values.get("at_voltage_V")
         for parameter in known()[name].parameters:
             diagnosed, acting = diagnosis.parameters.get(name, {}).get(parameter.name), values[parameter.name]
             at = nodes if isinstance(nodes, tuple) and isinstance(acting, tuple) else None
             if diagnosed is None or (diagnosed.value, diagnosed.at_voltage_V) != (acting, at):
-                diagnosed = Value(value=acting, low95=None, high95=None, unit=parameter.unit, at_voltage_V=at)
+                unit = control.own_unit(parameter.unit)
+                diagnosed = Value(value=acting, low95=None, high95=None, unit=unit, at_voltage_V=at)
             found.setdefault(name, {})[parameter.name] = diagnosed
     return found

@@ -9,6 +9,7 @@ from typing import ClassVar, Self
 from pydantic import Field, model_validator
 
 from pzd.artefacts.characteristics import Characteristics
+from pzd.artefacts.knee import Knees, knee_damper
 from pzd.damper.model import PHYSICAL, BaseRow, Damper, unphysical
 from pzd.quantities import Control
 from pzd.schema.csvfile import read_rows, write_rows
@@ -103,13 +104,16 @@ class Identified:
     """Of the conditions that show forces beside the element."""
     characteristics: Characteristics = field(default_factory=Characteristics)
     """What the tests show without any model."""
+    knees: Knees = field(default_factory=Knees)
+    """The knee law, where the config asks for it."""
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write parameters.csv, measures.csv, auxiliary.csv and the files of the characteristics."""
+        """Write parameters.csv, measures.csv, auxiliary.csv, and the files of the characteristics and the knee law."""
         write_rows(folder / "parameters.csv", ParameterRow, self.rows, control)
         write_rows(folder / "measures.csv", MeasureRow, self.measures, control)
         write_rows(folder / "auxiliary.csv", AuxiliaryRow, self.auxiliary, control)
         self.characteristics.write(folder, control)
+        self.knees.write(folder, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
@@ -126,6 +130,7 @@ class Identified:
             read_rows(folder / "measures.csv", MeasureRow, control),
             read_rows(folder / "auxiliary.csv", AuxiliaryRow, control),
             Characteristics.read(folder, control),
+            Knees.read(folder, control),
         )
 
     def untrusted(self, control: Control) -> tuple[str, ...]:
@@ -170,6 +175,18 @@ def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:
     if not mine:
         raise ValueError(f"no identified parameters for setting {setting!r}")
     return Damper(base=tuple(_filled(row, mine) for row in mine))
+
+
+def identified_damper(found: Identified, setting: str | None) -> Damper:
+    """The damper of one setting that identify hands on, by the law that it was given.
+
+    Raises
+    ------
+    ValueError : when the setting has no row
+    """
+    if found.knees.law_of(setting) == "knee":
+        return knee_damper(found.knees.of(setting))
+    return base_of(found.rows, setting)
 
 
 FALLBACK = {"T0_N": 0.0, "C_Ns_per_m": 1.0, "k_N_per_m": 1e8}

@@ -11,7 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from pzd.cli import blind, export, figures, look, stages, start
+from pzd.cli import blind, export, figures, look, stages, start, watch
 from pzd.cli.exits import DONE, INTERRUPTED, OWN_FAULT
 from pzd.cli.interrupt import (
     end_at_once_when_interrupted,
@@ -36,6 +36,7 @@ app = typer.Typer(
 )
 _COMMANDS: tuple[Callable[..., int], ...] = (
     *stages.COMMANDS,
+    *watch.COMMANDS,
     *look.COMMANDS,
     *export.COMMANDS,
     *figures.COMMANDS,
@@ -107,18 +108,18 @@ def status(arguments: Sequence[str]) -> int:
         silence(sys.stdout)
         return DONE
     except Exception as error:  # noqa: BLE001  # every ending has its exit code
-        return _failed(error)
+        return _failed(error, arguments)
     if code == INTERRUPTED:  # typer may make an exit of its own of it
         say_interrupted()
     return code
 
 
-def _failed(error: Exception) -> int:
+def _failed(error: Exception, arguments: Sequence[str]) -> int:
     if isinstance(error, UserError):
         complain(error.messages)
         return error.exit_code
     if isinstance(error, _USAGE_ERROR):
-        complain([_usage(error)])
+        complain([_usage(error, arguments)])
         return ConfigError.exit_code
     if isinstance(error, OSError) and error.errno is not None:
         complain([f"{error.filename or 'system'}: {error.strerror}"])
@@ -127,14 +128,20 @@ def _failed(error: Exception) -> int:
     return OWN_FAULT
 
 
-def _usage(error: Exception) -> str:
+def _usage(error: Exception, arguments: Sequence[str]) -> str:
     """What is wrong with the usage, as one line."""
+    names = [one.__name__ for one in _COMMANDS]
+    given = next((word for word in arguments if word in names), None)
     context = getattr(error, "ctx", None)
-    command = context.command_path if context else "pzd"
+    command = context.command_path if context else f"pzd {given}" if given else "pzd"
     message = " ".join(str(getattr(error, "format_message", error.__str__)()).split())
     unknown = re.search(r"No such command '([^']*)'", message)
     if unknown:
-        near = difflib.get_close_matches(unknown[1], [one.__name__ for one in _COMMANDS], 1)
+        near = difflib.get_close_matches(unknown[1], names, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         message = f"no such command{hint} (got {unknown[1]})"
+    misplaced = re.fullmatch(r"No such option: (-\S+).*", message)
+    if misplaced and command == "pzd" and given:
+        message = f"options of a command stand behind it: pzd {given} ... {misplaced[1]}"
+        command = f"pzd {given}"
     return f"{command}: {message.rstrip('.')}; see {command} --help"

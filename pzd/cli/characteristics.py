@@ -1,14 +1,16 @@
-"""Force over speed, gas force, friction and response to steps, as rows of text."""
+"""Force over speed, gas force, friction, response to steps and warm-up, as rows of text."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from pzd.artefacts.characteristics import AVERAGED, courses
 from pzd.artefacts.matching import force_behind
 from pzd.cli.layout import filled, number, number_as
 
 if TYPE_CHECKING:
+    from pzd.artefacts import Characteristics
     from pzd.pipeline.run_summary import RunSummary
 
 
@@ -69,6 +71,29 @@ def characteristics_tables(found: RunSummary) -> Iterator[tuple[str, list[list[s
             2,
         ),
     )
+    yield f"warm-up: from the first {AVERAGED} cycles of a long test to its last", _warm_up(here, signal)
+
+
+def _warm_up(here: Characteristics, signal: str) -> list[list[str]]:
+    rows = [
+        [
+            number(one.first.setting),
+            number(one.first.voltage_V),
+            number(one.first.velocity_m_per_s),
+            str(one.cycles),
+            _course(one.first.temperature_degC, one.last.temperature_degC),
+            _course(one.first.rebound_force_N, one.last.rebound_force_N),
+            _course(one.first.compression_force_N, one.last.compression_force_N),
+            one.first.record,
+        ]
+        for one in courses(here.warm_up)
+    ]
+    head = ["setting", signal, "speed [m/s]", "cycles", "T [degC]", "rebound [N]", "compression [N]", "record"]
+    return filled(head, rows, 2)
+
+
+def _course(first: float | None, last: float | None) -> str:
+    return number(None) if first is None else f"{number(first)} to {number(last)}"
 
 
 def _place(setting: str | None, voltage: float | None, temperature: float | None) -> list[str]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pzd.artefacts import Diagnosis, NextTest, Prediction, Value
 from pzd.cli.layout import interval, number
 from pzd.quantities import Control
+from pzd.schema.wording import counted
 
 _VERDICTS = {
     "named": "one answer fits, and no other does",
@@ -52,7 +53,7 @@ def _gap(diagnosis: Diagnosis) -> str:
     if gap is None:
         return "gap: could not be measured"
     share = f", {1.0 - gap.after / gap.before:.0%} less" if gap.after < gap.before else ""
-    records = f"{len(gap.held_out)} record{'s' if len(gap.held_out) != 1 else ''}"
+    records = counted(len(gap.held_out), "record")
     held = {"records": records, "mixed": f"{records}, whole or in part"}.get(
         gap.hold_out, f"{gap.hold_out} of {records}"
     )

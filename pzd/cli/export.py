@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -12,11 +13,25 @@ from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose, comma
 from pzd.cli.output import Output, complain
 from pzd.export.formats import formats
 
+
+def _once(given: Sequence[str]) -> list[str]:
+    """The value of --to.
+
+    Raises
+    ------
+    BadParameter : when there are several
+    """
+    if len(given) > 1:
+        raise typer.BadParameter(f"takes one format, and so one command each (got {', '.join(given)})")
+    return list(given)
+
+
 To = Annotated[
-    str,
+    list[str],  # a list, for of a single value given twice the last would be taken in silence
     typer.Option(
         "--to",
         metavar="FORMAT",
+        callback=_once,
         help="; ".join(f"{name}: {one.meaning}" for name, one in formats().items()) + ".",
         show_default=False,
     ),
@@ -43,10 +58,11 @@ def export(
 
     output = Output(quiet=quiet, verbose=verbose)
     remedy = command_line(LAST, config, runs, overrides or ())
-    written = exported(opened(config, runs, overrides or ()), to, out, remedy)
+    (form,) = to
+    written = exported(opened(config, runs, overrides or ()), form, out, remedy)
     if as_json:
         files = [path.as_posix() for path in written.files]
-        output.say_json({"format": to, "files": files, "not_to_be_trusted": written.marks})
+        output.say_json({"format": form, "files": files, "not_to_be_trusted": written.marks})
     else:
         output.say(*(f"export: {path}" for path in written.files))
     complain(f"not to be trusted: {mark}" for mark in written.marks)

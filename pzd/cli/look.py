@@ -14,6 +14,7 @@ from pzd.cli.machine import run_as_data
 from pzd.cli.options import CORES, RUNS, Config, Json, Quiet, Runs, Set, Verbose
 from pzd.cli.output import Output
 from pzd.schema.errors import ConfigError
+from pzd.schema.wording import counted
 
 if TYPE_CHECKING:
     from pzd.artefacts import IngestRow, ParameterRow, RecordEntry
@@ -61,7 +62,7 @@ def check(
     check_setting(given, entries)
     found = sum(len(entry.findings) for entry in entries)
     wrote = f"the records are drawn in {plot}" if plot is not None else "nothing was written"
-    output.say(f"{len(entries)} records, {found} findings; the config is in order, {wrote}")
+    output.say(f"{counted(len(entries), 'record')}, {counted(found, 'finding')}; the config is in order, {wrote}")
     return DONE
 
 
@@ -104,6 +105,7 @@ def show(
         return _show_resolved(config, runs, overrides or (), Output(quiet=quiet, verbose=verbose), as_json=as_json)
     from pzd.cli.characteristics import characteristics_tables
     from pzd.cli.diagnosis import diagnosis_lines
+    from pzd.cli.knee import knee_tables
     from pzd.pipeline.command import opened
     from pzd.pipeline.run_summary import summary_with_stale
 
@@ -114,6 +116,8 @@ def show(
         return DONE
     output.say(f"run: {found.folder}", *stale_lines(found))
     for title, rows in characteristics_tables(found):
+        _section(output, title, rows)
+    for title, rows in knee_tables(found):
         _section(output, title, rows)
     _section(output, "parameters", _parameters(found))
     _section(

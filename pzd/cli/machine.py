@@ -20,6 +20,7 @@ def run_as_data(run: RunSummary) -> dict[str, Any]:
         "stale": run.stale,
         "not_to_be_trusted": run.marks,
         "characteristics": vars(run.characteristics),
+        "knee": vars(run.knees),
         "parameters": run.parameters,
         "diagnosis": run.diagnosis,
         "rides": run.summary,

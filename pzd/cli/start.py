@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -35,7 +36,9 @@ def init(files: RigFiles, layout: LayoutName = None, verbose: Verbose = False) -
 
 def _absent(path: Path) -> str:
     if path.is_dir():
-        return f"{path}: this is a folder; name the files in it, e.g. {path}/*.csv"
+        endings = Counter(file.suffix for file in path.iterdir() if file.is_file() and file.suffix)
+        ending = max(endings, key=lambda one: endings[one], default=".csv")
+        return f"{path}: this is a folder; name the files in it, e.g. {path}/*{ending}"
     return f"{path}: no such file; check the path"
 
 

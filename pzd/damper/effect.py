@@ -20,10 +20,12 @@ stroke
 flow
     One or more changes of the curve that gives the force by the flow speed w = |dy/dt| >= 0:
     |F| = yield(w) + viscous(w) + extra(w), and beyond the force that opens a valve a straight line.
-    `direction_factor`: on T0 and C by the sign of F. `yield_force`, `yield_slope`: in place of T0, in proportion to it.
+    `direction_factor`: on T0 and C by the sign of F; `bleed_factor`: on C alone.
+    `yield_force`, `yield_slope`: in place of T0, in proportion to it.
     `viscous_force`, `viscous_slope`, `viscous_speed`: in place of C w, in proportion to C; speed is the inverse.
     `extra_force`, `extra_slope`: beside both, 0 at w = 0; `extra_speed`: the flow speed at C w + extra, where there is
-    a closed form. `opens_at`, `slope_beyond`: force from which the slope is another. All rise with w.
+    a closed form. `opens_at`, `slope_beyond`: force from which the slope is another, by the sign of F
+    too. All rise with w.
 parallel
     `law`: force beside the element by x, v and a of the piston, `about_zero` where a fit looks for the zero of x too.
     It has no memory: a further slip branch (k_2, T0_2,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from pzd.compiled import compiled
 from pzd.damper import kernels
-from pzd.damper.kernels import T0, C, Row, direction_factor
+from pzd.damper.kernels import T0, C, Row, bleed_factor, direction_factor
 
 _NEWTON_STEPS = 60
 _NEWTON_TOLERANCE = 1e-13
@@ -29,6 +29,12 @@ _relief = kernels.relief_of
 
 
 @compiled
+def damping(p: Row, side: float) -> float:
+    """C [N s/m] in the direction `side` (+1 rebound, -1 compression)."""
+    return p[C] * direction_factor(side, p) * bleed_factor(side, p)
+
+
+@compiled
 def breakaway(p: Row, side: float) -> float:
     """Force [N] below which nothing flows in the direction `side` (+1 rebound, -1 compression)."""
     return _friction(0.0, p[T0] * direction_factor(side, p), p)
@@ -37,14 +43,14 @@ def breakaway(p: Row, side: float) -> float:
 @compiled
 def relief(p: Row, side: float) -> float:
     """Force [N] beyond which the relief valve carries the rise."""
-    edge, _ = _relief(p[T0] * direction_factor(side, p), p)
+    edge, _ = _relief(p[T0] * direction_factor(side, p), side, p)
     return edge
 
 
 @compiled
 def relief_slope(p: Row, side: float) -> float:
     """Slope of the curve [N s/m] beyond `relief`."""
-    _, slope = _relief(p[T0] * direction_factor(side, p), p)
+    _, slope = _relief(p[T0] * direction_factor(side, p), side, p)
     return slope
 
 
@@ -57,13 +63,13 @@ def straight(p: Row) -> bool:
 @compiled
 def viscous_force(w: float, p: Row, side: float) -> float:
     """Viscous force s [N] at a flow speed w >= 0 [m/s]."""
-    return _viscous(w, p[C] * direction_factor(side, p), p)
+    return _viscous(w, damping(p, side), p)
 
 
 @compiled
 def viscous_speed(s: float, p: Row, side: float) -> float:
     """Flow speed w [m/s] at a viscous force s >= 0 [N]."""
-    return _viscous_speed(s, p[C] * direction_factor(side, p), p)
+    return _viscous_speed(s, damping(p, side), p)
 
 
 @compiled
@@ -80,7 +86,7 @@ def smooth_rise(w: float, p: Row, side: float) -> float:
     bend = _friction_slope(w, p[T0] * factor, p) + _extra_slope(w, p)
     if bend == 0.0:
         return 1.0
-    return 1.0 + bend / _viscous_slope(w, p[C] * factor, p)
+    return 1.0 + bend / _viscous_slope(w, damping(p, side), p)
 
 
 @compiled
@@ -92,7 +98,7 @@ def smooth_force(w: float, p: Row, side: float) -> float:
 @compiled
 def smooth_slope(w: float, p: Row, side: float) -> float:
     """Slope [N s/m] of `smooth_force`; infinite at w = 0 where the fluid thins."""
-    return smooth_rise(w, p, side) * _viscous_slope(w, p[C] * direction_factor(side, p), p)
+    return smooth_rise(w, p, side) * _viscous_slope(w, damping(p, side), p)
 
 
 @compiled
@@ -106,24 +112,24 @@ def speed_explicit(p: Row) -> bool:
 @compiled
 def smooth_speed(force: float, p: Row, side: float, guess: float) -> float:
     """Flow speed [m/s] at a force at or above breakaway [N], the relief valve shut; closed form where there is one."""
-    factor = direction_factor(side, p)
     if _friction_is_sharp(p):
-        over = max(force - p[T0] * factor, 0.0)
+        over = max(force - p[T0] * direction_factor(side, p), 0.0)
+        slope = damping(p, side)
         if _no_extra(p):
-            return _viscous_speed(over, p[C] * factor, p)
+            return _viscous_speed(over, slope, p)
         if _viscous_is_straight(p):
-            speed = _extra_speed(over, p[C] * factor, p)
+            speed = _extra_speed(over, slope, p)
             if speed >= 0.0:
                 return speed
-    return _searched_speed(force, p, factor, side, guess)
+    return _searched_speed(force, p, side, guess)
 
 
 @compiled
-def _searched_speed(force: float, p: Row, factor: float, side: float, guess: float) -> float:
+def _searched_speed(force: float, p: Row, side: float, guess: float) -> float:
     """The same by Newton's method within a bracket."""
     if force <= 0.0:
         return 0.0
-    low, high = 0.0, _viscous_speed(force, p[C] * factor, p)
+    low, high = 0.0, _viscous_speed(force, damping(p, side), p)
     w = guess if low < guess < high else 0.5 * high
     for _ in range(_NEWTON_STEPS):
         miss = smooth_force(w, p, side) - force

@@ -131,16 +131,17 @@ def _stroke() -> Iterator[str]:
 
 def _flow() -> Iterator[str]:
     effects = acting("flow")
-    factors = [f"factor *= {_call(e, 'direction_factor', side='side')}" for e in _has(effects, "direction_factor")]
-    yield from _function("direction_factor(side, p)", "factor = 1.0", *factors, "return factor")
+    for name in ("direction_factor", "bleed_factor"):
+        factors = [f"factor *= {_call(e, name, side='side')}" for e in _has(effects, name)]
+        yield from _function(f"{name}(side, p)", "factor = 1.0", *factors, "return factor")
     yield from _yield(_has(effects, "yield_force"))
     yield from _viscous(_has(effects, "viscous_force"))
     yield from _extra(_has(effects, "extra_force"))
     lines = ["edge, slope = math.inf, 1.0"]
     for effect in _has(effects, "opens_at"):
-        opens, beyond = _call(effect, "opens_at", T0="T0"), _call(effect, "slope_beyond")
+        opens, beyond = (_call(effect, name, T0="T0", side="side") for name in ("opens_at", "slope_beyond"))
         lines += _guarded(effect, f"at = {opens}", "if at < edge:", f"    edge, slope = at, {beyond}")
-    yield from _function("relief_of(T0, p)", *lines, "return edge, slope")
+    yield from _function("relief_of(T0, side, p)", *lines, "return edge, slope")
 
 
 def _yield(effects: Sequence[Effect]) -> Iterator[str]:
@@ -261,6 +262,8 @@ stroke_straight: Callable[[Row], bool] = _MODULE.stroke_straight
 
 direction_factor: Callable[[float, Row], float] = _MODULE.direction_factor
 """Factor on T0 and C by the sign of the force."""
+bleed_factor: Callable[[float, Row], float] = _MODULE.bleed_factor
+"""Factor on C alone by the sign of the force."""
 yield_force: Callable[[float, float, Row], float] = _MODULE.yield_force
 """Friction [N] at a flow speed [m/s] and T0 [N]."""
 yield_slope: Callable[[float, float, Row], float] = _MODULE.yield_slope
@@ -283,8 +286,8 @@ extra_speed: Callable[[float, float, Row], float] = _MODULE.extra_speed
 """Flow speed [m/s] at which C w and the extra force together take a force [N]; -1 where there is no closed form."""
 extra_none: Callable[[Row], bool] = _MODULE.extra_none
 """Whether there is no extra force."""
-relief_of: Callable[[float, Row], tuple[float, float]] = _MODULE.relief_of
-"""Force from which a valve is open [N] and the slope beyond [N s/m], at a T0 [N]; the first to open counts."""
+relief_of: Callable[[float, float, Row], tuple[float, float]] = _MODULE.relief_of
+"""Force from which a valve is open [N] and the slope beyond [N s/m], by T0 [N] and side; the first to open counts."""
 
 parallel_force: Callable[[float, float, float, Array], float] = _MODULE.parallel_force
 """Force [N] beside the element at one x [m], v [m/s], a [m/s2] and one row of parameters."""

@@ -43,6 +43,7 @@ LAWS: Mapping[Place, Mapping[str, Law]] = {
     },
     "flow": {
         "direction_factor": Law(("side",)),
+        "bleed_factor": Law(("side",)),
         "yield_force": Law(("w", "T0"), ("yield_slope",)),
         "yield_slope": Law(("w", "T0"), alone=False),
         "viscous_force": Law(("w", "C"), ("viscous_slope", "viscous_speed")),
@@ -51,8 +52,8 @@ LAWS: Mapping[Place, Mapping[str, Law]] = {
         "extra_force": Law(("w",), ("extra_slope",)),
         "extra_slope": Law(("w",), alone=False),
         "extra_speed": Law(("force", "C"), alone=False),
-        "opens_at": Law(("T0",), ("slope_beyond",)),
-        "slope_beyond": Law((), alone=False),
+        "opens_at": Law(("T0", "side"), ("slope_beyond",)),
+        "slope_beyond": Law(("side",), alone=False),
     },
     "parallel": {"law": Law(("x", "v", "a"))},
     "sensor": {"law": Law(("time",))},

@@ -1,10 +1,9 @@
-"""One piece of the path inside one regime: in closed form where it is straight, else by Runge-Kutta.
+"""One piece of the path inside one regime: in closed form where it is straight, else by an exponential integrator.
 
-Straight pieces with standing parameters are solved in closed form. The others are integrated by Dormand and Prince's
-pair of order 5(4): in the elastic deflection e where the flow curve is inverted in closed form, else in the viscous
-force s = visc(w), in which w(s) and F(s) are both explicit and dF/ds >= 1, so that nothing is inverted. Where a piece
-is long beside the time in which the force settles (hard oil, slow test), Runge-Kutta would have to cut it in as many
-parts, and a Rosenbrock method of order 4(3) takes its place.
+Straight pieces with standing parameters are solved in closed form. The others are integrated by the method of
+`pzd.damper.exponential`, which takes the slope of the flow curve exactly however fast the force settles beside the
+piece (hard oil, slow test): in the elastic deflection e where the flow curve is inverted in closed form, else in the
+viscous force s = visc(w), in which w(s) and F(s) are both explicit and dF/ds >= 1, so that nothing is inverted.
 """
 
 from __future__ import annotations
@@ -12,9 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from pzd.compiled import compiled, inlined
-from pzd.damper import rosenbrock
-from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, TIMES
 from pzd.damper.element import relaxation, slip
+from pzd.damper.exponential import STAGES, bend, end_corrected, phi
 from pzd.damper.flow import (
     breakaway,
     relief_slope,
@@ -30,9 +28,7 @@ from pzd.damper.kernels import K, Row, interpolate, stroke_law, stroke_moves, st
 from pzd.damper.regimes import RELIEF, STICK, deflection_on, speed_at, spring_force
 
 _DIFFERENCE = 1e-3  # of a step, for the drift of the flow curve with moving parameters
-_STIFF = 2.5  # settling times in a piece; Runge-Kutta is stable up to 3.3
-_STIFF_TIMES, _STIFF_WEIGHTS = rosenbrock.TIMES, rosenbrock.STAGE_WEIGHTS
-_RATE_WEIGHTS, _TIME_WEIGHTS, _DIAGONAL = rosenbrock.RATE_WEIGHTS, rosenbrock.TIME_WEIGHTS, rosenbrock.DIAGONAL
+_SECOND_DIFFERENCE = 0.03  # of a step, for the change of that drift: a shorter one would show rounding
 _NUDGE = 1e-7  # of the integrated variable, for the derivative of its rate
 
 
@@ -74,17 +70,13 @@ def piece(
         pull, pull_after = side * extension_speed(step, at), side * extension_speed(step, at + dt)
         end = slip(force, force - slope * w, pull, pull_after, relaxation(dt, slope, p[K]))
         return deflection_on(end, p, side), w + (end - force) / slope, 0.0
-    if speed_explicit(p) and dt * p[K] <= _STIFF * smooth_slope(w, p, side):
-        end, last, error = _runge_kutta(e, extension_speed(step, at) - side * w, w, at, dt, regime, side, step, True)
+    if speed_explicit(p):
+        end, error = _exponential(e, w, at, dt, regime, side, step, True)
         p = row_in(step, at + dt)
         force, other = side * p[K] * stroke_law(end, side, p), side * p[K] * stroke_law(end + error, side, p)
-        return end, side * (extension_speed(step, at + dt) - last), abs(other - force)
+        return end, speed_at(force, p, regime, side, w), abs(other - force)
     y = abs(spring_force(e, p)) if regime == RELIEF else viscous_force(w, p, side)
-    rate = _rate_of_force(y, at, regime, side, step)
-    if dt * p[K] > _STIFF * (relief_slope(p, side) if regime == RELIEF else smooth_slope(w, p, side)):
-        y, error = _rosenbrock(y, rate, at, dt, regime, side, step)
-    else:
-        y, _, error = _runge_kutta(y, rate, w, at, dt, regime, side, step, False)
+    y, error = _exponential(y, w, at, dt, regime, side, step, False)
     p = row_in(step, at + dt)
     if regime == RELIEF:
         return deflection_on(y, p, side), speed_at(y, p, regime, side, w), abs(error)
@@ -96,51 +88,47 @@ def piece(
 
 
 @compiled
-def _runge_kutta(
-    y: float, r0: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep, explicit: bool
-) -> tuple[float, float, float]:
-    """The integrated variable after dt, its rate there, and its embedded error; its rate at the start is given."""
-    a, t, d = STAGE_WEIGHTS, TIMES, ERROR_WEIGHTS
-    end = y + dt * (a[1, 0] * r0)
-    r1 = _rate(end, w, at + t[1] * dt, regime, side, step, explicit)
-    end = y + dt * (a[2, 0] * r0 + a[2, 1] * r1)
-    r2 = _rate(end, w, at + t[2] * dt, regime, side, step, explicit)
-    end = y + dt * (a[3, 0] * r0 + a[3, 1] * r1 + a[3, 2] * r2)
-    r3 = _rate(end, w, at + t[3] * dt, regime, side, step, explicit)
-    end = y + dt * (a[4, 0] * r0 + a[4, 1] * r1 + a[4, 2] * r2 + a[4, 3] * r3)
-    r4 = _rate(end, w, at + t[4] * dt, regime, side, step, explicit)
-    end = y + dt * (a[5, 0] * r0 + a[5, 1] * r1 + a[5, 2] * r2 + a[5, 3] * r3 + a[5, 4] * r4)
-    r5 = _rate(end, w, at + t[5] * dt, regime, side, step, explicit)
-    end = y + dt * (a[6, 0] * r0 + a[6, 2] * r2 + a[6, 3] * r3 + a[6, 4] * r4 + a[6, 5] * r5)
-    r6 = _rate(end, w, at + t[6] * dt, regime, side, step, explicit)
-    return end, r6, dt * (d[0] * r0 + d[2] * r2 + d[3] * r3 + d[4] * r4 + d[5] * r5 + d[6] * r6)
+def _exponential(
+    y: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep, explicit: bool
+) -> tuple[float, float]:
+    """The integrated variable after dt, and its error; see `pzd.damper.exponential`."""
+    rate = _rate(y, w, at, regime, side, step, explicit)
+    by_y, by_time = _slopes(y, rate, w, at, dt, regime, side, step, explicit)
+    z, c, d = by_y * dt, STAGES[0], STAGES[1]
+    over, half, late = phi(z), phi(c * z), phi(d * z)
+    bent, drift = rate * dt, by_time * dt * dt
+    first = y + c * bent * half.one + c * c * drift * half.two
+    beside = _rate(first, w, at + c * dt, regime, side, step, explicit) - rate
+    beside -= by_y * (first - y) + by_time * c * dt
+    second = y + d * bent * late.one + d * d * drift * late.two
+    second += dt * beside * (27.0 / 25.0 * half.three + 729.0 / 125.0 * late.three)
+    later = _rate(second, w, at + d * dt, regime, side, step, explicit) - rate
+    later -= by_y * (second - y) + by_time * d * dt
+    a, b = bend(beside, later)
+    end = y + bent * over.one + drift * over.two + dt * (2.0 * a * over.three + 6.0 * b * over.four)
+    last = _rate(end, w, at + dt, regime, side, step, explicit) - rate - by_y * (end - y) - by_time * dt
+    added, error = end_corrected(a, b, last, over)
+    return end + dt * added, dt * error
 
 
 @compiled
-def _rosenbrock(
-    y: float, r0: float, at: float, dt: float, regime: int, side: float, step: TimeStep
+def _slopes(
+    y: float, rate: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep, explicit: bool
 ) -> tuple[float, float]:
-    """The integrated variable after dt, and its embedded error; its rate at the start is given."""
-    a, c, t, d = _STIFF_WEIGHTS, _RATE_WEIGHTS, _STIFF_TIMES, _TIME_WEIGHTS
-    nudge = _NUDGE * max(y, step.p0[K] * 1e-9)
-    settling = (_rate_of_force(y + nudge, at, regime, side, step) - r0) / nudge
-    span = _DIFFERENCE * dt
-    drift = (_rate_of_force(y, at + span, regime, side, step) - r0) / span
-    divisor = 1.0 / (dt * _DIAGONAL) - settling
-    u0 = (r0 + dt * d[0] * drift) / divisor
-    r = _rate_of_force(y + a[1, 0] * u0, at + t[1] * dt, regime, side, step)
-    u1 = (r + dt * d[1] * drift + c[1, 0] * u0 / dt) / divisor
-    r = _rate_of_force(y + a[2, 0] * u0 + a[2, 1] * u1, at + t[2] * dt, regime, side, step)
-    u2 = (r + dt * d[2] * drift + (c[2, 0] * u0 + c[2, 1] * u1) / dt) / divisor
-    r = _rate_of_force(y + a[3, 0] * u0 + a[3, 1] * u1 + a[3, 2] * u2, at + t[3] * dt, regime, side, step)
-    u3 = (r + dt * d[3] * drift + (c[3, 0] * u0 + c[3, 1] * u1 + c[3, 2] * u2) / dt) / divisor
-    end = y + a[4, 0] * u0 + a[4, 1] * u1 + a[4, 2] * u2 + a[4, 3] * u3
-    r = _rate_of_force(end, at + dt, regime, side, step)
-    u4 = (r + (c[4, 0] * u0 + c[4, 1] * u1 + c[4, 2] * u2 + c[4, 3] * u3) / dt) / divisor
-    end += u4
-    r = _rate_of_force(end, at + dt, regime, side, step)
-    error = (r + (c[5, 0] * u0 + c[5, 1] * u1 + c[5, 2] * u2 + c[5, 3] * u3 + c[5, 4] * u4) / dt) / divisor
-    return end + error, error
+    """Derivatives of the rate of the integrated variable by itself and by time."""
+    p = row_in(step, at)
+    if explicit:
+        by_y = -p[K] * stroke_slope(y, side, p) / smooth_slope(w, p, side)
+    else:
+        nudge = _NUDGE * max(y, p[K] * 1e-9)
+        by_y = (_rate(y + nudge, w, at, regime, side, step, explicit) - rate) / nudge
+    if not step.moving:
+        if explicit:
+            return by_y, (step.u1 - step.u0) / step.h
+        return by_y, (_rate(y, w, at + dt, regime, side, step, explicit) - rate) / dt  # linear in time
+    span = _SECOND_DIFFERENCE * step.h
+    ahead = _rate(y, w, at + span, regime, side, step, explicit)
+    return by_y, (ahead - _rate(y, w, at - span, regime, side, step, explicit)) / (2.0 * span)
 
 
 @compiled

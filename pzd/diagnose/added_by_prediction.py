@@ -63,7 +63,7 @@ def with_predictive_effects(
     """
     added: list[Candidate] = []
     at = trials.fitted_by_criterion(selection.fitted.damper, trials.nothing)
-    while at is not None:
+    while at is not None and trials.campaign.work.may_go_on():
         found = _best(*at, (missed, between), trials, config)
         if found is None:
             break

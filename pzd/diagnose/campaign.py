@@ -14,6 +14,7 @@ from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.data.split import UNTOUCHED, Split
 from pzd.diagnose.fit.input_uncertainty import Predicted, expected
 from pzd.diagnose.residual_check import ResidualCheck, check_residual
+from pzd.diagnose.work import Work
 from pzd.record import Mask
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -30,6 +31,8 @@ class Campaign:
     nuisance: NuisanceConfig
     jobs: int = 1
     """Records that are simulated at the same time."""
+    work: Work = field(default_factory=Work, repr=False)
+    """What has been simulated in fits, and may be."""
     _expected: dict[tuple[str, int], Predicted] = field(default_factory=dict, repr=False)
     _checks: dict[str, tuple[ResidualCheck, ...]] = field(default_factory=dict, repr=False)
 

@@ -284,6 +284,6 @@ def trials_of(campaign: Campaign, plain: Damper, visible: float) -> Trials:
     """
     prepared = campaign.prepared
     everything = Split(tuple(np.full(p.record.time.size, TRAINING) for p in prepared), (), "records")
-    whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs)
+    whole = Campaign(prepared, everything, campaign.nuisance, campaign.jobs, campaign.work)
     dealt = deal(prepared, plain)
     return Trials(whole, plain, visible, dealt.groups, dealt.voltages, dealt.folds)

@@ -32,6 +32,8 @@ LEAST = 0.02
 """A test of less amplitude than this share of the largest is not weighed: the resolution of the stroke shows in it."""
 ROUND_OFF = 1e-12
 """Relative error of a difference of two displacements in double precision, with room."""
+MEASURED = 1e-3
+"""Relative error of a stroke or frequency as recorded: a sine of 10 mm sampled 100 times a cycle reaches 9.995 mm."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +69,12 @@ def reach_of(limits: Limits, prepared: Sequence[Prepared], voltages: Sequence[fl
     amplitude = 0.5 * (highest - lowest) if limits.stroke_m is None else 0.5 * limits.stroke_m
     middle = _tidy(0.5 * (lowest + highest), amplitude)
     if limits.stroke_m is None:
-        amplitude = min(highest - middle, middle - lowest)
+        amplitude = (1.0 + MEASURED) * min(highest - middle, middle - lowest)
     return Reach(
         middle,
         amplitude,
-        limits.speed_m_per_s or max(float(np.max(np.abs(r.velocity))) for r in records),
-        limits.frequency_Hz or max(frequency_of(p) for p in prepared),
+        limits.speed_m_per_s or (1.0 + MEASURED) * max(float(np.max(np.abs(r.velocity))) for r in records),
+        limits.frequency_Hz or (1.0 + MEASURED) * max(frequency_of(p) for p in prepared),
         force if limits.force_N is None else (-limits.force_N, limits.force_N),
         _within(limits.voltage_V or _recorded_voltages(records), voltages),
     )
@@ -171,10 +173,14 @@ def _plans(reach: Reach, temperature: float | None) -> Iterator[tuple[NextTest, 
         yield plan, replace(motion, displacement=reach.middle + motion.displacement)
 
 
-def rounded_down(value: float) -> float:
-    """A positive number to three digits, never above it; 0.02 stays 0.02 though a difference gave 0.0199...9."""
-    digits = 2 - math.floor(math.log10(value))
-    return round(math.floor(value * (1.0 + ROUND_OFF) * 10.0**digits) / 10.0**digits, max(digits, 0))
+def rounded_down(value: float, error: float = ROUND_OFF) -> float:
+    """A positive number to three digits, never above it by more than its relative error.
+
+    So 0.02 stays 0.02 though a difference gave 0.0199...9.
+    """
+    larger = value * (1.0 + error)
+    digits = 2 - math.floor(math.log10(larger))
+    return round(math.floor(larger * 10.0**digits) / 10.0**digits, max(digits, 0))
 
 
 def motion_of(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, NextTest, Rig, base_of
+from pzd.diagnose.as_fitted import as_fitted
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
@@ -47,7 +48,7 @@ def diagnose(
 
     Returns
     -------
-    the verdict, and the damper with what was adopted; unchanged where nothing was
+    the verdict, and the damper with what was adopted; unchanged where nothing was, and under the knee law
     """
     from pzd.diagnose.base_parameters import base_parameters
     from pzd.diagnose.campaign import Campaign
@@ -62,14 +63,17 @@ def diagnose(
     from pzd.diagnose.too_short import too_short, undecided
     from pzd.diagnose.verdict import parameters_of, ranking_of, unpredicted, weak
     from pzd.diagnose.where import regions
+    from pzd.diagnose.work import Work
 
+    if identified.knees.law_of(setting) == "knee":
+        return as_fitted(identified, setting, diagnose)
     records, cut_off = whole_records(rig, setting)
     recorded = prepare(records)
     zero = mid_stroke(recorded)
     prepared = about(recorded, zero)
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
-    campaign = Campaign(prepared, parts, diagnose.nuisance, jobs)
+    campaign = Campaign(prepared, parts, diagnose.nuisance, jobs, Work(diagnose.most_evaluations))
     rows = tuple(row for row in identified.rows if row.setting == setting)
     reach = reach_of(stand.limits, recorded, [row.voltage_V for row in plain.base if row.voltage_V is not None])
     if too_short(campaign):
@@ -78,15 +82,16 @@ def diagnose(
     handed, decision = concluded(select_effects(campaign, plain, diagnose, jobs), trials, diagnose, control.unit)
     selection, prediction = handed.selection, handed.prediction(trials)
     before = campaign.checks(selection.plain.damper)
-    log.info("diagnose: %s, %s", decision.verdict, decision.reason)
+    log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.work.spent)
     found = selection.fitted.damper.moved(zero) if selection.adopted else plain
+    notes = (campaign.work.words, weak(parts.hold_out), unpredicted(prediction), without(cut_off))
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + weak(parts.hold_out) + unpredicted(prediction) + without(cut_off),
+        reason=decision.reason + "".join(notes),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, trials if handed.by_criterion else None),
-        parameters=parameters_of(selection),
+        parameters=parameters_of(selection, control),
         prediction=prediction,
         zero_m=found.zero_m,
         ranking=ranking_of(selection, selection.first),
@@ -104,7 +109,7 @@ def _next_test(
 ) -> NextTest | None:
     """The test that tells rivals apart; without rivals one at a voltage at which the force is known least."""
     from pzd.diagnose.next_test import next_test
-    from pzd.diagnose.voltage_between import next_voltage
+    from pzd.diagnose.voltage_between import PredictingDamper, next_voltage
 
     selection = handed.selection
     warmth, campaign = selection.first.whole.reference, selection.first.campaign
@@ -112,4 +117,5 @@ def _next_test(
         rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
         return next_test(rivals, reach, warmth, [campaign.offset(damper) for _, damper in selection.rivalling])
     offset = campaign.offset(found.moved(-zero) if selection.adopted else found)
-    return next_voltage((found, offset), trials, (handed.missed, handed.between), recorded, reach, warmth)
+    predicting = PredictingDamper(found, offset, handed.missed, handed.between)
+    return next_voltage(predicting, trials, recorded, reach, warmth)

@@ -22,6 +22,7 @@ from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection
 from pzd.diagnose.thresholds import CONTRADICTS, OUTSIDE_LIBRARY
 from pzd.diagnose.trends_of_tests import Trend
+from pzd.quantities import Control
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
@@ -173,8 +174,8 @@ def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
     return tuple(sorted(rows.values(), key=lambda r: (r.effect not in selection.adopted, r.delta_bic)))
 
 
-def parameters_of(selection: Selection) -> dict[str, dict[str, Value]]:
-    """The parameters of what was adopted, with 95 % intervals."""
+def parameters_of(selection: Selection, control: Control) -> dict[str, dict[str, Value]]:
+    """The parameters of what was adopted, with 95 % intervals, in units of this control signal."""
     damper, errors = selection.fitted.damper, standard_errors(selection.fitted)
     found: dict[str, dict[str, Value]] = {}
     for name, values in damper.effects.items():
@@ -185,12 +186,15 @@ def parameters_of(selection: Selection) -> dict[str, dict[str, Value]]:
                 for u, error in zip(selection.fitted.unknowns, errors, strict=True)
                 if (u.effect, u.parameter.name) == (name, parameter.name)
             ]
-            found.setdefault(name, {})[parameter.name] = _value(mine, parameter, nodes)
+            found.setdefault(name, {})[parameter.name] = _value(mine, parameter, nodes, control)
     return found
 
 
 def _value(
-    found: Sequence[tuple[float, float]], parameter: Parameter, nodes: float | tuple[float, ...] | None
+    found: Sequence[tuple[float, float]],
+    parameter: Parameter,
+    nodes: float | tuple[float, ...] | None,
+    control: Control,
 ) -> Value:
     """A parameter with its 95 % interval inside its limits, one a voltage where it differs by voltage.
 
@@ -199,13 +203,15 @@ def _value(
     found : value and standard error, one a voltage or a single one
     parameter : its unit and limits
     nodes : the voltages [V]; None for a single value
+    control : whose unit stands in the place of V
     """
+    unit = control.own_unit(parameter.unit)
     middle = tuple(value for value, _ in found)
     low = tuple(max(value - LEVEL * error, parameter.low) for value, error in found)
     high = tuple(min(value + LEVEL * error, parameter.high) for value, error in found)
     if not isinstance(nodes, tuple):
-        return Value(value=middle[0], low95=low[0], high95=high[0], unit=parameter.unit)
-    return Value(value=middle, low95=low, high95=high, unit=parameter.unit, at_voltage_V=nodes)
+        return Value(value=middle[0], low95=low[0], high95=high[0], unit=unit)
+    return Value(value=middle, low95=low, high95=high, unit=unit, at_voltage_V=nodes)
 
 
 def _as_fitted(damper: Damper, effect: str) -> dict[str, Any]:

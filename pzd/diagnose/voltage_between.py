@@ -7,6 +7,7 @@ is visibly more than is missed of tests at that voltage, the force between volta
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -17,13 +18,26 @@ from pzd.damper.model import Damper
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.kept_back import Trials
 from pzd.diagnose.missed import Missed
-from pzd.diagnose.next_test import Reach, frequency_of, motion_of, rounded_down, sine
+from pzd.diagnose.next_test import MEASURED, Reach, frequency_of, motion_of, rounded_down, sine
+
+
+@dataclass(frozen=True)
+class PredictingDamper:
+    """A damper that is handed on, and what it misses of tests that it has not seen."""
+
+    damper: Damper
+    """Its displacement as recorded."""
+    offset: float
+    """By which the records lie above its force [N]."""
+    missed: Missed
+    """Of tests that were kept back."""
+    missed_between: Missed
+    """Of voltages between others that were left out."""
 
 
 def next_voltage(
-    damper: tuple[Damper, float],
+    predicting: PredictingDamper,
     trials: Trials,
-    missed: tuple[Missed, Missed],
     recorded: Sequence[Prepared],
     reach: Reach,
     temperature: float | None,
@@ -32,9 +46,8 @@ def next_voltage(
 
     Parameters
     ----------
-    damper : the one handed on, its displacement as recorded, and by how much the records lie above its force [N]
+    predicting : the damper that is handed on
     trials : the tests, dealt into folds
-    missed : what the damper misses of kept-back tests, and of the voltages between others
     recorded : the records of the setting, their displacement as recorded
     reach : what a test may reach
     temperature : at which the test is run [degC]
@@ -43,19 +56,20 @@ def next_voltage(
     -------
     None where voltages left out are predicted as well as tests are, or the test would reach too much
     """
-    group = _least_known(trials, *missed)
+    group = _least_known(trials, predicting.missed, predicting.missed_between)
     if group is None:
         return None
     below, above = _widest_beside(trials, group)
     voltage = 0.5 * (below + above)
     if not reach.voltages[0] <= voltage <= reach.voltages[-1]:
         return None
-    test = recorded[_most_missed(missed[1].of(trials.groups[group]))]
-    amplitude = rounded_down(min(0.5 * float(np.ptp(test.record.displacement)), reach.amplitude))
-    frequency = rounded_down(min(frequency_of(test), reach.frequency, reach.speed / (2.0 * np.pi * amplitude)))
+    test = recorded[_most_missed(predicting.missed_between.of(trials.groups[group]))]
+    half_stroke = 0.5 * float(np.ptp(test.record.displacement))
+    amplitude = min(rounded_down(half_stroke, MEASURED), rounded_down(reach.amplitude))
+    fastest = rounded_down(min(reach.frequency, reach.speed / (2.0 * np.pi * amplitude)))
+    frequency = min(rounded_down(frequency_of(test), MEASURED), fastest)
     motion = motion_of(sine, frequency, amplitude, voltage, temperature)
-    model, offset = damper
-    force = respond(model, motion.about(-reach.middle)) + offset
+    force = respond(predicting.damper, motion.about(-reach.middle)) + predicting.offset
     if np.min(force) < reach.force[0] or np.max(force) > reach.force[1]:
         return None
     return NextTest(

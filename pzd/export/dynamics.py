@@ -22,7 +22,7 @@ from pzd.schema.errors import ConfigError
 
 CARRIED = (
     *("asymmetry", "end_stop", "fluid_inertia", "gas_spring", "lash", "orifice_quadratic", "piezo_hysteresis"),
-    *("preload_offset", "relief_valve", "stribeck_friction", "temperature_drift"),
+    *("preload_offset", "relief_valve", "knee", "stribeck_friction", "temperature_drift"),
 )
 """Effects whose path under held inputs is a closed form, piece by piece; `sources/element.c` holds them."""
 VARIABLES = (

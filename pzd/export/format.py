@@ -28,3 +28,5 @@ class Format:
     """
     needs: str | None = None
     """The library that writes it, an extra; None where pzd itself needs it anyway."""
+    ending: str | None = None
+    """Of the files' names, where how many there are depends on the damper; None where there are always the same."""

@@ -64,11 +64,11 @@ def effect_rows(content: Content) -> tuple[EffectRow, ...]:
     for name, given in content.damper.effects.items():
         nodes = given.get("at_voltage_V")
         for parameter in known()[name].parameters:
-            value = given[parameter.name]
+            value, unit = given[parameter.name], content.control.own_unit(parameter.unit)
             values = value if isinstance(value, tuple) else (value,)
             voltages = nodes if isinstance(value, tuple) and isinstance(nodes, tuple) else (None,)
             rows += [
-                EffectRow(effect=name, parameter=parameter.name, voltage_V=U, value=v, unit=parameter.unit)
+                EffectRow(effect=name, parameter=parameter.name, voltage_V=U, value=v, unit=unit)
                 for U, v in zip(voltages, values, strict=True)
             ]
     return tuple(rows)

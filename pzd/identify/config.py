@@ -35,6 +35,10 @@ class EvolutionaryConfig(Frozen):
 class IdentifyConfig(Frozen):
     """How the Bingham parameters are found."""
 
+    law: Literal["bingham", "knee", "auto"] = "bingham"
+    """Which damper is handed on. `bingham`: one T0 and C, what it lacks is named by diagnose. `knee`, for passive road
+    and race dampers: bleed, knee and blow-off of rebound and of compression, with seal friction and gas; diagnose then
+    looks for nothing more. `auto`: `knee` where it predicts whole tests kept back better beyond chance."""
     method: Literal["separable", "evolutionary"] = "separable"
     """`separable`: grid and least squares with the stiffness solved linearly; `evolutionary`: as the paper's
     genetic algorithm. Both minimise the same criterion (4)."""

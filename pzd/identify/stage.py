@@ -6,7 +6,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pzd.artefacts import AuxiliaryRow, Identified, ParameterRow, Rig
+from pzd.artefacts import AuxiliaryRow, Identified, Knees, ParameterRow, Rig
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.record import Condition, Record, conditions, merged_voltages
@@ -58,7 +58,23 @@ def identify(
         measures(rig.records),
         tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_order)),
         characteristics(constant, moving),
+        _knees(identify, known, [r.setting for r in rig.records], control, progress),
     )
+
+
+def _knees(
+    config: IdentifyConfig,
+    known: Sequence[tuple[Condition, ParameterRow]],
+    settings: Sequence[str | None],
+    control: Control,
+    progress: Listener,
+) -> Knees:
+    """The knee law of every condition, where the config asks for it."""
+    if config.law == "bingham":
+        return Knees()
+    from pzd.identify.knee.summary import knees
+
+    return knees(known, tuple(dict.fromkeys(settings)), config, control, progress)
 
 
 def refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> None:

@@ -13,9 +13,11 @@ from pzd.config import RunConfig, setting_in_use, validated
 from pzd.identify.stage import refuse_one_condition
 from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
+from pzd.quantities import Control
 from pzd.runs import Run
 from pzd.schema.errors import ConfigError
 from pzd.schema.extends import read_extended
+from pzd.schema.nearest import nearest
 from pzd.schema.progress import Listener, no_listener
 from pzd.schema.yamlfile import Document
 
@@ -60,15 +62,34 @@ def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:
     ------
     ConfigError : when the config is wrong, or its run belongs to another config
     """
+    check_given(path)
     try:
         document = read_extended(path).overridden(overrides)
         config = validated(document)
     except ConfigError as error:
-        if path.suffix.lower() in _SUFFIXES or not path.is_file():
+        if path.suffix.lower() in _SUFFIXES:
             raise
         hint = f"{path}: is this a config? it would be a YAML file; pzd init prints one for files of a rig"
         raise ConfigError([*error.messages, hint]) from error
     return Opened(document, config, Run.of(path, runs, config.control.signal()))
+
+
+def check_given(path: Path) -> None:
+    """Check that a path given as a config is a file.
+
+    Raises
+    ------
+    ConfigError : when it is a folder, or nothing is there, with the config that was most likely meant
+    """
+    if path.is_dir():
+        owner = Run(path, path, Control()).config_of_results()
+        hint = f"these are the results of {owner}; give {owner}" if owner else "this is a folder, a file is needed"
+        raise ConfigError(f"{path}: {hint}")
+    if not path.exists():
+        beside = {one.stem: one for one in sorted(path.parent.glob("*")) if one.suffix.lower() in _SUFFIXES}
+        near = nearest(path.stem, beside)
+        hint = f"did you mean {beside[near]}?" if near else "check the path"
+        raise ConfigError(f"{path}: the file is missing; {hint}")
 
 
 def execute(

@@ -119,17 +119,34 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 def _file_hashes(values: Mapping[str, Any], folder: Path) -> dict[str, str]:
     """Hashes of the files beside the config that its values name; absent ones are the stage's to refuse."""
-    from pzd.rig.files.listing import matching
-
-    paths = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
     try:
-        files = [file for value in paths for file in matching(folder, value)]
-        layouts = [value for path, value in values.items() if path.endswith(".layout") and isinstance(value, str)]
-        files += [file for name in layouts if (file := folder / f"{name}.yaml").is_file()]
-        if expected := values.get("report.reference"):
-            from pzd.report.reference import path_of
-
-            files += [path for path in (path_of(expected, folder),) if path.is_file()]
+        files = _files_named(values, folder)
         return {Path(os.path.relpath(file, folder)).as_posix(): file_hash(file) for file in files}
     except OSError as error:
         raise FilesError(f"{error.filename}: {error.strerror}") from error
+
+
+def files_named(config: RunConfig, folder: Path) -> list[Path]:
+    """Every file beside a config that its values name and that is there: records, layouts, motions, expected numbers.
+
+    Parameters
+    ----------
+    config : the config
+    folder : its folder
+    """
+    blocks = config.model_dump(mode="json")
+    return _files_named({path: leaf for name in blocks for path, leaf in _leaves(name, blocks[name])}, folder)
+
+
+def _files_named(values: Mapping[str, Any], folder: Path) -> list[Path]:
+    from pzd.rig.files.listing import matching
+
+    paths = [value for path, value in values.items() if path.endswith(".path") and isinstance(value, str)]
+    files = [file for value in paths for file in matching(folder, value)]
+    layouts = [value for path, value in values.items() if path.endswith(".layout") and isinstance(value, str)]
+    files += [file for name in layouts if (file := folder / f"{name}.yaml").is_file()]
+    if expected := values.get("report.reference"):
+        from pzd.report.reference import path_of
+
+        files += [path for path in (path_of(expected, folder),) if path.is_file()]
+    return files

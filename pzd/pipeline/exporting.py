@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable
+import re
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from pzd.artefacts import Diagnosed, Identified, Table
 from pzd.export.content import WRITTEN_BY_PZD, Content
+from pzd.export.format import Format
 from pzd.export.formats import format_of
 from pzd.pipeline.command import Opened, stale_stages
 from pzd.runs.disk import as_files_error, versions
@@ -69,7 +71,19 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
             fresh = folder / f".{name}.new"
             fresh.write_bytes(data)
             fresh.replace(folder / name)
+        for path in _outdated(folder, wanted, content, files):
+            path.unlink()
+            log.info("%s: removed, as the damper of %s has no such part any more", path, content.config)
     return Exported(tuple(folder / name for name in files), content.marks)
+
+
+def _outdated(folder: Path, wanted: Format, content: Content, files: Collection[str]) -> list[Path]:
+    """What an earlier export of this config in this form left that the new one does not write: curves, tables."""
+    if wanted.ending is None:
+        return []
+    ours = re.compile(WRITTEN_BY_PZD.pattern + re.escape(content.config.encode()) + rb"(?![\w.-])")
+    left = [path for path in sorted(folder.glob(f"*{wanted.ending}")) if path.name not in files]
+    return [path for path in left if path.name.startswith(content.name) and ours.search(path.read_bytes())]
 
 
 def _check_own(files: Iterable[Path]) -> None:

@@ -12,6 +12,7 @@ from pzd.artefacts import (
     Diagnosed,
     Diagnosis,
     Identified,
+    Knees,
     ParameterRow,
     Report,
     Rides,
@@ -48,6 +49,8 @@ class RunSummary:
     """Why results are not those of the config as it is today, by stage."""
     characteristics: Characteristics = field(default_factory=Characteristics)
     """What the tests show without any model."""
+    knees: Knees = field(default_factory=Knees)
+    """The knee law, where the config asks for it."""
 
 
 def page_of(run: Run) -> Path:
@@ -82,6 +85,7 @@ def run_summary(run: Run) -> RunSummary:
         page_of(run) if Report in there else None,
         tuple(dict.fromkeys(mark for manifest in manifests.values() if manifest for mark in manifest.marks)),
         characteristics=identified.characteristics,
+        knees=identified.knees,
     )
 
 

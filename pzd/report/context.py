@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +21,8 @@ from pzd.artefacts import (
     SummaryRow,
     Table,
 )
-from pzd.damper.competing_forms import competing_forms
+from pzd.damper.competing_forms import known, module_of
+from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import BaseRow
 from pzd.quantities import Control
 from pzd.record import Array, Record
@@ -95,7 +95,7 @@ class ReportContext:
     @cached_property
     def final(self) -> tuple[ParameterRow | BaseRow, ...]:
         """T0, C and k of the damper that everything behind uses; without intervals where somebody edited them since."""
-        if not self.extended:
+        if not self.extended and not self.fitted_law:
             return self.parameters
         return tuple(_fitted(base, self.diagnosed.parameters) or base for base in self.diagnosed.damper.base)
 
@@ -121,6 +121,16 @@ class ReportContext:
     @cached_property
     def _forces(self) -> dict[str, tuple[Array, Array]]:
         return {}
+
+    @property
+    def fitted_law(self) -> bool:
+        """Whether identify handed on another law than Bingham's."""
+        return any(name in fitted_laws() for name in self.diagnosed.plain.effects)
+
+    @property
+    def model(self) -> str:
+        """What the damper before diagnose is called."""
+        return "knee law" if self.fitted_law else "simple model"
 
     @property
     def extended(self) -> bool:
@@ -281,9 +291,7 @@ def _fitted(base: BaseRow, rows: Sequence[ParameterRow]) -> ParameterRow | None:
 
 def effect_in_words(name: str) -> str:
     """What an effect is, in the first sentence of its own documentation."""
-    package = "competing_forms" if name in competing_forms() else "effects"
-    text = importlib.import_module(f"pzd.damper.{package}.{name}").__doc__ or name
-    first = text.split("\n")[0].rstrip(".")
+    first = (module_of(known()[name]).__doc__ or name).split("\n")[0].rstrip(".")
     return first[0].lower() + first[1:]
 
 

@@ -14,13 +14,15 @@ Row = TypeVar("Row", PeakVelocityRow, ContinuousVelocityRow)
 def characteristics_of(context: ReportContext) -> Characteristics:
     """What the tests of the chosen setting show without any model; of every setting where nothing else is set."""
     found = context.identified.characteristics
-    if all(row.voltage_V is None for row in found.peak_velocity) and not found.steps:
+    voltages = {row.voltage_V for row in found.peak_velocity} | {row.voltage_V for row in found.warm_up}
+    if voltages <= {None} and not found.steps:
         return found
     return Characteristics(
         tuple(row for row in found.peak_velocity if row.setting == context.chosen),
         tuple(row for row in found.continuous_velocity if row.setting == context.chosen),
         tuple(row for row in found.gas_and_friction if row.setting == context.chosen),
         tuple(row for row in found.steps if row.setting == context.chosen),
+        tuple(row for row in found.warm_up if row.setting == context.chosen),
     )
 
 

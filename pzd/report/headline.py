@@ -15,7 +15,7 @@ from pzd.report.wording import amount, listed, number, percent, sentence
 
 def cards(context: ReportContext) -> tuple[Card, ...]:
     """Damper, missing effect, confidence, next test, and comfort if ridden: each a question with its answer."""
-    question = "What is missing from the simple model?"
+    question = f"What is missing from the {context.model}?"
     missing = Card(question, _missing(context), _meaning(context))
     comfort = (_comfort(context),) if context.ridden else ()
     return _damper(context), missing, _confidence(context), _next(context), *comfort
@@ -56,6 +56,8 @@ def _missing(context: ReportContext) -> str:
         return _capital(listed([_name(e) for e in (*diagnosis.effects, *diagnosis.rivals)], "or")) + ": not settled"
     if diagnosis.verdict == "none":
         return "Nothing that these tests can see"
+    if context.fitted_law:
+        return "Nothing was looked for"
     return f"Something unexplained, beside {names}" if names else "Something unexplained"
 
 
@@ -63,7 +65,7 @@ def _meaning(context: ReportContext) -> str:
     diagnosis = context.diagnosed.diagnosis
     if diagnosis.verdict == "named":
         return sentence("; ".join(effect_in_words(effect) for effect in diagnosis.effects))
-    return verdict(diagnosis)
+    return verdict(context)
 
 
 def _name(effect: str) -> str:

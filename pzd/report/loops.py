@@ -28,7 +28,7 @@ def loops(context: ReportContext, record: Record, abscissa: Array, quantity: Qua
     x, measured, plain, final = thinned(abscissa[part], record.force[part], before[part], after[part])
     figure, ax = axes()
     ax.plot(x, measured / 1000.0, ".", color=MEASURED, markersize=2.4, label="measured")
-    ax.plot(x, plain / 1000.0, color=BASELINE, linestyle="--", label="simple model")
+    ax.plot(x, plain / 1000.0, color=BASELINE, linestyle="--", label=context.model)
     if context.extended:
         ax.plot(x, final / 1000.0, color=FINAL, label="with what was missing")
     unit = "mm" if quantity == DISPLACEMENT else quantity.unit
@@ -36,7 +36,7 @@ def loops(context: ReportContext, record: Record, abscissa: Array, quantity: Qua
     ax.set_ylabel("force [kN]")
     legend(figure)
     name = context.conditions(record)
-    curves = "measured force, the simple model" + (" and the extended one" if context.extended else "")
+    curves = f"measured force, the {context.model}" + (" and the extended one" if context.extended else "")
     return Panel(
         figure, f"{title[0].upper()}{title[1:]}, {name}", f"{title}, {name}: {curves}.", f"Record {record.name}."
     )

@@ -17,6 +17,7 @@ from pzd.report.drawing import BASELINE, FINAL, MEASURED, STYLE, Panel, axes, en
 from pzd.report.page import render
 from pzd.report.wording import amount, number
 from pzd.schema.processes import parallel_map
+from pzd.schema.wording import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +52,7 @@ def records_page(rig: Rig, control: Control, jobs: int = 1) -> str:
         sections = parallel_map(lambda record: _section(record, entries[record.name], control), rig.records, jobs)
     count = sum(len(entry.findings) for entry in rig.entries)
     footer = "Written by pzd check. The records stand as they were read: nothing was corrected."
-    title = f"{len(rig.records)} records as read, with {count} findings of the preflight"
+    title = f"{counted(len(rig.records), 'record')} as read, with {counted(count, 'finding')} of the preflight"
     return render(title, (), (), tuple(sections), footer)
 
 

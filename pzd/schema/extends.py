@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from pzd.schema.errors import ConfigError
+from pzd.schema.errors import ConfigError, UserError
 from pzd.schema.nodes import Entry, Node, collection
 from pzd.schema.yamlfile import Document, read_yaml
 
@@ -48,6 +48,21 @@ def read_extended(path: Path, seen: tuple[Path, ...] = ()) -> Document:
     base = read_extended(other, (*seen, path))
     own = {key: entry for key, entry in entries.items() if key != KEY}
     return replace(document, root=_over(base.root, collection(own, document.root.place)))
+
+
+def chain(path: Path) -> tuple[Path, ...]:
+    """A config, the one that it extends, and so on, as far as they can be read."""
+    found = [path]
+    while True:
+        try:
+            entries = read_yaml(found[-1]).root.value
+        except UserError:
+            return tuple(found)
+        named = entries.get(KEY) if isinstance(entries, Mapping) else None
+        other = path.parent / str(named.node.value) if named else path
+        if other in found:
+            return tuple(found)
+        found.append(other)
 
 
 def _over(base: Node, own: Node) -> Node:

@@ -1,4 +1,4 @@
-"""What pydantic says of a value, in the words of a person who wrote it."""
+"""Numbers and faults in the words of a person: digits that are known, counted things, what pydantic says of a value."""
 
 from __future__ import annotations
 
@@ -36,6 +36,11 @@ def rounded_as(value: float, other: float, digits: int) -> float:
     if other == 0.0 or not math.isfinite(other):
         return value
     return round(value, digits - 1 - math.floor(math.log10(abs(other)))) + 0.0
+
+
+def counted(count: int, noun: str) -> str:
+    """So many of a thing: 1 record, 2 records."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def worded(kind: str, message: str) -> str:

@@ -10,6 +10,7 @@ import pytest
 from pzd.damper.competing_forms import competing_forms, known
 from pzd.damper.compose import respond
 from pzd.damper.effects import library
+from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.config import DiagnoseConfig
@@ -21,7 +22,7 @@ PLAIN = Damper(base=(BaseRow(T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e5),))
 
 def test_a_foil_is_known_to_the_damper_and_not_to_the_library() -> None:
     assert not set(competing_forms()) & set(library())
-    assert set(known()) == set(competing_forms()) | set(library())
+    assert set(known()) == {*competing_forms(), *library(), *fitted_laws()}
 
 
 @pytest.mark.parametrize("name", competing_forms())

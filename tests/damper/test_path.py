@@ -203,8 +203,10 @@ def test_oil_that_settles_within_a_fraction_of_a_step_is_followed(effects: dict)
 @pytest.mark.parametrize("effects", [*FLOWS[:3], FLOWS[7]], ids="+".join)
 @pytest.mark.parametrize("moving", [False, True], ids=["standing", "moving"])
 def test_a_scheme_of_fixed_steps_is_of_order_five(effects: dict, moving: bool) -> None:
+    """From a deflection at which the flow curve bends; where it is straight the method is exact."""
     first, last = (row_of(element_rows(with_effects(effects), np.array([u]), None)[0]) for u in (60.0, 70.0))
-    start, long, unlimited = 8e-3, 8e-3, 1e9
+    start = {1: 8e-3, 3: 5e-3}[len(effects)] if [*effects] != ["rounded_yield"] else 3e-3
+    long, unlimited = 8e-3, 1e9
 
     def after(steps: int) -> float:
         state, share = np.array([start, 0.0, 0.0, 0.0]), np.linspace(0.0, 1.0, steps + 1)

@@ -11,7 +11,7 @@ from pzd.artefacts import NextTest
 from pzd.damper.model import Damper
 from pzd.diagnose.kept_back import trials_of
 from pzd.diagnose.next_test import reach_of
-from pzd.diagnose.voltage_between import next_voltage
+from pzd.diagnose.voltage_between import PredictingDamper, next_voltage
 from pzd.rig.config import Limits
 
 THREE = (0.0, 50.0, 150.0)
@@ -36,9 +36,9 @@ def asked(damper: Damper, rng: np.random.Generator, limits: Limits = LIMITS) -> 
     records = sines(damper, rng, [row.voltage_V or 0.0 for row in damper.base], tests=TESTS, cycles=4)
     campaign = campaign_of(records)
     trials = trials_of(campaign, damper, 0.0025)
-    missed = trials.plain_missed(), trials.plain_missed_between
+    predicting = PredictingDamper(damper, 0.0, trials.plain_missed(), trials.plain_missed_between)
     reach = reach_of(limits, campaign.prepared, [row.voltage_V or 0.0 for row in damper.base])
-    return next_voltage((damper, 0.0), trials, missed, campaign.prepared, reach, None)
+    return next_voltage(predicting, trials, campaign.prepared, reach, None)
 
 
 @pytest.mark.parametrize("T0", [0.6 * ON_THE_LINE, 1.5 * ON_THE_LINE])

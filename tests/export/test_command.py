@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -108,6 +109,14 @@ def test_a_format_that_there_is_not_gets_the_nearest(typed) -> None:
     )
 
 
+def test_two_formats_at_once_are_refused(typed) -> None:
+    typed("table", "first.yaml")
+    code, out, (line,) = typed("export", "first.yaml", "--to", "csv", "--to", "c")
+    assert (code, out) == (2, [])
+    assert "'--to': takes one format, and so one command each (got csv, c)" in line
+    assert not Path("runs/first/export").exists()
+
+
 def test_without_its_library_a_format_names_the_extra(typed, monkeypatch: pytest.MonkeyPatch) -> None:
     typed("table", "first.yaml")
     monkeypatch.setattr("pzd.export.formats.find_spec", lambda name: None if name == "pyarrow" else find_spec(name))
@@ -156,6 +165,28 @@ def test_what_is_not_from_an_export_is_not_written_over(typed) -> None:
     assert sorted(err) == [f"{path}: {says}" for path in mine]
     assert [path.read_text() for path in mine] == ["mine", "mine"]
     assert Path("elsewhere/first-inverse.csv").stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize("out", [None, "elsewhere"])
+@pytest.mark.parametrize(("form", "ending"), [("tir", ".dpr"), ("chrono", "-chrono.json")])
+def test_curves_of_an_earlier_export_go_and_nothing_else_does(
+    typed, form: str, ending: str, out: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    typed("table", "first.yaml")
+    folder = Path(out or "runs/first/export")
+    export = ("export", "first.yaml", "--to", form, *(("--out", out) if out else ()))
+    many, few = content_of(DAMPERS["plain"]), content_of(DAMPERS["single"])
+    named = {"name": "first", "config": "first.yaml"}
+    monkeypatch.setattr("pzd.pipeline.exporting.content_of", lambda _: replace(many, **named))
+    assert len(typed(*export)[1]) == 3
+    foreign = {folder / f"first-mine{ending}": "mine", folder / f"first-9V{ending}": "pzd 1, config first.yaml2"}
+    foreign[folder / "first.json"] = "pzd 1, config first.yaml"
+    for path, text in foreign.items():
+        path.write_text(text)
+    monkeypatch.setattr("pzd.pipeline.exporting.content_of", lambda _: replace(few, **named))
+    (line,) = typed(*export)[1]
+    assert {path for path in folder.iterdir() if path not in foreign} == {Path(line.removeprefix("export: "))}
+    assert {path: path.read_text() for path in foreign} == foreign
 
 
 def test_a_file_where_the_folder_should_be_is_a_fault_of_the_files(typed) -> None:

@@ -57,6 +57,7 @@ IN_THE_FLOW = {
     "orifice_quadratic": {"q": (1500.0, 4000.0), "at_voltage_V": (0.0, 120.0)},
     "relief_valve": {"F_r": 900.0, "C_r": 800.0},
 }
+KNEE = {"beta": 0.4, "F_reb": 950.0, "C_reb": 700.0, "F_comp": 800.0, "C_comp": 400.0}
 EXACT = {
     "plain": DAMPERS["plain"],
     "passive": DAMPERS["passive"],
@@ -66,6 +67,8 @@ EXACT = {
     "stiff": Damper(base=tuple(row.model_copy(update={"k_N_per_m": 1e9}) for row in CONTROLLED)),
     "orifice": with_effects(DAMPERS["plain"], orifice_quadratic={"q": 2500.0}),
     "relief": with_effects(DAMPERS["plain"], relief_valve={"F_r": 1000.0, "C_r": 500.0}),
+    "knee": with_effects(DAMPERS["plain"], knee=KNEE),
+    "knee and relief": with_effects(DAMPERS["plain"], knee=KNEE, **IN_THE_FLOW),
     "lash": with_effects(DAMPERS["plain"], lash={"delta": 8e-4}),
     "play": with_effects(DAMPERS["plain"], piezo_hysteresis={"r": 12.0}),
     "drift": with_effects(DAMPERS["plain"], temperature_drift={"beta_T0": 0.01, "beta_C": 0.02}),

@@ -104,3 +104,11 @@ def test_what_the_effects_count_from_goes_with_them() -> None:
     assert document["units"] == {"reference_temperature_degC": "degC", "zero_m": "m"}
     damper = loadmat(io.BytesIO(written["mat"]["my-run.mat"]), simplify_cells=True)["damper"]
     assert {name: damper[name] for name in told} == told
+
+
+def test_the_play_of_a_damper_driven_by_a_current_is_one_of_the_current() -> None:
+    damper = DAMPERS["plain"].with_effect("piezo_hysteresis", {"r": 0.1})
+    for control, unit in ((Control("current", "A"), "A"), (Control(), "V")):
+        content = replace(content_of(damper), control=control)
+        effects = json.loads(formats()["json"].files(content)["my-run.json"])["effects"]["columns"]
+        assert (effects["effect"], effects["unit"]) == (["piezo_hysteresis"], [unit])

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from pzd.artefacts import Characteristics, Identified, Rides, Rig, Table, TableNotes
+from pzd.artefacts import Characteristics, Identified, Rides, Rig, Table, TableNotes, WarmUpRow
 from pzd.damper.model import BaseRow, Damper
 from pzd.identify.characteristics.summary import characteristics
 from pzd.quantities import Control
@@ -111,7 +111,7 @@ def test_every_picture_says_what_it_shows(read: Reader) -> None:
 def test_force_over_speed_is_told_as_damper_people_chart_it(read: Reader, run: Any) -> None:
     part = read.text.partition("2 Force over speed, as measured")[2].partition("3 Where the simple model fails")[0]
     assert "Rebound is extension: its speed and force are positive, those of compression negative." in part
-    assert "4 such tests were found in the 4 records, by their motion." in part
+    assert "Found by their motion: 4 such tests in 4 records." in part
     for row in run.identified.characteristics.peak_velocity:
         assert f"{row.rebound_force_N:.3g}"[:2] in part.replace("\u2212", "")
         assert row.record in part
@@ -120,6 +120,28 @@ def test_force_over_speed_is_told_as_damper_people_chart_it(read: Reader, run: A
     titles = [picture["alt"] for picture in read.pictures()]
     assert any("Force over peak speed of 4 tests, rebound above zero" in (alt or "") for alt in titles)
     assert any("one average settled cycle, one test each for 0" in (alt or "") for alt in titles)
+
+
+def test_a_warm_up_is_told_from_its_first_cycles_to_its_last(run: Any, words_only: None) -> None:
+    setting = run.identified.rows[0].setting
+    rows = tuple(
+        WarmUpRow(
+            record="r77",
+            setting=setting,
+            voltage_V=150.0,
+            cycle=n,
+            time_s=float(n),
+            temperature_degC=20.0 + n,
+            velocity_m_per_s=0.131,
+            rebound_force_N=2000.0 - 100.0 * n,
+            compression_force_N=-1000.0,
+        )
+        for n in range(1, 8)
+    )
+    warmed = replace(run.identified, characteristics=replace(run.identified.characteristics, warm_up=rows))
+    text = Reader(replace(run, identified=warmed).told().page).text.replace("\u00a0", " ").replace("\u2212", "-")
+    assert "Warm-up: force at the peak speed from the first 3 cycles to the last" in text
+    assert "150 V 0.131 m/s 7 22 to 26 °C 1 800 to 1 400 N -1 000 to -1 000 N r77" in text
 
 
 def test_without_such_tests_there_is_no_such_section(run: Any, words_only: None) -> None:

@@ -37,9 +37,9 @@ def test_no_sample_that_stands_out_is_passed_over(rng: np.random.Generator) -> N
 @pytest.mark.parametrize(
     ("where", "times"),
     [
-        ("force, 1 samples, the largest at 3.21 s", [3.21]),
+        ("force, 1 sample, the largest at 3.21 s", [3.21]),
         ("before 4.233 s and after 10.66 s", [4.233, 10.66]),
-        ("1 gaps, the first after 2 s, the longest 0.02 s", [2.0]),
+        ("1 gap, the first after 2 s, the longest 0.02 s", [2.0]),
         ("force, held or jumping 3 times, the largest until 1e-05 s", [1e-5]),
         ("the cycles at 2 Hz", []),
         ("force, +18.9% of half its range", []),
@@ -54,7 +54,7 @@ def test_each_record_has_its_section_with_its_findings(run: Any) -> None:
     page = records_page(replace(run.rig, entries=entries), Control())
     assert re.findall(r'<section id="([^"]*)"', page) == [record.name for record in run.rig.records]
     assert page.count("<img ") == 3 * len(run.rig.records)
-    assert "4 records as read, with 1 findings of the preflight" in page
+    assert "4 records as read, with 1 finding of the preflight" in page
     assert "1. spikes: force at 0.412 s: 1\u00a0N; it stands out" in page
     assert page.count("Dashed: findings, by their number below.") == 1
     assert re.findall(r'(?:src|href)="(?!data:|#)', page) == []

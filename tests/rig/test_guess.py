@@ -11,7 +11,7 @@ import pytest
 from written_files import FORCE, TIME, X
 
 from pzd.artefacts import Rig
-from pzd.config import load
+from pzd.config import WITHOUT_CAR, load
 from pzd.rig.files.guess import guessed
 from pzd.rig.stage import ingest
 from pzd.schema.errors import ConfigError, DataError
@@ -144,3 +144,57 @@ def test_names_of_files_tell_the_control_and_the_work_the_sign(tmp_path: Path) -
     rig = read_back(tmp_path, files)
     assert sorted(entry.voltage_V or 0.0 for entry in rig.entries) == [0.0, 75.0, 150.0]
     assert np.abs(rig.records[0].force - FORCE).max() < 1e-5
+
+
+# ---------------------------------------------------------------- dampers with clickers
+
+CLICKERS = {
+    "C08_R12_22degC": ("C04_R12_22degC", "C08_R12"),
+    "run7-click5-0.131": ("run7-click1-0.131", "click5"),
+    "15 clicks fast": ("3 clicks fast", "15 clicks"),
+    "front_Klick-9": ("front_Klick-10", "Klick-9"),
+    "150V_C08R12_22C": ("100V_C04R12_22C", "C08R12"),
+}
+
+
+@pytest.mark.parametrize("name", CLICKERS)
+def test_clickers_in_the_names_are_settings_and_one_of_them_is_chosen(tmp_path: Path, name: str) -> None:
+    other, clicker = CLICKERS[name]
+    columns = [numbers(values) for values in (TIME, X, FORCE)]
+    head = ["time_s,displacement_m,force_N"]
+    files = [stored(tmp_path / "data" / f"{stem}.csv", head, columns, ",") for stem in (name, other)]
+    entries = {entry.name.replace("_", " "): entry for entry in read_back(tmp_path, files).entries}
+    mine = entries[name.replace("_", " ")]
+    assert mine.setting == clicker
+    assert mine.temperature_degC == (22.0 if "22" in name else None)
+    assert mine.voltage_V == (150.0 if "150V" in name else None)
+    settings = sorted(entry.setting or "" for entry in entries.values())
+    assert load(tmp_path / "guess.yaml").setting == settings[0]
+
+
+def test_clickers_are_read_by_a_layout_that_does_not_tell_where_they_stand(tmp_path: Path) -> None:
+    columns = [numbers(values, ",") for values in (TIME, MM, FORCE, 0.0 * TIME + 22.0)]
+    head = ["Zeit [s];Weg [mm];Kraft [N];Temperatur [\xb0C]"]
+    files = [stored(tmp_path / f"click{n}.csv", head, columns, ";", "latin-1") for n in (1, 5)]
+    assert any("layout: german_dyno" in line for line in guessed(files))
+    assert [entry.setting for entry in read_back(tmp_path, files).entries] == ["click1", "click5"]
+
+
+def test_one_setting_or_none_needs_no_choice(tmp_path: Path) -> None:
+    columns = [numbers(values) for values in (TIME, X, FORCE)]
+    for names in (("click5-a", "click5-b"), ("plain-a", "plain-b"), ("click5-a", "plain-a")):
+        files = [
+            stored(tmp_path / names[1] / f"{name}.csv", ["time_s,displacement_m,force_N"], columns, ",")
+            for name in names
+        ]
+        assert not any(line.startswith("setting:") for line in guessed(files))
+
+
+def test_without_a_control_signal_the_line_that_leaves_the_car_out_is_shown(tmp_path: Path) -> None:
+    columns = [numbers(values) for values in (TIME, X, FORCE)]
+    path = stored(tmp_path / "a.csv", ["time_s,displacement_m,force_N"], columns, ",")
+    (line,) = [line for line in guessed([path]) if line.startswith("# stages:")]
+    (tmp_path / "guess.yaml").write_text("\n".join([line.removeprefix("# "), *guessed([path])]), encoding="utf-8")
+    assert load(tmp_path / "guess.yaml").stages == WITHOUT_CAR
+    driven = stored(tmp_path / "b_100V.csv", ["time_s,displacement_m,force_N"], columns, ",")
+    assert "stages" not in "\n".join(guessed([driven]))

@@ -241,6 +241,17 @@ def test_a_layout_beside_the_config_is_found_and_a_change_of_it_makes_the_run_st
     assert "ours.yaml has changed" in capsys.readouterr().out
 
 
+def test_a_layout_that_was_asked_for_and_does_not_fit_names_the_file_as_it_was_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dyno(tmp_path / "C08_R12_150psi_0.131mps.csv")
+    monkeypatch.chdir(tmp_path)
+    assert status(["init", "C08_R12_150psi_0.131mps.csv", "--layout", "us_dyno"]) == 3
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 5
+    assert all(line.startswith("C08_R12_150psi_0.131mps.csv:1: missing column") for line in said)
+
+
 def test_wrong_layouts_are_refused_with_file_and_line(tmp_path: Path) -> None:
     us(tmp_path / "a.csv")
     (said,) = wrong(tmp_path, {"path": "a.csv", "layout": "us_dino"})
@@ -273,8 +284,8 @@ def test_the_ingest_report_lists_everything_that_was_done(tmp_path: Path) -> Non
     }
     rig = run(tmp_path, entry)
     assert [(row.step, row.quantity, row.was, row.became) for row in rig.ingested] == [
-        ("left out", None, "1 lines above the header", ""),
-        ("left out", None, "1 lines that begin with '#'", ""),
+        ("left out", None, "1 line above the header", ""),
+        ("left out", None, "1 line that begin with '#'", ""),
         ("read", None, "lines 3 to 503", "500 rows"),
         ("left out", None, "columns spare", ""),
         ("rename", "time", "column 't'", "time_s"),

@@ -9,10 +9,12 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from functools import cache
+from pathlib import Path
 from types import ModuleType
 
 from pzd.damper.effect import Effect
 from pzd.damper.effects import effects_in, library
+from pzd.damper.fitted_laws import fitted_laws
 
 
 @cache
@@ -23,18 +25,24 @@ def competing_forms() -> dict[str, Effect]:
 
 @cache
 def known() -> dict[str, Effect]:
-    """Everything that a damper can be computed with: the library, and the competing forms.
+    """Everything that a damper can be computed with: the library, the competing forms and the fitted laws.
 
     Raises
     ------
-    ImportError : when a competing form has the name of an effect of the library
+    ImportError : when two of them have one name
     """
-    for name in competing_forms().keys() & library().keys():
-        raise ImportError(f"{module_of(library()[name]).__file__} and {__path__[0]}/{name}.py both declare {name}")
-    return {**library(), **competing_forms()}
+    folder, files = Path(__file__).parent.parent, dict[str, Path]()
+    sets = {"effects": library(), "competing_forms": competing_forms(), "fitted_laws": fitted_laws()}
+    for package, name in ((package, name) for package, found in sets.items() for name in found):
+        file = folder / package / f"{name}.py"
+        if name in files:
+            raise ImportError(f"{files[name]} and {file} both declare {name}")
+        files[name] = file
+    return {name: effect for found in sets.values() for name, effect in found.items()}
 
 
 def module_of(effect: Effect) -> ModuleType:
-    """The file that declares an effect or a competing form, imported."""
-    package = "effects" if library().get(effect.name) is effect else "competing_forms"
+    """The file that declares an effect, a competing form or a fitted law, imported."""
+    sets = {"effects": library(), "fitted_laws": fitted_laws()}
+    package = next((name for name, found in sets.items() if found.get(effect.name) is effect), "competing_forms")
     return importlib.import_module(f"pzd.damper.{package}.{effect.name}")

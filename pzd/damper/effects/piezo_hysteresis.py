@@ -19,7 +19,7 @@ EFFECT = Effect(
             0.0,
             0.0,
             1.0e4,
-            "half-width of the play, in the unit of the control signal",
+            "half-width of the play; V stands for the unit of the control signal",
             Search(lambda s: s.voltage, (0.03, 0.1)),
         ),
     ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import cast
 
@@ -15,6 +15,7 @@ from pzd.damper.effect import Parameter, Scales, Search
 from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.fit.likelihood import RecordLikelihood, response
+from pzd.diagnose.work import Work
 from pzd.record import Array
 
 SOFTEST = 0.1
@@ -93,6 +94,8 @@ class Problem:
     """T_ref for temperature drift [degC]."""
     varying: frozenset[str] = frozenset()
     """Effects whose parameters are numbers by voltage, one a voltage of the base rows."""
+    work: Work = field(default_factory=Work, repr=False)
+    """Counts what is simulated."""
 
     @cached_property
     def voltages(self) -> tuple[float, ...]:
@@ -213,6 +216,7 @@ class Point:
 def simulated(point: Point, observation: RecordLikelihood) -> Array:
     """(n,) force at the compared samples of an observation [N]."""
     o = observation
+    point.problem.work.add(o.motion.time.size)
     if o.place >= 0 and not any(known()[name].place == "material" for name in point.effects):
         friction, damping, stiffness = point.base[o.place]
         effects = point.at(o.place)

@@ -87,7 +87,7 @@ def evidence_of(campaign: Campaign, damper: Damper) -> Evidence:
     fastest = _fastest(prepared, damper)
     varying = frozenset(name for name, values in damper.effects.items() if "at_voltage_V" in values)
     problems = [
-        Problem(part, damper.base, scales, fastest, reference, varying)
+        Problem(part, damper.base, scales, fastest, reference, varying, campaign.work)
         for part in (whole, *(observed(campaign.in_role(role)) for role in (TRAINING, VALIDATION)))
     ]
     return Evidence(campaign, problems[0], (problems[1], problems[2]))

@@ -51,7 +51,7 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
     search.choose_temperature_axis()
     first, plain = search.evidence, search.current
     search.force()
-    while len(search.rounds) < 2 * config.most_effects and search.step():
+    while len(search.rounds) < 2 * config.most_effects and campaign.work.may_go_on() and search.step():
         pass
     search.rest()
     return Selection(

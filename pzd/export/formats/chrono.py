@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pzd.export.content import Content
 
 NAME = "chrono"
+_ENDING = "-chrono.json"
 
 
 def files(content: Content) -> Files:
@@ -34,8 +35,8 @@ def files(content: Content) -> Files:
             "Description": "; ".join(filter(None, (content.origin, one.condition))),
             "Damping Curve Data": pairs,
         }
-        found[f"{one.name}-chrono.json"] = f"{json_text(document)}\n".encode()
+        found[f"{one.name}{_ENDING}"] = f"{json_text(document)}\n".encode()
     return found
 
 
-FORMAT = Format(NAME, "nonlinear dampers for Project Chrono, one curve a control signal", files)
+FORMAT = Format(NAME, "nonlinear dampers for Project Chrono, one curve a control signal", files, ending=_ENDING)

@@ -31,4 +31,4 @@ def files(content: Content) -> Files:
     return found
 
 
-FORMAT = Format("csv", "tables as delimited text", files)
+FORMAT = Format("csv", "tables as delimited text", files, ending=".csv")

@@ -37,4 +37,4 @@ def _unit(unit: str | None) -> dict[str, str] | None:
     return {"unit": unit} if unit else None
 
 
-FORMAT = Format("parquet", "tables as typed columns", files, needs="pyarrow")
+FORMAT = Format("parquet", "tables as typed columns", files, needs="pyarrow", ending=".parquet")

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pzd.export.curves import ForceCurve
 
 NAME = "tir"
+_ENDING = ".dpr"
 
 
 def files(content: Content) -> Files:
@@ -25,7 +26,7 @@ def files(content: Content) -> Files:
     """
     from pzd.export.curves import curves
 
-    return {f"{one.name}.dpr": _text(one, content.origin).encode() for one in curves(content, NAME)}
+    return {f"{one.name}{_ENDING}": _text(one, content.origin).encode() for one in curves(content, NAME)}
 
 
 def _text(curve: ForceCurve, origin: str) -> str:
@@ -46,4 +47,4 @@ def _text(curve: ForceCurve, origin: str) -> str:
     )
 
 
-FORMAT = Format(NAME, "property files for vehicle dynamics, one curve a control signal", files)
+FORMAT = Format(NAME, "property files for vehicle dynamics, one curve a control signal", files, ending=_ENDING)

@@ -58,9 +58,12 @@ static double shut_speed(double over, double c, double q)
 
 static curve curve_of(const double *p, double side)
 {
-    const double factor = 1.0 + p[ASYMMETRY_ALPHA] * side;
-    curve flow = {p[T0] * factor, p[C] * factor, p[ORIFICE_QUADRATIC_Q], 0.0, p[RELIEF_VALVE_C_R], INFINITY};
-    flow.opens = fmax(p[RELIEF_VALVE_F_R], flow.friction);
+    const double factor = 1.0 + p[ASYMMETRY_ALPHA] * side, bleed = 1.0 + p[KNEE_BETA] * side;
+    const double knee = side > 0.0 ? p[KNEE_F_REB] : p[KNEE_F_COMP];
+    const int first = knee < p[RELIEF_VALVE_F_R];
+    const double beyond = !first ? p[RELIEF_VALVE_C_R] : side > 0.0 ? p[KNEE_C_REB] : p[KNEE_C_COMP];
+    curve flow = {p[T0] * factor, p[C] * factor * bleed, p[ORIFICE_QUADRATIC_Q], 0.0, beyond, INFINITY};
+    flow.opens = fmax(fmin(knee, p[RELIEF_VALVE_F_R]), flow.friction);
     if (isfinite(flow.opens))
         flow.speed_open = shut_speed(flow.opens - flow.friction, flow.c, flow.q);
     return flow;

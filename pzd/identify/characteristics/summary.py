@@ -10,11 +10,12 @@ from pzd.identify.characteristics.gas_and_friction import gas_and_friction
 from pzd.identify.characteristics.peak_velocity import peak_velocity
 from pzd.identify.characteristics.recognition import speed_tests
 from pzd.identify.characteristics.step_response import step_responses
+from pzd.identify.characteristics.warm_up import warm_up
 from pzd.record import Condition, Record
 
 
 def characteristics(constant: Sequence[Condition], moving: Sequence[Record]) -> Characteristics:
-    """Peak- and continuous-velocity plots, gas force and friction of every condition, and the response to steps.
+    """Peak- and continuous-velocity plots, gas force, friction and warm-up of every condition, the response to steps.
 
     Parameters
     ----------
@@ -28,4 +29,5 @@ def characteristics(constant: Sequence[Condition], moving: Sequence[Record]) -> 
         continuous_velocity=tuple(row for condition, tests in found for row in continuous_velocity(condition, tests)),
         gas_and_friction=gas_and_friction(peaks),
         steps=step_responses(moving),
+        warm_up=tuple(row for condition in constant for row in warm_up(condition)),
     )

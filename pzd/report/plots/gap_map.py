@@ -19,7 +19,7 @@ def draw(context: ReportContext) -> Iterator[Panel]:
     found = gap_map(context)
     top = float(np.nanmax(found.before))
     by = context.control.name if context.controlled else "test"
-    yield _panel(found, found.before, top, "simple model", by)
+    yield _panel(found, found.before, top, context.model, by)
     if context.extended:
         yield _panel(found, found.after, top, "with what was missing", by)
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pzd.artefacts import PeakVelocityRow
+from pzd.artefacts.characteristics import AVERAGED, courses
 from pzd.artefacts.matching import force_behind
 from pzd.report.blocks import Block, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext
 from pzd.report.curves import characteristics_of
 from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.wording import DASH, amount, amount_as, number
+from pzd.schema.wording import counted
 
 _FOLD = 12
 _PAPER_RESPONSE_MS = 9
@@ -20,13 +22,14 @@ _PAPER_RESPONSE_MS = 9
 def render(context: ReportContext, pictures: Pictures) -> Iterator[Section]:
     """The second section, where there are such tests."""
     found = characteristics_of(context)
-    if not found.peak_velocity and not found.steps:
+    if not found.peak_velocity and not found.steps and not found.warm_up:
         return
     blocks: list[Block] = [Paragraph(_intro(context)), *galleries(pictures["characteristics"])]
     blocks += [_force_at_speed(context)] if found.peak_velocity else []
     blocks += [_gas_and_friction(context)] if found.gas_and_friction else []
     if found.steps:
         blocks += [_steps(context), Paragraph(_beside_the_paper(context))]
+    blocks += [_warm_up(context)] if found.warm_up else []
     yield Section("characteristics", "Force over speed, as measured", tuple(blocks))
 
 
@@ -38,7 +41,8 @@ def _intro(context: ReportContext) -> str:
         "Forces are as recorded, with the gas force in them."
     )
     tests, records = len(characteristics_of(context).peak_velocity), len(context.rig.records)
-    return f"{text} {tests} such tests were found in the {records} records, by their motion." if tests else text
+    found = f"{counted(tests, 'such test')} in {counted(records, 'record')}"
+    return f"{text} Found by their motion: {found}." if tests else text
 
 
 def _places(context: ReportContext, *more: str) -> tuple[str, ...]:
@@ -116,6 +120,29 @@ def _steps(context: ReportContext) -> TextTable:
     header = ("step", "speed", "force", "to 63 %", "to 90 %", "status", "where")
     title = f"Measured response to steps of the {context.control.name}"
     return TextTable(title, header, rows, folded=len(rows) > _FOLD)
+
+
+def _warm_up(context: ReportContext) -> TextTable:
+    rows = tuple(
+        (
+            *([one.first.setting or DASH] if _settings(context) else []),
+            *([amount(one.first.voltage_V, context.control.unit)] if _control(context) else []),
+            amount(one.first.velocity_m_per_s, "m/s"),
+            str(one.cycles),
+            _course(one.first.temperature_degC, one.last.temperature_degC, "degC"),
+            _course(one.first.rebound_force_N, one.last.rebound_force_N, "N"),
+            _course(one.first.compression_force_N, one.last.compression_force_N, "N"),
+            one.first.record,
+        )
+        for one in courses(characteristics_of(context).warm_up)
+    )
+    header = (*_settings(context), *_control(context), "speed", "cycles", "temperature", "rebound", "compression")
+    title = f"Warm-up: force at the peak speed from the first {AVERAGED} cycles to the last"
+    return TextTable(title, (*header, "record"), rows, folded=len(rows) > _FOLD)
+
+
+def _course(first: float | None, last: float | None, unit: str) -> str:
+    return DASH if first is None else f"{number(first)} to {amount(last, unit)}"
 
 
 def _milliseconds(time: float | None) -> str:

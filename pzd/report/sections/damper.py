@@ -10,6 +10,7 @@ from pzd.damper.model import BaseRow
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS, VOLTAGE
 from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext, effect_in_words
+from pzd.report.sections.knee import trade_blocks
 from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.static_force import static_force_at, static_force_in_words
 from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
@@ -22,8 +23,8 @@ NO_FORCE = 1e-6
 
 def render(context: ReportContext, pictures: Pictures) -> Section:
     """The fourth section."""
-    blocks: list[Block] = [Paragraph(_intro(context)), _parameters(context)]
-    blocks += [_alone(context)] if context.extended else []
+    blocks: list[Block] = [Paragraph(_intro(context)), *trade_blocks(context), _parameters(context)]
+    blocks += [_alone(context)] if context.extended or context.fitted_law else []
     blocks += galleries(pictures["damper"])
     blocks += [_force(context)] if context.table.force else []
     notes = context.table.notes
@@ -42,7 +43,8 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
 def _intro(context: ReportContext) -> str:
     effects = context.diagnosed.damper.effects
     laws = [f"{effect_in_words(name)}, {known()[name].law}" for name in effects]
-    beside = f" What was missing stands beside it: {listed(laws)}." if laws else ""
+    origin = "What belongs to the knee law stands" if context.fitted_law else "What was missing stands"
+    beside = f" {origin} beside it: {listed(laws)}." if laws else ""
     return (
         "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. These allow for "
         "noise and for a gain, offset and delay of the sensors that differ from test to test. A value that the data do "
@@ -53,13 +55,14 @@ def _intro(context: ReportContext) -> str:
 def _parameters(context: ReportContext) -> TextTable:
     """T0, C and k of the damper that everything behind uses."""
     title = "T0, C and k beside what was missing" if context.extended else "T0, C and k of the Bingham element alone"
+    title = "T0, C and k beside the knee, C the mean bleed of both directions" if context.fitted_law else title
     rows = tuple(_row(context, row) for row in context.final)
     return TextTable(title, _header(context), rows).without_empty(*_conditions(context))
 
 
 def _alone(context: ReportContext) -> TextTable:
     """T0, C and k of the simple model: alone they also stand in for what it lacks."""
-    title = "The simple model: T0, C and k of the Bingham element alone, standing in for what was missing"
+    title = "The simple model: T0, C and k of the Bingham element alone, standing in for what it lacks"
     rows = tuple(_row(context, row) for row in context.parameters)
     return TextTable(title, _header(context), rows, folded=True).without_empty(*_conditions(context))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pzd.artefacts import Diagnosis, NextTest, Prediction, Ranked, Value
 from pzd.damper.competing_forms import known
+from pzd.quantities import Control
 from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext, effect_in_words, effects_in_words
 from pzd.report.sections.pictures import Pictures, galleries
@@ -20,7 +21,7 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     sure = (
         "" if diagnosis.confidence is None else f" The confidence in this verdict is {percent(diagnosis.confidence)}."
     )
-    blocks: list[Block] = [Paragraph(f"{verdict(diagnosis)}{sure}")]
+    blocks: list[Block] = [Paragraph(f"{verdict(context)}{sure}")]
     blocks += [Paragraph(text) for text in (sentence(diagnosis.reason), _gap(diagnosis)) if text]
     blocks += [*galleries(pictures["missing"])]
     if diagnosis.parameters:
@@ -28,23 +29,26 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     if diagnosis.prediction:
         blocks.append(_prediction(context, diagnosis.prediction))
     if diagnosis.ranking:
-        blocks.append(_ranking(diagnosis))
+        blocks.append(_ranking(diagnosis, context.control))
     blocks.append(Notes((next_test(context, diagnosis.next_test),)))
     return Section("missing", "What is missing, and how sure that is", tuple(blocks))
 
 
-def verdict(diagnosis: Diagnosis) -> str:
+def verdict(context: ReportContext) -> str:
     """The verdict in plain words."""
+    diagnosis = context.diagnosed.diagnosis
     adopted = listed(effects_in_words(diagnosis.effects))
     if diagnosis.verdict == "named":
-        text = f"Missing from the simple model: {adopted}"
+        text = f"Missing from the {context.model}: {adopted}"
     elif diagnosis.verdict == "ambiguous" and not diagnosis.effects:
         text = "These tests do not settle whether anything is missing"
     elif diagnosis.verdict == "ambiguous":
         rivals = listed(effects_in_words(diagnosis.rivals), "or")
         text = f"These tests do not settle what is missing. Best: {adopted or DASH}; also possible: {rivals or DASH}"
     elif diagnosis.verdict == "none":
-        text = "Nothing is missing: what the simple model leaves is within the noise and the scatter between tests"
+        text = f"Nothing is missing: what the {context.model} leaves is within the noise and the scatter between tests"
+    elif context.fitted_law:
+        text = "The knee law leaves a gap that repeats, and no effect was looked for beside it"
     else:
         found = f"; {adopted} is part of it" if adopted else ""
         text = f"Something is missing that the library of effects does not explain{found}"
@@ -133,15 +137,16 @@ def _with_interval(value: float, low: float | None, high: float | None) -> str:
     return f"{number(value)} (edited by hand)" if low is None and high is None else interval(value, low, high)
 
 
-def _ranking(diagnosis: Diagnosis) -> TextTable:
+def _ranking(diagnosis: Diagnosis, control: Control) -> TextTable:
     rows = tuple(
-        (r.effect, number(r.gap_after), number(round(r.delta_bic), 6), _fitted(r), r.reason) for r in diagnosis.ranking
+        (r.effect, number(r.gap_after), number(round(r.delta_bic), 6), _fitted(r, control), r.reason)
+        for r in diagnosis.ranking
     )
     header = ("effect", "W_s left", "delta BIC", "fitted", "what became of it")
     return TextTable("Every candidate, best first", header, rows, folded=len(rows) > _FOLD)
 
 
-def _fitted(ranked: Ranked) -> str:
+def _fitted(ranked: Ranked, control: Control) -> str:
     effects = known()
     texts = []
     for name, value in ranked.parameters.items():
@@ -149,7 +154,7 @@ def _fitted(ranked: Ranked) -> str:
         unit = next((p.unit for p in effect.parameters if p.name == name), "") if effect else ""
         values = value if isinstance(value, tuple) else (value,)
         shown = ", ".join(number(each) for each in values)
-        texts.append(f"{name} = {shown} {unit_of(unit)}".rstrip())
+        texts.append(f"{name} = {shown} {unit_of(control.own_unit(unit))}".rstrip())
     return "; ".join(texts) or DASH
 
 

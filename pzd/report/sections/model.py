@@ -11,16 +11,18 @@ from pzd.report.wording import number, percent
 
 def render(context: ReportContext, pictures: Pictures) -> Section:
     """The second section."""
-    text = (
-        "The simple model is the Bingham element of the paper: dry friction T0 and viscous damping C in series with "
-        f"the oil spring k. {_gap(context.diagnosed.diagnosis.gap)}"
+    element = (
+        "The knee law has dry friction T0, and bleed, knee and blow-off of each direction"
+        if context.fitted_law
+        else "The simple model is the Bingham element of the paper: dry friction T0 and viscous damping C"
     )
+    text = f"{element} in series with the oil spring k. {_gap(context.diagnosed.diagnosis.gap)}"
     blocks: list[Block] = [Paragraph(text), *galleries(pictures["model"])]
     where = context.diagnosed.diagnosis.where
     if where:
         rows = tuple((region.region, percent(region.share_of_gap)) for region in where)
         blocks.append(TextTable("Where the gap lies", ("region", "share of the gap"), rows))
-    return Section("model", "Where the simple model fails", tuple(blocks))
+    return Section("model", f"Where the {context.model} fails", tuple(blocks))
 
 
 def _gap(gap: Gap | None) -> str:

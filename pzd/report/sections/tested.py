@@ -9,6 +9,7 @@ from pzd.record import Record
 from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext
 from pzd.report.wording import amount, number
+from pzd.schema.wording import counted
 
 _FOLD = 12
 """Tables longer than this are folded."""
@@ -21,7 +22,7 @@ def render(context: ReportContext) -> Section:
     if findings.rows:
         text = "Nothing was corrected unasked: each finding says where it is, how large it is and what follows."
         blocks += [
-            Paragraph(f"The preflight found {_count(len(findings.rows), 'thing')} to know about. {text}"),
+            Paragraph(f"The preflight found {counted(len(findings.rows), 'thing')} to know about. {text}"),
             findings,
         ]
     else:
@@ -30,10 +31,6 @@ def render(context: ReportContext) -> Section:
     if removed:
         blocks += [Paragraph("A known fixture was taken out of the force:"), Notes(removed)]
     return Section("tested", "What was tested", tuple(blocks))
-
-
-def _count(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _summary(context: ReportContext) -> str:
@@ -46,12 +43,12 @@ def _summary(context: ReportContext) -> str:
     seconds = sum(float(r.time[-1] - r.time[0]) for r in records)
     where = f" of the setting {context.chosen}" if context.chosen else ""
     parts = [
-        f"{_count(len(records), 'record')}{where}, {number(seconds)} s in all",
+        f"{counted(len(records), 'record')}{where}, {number(seconds)} s in all",
         f"stroke up to {number(1000.0 * stroke)} mm, speed up to {number(speed)} m/s, force up to {amount(force, 'N')}",
     ]
     others = len(context.rig.records) - len(records)
     if others:
-        parts.append(f"{_count(others, 'record')} of other settings were identified as well, and not used further")
+        parts.append(f"{counted(others, 'record')} of other settings were identified as well, and not used further")
     return "; ".join([*parts[:1], *_conditions(context), *parts[1:]]) + "."
 
 

@@ -9,6 +9,7 @@ from pzd.comfort import iso2631_1978
 from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext
 from pzd.report.wording import amount, number, percent
+from pzd.schema.wording import counted
 
 _MUCH = 0.01
 
@@ -66,7 +67,7 @@ def _cares(context: ReportContext) -> Iterator[str]:
         yield f"the exposure times of {iso2631_1978.EDITION}, withdrawn in 1997, rest on an {iso2631_1978.TRUST}"
     findings = sum(len(entry.findings) for entry in context.rig.entries)
     if findings:
-        yield f"the preflight left {findings} finding{'s' if findings > 1 else ''} on the records"
+        yield f"the preflight left {counted(findings, 'finding')} on the records"
     if context.ridden:
         yield "vibration is judged in the vertical direction at point K only, without a seat"
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import Measured
+from pzd.schema.wording import counted
 
 LOST = 1.5
 """A step longer than this many median steps has lost samples."""
@@ -27,7 +28,8 @@ def check(test: Measured) -> list[Finding]:
         found.append(
             Finding(
                 check="dropped samples",
-                where=f"{gaps.size} gaps, the first after {time[gaps[0]]:.6g} s, the longest {steps.max():.4g} s",
+                where=f"{counted(gaps.size, 'gap')}, the first after {time[gaps[0]]:.6g} s, "
+                f"the longest {steps.max():.4g} s",
                 size=float(lost),
                 unit="samples",
                 follows="displacement is taken as linear across each gap; a fit over a long gap is wrong there",

@@ -7,6 +7,7 @@ import numpy as np
 from pzd.artefacts import Finding
 from pzd.record import from_neighbours, glitches
 from pzd.rig.preflight import Measured
+from pzd.schema.wording import counted
 
 EDGE = 3
 """Samples at either end of force and displacement that have too few neighbours to tell a spike from a kink."""
@@ -29,7 +30,8 @@ def check(test: Measured) -> list[Finding]:
             found.append(
                 Finding(
                     check="spikes",
-                    where=f"{channel.name}, {rows.size} samples, the largest at {test.record.time[worst]:.6g} s",
+                    where=f"{channel.name}, {counted(rows.size, 'sample')}, "
+                    f"the largest at {test.record.time[worst]:.6g} s",
                     size=float(from_neighbours(channel.values)[worst]),
                     unit=channel.unit,
                     follows=f"not corrected; {what}",

@@ -22,6 +22,7 @@ from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import BLANKS, after_lines, field_counts, fields_of, separator_of, text_of, without_blank_end
 from pzd.rig.files.sheet import ReadingStep, Sheet, Wanted
 from pzd.schema.errors import DataError, at
+from pzd.schema.wording import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -226,10 +227,10 @@ def _sheet(
 def _steps(entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[np.int64]) -> Iterator[ReadingStep]:
     """What is read of a file, and the lines and columns that are left out."""
     if entry.skip:
-        yield ReadingStep("left out", None, f"{entry.skip} lines above the header", "")
+        yield ReadingStep("left out", None, f"{counted(entry.skip, 'line')} above the header", "")
     dropped = int(lines[-1] - lines[0]) + 1 - lines.size
     if dropped:
-        yield ReadingStep("left out", None, f"{dropped} lines that begin with {entry.comment!r}", "")
+        yield ReadingStep("left out", None, f"{counted(dropped, 'line')} that begin with {entry.comment!r}", "")
     yield ReadingStep("read", None, f"lines {lines[0]} to {lines[-1]}", f"{lines.size} rows")
     unread = [head for head in header if head not in wanted.numbers | wanted.texts]
     if unread:

@@ -1,0 +1,304 @@
+"""Bleed, knee and blow-off of a passive damper, how well they predict kept-back tests, and the damper that has them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field
+
+from pzd.damper.fitted_laws.knee import NO_KNEE
+from pzd.damper.model import BaseRow, Damper
+from pzd.quantities import Control
+from pzd.schema.csvfile import read_rows, write_rows
+from pzd.schema.model import Frozen
+
+LawName = Literal["bingham", "knee"]
+
+
+Direction = Literal["rebound", "compression"]
+DIRECTIONS: tuple[Direction, ...] = ("rebound", "compression")
+OF_A_DIRECTION = ("bleed_Ns_per_m", "knee_force_N", "knee_velocity_m_per_s", "blow_off_Ns_per_m")
+"""The columns of a direction, behind its name."""
+OF_BOTH = ("gas_force_N", "friction_N")
+"""The columns that both directions share and the trade names with them."""
+Interval = tuple[float | None, float | None, float | None]
+
+
+class KneeRow(Frozen):
+    """The knee law of one condition; a direction without a knee has empty cells, and its bleed goes on.
+
+    Forces and speeds of both directions are magnitudes, of the oil and the seal alone; the gas is beside them.
+    """
+
+    setting: str | None
+    voltage_V: float | None
+    temperature_degC: float | None
+    rebound_bleed_Ns_per_m: float = Field(gt=0.0)
+    """Slope up to the knee."""
+    rebound_bleed_Ns_per_m_low95: float
+    rebound_bleed_Ns_per_m_high95: float
+    rebound_knee_force_N: float | None = Field(ge=0.0)
+    """With the seal friction, without the gas."""
+    rebound_knee_force_N_low95: float | None
+    rebound_knee_force_N_high95: float | None
+    rebound_knee_velocity_m_per_s: float | None = Field(gt=0.0)
+    rebound_knee_velocity_m_per_s_low95: float | None
+    rebound_knee_velocity_m_per_s_high95: float | None
+    rebound_blow_off_Ns_per_m: float | None = Field(gt=0.0)
+    """Slope beyond the knee."""
+    rebound_blow_off_Ns_per_m_low95: float | None
+    rebound_blow_off_Ns_per_m_high95: float | None
+    compression_bleed_Ns_per_m: float = Field(gt=0.0)
+    compression_bleed_Ns_per_m_low95: float
+    compression_bleed_Ns_per_m_high95: float
+    compression_knee_force_N: float | None = Field(ge=0.0)
+    compression_knee_force_N_low95: float | None
+    compression_knee_force_N_high95: float | None
+    compression_knee_velocity_m_per_s: float | None = Field(gt=0.0)
+    compression_knee_velocity_m_per_s_low95: float | None
+    compression_knee_velocity_m_per_s_high95: float | None
+    compression_blow_off_Ns_per_m: float | None = Field(gt=0.0)
+    compression_blow_off_Ns_per_m_low95: float | None
+    compression_blow_off_Ns_per_m_high95: float | None
+    friction_N: float = Field(ge=0.0)
+    """Seal friction T0, the same in both directions: half of what the force changes by where the rod turns round."""
+    friction_N_low95: float
+    friction_N_high95: float
+    gas_force_N: float
+    """F_0, the force beside the element at `zero_m`; below zero where the gas pushes the rod out."""
+    gas_force_N_low95: float
+    gas_force_N_high95: float
+    gas_spring_N_per_m: float
+    """k_g, by how much it rises with the displacement."""
+    gas_spring_N_per_m_low95: float
+    gas_spring_N_per_m_high95: float
+    k_N_per_m: float = Field(gt=0.0)
+    """Stiffness of the oil spring."""
+    k_N_per_m_low95: float
+    k_N_per_m_high95: float
+    zero_m: float
+    """Middle of the motion of the condition's tests, in the displacement as recorded."""
+    reached_m_per_s: float = Field(gt=0.0)
+    """Largest speed of the tests."""
+    W_s: float = Field(ge=0.0)
+    """Criterion (4) over the samples that the row was fitted to."""
+    rmse_N: float = Field(ge=0.0)
+    missed_share: float = Field(ge=0.0)
+    """R.m.s. of what the law misses beyond noise, as a share of peak force; 0 where noise alone may show it."""
+    status: str = Field(pattern=r"^(ok|weak: .*)$")
+    """`ok`, or `weak: ...` with the parameters and the reason."""
+
+    def interval(self, quantity: str) -> Interval:
+        """A quantity, by its column, with its 95 % interval; None where the direction has no knee."""
+        value, low, high = (getattr(self, f"{quantity}{end}") for end in ("", "_low95", "_high95"))
+        return value, low, high
+
+
+class KneeForceRow(Frozen):
+    """Force of the knee law at one of the trade's speeds, as a rig records it: with the gas force at mid-stroke."""
+
+    setting: str | None
+    voltage_V: float | None
+    temperature_degC: float | None
+    velocity_m_per_s: float = Field(gt=0.0)
+    """Of either direction."""
+    rebound_force_N: float
+    compression_force_N: float
+    gas_force_N: float
+    """What of both the gas makes."""
+    inside: int = Field(ge=0, le=1)
+    """1 where a test was as fast, 0 where the law is the model beyond."""
+
+
+class ClickRow(Frozen):
+    """How much of the force one click makes at one of the trade's speeds, between two neighbouring positions."""
+
+    setting: str | None
+    """With # for the number of the clicker, where that stands in the setting and not in the control signal."""
+    voltage_V: float | None
+    """Of the condition, where the clicker stands in the setting."""
+    temperature_degC: float | None
+    from_click: float
+    to_click: float
+    velocity_m_per_s: float = Field(gt=0.0)
+    rebound_N_per_click: float
+    """By how much the magnitude of the force rises a click; below zero where it falls."""
+    compression_N_per_click: float
+
+
+class PredictedRow(Frozen):
+    """One test that was kept back, predicted by both laws, each fitted without it."""
+
+    record: str
+    setting: str | None
+    voltage_V: float | None
+    temperature_degC: float | None
+    W_s_bingham: float = Field(ge=0.0)
+    """Of one T0 and C, with the same oil spring, gas force and gas spring beside it as the knee has."""
+    W_s_knee: float = Field(ge=0.0)
+
+
+class LawRow(Frozen):
+    """The law of one setting that is handed on, and why."""
+
+    setting: str | None
+    law: LawName
+    tests: int = Field(ge=0)
+    """Tests that were kept back in turn."""
+    W_s_bingham: float | None
+    """Criterion (4) over all of them."""
+    W_s_knee: float | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class DirectionOfCondition:
+    """What the trade says of one direction of one condition."""
+
+    row: KneeRow
+    direction: Direction
+    forces: tuple[float | None, ...]
+    """(s,) force as a rig records it, at the speeds of `Knees.speeds` [N]; None where the row has none."""
+    inside: tuple[bool, ...]
+    """(s,) whether a test was as fast."""
+
+    @property
+    def intervals(self) -> tuple[Interval, ...]:
+        """Those of `OF_A_DIRECTION`, then those of `OF_BOTH`."""
+        return tuple(
+            self.row.interval(name) for name in (*(f"{self.direction}_{name}" for name in OF_A_DIRECTION), *OF_BOTH)
+        )
+
+
+@dataclass(frozen=True)
+class Knees:
+    """What identify found of the knee law; empty where the config asks for Bingham alone."""
+
+    rows: tuple[KneeRow, ...] = ()
+    forces: tuple[KneeForceRow, ...] = ()
+    clicks: tuple[ClickRow, ...] = ()
+    predicted: tuple[PredictedRow, ...] = ()
+    laws: tuple[LawRow, ...] = ()
+
+    def write(self, folder: Path, control: Control) -> None:
+        """Write knee.csv, knee_force.csv, clicks.csv, kept_back.csv and law.csv where there is anything to write."""
+        if self.laws:
+            write_rows(folder / "knee.csv", KneeRow, self.rows, control)
+            write_rows(folder / "knee_force.csv", KneeForceRow, self.forces, control)
+            write_rows(folder / "clicks.csv", ClickRow, self.clicks, control)
+            write_rows(folder / "kept_back.csv", PredictedRow, self.predicted, control)
+            write_rows(folder / "law.csv", LawRow, self.laws, control)
+
+    @classmethod
+    def read(cls, folder: Path, control: Control) -> Self:
+        """Read and check them again; where the config asked for Bingham alone there are none."""
+        if not (folder / "law.csv").is_file():
+            return cls()
+        return cls(
+            read_rows(folder / "knee.csv", KneeRow, control),
+            read_rows(folder / "knee_force.csv", KneeForceRow, control),
+            read_rows(folder / "clicks.csv", ClickRow, control),
+            read_rows(folder / "kept_back.csv", PredictedRow, control),
+            read_rows(folder / "law.csv", LawRow, control),
+        )
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """(s,) the trade's speeds at which a force is told, rising [m/s]."""
+        return tuple(sorted({row.velocity_m_per_s for row in self.forces}))
+
+    def directions(self) -> tuple[DirectionOfCondition, ...]:
+        """Every direction of every condition, rebound first."""
+        at = {(r.setting, r.voltage_V, r.temperature_degC, r.velocity_m_per_s): r for r in self.forces}
+        return tuple(
+            DirectionOfCondition(
+                row,
+                direction,
+                tuple(None if f is None else float(getattr(f, f"{direction}_force_N")) for f in here),
+                tuple(f is not None and f.inside == 1 for f in here),
+            )
+            for row in self.rows
+            for here in [[at.get((row.setting, row.voltage_V, row.temperature_degC, v)) for v in self.speeds]]
+            for direction in DIRECTIONS
+        )
+
+    def law_of(self, setting: str | None) -> LawName:
+        """The law of a setting that is handed on."""
+        return next((row.law for row in self.laws if row.setting == setting), "bingham")
+
+    def of(self, setting: str | None) -> tuple[KneeRow, ...]:
+        """The rows of a setting."""
+        return tuple(row for row in self.rows if row.setting == setting)
+
+
+def knee_damper(rows: Sequence[KneeRow]) -> Damper:
+    """The damper of one setting with the knee law: a base row a condition, the knee and the gas as effects beside it.
+
+    Gas force and gas spring are left out where the interval of every condition holds zero. Effects know no temperature:
+    where a voltage was tested at several, theirs are the mean; T0, C and k are of each.
+
+    Parameters
+    ----------
+    rows : of one setting, at least one
+    """
+    zero = float(np.mean([row.zero_m for row in rows]))
+    voltages = sorted({row.voltage_V for row in rows}, key=lambda v: -np.inf if v is None else v)
+    parts = [[row for row in rows if row.voltage_V == voltage] for voltage in voltages]
+    effects = {
+        "knee": [_mean([_knee(row) for row in part]) for part in parts],
+        "preload_offset": [_mean([{"F_0": _gas_force(row, zero)} for row in part]) for part in parts],
+        "gas_spring": [_mean([{"k_g": row.gas_spring_N_per_m} for row in part]) for part in parts],
+    }
+    shown = {
+        "knee": True,
+        "preload_offset": any(row.gas_force_N_low95 * row.gas_force_N_high95 > 0.0 for row in rows),
+        "gas_spring": any(row.gas_spring_N_per_m_low95 * row.gas_spring_N_per_m_high95 > 0.0 for row in rows),
+    }
+    given = [voltage for voltage in voltages if voltage is not None]
+    return Damper(
+        base=tuple(
+            BaseRow(
+                voltage_V=row.voltage_V,
+                temperature_degC=row.temperature_degC,
+                T0_N=row.friction_N,
+                C_Ns_per_m=0.5 * (row.rebound_bleed_Ns_per_m + row.compression_bleed_Ns_per_m),
+                k_N_per_m=row.k_N_per_m,
+            )
+            for row in rows
+        ),
+        effects={name: _by_voltage(values, given) for name, values in effects.items() if shown[name]},
+        zero_m=zero,
+    )
+
+
+def _knee(row: KneeRow) -> dict[str, float]:
+    """The parameters of the law `knee`; a direction without one goes on with its bleed."""
+    rebound, compression = row.rebound_bleed_Ns_per_m, row.compression_bleed_Ns_per_m
+    return {
+        "beta": (rebound - compression) / (rebound + compression),
+        "F_reb": NO_KNEE if row.rebound_knee_force_N is None else row.rebound_knee_force_N,
+        "C_reb": rebound if row.rebound_blow_off_Ns_per_m is None else row.rebound_blow_off_Ns_per_m,
+        "F_comp": NO_KNEE if row.compression_knee_force_N is None else row.compression_knee_force_N,
+        "C_comp": compression if row.compression_blow_off_Ns_per_m is None else row.compression_blow_off_Ns_per_m,
+    }
+
+
+def _gas_force(row: KneeRow, zero: float) -> float:
+    """F_0 at another zero of the displacement [N]."""
+    return row.gas_force_N + row.gas_spring_N_per_m * (zero - row.zero_m)
+
+
+def _mean(values: Sequence[dict[str, float]]) -> dict[str, float]:
+    return {name: float(np.mean([each[name] for each in values])) for name in values[0]}
+
+
+def _by_voltage(values: Sequence[dict[str, float]], voltages: Sequence[float]) -> dict[str, float | tuple[float, ...]]:
+    """One number each, or lists beside `at_voltage_V` where there are several voltages."""
+    if len(values) == 1:
+        return dict(values[0])
+    lists = {name: tuple(each[name] for each in values) for name in values[0]}
+    return {**lists, "at_voltage_V": tuple(voltages)}

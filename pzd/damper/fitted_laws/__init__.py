@@ -1,0 +1,19 @@
+"""Laws of the element that identify fits in the place of T0 + C w, as `identify.law` of the config names them.
+
+They are no effects of the library: diagnose does not look for them, and the benchmark does not hide them. One file
+each, written as an effect is; every module here is found by itself.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from functools import cache
+
+from pzd.damper.effect import Effect
+from pzd.damper.effects import effects_in
+
+
+@cache
+def fitted_laws() -> dict[str, Effect]:
+    """Every fitted law by name."""
+    return {effect.name: effect for effect in effects_in(__name__, pkgutil.iter_modules(__path__))}

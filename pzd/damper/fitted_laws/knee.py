@@ -1,0 +1,62 @@
+"""Passive road and race damper: bleed, knee and blow-off, each of its own in rebound and in compression.
+
+Law: the flow curve is T0 + C (1 + beta) w in rebound and T0 + C (1 - beta) w in compression (bleed) up to the force of
+the knee; from there on it has the slope of the blow-off. Range: knees at 0.05 to 0.3 m/s; the bleed is two to ten times
+as steep as the blow-off where shims open, and flatter where a port chokes.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from pzd.damper.effect import Effect, Parameter, Search
+
+NO_KNEE = 1.0e7
+"""Knee force of a direction without a knee [N]: no damper reaches it."""
+
+_FORCES = Search(lambda s: s.force, (0.3,), logarithmic=True)
+_SLOPES = Search(lambda s: s.damping, (0.4,), logarithmic=True)
+
+EFFECT = Effect(
+    name="knee",
+    place="flow",
+    law="C times (1 + beta sign(F)); beyond max(F_reb or F_comp, T0) the slope is C_reb or C_comp",
+    parameters=(
+        Parameter(
+            "beta",
+            "-",
+            0.0,
+            -0.999,
+            0.999,
+            "share by which the bleed of rebound is steeper",
+            Search(lambda _: 1.0, (0.0,)),
+        ),
+        Parameter("F_reb", "N", inf, 0.0, NO_KNEE, "force of the knee in rebound", _FORCES),
+        Parameter("C_reb", "N s/m", 0.0, 1.0e-3, 1.0e8, "blow-off slope in rebound", _SLOPES),
+        Parameter("F_comp", "N", inf, 0.0, NO_KNEE, "force of the knee in compression", _FORCES),
+        Parameter("C_comp", "N s/m", 0.0, 1.0e-3, 1.0e8, "blow-off slope in compression", _SLOPES),
+    ),
+    source="bleed and blow-off stages of a shimmed piston; Dixon 2007, The Shock Absorber Handbook",
+    tests=(
+        ({"side": 1.0, "beta": 0.25}, 1.25),
+        ({"side": -1.0, "beta": 0.25}, 0.75),
+        ({"T0": 40.0, "side": 1.0, "F_reb": 300.0, "F_comp": 120.0}, 300.0),
+        ({"T0": 40.0, "side": -1.0, "F_reb": 300.0, "F_comp": 20.0}, 40.0),
+        ({"side": -1.0, "C_reb": 900.0, "C_comp": 500.0}, 500.0),
+    ),
+)
+
+
+def bleed_factor(side: float, beta: float) -> float:
+    """Factor on C for the sign of the force."""
+    return 1.0 + beta * side
+
+
+def opens_at(T0: float, side: float, F_reb: float, F_comp: float) -> float:
+    """Force [N] of the knee for the sign of the force."""
+    return max(F_reb if side > 0.0 else F_comp, T0)
+
+
+def slope_beyond(side: float, C_reb: float, C_comp: float) -> float:
+    """Slope [N s/m] beyond it."""
+    return C_reb if side > 0.0 else C_comp

@@ -1,0 +1,107 @@
+"""The damper in the language of the trade: rebound and compression, bleed, knee, blow-off, gas, friction, clicks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from pzd.artefacts import ClickRow
+from pzd.artefacts.knee import DirectionOfCondition
+from pzd.report.blocks import Block, Paragraph, TextTable
+from pzd.report.context import ReportContext
+from pzd.report.wording import DASH, amount, interval, number, sentence
+
+_FOLD = 12
+_CONDITION = ("setting", "temperature")
+
+
+def trade_blocks(context: ReportContext) -> Iterator[Block]:
+    """Which law is handed on and why, the knee law of all conditions, and the force a click; else nothing."""
+    knees = context.identified.knees
+    if not knees.rows:
+        return
+    laws = [
+        f"{row.setting}: {row.law}, {row.reason}" if row.setting else f"{row.law}, {row.reason}" for row in knees.laws
+    ]
+    yield Paragraph(f"Law of the element handed on: {sentence('; '.join(laws))}")
+    yield _trade(context)
+    if knees.clicks:
+        yield _clicks(context, knees.clicks)
+    yield _kept_back(context)
+
+
+def _trade(context: ReportContext) -> TextTable:
+    """Force at the trade's speeds, and the parameters of the law."""
+    knees = context.identified.knees
+    header = (
+        *_header(context),
+        "direction",
+        *(f"at {amount(v, 'm/s')}" for v in knees.speeds),
+        *(
+            "bleed [N s/m]",
+            "knee [N]",
+            "knee [m/s]",
+            "blow-off [N s/m]",
+            "gas force [N]",
+            "seal friction [N]",
+            "status",
+        ),
+    )
+    rows = tuple(_direction(context, each) for each in knees.directions())
+    title = (
+        "Force at the speeds of the trade, as a rig records it with the gas force at mid-stroke, in brackets beyond "
+        "what the tests reached; bleed, knee (with friction, without gas) and blow-off with 95 % intervals"
+    )
+    return TextTable(title, header, rows).without_empty(context.control.name, *_CONDITION)
+
+
+def _direction(context: ReportContext, each: DirectionOfCondition) -> tuple[str, ...]:
+    forces = [amount(force, "N") for force in each.forces]
+    row = each.row
+    return (
+        *_place(context, row.setting, row.voltage_V, row.temperature_degC),
+        each.direction,
+        *(text if inside or text == DASH else f"({text})" for text, inside in zip(forces, each.inside, strict=True)),
+        *(interval(*bounds) for bounds in each.intervals),
+        row.status if each.direction == "rebound" else "as in rebound",
+    )
+
+
+def _clicks(context: ReportContext, clicks: Sequence[ClickRow]) -> TextTable:
+    rows = tuple(
+        (
+            *_place(context, row.setting, row.voltage_V, row.temperature_degC),
+            f"{number(row.from_click)} to {number(row.to_click)}",
+            amount(row.velocity_m_per_s, "m/s"),
+            number(row.rebound_N_per_click),
+            number(row.compression_N_per_click),
+        )
+        for row in clicks
+    )
+    header = (*_header(context), "position", "speed", "rebound [N a click]", "compression [N a click]")
+    title = "Force a click, without the gas: by how much the magnitude rises with the number of the clicker"
+    return TextTable(title, header, rows, folded=len(rows) > _FOLD).without_empty(context.control.name, *_CONDITION)
+
+
+def _kept_back(context: ReportContext) -> TextTable:
+    rows = tuple(
+        (
+            row.record,
+            *_place(context, row.setting, row.voltage_V, row.temperature_degC),
+            number(row.W_s_bingham),
+            number(row.W_s_knee),
+        )
+        for row in context.identified.knees.predicted
+    )
+    header = ("test kept back", *_header(context), "W_s by one T0 and C", "W_s by the knee law")
+    title = "Tests predicted by both laws, each fitted without them"
+    return TextTable(title, header, rows, folded=True).without_empty(context.control.name, *_CONDITION)
+
+
+def _header(context: ReportContext) -> tuple[str, ...]:
+    return _CONDITION[0], context.control.name, _CONDITION[1]
+
+
+def _place(
+    context: ReportContext, setting: str | None, voltage: float | None, temperature: float | None
+) -> tuple[str, ...]:
+    return setting or DASH, context.voltage(voltage), amount(temperature, "degC")

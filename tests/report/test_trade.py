@@ -1,0 +1,125 @@
+"""The knee law on the page and in the terminal: rebound and compression in the language of the trade."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from conftest import PLAIN, Run
+
+from pzd.artefacts import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow
+from pzd.cli.knee import knee_tables
+from pzd.damper.model import Damper
+from pzd.pipeline.run_summary import RunSummary
+from pzd.quantities import Control
+
+PLACE = {"setting": "gap 0.25 mm", "voltage_V": 0.0, "temperature_degC": 22.0}
+VALUES = {
+    "rebound_bleed_Ns_per_m": 1530.0,
+    "rebound_knee_force_N": 167.0,
+    "rebound_knee_velocity_m_per_s": 0.085,
+    "rebound_blow_off_Ns_per_m": 640.0,
+    "compression_bleed_Ns_per_m": 650.0,
+    "compression_knee_force_N": None,
+    "compression_knee_velocity_m_per_s": None,
+    "compression_blow_off_Ns_per_m": None,
+    "friction_N": 37.0,
+    "gas_force_N": -288.0,
+    "gas_spring_N_per_m": 2840.0,
+    "k_N_per_m": 1e7,
+}
+
+
+def knees() -> Knees:
+    """One condition whose compression is straight, two clicks, and a test kept back."""
+    ends = {
+        f"{name}_{end}": value and value + side * abs(value) / 20.0
+        for name, value in VALUES.items()
+        for end, side in (("low95", -1.0), ("high95", 1.0))
+    }
+    rest = {"zero_m": 0.0, "reached_m_per_s": 0.2, "W_s": 6e-4, "rmse_N": 7.5, "missed_share": 0.013, "status": "ok"}
+    row = KneeRow.model_validate({**PLACE, **VALUES, **ends, **rest})
+    forces = [
+        KneeForceRow(
+            **PLACE, velocity_m_per_s=v, rebound_force_N=r, compression_force_N=c, gas_force_N=-288.0, inside=i
+        )
+        for v, r, c, i in ((0.131, -92.0, -410.0, 1), (0.262, -7.0, -460.0, 0))
+    ]
+    click = ClickRow(
+        setting="R# C8",
+        voltage_V=None,
+        temperature_degC=None,
+        from_click=3.0,
+        to_click=5.0,
+        velocity_m_per_s=0.131,
+        rebound_N_per_click=21.5,
+        compression_N_per_click=0.4,
+    )
+    predicted = PredictedRow(record="r00", **PLACE, W_s_bingham=0.0085, W_s_knee=0.00085)
+    law = LawRow(
+        setting="gap 0.25 mm", law="knee", tests=6, W_s_bingham=0.0085, W_s_knee=0.00085, reason="predicts better"
+    )
+    return Knees((row,), tuple(forces), (click,), (predicted,), (law,))
+
+
+def with_knee(run: Run) -> Run:
+    """The run on a damper with the knee law, handed on as it was fitted."""
+    damper = Damper(base=PLAIN.base).with_effect(
+        "knee", {"beta": 0.4, "F_reb": 900.0, "C_reb": 600.0, "F_comp": 700.0, "C_comp": 500.0}
+    )
+    diagnosis = run.diagnosed.diagnosis.without_effects("unexplained", "the knee law is handed on", gap=None)
+    return replace(
+        run,
+        identified=replace(run.identified, knees=knees()),
+        diagnosed=replace(run.diagnosed, diagnosis=diagnosis, damper=damper, plain=damper, parameters=()),
+    )
+
+
+@pytest.fixture(scope="module")
+def page(run: Run, tmp_path_factory: pytest.TempPathFactory) -> str:
+    folder = tmp_path_factory.mktemp("page")
+    return with_knee(run).told(folder=folder).page
+
+
+def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_direction_in_one_table(page: str) -> None:
+    for cell in (
+        "rebound",
+        "compression",
+        "1\u202f530",
+        "640",
+        "0.085",
+        "\u2212288",
+        "(\u22127\u00a0N)",
+        "\u2212410\u00a0N",
+    ):
+        assert cell in page
+    assert "21.5" in page
+    assert "Law of the element handed on" in page
+
+
+def test_the_page_does_not_call_a_knee_a_missing_effect(page: str) -> None:
+    assert "What is missing from the knee law?" in page
+    assert "Nothing was looked for" in page
+    assert "simple model fails" not in page
+    assert "library of effects does not explain" not in page
+
+
+def test_without_a_knee_law_the_page_says_nothing_of_it(run: Run, tmp_path: Path) -> None:
+    assert "knee" not in run.told(folder=tmp_path).page
+
+
+def test_the_terminal_has_the_same_table_with_a_dash_where_a_direction_is_straight() -> None:
+    found = RunSummary(Path(), Control(), (), None, (), (), None, (), knees=knees())
+    tables = dict(knee_tables(found))
+    head, rebound, compression = tables["rebound and compression, forces with the gas force at mid-stroke"]
+    assert rebound[head.index("0.131 m/s [N]")] == "-92"
+    assert rebound[head.index("0.262 m/s [N]")] == "(-7)"
+    assert rebound[head.index("knee [m/s]")].startswith("0.085 (")
+    assert compression[head.index("knee [N]")] == "-"
+    assert tables["force a click, without the gas"][1][-2:] == ["21.5", "0.4"]
+
+
+def test_a_run_without_a_knee_law_prints_no_table_of_it() -> None:
+    found = RunSummary(Path(), Control(), (), None, (), (), None, ())
+    assert all(not rows for _, rows in knee_tables(found))
