@@ -24,7 +24,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def _sources() -> list[Path]:
+def sources() -> list[Path]:
     """Every module of the damper, and every other one that compiles something."""
     package = Path(__file__).parent
     others = (path for path in package.rglob("*.py") if b"pzd.compiled import" in path.read_bytes())
@@ -36,7 +36,7 @@ def cache_folder() -> Path:
     digest = hashlib.sha256()
     for part in (sys.version, platform.machine(), numba.__version__, np.__version__):
         digest.update(part.encode())
-    for source in _sources():
+    for source in sources():
         digest.update(source.read_bytes())
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111  # Path's may raise
     for root in (Path(home), Path(tempfile.gettempdir())):

@@ -24,6 +24,7 @@ from scipy.special import ndtri
 
 from pzd.cli.app import status
 from pzd.config import load
+from pzd.damper.effects import library
 from pzd.damper.element import element_force
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -49,15 +50,17 @@ SMALL: dict[str, Any] = {
             }
         ]
     },
+    "diagnose": {"forbid": sorted(set(library()) - {"gas_spring", "orifice_quadratic"})},
     "table": {"speed_points": 8, "tolerance": 0.01},
     "simulate": {
         "roads": [{"kind": "sine", "frequency_Hz": 2.25, "amplitude_m": 0.02}],
+        "policies": ["passive", "comfort"],
         "fidelities": ["table"],
         "duration_s": 4,
         "settle_s": 2,
     },
 }
-"""A virtual rig of four records and two short rides: what the commands do, in seconds."""
+"""A virtual rig of four records, two candidates and two short rides: what the commands do, in seconds."""
 
 MISTAKES = {
     "sign: {force: -1} ": "sign: {force: 1} ",
@@ -134,8 +137,8 @@ def test_the_readme_tells_its_reader_what_to_type() -> None:
 def test_the_quick_commands_of_the_readme_run_one_after_the_other(
     clone: Callable[[str], subprocess.CompletedProcess[str]],
 ) -> None:
-    """A config that `pzd init` wrote gets the short rides too: those of its defaults take half a minute."""
-    short = yaml.safe_dump({key: SMALL[key] for key in ("table", "simulate")})
+    """A config that `pzd init` wrote gets the few candidates and short rides too: its defaults take half a minute."""
+    short = yaml.safe_dump({key: SMALL[key] for key in ("diagnose", "table", "simulate")})
     for command in typed("README.md"):
         if command not in LONG:
             done = clone(

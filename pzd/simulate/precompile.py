@@ -5,19 +5,42 @@ On a new machine this takes as long as all the stages before; a second core does
 
 from __future__ import annotations
 
+import hashlib
+import os
 import subprocess
 import sys
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from threading import Thread
+from typing import TYPE_CHECKING
 
 from pzd.artefacts import Diagnosed, ForceRow, Table, TableNotes
 from pzd.damper.model import BaseRow, Damper
 from pzd.simulate.config import SimulateConfig
 
-_MARK = "ride-compiled"
+if TYPE_CHECKING:
+    from filelock import FileLock
+
 _LOCK = "ride-compiling.lock"
+
+
+def mark(folder: Path) -> Path:
+    """The file in a folder of kernels that says that those of this copy of pzd are compiled.
+
+    Numba keeps them by path and time of their sources, so that those of another copy of the same text are no use.
+    """
+    from pzd.compiled import sources
+
+    kept_by = ((os.fspath(path), path.stat().st_mtime_ns) for path in sources())
+    return folder / f"ride-compiled-{hashlib.sha256(repr(list(kept_by)).encode()).hexdigest()[:16]}"
+
+
+def _lock(folder: Path) -> FileLock:
+    """One for all threads of a process: the ride that compiles does not wait for itself."""
+    from filelock import FileLock
+
+    return FileLock(folder / _LOCK, thread_local=False, is_singleton=True)
 
 
 @cache
@@ -29,8 +52,19 @@ def in_background() -> None:
     """
     from pzd.compiled import cache_folder
 
-    if not (cache_folder() / _MARK).exists():
+    if not mark(cache_folder()).exists():
         Thread(target=_compile, daemon=True).start()
+
+
+@cache
+def wait() -> None:
+    """Wait for the process that compiles the kernels of the ride, if there is one: twice would take as long again."""
+    from pzd.compiled import cache_folder
+
+    folder = cache_folder()
+    if not mark(folder).exists():
+        with _lock(folder):
+            pass
 
 
 def _compile() -> None:
@@ -63,12 +97,12 @@ def _steady(row: BaseRow, velocity: float) -> float:
 
 def _once(folder: Path) -> None:
     """Compile into the folder, unless it was done or another process is at it."""
-    from filelock import FileLock, Timeout
+    from filelock import Timeout
 
-    with suppress(Timeout), FileLock(folder / _LOCK, blocking=False):
-        if not (folder / _MARK).exists():
+    with suppress(Timeout), _lock(folder).acquire(blocking=False):
+        if not mark(folder).exists():
             _smallest_ride()
-            (folder / _MARK).touch()
+            mark(folder).touch()
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from pzd.simulate.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALL
 from pzd.simulate.minimise import LEAST_LOAD, TIE_BREAKS
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.plan import Case
+from pzd.simulate.precompile import wait
 from pzd.simulate.prediction.planning import LEVELS, predictor_of
 from pzd.simulate.profile import Profile
 from pzd.simulate.ride_model import (
@@ -150,6 +151,7 @@ def ride_case(
     ------
     DataError : when the ride needs the table where it ends
     """
+    wait()
     car, clock, held = config.car.car(), Clock.of(config), held or Held.of(config, grid)
     speed = config.vehicle_speed_km_per_h * KM_PER_H
     if case.fidelity == "ideal" and case.policy.aim == "damping" and profile.smooth:

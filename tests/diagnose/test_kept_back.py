@@ -8,7 +8,6 @@ from typing import cast
 import numpy as np
 import pytest
 from campaign import TABLE_2, damper_of, sine, sines
-from whole_diagnosis import diagnosed
 
 from pzd.artefacts import Prediction
 from pzd.damper.model import Damper
@@ -53,10 +52,12 @@ def test_nothing_is_fitted_to_a_kept_back_test(rng: np.random.Generator) -> None
     records[2] = replace(records[2], force=1.05 * records[2].force)
     found = predicted(tuple(records), damper_of(TWO), damper_of(TWO))
     (odd,) = (each for each in found.by if each.record == records[2].name)
-    # A gain of 5 % of one test is within the priors of nuisances, and here it is missed all the same; the other tests
-    # of its voltage were each fitted beside it, and bend a little.
-    for missed in (odd.W_s_plain, odd.W_s):
-        assert missed == pytest.approx((0.05 / 1.05) ** 2, rel=0.1)
+    # A gain of 5 % of one test is within the priors of nuisances, and here it is missed all the same; a damper fitted
+    # to this test beside the three others of its voltage would miss about half. Noise scatters the one by 0.6 %, one
+    # standard deviation. The fit that leaves each test a gain of its own sees friction and damping part by the shape
+    # of each loop alone, which scatters the other by 3 %.
+    assert odd.W_s_plain == pytest.approx((0.05 / 1.05) ** 2, rel=0.04)
+    assert odd.W_s == pytest.approx((0.05 / 1.05) ** 2, rel=0.2)
     assert found.hold_out == "tests"
     assert sorted(each.record for each in found.by) == sorted(r.name for r in records)
 
@@ -97,14 +98,6 @@ def test_too_little_to_keep_a_test_back_is_told(rng: np.random.Generator) -> Non
     asked = trials((sine(damper, 0.0, 1.0, 0.03, rng, cycles=1, rate=1000.0),), damper)
     assert asked.prediction(asked.plain_missed(), asked.missed(damper), asked.plain_missed_between) is None
     assert "too little to keep a test back" in unpredicted(None)
-
-
-def test_with_nothing_adopted_the_plain_damper_is_what_predicts(rng: np.random.Generator) -> None:
-    found = diagnosed(sines(damper_of(TWO), rng, TWO, cycles=4)).diagnosis
-    assert found.effects == ()
-    assert found.prediction is not None
-    assert found.prediction.W_s == found.prediction.W_s_plain
-    assert all(each.W_s == each.W_s_plain for each in found.prediction.by)
 
 
 # ---------------------------------------------------------------- what does harm is not handed on

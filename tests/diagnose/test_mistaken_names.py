@@ -45,7 +45,7 @@ def test_a_mean_that_creeps_is_no_gap(rng: np.random.Generator) -> None:
     def creeping(record: Record) -> Record:
         return replace(record, displacement=record.displacement + 1e-3 * record.time / record.time[-1])
 
-    records = sines(damper_of(TWO), rng, TWO, tests=LINEAR_TESTS)
+    records = sines(damper_of(TWO), rng, TWO, tests=LINEAR_TESTS, cycles=5)
     told = diagnosed(tuple(creeping(r) for r in records)).diagnosis
     assert told.verdict == "none", told.reason
 

@@ -77,7 +77,8 @@ def test_a_run_on_a_short_record_goes_to_its_end(
         header="time_s,displacement_m,force_N,voltage_V",
         comments="",
     )
-    rides = "simulate: {fidelities: [table], duration_s: 4, settle_s: 2, roads: [{kind: sine, frequency_Hz: 2.25}]}\n"
+    rides = "simulate: {policies: [passive], fidelities: [table], duration_s: 4, settle_s: 2,\n"
+    rides += "  roads: [{kind: sine, frequency_Hz: 2.25}]}\n"
     (tmp_path / "short.yaml").write_text(f"rig:\n  files:\n    - path: short.csv\n{rides}")
     ended = pzd("run", "short.yaml", cwd=tmp_path)
     assert ended.stderr == ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from pzd.artefacts import Diagnosed, Rig
+from pzd.damper.effects import library
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.stage import diagnose
 from pzd.identify.config import IdentifyConfig
@@ -15,6 +16,11 @@ from pzd.rig.config import FilesEntry, RigConfig
 
 STAND = RigConfig(files=(FilesEntry(path="*.csv"),))
 """A rig whose files say nothing of the stand."""
+
+
+def all_but(*effects: str) -> tuple[str, ...]:
+    """What to forbid where the claim needs few candidates: most of a diagnosis is their fits."""
+    return tuple(sorted(set(library()) - set(effects)))
 
 
 def diagnosed(records: Iterable[Record], jobs: int = 2, **config: object) -> Diagnosed:

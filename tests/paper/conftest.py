@@ -39,7 +39,8 @@ def rides(config: RunConfig, rig: Rig, identified: Identified) -> Rides:
     damper = base_of(identified.rows, config.setting)
     diagnosed = Diagnosed(Diagnosis.model_construct(), damper, damper)
     table = tabulate(config.table, rig, diagnosed, Control(), config.setting)
-    return simulate(config.simulate, diagnosed, table, config.seed, Path())
+    of_the_paper = config.simulate.model_copy(update={"policies": ("constant", "comfort")})  # the paper knows no other
+    return simulate(of_the_paper, diagnosed, table, config.seed, Path())
 
 
 @pytest.fixture(scope="package")

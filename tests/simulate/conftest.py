@@ -19,8 +19,15 @@ from pzd.simulate.dampers import dynamic_damper_of, grid_of
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
+from pzd.simulate.precompile import wait
 from pzd.simulate.riding import ride_case
 from pzd.simulate.road import Way
+
+
+@pytest.fixture(scope="session", autouse=True)
+def ride_compiled(kernels_compiled_once: None) -> None:
+    """What a test calls of the ride by itself waits for its kernels as a ride does."""
+    wait()
 
 
 @pytest.fixture(scope="session")

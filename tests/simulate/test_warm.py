@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import threading
@@ -36,6 +37,38 @@ def test_a_second_process_leaves_the_compiling_to_the_first(rides: list[str], tm
     assert rides == ["ride"]
 
 
+def test_a_ride_waits_for_the_process_that_compiles_and_not_for_itself(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(warm, "_smallest_ride", warm.wait.__wrapped__)
+    warm._once(tmp_path)  # would never end
+    assert warm.mark(tmp_path).exists()
+    warm.mark(tmp_path).unlink()
+    waiting = threading.Thread(target=warm.wait.__wrapped__)
+    with FileLock(tmp_path / warm._LOCK):
+        waiting.start()
+        waiting.join(0.2)
+        assert waiting.is_alive()
+    waiting.join(60.0)
+    assert not waiting.is_alive()
+
+
+def test_what_another_copy_of_pzd_compiled_is_no_use(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    source = tmp_path / "law.py"
+    monkeypatch.setattr(compiled, "sources", lambda: [source])
+    marks = set()
+    for changed in (1, 2):
+        source.touch()
+        os.utime(source, (changed, changed))
+        marks.add(warm.mark(tmp_path))
+    monkeypatch.setattr(compiled, "sources", lambda: [tmp_path / "copy" / "law.py"])
+    (tmp_path / "copy").mkdir()
+    (tmp_path / "copy" / "law.py").touch()
+    os.utime(tmp_path / "copy" / "law.py", (2, 2))
+    assert len(marks | {warm.mark(tmp_path)}) == 3
+
+
 def test_a_command_starts_one_process_and_reaps_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     begun: list[subprocess.Popen[bytes]] = []
 
@@ -53,7 +86,7 @@ def test_a_command_starts_one_process_and_reaps_it(monkeypatch: pytest.MonkeyPat
     for thread in set(threading.enumerate()) - before:
         thread.join(60.0)
     assert [process.returncode for process in begun] == [0]
-    (tmp_path / warm._MARK).touch()
+    warm.mark(tmp_path).touch()
     warm.in_background.cache_clear()
     warm.in_background()
     assert len(begun) == 1
