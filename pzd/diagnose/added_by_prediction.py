@@ -10,7 +10,7 @@ values there is none. That makes no name of it: the verdict stays `unexplained`.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from pzd.damper.effects import library
@@ -64,7 +64,7 @@ def with_predictive_effects(
     added: list[Candidate] = []
     at = trials.fitted_by_criterion(selection.fitted.damper, trials.nothing)
     while at is not None and trials.campaign.work.may_go_on():
-        found = _best(*at, (missed, between), trials, config)
+        found = _best(*at, (missed, between), trials, config, selection.adopted)
         if found is None:
             break
         chosen, missed, between = found
@@ -89,10 +89,15 @@ def _in_words(added: Candidate) -> str:
 
 
 def _best(
-    problem: Problem, fitted: Fitted, before: tuple[Missed, Missed], trials: Trials, config: DiagnoseConfig
+    problem: Problem,
+    fitted: Fitted,
+    before: tuple[Missed, Missed],
+    trials: Trials,
+    config: DiagnoseConfig,
+    adopted: Sequence[str],
 ) -> tuple[Candidate, Missed, Missed] | None:
     """Of the candidates that fit best, the one that predicts best; None where none predicts better than without it."""
-    promising = sorted(_tried(problem, fitted, config), key=lambda c: c.delta_bic)[:PREDICTED_AT_ONCE]
+    promising = sorted(_tried(problem, fitted, config, adopted), key=lambda c: c.delta_bic)[:PREDICTED_AT_ONCE]
     better = []
     for each in promising:
         predicted = trials.missed_by_criterion(each.fitted.damper)
@@ -105,14 +110,14 @@ def _best(
     return None
 
 
-def _tried(problem: Problem, fitted: Fitted, config: DiagnoseConfig) -> Iterator[Candidate]:
+def _tried(problem: Problem, fitted: Fitted, config: DiagnoseConfig, adopted: Sequence[str]) -> Iterator[Candidate]:
     """Candidates that are possible: a new effect each, or an adopted one with its parameters by voltage.
 
     What a sensor shows is not tried: no ride feels it, and a delay fits any hysteresis a little. Nor is what begins at
     some displacement: it would grow beyond the recorded stroke, where no test shows it.
     """
     found: list[Candidate] = by_voltage(problem, fitted)
-    if len(fitted.effects) < config.most_effects:
+    if len({*fitted.effects} - {*adopted}) < config.most_added:
         new = [
             effect
             for effect in library().values()

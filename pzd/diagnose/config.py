@@ -27,6 +27,8 @@ class DiagnoseConfig(Frozen):
     """Effects whose criterion lies within this of the best are its rivals."""
     most_effects: int = Field(default=3, ge=1, le=5)
     """Most effects adopted one after another."""
+    most_added: int = Field(default=3, ge=0, le=5)
+    """Most effects added beside them, where a gap has no name, with which kept-back tests are predicted better."""
     most_evaluations: float = Field(default=1e10, gt=0.0)
     """Forces (one a sample) that the search may compute before it ends with what it knows and says so. It is work, not
     time, so that the same tests give the same result. One takes 0.1 to 3 us on one core."""

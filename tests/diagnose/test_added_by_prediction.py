@@ -64,7 +64,7 @@ def test_a_branch_that_no_verdict_names_is_added_with_its_values(rng: np.random.
     """Looked for by voltage, in proportion to T0: 301 N and 1325 N."""
     by_voltage_V = {"T0_2": (150.0, 500.0), "k_2": (3e4, 8e4), "at_voltage_V": TWO}
     records = records_of(damper_of(TWO).with_effect("second_branch", by_voltage_V), rng)
-    found, before = extended(records, DiagnoseConfig(most_effects=1))
+    found, before = extended(records, DiagnoseConfig(most_added=1))
     assert found is not None
     assert found.added == ("second_branch by voltage",)
     assert found.selection.reasons["second_branch"] == ADDED
@@ -100,7 +100,7 @@ def test_nothing_is_added_to_a_damper_that_lacks_nothing(rng: np.random.Generato
 def test_no_more_is_added_than_the_config_allows_nor_what_it_forbids(rng: np.random.Generator) -> None:
     truth = damper_of(TWO, preload_offset={"F_0": 150.0}, gas_spring={"k_g": 8000.0})
     records = records_of(truth, rng)
-    found, _ = extended(records, DiagnoseConfig(most_effects=1, forbid=all_but("preload_offset", "gas_spring")))
+    found, _ = extended(records, DiagnoseConfig(most_added=1, forbid=all_but("preload_offset", "gas_spring")))
     assert found is not None
     assert len(found.added) == 1
     found, _ = extended(records, DiagnoseConfig(forbid=all_but("gas_spring")))
@@ -133,7 +133,7 @@ def test_what_is_worse_between_the_voltages_is_not_added(
         ("preload_offset",),
         evidence.whole.start_with(truth.with_effect("preload_offset", {"F_0": 10.0})),
     )
-    config = DiagnoseConfig(most_effects=1)
+    config = DiagnoseConfig(most_added=1)
     trials = trials_of(campaign, plain.damper, config.visible)
     selection = Selection(plain, fitted, (), {"preload_offset": "adopted"}, evidence, evidence)
     missed = trials.missed_by_criterion(fitted.damper)
