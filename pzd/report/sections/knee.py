@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from pzd.artefacts import ClickRow
-from pzd.artefacts.knee import DirectionOfCondition
+from pzd.artefacts.knee import DIRECTIONS, OF_A_DIRECTION, DirectionOfCondition
 from pzd.report.blocks import Block, Paragraph, TextTable
 from pzd.report.context import ReportContext
 from pzd.report.wording import DASH, amount, interval, number, sentence
@@ -23,47 +23,60 @@ def trade_blocks(context: ReportContext) -> Iterator[Block]:
         f"{row.setting}: {row.law}, {row.reason}" if row.setting else f"{row.law}, {row.reason}" for row in knees.laws
     ]
     yield Paragraph(f"Law of the element handed on: {sentence('; '.join(laws))}")
-    yield _trade(context)
+    yield _forces(context)
+    yield _parameters(context)
+    yield _of_both(context)
     if knees.clicks:
         yield _clicks(context, knees.clicks)
     yield _kept_back(context)
 
 
-def _trade(context: ReportContext) -> TextTable:
-    """Force at the trade's speeds, and the parameters of the law."""
+def _forces(context: ReportContext) -> TextTable:
+    """Force at the trade's speeds."""
     knees = context.identified.knees
-    header = (
-        *_header(context),
-        "direction",
-        *(f"at {amount(v, 'm/s')}" for v in knees.speeds),
-        *(
-            "bleed [N s/m]",
-            "knee [N]",
-            "knee [m/s]",
-            "blow-off [N s/m]",
-            "gas force [N]",
-            "seal friction [N]",
-            "status",
-        ),
-    )
-    rows = tuple(_direction(context, each) for each in knees.directions())
+    header = (*_header(context), "direction", *(f"at {amount(v, 'm/s')}" for v in knees.speeds))
+    rows = []
+    for each in knees.directions():
+        told = [amount(force, "N") for force in each.forces]
+        inside = zip(told, each.inside, strict=True)
+        rows.append((*_direction(context, each), *(t if known or t == DASH else f"({t})" for t, known in inside)))
     title = (
         "Force at the speeds of the trade, as a rig records it with the gas force at mid-stroke, in brackets beyond "
-        "what the tests reached; bleed, knee (with friction, without gas) and blow-off with 95 % intervals"
+        "what the tests reached"
     )
+    return TextTable(title, header, tuple(rows)).without_empty(context.control.name, *_CONDITION)
+
+
+def _parameters(context: ReportContext) -> TextTable:
+    """Bleed, knee and blow-off of either direction."""
+    header = (*_header(context), "direction", "bleed [N s/m]", "knee [N]", "knee [m/s]", "blow-off [N s/m]")
+    rows = tuple(
+        (*_direction(context, each), *(interval(*bounds) for bounds in each.intervals[: len(OF_A_DIRECTION)]))
+        for each in context.identified.knees.directions()
+    )
+    title = "Bleed, knee (with friction, without gas) and blow-off with 95 % intervals"
+    return TextTable(title, header, rows).without_empty(context.control.name, *_CONDITION)
+
+
+def _of_both(context: ReportContext) -> TextTable:
+    """Gas and friction, which both directions share, and how far all of it is to be trusted."""
+    header = (*_header(context), "gas force [N]", "seal friction [N]", "status")
+    rows = tuple(
+        (
+            *_place(context, each.row.setting, each.row.voltage_V, each.row.temperature_degC),
+            *(interval(*bounds) for bounds in each.intervals[len(OF_A_DIRECTION) :]),
+            each.row.status,
+        )
+        for each in context.identified.knees.directions()
+        if each.direction == DIRECTIONS[0]
+    )
+    title = "Gas force at mid-stroke and seal friction with 95 % intervals, and the status of the condition"
     return TextTable(title, header, rows).without_empty(context.control.name, *_CONDITION)
 
 
 def _direction(context: ReportContext, each: DirectionOfCondition) -> tuple[str, ...]:
-    forces = [amount(force, "N") for force in each.forces]
     row = each.row
-    return (
-        *_place(context, row.setting, row.voltage_V, row.temperature_degC),
-        each.direction,
-        *(text if inside or text == DASH else f"({text})" for text, inside in zip(forces, each.inside, strict=True)),
-        *(interval(*bounds) for bounds in each.intervals),
-        row.status if each.direction == "rebound" else "as in rebound",
-    )
+    return *_place(context, row.setting, row.voltage_V, row.temperature_degC), each.direction
 
 
 def _clicks(context: ReportContext, clicks: Sequence[ClickRow]) -> TextTable:
