@@ -17,6 +17,8 @@ from pzd.compiled import compiled, inlined
 
 STAGES = (0.5, 0.9)
 """Share of the step at which the two stages stand; 0.9 follows from 0.5 by the conditions of order 5."""
+COUPLING = (27.0 / 25.0, 729.0 / 125.0)
+"""What the second stage takes of what the first one shows, by phi_3 at either stage's share of Z."""
 _SMALL = 1.0  # below it the series is used: the recursion loses digits like |z|^-4
 _CAUTION = 2.0  # the stages, of lower order than the whole, miss about as much again
 _CHANCE = 1e-3  # at a tolerance of 1e-9 the error of order 4 is about so much of that of order 3

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from pzd.compiled import compiled, inlined
 from pzd.damper.element import relaxation, slip
-from pzd.damper.exponential import STAGES, bend, end_corrected, phi
+from pzd.damper.exponential import COUPLING, STAGES, bend, end_corrected, phi
 from pzd.damper.flow import (
     breakaway,
     relief_slope,
@@ -96,16 +96,16 @@ def _exponential(
     by_y, by_time = _slopes(y, rate, w, at, dt, regime, side, step, explicit)
     z, c, d = by_y * dt, STAGES[0], STAGES[1]
     over, half, late = phi(z), phi(c * z), phi(d * z)
-    bent, drift = rate * dt, by_time * dt * dt
-    first = y + c * bent * half.one + c * c * drift * half.two
+    way, drift = rate * dt, by_time * dt * dt
+    first = y + c * way * half.one + c * c * drift * half.two
     beside = _rate(first, w, at + c * dt, regime, side, step, explicit) - rate
     beside -= by_y * (first - y) + by_time * c * dt
-    second = y + d * bent * late.one + d * d * drift * late.two
-    second += dt * beside * (27.0 / 25.0 * half.three + 729.0 / 125.0 * late.three)
+    second = y + d * way * late.one + d * d * drift * late.two
+    second += dt * beside * (COUPLING[0] * half.three + COUPLING[1] * late.three)
     later = _rate(second, w, at + d * dt, regime, side, step, explicit) - rate
     later -= by_y * (second - y) + by_time * d * dt
     a, b = bend(beside, later)
-    end = y + bent * over.one + drift * over.two + dt * (2.0 * a * over.three + 6.0 * b * over.four)
+    end = y + way * over.one + drift * over.two + dt * (2.0 * a * over.three + 6.0 * b * over.four)
     last = _rate(end, w, at + dt, regime, side, step, explicit) - rate - by_y * (end - y) - by_time * dt
     added, error = end_corrected(a, b, last, over)
     return end + dt * added, dt * error
