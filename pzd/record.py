@@ -131,6 +131,12 @@ def without_glitches(values: Array) -> Array:
     return np.delete(values, rows) if rows.size else values
 
 
+def mid_stroke(displacements: Iterable[Array]) -> float:
+    """Middle between the ends of what several tests reached [m], of their displacements (n,) as recorded."""
+    ends = [end(displacement) for displacement in displacements for end in (np.min, np.max)]
+    return 0.5 * float(min(ends) + max(ends))
+
+
 def voltage_scale(records: Iterable[Record]) -> float:
     """The larger of the rig's voltage span and its largest magnitude [V], glitches aside; 0 without voltages."""
     voltages = [without_glitches(record.voltage) for record in records if record.voltage is not None]

@@ -12,6 +12,7 @@ from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.work import Work
 from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
+from pzd.record import mid_stroke
 from pzd.rig.config import RigConfig
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def diagnose(
     from pzd.diagnose.base_parameters import base_parameters
     from pzd.diagnose.campaign import Campaign
     from pzd.diagnose.conclusion import concluded
-    from pzd.diagnose.data.cleaning import about, mid_stroke, prepare
+    from pzd.diagnose.data.cleaning import about, prepare
     from pzd.diagnose.data.exclusions import whole_records
     from pzd.diagnose.data.split import split
     from pzd.diagnose.held_out import held_out_gap
@@ -70,7 +71,7 @@ def diagnose(
         return as_fitted(identified, setting, diagnose)
     records, cut_off = whole_records(rig, setting)
     recorded = prepare(records)
-    prepared = about(recorded, zero := mid_stroke(recorded))
+    prepared = about(recorded, zero := mid_stroke(each.record.displacement for each in recorded))
     parts = split(prepared, identify.group.voltage_V, identify.group.temperature_degC)
     plain = base_of(identified.rows, setting)
     campaign = Campaign(prepared, parts, diagnose.nuisance, jobs, Work(diagnose.most_evaluations))

@@ -20,7 +20,7 @@ from pzd.identify.intervals import half_widths
 from pzd.identify.misfit import misfit_of
 from pzd.identify.objective import Fit, Objective
 from pzd.identify.part import parts_of
-from pzd.record import SAME_TEMPERATURE, Array, Record
+from pzd.record import SAME_TEMPERATURE, Array, Record, mid_stroke
 from pzd.signals.nuisance import NuisanceConfig
 
 WORTH_A_LOOK = 0.0025
@@ -44,8 +44,7 @@ class Auxiliary:
 
 def columns_of(objective: Objective) -> tuple[Array, float]:
     """(N, 2) forces of F_0 = 1 N and k_g = 1 N/m at the counted samples, and the middle of the motion [m]."""
-    ends = [end(t.displacement) for t in objective.trials for end in (np.min, np.max)]
-    middle = 0.5 * float(min(ends) + max(ends))
+    middle = mid_stroke(t.displacement for t in objective.trials)
     x = np.concatenate([t.at_samples(t.displacement)[t.counted] for t in objective.trials]) - middle
     return np.column_stack([np.ones(x.size), x]), middle
 

@@ -70,12 +70,6 @@ class Prepared:
         return 0 if self.lead is None else self.lead.time.size - self.record.time.size
 
 
-def mid_stroke(prepared: Sequence[Prepared]) -> float:
-    """Middle between the ends of what all the records reached [m]."""
-    ends = [end(p.record.displacement) for p in prepared for end in (np.min, np.max)]
-    return 0.5 * float(min(ends) + max(ends))
-
-
 def about(prepared: Sequence[Prepared], zero: float) -> tuple[Prepared, ...]:
     """The same with the displacement counted from another zero [m]."""
 

@@ -12,7 +12,7 @@ from pzd.damper.compose import constant_rows, integrated_force, sampling_steps
 from pzd.damper.motion import Motion
 from pzd.identify.knee.curve import KneeCurve
 from pzd.identify.trial import in_motion
-from pzd.record import Array, Mask, Record
+from pzd.record import Array, Mask, Record, mid_stroke
 
 TOLERANCE = 1e-6
 """Admissible error of a piece of the path, as a share of the force; between its corners the law is in closed form."""
@@ -61,8 +61,7 @@ class Tests:
     @classmethod
     def of(cls, records: Sequence[Record]) -> Tests:
         """The tests, the displacement counted from the middle of their motion."""
-        ends = [end(r.displacement) for r in records for end in (np.min, np.max)]
-        middle = 0.5 * float(min(ends) + max(ends))
+        middle = mid_stroke(r.displacement for r in records)
         found = (Test(r, Motion.of(r).about(middle), sampling_steps(r.time), in_motion(r)) for r in records)
         return cls(tuple(found), middle)
 
