@@ -125,6 +125,23 @@ def control_of(data: Any) -> Control:
         return Control()
 
 
+def check_settings(config: RunConfig, found: Sequence[str | None]) -> str | None:
+    """The setting in use, after a look at the settings that the table is to hold besides.
+
+    Parameters
+    ----------
+    config : the config
+    found : the settings of the rig's records
+
+    Raises
+    ------
+    ConfigError : as `setting_in_use` does, and when a setting of the table does not lie between tested ones
+    """
+    chosen = setting_in_use(config.setting, found)
+    config.table.between(found)
+    return chosen
+
+
 def setting_in_use(chosen: str | None, found: Sequence[str | None]) -> str | None:
     """The setting that diagnose and everything behind it use.
 

@@ -54,7 +54,7 @@ from pzd.artefacts.rides import (
     WheelRow,
 )
 from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig, extent
-from pzd.artefacts.table import ForceRow, InverseRow, Table, TableNotes
+from pzd.artefacts.table import ForceRow, InverseRow, SettingLeftOutRow, SettingRow, Table, TableNotes
 
 Artefact = Rig | Identified | Diagnosed | Table | Rides | Report
 
@@ -103,6 +103,8 @@ __all__ = [
     "RideRow",
     "Rides",
     "Rig",
+    "SettingLeftOutRow",
+    "SettingRow",
     "SpectrumRow",
     "StepRow",
     "SummaryRow",
