@@ -59,7 +59,7 @@ def numbers_in(setting: str | None) -> tuple[NumberedSetting, ...]:
 
 
 def on_axis(axis: str, tested: Sequence[str | None]) -> tuple[NumberedSetting, ...]:
-    """The tested settings on an axis, by rising number; `gap 0.2 mm` and `gap 0.20 mm` count once, the first of them."""
+    """The tested settings on an axis, by rising number; `gap 0.2 mm` and `gap 0.20 mm` count once."""
     found: dict[float, NumberedSetting] = {}
     for name in sorted({name for name in tested if name is not None}):
         for one in numbers_in(name):
@@ -92,11 +92,11 @@ def neighbours(wanted: str, tested: Sequence[str | None]) -> Neighbours:
         beyond = beyond or line
     if beyond:
         raise ValueError(
-            f"must lie between {beyond[0].setting} and {beyond[-1].setting}, which were tested: nothing is extrapolated "
-            f"(got {wanted})"
+            f"must lie between {beyond[0].setting} and {beyond[-1].setting}, which were tested: nothing is "
+            f"extrapolated (got {wanted})"
         )
     names = ", ".join(sorted({name for name in tested if name is not None})) or "none that has a name"
     raise ValueError(
-        f"no two tested settings differ from it by one number alone, as gap 0.15 mm and gap 0.25 mm do from gap 0.2 mm; "
-        f"tested: {names} (got {wanted})"
+        f"no two tested settings differ from it by one number alone, as gap 0.15 mm and gap 0.25 mm do from gap "
+        f"0.2 mm; tested: {names} (got {wanted})"
     )

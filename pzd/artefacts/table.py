@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal, Self
@@ -67,6 +68,20 @@ class SettingLeftOutRow(Frozen):
     largest_share_of_peak: float = Field(ge=0.0)
 
 
+def fastest(rows: Sequence[SettingRow]) -> tuple[tuple[SettingRow, SettingRow], ...]:
+    """The rows of the largest speed in rebound and in compression, of each setting, temperature and control signal.
+
+    Parameters
+    ----------
+    rows : of `settings.csv`
+    """
+    found: dict[tuple[str, float | None, float | None], list[SettingRow]] = {}
+    for row in rows:
+        found.setdefault((row.setting, row.temperature_degC, row.voltage_V), []).append(row)
+    ordered = [sorted(mine, key=lambda row: row.velocity_m_per_s) for mine in found.values()]
+    return tuple((mine[-1], mine[0]) for mine in ordered)
+
+
 class TableNotes(Frozen):
     """What the table cannot carry, and where it had to decide."""
 
@@ -95,7 +110,7 @@ class Table:
     """What to think of them, where three settings or more were tested."""
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write force.csv, inverse.csv and notes.json; settings.csv and settings_left_out.csv where they are asked for."""
+        """Write force.csv, inverse.csv and notes.json; settings.csv and settings_left_out.csv where there are any."""
         write_rows(folder / "force.csv", ForceRow, self.force, control)
         write_rows(folder / "inverse.csv", InverseRow, self.inverse, control)
         write_json(folder / "notes.json", self.notes, control)
@@ -114,9 +129,7 @@ class Table:
         )
 
     @staticmethod
-    def read_settings(
-        folder: Path, control: Control
-    ) -> tuple[tuple[SettingRow, ...], tuple[SettingLeftOutRow, ...]]:
+    def read_settings(folder: Path, control: Control) -> tuple[tuple[SettingRow, ...], tuple[SettingLeftOutRow, ...]]:
         """The force at settings between tested ones, and how well left-out ones are predicted; none where not asked."""
         if not (folder / "settings.csv").is_file():
             return (), ()

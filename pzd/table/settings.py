@@ -138,9 +138,7 @@ def _rows(
     return found
 
 
-def _left_out(
-    config: TableConfig, one: Neighbours, tested: Callable[[str], TestedSetting]
-) -> SettingLeftOutRow | None:
+def _left_out(config: TableConfig, one: Neighbours, tested: Callable[[str], TestedSetting]) -> SettingLeftOutRow | None:
     """None where the three were tested at nothing in common."""
     lower, middle, upper = (tested(each.setting) for each in (one.lower, one.wanted, one.upper))
     three = (lower, middle, upper)
