@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
 
 from pzd.blind.config import BlindConfig
 from pzd.diagnose.config import DiagnoseConfig
@@ -28,8 +28,22 @@ WITHOUT_CAR: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "r
 """What `stages` of a config may say."""
 
 
+def _rig_may_stand_elsewhere(schema: dict[str, Any]) -> None:
+    """Ask for `rig` only where the config extends no other one, in which it may stand."""
+    del schema["required"]
+    schema["anyOf"] = [{"required": ["rig"]}, {"required": ["extends"]}]
+
+
+SCHEMA = Path(__file__).with_name("config.schema.json")
+"""What `pzd schema` prints, as a file that editors read; `pzd schema > pzd/config.schema.json` makes it anew."""
+EDITORS = "# yaml-language-server: $schema="
+"""How the first line of a config names its schema to an editor."""
+
+
 class RunConfig(Frozen):
     """One run: rig files in, comfort report out."""
+
+    model_config = ConfigDict(json_schema_extra=_rig_may_stand_elsewhere)
 
     extends: str | None = None
     """A config beside this one that says what this one does not."""
