@@ -101,7 +101,7 @@ def test_neighbours_that_were_tested_at_nothing_in_common_are_refused_by_place()
 
 
 def test_a_setting_whose_force_is_linear_in_its_number_is_predicted_without_error() -> None:
-    tests = tested(("click 0", 1000.0), ("click 4", 1400.0), ("click 8", 1800.0))
+    tests = steady(("click 0", 1000.0), ("click 4", 1400.0), ("click 8", 1800.0))
     _, (left_out,) = found(tests, ["click 6"])
     assert (left_out.lower_setting, left_out.setting, left_out.upper_setting) == ("click 0", "click 4", "click 8")
     assert left_out.largest_share_of_peak < 1e-12

@@ -30,8 +30,8 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Step:
-    """From one position on an axis to the next one at one speed; rises are those of the magnitude of a force [N]."""
+class Rise:
+    """By how much magnitudes of the force rise from one position on an axis to the next one, at one speed [N]."""
 
     axis: Axis
     low: float
@@ -59,17 +59,17 @@ def clicks(forces: Sequence[KneeForceRow], control: Control) -> tuple[ClickRow, 
     """
     return tuple(
         ClickRow(
-            setting=step.axis.setting,
-            voltage_V=step.axis.voltage,
-            temperature_degC=step.before.temperature_degC,
-            from_click=step.low,
-            to_click=step.high,
-            velocity_m_per_s=step.before.velocity_m_per_s,
-            rebound_N_per_click=step.rebound / step.way,
-            compression_N_per_click=step.compression / step.way,
+            setting=rise.axis.setting,
+            voltage_V=rise.axis.voltage,
+            temperature_degC=rise.before.temperature_degC,
+            from_click=rise.low,
+            to_click=rise.high,
+            velocity_m_per_s=rise.before.velocity_m_per_s,
+            rebound_N_per_click=rise.rebound / rise.way,
+            compression_N_per_click=rise.compression / rise.way,
         )
-        for step in _steps(forces, control)
-        if not step.axis.unit
+        for rise in _rises(forces, control)
+        if not rise.axis.unit
     )
 
 
@@ -83,23 +83,23 @@ def per_unit(forces: Sequence[KneeForceRow], control: Control) -> tuple[UnitRow,
     """
     return tuple(
         UnitRow(
-            setting=step.axis.setting,
-            voltage_V=step.axis.voltage,
-            temperature_degC=step.before.temperature_degC,
-            unit=step.axis.unit,
-            from_value=step.low,
-            to_value=step.high,
-            velocity_m_per_s=step.before.velocity_m_per_s,
-            rebound_N_per_unit=step.rebound / step.way,
-            compression_N_per_unit=step.compression / step.way,
-            gas_force_N_per_unit=step.gas / step.way,
+            setting=rise.axis.setting,
+            voltage_V=rise.axis.voltage,
+            temperature_degC=rise.before.temperature_degC,
+            unit=rise.axis.unit,
+            from_value=rise.low,
+            to_value=rise.high,
+            velocity_m_per_s=rise.before.velocity_m_per_s,
+            rebound_N_per_unit=rise.rebound / rise.way,
+            compression_N_per_unit=rise.compression / rise.way,
+            gas_force_N_per_unit=rise.gas / rise.way,
         )
-        for step in _steps(forces, control)
-        if step.axis.unit
+        for rise in _rises(forces, control)
+        if rise.axis.unit
     )
 
 
-def _steps(forces: Sequence[KneeForceRow], control: Control) -> Iterator[Step]:
+def _rises(forces: Sequence[KneeForceRow], control: Control) -> Iterator[Rise]:
     for axis, rows in _axes(forces, control).items():
         yield from _of_one(axis, rows)
 
@@ -117,7 +117,7 @@ def _axes(forces: Sequence[KneeForceRow], control: Control) -> dict[Axis, list[t
     return found
 
 
-def _of_one(axis: Axis, rows: Sequence[tuple[float, KneeForceRow]]) -> Iterator[Step]:
+def _of_one(axis: Axis, rows: Sequence[tuple[float, KneeForceRow]]) -> Iterator[Rise]:
     """The rows of one axis: by temperature and speed, from one position to the next."""
     groups: dict[Hashable, list[tuple[float, KneeForceRow]]] = defaultdict(list)
     first: float | None = None
@@ -131,7 +131,7 @@ def _of_one(axis: Axis, rows: Sequence[tuple[float, KneeForceRow]]) -> Iterator[
             if high > low:
                 rebound = [row.rebound_force_N - row.gas_force_N for row in (before, after)]
                 compression = [row.gas_force_N - row.compression_force_N for row in (before, after)]
-                yield Step(
+                yield Rise(
                     axis,
                     low,
                     high,
