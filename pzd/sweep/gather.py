@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import groupby
 from pathlib import Path
 
@@ -98,6 +99,7 @@ class Results:
             found += [{**own, **row} for row in self._by_task[task.number].rows]
         return found
 
+    @cached_property
     def spread(self) -> tuple[SpreadRow, ...]:
         """Every measure over the independent draws of each combination."""
         return tuple(
@@ -117,6 +119,7 @@ class Results:
             if values.size
         )
 
+    @cached_property
     def indices(self) -> tuple[IndexRow, ...]:
         """Sobol indices of every measure that varies, for combinations of which no run failed.
 
@@ -142,9 +145,9 @@ class Results:
             func={"f_A": parts[0], "f_B": parts[1], "f_AB": parts[2:]}, n=n, rng=np.random.default_rng(self.seed)
         )
         sure = found.bootstrap(confidence_level=0.95, n_resamples=RESAMPLES)
-        # The stubs take an interval for two numbers; they are two arrays (s, d).
+        # With one measure each is (d,).
         first, total = (
-            (np.asarray(each.confidence_interval.low), np.asarray(each.confidence_interval.high))
+            (np.ravel(each.confidence_interval.low), np.ravel(each.confidence_interval.high))
             for each in (sure.first_order, sure.total_order)
         )
         combination, about, measure = labels
@@ -154,12 +157,12 @@ class Results:
                 about=about,
                 measure=measure,
                 quantity=name,
-                first_order=float(found.first_order[0, i]),
-                first_order_low95=float(first[0][0, i]),
-                first_order_high95=float(first[1][0, i]),
-                total_order=float(found.total_order[0, i]),
-                total_order_low95=float(total[0][0, i]),
-                total_order_high95=float(total[1][0, i]),
+                first_order=float(np.ravel(found.first_order)[i]),
+                first_order_low95=float(first[0][i]),
+                first_order_high95=float(first[1][i]),
+                total_order=float(np.ravel(found.total_order)[i]),
+                total_order_low95=float(total[0][i]),
+                total_order_high95=float(total[1][i]),
             )
             for i, name in enumerate(names)
         ]
@@ -220,8 +223,8 @@ def write(results: Results, folder: Path, control: Control) -> None:
     rows = results.rows()
     columns = list(dict.fromkeys(key for row in rows for key in row)) or ["task"]
     _write_table(folder / "results.csv", columns, rows, control)
-    write_rows(folder / "spread.csv", SpreadRow, results.spread(), control)
-    write_rows(folder / "sensitivity.csv", IndexRow, results.indices(), control)
+    write_rows(folder / "spread.csv", SpreadRow, results.spread, control)
+    write_rows(folder / "sensitivity.csv", IndexRow, results.indices, control)
     write_rows(folder / "failed.csv", FailedRow, results.failed, control)
     _write_parquet(folder / "results.parquet", columns, rows, control)
 
