@@ -123,7 +123,9 @@ def show(
     _section(
         output,
         "diagnosis",
-        [[line] for line in diagnosis_lines(found.diagnosis, found.control)] if found.diagnosis else [],
+        [[line] for line in diagnosis_lines(found.diagnosis, found.control, hypotheses=found.hypotheses)]
+        if found.diagnosis
+        else [],
     )
     _section(output, "rides", _rides(found))
     _section(output, "assumed, since the config does not say it", [[line] for line in found.assumed])

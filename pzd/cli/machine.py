@@ -23,6 +23,7 @@ def run_as_data(run: RunSummary) -> dict[str, Any]:
         "knee": vars(run.knees),
         "parameters": run.parameters,
         "diagnosis": run.diagnosis,
+        "hypotheses": run.hypotheses.rows,
         "rides": run.summary,
         "assumed": run.assumed,
         "comfort": run.comfort,

@@ -11,6 +11,7 @@ from pzd.artefacts import (
     ComfortRow,
     Diagnosed,
     Diagnosis,
+    Hypotheses,
     Identified,
     Knees,
     ParameterRow,
@@ -51,6 +52,8 @@ class RunSummary:
     """What the tests show without any model."""
     knees: Knees = field(default_factory=Knees)
     """The knee law, where the config asks for it."""
+    hypotheses: Hypotheses = field(default_factory=Hypotheses)
+    """Which shape what is left has, where the verdict is `unexplained`."""
 
 
 def page_of(run: Run) -> Path:
@@ -74,18 +77,20 @@ def run_summary(run: Run) -> RunSummary:
     control = control_of(read_yaml(at / CONFIG).data) if (at / CONFIG).is_file() else run.control
     run = replace(run, control=control)
     identified = run.read(Identified) if Identified in there else Identified((), ())
+    diagnosed = run.read(Diagnosed) if Diagnosed in there else None
     comfort = at / Report.folder / "comfort.csv"
     return RunSummary(
         at,
         control,
         identified.rows,
-        run.read(Diagnosed).diagnosis if Diagnosed in there else None,
+        diagnosed.diagnosis if diagnosed else None,
         read_rows(at / Rides.folder / "summary.csv", SummaryRow, control) if Rides in there else (),
         read_rows(comfort, ComfortRow, control) if Report in there else (),
         page_of(run) if Report in there else None,
         tuple(dict.fromkeys(mark for manifest in manifests.values() if manifest for mark in manifest.marks)),
         characteristics=identified.characteristics,
         knees=identified.knees,
+        hypotheses=diagnosed.hypotheses if diagnosed else Hypotheses(),
     )
 
 
