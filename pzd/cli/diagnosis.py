@@ -17,7 +17,7 @@ _VERDICTS = {
 }
 _MOST = 3
 """How many places and candidates are listed."""
-_TOLD = 2
+_MOST_SHAPES = 2
 """How many shapes of what is left, each by itself."""
 NONE_SOUGHT = Hypotheses()
 
@@ -117,7 +117,7 @@ def _hypotheses(found: Hypotheses) -> Iterator[str]:
     """The best shapes of what is left, and what stands beside the best; nothing where none was looked for."""
     if found.sought and not found.rows:
         yield "hypothesis: none, no shape of what is left predicts tests kept back beyond two standard errors"
-    for row in found.alone[:_TOLD]:
+    for row in found.alone[:_MOST_SHAPES]:
         yield f"{'hypothesis' if row.place == 1 else 'or'}: {hypothesis(row)}; {row.physics}{of_library(row)}"
     for row in found.together:
         yield f"and beside {row.beside}: {hypothesis(row)} together; {row.physics}{of_library(row)}"

@@ -102,7 +102,7 @@ def _propose(run: Path, out: Path | None, output: Output) -> int:
     file.write_text(proposal.text, encoding="utf-8", newline="\n")
     output.say(*(f"passed over: {why}" for why in proposal.passed_over))
     output.say(f"effect: {file}, {proposal.row.physics}")
-    output.say(f"to force it: {VARIABLE}={folder} pzd diagnose CONFIG --set 'diagnose.force=[{proposal.name}]'")
+    output.say(f"to force it: say `diagnose: {{force: [{proposal.name}]}}` in the config, and set {VARIABLE}={folder}")
     return DONE
 
 

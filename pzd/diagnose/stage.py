@@ -6,7 +6,7 @@ import logging
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from pzd.artefacts import Diagnosed, Diagnosis, Hypotheses, Identified, NextTest, Prediction, Rig, base_of
+from pzd.artefacts import Diagnosed, Diagnosis, Identified, NextTest, Prediction, Rig, base_of
 from pzd.diagnose.as_fitted import as_fitted
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.work import Work
@@ -60,7 +60,7 @@ def diagnose(
     from pzd.diagnose.data.exclusions import whole_records
     from pzd.diagnose.data.split import split
     from pzd.diagnose.held_out import held_out_gap
-    from pzd.diagnose.hypotheses.told import hypotheses
+    from pzd.diagnose.hypotheses.rows import hypotheses
     from pzd.diagnose.kept_back import trials_of
     from pzd.diagnose.next_test import reach_of
     from pzd.diagnose.search.forward_selection import select_effects
@@ -102,8 +102,7 @@ def diagnose(
     )
     if selection.adopted:
         rows = base_parameters(selection, decision.verdict, setting)
-    left = hypotheses(trials, found.moved(-zero), control) if decision.verdict == "unexplained" else Hypotheses()
-    return Diagnosed(diagnosis, found, plain, rows, left)
+    return Diagnosed(diagnosis, found, plain, rows, hypotheses(trials, found.moved(-zero), control, decision.verdict))
 
 
 def _notes(campaign: Campaign, prediction: Prediction | None, cut_off: Sequence[str]) -> str:

@@ -14,15 +14,16 @@ from campaign import damper_of, sines
 from test_kept_back import TWO, campaign_of
 from whole_diagnosis import all_but, diagnosed
 
-import pzd.diagnose.hypotheses.told
+import pzd.diagnose.hypotheses.rows
 from pzd.artefacts import Diagnosed, Hypotheses, HypothesisRow
 from pzd.cli.diagnosis import diagnosis_lines
 from pzd.damper.laws import declared
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.hypotheses.proposal import proposal_of
-from pzd.diagnose.hypotheses.shapes import IN_ONE_UNIT, SHAPES, play
-from pzd.diagnose.hypotheses.told import hypotheses
+from pzd.diagnose.hypotheses.rows import hypotheses
+from pzd.diagnose.hypotheses.shapes import IN_ONE_UNIT, SHAPES
+from pzd.diagnose.hypotheses.signals import play
 from pzd.diagnose.kept_back import trials_of
 from pzd.diagnose.search.evidence import evidence_of
 from pzd.quantities import Control
@@ -125,7 +126,7 @@ def bypass(bypass_records: tuple[Record, ...]) -> Diagnosed:
 def test_the_hypothesis_changes_nothing_that_is_handed_on(
     bypass: Diagnosed, bypass_records: tuple[Record, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pzd.diagnose.hypotheses.told, "hypotheses", lambda *_: Hypotheses())
+    monkeypatch.setattr(pzd.diagnose.hypotheses.rows, "hypotheses", lambda *_: Hypotheses())
     without = diagnosed(bypass_records, forbid=all_but("gas_spring"))
     for name, one in (("with", bypass), ("without", without)):
         (tmp_path / name).mkdir()

@@ -28,7 +28,7 @@ LEVEL = 1.959963984540054
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ProductsOfTest:
     """One test, or the half of one that is alone at its voltage."""
 
     record: int
@@ -56,7 +56,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class CandidateShape:
     """A shape with every value that is tried."""
 
     shape: Shape
@@ -64,10 +64,10 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class PredictingShapes:
     """What a set of shapes predicts of the tests kept back."""
 
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[CandidateShape, ...]
     missed: Missed
     closes: float
     """Share of the gap above the noise that it closes on the tests kept back."""
@@ -76,7 +76,7 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedShapes:
     """A set of shapes fitted to all tests."""
 
     choices: tuple[Choice, ...]
@@ -90,10 +90,10 @@ class Fitted:
 class Regression:
     """The tests as inner products, and what is tried on them."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[ProductsOfTest, ...]
     tangents: int
     """How many columns behind the residual are those of T0, C, k and effects."""
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[CandidateShape, ...]
     _missed: dict[tuple[str, ...], Missed] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -105,11 +105,11 @@ class Regression:
         }
 
     @staticmethod
-    def _products(parts: Sequence[Part]) -> Array:
+    def _products(parts: Sequence[ProductsOfTest]) -> Array:
         """(m, m) the weighted sum of the products of some parts."""
         return np.asarray(sum(p.weight * p.products for p in parts))
 
-    def missed(self, candidates: Sequence[Candidate]) -> Missed:
+    def missed(self, candidates: Sequence[CandidateShape]) -> Missed:
         """What is missed of every kept-back test, tangents and shapes fitted without its fold.
 
         The value of a searched parameter is chosen without it as well, shape by shape.
@@ -126,7 +126,7 @@ class Regression:
             )
         return self._missed[names]
 
-    def solved(self, products: Array, candidates: Sequence[Candidate]) -> tuple[Array, tuple[Choice, ...]]:
+    def solved(self, products: Array, candidates: Sequence[CandidateShape]) -> tuple[Array, tuple[Choice, ...]]:
         """(m,) the combination of columns that is left of the residual, 1 in front; and the values chosen."""
         columns = list(range(1, 1 + self.tangents))
         left, chosen = _left(products, columns), list[Choice]()
@@ -137,7 +137,7 @@ class Regression:
             columns += choice.columns
         return left, tuple(chosen)
 
-    def found(self, candidates: Sequence[Candidate]) -> Found | None:
+    def found(self, candidates: Sequence[CandidateShape]) -> PredictingShapes | None:
         """What a set of shapes predicts; None where the last of them adds nothing visible beyond two standard errors.
 
         Equation: mean d > 2 s_d / sqrt(n), d_i = w_i (e_i before - e_i after)         Source: paired differences
@@ -154,16 +154,16 @@ class Regression:
         if surer <= PREDICTS_WORSE or gap <= 0.0:
             return None
         closes = float(weight @ (plain.error - after.error)) / gap
-        return Found(tuple(candidates), after, min(closes, 1.0), surer)
+        return PredictingShapes(tuple(candidates), after, min(closes, 1.0), surer)
 
-    def alone(self) -> list[Found]:
+    def alone(self) -> list[PredictingShapes]:
         """Every shape that predicts kept-back tests by itself, the one that closes most first."""
         found = (self.found((candidate,)) for candidate in self.candidates)
         return sorted((f for f in found if f is not None), key=lambda f: -f.closes)
 
-    def together(self, best: Found) -> list[Found]:
+    def together(self, best: PredictingShapes) -> list[PredictingShapes]:
         """The best shape with a second and a third beside it, as far as these predict kept-back tests better yet."""
-        grown, last = list[Found](), best
+        grown, last = list[PredictingShapes](), best
         while len(last.candidates) < MOST_SHAPES:
             names = {c.shape.name for c in last.candidates}
             tried = (self.found((*last.candidates, c)) for c in self.candidates if c.shape.name not in names)
@@ -174,7 +174,7 @@ class Regression:
             last = more
         return grown
 
-    def fitted(self, candidates: Sequence[Candidate]) -> Fitted:
+    def fitted(self, candidates: Sequence[CandidateShape]) -> FittedShapes:
         """A set of shapes fitted to all tests, with the scatter that leaving one out shows.
 
         Equation: s^2 = (n - 1)/n sum (c_-i - mean c_-i)^2                  Source: Efron and Stein 1981, jackknife
@@ -187,7 +187,7 @@ class Regression:
         without = np.array([-self.solved(products, fixed)[0] for products in rest])
         n = len(records)
         errors = np.sqrt((n - 1) / n * np.sum((without - without.mean(axis=0)) ** 2, axis=0))
-        return Fitted(choices, -left, errors)
+        return FittedShapes(choices, -left, errors)
 
 
 def _left(products: Array, columns: Sequence[int]) -> Array:

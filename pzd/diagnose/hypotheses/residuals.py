@@ -10,8 +10,9 @@ import numpy as np
 
 from pzd.damper.model import Damper
 from pzd.diagnose.folds import deal
-from pzd.diagnose.hypotheses.regression import Candidate, Choice, Part, Regression
-from pzd.diagnose.hypotheses.shapes import Shape, Signals, shapes_of, signals_of
+from pzd.diagnose.hypotheses.regression import CandidateShape, Choice, ProductsOfTest, Regression
+from pzd.diagnose.hypotheses.shapes import Shape, shapes_of
+from pzd.diagnose.hypotheses.signals import Signals, signals_of
 from pzd.diagnose.hypotheses.tangents import Key, tangents
 from pzd.diagnose.kept_back import Trials
 from pzd.diagnose.residual_check import ResidualCheck, bend_beside_jumps
@@ -97,19 +98,19 @@ class Residuals:
         """(n, p) every shape with every value that is tried."""
         return np.column_stack([found for shape in self.shapes for _, found in shape.columns(signals)])
 
-    def _candidates(self) -> tuple[Candidate, ...]:
+    def _candidates(self) -> tuple[CandidateShape, ...]:
         found, at = [], 1 + len(self.keys)
         for shape in self.shapes:
             choices = []
             for value, columns in shape.columns(self.tests[0].signals):
                 choices.append(Choice(value, tuple(range(at, at + columns.shape[1]))))
                 at += columns.shape[1]
-            found.append(Candidate(shape, tuple(choices)))
+            found.append(CandidateShape(shape, tuple(choices)))
         return tuple(found)
 
-    def _part(self, record: int, fold: int, test: ResidualOfTest, columns: Array, counts: Mask) -> Part:
+    def _part(self, record: int, fold: int, test: ResidualOfTest, columns: Array, counts: Mask) -> ProductsOfTest:
         force = test.check.prepared.record.force[counts]
-        return Part(
+        return ProductsOfTest(
             record=record,
             fold=fold,
             products=test.products(columns, counts),

@@ -14,53 +14,20 @@ from typing import Literal
 
 import numpy as np
 
-from pzd.diagnose.data.cleaning import Prepared
+from pzd.diagnose.hypotheses.signals import (
+    SPOT,
+    Columns,
+    Signals,
+    at_a_place,
+    behind_play,
+    lagging,
+    one_column,
+    waves,
+    while_running,
+)
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array
 
-LENGTHS = tuple(float(x) for x in np.geomspace(0.2, 1.5, 42))
-"""Wave lengths that are tried [half strokes]: 5 % apart, so that the shortest stays within a quarter of a wave over the
-stroke; a longer one is a spring."""
-PLACES = tuple(float(x) for x in np.linspace(-0.9, 0.9, 37))
-"""Places of the stroke that are tried [half strokes from its middle]: a sixth of `SPOT` apart."""
-SPOT = 0.3
-"""Half-width of a place with friction of its own [half strokes]; a narrower one shows as well, and no ride would feel
-it."""
-WIDTHS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)
-"""Half-widths of the play that are tried [half strokes]."""
-TIMES_S = (0.003, 0.01, 0.03, 0.1, 0.3)
-"""Time constants of the lag that are tried [s], in half decades."""
-SHORTEST_RISE = 0.5
-"""Time constants of what changes while a test runs [s], and the doubles of it up to `LONGEST_RISE`."""
-LONGEST_RISE = 8.0
-
 Needs = Literal["control", "temperature"]
-
-
-@dataclass(frozen=True, eq=False)
-class Signals:
-    """What a shape may be made of, along one test."""
-
-    t: Array
-    """(n,) time since the test began [s]."""
-    x: Array
-    v: Array
-    a: Array
-    F: Array
-    U: Array
-    """(n,) 0 where there is none."""
-    T: Array
-    """(n,) temperature from that of the setting [K]; 0 where there is none."""
-    half_stroke: float
-    """Of all tests [m]."""
-
-    @property
-    def force_rate(self) -> Array:
-        """(n,) dF/dt [N/s]."""
-        return np.gradient(self.F, self.t)
-
-
-Columns = Callable[[Signals], Iterator[tuple[float | None, Array]]]
-"""Value of the parameter that is searched (None without one), and (n, k) columns: one a coefficient."""
 
 
 @dataclass(frozen=True)
@@ -91,59 +58,6 @@ class Shape:
     """Effects of the library that have this shape."""
 
 
-def _one(function: Callable[[Signals], Array]) -> Columns:
-    def columns(s: Signals) -> Iterator[tuple[float | None, Array]]:
-        yield None, np.asarray(function(s))[:, None]
-
-    return columns
-
-
-def _waves(s: Signals) -> Iterator[tuple[float | None, Array]]:
-    for length in (share * s.half_stroke for share in LENGTHS):
-        phase = 2.0 * np.pi * s.x / length
-        yield length, np.column_stack([np.sin(phase), np.cos(phase)])
-
-
-def _at_a_place(s: Signals) -> Iterator[tuple[float | None, Array]]:
-    for place in (share * s.half_stroke for share in PLACES):
-        yield place, (np.sign(s.v) * np.maximum(1.0 - np.abs(s.x - place) / (SPOT * s.half_stroke), 0.0))[:, None]
-
-
-def _behind_play(s: Signals) -> Iterator[tuple[float | None, Array]]:
-    for half_width in (share * s.half_stroke for share in WIDTHS):
-        yield half_width, (play(s.x, half_width) / half_width)[:, None]
-
-
-def play(x: Array, half_width: float) -> Array:
-    """(n,) by how far the rod is ahead of what it drags behind a play of that half-width [m].
-
-    Equation: e_i = clip(e_(i-1) + x_i - x_(i-1), -r, r)     Source: Visintin 1994, Differential Models of Hysteresis
-    """
-    ahead, found = 0.0, np.empty(x.size)
-    for i, step in enumerate(np.diff(x, prepend=x[0]).tolist()):
-        ahead = min(max(ahead + step, -half_width), half_width)
-        found[i] = ahead
-    return found
-
-
-def _lagging(s: Signals) -> Iterator[tuple[float | None, Array]]:
-    """Velocity behind a lag of first order, less the velocity itself: what the lag takes off the damping."""
-    from scipy.signal import lfilter
-
-    step = float(np.median(np.diff(s.t)))
-    for tau in TIMES_S:
-        share = step / (tau + step)
-        behind = lfilter([share], [1.0, share - 1.0], s.v, zi=[(1.0 - share) * s.v[0]])[0]
-        yield tau, (behind - s.v)[:, None]
-
-
-def _while_running(s: Signals) -> Iterator[tuple[float | None, Array]]:
-    tau = SHORTEST_RISE
-    while tau <= LONGEST_RISE:
-        yield tau, (-np.expm1(-s.t / tau) * s.v)[:, None]
-        tau *= 2.0
-
-
 def _shape(
     name: str,
     unit: str,
@@ -154,7 +68,7 @@ def _shape(
     needs: Needs | None = None,
     library: tuple[str, ...] = (),
 ) -> Shape:
-    return Shape(name, unit, physics, source, _one(function), law=law, needs=needs, library=library)
+    return Shape(name, unit, physics, source, one_column(function), law=law, needs=needs, library=library)
 
 
 _DIXON = "Dixon 2007, The Shock Absorber Handbook"
@@ -184,7 +98,7 @@ SHAPES: tuple[Shape, ...] = (
     _shape("x sign v", "N/m", "friction that is larger at one end, as a side load or a covered port gives", _STRUT,
            lambda s: s.x * np.sign(s.v), f"x * {_SIGN}"),
     Shape("sign v about x_p", "N", "friction at one place of the stroke, as a dent or a tight guide gives", _STRUT,
-          _at_a_place, "x_p", "m", width=SPOT, law=f"max(1.0 - abs(x - {{parameter}}) / {{width}}, 0.0) * {_SIGN}"),
+          at_a_place, "x_p", "m", width=SPOT, law=f"max(1.0 - abs(x - {{parameter}}) / {{width}}, 0.0) * {_SIGN}"),
     # ---- forces by position alone
     _shape("x", "N/m", "a spring beside the element, as a gas charge gives", _DIXON, lambda s: s.x, "x",
            library=("gas_spring",)),
@@ -195,7 +109,7 @@ SHAPES: tuple[Shape, ...] = (
     _shape("x^3", "N/m3", "a spring that hardens to both ends, as rubber stops or mounts give", _DIXON,
            lambda s: s.x**3, "x * x * x", library=("end_stop",)),
     Shape("sin 2 pi x/lambda", "N", "a force that waves over the position: cogging of magnets, a thread, a wavy guide",
-          "Hendershot and Miller 1994, Design of Brushless Permanent-Magnet Motors: cogging", _waves, "lambda", "m",
+          "Hendershot and Miller 1994, Design of Brushless Permanent-Magnet Motors: cogging", waves, "lambda", "m",
           law="math.sin(2.0 * math.pi * x / {parameter});math.cos(2.0 * math.pi * x / {parameter})"),
     # ---- forces by speed and acceleration
     _shape("1", "N", "a constant force, as a gas charge gives", _DIXON,
@@ -226,12 +140,12 @@ SHAPES: tuple[Shape, ...] = (
     _shape("dF/dt", "s", "a force that comes late or early", _DUYM, lambda s: s.force_rate, library=("sensor_delay",)),
     _shape("|dF/dt|", "s", "a force that comes late one way alone", _DUYM, lambda s: np.abs(s.force_rate)),
     Shape("(v behind a lag - v)", "N s/m", "damping that comes late, as a softer oil spring or mount gives",
-          _DUYM, _lagging, "tau", "s"),
+          _DUYM, lagging, "tau", "s"),
     Shape("(x behind a play)/r", "N", "a spring that slips, whatever the speed, as a rubber seat does",
-          "Al-Bender, Lampaert and Swevers 2005, IEEE Trans. Automatic Control 50(11)", _behind_play, "r", "m",
+          "Al-Bender, Lampaert and Swevers 2005, IEEE Trans. Automatic Control 50(11)", behind_play, "r", "m",
           library=("second_branch",)),
     Shape("(1 - exp(-t/tau)) v", "N s/m", "damping that changes while a test runs, as air in the oil gives",
-          _DUYM, _while_running, "tau", "s"),
+          _DUYM, while_running, "tau", "s"),
     _shape("T v", "N s/(m K)", "damping that changes with the temperature", _DIXON, lambda s: s.T * s.v,
            needs="temperature", library=("temperature_drift",)),
     _shape("T sign v", "N/K", "friction that changes with the temperature", _DIXON, lambda s: s.T * np.sign(s.v),
@@ -280,32 +194,4 @@ def _by_control(shape: Shape) -> Shape:
         columns=columns,
         law=shape.law,
         per_control=True,
-    )
-
-
-def signals_of(prepared: Prepared, force: Array, temperature: float | None, half_stroke: float) -> Signals:
-    """What a shape may be made of, along one test.
-
-    Parameters
-    ----------
-    prepared : the test, its displacement cleaned and counted from the middle of the stroke
-    force : (n,) that the damper gives [N]
-    temperature : median of all tests [degC]; None where none was recorded
-    half_stroke : of all tests [m]
-    """
-    record = prepared.record
-    warmth = record.median_temperature()
-    T = 0.0 if warmth is None or temperature is None else warmth - temperature
-    U = np.zeros(force.size) if record.voltage is None else record.voltage
-    if prepared.constant and record.voltage is not None:
-        U = np.full(force.size, record.median_voltage())
-    return Signals(
-        t=record.time - record.time[0],
-        x=record.displacement,
-        v=record.velocity,
-        a=record.acceleration,
-        F=force,
-        U=U,
-        T=np.full(force.size, T),
-        half_stroke=half_stroke,
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from pzd.artefacts import Hypotheses, HypothesisPoint, HypothesisRow
 from pzd.damper.model import Damper
-from pzd.diagnose.hypotheses.regression import LEVEL, Found
+from pzd.diagnose.hypotheses.regression import LEVEL, PredictingShapes
 from pzd.diagnose.hypotheses.residuals import ResidualOfTest, Residuals, groups_of, residuals_of
 from pzd.diagnose.hypotheses.shapes import IN_ONE_UNIT, Shape
 from pzd.diagnose.kept_back import Trials
@@ -23,15 +23,20 @@ MOST_VOLTAGES = 5
 """Voltages told apart in the picture."""
 
 
-def hypotheses(trials: Trials, damper: Damper, control: Control) -> Hypotheses:
+def hypotheses(trials: Trials, damper: Damper, control: Control, verdict: str = "unexplained") -> Hypotheses:
     """The shapes of what a damper leaves that predict tests kept back, beyond two standard errors.
+
+    None is looked for under another verdict than `unexplained`.
 
     Parameters
     ----------
     trials : the tests, dealt into folds
     damper : that is handed on, about the middle of the stroke
     control : the control signal, for units
+    verdict : of the diagnosis
     """
+    if verdict != "unexplained":
+        return Hypotheses()
     residuals = residuals_of(trials, damper)
     regression = residuals.regression
     alone = regression.alone()[:MOST_ALONE]
@@ -43,7 +48,7 @@ def hypotheses(trials: Trials, damper: Damper, control: Control) -> Hypotheses:
     return Hypotheses(tuple(rows), tuple(_points(residuals, alone[0], control)), sought=True)
 
 
-def _row(found: Found, place: int, residuals: Residuals, control: Control) -> HypothesisRow:
+def _row(found: PredictingShapes, place: int, residuals: Residuals, control: Control) -> HypothesisRow:
     regression, reach = residuals.regression, residuals.tests[0].signals.half_stroke
     fitted = regression.fitted(found.candidates)
     shape, choice = found.candidates[-1].shape, fitted.choices[-1]
@@ -77,7 +82,7 @@ def _unit(shape: Shape, control: Control) -> str:
     return f"{shape.unit.removesuffix('/V')}/{control.unit}" if shape.per_control else shape.unit
 
 
-def _points(residuals: Residuals, best: Found, control: Control) -> Iterator[HypothesisPoint]:
+def _points(residuals: Residuals, best: PredictingShapes, control: Control) -> Iterator[HypothesisPoint]:
     """What is left over the argument of the best shape, class by class: component plus residual.
 
     Source: Larsen and McCleary 1972, Technometrics 14(3), partial residual plots
