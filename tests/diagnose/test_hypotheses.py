@@ -21,10 +21,11 @@ from pzd.damper.laws import declared
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.hypotheses.proposal import proposal_of
+from pzd.diagnose.hypotheses.residuals import residuals_of
 from pzd.diagnose.hypotheses.rows import hypotheses
 from pzd.diagnose.hypotheses.shapes import IN_ONE_UNIT, SHAPES
 from pzd.diagnose.hypotheses.signals import play
-from pzd.diagnose.kept_back import trials_of
+from pzd.diagnose.kept_back import Trials, trials_of
 from pzd.diagnose.search.evidence import evidence_of
 from pzd.quantities import Control
 from pzd.record import Array, Record
@@ -40,12 +41,18 @@ def records_with(force: Force, rng: np.random.Generator, jitter: float = 0.0) ->
     return tuple(replace(r, force=r.force + force(r)) for r in plain)
 
 
-def told(records: tuple[Record, ...]) -> Hypotheses:
-    """The hypotheses on what the plain damper, fitted to the records, leaves of them."""
+def fitted(records: tuple[Record, ...]) -> Trials:
+    """The tests, dealt into folds, and the plain damper fitted to them."""
     campaign = campaign_of(records)
     evidence = evidence_of(campaign, damper_of(TWO))
     plain = fit(evidence.whole, (), evidence.whole.start()).damper
-    return hypotheses(trials_of(campaign, plain, DiagnoseConfig().visible), plain, Control())
+    return trials_of(campaign, plain, DiagnoseConfig().visible)
+
+
+def told(records: tuple[Record, ...]) -> Hypotheses:
+    """The hypotheses on what the plain damper, fitted to the records, leaves of them."""
+    trials = fitted(records)
+    return hypotheses(trials, trials.plain, Control())
 
 
 FORCES: dict[str, tuple[Force, float]] = {
@@ -67,6 +74,24 @@ def test_the_shape_of_what_is_left_comes_first_with_its_coefficient(shape: str, 
     assert best.coefficient == pytest.approx(coefficient, rel=0.1)
     assert best.closes > 0.85
     assert best.W_s_after < 0.2 * best.W_s_before
+
+
+def test_what_friction_and_damping_take_up_of_a_shape_does_not_bias_its_coefficient(rng: np.random.Generator) -> None:
+    """An orifice is mostly taken up by T0 and C, so that its coefficient does not show in what is left."""
+    found = told(records_with(lambda r: 1500.0 * np.abs(r.velocity) * r.velocity, rng))
+    orifice = next(row for row in found.alone if row.shape == "|v| v")
+    assert orifice.place <= 2
+    assert orifice.coefficient == pytest.approx(1500.0, rel=0.1)
+
+
+def test_what_a_tests_own_gain_offset_and_delay_make_hardly_counts(rng: np.random.Generator) -> None:
+    """By their priors: a gain of 2 % counts as one square of noise, however many samples show it."""
+    trials = fitted(records_with(lambda r: np.zeros(r.time.size), rng))
+    test = residuals_of(trials, trials.plain).tests[0]
+    by_own = test.nuisances
+    counted = np.diag(test.products(by_own, test.counts)) / test.noise
+    assert np.all(counted <= 1.0)
+    assert np.all(np.sum(by_own[test.counts] ** 2, axis=0) > 50.0 * test.noise)
 
 
 def test_gains_of_single_tests_hide_no_shape_and_make_none(rng: np.random.Generator) -> None:
