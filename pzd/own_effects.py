@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 
 VARIABLE = "PZD_EFFECTS"
-"""The environment variable; workers in processes of their own have it from the command."""
+"""The environment variable; workers on this machine have it from the command, those of a cluster need their own."""
 
 
 def own_folder() -> Path | None:
