@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
@@ -47,14 +48,15 @@ class IndexRow(Frozen):
     about: str
     measure: str
     quantity: str
+    """Its intervals are empty where the draws do not vary with it at all."""
     first_order: float
     """Share of the variance that goes when the quantity alone is known."""
-    first_order_low95: float
-    first_order_high95: float
+    first_order_low95: float | None
+    first_order_high95: float | None
     total_order: float
     """Share that stays when everything else is known."""
-    total_order_low95: float
-    total_order_high95: float
+    total_order_low95: float | None
+    total_order_high95: float | None
 
 
 class FailedRow(Frozen):
@@ -144,7 +146,9 @@ class Results:
         found = sobol_indices(
             func={"f_A": parts[0], "f_B": parts[1], "f_AB": parts[2:]}, n=n, rng=np.random.default_rng(self.seed)
         )
-        sure = found.bootstrap(confidence_level=0.95, n_resamples=RESAMPLES)
+        with np.errstate(invalid="ignore", divide="ignore"), catch_warnings():
+            simplefilter("ignore")  # where a quantity changes nothing there is no interval, which the row tells
+            sure = found.bootstrap(confidence_level=0.95, n_resamples=RESAMPLES)
         # With one measure each is (d,).
         first, total = (
             (np.ravel(each.confidence_interval.low), np.ravel(each.confidence_interval.high))
@@ -158,11 +162,11 @@ class Results:
                 measure=measure,
                 quantity=name,
                 first_order=float(np.ravel(found.first_order)[i]),
-                first_order_low95=float(first[0][i]),
-                first_order_high95=float(first[1][i]),
+                first_order_low95=_finite(first[0][i]),
+                first_order_high95=_finite(first[1][i]),
                 total_order=float(np.ravel(found.total_order)[i]),
-                total_order_low95=float(total[0][i]),
-                total_order_high95=float(total[1][i]),
+                total_order_low95=_finite(total[0][i]),
+                total_order_high95=_finite(total[1][i]),
             )
             for i, name in enumerate(names)
         ]
@@ -204,6 +208,10 @@ def _measure(key: str, value: Scalar) -> bool:
 
 def _number(value: Scalar) -> float:
     return float(value) if isinstance(value, int | float) else float("nan")
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _known(values: Array) -> Array:

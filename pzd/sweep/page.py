@@ -62,6 +62,8 @@ def decisive(results: Results) -> list[str]:
 
 
 def _interval(row: IndexRow) -> str:
+    if row.total_order_low95 is None or row.total_order_high95 is None:
+        return "no interval"
     return f"{row.total_order_low95:.0%} to {row.total_order_high95:.0%}"
 
 
@@ -165,7 +167,8 @@ def _tornado(rows: Sequence[IndexRow], measure: str) -> Panel:
     figure, ax = _lines([_short(row.quantity) for row in ordered])
     for place, row in enumerate(ordered):
         ax.barh(place, row.total_order, color=FINAL, height=0.6)
-        ax.plot((row.total_order_low95, row.total_order_high95), (place, place), color=BASELINE, linewidth=1.5)
+        if row.total_order_low95 is not None and row.total_order_high95 is not None:
+            ax.plot((row.total_order_low95, row.total_order_high95), (place, place), color=BASELINE, linewidth=1.5)
     ax.set_xlabel("share of the variance (total order)")
     label = _label(rows[0].combination, rows[0].about)
     return Panel(figure, f"{measure}, {label}", f"Share of the variance of {measure} by quantity.", "")

@@ -199,7 +199,21 @@ def test_the_indices_are_those_published_for_ishigamis_function() -> None:
     found = {row.quantity: row for row in Results(sweep, runs, outcomes).indices}
     assert [found[name].first_order for name in "xyz"] == pytest.approx([0.3139, 0.4424, 0.0], abs=0.01)
     assert [found[name].total_order for name in "xyz"] == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.01)
-    assert all(row.total_order_low95 < row.total_order < row.total_order_high95 for row in found.values())
+    assert all(
+        row.total_order_low95 is not None
+        and row.total_order_high95 is not None
+        and row.total_order_low95 < row.total_order < row.total_order_high95
+        for row in found.values()
+    )
+
+
+def test_a_quantity_that_changes_nothing_has_an_index_of_zero_and_no_interval() -> None:
+    sweep = SweepConfig(drawn=dict.fromkeys("xy", UNIT), draws=64)
+    runs = tasks(sweep, seed=5)
+    outcomes = tuple(Outcome(task=run.number, rows=({"f": dict(run.drawn)["x"]},)) for run in runs)
+    of_x, of_y = Results(sweep, runs, outcomes).indices
+    assert of_x.total_order == pytest.approx(1.0, abs=0.02)
+    assert (of_y.total_order, of_y.total_order_low95) == (0.0, None)
 
 
 def test_the_spread_counts_the_independent_draws_alone() -> None:
@@ -319,7 +333,7 @@ def test_dask_gives_the_same_bytes_though_a_worker_is_killed(small: Path, tmp_pa
     alone, _ = swept(small, tmp_path / "a", "sweep.chunk=1", jobs=2)
     killed: list[int] = []
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs="critical"
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
     ) as cluster:
 
         def kill_one(_: Progress) -> None:
