@@ -20,15 +20,17 @@ from typing import Any, ParamSpec, TypeVar, cast
 import numba
 import numpy as np
 
+from pzd.own_effects import own_files
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
 def sources() -> list[Path]:
-    """Every module of the damper, and every other one that compiles something."""
+    """Every module of the damper, effect files of one's own too, and every other one that compiles something."""
     package = Path(__file__).parent
     others = (path for path in package.rglob("*.py") if b"pzd.compiled import" in path.read_bytes())
-    return sorted({Path(__file__), *(package / "damper").rglob("*.py"), *others})
+    return sorted({Path(__file__), *(package / "damper").rglob("*.py"), *own_files(), *others})
 
 
 def cache_folder() -> Path:

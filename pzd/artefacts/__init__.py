@@ -26,6 +26,7 @@ from pzd.artefacts.diagnosed import (
     Region,
     Value,
 )
+from pzd.artefacts.hypotheses import Hypotheses, HypothesisPoint, HypothesisRow
 from pzd.artefacts.identified import (
     FALLBACK,
     AuxiliaryRow,
@@ -79,6 +80,9 @@ __all__ = [
     "ForceRow",
     "Gap",
     "GasAndFrictionRow",
+    "Hypotheses",
+    "HypothesisPoint",
+    "HypothesisRow",
     "Identified",
     "IngestRow",
     "InverseRow",
