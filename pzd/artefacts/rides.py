@@ -80,9 +80,9 @@ class WheelRow(Frozen):
     rms_dynamic_load_N: float
     """R.m.s. of the force about the static load."""
     min_contact_force_N: float
-    """Smallest force; below 0 the wheel would leave the road, and this car's wheels pull on it instead."""
+    """Smallest force; below 0 the wheel would leave the road, and one without mass pulls on it instead."""
     pulling: float
-    """Share of the time in which the force is 0 or below."""
+    """Share of the time in which the force is 0 or below; a wheel with mass is then off the road."""
 
 
 class WeightedRow(Frozen):

@@ -18,6 +18,7 @@ from pzd.simulate.ride_model import (
     ASKED,
     BEHIND,
     COMFORT,
+    CONTACT,
     DEFLECTION,
     DISSIPATED,
     DYNAMIC,
@@ -48,8 +49,8 @@ OUTSIDE, STEPS_DONE = range(2)
 """Steps beyond what the rig reached, and steps done."""
 TALLIES = 2
 A_K, LOAD_1, LOAD_2, TRAVEL, LOST = range(5)
-"""What is kept of every step: acceleration at K [m/s2], suspension force S + T of each axle [N], larger deflection
-of the two suspensions [m], energy dissipated so far [J]."""
+"""What is kept of every step: acceleration at K [m/s2], what each axle takes off the road's static load [N], S + T
+where the wheels have no mass, larger deflection of the two suspensions [m], energy dissipated so far [J]."""
 COURSE_COLUMNS = 5
 COLUMNS = 16
 """time, z, phi, a_K, and per axle deflection, rate, spring, damper and demanded force, voltage."""
@@ -83,9 +84,9 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
     Parameters
     ----------
     time : [s]
-    y : (STATES,) state; a valve without lag tightens the oil spring at once, which is booked here
+    y : (n,) state; a valve without lag tightens the oil spring at once, which is booked here
     model, control, workspace : see `ride_model`; the control is changed in place
-    scratch : (STATES,) to work in
+    scratch : (n,) to work in
     """
     control_spec, car = model.control_spec, model.car
     if _acts_at_once(control_spec):
@@ -183,7 +184,7 @@ def _keep(y: Array, workspace: Array, row: Array) -> None:
     """Fill one row of the course."""
     row[A_K], row[LOST] = workspace[COMFORT, 0], y[DISSIPATED]
     for i in range(2):
-        row[LOAD_1 + i] = workspace[SPRINGS, i] + workspace[FORCE, i]
+        row[LOAD_1 + i] = -workspace[CONTACT, i]
     row[TRAVEL] = max(abs(workspace[DEFLECTION, 0]), abs(workspace[DEFLECTION, 1]))
 
 
@@ -208,7 +209,7 @@ def ride(
 
     Parameters
     ----------
-    y : (STATES,) state; changed in place
+    y : (n,) state; changed in place
     model, control, workspace : see `ride_model`
     steps, h : number and length of the steps of integration [s]
     tolerance : see `advance`

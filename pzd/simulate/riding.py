@@ -30,7 +30,6 @@ from pzd.simulate.ride_model import (
     MINIMISE,
     PREDICT,
     SENSED,
-    STATES,
     SWITCH,
     TABLE,
     UNBOUNDED,
@@ -38,6 +37,7 @@ from pzd.simulate.ride_model import (
     ControlSpec,
     RideModel,
     TableArrays,
+    at_rest,
     control,
     road_coefficients,
     vehicle,
@@ -154,7 +154,8 @@ def ride_case(
     wait()
     car, clock, held = config.car.car(), Clock.of(config), held or Held.of(config, grid)
     speed = config.vehicle_speed_km_per_h * KM_PER_H
-    if case.fidelity == "ideal" and case.policy.aim == "damping" and profile.smooth:
+    linear = case.fidelity == "ideal" and case.policy.aim == "damping" and not car.wheels_have_mass
+    if linear and profile.smooth:
         frequency = profile.wavenumber * speed / (2.0 * np.pi)
         return ride_exactly(
             car,
@@ -192,7 +193,7 @@ def ride_case(
 
 def ride_of_model(model: RideModel, clock: Clock, tolerance: float, name: str, ends: bool) -> Outcome:
     """Ride from rest on a level start, and balance the energies; see `ride_case`."""
-    acts, scratch, y = control(model.control_spec.voltage), workspace(), np.zeros(STATES)
+    acts, scratch, y = control(model.control_spec.voltage), workspace(), at_rest(model.car)
     course = np.zeros((clock.steps + 1, COURSE_COLUMNS))
     history = np.zeros((clock.steps // clock.per_output + 1, COLUMNS))
     tally = np.zeros(TALLIES)
@@ -210,8 +211,8 @@ def ride_of_model(model: RideModel, clock: Clock, tolerance: float, name: str, e
         course,
         history,
         tally,
-        np.zeros((STAGES + 1, STATES)),
-        np.zeros(STATES),
+        np.zeros((STAGES + 1, y.size)),
+        np.zeros(y.size),
     )
     if tally[STEPS_DONE] < clock.steps or not np.all(np.isfinite(y)):
         raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(scratch[1])))))
