@@ -14,6 +14,7 @@ from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 from pzd.simulate.cars import cars
 from pzd.simulate.policies import policies
+from pzd.simulate.policies.best_found import BestFound
 from pzd.simulate.policies.clipped_lqr import ClippedLqr
 from pzd.simulate.policies.comfort_predictive import ComfortPredictive
 from pzd.simulate.policies.skyhook_add import SkyhookAdd
@@ -168,6 +169,8 @@ class SimulateConfig(Frozen):
     """Parameters of the policy `comfort_predictive`."""
     clipped_lqr: ClippedLqr = ClippedLqr()
     """Parameters of the policy `clipped_lqr`."""
+    best_found: BestFound = BestFound()
+    """Parameters of the policy `best_found`."""
     skyhook_add: SkyhookAdd = SkyhookAdd()
     """Parameters of the policy `skyhook_add`."""
     response_speed_m_per_s: float = Field(default=0.2, gt=0.0)

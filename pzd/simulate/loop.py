@@ -30,6 +30,7 @@ from pzd.simulate.ride_model import (
     OIL_1,
     PREDICT,
     RATE,
+    SCHEDULE,
     SET,
     SIDE,
     SIDED_RATE,
@@ -48,6 +49,8 @@ from pzd.table.kernel import table_voltage
 OUTSIDE, STEPS_DONE = range(2)
 """Steps beyond what the rig reached, and steps done."""
 TALLIES = 2
+_SAME_PLACE = 1e-9
+"""Of an interval of a schedule: the clock meets its beginning but for rounding."""
 A_K, LOAD_1, LOAD_2, TRAVEL, LOST = range(5)
 """What is kept of every step: acceleration at K [m/s2], what each axle takes off the road's static load [N], S + T
 where the wheels have no mass, larger deflection of the two suspensions [m], energy dissipated so far [J]."""
@@ -97,10 +100,10 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
         return
     if control_spec.aim == PREDICT:
         predict(time, y, model, control, workspace)
-    elif control_spec.aim != VOLTAGE:
+    elif control_spec.aim not in (VOLTAGE, SCHEDULE):
         demand(control_spec, car, y, control, workspace)
     for i in range(2):
-        _set_voltage(time, y, model, control, i, _wanted_voltage(model, control, workspace, i))
+        _set_voltage(time, y, model, control, i, _wanted_voltage(time, model, control, workspace, i))
     control[SINCE, 0] = time
     for i in range(2):
         if control[SIDE, i] == 0.0:
@@ -108,11 +111,22 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
 
 
 @inlined
-def _wanted_voltage(model: RideModel, control: Array, workspace: Array, axle: int) -> float:
+def scheduled(time: float, model: RideModel, axle: int) -> float:
+    """The voltage [V] that a schedule has for an axle at a time [s], by where axle 1 is in the harmonic of the road."""
+    count = model.control_spec.schedule.shape[1]
+    turns = model.road_coefficients.wavenumber * model.car.speed * time / (2.0 * math.pi)
+    place = min(int((turns - math.floor(turns)) * count + _SAME_PLACE), count - 1)
+    return float(model.control_spec.schedule[axle, place])
+
+
+@inlined
+def _wanted_voltage(time: float, model: RideModel, control: Array, workspace: Array, axle: int) -> float:
     """The voltage that the policy asks of an axle [V]; a force that it asks is noted."""
     aim = model.control_spec.aim
     if aim == VOLTAGE:
         return model.control_spec.voltage
+    if aim == SCHEDULE:
+        return scheduled(time, model, axle)
     if aim == PREDICT:
         return float(model.predictor.candidates[model.predictor.chosen[axle]])
     control[ASKED, axle] = workspace[FORCE, axle]

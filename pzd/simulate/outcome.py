@@ -18,6 +18,9 @@ from pzd.simulate.window import Window
 POINT = "K"
 """The point of the car at which comfort is judged."""
 
+VOLTAGES = [len(RIDE_COLUMNS) + (axle + 1) * len(AXLE_COLUMNS) - 1 for axle in range(len(AXLES))]
+"""Columns of the history with the voltage of each axle."""
+
 JERK_CORNER = 80.0
 """Corner of the low-pass behind which the jerk is taken [Hz]: the raw jerk of a law that switches has no r.m.s."""
 _POLES = (math.pi / 8, 3 * math.pi / 8)

@@ -24,7 +24,7 @@ IDEAL, TABLE, DYNAMIC = range(3)
 """How a demanded force comes about."""
 UNBOUNDED, BY_COEFFICIENTS, BY_TABLE = range(3)
 """What bounds a demanded force."""
-FEEDBACK, SWITCH, MINIMISE, VOLTAGE, PREDICT = range(5)
+FEEDBACK, SWITCH, MINIMISE, VOLTAGE, PREDICT, SCHEDULE = range(6)
 """What the policy asks for."""
 SENSED = 8
 """Deflection 1, 2, its rate 1, 2, z, phi, dz, dphi: what a feedback policy reads."""
@@ -136,6 +136,8 @@ class ControlSpec(NamedTuple):
     """Of the aim `SWITCH` [rad/s]."""
     gains: Array
     """(2, SENSED) of the aims `FEEDBACK` and `SWITCH`."""
+    schedule: Array
+    """(2, n) of the aim `SCHEDULE`, over a period of the harmonic of the road [V]."""
 
 
 class RideModel(NamedTuple):

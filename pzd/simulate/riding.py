@@ -29,6 +29,7 @@ from pzd.simulate.ride_model import (
     IDEAL,
     MINIMISE,
     PREDICT,
+    SCHEDULE,
     SENSED,
     SWITCH,
     TABLE,
@@ -52,6 +53,7 @@ _AIMS = {
     "minimise": MINIMISE,
     "voltage": VOLTAGE,
     "predict": PREDICT,
+    "schedule": SCHEDULE,
 }
 _SWITCHED = 0.01
 """Share of the tolerance where the voltage of a damper with dynamics jumps once in a control period: on a single bump,
@@ -80,6 +82,20 @@ class Clock:
 
 
 @dataclass(frozen=True)
+class Found:
+    """The most comfortable ride that was found within a bound on the wheel load."""
+
+    by: str
+    """`search`, or the policy that none of the schedules beats."""
+    most_load: float
+    """The bound [N]."""
+    evaluations: int
+    """Rides that the search took."""
+    voltages: tuple[tuple[float, ...], ...] = ()
+    """Of each axle over a period of the road, from where axle 1 meets its rising zero [V]; empty for a policy."""
+
+
+@dataclass(frozen=True)
 class Held:
     """What a policy may hold constant during a ride."""
 
@@ -87,6 +103,8 @@ class Held:
     """Of `passive` and the like, and of every valve before the ride [V]."""
     damping: float
     """c of `constant` and the like, per axle [N s/m]."""
+    found: Found | None = None
+    """What `best_found` came to."""
 
     @classmethod
     def of(cls, config: SimulateConfig, grid: TableArrays) -> Held:
@@ -120,6 +138,7 @@ def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: Dy
         jumps,
         crossover,
         gains,
+        np.array(held.found.voltages) if held.found is not None and held.found.voltages else np.zeros((2, 1)),
     )
 
 
