@@ -59,14 +59,18 @@ class Search:
         def schedule(x: Array) -> Array:
             return np.tile(x.reshape(2, -1), repeats)
 
+        def objective(x: Array) -> float:
+            return self.rated(schedule(x))[0] / discomfort
+
+        def load(x: Array) -> Array:
+            return np.array([self.rated(schedule(x))[1] / self.most_load])
+
         minimize(
-            lambda x: self.rated(schedule(x))[0] / discomfort,
+            objective,
             start.ravel(),
             method="COBYLA",
             bounds=[(0.0, 1.0)] * start.size,
-            constraints=NonlinearConstraint(
-                lambda x: np.array([self.rated(schedule(x))[1] / self.most_load]), -np.inf, 1.0
-            ),
+            constraints=NonlinearConstraint(load, -np.inf, 1.0),
             tol=_LAST_STEP,
             options={"maxiter": evaluations - 1, "rhobeg": _FIRST_STEP},
         )
