@@ -18,6 +18,7 @@ from pathlib import Path
 from pzd.blind.case import Places, Scored
 from pzd.blind.diagnosis import Methods, diagnose_case
 from pzd.blind.hide import BenchmarkSetup, hide
+from pzd.blind.hide_independent import hide_independent, plan_independent
 from pzd.blind.plan import PlannedCase, plan
 from pzd.blind.scoring import score_case
 from pzd.schema.errors import DataError
@@ -61,13 +62,18 @@ class Benchmark:
         jobs : processes that work at a time
         afresh : do the finished ones again as well
         """
-        cases = plan(self.setup.blind)
+        cases = self.plan()
         done = {} if afresh else self.finished(cases)
         waiting = [case for case in cases if case.id not in done]
         if waiting:
             self._prepare(waiting)
             done |= self._worked(waiting, len(cases), jobs)
         return tuple(done[case.id] for case in cases)
+
+    def plan(self) -> tuple[PlannedCase, ...]:
+        """Every case, in the order in which they are done."""
+        independent = self.setup.blind.generator == "independent"
+        return plan_independent(self.setup.blind) if independent else plan(self.setup.blind)
 
     def finished(self, cases: Iterable[PlannedCase]) -> dict[str, Scored]:
         """The scores that stand there and were made from the same config and code."""
@@ -98,11 +104,12 @@ class Benchmark:
             done = whole - len(waiting) + len(found)
             self.progress(Progress(done, whole, f"cases, {_duration(left)} left"))
 
+        draws = hide_independent if self.setup.blind.generator == "independent" else hide
         drawing, seeking = (self.pool(min(jobs, len(waiting))) for _ in range(2))
         try:
             _in_turn(
                 waiting,
-                lambda case: drawing.submit(hide, self.setup, case, self.places),
+                lambda case: drawing.submit(draws, self.setup, case, self.places),
                 lambda case: seeking.submit(diagnose_case, self.methods, self.places.case(case.id)),
                 kept,
                 jobs,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -53,6 +53,10 @@ class BlindConfig(Frozen):
     `diagnose.nuisance`.
     """
 
+    generator: Literal["own", "independent"] = "own"
+    """Where the rig files come from: the virtual rig, which shares its laws with the diagnosis, or a second generator
+    that shares no line with it and draws its own dampers, campaigns and sensors; then `campaigns` and all below it
+    but `keep_files` say nothing."""
     seed: int = Field(ge=0)
     """Seed of every draw."""
     tuned_on: tuple[int, ...] = ()
