@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pzd.blind.case import Places, Scored
+from pzd.blind.config import BlindConfig
 from pzd.blind.diagnosis import Methods, diagnose_case
 from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.hide_independent import hide_independent, plan_independent
@@ -152,6 +153,7 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds > 90.0 else f"{seconds:.0f} s"
 
 
-def folder_of(root: Path, seed: int) -> Places:
-    """Where a benchmark of a seed lies below the benchmark's folder."""
-    return Places(root / f"seed-{seed}")
+def folder_of(root: Path, blind: BlindConfig) -> Places:
+    """Where a benchmark lies below the benchmarks' folder, by its seed and its generator."""
+    kind = "" if blind.generator == "own" else f"{blind.generator}-"
+    return Places(root / f"{kind}seed-{blind.seed}")

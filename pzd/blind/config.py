@@ -63,6 +63,9 @@ class BlindConfig(Frozen):
     """Seeds that thresholds were tuned on: a scored run with one of them is refused."""
     tuning: bool = False
     """Whether this run tunes: its seed must be one of `tuned_on`, and its figures are no result."""
+    ledger: str | None = None
+    """CSV file, relative to the config, of the seeds that were scored: every scored run is entered, and one whose seed
+    stands there for another config or other code is refused."""
     cases: int = Field(default=1600, ge=1)
     """How many cases; the first n of them are the same whatever the number, and fairly mixed."""
     kinds: Kinds = Kinds()

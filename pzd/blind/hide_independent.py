@@ -55,13 +55,15 @@ def hideable(campaign: str, kind: Kind) -> list[tuple[str, ...]]:
     laws = [name for name in LAWS if name not in DRIVE or campaign == "moving_signal"]
     if kind == "none":
         return [()]
+    choices: list[tuple[str, ...]]
     if kind == "outside":
         choices = [(name,) for name in OUTSIDE]
     elif kind == "single":
         choices = [(name,) for name in laws]
     else:
         together = [name for name in laws if name not in SEPARATE]
-        choices = sorted(combinations(together, 2), key=lambda pair: (len(pair[0]) * 5 + len(pair[1]) * 3) % 11)
+        choices = [(one, other) for one, other in combinations(together, 2)]
+        choices.sort(key=lambda pair: (len(pair[0]) * 5 + len(pair[1]) * 3) % 11)  # mixed, and the same every time
     turn %= len(choices)
     return choices[turn:] + choices[:turn]
 

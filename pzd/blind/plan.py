@@ -85,6 +85,7 @@ def mixed(shares: Mapping[Key, float]) -> Iterator[Key]:
 
 
 def in_turn(choices: list[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
+    """One choice after the other, for ever."""
     turn = 0
     while True:
         yield choices[turn % len(choices)]

@@ -90,6 +90,12 @@ def wrong_single(case: Scored) -> bool:
     return case.failure is not None or (case.verdict == "named" and len(case.effects) == 1)
 
 
+def rightly_outside(case: Scored) -> bool:
+    """Left unexplained, or named by what describes it rightly."""
+    described = bool(case.described_by) and bool(case.effects) and set(case.effects) <= set(case.described_by)
+    return case.verdict == "unexplained" or (case.verdict in ("named", "ambiguous") and described)
+
+
 def false_name(case: Scored) -> bool:
     """Something named or adopted where nothing was there; a failed diagnosis is wrong as well."""
     return case.failure is not None or case.verdict in ("named", "ambiguous")

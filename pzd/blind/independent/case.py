@@ -131,7 +131,9 @@ def drawn_case(seed: int, index: int, campaign_name: str, hidden: Sequence[str])
         reference_temperature=start if drifts else None,
         visible_gap=gap_after_refit(coarse, seen, base),
         gap_given_other={
-            name: gap_after_refit(coarse, seen, base, parameters_of({n: v for n, v in damper.laws.items() if n != name}))
+            name: gap_after_refit(
+                coarse, seen, base, parameters_of({n: v for n, v in damper.laws.items() if n != name})
+            )
             for name in (hidden if len(hidden) > 1 else ())
         },
     )
@@ -217,7 +219,9 @@ def _sized(
         for _ in range(TRIALS):
             values = law.drawn(default_rng(chance), scale, strength)
             damper = Hidden(plain.base, {name: values}, start)
-            gap = gap_after_refit(some, _coarse_forces(damper, some, start, rise, name == "temperature_drift"), plain.base)
+            gap = gap_after_refit(
+                some, _coarse_forces(damper, some, start, rise, name == "temperature_drift"), plain.base
+            )
             if 0.7 * wanted <= gap <= 1.4 * wanted:
                 break
             strength = min(2.0, strength * min(4.0, max(0.2, wanted / max(gap, 1e-9))))

@@ -9,8 +9,7 @@ It shares no line with `pzd.damper`: the flow is found from the force by bracket
 from __future__ import annotations
 
 import math
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +40,7 @@ from pzd.blind.independent.outside import (
     two_stage_blow_off,
     viscoelastic_mount,
 )
+from pzd.compiled import compiled
 from pzd.record import Array
 
 
@@ -90,6 +90,42 @@ class Parameters(NamedTuple):
     column: float = 1.0
 
 
+# The laws as machine code.
+_side_factor = compiled(asymmetry.side_factor)
+_orifice = compiled(orifice_quadratic.pressure_force)
+_yield_force = compiled(rounded_yield.yield_force)
+_viscous = compiled(shear_thinning.viscous_force)
+_opening_force = compiled(relief_valve.opening_force)
+_relief_flow = compiled(relief_valve.flow_beyond)
+_play = compiled(lash.spring_extension)
+_branch_force = compiled(second_branch.next_force)
+_stop = compiled(end_stop.force)
+_gas_spring = compiled(gas_spring.force)
+_inertia = compiled(fluid_inertia.force)
+_preload = compiled(preload_offset.force)
+_stribeck = compiled(stribeck_friction.force)
+_bypass_factor = compiled(frequency_dependent.damping_factor)
+_spool_rate = compiled(frequency_dependent.spool_rate)
+_structure_factor = compiled(thixotropy.friction_factor)
+_structure_rate = compiled(thixotropy.structure_rate)
+_groove_factor = compiled(position_grooves.damping_factor)
+_stages_flow = compiled(two_stage_blow_off.flow_beyond)
+_slips = compiled(frame_stick_slip.slips)
+_slip_rate = compiled(frame_stick_slip.slip_rate)
+_bushing = compiled(viscoelastic_mount.force)
+_relaxation_rate = compiled(viscoelastic_mount.relaxation_rate)
+_fading = compiled(aeration.damping_factor)
+_late = compiled(late_filling.spring_extension)
+_hardening = compiled(cubic_spring.force)
+_duct = compiled(smooth_pipe.pressure_force)
+_charge = compiled(polytropic_gas.force)
+
+_STATES = 5
+"""Oil, mount, spool, structure, bushing."""
+_CLOSE = 1e-10
+"""Share of the force to which the flow is found."""
+
+
 def integrated(
     time: Array, motion: tuple[Array, Array, Array], base: tuple[Array, Array, Array], parameters: Parameters
 ) -> Array:
@@ -107,157 +143,139 @@ def integrated(
     (n + 1,) force [N]
     """
     force = np.empty(time.size // 2 + 1)
-    _march()(time, *motion, *base, parameters, np.zeros((6, 5)), force)
+    _march(time, *motion, *base, parameters, np.zeros((6, _STATES)), force)
     return force
 
 
-@cache
-def _march() -> Any:
-    """The march as machine code; compiled once in a process, when a case is drawn."""
-    import numba
+@compiled
+def _resistance(w: float, T0: float, C: float, p: Parameters) -> float:
+    """Force [N] that the closed valve takes at a flow speed > 0 [m/s]."""
+    force = _yield_force(w, T0, p.w_s) + _viscous(w, C, p.n) + _orifice(w, p.q)
+    return force + _duct(w, p.duct) if p.duct > 0.0 else force
 
-    def machine_code(function: Any) -> Any:
-        return numba.njit(error_model="numpy", nogil=True)(function)
 
-    side_factor = machine_code(asymmetry.side_factor)
-    orifice = machine_code(orifice_quadratic.pressure_force)
-    yield_force = machine_code(rounded_yield.yield_force)
-    viscous = machine_code(shear_thinning.viscous_force)
-    opening = machine_code(relief_valve.opening_force)
-    relief_flow = machine_code(relief_valve.flow_beyond)
-    play = machine_code(lash.spring_extension)
-    branch_force = machine_code(second_branch.next_force)
-    stop = machine_code(end_stop.force)
-    gas = machine_code(gas_spring.force)
-    inertia = machine_code(fluid_inertia.force)
-    preload = machine_code(preload_offset.force)
-    stribeck = machine_code(stribeck_friction.force)
-    bypass_factor = machine_code(frequency_dependent.damping_factor)
-    spool_rate = machine_code(frequency_dependent.spool_rate)
-    structure_factor = machine_code(thixotropy.friction_factor)
-    structure_rate = machine_code(thixotropy.structure_rate)
-    groove_factor = machine_code(position_grooves.damping_factor)
-    stages_flow = machine_code(two_stage_blow_off.flow_beyond)
-    slips = machine_code(frame_stick_slip.slips)
-    slip_rate = machine_code(frame_stick_slip.slip_rate)
-    bushing = machine_code(viscoelastic_mount.force)
-    relaxation_rate = machine_code(viscoelastic_mount.relaxation_rate)
-    fading = machine_code(aeration.damping_factor)
-    late = machine_code(late_filling.spring_extension)
-    hardening = machine_code(cubic_spring.force)
-    duct = machine_code(smooth_pipe.pressure_force)
-    charge = machine_code(polytropic_gas.force)
-
-    @machine_code
-    def resistance(w: float, T0: float, C: float, p: Parameters) -> float:
-        force = yield_force(w, T0, p.w_s) + viscous(w, C, p.n) + orifice(w, p.q)
-        return force + duct(w, p.duct) if p.duct > 0.0 else force
-
-    @machine_code
-    def closed_flow(force: float, T0: float, C: float, p: Parameters) -> float:
-        """Flow speed at which the resistance is a force >= 0: bracketed, then the Illinois rule."""
-        if p.w_s <= 0.0 and force <= T0:
-            return 0.0
-        if p.w_s <= 0.0 and p.n == 1.0 and p.q == 0.0 and p.duct == 0.0:
-            return (force - T0) / C
-        low, high = 0.0, force / C + 1e-9
-        below = (T0 if p.w_s <= 0.0 else 0.0) - force
-        above = resistance(high, T0, C, p) - force
-        while above < 0.0:
-            low, below = high, above
-            high *= 2.0
-            above = resistance(high, T0, C, p) - force
-        side = 0
-        for _ in range(100):
-            w = (low * above - high * below) / (above - below)
-            off = resistance(w, T0, C, p) - force
-            if abs(off) <= 1e-10 * force or high - low <= 1e-14 * high:
-                return w
-            if off > 0.0:
-                high, above = w, off
-                if side == 1:
-                    below *= 0.5
-                side = 1
-            else:
-                low, below = w, off
-                if side == -1:
-                    above *= 0.5
-                side = -1
-        return w
-
-    @machine_code
-    def flow(force: float, T0: float, C: float, p: Parameters) -> float:
-        factor = side_factor(force > 0.0, p.alpha)
-        size, T0, C = abs(force), T0 * factor, C * factor
-        opens = opening(p.F_r, T0)
-        if size > opens:
-            w = closed_flow(opens, T0, C, p) + relief_flow(size - opens, p.C_r)
-        elif size > p.first_force and p.first_force > T0:
-            w = closed_flow(p.first_force, T0, C, p) + stages_flow(
-                size, p.first_force, p.first_slope, p.second_force, p.second_slope
-            )
+@compiled
+def _closed_flow(force: float, T0: float, C: float, p: Parameters) -> float:
+    """Flow speed [m/s] at which the closed valve takes a force >= 0 [N]: bracketed, then the Illinois rule."""
+    sharp = p.w_s <= 0.0
+    if sharp and force <= T0:
+        return 0.0
+    if sharp and p.n == 1.0 and p.q == 0.0 and p.duct == 0.0:
+        return (force - T0) / C
+    low, below = 0.0, (T0 if sharp else 0.0) - force
+    high = force / C + 1e-9
+    above = _resistance(high, T0, C, p) - force
+    while above < 0.0:
+        low, below, high = high, above, 2.0 * high
+        above = _resistance(high, T0, C, p) - force
+    last, w = 0, high
+    for _ in range(100):
+        w = (low * above - high * below) / (above - below)
+        off = _resistance(w, T0, C, p) - force
+        if abs(off) <= _CLOSE * force or high - low <= 1e-14 * high:
+            break
+        if off > 0.0:
+            high, above, below = w, off, below * (0.5 if last == 1 else 1.0)
+            last = 1
         else:
-            w = closed_flow(size, T0, C, p)
-        return math.copysign(w, force)
+            low, below, above = w, off, above * (0.5 if last == -1 else 1.0)
+            last = -1
+    return w
 
-    @machine_code
-    def spring(e: float, k: float, p: Parameters) -> float:
-        if p.gap > 0.0:
-            return k * late(e, p.gap)
-        return k * play(e, p.delta)
 
-    @machine_code
-    def rates(s: Any, x: float, t: float, T0: float, C: float, k: float, slipping: bool, p: Parameters, out: Any) -> None:
-        """Rates of oil, mount, spool, structure and bushing."""
-        force = spring(x - s[1] - s[0], k, p)
-        if p.structure > 0.0:
-            T0 *= structure_factor(s[3], p.structure)
-        if p.bypass > 0.0:
-            C *= bypass_factor(s[2], p.bypass, p.bypass_force)
-        if p.groove > 0.0:
-            C *= groove_factor(x, p.groove, p.groove_end, p.groove_run_out)
-        if p.fade > 0.0:
-            C *= fading(t, p.fade, p.fade_time)
-        w = flow(force, T0, C, p)
-        out[0] = w
-        out[1] = slip_rate(force - p.mount_stiffness * s[1], p.mount_stiffness, p.mount_slides) if slipping else 0.0
-        out[2] = spool_rate(force, s[2], p.bypass_lag)
-        out[3] = structure_rate(s[3], w, p.rebuilding, p.breakdown)
-        out[4] = relaxation_rate(x, s[4], p.bushing_time)
+@compiled
+def _flow(force: float, T0: float, C: float, p: Parameters) -> float:
+    """Flow speed [m/s], with its sign, that a force drives through the valves."""
+    factor = _side_factor(force > 0.0, p.alpha)
+    size, friction, damping = abs(force), T0 * factor, C * factor
+    opens = _opening_force(p.F_r, friction)
+    if size > opens:
+        w = _closed_flow(opens, friction, damping, p) + _relief_flow(size - opens, p.C_r)
+    elif size > p.first_force > friction:
+        w = _closed_flow(p.first_force, friction, damping, p)
+        w += _stages_flow(size, p.first_force, p.first_slope, p.second_force, p.second_slope)
+    else:
+        w = _closed_flow(size, friction, damping, p)
+    return math.copysign(w, force)
 
-    @machine_code
-    def march(
-        time: Any, x: Any, v: Any, a: Any, T0: Any, C: Any, k: Any, p: Parameters, work: Any, force: Any
-    ) -> None:
-        s, moved, r1, r2, r3, r4 = work[0], work[1], work[2], work[3], work[4], work[5]
-        s[0], s[3], s[4] = x[0], 1.0, x[0]
-        slipping, beside = False, 0.0
-        steps = force.size - 1
-        for j in range(steps + 1):
-            i = 2 * j
-            oil = spring(x[i] - s[1] - s[0], k[i], p)
-            total = oil + beside + stop(x[i], p.k_e, p.x_e) + gas(x[i], p.k_g) + inertia(a[i], p.m) + preload(p.F_0)
-            total += stribeck(v[i], p.F_s, p.v_s) + bushing(x[i], s[4], p.bushing_stiffness)
-            total += hardening(x[i], p.cubic) + charge(x[i], p.charge, p.column)
-            force[j] = total
-            if j == steps:
-                break
-            h = time[i + 2] - time[i]
-            slipping = slips(oil - p.mount_stiffness * s[1], slipping, p.mount_holds, p.mount_slides)
-            rates(s, x[i], time[i], T0[i], C[i], k[i], slipping, p, r1)
-            for n in range(5):
-                moved[n] = s[n] + 0.5 * h * r1[n]
-            rates(moved, x[i + 1], time[i + 1], T0[i + 1], C[i + 1], k[i + 1], slipping, p, r2)
-            for n in range(5):
-                moved[n] = s[n] + 0.5 * h * r2[n]
-            rates(moved, x[i + 1], time[i + 1], T0[i + 1], C[i + 1], k[i + 1], slipping, p, r3)
-            for n in range(5):
-                moved[n] = s[n] + h * r3[n]
-            rates(moved, x[i + 2], time[i + 2], T0[i + 2], C[i + 2], k[i + 2], slipping, p, r4)
-            for n in range(5):
-                s[n] += h / 6.0 * (r1[n] + 2.0 * r2[n] + 2.0 * r3[n] + r4[n])
-            if p.T0_2 > 0.0:
-                beside = branch_force(beside, x[i + 1] - x[i], p.T0_2, p.k_2)
-                beside = branch_force(beside, x[i + 2] - x[i + 1], p.T0_2, p.k_2)
 
-    return march
+@compiled
+def _oil_force(deflection: float, k: float, p: Parameters) -> float:
+    """Force [N] of the oil spring."""
+    return k * (_late(deflection, p.gap) if p.gap > 0.0 else _play(deflection, p.delta))
+
+
+@compiled
+def _beside(x: float, v: float, a: float, relaxed: float, p: Parameters) -> float:
+    """Force [N] beside the oil spring that remembers nothing but what has relaxed in the bushing."""
+    force = _stop(x, p.k_e, p.x_e) + _gas_spring(x, p.k_g) + _inertia(a, p.m) + _preload(p.F_0)
+    force += _stribeck(v, p.F_s, p.v_s) + _bushing(x, relaxed, p.bushing_stiffness)
+    return force + _hardening(x, p.cubic) + _charge(x, p.charge, p.column)
+
+
+@compiled
+def _rates(
+    s: Array, x: float, t: float, T0: float, C: float, k: float, slipping: bool, p: Parameters, out: Array
+) -> None:
+    """Fill in the rates of the states."""
+    force = _oil_force(x - s[1] - s[0], k, p)
+    friction, damping = T0, C
+    if p.structure > 0.0:
+        friction *= _structure_factor(s[3], p.structure)
+    if p.bypass > 0.0:
+        damping *= _bypass_factor(s[2], p.bypass, p.bypass_force)
+    if p.groove > 0.0:
+        damping *= _groove_factor(x, p.groove, p.groove_end, p.groove_run_out)
+    if p.fade > 0.0:
+        damping *= _fading(t, p.fade, p.fade_time)
+    w = _flow(force, friction, damping, p)
+    out[0] = w
+    out[1] = _slip_rate(force - p.mount_stiffness * s[1], p.mount_stiffness, p.mount_slides) if slipping else 0.0
+    out[2] = _spool_rate(force, s[2], p.bypass_lag)
+    out[3] = _structure_rate(s[3], w, p.rebuilding, p.breakdown)
+    out[4] = _relaxation_rate(x, s[4], p.bushing_time)
+
+
+@compiled
+def _moved(s: Array, rate: Array, h: float, out: Array) -> None:
+    for n in range(s.size):
+        out[n] = s[n] + h * rate[n]
+
+
+@compiled
+def _march(
+    time: Array,
+    x: Array,
+    v: Array,
+    a: Array,
+    T0: Array,
+    C: Array,
+    k: Array,
+    p: Parameters,
+    work: Array,
+    force: Array,
+) -> None:
+    """Fill in the force: four rates a step, from the middle of the stroke with all structure built."""
+    s, moved, r1, r2, r3, r4 = work[0], work[1], work[2], work[3], work[4], work[5]
+    s[0], s[3], s[4] = x[0], 1.0, x[0]
+    slipping, branch = False, 0.0
+    for j in range(force.size):
+        i = 2 * j
+        oil = _oil_force(x[i] - s[1] - s[0], k[i], p)
+        force[j] = oil + branch + _beside(x[i], v[i], a[i], s[4], p)
+        if j == force.size - 1:
+            break
+        h, m, e = time[i + 2] - time[i], i + 1, i + 2
+        slipping = _slips(oil - p.mount_stiffness * s[1], slipping, p.mount_holds, p.mount_slides)
+        _rates(s, x[i], time[i], T0[i], C[i], k[i], slipping, p, r1)
+        _moved(s, r1, 0.5 * h, moved)
+        _rates(moved, x[m], time[m], T0[m], C[m], k[m], slipping, p, r2)
+        _moved(s, r2, 0.5 * h, moved)
+        _rates(moved, x[m], time[m], T0[m], C[m], k[m], slipping, p, r3)
+        _moved(s, r3, h, moved)
+        _rates(moved, x[e], time[e], T0[e], C[e], k[e], slipping, p, r4)
+        for n in range(s.size):
+            s[n] += h / 6.0 * (r1[n] + 2.0 * r2[n] + 2.0 * r3[n] + r4[n])
+        if p.T0_2 > 0.0:
+            branch = _branch_force(branch, x[m] - x[i], p.T0_2, p.k_2)
+            branch = _branch_force(branch, x[e] - x[m], p.T0_2, p.k_2)

@@ -11,10 +11,11 @@ from pzd.blind.independent.kernel import Parameters, integrated
 from pzd.blind.independent.stand import Driven
 from pzd.record import Array
 
+PLAIN = Parameters()
+"""Nothing but T0, C and k."""
 
-def gap_after_refit(
-    motions: Sequence[Driven], forces: Sequence[Array], base: Base, known: Parameters = Parameters()
-) -> float:
+
+def gap_after_refit(motions: Sequence[Driven], forces: Sequence[Array], base: Base, known: Parameters = PLAIN) -> float:
     """What T0, C and k cannot follow of noise-free tests, refitted at every constant value of the control signal.
 
     Equation: min sqrt(mean ((F - F_sim)/F_peak)^2), F_peak of each test; where the signal moves, the refitted ones are
@@ -37,15 +38,23 @@ def gap_after_refit(
     found = [np.array(row, dtype=float) for row in start]
     squares = count = 0.0
     for i, value in enumerate(values):
-        own = [(m, f) for m, f in zip(motions, forces, strict=True) if m.test.signal == "constant" and m.test.value == value]
+        own = [
+            (m, f)
+            for m, f in zip(motions, forces, strict=True)
+            if m.test.signal == "constant" and m.test.value == value
+        ]
         if not own:
             continue
+
+        def missed_by(z: Array, own: Sequence[tuple[Driven, Array]] = own, i: int = i) -> Array:
+            return np.concatenate([_missed(m, f, _constant(m, start, i, z), known) for m, f in own])
+
         fit = least_squares(
-            lambda z, own=own, i=i: np.concatenate([_missed(m, f, _constant(m, start, i, z), known) for m, f in own]),
+            missed_by,
             [0.0, 0.0, 0.0],
             bounds=([-6.0, -3.0, -3.0], [3.0, 3.0, 3.0]),
             max_nfev=12,
-            diff_step=1e-3,
+            diff_step=np.full(3, 1e-3),
             xtol=1e-3,
             ftol=1e-3,
         )

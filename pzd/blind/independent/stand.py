@@ -9,7 +9,7 @@ import numpy as np
 from numpy.random import Generator
 
 from pzd.blind.independent.campaigns import Campaign, LaboratoryTest
-from pzd.record import Array
+from pzd.record import Array, Rows
 
 FINEST = 1.25e-4
 """Longest step of the integration [s]: `tests/blind` shows what it costs."""
@@ -65,14 +65,16 @@ class Driven:
     """Steps of the integration from one recorded sample to the next."""
 
     @property
-    def recorded(self) -> Array:
+    def recorded(self) -> Rows:
         """(m,) indices of the fine grid at which the logger samples."""
         every = 2 * self.thinned
         first = int(np.argmin(np.abs(self.time)))
         return np.arange(first, self.time.size, every)
 
 
-def driven(campaign: Campaign, test: LaboratoryTest, actuator: Actuator, draw: Generator, coarse: bool = False) -> Driven:
+def driven(
+    campaign: Campaign, test: LaboratoryTest, actuator: Actuator, draw: Generator, coarse: bool = False
+) -> Driven:
     """The motion of a test on the fine grid.
 
     Parameters
@@ -86,9 +88,9 @@ def driven(campaign: Campaign, test: LaboratoryTest, actuator: Actuator, draw: G
     step = 1.0 / campaign.rate
     thinned = int(np.ceil(step / (FINEST * (4.0 if coarse else 1.0))))
     half = 0.5 * step / thinned
-    before = int(round((REST + _run_in(test)) / step)) * thinned * 2
-    after = int(round(test.seconds / step)) * thinned * 2
-    time = np.arange(-before, after + 1) * half
+    before = round((REST + _run_in(test)) / step) * thinned * 2
+    after = round(test.seconds / step) * thinned * 2
+    time = np.asarray(np.arange(-before, after + 1) * half, dtype=np.float64)
     asked = _asked(test, time, draw)
     begun = np.clip((time - time[0] - REST) / (0.6 * _run_in(test)), 0.0, 1.0)
     asked *= begun * begun * (3.0 - 2.0 * begun)
@@ -115,11 +117,7 @@ def _asked(test: LaboratoryTest, time: Array, draw: Generator) -> Array:
         second = np.sin(3.0 * phase + draw.uniform(0.0, 2.0 * np.pi))
         return np.asarray(test.amplitude * (0.7 * np.sin(phase) + 0.3 * second))
     if test.kind == "sweep":
-        lowest = 0.5
-        ratio = np.log(test.frequency / lowest)
-        held = np.clip(time, 0.0, test.seconds)
-        swept = lowest * test.seconds / ratio * np.expm1(ratio * held / test.seconds) + lowest * np.clip(time, None, 0.0)
-        return np.asarray(test.amplitude * np.sqrt(lowest / (lowest * np.exp(ratio * held / test.seconds))) * np.sin(2.0 * np.pi * swept))
+        return test.amplitude * _swept(test, time)
     frequencies = np.arange(0.2, 3.0 * test.frequency, 0.07)
     strength = 1.0 / (1.0 + (frequencies / test.frequency) ** 4)
     phases = draw.uniform(0.0, 2.0 * np.pi, frequencies.size)
@@ -127,6 +125,15 @@ def _asked(test: LaboratoryTest, time: Array, draw: Generator) -> Array:
     for frequency, size, start in zip(frequencies, strength, phases, strict=True):
         summed += size * np.sin(2.0 * np.pi * frequency * time + start)
     return np.asarray(test.amplitude * summed / np.max(np.abs(summed)))
+
+
+def _swept(test: LaboratoryTest, time: Array) -> Array:
+    """(n,) logarithmic sweep whose amplitude falls with the root of the frequency; before it a sine of the lowest."""
+    lowest = 0.5
+    ratio = np.log(test.frequency / lowest)
+    share = np.clip(time, 0.0, test.seconds) / test.seconds
+    turns = lowest * (test.seconds / ratio * np.expm1(ratio * share) + np.clip(time, None, 0.0))
+    return np.asarray(np.exp(-0.5 * ratio * share) * np.sin(2.0 * np.pi * turns))
 
 
 def _followed(asked: Array, step: float, actuator: Actuator) -> Array:

@@ -20,4 +20,4 @@ def drawn(draw: Generator, scale: Scale, strength: float) -> dict[str, float]:
 
 def pressure_force(flow: float, duct: float) -> float:
     """Force [N] that the duct takes at a flow speed >= 0 [m/s]."""
-    return duct * flow**1.75
+    return float(duct * flow**1.75)

@@ -1,7 +1,7 @@
 """A fluid whose structure breaks down in flow and builds up at rest, so that its yield has a memory.
 
-Equation: dl/dt = (1 - l)/tau - beta |w| l,  T0 (1 + a l)       Source: Moore 1959, Trans. Br. Ceram. Soc. 58; Barnes 1997,
-J. Non-Newtonian Fluid Mech. 70
+Equation: dl/dt = (1 - l)/tau - beta |w| l,  T0 (1 + a l)
+Source: Moore 1959, Trans. Br. Ceram. Soc. 58; Barnes 1997, J. Non-Newtonian Fluid Mech. 70
 """
 
 from __future__ import annotations
