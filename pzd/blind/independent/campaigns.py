@@ -35,7 +35,7 @@ class LaboratoryTest:
 
 
 @dataclass(frozen=True)
-class Campaign:
+class LaboratoryCampaign:
     """What the stand runs in one case."""
 
     tests: tuple[LaboratoryTest, ...]
@@ -132,7 +132,7 @@ SHARES: Mapping[str, float] = {
 """How many of the cases run each."""
 
 
-def campaign(name: str, draw: Generator) -> Campaign:
+def campaign(name: str, draw: Generator) -> LaboratoryCampaign:
     """The tests of a case.
 
     Parameters
@@ -155,4 +155,4 @@ def campaign(name: str, draw: Generator) -> Campaign:
     ]
     seconds = sum(test.seconds for test in every)
     fast_enough = [r for r in RATES if r * seconds <= MOST_SAMPLES]
-    return Campaign(tuple(every), values, float(draw.choice(fast_enough or RATES[:1])))
+    return LaboratoryCampaign(tuple(every), values, float(draw.choice(fast_enough or RATES[:1])))

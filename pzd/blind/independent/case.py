@@ -10,13 +10,13 @@ from types import ModuleType
 import numpy as np
 from numpy.random import Generator, SeedSequence, default_rng
 
-from pzd.blind.independent.base import Base
-from pzd.blind.independent.campaigns import Campaign, campaign
+from pzd.blind.independent.bingham import Base
+from pzd.blind.independent.campaigns import LaboratoryCampaign, campaign
 from pzd.blind.independent.kernel import Parameters, integrated
 from pzd.blind.independent.laws import piezo_hysteresis, sensor_delay, temperature_drift, valve_lag
 from pzd.blind.independent.refit import gap_after_refit
 from pzd.blind.independent.scale import Scale
-from pzd.blind.independent.sensors import Chain, TestErrors, sensed_displacement, sensed_force, stamped
+from pzd.blind.independent.sensors import Chain, ErrorsOfTest, sensed_displacement, sensed_force, stamped
 from pzd.blind.independent.stand import Actuator, Driven, driven, warmed
 from pzd.record import Array
 
@@ -62,7 +62,7 @@ class LoggedTest:
 class IndependentCase:
     """A case and its truth."""
 
-    campaign: Campaign
+    campaign: LaboratoryCampaign
     base: Base
     laws: Mapping[str, Mapping[str, float]]
     """What is hidden, with its parameters."""
@@ -172,7 +172,7 @@ def parameters_of(laws: Mapping[str, Mapping[str, float]]) -> Parameters:
     return Parameters(**{key: v for law in laws.values() for key, v in law.items() if key in Parameters._fields})
 
 
-def _scale(run: Campaign, base: Base, motions: Sequence[Driven], forces: Sequence[Array]) -> Scale:
+def _scale(run: LaboratoryCampaign, base: Base, motions: Sequence[Driven], forces: Sequence[Array]) -> Scale:
     return Scale(
         force=max(float(np.max(np.abs(f))) for f in forces),
         speed=max(float(np.max(np.abs(m.velocity))) for m in motions),
@@ -241,7 +241,7 @@ def _logged(
 ) -> LoggedTest:
     at = motion.recorded
     time, x, true = motion.time[at], motion.displacement[at], force[at // 2]
-    errors = TestErrors.drawn(draw, float(np.max(np.abs(true))))
+    errors = ErrorsOfTest.drawn(draw, float(np.max(np.abs(true))))
     span = damper.base.values[-1] - damper.base.values[0]
     return LoggedTest(
         time=stamped(time, chain),

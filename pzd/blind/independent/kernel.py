@@ -206,7 +206,7 @@ def _oil_force(deflection: float, k: float, p: Parameters) -> float:
 
 
 @compiled
-def _beside(x: float, v: float, a: float, relaxed: float, p: Parameters) -> float:
+def _parallel_force(x: float, v: float, a: float, relaxed: float, p: Parameters) -> float:
     """Force [N] beside the oil spring that remembers nothing but what has relaxed in the bushing."""
     force = _stop(x, p.k_e, p.x_e) + _gas_spring(x, p.k_g) + _inertia(a, p.m) + _preload(p.F_0)
     force += _stribeck(v, p.F_s, p.v_s) + _bushing(x, relaxed, p.bushing_stiffness)
@@ -262,7 +262,7 @@ def _march(
     for j in range(force.size):
         i = 2 * j
         oil = _oil_force(x[i] - s[1] - s[0], k[i], p)
-        force[j] = oil + branch + _beside(x[i], v[i], a[i], s[4], p)
+        force[j] = oil + branch + _parallel_force(x[i], v[i], a[i], s[4], p)
         if j == force.size - 1:
             break
         h, m, e = time[i + 2] - time[i], i + 1, i + 2

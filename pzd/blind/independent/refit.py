@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pzd.blind.independent.base import Base
+from pzd.blind.independent.bingham import Base
 from pzd.blind.independent.kernel import Parameters, integrated
 from pzd.blind.independent.stand import Driven
 from pzd.record import Array

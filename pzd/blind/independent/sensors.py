@@ -65,7 +65,7 @@ class Chain:
 
 
 @dataclass(frozen=True)
-class TestErrors:
+class ErrorsOfTest:
     """What differs from test to test, within the standard deviations that `diagnose.nuisance` assumes."""
 
     gain: float
@@ -79,7 +79,7 @@ class TestErrors:
     """Displacement at rest [m]."""
 
     @classmethod
-    def drawn(cls, draw: Generator, peak: float) -> TestErrors:
+    def drawn(cls, draw: Generator, peak: float) -> ErrorsOfTest:
         """Those of one test whose largest force is the peak [N]."""
         return cls(
             gain=float(np.clip(draw.normal(0.0, 0.01), -0.025, 0.025)),
@@ -90,7 +90,7 @@ class TestErrors:
         )
 
 
-def sensed_force(time: Array, force: Array, peak: float, chain: Chain, errors: TestErrors, draw: Generator) -> Array:
+def sensed_force(time: Array, force: Array, peak: float, chain: Chain, errors: ErrorsOfTest, draw: Generator) -> Array:
     """(n,) what the force channel shows [N].
 
     Parameters
@@ -129,7 +129,7 @@ def coloured(count: int, step: float, draw: Generator) -> Array:
     return np.asarray(np.fft.irfft(white * np.sqrt(wanted / (2.0 * step)), length)[:count])
 
 
-def sensed_displacement(time: Array, x: Array, chain: Chain, errors: TestErrors, draw: Generator) -> Array:
+def sensed_displacement(time: Array, x: Array, chain: Chain, errors: ErrorsOfTest, draw: Generator) -> Array:
     """(n,) what the displacement channel shows [m]; `x` (n,) counts from the middle of the stroke."""
     shown = x + chain.zero + errors.position + chain.displacement_noise * draw.normal(size=time.size)
     return np.asarray(np.round(shown / chain.displacement_step) * chain.displacement_step)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from pzd.blind.independent.campaigns import Campaign, LaboratoryTest
+from pzd.blind.independent.campaigns import LaboratoryCampaign, LaboratoryTest
 from pzd.record import Array, Rows
 
 FINEST = 1.25e-4
@@ -73,7 +73,7 @@ class Driven:
 
 
 def driven(
-    campaign: Campaign, test: LaboratoryTest, actuator: Actuator, draw: Generator, coarse: bool = False
+    campaign: LaboratoryCampaign, test: LaboratoryTest, actuator: Actuator, draw: Generator, coarse: bool = False
 ) -> Driven:
     """The motion of a test on the fine grid.
 
@@ -145,7 +145,7 @@ def _followed(asked: Array, step: float, actuator: Actuator) -> Array:
     return np.asarray(lfilter(b, a, asked))
 
 
-def _signal(campaign: Campaign, test: LaboratoryTest, time: Array) -> Array:
+def _signal(campaign: LaboratoryCampaign, test: LaboratoryTest, time: Array) -> Array:
     low, high = campaign.values[0], campaign.values[-1]
     if test.signal == "constant":
         return np.full_like(time, test.value)
