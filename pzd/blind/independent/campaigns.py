@@ -52,7 +52,7 @@ class LaboratoryCampaign:
 
 RATES = (500.0, 512.0, 1000.0, 1024.0, 2000.0, 4000.0)
 """Usual rates of data loggers [Hz]."""
-MOST_SAMPLES = 60_000
+MOST_SAMPLES = 40_000
 """In all tests of a case; longer campaigns are sampled more slowly."""
 
 
