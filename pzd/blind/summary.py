@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from pzd.blind.case import Scored
-from pzd.blind.config import BlindConfig
 from pzd.blind.confusion import confusion, draw, write_table
 from pzd.blind.rates import CalibrationRow, RateRow, calibration_rows, rate_rows
 from pzd.blind.targets import Line, independent_lines, lines
@@ -18,7 +17,9 @@ from pzd.schema.csvfile import write_rows
 from pzd.schema.jsonfile import write_json
 
 
-def write(cases: Sequence[Scored], folder: Path, control: Control, blind: BlindConfig) -> list[str]:
+def write(
+    cases: Sequence[Scored], folder: Path, control: Control, *, tuning: bool, generator: str = "own"
+) -> list[str]:
     """Write tables and picture beside the scored cases.
 
     Parameters
@@ -26,7 +27,8 @@ def write(cases: Sequence[Scored], folder: Path, control: Control, blind: BlindC
     cases : all that are scored
     folder : takes rates.csv, calibration.csv, confusion.csv, confusion.png and summary.json
     control : the control signal
-    blind : the config, which says where the cases come from and whether thresholds were tuned on the seed
+    tuning : whether the seed is one that thresholds were tuned on
+    generator : where the cases come from, `own` or `independent`
 
     Returns
     -------
@@ -38,10 +40,10 @@ def write(cases: Sequence[Scored], folder: Path, control: Control, blind: BlindC
     matrix = confusion(cases)
     write_table(matrix, folder / "confusion.csv")
     draw(matrix, folder / "confusion.png")
-    said = lines(cases) if blind.generator == "own" else independent_lines(cases)
+    said = lines(cases) if generator == "own" else independent_lines(cases)
     write_json(folder / "summary.json", said, control)
     head = f"{len(cases)} cases"
-    if blind.tuning:
+    if tuning:
         head += "; thresholds were tuned on this seed, so these figures are no result"
     return [head, *(_printed(line) for line in said), *_failures(cases), _cost(cases)]
 

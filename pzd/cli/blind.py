@@ -46,7 +46,8 @@ def blind(
             _entered(setup.blind, made_from, config.parent)
         benchmark = Benchmark(setup, methods, places, made_from, progress=output.progress)
         cases = benchmark.run(jobs, afresh=force)
-        lines = write(cases, places.folder, setup.control, setup.blind)
+        tuning, generator = setup.blind.tuning, setup.blind.generator
+        lines = write(cases, places.folder, setup.control, tuning=tuning, generator=generator)
     output.say(*lines, f"tables and picture: {places.folder}")
     return DONE
 
