@@ -23,6 +23,8 @@ class Truth(Frozen):
     form: str | None
     """Form outside the library that was hidden."""
     form_values: dict[str, float]
+    described_by: tuple[str, ...] = ()
+    """Effects of the library with which a verdict is right about the form."""
     damper: Damper
     sizes: dict[str, float]
     """How much each changes the force, as `blind.sizes` counts it."""
@@ -61,6 +63,8 @@ class Scored(Frozen):
     one_frequency: bool
     hidden: str
     """Names of all that was hidden, joined by `+`; `none`."""
+    described_by: tuple[str, ...] = ()
+    """Effects with which a verdict is right about a form outside the library."""
     truth: tuple[str, ...]
     """Effects that were there to be named: what counts as nothing is left out."""
     force_noise: float

@@ -43,7 +43,7 @@ class Form:
     """(n,) force of about one."""
     ranges: Mapping[str, tuple[float, float]]
     """Its parameters, each drawn evenly between two limits."""
-    described_by: tuple[str, ...]
+    named_shapes: tuple[str, ...]
     """Names of the shapes in `pzd/diagnose/hypotheses/shapes.py` that describe it rightly."""
 
 

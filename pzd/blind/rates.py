@@ -93,7 +93,13 @@ def wrong_single(case: Scored) -> bool:
 
 def shape_told(case: Scored) -> bool:
     """The shape of a force outside the library is among the first two that are told of what is left."""
-    return case.hidden in FORMS and bool({*case.shapes[:2]} & {*FORMS[case.hidden].described_by})
+    return case.hidden in FORMS and bool({*case.shapes[:2]} & {*FORMS[case.hidden].named_shapes})
+
+
+def rightly_outside(case: Scored) -> bool:
+    """Left unexplained, or named by what describes it rightly."""
+    described = bool(case.described_by) and bool(case.effects) and set(case.effects) <= set(case.described_by)
+    return case.verdict == "unexplained" or (case.verdict in ("named", "ambiguous") and described)
 
 
 def false_name(case: Scored) -> bool:

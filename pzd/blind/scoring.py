@@ -70,6 +70,7 @@ def scored(truth: Truth, cost: Cost, found: Diagnosed | None, clean: Mapping[str
         campaign=truth.campaign,
         one_frequency=truth.one_frequency,
         hidden=truth.form or "+".join(truth.effects) or "none",
+        described_by=truth.described_by,
         truth=counted_truth,
         force_noise=truth.force_noise,
         noise_rho=truth.noise_rho,

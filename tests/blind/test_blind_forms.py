@@ -38,9 +38,9 @@ def test_a_form_gives_a_force_of_about_one(name: str) -> None:
 
 @pytest.mark.parametrize("name", FORMS)
 def test_a_form_is_described_by_shapes_that_are_tried(name: str) -> None:
-    described_by = FORMS[name].described_by
-    assert described_by
-    assert {*described_by} <= {shape.name for shape in SHAPES}
+    named = FORMS[name].named_shapes
+    assert named
+    assert {*named} <= {shape.name for shape in SHAPES}
 
 
 def test_position_damping_vanishes_at_the_middle_and_dissipates() -> None:
