@@ -45,22 +45,34 @@ def peers(
     if as_json:
         output.say_json(plain_data({**vars(found), "not_to_be_trusted": marks}, run.control))
     else:
-        output.say(*_lines(found, run.control))
+        output.say(*comparison_lines(found, run.control))
         output.say(f"tables: {run.folder / PeerComparison.folder}")
     complain(f"not to be trusted: {mark}" for mark in marks)
     return UNTRUSTED if marks else DONE
 
 
-def _lines(found: PeerComparison, control: Control) -> Iterator[str]:
+def comparison_lines(found: PeerComparison, control: Control) -> Iterator[str]:
+    """The tables: every test kept back, these by control signal and in all, what was left out, and the parameters.
+
+    Parameters
+    ----------
+    found : the comparison
+    control : the control signal, for its name and unit
+    """
     kept_back = [row for row in found.rows if row.kept_back == "test"]
-    yield "tests kept back:"
-    yield from aligned(_table([row for row in kept_back if row.record], found.models, control), "  ")
-    yield from ("", "all of them, and by control signal:" if kept_back else "")
-    yield from aligned(_table([row for row in kept_back if not row.record], found.models, control), "  ")
-    if left_out := [row for row in found.rows if row.kept_back == "voltage"]:
-        yield from ("", "left out, predicted from its neighbours:")
-        yield from aligned(_table(left_out, found.models, control), "  ")
-    yield from ("", "peers fitted to all tests:")
+    pooled = [row for row in kept_back if row.record is None]
+    sections = {
+        "tests kept back": [row for row in kept_back if row.record is not None],
+        f"tests kept back, by {control.name}": [row for row in pooled if row.voltage_V is not None],
+        "all tests kept back": [row for row in pooled if row.voltage_V is None],
+        "left out, predicted from its neighbours": [row for row in found.rows if row.kept_back == "voltage"],
+    }
+    for title, rows in sections.items():
+        if rows:
+            yield f"{title}:"
+            yield from aligned(_table(rows, found.models, control), "  ")
+            yield ""
+    yield "peers, fitted to all tests:"
     yield from aligned(_parameters(found.parameters, control), "  ")
     if found.moving:
         yield f"not compared, for the control signal moves: {', '.join(found.moving)}"

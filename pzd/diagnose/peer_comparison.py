@@ -37,15 +37,18 @@ def compare_with_peers(rig: Rig, identified: Identified, diagnosed: Diagnosed, s
             "2-identify/kept_back.csv has what both laws predict; say bingham"
         )
     prediction = diagnosed.diagnosis.prediction
-    plain = base_of(identified.rows, setting)
-    prepared = prepare(whole_records(rig, setting)[0])
-    tests = KeptBackTests(prepared, deal(prepared, plain))
-    if prediction is None or not tests.groups:
+    if prediction is None or (all(each.voltage is None for each in prediction.by) and _controlled(identified, setting)):
         raise DataError(
-            "pzd peers: too little to keep a test back at a constant control signal; record two tests of each"
+            "pzd peers: too little to keep a test back at a constant control signal; record two or more at each"
         )
-    controlled = any(row.voltage_V is not None for row in plain.base)
-    return _filled(_Tables(setting, controlled), tests, prediction)
+    prepared = prepare(whole_records(rig, setting)[0])
+    tests = KeptBackTests(prepared, deal(prepared, base_of(identified.rows, setting)))
+    return _filled(_Tables(setting, _controlled(identified, setting)), tests, prediction)
+
+
+def _controlled(identified: Identified, setting: str | None) -> bool:
+    """Whether the damper of a setting has a control signal."""
+    return any(row.voltage_V is not None for row in identified.rows if row.setting == setting)
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ def _filled(tables: _Tables, tests: KeptBackTests, prediction: Prediction) -> Pe
         for i in group:
             name = tests.prepared[i].record.name
             tables.add("test", voltage, name, {model: each.of([i]) for model, each in missed.items()})
-    for voltage, group in tests.groups:
+    for voltage, group in tests.groups if tables.controlled else ():
         tables.add("test", voltage, None, {model: each.of(group) for model, each in missed.items()})
     tables.add("test", None, None, missed)
     left_out = {left.voltage: left for left in prediction.left_out_voltages}
