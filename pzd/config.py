@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator
+from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator, model_validator
 
 from pzd.blind.config import BlindConfig
 from pzd.diagnose.config import DiagnoseConfig
@@ -26,6 +26,80 @@ StageName = Literal["rig", "identify", "diagnose", "table", "simulate", "report"
 STAGES: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "simulate", "report")
 WITHOUT_CAR: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "report")
 """What `stages` of a config may say."""
+
+
+class Uniform(Frozen):
+    """A number that lies anywhere between two limits."""
+
+    uniform: tuple[float, float]
+    """The limits."""
+
+    @field_validator("uniform")
+    @classmethod
+    def _rising(cls, limits: tuple[float, float]) -> tuple[float, float]:
+        if limits[0] >= limits[1]:
+            raise ValueError(f"the first limit must be below the second (got {limits[0]:g}, {limits[1]:g})")
+        return limits
+
+
+class Normal(Frozen):
+    """A number that scatters about a mean."""
+
+    normal: tuple[float, float]
+    """Mean and standard deviation."""
+
+    @field_validator("normal")
+    @classmethod
+    def _scatters(cls, values: tuple[float, float]) -> tuple[float, float]:
+        if values[1] <= 0.0:
+            raise ValueError(f"the standard deviation must be above 0 (got {values[1]:g})")
+        return values
+
+
+Scatter = Literal["interval"] | Annotated[float, Field(gt=0.0, lt=1.0)]
+
+
+class SweepConfig(Frozen):
+    """The same run many times: every combination of values, and random draws."""
+
+    over: dict[str, tuple[bool | int | float | str, ...]] = Field(default_factory=dict)
+    """Values of keys of this config, written as for `--set`; every combination of them is run."""
+    drawn: dict[str, Uniform | Normal] = Field(default_factory=dict)
+    """Keys of this config whose numbers are drawn: `{uniform: [low, high]}` or `{normal: [mean, sd]}`."""
+    damper: dict[str, Scatter] = Field(default_factory=dict)
+    """What scatters of the damper handed on by diagnose, at every voltage and temperature alike: `T0`, `C`, `k`, or a
+    parameter of an adopted effect as in `orifice_quadratic.q`. Either the standard deviation as a share of the value,
+    from one damper of a series to the next, or `interval`: as uncertain as the tests leave it."""
+    draws: int = Field(default=64, ge=2)
+    """Base number of draws, a power of two. With two drawn quantities or more each combination is run `draws` times
+    (their number + 2), which the Sobol indices need."""
+    until: Literal["identify", "diagnose", "simulate"] = "simulate"
+    """The stage whose results are gathered."""
+    chunk: int = Field(default=8, ge=1)
+    """Runs that a worker does at a time; what a chunk found is written when it is done."""
+    engine: Literal["local", "dask"] = "local"
+    """Where it runs: in processes of this machine, or on a Dask cluster (`pip install pzd[cluster]`)."""
+    address: str | None = None
+    """Of the Dask scheduler; by default a cluster of `--jobs` processes on this machine. All workers must see the
+    folder of the results."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> SweepConfig:
+        if not (self.over or self.drawn or self.damper):
+            raise ValueError("nothing differs from run to run; say what under over, drawn or damper")
+        empty = [key for key, values in self.over.items() if not values]
+        if empty:
+            raise ValueError(f"over.{empty[0]} has no values")
+        both = sorted({*self.over} & {*self.drawn})
+        if both:
+            raise ValueError(f"{both[0]} stands under over and under drawn; take one of them away")
+        if self.draws & (self.draws - 1):
+            raise ValueError(f"draws must be a power of two (got {self.draws})")
+        if self.damper and self.until != "simulate":
+            raise ValueError(f"damper scatters behind diagnose, and until ends at {self.until}; say until: simulate")
+        if self.address is not None and self.engine != "dask":
+            raise ValueError("address belongs to engine: dask")
+        return self
 
 
 class RunConfig(Frozen):
@@ -55,6 +129,8 @@ class RunConfig(Frozen):
     """The comfort report."""
     blind: BlindConfig | None = None
     """What `pzd blind` hides in virtual rigs, to see how far the naming can be trusted."""
+    sweep: SweepConfig | None = None
+    """What `pzd sweep` runs many times."""
 
     @property
     def with_car(self) -> bool:

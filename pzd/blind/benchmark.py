@@ -5,12 +5,10 @@ At most `jobs` processes work at a time, so that the seconds of a diagnosis are 
 
 from __future__ import annotations
 
-import logging
-import multiprocessing
 import shutil
 import time
 from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,21 +20,8 @@ from pzd.blind.plan import PlannedCase, plan
 from pzd.blind.scoring import score_case
 from pzd.schema.errors import DataError
 from pzd.schema.jsonfile import read_json
-from pzd.schema.processes import end_with_parent
+from pzd.schema.processes import spawned_pool
 from pzd.schema.progress import Listener, Progress, no_listener
-
-log = logging.getLogger(__name__)
-
-
-def processes(count: int) -> Executor:
-    """A pool of processes that share nothing with this one, and end with it however it ends."""
-    return ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _ends_quietly)
-
-
-def _ends_quietly() -> None:
-    """Let a process end with its parent and without a traceback, and say nothing: the parent speaks for all."""
-    logging.getLogger("pzd").addHandler(logging.NullHandler())
-    end_with_parent()
 
 
 @dataclass(frozen=True)
@@ -48,7 +33,7 @@ class Benchmark:
     places: Places
     made_from: str
     """Hash of everything that a case depends on but its number: cases with another one are done again."""
-    pool: Callable[[int], Executor] = processes
+    pool: Callable[[int], Executor] = spawned_pool
     """Makes a pool of so many workers."""
     progress: Listener = no_listener
     """Hears of every case that is done."""

@@ -11,7 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from pzd.cli import blind, export, figures, look, peers, stages, start, watch
+from pzd.cli import blind, export, figures, look, peers, stages, start, sweep, watch
 from pzd.cli.exits import DONE, INTERRUPTED, OWN_FAULT
 from pzd.cli.interrupt import (
     end_at_once_when_interrupted,
@@ -41,6 +41,7 @@ _COMMANDS: tuple[Callable[..., int], ...] = (
     *look.COMMANDS,
     *export.COMMANDS,
     *figures.COMMANDS,
+    *sweep.COMMANDS,
     *blind.COMMANDS,
     *start.COMMANDS,
 )

@@ -68,7 +68,7 @@ class Pipeline:
         """Now that the records are sound, write the config, and see that it is clear which setting is meant."""
         self.run.write_config(yaml_text(self.config, self.run.control))
         if any("setting" in stage.takes for stage in wanted):
-            setting_of(self.config, self.run)
+            self.setting()
 
     def _execute_stage(self, stage: Stage, *, force: bool) -> None:
         inputs = dependencies(stage, self.config, self.run, self._carried(stage, ()))
@@ -129,17 +129,21 @@ class Pipeline:
     def _argument(self, name: str, annotation: Any) -> Any:
         """What a parameter of a stage is given; artefacts are read back from their files, never passed on."""
         if is_artefact(annotation):
-            return self._read_back(annotation)
+            return self.read_back(annotation)
         if block := block_of(self.config, annotation):
             return block[1]
         if annotation is Control:
             return self.run.control
         if name == "setting":
-            return setting_of(self.config, self.run)
+            return self.setting()
         given = {"seed": self.config.seed, "folder": self.run.config.parent}
         return (given | {"jobs": self.jobs, "progress": self.progress})[name]
 
-    def _read_back(self, kind: type[Artefact]) -> Artefact:
+    def setting(self) -> str | None:
+        """The setting in use, by the config and the records of the run."""
+        return setting_of(self.config, self.run)
+
+    def read_back(self, kind: type[Artefact]) -> Artefact:
         """An artefact as its files have it: read and checked once, and again where they have changed since."""
         now = self.run.outputs(kind.folder)
         files, artefact = self._in_hand.get(kind.folder, ({}, None))
@@ -151,7 +155,7 @@ class Pipeline:
     def _marks_as_it_stands(self, stage: Stage, state: StageFolder) -> tuple[str, ...]:
         """The marks of the manifest, or of the artefact itself where it was edited, which checks it too."""
         if state.edited:
-            return self._carried(stage, self._untrusted(self._read_back(stage.makes)))
+            return self._carried(stage, self._untrusted(self.read_back(stage.makes)))
         return state.manifest.marks if state.manifest else ()
 
     def _untrusted(self, artefact: Artefact) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -9,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
+    from concurrent.futures import Executor, Future
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
@@ -48,6 +49,19 @@ def parallel_map(function: Callable[[Item], Made], items: Sequence[Item], jobs: 
     finally:
         pool.shutdown(wait=finished, cancel_futures=True)
     return made
+
+
+def spawned_pool(jobs: int) -> Executor:
+    """A pool of processes that share nothing with this one, say nothing, and end with it however it ends."""
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    return ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _work_quietly)
+
+
+def _work_quietly() -> None:
+    logging.getLogger("pzd").addHandler(logging.NullHandler())
+    end_with_parent()
 
 
 def end_with_parent() -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from pzd.compiled import compiled, inlined
-from pzd.damper.dormand_prince import STAGES
 from pzd.damper.kernels import keep_voltage
 from pzd.damper.rows import row_at
 from pzd.record import Array
 from pzd.simulate.demand import bounds_of, choose_hardness, demand, spring_acceleration
+from pzd.simulate.dormand_prince import STAGES
 from pzd.simulate.dynamic_damper import effective_voltage, place, stored
 from pzd.simulate.equations import motion
 from pzd.simulate.minimise import LARGEST, farther_end

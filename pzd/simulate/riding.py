@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.damper.dormand_prince import STAGES
 from pzd.schema.errors import DataError
 from pzd.simulate.car import HalfCar
 from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.dampers import rubs
+from pzd.simulate.dormand_prince import STAGES
 from pzd.simulate.dynamic_damper import DynamicDamper
 from pzd.simulate.energy import balance_error, stored_energy
 from pzd.simulate.linear import ride_exactly

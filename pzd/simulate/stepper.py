@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from pzd.compiled import compiled, inlined
-from pzd.damper.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
 from pzd.record import Array
+from pzd.simulate.dormand_prince import ERROR_WEIGHTS, STAGE_WEIGHTS, STAGES, TIMES
 from pzd.simulate.equations import motion, remember_step
 from pzd.simulate.ride_model import (
     COMPRESSION_PUSH,

@@ -12,13 +12,13 @@ from simulate_dampers import table_of
 
 from pzd.artefacts import Diagnosed
 from pzd.comfort.weighting import WK, modes, response, weighted
-from pzd.damper.dormand_prince import STAGES
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
 from pzd.signals.root_mean_square import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.dampers import dynamic_damper_of, grid_of
+from pzd.simulate.dormand_prince import STAGES
 from pzd.simulate.equations import motion
 from pzd.simulate.loop import set_control
 from pzd.simulate.plan import Case

@@ -1,0 +1,253 @@
+"""All runs of a sweep in chunks, each written when it is done, so that one that was stopped goes on where it was."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from pzd.artefacts import Diagnosed
+from pzd.config import SweepConfig
+from pzd.pipeline.sources import code_hash
+from pzd.quantities import Control
+from pzd.runs import file_hash
+from pzd.schema.errors import ConfigError, DataError
+from pzd.schema.jsonfile import read_json_list, write_json
+from pzd.schema.progress import Listener, Progress, no_listener
+from pzd.sweep.engines import ENGINES
+from pzd.sweep.gather import Results, write
+from pzd.sweep.page import decisive, page
+from pzd.sweep.plan import Task, tasks
+from pzd.sweep.scatter import check_scatter
+from pzd.sweep.task import TRIES, Base, Outcome, config_of, outcomes, shared_stages
+
+FOLDER = "sweep"
+"""Where a sweep lies beside the stages of the run."""
+_MADE_FROM = "made_from.sha256"
+_MOST_TOLD = 5
+"""Failures that are printed; failed.csv holds all."""
+_HOW = {"engine", "address", "chunk"}
+"""Keys of the block that change nothing of the results."""
+_AHEAD = 4
+"""Chunks that wait at each worker: enough that none is idle, few enough that little is lost when it is stopped."""
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """The runs of a sweep, and where what they found is written."""
+
+    base: Base
+    sweep: SweepConfig
+    tasks: tuple[Task, ...]
+    progress: Listener = no_listener
+    """Hears of every chunk that is done."""
+
+    @classmethod
+    def of(cls, base: Base, progress: Listener = no_listener) -> Campaign:
+        """The campaign of a config.
+
+        Raises
+        ------
+        ConfigError : when the config has no block `sweep`
+        """
+        config = base.opened.config
+        if config.sweep is None:
+            raise ConfigError("sweep: the config has no such block; configs/sweep.yaml is an example")
+        return cls(base, config.sweep, tasks(config.sweep, config.seed), progress)
+
+    @property
+    def folder(self) -> Path:
+        """Of the results."""
+        return self.base.opened.run.folder / FOLDER
+
+    @property
+    def control(self) -> Control:
+        """The control signal."""
+        return self.base.opened.run.control
+
+    @property
+    def chunks(self) -> tuple[tuple[Task, ...], ...]:
+        """The runs in parts."""
+        size = self.sweep.chunk
+        return tuple(self.tasks[first : first + size] for first in range(0, len(self.tasks), size))
+
+    def last_shared_stage(self) -> str | None:
+        """The last stage that is the same in all runs; None where already the records differ.
+
+        Raises
+        ------
+        ConfigError : when a value is wrong, with every place
+        """
+        once: dict[tuple[str, object], Task] = {}
+        for task in self.tasks:
+            for key, value in task.over:
+                once.setdefault((key, value), task)
+        ends = [*self.tasks[:1], *once.values()]
+        for key in self.sweep.drawn:
+            drawn = sorted(self.tasks, key=lambda task: dict(task.drawn)[key])
+            ends += [drawn[0], drawn[-1]]
+        faults: list[str] = []
+        for task in ends:
+            try:
+                config_of(self.base.opened, task)
+            except ConfigError as error:
+                faults += error.messages
+        if faults:
+            raise ConfigError(dict.fromkeys(faults))
+        shared = [stage.name for stage in shared_stages(self.base.opened, ends)]
+        wanted = {"identify": 2, "diagnose": 3, "simulate": 4}[self.sweep.until]
+        return shared[min(len(shared), wanted) - 1] if shared else None
+
+    def check(self) -> None:
+        """Check that the damper handed on has what is to scatter: before any run, where all share its diagnosis.
+
+        Raises
+        ------
+        ConfigError : when it has no such parameter
+        DataError : when the tests leave no interval for one
+        """
+        if self.sweep.damper:
+            check_scatter(self.sweep.damper, self.base.opened.run.read(Diagnosed))
+
+    def gather(self, found: Sequence[Outcome], name: str) -> list[str]:
+        """Write the tables and the page; the lines to print.
+
+        Parameters
+        ----------
+        found : what came of every run
+        name : of the config
+        """
+        results = Results(self.sweep, self.tasks, tuple(found), self.base.opened.config.seed)
+        write(results, self.folder, self.control)
+        path = self.folder / "sweep.html"
+        path.write_text(page(results, f"Sweep of {name}"), encoding="utf-8", newline="\n")
+        told = [f"{len(self.tasks)} runs, {len(results.failed)} without a result"]
+        told += [f"failed: {row.differs_in}: {row.failure}" for row in results.failed[:_MOST_TOLD]]
+        told += decisive(results)
+        return [*told, f"tables and page: {self.folder}"]
+
+    def run(self, jobs: int, *, afresh: bool = False) -> tuple[Outcome, ...]:
+        """What came of every run, in order; what stands there finished and made from the same is not done again.
+
+        Parameters
+        ----------
+        jobs : processes of this machine
+        afresh : whether everything is done again
+        """
+        self._prepare(afresh=afresh)
+        waiting = [chunk for chunk in self.chunks if self._found(chunk) is None]
+        while waiting:
+            lost = self._in_parallel(waiting, jobs)
+            for chunk in lost:
+                self._alone(chunk)
+            waiting = [chunk for chunk in waiting if self._found(chunk) is None]
+        return tuple(outcome for chunk in self.chunks for outcome in self._found(chunk) or ())
+
+    def finished(self) -> tuple[Outcome, ...]:
+        """What came of the runs that are done."""
+        if not self._is_of_this_config():
+            return ()
+        return tuple(outcome for chunk in self.chunks for outcome in self._found(chunk) or ())
+
+    def seconds_a_chunk(self) -> float | None:
+        """How long a chunk took, by when the files were written [s]; None with fewer than two."""
+        times = sorted(path.stat().st_mtime for path in self._chunks_folder.glob("*.json"))
+        return (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else None
+
+    @property
+    def _chunks_folder(self) -> Path:
+        return self.folder / "chunks"
+
+    def _path(self, chunk: Sequence[Task]) -> Path:
+        return self._chunks_folder / f"{chunk[0].number:06d}-{chunk[-1].number:06d}.json"
+
+    def _found(self, chunk: Sequence[Task]) -> tuple[Outcome, ...] | None:
+        path = self._path(chunk)
+        if not path.exists():
+            return None
+        with suppress(DataError):
+            found = read_json_list(path, Outcome, self.control)
+            if [outcome.task for outcome in found] == [task.number for task in chunk]:
+                return found
+        return None
+
+    def _keep(self, chunk: Sequence[Task], found: Sequence[Outcome]) -> None:
+        path = self._path(chunk)
+        fresh = path.with_suffix(".new")
+        write_json(fresh, found, self.control)
+        fresh.replace(path)
+
+    def _prepare(self, *, afresh: bool) -> None:
+        """Take away what was made from another config, from other records or by other code."""
+        if afresh or not self._is_of_this_config():
+            shutil.rmtree(self._chunks_folder, ignore_errors=True)
+        self._chunks_folder.mkdir(parents=True, exist_ok=True)
+        (self.folder / _MADE_FROM).write_text(self._made_from() + "\n", encoding="utf-8")
+
+    def _is_of_this_config(self) -> bool:
+        path = self.folder / _MADE_FROM
+        return path.exists() and path.read_text(encoding="utf-8").strip() == self._made_from()
+
+    def _made_from(self) -> str:
+        """Hash of all that the results depend on."""
+        given = self.base.opened
+        blocks = given.config.model_dump(mode="json")
+        blocks["sweep"] = {key: value for key, value in blocks["sweep"].items() if key not in _HOW}
+        files = {
+            f"{path.parent.name}/{path.name}": file_hash(path)
+            for folder in ("1-rig", "2-identify", "3-diagnose", "4-table")
+            for path in sorted((given.run.folder / folder).glob("*"))
+            if path.is_file() and path.name != "manifest.json"
+        }
+        return hashlib.sha256(json.dumps([blocks, files, code_hash("pzd.sweep.task")]).encode()).hexdigest()
+
+    def _in_parallel(self, waiting: Sequence[tuple[Task, ...]], jobs: int) -> list[tuple[Task, ...]]:
+        """Do chunks at the same time; those that were at work when a process was killed, which ends the pool."""
+        left = iter(waiting)
+        flying: dict[Future[tuple[Outcome, ...]], tuple[Task, ...]] = {}
+        with ENGINES[self.sweep.engine](jobs, self.sweep.address) as pool:
+            while True:
+                for chunk in _some(left, _AHEAD * jobs - len(flying)):
+                    flying[pool.submit(outcomes, self.base, chunk)] = chunk
+                if not flying:
+                    return []
+                done, _ = wait(flying, return_when=FIRST_COMPLETED)
+                for future in done:
+                    try:
+                        found = future.result()
+                    except Exception:  # noqa: BLE001  # a run tells its own failures; this is the end of a process
+                        return list(flying.values())
+                    self._keep(flying.pop(future), found)
+                    self._tell()
+
+    def _alone(self, chunk: tuple[Task, ...]) -> None:
+        """Do a chunk run by run, each in a process of its own: one that kills it again and again is set aside."""
+        self._keep(chunk, [self._tried(task) for task in chunk])
+        self._tell()
+
+    def _tried(self, task: Task) -> Outcome:
+        reason: Exception | None = None
+        for _ in range(TRIES):
+            with ENGINES[self.sweep.engine](1, self.sweep.address) as pool:
+                try:
+                    return pool.submit(outcomes, self.base, (task,)).result()[0]
+                except Exception as error:  # noqa: BLE001  # a run tells its own failures; this is the process's end
+                    reason = error
+        return Outcome(task=task.number, failure=f"the process that did it was lost {TRIES} times: {reason}")
+
+    def _tell(self) -> None:
+        done = sum(self._path(chunk).exists() for chunk in self.chunks)
+        self.progress(Progress(done, len(self.chunks), f"chunks of {self.sweep.chunk} runs"))
+
+
+def _some(left: Iterator[tuple[Task, ...]], count: int) -> Iterator[tuple[Task, ...]]:
+    for _ in range(max(count, 0)):
+        chunk = next(left, None)
+        if chunk is None:
+            return
+        yield chunk

@@ -1,0 +1,249 @@
+"""The results of a sweep in one table, how they spread over the draws, and which quantity decides."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from pzd.config import SweepConfig
+from pzd.quantities import Control
+from pzd.record import Array
+from pzd.schema.csvfile import write_rows
+from pzd.schema.model import Frozen
+from pzd.schema.scalars import Scalar
+from pzd.sweep.plan import Task, quantities, with_indices
+from pzd.sweep.task import Outcome
+
+LABELS = ("setting", "voltage_V", "temperature_degC", "case", "road", "policy", "fidelity", "point")
+"""Columns that say what a row is about; all other numbers are measures of it."""
+RESAMPLES = 200
+"""Of the draws, for the intervals of the indices."""
+
+
+class SpreadRow(Frozen):
+    """One measure over the draws of one combination."""
+
+    combination: str
+    about: str
+    measure: str
+    draws: int
+    mean: float
+    standard_deviation: float
+    percent_5: float
+    median: float
+    percent_95: float
+
+
+class IndexRow(Frozen):
+    """How much of the variance of one measure comes from one quantity."""
+
+    combination: str
+    about: str
+    measure: str
+    quantity: str
+    first_order: float
+    """Share of the variance that goes when the quantity alone is known."""
+    first_order_low95: float
+    first_order_high95: float
+    total_order: float
+    """Share that stays when everything else is known."""
+    total_order_low95: float
+    total_order_high95: float
+
+
+class FailedRow(Frozen):
+    """A run that came to no result."""
+
+    task: int
+    differs_in: str
+    failure: str
+
+
+@dataclass(frozen=True)
+class Results:
+    """All results of a sweep."""
+
+    sweep: SweepConfig
+    tasks: tuple[Task, ...]
+    outcomes: tuple[Outcome, ...]
+    seed: int = 1
+    """Of the resampling."""
+    _by_task: Mapping[int, Outcome] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Sort the outcomes by their run."""
+        object.__setattr__(self, "_by_task", {outcome.task: outcome for outcome in self.outcomes})
+
+    @property
+    def failed(self) -> tuple[FailedRow, ...]:
+        """The runs that came to no result."""
+        pairs = ((task, self._by_task[task.number].failure) for task in self.tasks)
+        return tuple(
+            FailedRow(task=task.number, differs_in=task.described, failure=failure)
+            for task, failure in pairs
+            if failure
+        )
+
+    def rows(self) -> list[dict[str, Scalar]]:
+        """Every row of every run, behind its number and what it differs in."""
+        found = []
+        for task in self.tasks:
+            own = {"task": task.number, **dict(task.over), **dict(task.drawn)}
+            own |= {f"damper.{name}": z for name, z in task.damper}
+            found += [{**own, **row} for row in self._by_task[task.number].rows]
+        return found
+
+    def spread(self) -> tuple[SpreadRow, ...]:
+        """Every measure over the independent draws of each combination."""
+        return tuple(
+            SpreadRow(
+                combination=combination,
+                about=about,
+                measure=measure,
+                draws=values.size,
+                mean=float(values.mean()),
+                standard_deviation=float(values.std(ddof=1)) if values.size > 1 else 0.0,
+                percent_5=float(np.percentile(values, 5.0)),
+                median=float(np.median(values)),
+                percent_95=float(np.percentile(values, 95.0)),
+            )
+            for combination, about, measure, found in self._measures()
+            for values in [_known(found[: self._independent])]
+            if values.size
+        )
+
+    def indices(self) -> tuple[IndexRow, ...]:
+        """Sobol indices of every measure that varies, for combinations of which no run failed.
+
+        Equation: S_i = V_i(E(Y | x_i)) / V(Y), S_Ti = E(V(Y | x_~i)) / V(Y)
+                                        Source: Saltelli et al. 2010, by scipy.stats.sobol_indices
+        """
+        if not with_indices(self.sweep):
+            return ()
+        return tuple(
+            row
+            for combination, about, measure, found in self._measures()
+            if np.isfinite(found).all() and float(np.ptp(found)) > 0.0
+            for row in self._indices_of((combination, about, measure), found)
+        )
+
+    def _indices_of(self, labels: tuple[str, str, str], values: Array) -> list[IndexRow]:
+        from scipy.stats import sobol_indices
+
+        names, n = quantities(self.sweep), self.sweep.draws
+        # A mean far from zero would cancel digits; the indices do not depend on it.
+        parts = (values - values[: 2 * n].mean()).reshape(len(names) + 2, 1, n)
+        found = sobol_indices(
+            func={"f_A": parts[0], "f_B": parts[1], "f_AB": parts[2:]}, n=n, rng=np.random.default_rng(self.seed)
+        )
+        sure = found.bootstrap(confidence_level=0.95, n_resamples=RESAMPLES)
+        # The stubs take an interval for two numbers; they are two arrays (s, d).
+        first, total = (
+            (np.asarray(each.confidence_interval.low), np.asarray(each.confidence_interval.high))
+            for each in (sure.first_order, sure.total_order)
+        )
+        combination, about, measure = labels
+        return [
+            IndexRow(
+                combination=combination,
+                about=about,
+                measure=measure,
+                quantity=name,
+                first_order=float(found.first_order[0, i]),
+                first_order_low95=float(first[0][0, i]),
+                first_order_high95=float(first[1][0, i]),
+                total_order=float(found.total_order[0, i]),
+                total_order_low95=float(total[0][0, i]),
+                total_order_high95=float(total[1][0, i]),
+            )
+            for i, name in enumerate(names)
+        ]
+
+    @property
+    def _independent(self) -> int:
+        """Runs of a combination that are independent of each other; the rest serve the indices."""
+        return 2 * self.sweep.draws if with_indices(self.sweep) else self.sweep.draws
+
+    def _measures(self) -> list[tuple[str, str, str, Array]]:
+        """Combination, label, measure, and its value in every run; not a number where a run has none."""
+        found = []
+        for over, some in groupby(self.tasks, key=lambda task: task.over):
+            runs = [self._by_task[task.number].rows for task in some]
+            names = dict.fromkeys(
+                (_about(row), key)
+                for rows in runs
+                for row in rows
+                for key, value in row.items()
+                if _measure(key, value)
+            )
+            by_label = [{_about(row): row for row in rows} for rows in runs]
+            combination = ", ".join(f"{key} = {value}" for key, value in over)
+            for about, key in names:
+                values = [_number(each.get(about, {}).get(key)) for each in by_label]
+                found.append((combination, about, key, np.array(values)))
+        return found
+
+
+def _about(row: Mapping[str, Scalar]) -> str:
+    if "case" in row:
+        return str(row["case"]) if row.get("point") in (None, "K") else f"{row['case']} {row['point']}"
+    return ", ".join(f"{row[key]}" for key in LABELS if row.get(key) is not None)
+
+
+def _measure(key: str, value: Scalar) -> bool:
+    return key not in LABELS and isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _number(value: Scalar) -> float:
+    return float(value) if isinstance(value, int | float) else float("nan")
+
+
+def _known(values: Array) -> Array:
+    found: Array = values[np.isfinite(values)]
+    return found
+
+
+def write(results: Results, folder: Path, control: Control) -> None:
+    """Write results.csv, spread.csv, sensitivity.csv and failed.csv; results.parquet too where pyarrow is installed.
+
+    Parameters
+    ----------
+    results : of all runs
+    folder : takes the files
+    control : the control signal, which names its columns
+    """
+    rows = results.rows()
+    columns = list(dict.fromkeys(key for row in rows for key in row)) or ["task"]
+    _write_table(folder / "results.csv", columns, rows, control)
+    write_rows(folder / "spread.csv", SpreadRow, results.spread(), control)
+    write_rows(folder / "sensitivity.csv", IndexRow, results.indices(), control)
+    write_rows(folder / "failed.csv", FailedRow, results.failed, control)
+    _write_parquet(folder / "results.parquet", columns, rows, control)
+
+
+def _write_table(path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Scalar]], control: Control) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([control.renamed(name) for name in columns])
+        writer.writerows([row.get(name) for name in columns] for row in rows)
+
+
+def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Scalar]], control: Control) -> None:
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:  # an extra
+        return
+    table = pa.table({control.renamed(name): _of_one_type([row.get(name) for row in rows]) for name in columns})
+    parquet.write_table(table, path)
+
+
+def _of_one_type(values: Sequence[Scalar]) -> Sequence[Scalar]:
+    """A column as text where some of it is text."""
+    mixed = any(isinstance(value, str) for value in values)
+    return [None if value is None else str(value) for value in values] if mixed else values
