@@ -68,7 +68,7 @@ format: $(DEV)  ## Format the code and mend what ruff can mend
 lock: $(DEV)  ## Resolve the dependencies again, for Python 3.11 to 3.13 and every platform
 	$(LOCK) --upgrade pyproject.toml --output-file requirements.lock
 	$(LOCK) --upgrade --group build --output-file requirements-build.lock
-	$(LOCK) --upgrade --group dev --extra formats pyproject.toml --constraint requirements.lock \
+	$(LOCK) --upgrade --group dev --extra cluster --extra formats pyproject.toml --constraint requirements.lock \
 	        --constraint requirements-build.lock --output-file requirements-dev.lock
 
 .PHONY: clean

@@ -32,7 +32,7 @@ from pzd.schema.progress import Progress
 
 COMMANDS = [
     *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report", "watch", "peers"),
-    *("check", "show", "compare", "export", "figures", "blind", "init", "schema", "effects"),
+    *("check", "show", "compare", "export", "figures", "sweep", "blind", "init", "schema", "effects"),
 ]
 HEAVY = ("numba", "pandas", "scipy", "matplotlib", "pint", "jinja2")
 

@@ -41,7 +41,7 @@ pytestmark = pytest.mark.ci
 
 def measured(config: Path) -> list[str]:
     """The patterns of the rig files that a config reads."""
-    rig: dict[str, Any] = yaml.safe_load(config.read_text(encoding="utf-8"))["rig"]
+    rig: dict[str, Any] = yaml.safe_load(config.read_text(encoding="utf-8")).get("rig", {})
     return [entry["path"] for entry in rig.get("files", ())]
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import groupby
 from pathlib import Path
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
@@ -46,14 +48,15 @@ class IndexRow(Frozen):
     about: str
     measure: str
     quantity: str
+    """Its intervals are empty where the draws do not vary with it at all."""
     first_order: float
     """Share of the variance that goes when the quantity alone is known."""
-    first_order_low95: float
-    first_order_high95: float
+    first_order_low95: float | None
+    first_order_high95: float | None
     total_order: float
     """Share that stays when everything else is known."""
-    total_order_low95: float
-    total_order_high95: float
+    total_order_low95: float | None
+    total_order_high95: float | None
 
 
 class FailedRow(Frozen):
@@ -98,6 +101,7 @@ class Results:
             found += [{**own, **row} for row in self._by_task[task.number].rows]
         return found
 
+    @cached_property
     def spread(self) -> tuple[SpreadRow, ...]:
         """Every measure over the independent draws of each combination."""
         return tuple(
@@ -117,6 +121,7 @@ class Results:
             if values.size
         )
 
+    @cached_property
     def indices(self) -> tuple[IndexRow, ...]:
         """Sobol indices of every measure that varies, for combinations of which no run failed.
 
@@ -141,10 +146,12 @@ class Results:
         found = sobol_indices(
             func={"f_A": parts[0], "f_B": parts[1], "f_AB": parts[2:]}, n=n, rng=np.random.default_rng(self.seed)
         )
-        sure = found.bootstrap(confidence_level=0.95, n_resamples=RESAMPLES)
-        # The stubs take an interval for two numbers; they are two arrays (s, d).
+        with np.errstate(invalid="ignore", divide="ignore"), catch_warnings():
+            simplefilter("ignore")  # where a quantity changes nothing there is no interval, which the row tells
+            sure = found.bootstrap(confidence_level=0.95, n_resamples=RESAMPLES)
+        # With one measure each is (d,).
         first, total = (
-            (np.asarray(each.confidence_interval.low), np.asarray(each.confidence_interval.high))
+            (np.ravel(each.confidence_interval.low), np.ravel(each.confidence_interval.high))
             for each in (sure.first_order, sure.total_order)
         )
         combination, about, measure = labels
@@ -154,12 +161,12 @@ class Results:
                 about=about,
                 measure=measure,
                 quantity=name,
-                first_order=float(found.first_order[0, i]),
-                first_order_low95=float(first[0][0, i]),
-                first_order_high95=float(first[1][0, i]),
-                total_order=float(found.total_order[0, i]),
-                total_order_low95=float(total[0][0, i]),
-                total_order_high95=float(total[1][0, i]),
+                first_order=float(np.ravel(found.first_order)[i]),
+                first_order_low95=_finite(first[0][i]),
+                first_order_high95=_finite(first[1][i]),
+                total_order=float(np.ravel(found.total_order)[i]),
+                total_order_low95=_finite(total[0][i]),
+                total_order_high95=_finite(total[1][i]),
             )
             for i, name in enumerate(names)
         ]
@@ -203,6 +210,10 @@ def _number(value: Scalar) -> float:
     return float(value) if isinstance(value, int | float) else float("nan")
 
 
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
 def _known(values: Array) -> Array:
     found: Array = values[np.isfinite(values)]
     return found
@@ -220,8 +231,8 @@ def write(results: Results, folder: Path, control: Control) -> None:
     rows = results.rows()
     columns = list(dict.fromkeys(key for row in rows for key in row)) or ["task"]
     _write_table(folder / "results.csv", columns, rows, control)
-    write_rows(folder / "spread.csv", SpreadRow, results.spread(), control)
-    write_rows(folder / "sensitivity.csv", IndexRow, results.indices(), control)
+    write_rows(folder / "spread.csv", SpreadRow, results.spread, control)
+    write_rows(folder / "sensitivity.csv", IndexRow, results.indices, control)
     write_rows(folder / "failed.csv", FailedRow, results.failed, control)
     _write_parquet(folder / "results.parquet", columns, rows, control)
 

@@ -42,7 +42,7 @@ def page(results: Results, title: str) -> str:
     """
     import matplotlib as mpl
 
-    spread, indices = results.spread(), results.indices()
+    spread, indices = results.spread, results.indices
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
         sections = (_spread(results, spread), *_decides(results, indices), *_failed(results))
     return render(title, _cards(results, indices), (), sections, _FOOTER)
@@ -53,12 +53,18 @@ def decisive(results: Results) -> list[str]:
     measure = MEASURES[results.sweep.until][0]
     lines = []
     for (combination, about), rows in groupby(
-        (row for row in results.indices() if row.measure == measure), key=lambda row: (row.combination, row.about)
+        (row for row in results.indices if row.measure == measure), key=lambda row: (row.combination, row.about)
     ):
         ordered = sorted(rows, key=lambda row: -row.total_order)
-        shares = ", ".join(f"{row.quantity} {row.total_order:.0%}" for row in ordered[:_MOST_NAMED])
-        lines.append(f"{measure} of {_label(combination, about)}: {shares} of the variance")
+        shares = ", ".join(f"{row.quantity} {row.total_order:.0%} ({_interval(row)})" for row in ordered[:_MOST_NAMED])
+        lines.append(f"{measure} of {_label(combination, about)}: of the variance {shares}")
     return lines
+
+
+def _interval(row: IndexRow) -> str:
+    if row.total_order_low95 is None or row.total_order_high95 is None:
+        return "no interval"
+    return f"{row.total_order_low95:.0%} to {row.total_order_high95:.0%}"
 
 
 def _cards(results: Results, indices: Sequence[IndexRow]) -> tuple[Card, ...]:
@@ -121,7 +127,7 @@ def _decides(results: Results, indices: Sequence[IndexRow]) -> tuple[Section, ..
             row.quantity,
             f"{row.first_order:.0%}",
             f"{row.total_order:.0%}",
-            f"{row.total_order_low95:.0%} to {row.total_order_high95:.0%}",
+            _interval(row),
         )
         for row in mine
     )
@@ -161,7 +167,8 @@ def _tornado(rows: Sequence[IndexRow], measure: str) -> Panel:
     figure, ax = _lines([_short(row.quantity) for row in ordered])
     for place, row in enumerate(ordered):
         ax.barh(place, row.total_order, color=FINAL, height=0.6)
-        ax.plot((row.total_order_low95, row.total_order_high95), (place, place), color=BASELINE, linewidth=1.5)
+        if row.total_order_low95 is not None and row.total_order_high95 is not None:
+            ax.plot((row.total_order_low95, row.total_order_high95), (place, place), color=BASELINE, linewidth=1.5)
     ax.set_xlabel("share of the variance (total order)")
     label = _label(rows[0].combination, rows[0].about)
     return Panel(figure, f"{measure}, {label}", f"Share of the variance of {measure} by quantity.", "")

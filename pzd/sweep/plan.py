@@ -59,7 +59,7 @@ def tasks(sweep: SweepConfig, seed: int) -> tuple[Task, ...]:
     seed : of the draws
     """
     shares = design(sweep, seed)
-    combinations = itertools.product(*(((key, value) for value in values) for key, values in sweep.over.items()))
+    combinations = itertools.product(*([(key, value) for value in values] for key, values in sweep.over.items()))
     pairs = itertools.product(combinations, shares)
     return tuple(_task(sweep, number, over, row) for number, (over, row) in enumerate(pairs, start=1))
 

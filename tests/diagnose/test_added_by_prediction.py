@@ -108,6 +108,7 @@ def test_no_more_is_added_than_the_config_allows_nor_what_it_forbids(rng: np.ran
     assert {name.partition(" ")[0] for name in found.added} == {"gas_spring"}
 
 
+@pytest.mark.ci
 def test_what_only_a_sensor_shows_is_not_added(rng: np.random.Generator) -> None:
     found, _ = extended(records_of(damper_of(TWO, sensor_delay={"tau": 0.004}), rng), DiagnoseConfig())
     assert found is None or "sensor_delay" not in found.added

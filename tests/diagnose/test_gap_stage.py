@@ -60,6 +60,7 @@ def test_a_damper_that_misses_nothing_is_handed_on_with_the_verdict_none(rng: np
     assert all(each.W_s == each.W_s_plain for each in prediction.by)
 
 
+@pytest.mark.ci
 def test_displacement_noise_of_a_tenth_of_a_millimetre_is_no_missing_effect(rng: np.random.Generator) -> None:
     records = sines(damper_of(TWO), rng, TWO, jitter=0.01, displacement_noise=1e-4, cycles=5)
     assert diagnosed(records).diagnosis.verdict == "none"

@@ -40,6 +40,7 @@ def test_an_offset_that_any_test_could_have_is_an_effect_where_every_test_has_it
     assert (told.verdict, told.effects) == ("named", ("preload_offset",)), told.reason
 
 
+@pytest.mark.ci
 def test_a_mean_that_creeps_is_no_gap(rng: np.random.Generator) -> None:
 
     def creeping(record: Record) -> Record:

@@ -34,6 +34,7 @@ def test_what_was_adopted_before_the_end_is_kept_whatever_the_number_of_threads(
     assert "most_evaluations" in one.reason
 
 
+@pytest.mark.ci
 def test_a_search_that_comes_to_its_end_says_nothing_of_it(records: tuple[Record, ...]) -> None:
     found = diagnosed(records).diagnosis
     assert {*found.effects} == {"preload_offset", "gas_spring"}

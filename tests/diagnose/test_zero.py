@@ -70,6 +70,7 @@ def test_where_the_gap_lies_is_told_in_the_displacement_as_recorded(stopped: tup
     assert len(there) == len(here) > 0
 
 
+@pytest.mark.ci
 def test_a_gas_spring_and_its_next_test_are_the_same_about_a_shifted_middle(rng: np.random.Generator) -> None:
     tests = ((2.0, 0.015), (2.0, 0.03))
     records = sines(damper_of(TWO, gas_spring={"k_g": 3000.0}), rng, TWO, tests=tests)

@@ -54,6 +54,7 @@ def test_a_gas_charge_biases_neither_friction_nor_damping_nor_spring(rng: np.ran
     assert beside.k_g_N_per_m == pytest.approx(GAS[1], rel=0.05)
 
 
+@pytest.mark.ci
 def test_the_intervals_of_a_gas_charge_hold_it_nineteen_times_in_twenty(rng: np.random.Generator) -> None:
     held = []
     for _ in range(8):

@@ -46,6 +46,7 @@ def relative_widths(records: Sequence[Record], config: IdentifyConfig) -> Array:
     return half_widths(parts, misfit_of(parts)) / estimate
 
 
+@pytest.mark.ci
 def test_intervals_hold_the_truth_under_correlated_noise(rng: np.random.Generator) -> None:
     # Binomial, 120 at 0.95: sd 2 %; the three of one draw hang together, so that 8 % below are seldom chance.
     found = 0
@@ -55,6 +56,7 @@ def test_intervals_hold_the_truth_under_correlated_noise(rng: np.random.Generato
     assert found >= 0.87 * 120
 
 
+@pytest.mark.ci
 def test_intervals_hold_the_truth_where_nothing_repeats(rng: np.random.Generator) -> None:
     found = 0
     for draw in rng.spawn(24):

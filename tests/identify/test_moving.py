@@ -72,6 +72,7 @@ def test_rows_rise_with_the_voltage_whichever_was_fitted_first() -> None:
     assert [row.voltage_V for row in rows] == pytest.approx([0.0, 150.0], abs=0.1)
 
 
+@pytest.mark.ci
 def test_a_node_whose_constant_record_tells_too_little_is_fitted_to_both() -> None:
     slow = sine_test(TABLE_2[0.0], 0.05, 0.002, cycles=2, rate=250, voltage=0.0, name="slow")
     assert rows_for(slow)[0].C_Ns_per_m is None

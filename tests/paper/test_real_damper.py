@@ -34,6 +34,7 @@ def rides_by_gap(config: RunConfig, rig: Rig, identified: Identified) -> Mapping
     return found
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(("gap", "fidelity"), PEAKS)
 def test_controlled_peaks_of_a_real_damper(rides_by_gap: Mapping[str, SettingRides], gap: str, fidelity: str) -> None:
     rows = [row for row in rides_by_gap[gap].rides.summary if row.fidelity == fidelity]

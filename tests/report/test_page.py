@@ -247,6 +247,7 @@ def test_pictures_drawn_at_the_same_time_are_the_same(page: str, run: Any) -> No
     assert run.told(jobs=3).page == page
 
 
+@pytest.mark.ci
 def test_the_same_input_gives_the_same_bytes_in_another_process(page: str) -> None:
     code = (
         f"import sys; sys.path[:0] = [{str(HERE)!r}, {str(HERE.parent)!r}]; import hashlib, conftest as c\n"

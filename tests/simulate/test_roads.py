@@ -95,6 +95,7 @@ def test_a_road_is_another_one_with_another_seed_or_name_and_the_same_one_with_t
     assert np.array_equal(one, same)
 
 
+@pytest.mark.ci
 def test_a_road_does_not_repeat_and_keeps_its_size(seeds: Callable[[int], list[int]]) -> None:
     """Pieces of 1 km fade into each other: the mean square over 50 m is the same wherever they meet."""
     rough = []

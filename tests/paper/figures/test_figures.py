@@ -127,6 +127,7 @@ def test_the_same_bytes_come_out_again(data: FigureData, figure_set: FigureSet) 
     assert drawn(data).files == figure_set.files
 
 
+@pytest.mark.ci
 def test_the_same_bytes_come_out_of_another_process(root: Path, figure_set: FigureSet) -> None:
     script = """
 import hashlib
