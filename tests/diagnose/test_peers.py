@@ -10,6 +10,9 @@ import pytest
 from campaign import damper_of, sine, waveform
 from scipy.integrate import solve_ivp
 
+from pzd.damper.compose import respond
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.data.cleaning import prepare
@@ -166,10 +169,20 @@ def test_a_voltage_left_out_is_predicted_by_the_line_between_its_neighbours(rng:
     assert left_out.determination == pytest.approx(1.0, abs=1e-5)
 
 
+def irregular(damper: Damper, voltage: float) -> Record:
+    """A test that does not repeat: its ends are not judged."""
+    time = np.arange(2400) / 200.0
+    parts = [waveform(time, frequency, amplitude) for frequency, amplitude in ((0.5, 0.015), (1.37, 0.007))]
+    x, v, a = (np.sum(channel, axis=0) for channel in zip(*parts, strict=True))
+    U = np.full(time.size, voltage)
+    return Record("irregular", None, time, x, v, a, respond(damper, Motion(time, x, v, a, U)), U)
+
+
 def test_the_samples_compared_are_those_of_the_diagnosis(rng: np.random.Generator) -> None:
     """W_s and R2 of all tests together follow from the W_s of each, as diagnosis.json holds it."""
     damper = damper_of(TWO, preload_offset={"F_0": 80.0})
     records = [sine(damper, U, f, x, rng, cycles=3, rate=200.0) for U in TWO for f, x in TESTS]
+    records.append(irregular(damper, TWO[0]))
     prepared, plain = prepare(records), damper_of(TWO)
     campaign = Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig())
     trials = trials_of(campaign, plain, DiagnoseConfig().visible)
@@ -179,6 +192,7 @@ def test_the_samples_compared_are_those_of_the_diagnosis(rng: np.random.Generato
     W_s = {each.record: each.W_s_plain for each in prediction.by}
     R2 = {each.record: each.R2_plain for each in prediction.by}
     tests = KeptBackTests(prepared, deal(prepared, plain))
+    assert any(p.lead is None for p in prepared)
     known = tests.known({i: W_s[p.record.name] for i, p in enumerate(prepared)})
     assert known.criterion == pytest.approx(prediction.W_s_plain, rel=1e-9)
     assert [known.of([i]).determination for i in range(len(prepared))] == pytest.approx(
