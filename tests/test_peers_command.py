@@ -9,10 +9,14 @@ from pathlib import Path
 import pytest
 from stub_stages import project
 
+from pzd.artefacts import Diagnosed, Identified, Knees, LawRow, Rig
 from pzd.artefacts.peers import PeerComparison, PeerParameterRow, PeerRow
 from pzd.cli.app import status
 from pzd.cli.peers import comparison_lines
+from pzd.damper.model import BaseRow, Damper
+from pzd.diagnose.peer_comparison import compare_with_peers
 from pzd.quantities import Control
+from pzd.schema.errors import ConfigError
 
 MODELS = ["plain", "handed_on", "bouc_wen", "kwok"]
 CONFIG = """\
@@ -86,6 +90,14 @@ def test_without_a_test_kept_back_there_is_nothing_to_compare(
     assert status(["peers", str(config), "--runs", str(tmp_path / "runs")]) == 3
     assert capsys.readouterr().err.startswith("pzd peers: too little to keep a test back")
     assert not (tmp_path / "runs" / "first" / "peers").exists()
+
+
+def test_the_knee_law_is_refused_with_what_to_do() -> None:
+    law = LawRow(setting=None, law="knee", tests=4, W_s_bingham=0.1, W_s_knee=0.01, reason="it predicts better")
+    plain = Damper(base=(BaseRow(T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e6),))
+    identified = Identified((), (), knees=Knees(laws=(law,)))
+    with pytest.raises(ConfigError, match=r"identify.law: .* say bingham"):
+        compare_with_peers(Rig((), ()), identified, Diagnosed.undiagnosed(plain), None)
 
 
 @pytest.mark.ci

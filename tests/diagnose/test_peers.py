@@ -171,7 +171,7 @@ def test_a_voltage_left_out_is_predicted_by_the_line_between_its_neighbours(rng:
 
 def irregular(damper: Damper, voltage: float) -> Record:
     """A test that does not repeat: its ends are not judged."""
-    time = np.arange(2400) / 200.0
+    time = np.arange(1200) / 200.0
     parts = [waveform(time, frequency, amplitude) for frequency, amplitude in ((0.5, 0.015), (1.37, 0.007))]
     x, v, a = (np.sum(channel, axis=0) for channel in zip(*parts, strict=True))
     U = np.full(time.size, voltage)
