@@ -42,6 +42,11 @@ class KeptBack(Frozen):
     """None where it moves, or where the damper has none."""
     W_s_plain: float
     W_s: float
+    R2_plain: float | None = None
+    """1 - (sum of squared residuals)/(sum of squares about the mean force of the test); None where an earlier version
+    wrote the file."""
+    R2: float | None = None
+    """The same of the damper handed on."""
 
 
 class LeftOut(Frozen):

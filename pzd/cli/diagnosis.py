@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.artefacts import Diagnosis, Hypotheses, HypothesisRow, NextTest, Prediction, Value
+from pzd.artefacts import Diagnosis, Hypotheses, HypothesisRow, KeptBack, NextTest, Prediction, Value
 from pzd.cli.layout import interval, number
 from pzd.quantities import Control
 from pzd.schema.wording import counted
@@ -75,11 +75,17 @@ def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[s
     if every_test:
         for each in found.by:
             at = "" if each.voltage is None else f" at {number(each.voltage)} {unit}"
-            yield f"kept back: {each.record}{at}, W_s {number(each.W_s_plain)} plain, {number(each.W_s)} as handed on"
+            figures = f"W_s {number(each.W_s_plain)} plain, {number(each.W_s)} as handed on"
+            yield f"kept back: {each.record}{at}, {figures}{_explained(each)}"
     listed = sorted(found.left_out_voltages, key=lambda left: -left.W_s)
     for left in listed if every_test else listed[:1]:
         figures = f"W_s {number(left.W_s_plain)} plain, {number(left.W_s)} as handed on"
         yield f"left out: {number(left.voltage)} {unit}, predicted from its neighbours with {figures}"
+
+
+def _explained(each: KeptBack) -> str:
+    """R2 of one test; nothing where an earlier version wrote the file."""
+    return "" if each.R2 is None or each.R2_plain is None else f"; R2 {each.R2_plain:.4f} and {each.R2:.4f}"
 
 
 def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:

@@ -38,6 +38,8 @@ class ProductsOfTest:
     samples: int
     energy: float
     """Sum of the squared force [N^2]."""
+    spread: float
+    """The same about the mean of the force [N^2]."""
     limit: float
     """Sum of squares that counts as nothing [N^2]."""
     noise: float
@@ -122,6 +124,7 @@ class Regression:
                 tuple(p.record for p in self.parts),
                 np.array(errors),
                 np.array([p.energy for p in self.parts]),
+                np.array([p.spread for p in self.parts]),
                 np.array([p.limit for p in self.parts]),
             )
         return self._missed[names]

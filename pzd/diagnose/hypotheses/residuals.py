@@ -116,6 +116,7 @@ class Residuals:
             products=test.products(columns, counts),
             samples=force.size,
             energy=float(force @ force),
+            spread=float(np.sum((force - force.mean()) ** 2)),
             limit=force.size * (self.trials.visible * test.check.peak) ** 2,
             noise=force.size * test.check.variance,
             weight=1.0 / test.noise,
