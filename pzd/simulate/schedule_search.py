@@ -13,6 +13,8 @@ _FIRST_STEP = 0.3
 """Of the search, as a share of the range of voltage."""
 _LAST_STEP = 0.01
 """The search from one start ends where its step is this small."""
+_FEWEST = 3
+"""Evaluations a voltage with which a start is worth taking; where there are fewer, fewer starts are taken."""
 _REFINED = 0.4
 """Share of the evaluations that is kept for the second part, in which both halves of the period are free."""
 
@@ -21,7 +23,7 @@ Rate = Callable[[Array], tuple[float, float]]
 
 
 @dataclass
-class Search:
+class ScheduleSearch:
     """What was tried so far, and the best of it within the bound."""
 
     rate: Rate
@@ -46,7 +48,7 @@ class Search:
         return self.kept[key]
 
     def descend(self, start: Array, repeats: int, evaluations: int) -> None:
-        """Search from a start (2, n), repeated so many times in a period; shares of the range of voltage.
+        """ScheduleSearch from a start (2, n), repeated so many times in a period; shares of the range of voltage.
 
         Source: COBYLA, Powell 1994, a direct search by linear approximations of objective and constraints
         """
@@ -96,8 +98,8 @@ def square_waves(intervals: int, starts: int, late: float) -> list[Array]:
     ]
 
 
-def best_schedule(search: Search, starts: Sequence[Array], evaluations: int) -> None:
-    """Search from every start, then from the best of all.
+def best_schedule(search: ScheduleSearch, starts: Sequence[Array], evaluations: int) -> None:
+    """ScheduleSearch from every start, then from the best of all.
 
     The first part repeats a half of the period, since a sine is mirrored there and so is a damper that is the same in
     both directions; the second frees both halves.
@@ -105,12 +107,13 @@ def best_schedule(search: Search, starts: Sequence[Array], evaluations: int) -> 
     Parameters
     ----------
     search : holds the best; changed in place
-    starts : (2, n) shares of the range of voltage over a half of the period
+    starts : (2, n) shares of the range of voltage over a half of the period, one or more, the most promising first
     evaluations : in all
     """
     first = round((1.0 - _REFINED) * evaluations)
-    for n, start in enumerate(starts):
-        search.descend(start, 2, (first - search.tried) // (len(starts) - n))
+    taken = starts[: max(first // (_FEWEST * starts[0].size), 1)]
+    for n, start in enumerate(taken):
+        search.descend(start, 2, (first - search.tried) // (len(taken) - n))
     if search.best is not None:
         span = max(search.high - search.low, np.finfo(np.float64).tiny)
         search.descend((search.best[1] - search.low) / span, 1, evaluations - search.tried)
