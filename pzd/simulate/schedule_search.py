@@ -48,7 +48,7 @@ class ScheduleSearch:
         return self.kept[key]
 
     def descend(self, start: Array, repeats: int, evaluations: int) -> None:
-        """ScheduleSearch from a start (2, n), repeated so many times in a period; shares of the range of voltage.
+        """Search from a start (2, n), repeated so many times in a period; shares of the range of voltage.
 
         Source: COBYLA, Powell 1994, a direct search by linear approximations of objective and constraints
         """
@@ -99,7 +99,7 @@ def square_waves(intervals: int, starts: int, late: float) -> list[Array]:
 
 
 def best_schedule(search: ScheduleSearch, starts: Sequence[Array], evaluations: int) -> None:
-    """ScheduleSearch from every start, then from the best of all.
+    """Search from every start, then from the best of all.
 
     The first part repeats a half of the period, since a sine is mirrored there and so is a damper that is the same in
     both directions; the second frees both halves.
