@@ -6,6 +6,7 @@ wrong. `control` renames the columns of the control signal.
 """
 
 from pzd.artefacts.characteristics import (
+    AsItStandsRow,
     Characteristics,
     ContinuousVelocityRow,
     GasAndFrictionRow,
@@ -25,6 +26,7 @@ from pzd.artefacts.diagnosed import (
     Region,
     Value,
 )
+from pzd.artefacts.hypotheses import Hypotheses, HypothesisPoint, HypothesisRow
 from pzd.artefacts.identified import (
     FALLBACK,
     AuxiliaryRow,
@@ -34,7 +36,7 @@ from pzd.artefacts.identified import (
     base_of,
     identified_damper,
 )
-from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow
+from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, UnitRow
 from pzd.artefacts.knee_as_damper import knee_damper
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
@@ -55,7 +57,7 @@ from pzd.artefacts.rides import (
     WheelRow,
 )
 from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig, extent
-from pzd.artefacts.table import ForceRow, InverseRow, Table, TableNotes
+from pzd.artefacts.table import ForceRow, InverseRow, SettingLeftOutRow, SettingRow, Table, TableNotes
 
 Artefact = Rig | Identified | Diagnosed | Table | Rides | Report
 
@@ -66,6 +68,7 @@ __all__ = [
     "FALLBACK",
     "RIDE_COLUMNS",
     "Artefact",
+    "AsItStandsRow",
     "AuxiliaryRow",
     "Characteristics",
     "ClickRow",
@@ -79,6 +82,9 @@ __all__ = [
     "FoundRow",
     "Gap",
     "GasAndFrictionRow",
+    "Hypotheses",
+    "HypothesisPoint",
+    "HypothesisRow",
     "Identified",
     "IngestRow",
     "InverseRow",
@@ -105,11 +111,14 @@ __all__ = [
     "RideRow",
     "Rides",
     "Rig",
+    "SettingLeftOutRow",
+    "SettingRow",
     "SpectrumRow",
     "StepRow",
     "SummaryRow",
     "Table",
     "TableNotes",
+    "UnitRow",
     "Value",
     "WarmUpRow",
     "WeightedRow",

@@ -11,12 +11,16 @@ from pzd.artefacts import (
     ComfortRow,
     Diagnosed,
     Diagnosis,
+    Hypotheses,
     Identified,
     Knees,
     ParameterRow,
     Report,
     Rides,
+    SettingLeftOutRow,
+    SettingRow,
     SummaryRow,
+    Table,
 )
 from pzd.config import control_of, validated
 from pzd.pipeline.command import Opened, stale_stages
@@ -51,6 +55,12 @@ class RunSummary:
     """What the tests show without any model."""
     knees: Knees = field(default_factory=Knees)
     """The knee law, where the config asks for it."""
+    settings: tuple[SettingRow, ...] = ()
+    """The force at settings between tested ones, where the config asks for some."""
+    settings_left_out: tuple[SettingLeftOutRow, ...] = ()
+    """How well tested settings are predicted from their neighbours."""
+    hypotheses: Hypotheses = field(default_factory=Hypotheses)
+    """Which shape what is left has, where the verdict is `unexplained`."""
 
 
 def page_of(run: Run) -> Path:
@@ -66,7 +76,7 @@ def run_summary(run: Run) -> RunSummary:
     ConfigError : when there are none
     DataError : when a file of it is at fault
     """
-    manifests = {kind: run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Rides, Report)}
+    manifests = {kind: run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Table, Rides, Report)}
     there = {kind for kind, manifest in manifests.items() if manifest is not None}
     if not there:
         raise ConfigError(f"{run.folder}: there are no results yet; pzd run {run.config} makes them")
@@ -74,18 +84,23 @@ def run_summary(run: Run) -> RunSummary:
     control = control_of(read_yaml(at / CONFIG).data) if (at / CONFIG).is_file() else run.control
     run = replace(run, control=control)
     identified = run.read(Identified) if Identified in there else Identified((), ())
+    diagnosed = run.read(Diagnosed) if Diagnosed in there else None
     comfort = at / Report.folder / "comfort.csv"
+    settings = Table.read_settings(at / Table.folder, control) if Table in there else ((), ())
     return RunSummary(
         at,
         control,
         identified.rows,
-        run.read(Diagnosed).diagnosis if Diagnosed in there else None,
+        diagnosed.diagnosis if diagnosed else None,
         read_rows(at / Rides.folder / "summary.csv", SummaryRow, control) if Rides in there else (),
         read_rows(comfort, ComfortRow, control) if Report in there else (),
         page_of(run) if Report in there else None,
         tuple(dict.fromkeys(mark for manifest in manifests.values() if manifest for mark in manifest.marks)),
         characteristics=identified.characteristics,
         knees=identified.knees,
+        settings=settings[0],
+        settings_left_out=settings[1],
+        hypotheses=diagnosed.hypotheses if diagnosed else Hypotheses(),
     )
 
 
