@@ -125,7 +125,7 @@ class SweepRuns:
         results = Results(self.sweep, self.tasks, tuple(found), self.base.opened.config.seed)
         write(results, self.folder, self.control)
         path = self.folder / "sweep.html"
-        path.write_text(page(results, f"Sweep of {name}"), encoding="utf-8", newline="\n")
+        path.write_text(page(results, f"Sweep: {name}"), encoding="utf-8", newline="\n")
         told = [f"{len(self.tasks)} runs, {len(results.failed)} without a result"]
         told += [f"failed: {row.differs_in}: {row.failure}" for row in results.failed[:_MOST_TOLD]]
         told += decisive(results)

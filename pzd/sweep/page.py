@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from pzd.config import Normal, Scatter, Uniform
 from pzd.report.blocks import Block, Card, Gallery, Notes, Paragraph, Section, TextTable
 from pzd.report.drawing import BASELINE, FINAL, STYLE, Panel, axes, encoded
 from pzd.report.page import render
@@ -64,7 +65,7 @@ def decisive(results: Results) -> list[str]:
 def _interval(row: IndexRow) -> str:
     if row.total_order_low95 is None or row.total_order_high95 is None:
         return "no interval"
-    return f"{row.total_order_low95:.0%} to {row.total_order_high95:.0%}"
+    return f"{_percent(row.total_order_low95)} to {_percent(row.total_order_high95)}"
 
 
 def _cards(results: Results, indices: Sequence[IndexRow]) -> tuple[Card, ...]:
@@ -84,7 +85,8 @@ def _spread(results: Results, spread: Sequence[SpreadRow]) -> Section:
     blocks: list[Block] = []
     names = quantities(results.sweep)
     said = [f"{key}: {', '.join(map(str, values))}" for key, values in results.sweep.over.items()]
-    said += [f"{name} is drawn" for name in names]
+    said += [f"{key}: {_in_words(how)}" for key, how in results.sweep.drawn.items()]
+    said += [f"damper.{name}: {_in_words(how)}" for name, how in results.sweep.damper.items()]
     blocks.append(Notes(tuple(said)))
     if names:
         blocks.append(Paragraph("Dots are medians, bars hold nine draws of ten."))
@@ -125,8 +127,8 @@ def _decides(results: Results, indices: Sequence[IndexRow]) -> tuple[Section, ..
         (
             _label(row.combination, row.about),
             row.quantity,
-            f"{row.first_order:.0%}",
-            f"{row.total_order:.0%}",
+            _percent(row.first_order),
+            _percent(row.total_order),
             _interval(row),
         )
         for row in mine
@@ -144,8 +146,25 @@ def _failed(results: Results) -> tuple[Section, ...]:
     return (Section("failed", "Without a result", (TextTable("Runs", ("run", "differs in", "why"), rows),)),)
 
 
+def _in_words(how: Uniform | Normal | Scatter) -> str:
+    """How a quantity is drawn."""
+    if isinstance(how, Uniform):
+        return f"drawn between {how.uniform[0]:g} and {how.uniform[1]:g}"
+    if isinstance(how, Normal):
+        return f"drawn about {how.normal[0]:g} with a standard deviation of {how.normal[1]:g}"
+    return "drawn as uncertain as the tests leave it" if isinstance(how, str) else f"scatters by {how:.3g} of its value"
+
+
 def _label(combination: str, about: str) -> str:
-    return ", ".join(part for part in (combination, about) if part) or "all"
+    """What a result is of, keys of the config by their last word."""
+    pairs = (part.partition(" = ") for part in combination.split(", "))
+    short = ", ".join(f"{key.rpartition('.')[2]}{equals}{value}" for key, equals, value in pairs)
+    return ", ".join(part for part in (short, about) if part) or "all"
+
+
+def _percent(share: float) -> str:
+    """A share that chance makes less than none is none."""
+    return f"{max(share, 0.0):.0%}"
 
 
 def _strips(rows: Sequence[SpreadRow], measure: str) -> Panel | None:
@@ -178,6 +197,7 @@ def _lines(labels: Sequence[str]) -> tuple[Figure, Axes]:
     figure, ax = axes(0.9 + 0.24 * len(labels), labels, key=0)
     ax.set_yticks(range(len(labels)), labels)
     ax.set_ylim(-0.7, len(labels) - 0.3)
+    ax.locator_params(axis="x", nbins=4)
     return figure, ax
 
 

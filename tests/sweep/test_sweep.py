@@ -346,3 +346,25 @@ def test_dask_gives_the_same_bytes_though_a_worker_is_killed(small: Path, tmp_pa
         campaign.gather(campaign.run(2), "small")
     assert killed
     assert files(campaign.folder) == files(alone.folder)
+
+
+def test_the_page_says_how_each_quantity_is_drawn_and_names_keys_by_their_last_word() -> None:
+    sweep = SweepConfig(
+        over={"simulate.car.x_K_m": (0.5, 0.75)},
+        drawn={"a": {"normal": (3.0, 0.5)}},
+        damper={"T0": 0.05, "k": "interval"},
+        draws=2,
+    )
+    runs = tasks(sweep, seed=5)
+    outcomes = tuple(
+        RunResult(task=run.number, rows=({"case": "B", "point": "K", "a_w_m_per_s2": dict(run.drawn)["a"]},))
+        for run in runs
+    )
+    text = page(Results(sweep, runs, outcomes), "a sweep")
+    for said in (
+        "a: drawn about 3 with a standard deviation of 0.5",
+        "damper.T0: scatters by 0.05 of its value",
+        "damper.k: drawn as uncertain as the tests leave it",
+        "x_K_m = 0.75, B",
+    ):
+        assert said in text
