@@ -21,16 +21,18 @@ from typing import Any, ParamSpec, TypeVar, cast
 import numba
 import numpy as np
 
+from pzd.own_effects import own_files
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
 def sources() -> list[Path]:
-    """Every module with laws, of the damper and of the blind benchmark, and every other one that compiles something."""
+    """Every module with laws (the damper's, one's own, the blind benchmark's), and every other one that compiles."""
     package = Path(__file__).parent
     others = (path for path in package.rglob("*.py") if b"pzd.compiled import" in path.read_bytes())
     laws = (path for folder in ("damper", "blind/independent") for path in (package / folder).rglob("*.py"))
-    return sorted({Path(__file__), *laws, *others})
+    return sorted({Path(__file__), *laws, *own_files(), *others})
 
 
 def cache_folder() -> Path:

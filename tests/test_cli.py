@@ -31,8 +31,8 @@ from pzd.runs import Run
 from pzd.schema.progress import Progress
 
 COMMANDS = [
-    *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report", "watch"),
-    *("check", "show", "compare", "export", "figures", "blind", "init", "schema", "effects"),
+    *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report", "watch", "peers"),
+    *("check", "show", "compare", "export", "figures", "sweep", "blind", "init", "schema", "effects"),
 ]
 HEAVY = ("numba", "pandas", "scipy", "matplotlib", "pint", "jinja2")
 
@@ -636,7 +636,7 @@ def test_the_story_tells_what_a_test_between_two_voltages_is_for() -> None:
 def test_the_story_tells_every_kept_back_test_where_it_is_asked_to() -> None:
     kept_back = Prediction(
         hold_out="tests",
-        by=(KeptBack(record="r03", voltage=100.0, W_s_plain=0.012, W_s=0.003),),
+        by=(KeptBack(record="r03", voltage=100.0, W_s_plain=0.012, W_s=0.003, R2_plain=0.9871, R2=0.99675),),
         W_s_plain=0.011,
         W_s=0.004,
         left_out_voltages=(LeftOut(voltage=50.0, W_s_plain=0.02, W_s=0.01),),
@@ -644,7 +644,7 @@ def test_the_story_tells_every_kept_back_test_where_it_is_asked_to() -> None:
     predicted = diagnosis().model_copy(update={"prediction": kept_back})
     whole = "prediction of whole tests kept back: W_s 0.011 plain, 0.004 as handed on"
     each = [
-        "kept back: r03 at 100 V, W_s 0.012 plain, 0.003 as handed on",
+        "kept back: r03 at 100 V, W_s 0.012 plain, 0.003 as handed on; R2 0.9871 and 0.9968",
         "left out: 50 V, predicted from its neighbours with W_s 0.02 plain, 0.01 as handed on",
     ]
     plain = diagnosis_lines(diagnosis(), Control())

@@ -13,6 +13,7 @@ import pzd
 
 ORDER = (
     "quantities",
+    "own_effects",
     "schema",
     "record",
     "compiled",

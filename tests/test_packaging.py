@@ -159,6 +159,7 @@ def test_the_wheel_alone_runs_every_command(installed: Installed, elsewhere: Pat
     assert "index.html" in pzd("figures", "first.yaml")
     assert pzd("blind", "blind.yaml", "--set", "blind.cases=2")
     assert pzd("show", "first.yaml")
+    assert pzd("peers", "first.yaml")
     assert pzd("export", "first.yaml", "--to", "csv")
     assert pzd("compare", "runs/first", "runs/second")
     assert "orifice_quadratic" in pzd("effects")

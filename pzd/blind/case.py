@@ -77,6 +77,8 @@ class Scored(Frozen):
     effects: tuple[str, ...]
     rivals: tuple[str, ...]
     confidence: float | None
+    shapes: tuple[str, ...]
+    """Of what is left, as the diagnosis tells them, the best first."""
     inside: dict[str, bool]
     """Of each parameter of a rightly named effect: whether it lies in its 95 % interval."""
     gap_cut: float | None

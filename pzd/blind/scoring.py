@@ -81,6 +81,7 @@ def scored(truth: Truth, cost: Cost, found: Diagnosed | None, clean: Mapping[str
         effects=diagnosis.effects if diagnosis else (),
         rivals=diagnosis.rivals if diagnosis else (),
         confidence=diagnosis.confidence if diagnosis else None,
+        shapes=tuple(row.shape for row in found.hypotheses.alone) if found else (),
         inside=_inside(diagnosis, truth) if diagnosis and set(diagnosis.effects) == set(counted_truth) else {},
         gap_cut=gap_cut(found, clean) if found and found.diagnosis.effects else None,
         gap_cut_gains_out=gap_cut(found, clean, gains_out=True) if found and found.diagnosis.effects else None,

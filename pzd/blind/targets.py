@@ -18,6 +18,7 @@ from pzd.blind.rates import (
     low_noise,
     right,
     rightly_outside,
+    shape_told,
     visible,
     wrong_name,
     wrong_single,
@@ -155,6 +156,7 @@ def _nothing_to_name(cases: Sequence[Scored]) -> Iterator[Line]:
     outside = [c for c in cases if c.kind == "outside" and visible(c)]
     yield rate_line("outside the library, visible", "a wrong single name", outside, wrong_single, "<= 3 %")
     yield rate_line("outside the library, visible", "unexplained", outside, _unexplained, ">= 92 %")
+    yield rate_line("outside the library, visible", "shape among the first two", outside, shape_told, ">= 60 %")
 
 
 def _unexplained(case: Scored) -> bool:

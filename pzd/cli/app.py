@@ -11,7 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from pzd.cli import blind, export, figures, look, stages, start, sweep, watch
+from pzd.cli import blind, export, figures, look, peers, stages, start, sweep, watch
 from pzd.cli.exits import DONE, INTERRUPTED, OWN_FAULT
 from pzd.cli.interrupt import (
     end_at_once_when_interrupted,
@@ -37,6 +37,7 @@ app = typer.Typer(
 _COMMANDS: tuple[Callable[..., int], ...] = (
     *stages.COMMANDS,
     *watch.COMMANDS,
+    *peers.COMMANDS,
     *look.COMMANDS,
     *export.COMMANDS,
     *figures.COMMANDS,

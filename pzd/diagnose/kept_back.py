@@ -32,7 +32,7 @@ from pzd.signals.nuisance import NuisanceConfig, columns_of
 EVALUATIONS = 6
 """Of a refit without one fold: it begins at the optimum of all tests, and a fifth of them moves that little."""
 HoldOut = Literal["tests", "cycles", "segments", "mixed"]
-_NOTHING = Missed((), np.zeros(0), np.zeros(0), np.zeros(0))
+_NOTHING = Missed((), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
 _Refit = Callable[[Sequence[Mask]], "Damper | None"]
 """The damper fitted to all but what is kept back; None where nothing is left."""
 
@@ -129,7 +129,8 @@ class Trials:
                 simple, handed = plain.of([i]).criterion, missed.of([i]).criterion
                 if simple is not None and handed is not None:
                     name, at = self.campaign.prepared[i].record.name, voltage if controlled else None
-                    by.append(KeptBack(record=name, voltage=at, W_s_plain=simple, W_s=handed))
+                    R2 = {"R2_plain": plain.of([i]).determination, "R2": missed.of([i]).determination}
+                    by.append(KeptBack(record=name, voltage=at, W_s_plain=simple, W_s=handed, **R2))
         left_out = [self._left_out(i, between) for i in self.between()]
         return Prediction(
             hold_out=self._hold_out(),
@@ -178,7 +179,10 @@ class Trials:
             return _NOTHING
         return Missed(
             tuple(i for part in parts for i in part.record),
-            *(np.concatenate([getattr(part, name) for part in parts]) for name in ("error", "energy", "limit")),
+            *(
+                np.concatenate([getattr(part, name) for part in parts])
+                for name in ("error", "energy", "spread", "limit")
+            ),
         )
 
     def _known(self, damper: Damper, kept_back: Sequence[Mask]) -> list[Mask]:
@@ -211,8 +215,9 @@ class Trials:
             if i in self._alone:
                 limit += float(np.sum(columns_of(force, p.record.rate, self.campaign.nuisance) ** 2))
             records.append(i)
-            rows.append((residual @ residual, force @ force, limit))
-        columns = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+            about_mean = force - force.mean()
+            rows.append((residual @ residual, force @ force, about_mean @ about_mean, limit))
+        columns = np.array(rows, dtype=np.float64).reshape(-1, 4).T
         return Missed(tuple(records), *columns)
 
     def _by_likelihood(self, damper: Damper) -> _Refit:

@@ -21,6 +21,8 @@ class Missed:
     """(t,) sum of the squared residual [N^2]."""
     energy: Array
     """(t,) sum of the squared force [N^2]."""
+    spread: Array
+    """(t,) sum of the squared force about its mean over the entry [N^2]."""
     limit: Array
     """(t,) sum of squares [N^2] that counts as nothing: so many samples of a visible gap, and beside them what offset,
     gain and delay of a test may come to where its other half was fitted."""
@@ -33,6 +35,14 @@ class Missed:
         """
         return float(self.error.sum() / self.energy.sum()) if self.record else None
 
+    @property
+    def determination(self) -> float | None:
+        """R2 pooled over the entries, each about its own mean; None without any, or where no force moves.
+
+        Equation: 1 - sum (F - F_sim)^2 / sum (F - mean F)^2                      Source: coefficient of determination
+        """
+        return float(1.0 - self.error.sum() / self.spread.sum()) if self.spread.sum() > 0.0 else None
+
     def less_than(self, other: Missed) -> bool:
         """Whether less is missed than by another damper, all tests together, by what can be seen."""
         return float((other.error - self.error).sum()) > float(self.limit.sum())
@@ -41,7 +51,7 @@ class Missed:
         """The entries of some records."""
         kept = np.isin(self.record, wanted)
         records = tuple(r for r, k in zip(self.record, kept, strict=True) if k)
-        return Missed(records, self.error[kept], self.energy[kept], self.limit[kept])
+        return Missed(records, self.error[kept], self.energy[kept], self.spread[kept], self.limit[kept])
 
 
 def worse(one: Missed, other: Missed) -> bool:

@@ -34,7 +34,7 @@ _CONFIG_HASHES = ".config.sha256"
 """Hashes of the config as it was written, the last two times: a config with another one was edited by hand."""
 _WRITTEN = ".written.json"
 """Hashes of what was written into a folder that is no stage and has no manifest."""
-_FOLDERS = (*(kind.folder for kind in (Rig, Identified, Diagnosed, Table, Rides, Report)), "figures")
+_FOLDERS = (*(kind.folder for kind in (Rig, Identified, Diagnosed, Table, Rides, Report)), "figures", "peers")
 """What a run's folder may hold."""
 _NAMES = Control()
 """Manifests name files and keys as they are, whatever the control is called."""

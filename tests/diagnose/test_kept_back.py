@@ -106,7 +106,7 @@ def test_too_little_to_keep_a_test_back_is_told(rng: np.random.Generator) -> Non
 def test_worse_is_beyond_two_standard_errors_at_any_voltage(rng: np.random.Generator) -> None:
     asked = trials(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
     records = tuple(range(8))
-    plain = Missed(records, np.full(8, 1.0), np.full(8, 100.0), np.full(8, 1e-3))
+    plain = Missed(records, *(np.full(8, value) for value in (1.0, 100.0, 100.0, 1e-3)))
     alike = replace(plain, error=1.0 + 0.1 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0]))
     at_one = replace(plain, error=np.array([0.1, 0.2, 0.1, 0.2, 1.2, 1.3, 1.2, 1.3]))
     assert asked.worse(alike, plain) == ()
@@ -116,7 +116,7 @@ def test_worse_is_beyond_two_standard_errors_at_any_voltage(rng: np.random.Gener
 
 def test_worse_by_less_than_can_be_seen_is_not_worse(rng: np.random.Generator) -> None:
     asked = trials(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
-    plain = Missed(tuple(range(8)), np.full(8, 1.0), np.full(8, 100.0), np.full(8, 1e-2))
+    plain = Missed(tuple(range(8)), *(np.full(8, value) for value in (1.0, 100.0, 100.0, 1e-2)))
     assert asked.worse(replace(plain, error=plain.error + 5e-3), plain) == ()
     assert asked.worse(replace(plain, error=plain.error + 2e-2), plain) == TWO
 
