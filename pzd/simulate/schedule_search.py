@@ -13,6 +13,8 @@ _FIRST_STEP = 0.3
 """Of the search, as a share of the range of voltage."""
 _LAST_STEP = 0.01
 """The search from one start ends where its step is this small."""
+_FEWEST = 3
+"""Evaluations a voltage with which a start is worth taking; where there are fewer, fewer starts are taken."""
 _REFINED = 0.4
 """Share of the evaluations that is kept for the second part, in which both halves of the period are free."""
 
@@ -105,12 +107,13 @@ def best_schedule(search: ScheduleSearch, starts: Sequence[Array], evaluations: 
     Parameters
     ----------
     search : holds the best; changed in place
-    starts : (2, n) shares of the range of voltage over a half of the period
+    starts : (2, n) shares of the range of voltage over a half of the period, one or more, the most promising first
     evaluations : in all
     """
     first = round((1.0 - _REFINED) * evaluations)
-    for n, start in enumerate(starts):
-        search.descend(start, 2, (first - search.tried) // (len(starts) - n))
+    taken = starts[: max(first // (_FEWEST * starts[0].size), 1)]
+    for n, start in enumerate(taken):
+        search.descend(start, 2, (first - search.tried) // (len(taken) - n))
     if search.best is not None:
         span = max(search.high - search.low, np.finfo(np.float64).tiny)
         search.descend((search.best[1] - search.low) / span, 1, evaluations - search.tried)

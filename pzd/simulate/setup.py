@@ -18,7 +18,7 @@ from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
 from pzd.simulate.profile import Profile
 from pzd.simulate.ride_model import TableArrays
-from pzd.simulate.riding import BestSchedule, Held, ride_case
+from pzd.simulate.riding import Held, RideFound, ride_case
 from pzd.simulate.schedule_search import ScheduleSearch, best_schedule, sampled, square_waves
 from pzd.simulate.tuning import best_value, damping_range
 from pzd.simulate.window import event_of
@@ -83,10 +83,10 @@ class Setup:
             most_load,
         )
         best_schedule(search, self._starts(case, best, search), own.evaluations)
-        found = BestSchedule(by, most_load, search.tried)
+        found = RideFound(by, most_load, search.tried)
         if search.best is not None:
             schedule = tuple(tuple(float(u) for u in axle) for axle in search.best[1])
-            by_search = replace(held, found=BestSchedule("search", most_load, search.tried, schedule))
+            by_search = replace(held, found=RideFound("search", most_load, search.tried, schedule))
             outcome = self._ride(self.config, case, by_search)
             a, load = self._rated(outcome, self.config.settle_s)
             if a < discomfort and load <= most_load:
@@ -114,7 +114,7 @@ class Setup:
             update={"duration_s": steps * h, "tolerance": max(self.config.tolerance, _SCHEDULE_TOLERANCE)}
         )
         schedule = tuple(tuple(float(u) for u in axle) for axle in voltages)
-        outcome = self._ride(config, case, replace(held, found=BestSchedule("search", 0.0, 0, schedule)))
+        outcome = self._ride(config, case, replace(held, found=RideFound("search", 0.0, 0, schedule)))
         return self._rated(outcome, steps * h - _SHORT_PERIODS * period)
 
     def _rated(self, outcome: Outcome, after: float) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -87,12 +87,12 @@ class Run:
     rides: Rides
     control: Control = VOLTS
     setting: str | None = "gap 0.25 mm"
+    simulate: SimulateConfig = field(default_factory=SimulateConfig)
 
     def told(self, config: ReportConfig | None = None, jobs: int = 1, folder: Path = Path()) -> Report:
         """The report of this run."""
-        simulate = SimulateConfig()
         parts = (self.rig, self.identified, self.diagnosed, self.table, self.rides)
-        return report(config or ReportConfig(), simulate, *parts, self.control, self.setting, folder, jobs)
+        return report(config or ReportConfig(), self.simulate, *parts, self.control, self.setting, folder, jobs)
 
     def with_diagnosis(self, damper: Damper = PLAIN, **changes: object) -> Run:
         """The same run with another verdict."""

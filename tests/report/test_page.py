@@ -9,10 +9,12 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pzd.artefacts import (
@@ -33,6 +35,7 @@ from pzd.quantities import Control
 from pzd.record import conditions
 from pzd.report.config import ReportConfig
 from pzd.report.plots import characteristic, library
+from pzd.simulate.config import CarBlock, SimulateConfig
 
 HERE = Path(__file__).parent
 ORDER = ["tested", "characteristics", "model", "missing", "damper", "passenger", "trust", "made"]
@@ -496,3 +499,17 @@ def test_an_untrusted_ride_is_marked(words_only: None, run: Any) -> None:
     read = Reader(replace(run, rides=replace(run.rides, summary=summary)).told().page)
     assert "not to be trusted as they stand" in read.text
     assert "energy error 1.0e-03" in read.text
+
+
+@pytest.mark.ci
+def test_a_car_whose_wheels_have_mass_is_told_with_how_it_swings_and_when_they_leave_the_road(run: Any) -> None:
+    tyres = {"unsprung_mass_kg": (90.0, 80.0), "tyre_stiffness_N_per_m": (400000.0, 360000.0)}
+    page = replace(run, simulate=SimulateConfig(car=CarBlock(**tyres))).told().page
+    text = re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", " ", page)))
+    assert "wheels of 90 and 80 kg on tyres of 400 and 360 kN/m" in text
+    assert "the wheels of 8 rides leave the road, axle 2 of sine-2.25Hz" in text
+    assert "off the road: share of the time at 0" in text
+    assert "pull on the road" not in text
+    found = re.search(r"wheel hop, axle 1 ([0-9.]+) Hz", text)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(np.sqrt((47500.0 + 400000.0) / 90.0) / (2.0 * np.pi), rel=0.01)

@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from pzd.artefacts import FoundRow
+
 ROAD = "sine-2.25Hz"
 RIDDEN = {
     "comfort": (1.00, 1000.0),
@@ -64,3 +66,24 @@ def test_where_one_policy_controls_there_is_nothing_to_choose(run: Any, made_rid
     page = page_of(run, rides_of(made_ride, alone, "dynamic"))
     assert "All policies beside each other" not in page
     assert "Comfort against wheel load" not in page
+
+
+@pytest.mark.ci
+def test_the_best_that_was_found_is_told_with_how_far_the_controlled_policy_goes(run: Any, made_ride: Any) -> None:
+    """a_w goes with the peak here: from 1.2 at the fixed voltage over 1.0 to 0.7, two fifths of the way."""
+    ridden = {**RIDDEN, "best_fixed_voltage": (1.20, 800.0), "best_found": (0.70, 880.0)}
+    made = run.with_rides(rides_of(made_ride, ridden, "dynamic"))
+    row = FoundRow(
+        case=f"{ROAD}-best_found-dynamic",
+        found_by="search",
+        evaluations=487,
+        most_load_N=880.0,
+        from_share_of_period=0.0,
+        voltage_1_V=0.0,
+        voltage_2_V=150.0,
+    )
+    page = unescape(replace(made, rides=replace(made.rides, found=(row,))).told().page)
+    page = page.replace("\u00a0", " ").replace("\u202f", " ")
+    assert "Star: the best that was found, with a wheel load at most 1.1 times that at the best fixed voltage" in page
+    assert "by a schedule, after 487 rides; comfort goes 40 % of the way to it from the best fixed voltage" in page
+    assert f"<li>{ROAD}, dynamic: best found, add and passive</li>" in page

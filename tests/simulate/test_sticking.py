@@ -8,7 +8,33 @@ import numpy as np
 import pytest
 
 from pzd.simulate.cars import cars
-from pzd.simulate.ride_model import ACCELERATION, FORCE, INERTANCE, LIFT, SIDE, SPRINGS, control, vehicle, workspace
+from pzd.simulate.config import SimulateConfig
+from pzd.simulate.dampers import dynamic_damper_of, grid_of
+from pzd.simulate.equations import motion
+from pzd.simulate.plan import Case
+from pzd.simulate.policies import policies
+from pzd.simulate.prediction.planning import predictor_of
+from pzd.simulate.profile import Profile
+from pzd.simulate.ride_model import (
+    ACCELERATION,
+    FORCE,
+    HEAVE_RATE,
+    INERTANCE,
+    LIFT,
+    PITCH_RATE,
+    RATE,
+    SIDE,
+    SPRINGS,
+    WHEEL_RATE_1,
+    RideModel,
+    at_rest,
+    control,
+    road_coefficients,
+    vehicle,
+    workspace,
+)
+from pzd.simulate.riding import Held, control_spec_of
+from pzd.simulate.stepper import choose_side
 from pzd.simulate.sticking import accelerate
 
 
@@ -35,3 +61,34 @@ def test_the_suspensions_accelerate_as_body_and_road_do(rng: np.random.Generator
             else:
                 inertia = scratch[INERTANCE, i] * scratch[ACCELERATION, i]
                 assert scratch[FORCE, i] == pytest.approx(before[i] + inertia, abs=1e-9)
+
+
+@pytest.mark.parametrize("unsprung", [(0.0, 0.0), (90.0, 70.0)])
+def test_an_axle_is_stopped_by_an_impulse_between_body_and_wheel(damper, table, unsprung) -> None:
+    """The suspension of axle 2 stands still; momentum and its moment about the centre of gravity are what they were."""
+    car = replace(cars()["makowski2021"], unsprung_masses=unsprung, tyre_stiffnesses=(4e5, 4e5))
+    config, dynamic, grid = SimulateConfig(), dynamic_damper_of(damper, 22.0, 0.0039), grid_of(table, None)
+    case = Case(config.roads[0], policies()["passive"], "table", plain=False)
+    model = RideModel(
+        vehicle(car, 25.0),
+        road_coefficients(Profile(), car.wheelbase),
+        control_spec_of(config, case, car, dynamic, Held(0.0, 0.0)),
+        grid,
+        dynamic,
+        predictor_of(config.comfort_predictive, 1e-3, dynamic, car, 25.0, grid.voltages, 1),
+    )
+    y, acts, room = at_rest(model.car), control(0.0), workspace()
+    y[HEAVE_RATE], y[PITCH_RATE] = 0.3, -0.1
+    wheels = car.wheels_have_mass
+    if wheels:
+        y[WHEEL_RATE_1 : WHEEL_RATE_1 + 2] = 0.2, -0.4
+    motion(0.0, y, model, acts, room, np.zeros_like(y))
+    before, other = y.copy(), room[RATE, 0]
+    choose_side(1, 0.0, y, model, acts, room, np.zeros_like(y))
+    assert room[RATE, 1] == pytest.approx(0.0, abs=1e-15)
+    assert (room[RATE, 0] != other) or wheels
+    if wheels:
+        given = unsprung[1] * (y - before)[WHEEL_RATE_1 + 1]
+        assert car.mass * (y - before)[HEAVE_RATE] == pytest.approx(-given)
+        assert car.pitch_inertia * (y - before)[PITCH_RATE] == pytest.approx(-given * car.distances[1])
+        assert y[WHEEL_RATE_1] == before[WHEEL_RATE_1]
