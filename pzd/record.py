@@ -22,6 +22,10 @@ SAME_TEMPERATURE = 2.0
 """Records within this many degC are one condition."""
 
 
+_EVEN = 1e-3
+"""Steps that scatter by less than this share are even: a clock in microseconds at 1 kHz."""
+
+
 @dataclass(frozen=True, eq=False)
 class Record:
     """What one test recorded; every array is (n,), extension positive, in SI and degC."""
@@ -39,8 +43,11 @@ class Record:
 
     @property
     def rate(self) -> float:
-        """Sampling rate [Hz], from the median step."""
-        return float(1.0 / np.median(np.diff(self.time)))
+        """Sampling rate [Hz], from the median step, or the mean of the usual ones where a coarse clock rounds them."""
+        steps = np.diff(self.time)
+        middle = float(np.median(steps))
+        usual = steps[np.abs(steps - middle) <= 0.5 * middle]  # no gaps
+        return float(1.0 / (middle if np.ptp(usual) <= _EVEN * middle else np.mean(usual)))
 
     def median_voltage(self) -> float | None:
         """The voltage that labels the record, None where none was recorded."""

@@ -24,7 +24,7 @@ from pzd.quantities import Control
 from pzd.schema.jsonfile import read_json
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
-CASES = 10
+CASES = 8
 TUNED_ON = 3
 """A seed on which rules may be chosen, so that no scored one is used up."""
 
