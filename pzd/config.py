@@ -6,7 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from pzd.blind.config import BlindConfig
 from pzd.diagnose.config import DiagnoseConfig
@@ -26,6 +34,18 @@ StageName = Literal["rig", "identify", "diagnose", "table", "simulate", "report"
 STAGES: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "simulate", "report")
 WITHOUT_CAR: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "report")
 """What `stages` of a config may say."""
+
+
+def _rig_may_stand_elsewhere(schema: dict[str, Any]) -> None:
+    """Ask for `rig` only where the config extends no other one, in which it may stand."""
+    del schema["required"]
+    schema["anyOf"] = [{"required": ["rig"]}, {"required": ["extends"]}]
+
+
+SCHEMA = Path(__file__).with_name("config.schema.json")
+"""What `pzd schema` prints, as a file that editors read; `pzd schema > pzd/config.schema.json` makes it anew."""
+EDITORS = "# yaml-language-server: $schema="
+"""How the first line of a config names its schema to an editor."""
 
 
 class Uniform(Frozen):
@@ -104,6 +124,8 @@ class SweepConfig(Frozen):
 
 class RunConfig(Frozen):
     """One run: rig files in, comfort report out."""
+
+    model_config = ConfigDict(json_schema_extra=_rig_may_stand_elsewhere)
 
     extends: str | None = None
     """A config beside this one that says what this one does not."""
@@ -199,6 +221,23 @@ def control_of(data: Any) -> Control:
         return TypeAdapter(ControlConfig).validate_python(block).signal()
     except ValidationError:
         return Control()
+
+
+def check_settings(config: RunConfig, found: Sequence[str | None]) -> str | None:
+    """The setting in use, after a look at the settings that the table is to hold besides.
+
+    Parameters
+    ----------
+    config : the config
+    found : the settings of the rig's records
+
+    Raises
+    ------
+    ConfigError : as `setting_in_use` does, and when a setting of the table does not lie between tested ones
+    """
+    chosen = setting_in_use(config.setting, found)
+    config.table.between(found)
+    return chosen
 
 
 def setting_in_use(chosen: str | None, found: Sequence[str | None]) -> str | None:

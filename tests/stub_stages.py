@@ -126,7 +126,9 @@ def diagnose(diagnose: DiagnoseConfig, rig: Rig, identified: Identified, setting
     return Diagnosed(told, damper, damper)
 
 
-def tabulate(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Control, setting: str | None) -> Table:
+def tabulate(
+    table: TableConfig, rig: Rig, identified: Identified, diagnosed: Diagnosed, control: Control, setting: str | None
+) -> Table:
     """One node; the largest speed is that of the config."""
     force = diagnosed.damper.base[0].T0_N
     row = ForceRow(temperature_degC=22.0, voltage_V=1.0, velocity_m_per_s=0.1, force_N=force, inside=1)

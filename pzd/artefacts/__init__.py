@@ -6,6 +6,7 @@ wrong. `control` renames the columns of the control signal.
 """
 
 from pzd.artefacts.characteristics import (
+    AsItStandsRow,
     Characteristics,
     ContinuousVelocityRow,
     GasAndFrictionRow,
@@ -34,7 +35,7 @@ from pzd.artefacts.identified import (
     base_of,
     identified_damper,
 )
-from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow
+from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, UnitRow
 from pzd.artefacts.knee_as_damper import knee_damper
 from pzd.artefacts.manifest import Manifest
 from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
@@ -54,7 +55,7 @@ from pzd.artefacts.rides import (
     WheelRow,
 )
 from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig, extent
-from pzd.artefacts.table import ForceRow, InverseRow, Table, TableNotes
+from pzd.artefacts.table import ForceRow, InverseRow, SettingLeftOutRow, SettingRow, Table, TableNotes
 
 Artefact = Rig | Identified | Diagnosed | Table | Rides | Report
 
@@ -65,6 +66,7 @@ __all__ = [
     "FALLBACK",
     "RIDE_COLUMNS",
     "Artefact",
+    "AsItStandsRow",
     "AuxiliaryRow",
     "Characteristics",
     "ClickRow",
@@ -103,11 +105,14 @@ __all__ = [
     "RideRow",
     "Rides",
     "Rig",
+    "SettingLeftOutRow",
+    "SettingRow",
     "SpectrumRow",
     "StepRow",
     "SummaryRow",
     "Table",
     "TableNotes",
+    "UnitRow",
     "Value",
     "WarmUpRow",
     "WeightedRow",

@@ -1,4 +1,4 @@
-"""What the tests of the rig show without any model: force over speed, gas force, friction, step response, warm-up."""
+"""What the tests of the rig show without any model: force over speed, gas force, friction, response, warm-up."""
 
 from __future__ import annotations
 
@@ -120,6 +120,27 @@ class WarmUpRow(Frozen):
     compression_force_N: float
 
 
+class AsItStandsRow(Frozen):
+    """The extremes of a record that is none of the tests above, such as a knock, a transient or a road, as recorded."""
+
+    record: str
+    setting: str | None
+    voltage_V: float | None
+    """Of the condition, as in `parameters.csv`; None where the control signal moves within the record."""
+    temperature_degC: float | None
+    rebound_force_N: float
+    """The largest force; in rebound forces are positive."""
+    compression_force_N: float
+    """The smallest force."""
+    rebound_velocity_m_per_s: float = Field(ge=0.0)
+    """The largest velocity."""
+    compression_velocity_m_per_s: float = Field(le=0.0)
+    """The smallest velocity."""
+    stroke_m: float = Field(gt=0.0)
+    """From end to end."""
+    duration_s: float = Field(gt=0.0)
+
+
 @dataclass(frozen=True)
 class Course:
     """From where to where a warm-up goes: means of its first cycles and of its last."""
@@ -165,25 +186,29 @@ class Characteristics:
     gas_and_friction: tuple[GasAndFrictionRow, ...] = ()
     steps: tuple[StepRow, ...] = ()
     warm_up: tuple[WarmUpRow, ...] = ()
+    as_it_stands: tuple[AsItStandsRow, ...] = ()
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write pvp.csv, cvp.csv, gas_and_friction.csv, steps.csv and warm_up.csv."""
+        """Write pvp.csv, cvp.csv, gas_and_friction.csv, steps.csv, warm_up.csv and as_it_stands.csv."""
         write_rows(folder / "pvp.csv", PeakVelocityRow, self.peak_velocity, control)
         write_rows(folder / "cvp.csv", ContinuousVelocityRow, self.continuous_velocity, control)
         write_rows(folder / "gas_and_friction.csv", GasAndFrictionRow, self.gas_and_friction, control)
         write_rows(folder / "steps.csv", StepRow, self.steps, control)
         write_rows(folder / "warm_up.csv", WarmUpRow, self.warm_up, control)
+        write_rows(folder / "as_it_stands.csv", AsItStandsRow, self.as_it_stands, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
         """Read and check them again; a run of an earlier version has none of them."""
         if not (folder / "pvp.csv").is_file():
             return cls()
-        warm_up = folder / "warm_up.csv"  # an earlier version wrote the others alone
+        # An earlier version wrote the others alone.
+        warm_up, as_it_stands = folder / "warm_up.csv", folder / "as_it_stands.csv"
         return cls(
             read_rows(folder / "pvp.csv", PeakVelocityRow, control),
             read_rows(folder / "cvp.csv", ContinuousVelocityRow, control),
             read_rows(folder / "gas_and_friction.csv", GasAndFrictionRow, control),
             read_rows(folder / "steps.csv", StepRow, control),
             read_rows(warm_up, WarmUpRow, control) if warm_up.is_file() else (),
+            read_rows(as_it_stands, AsItStandsRow, control) if as_it_stands.is_file() else (),
         )

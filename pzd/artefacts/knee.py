@@ -124,6 +124,26 @@ class ClickRow(Frozen):
     compression_N_per_click: float
 
 
+class UnitRow(Frozen):
+    """How much of the force one unit of a gas pressure, gap or shim makes at one of the trade's speeds."""
+
+    setting: str | None
+    """With # for the number, where that stands in the setting and not in the control signal."""
+    voltage_V: float | None
+    """Of the condition, where the number stands in the setting."""
+    temperature_degC: float | None
+    unit: str
+    """Of the number, as it was written: psi, bar, mm, ..."""
+    from_value: float
+    to_value: float
+    velocity_m_per_s: float = Field(gt=0.0)
+    rebound_N_per_unit: float
+    """By how much the magnitude of the force rises a unit, without the gas; below zero where it falls."""
+    compression_N_per_unit: float
+    gas_force_N_per_unit: float
+    """By how much the gas force itself changes; below zero where the gas pushes the rod out more."""
+
+
 class PredictedRow(Frozen):
     """One test that was kept back, predicted by both laws, each fitted without it."""
 
@@ -177,13 +197,15 @@ class Knees:
     clicks: tuple[ClickRow, ...] = ()
     predicted: tuple[PredictedRow, ...] = ()
     laws: tuple[LawRow, ...] = ()
+    per_unit: tuple[UnitRow, ...] = ()
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write knee.csv, knee_force.csv, clicks.csv, kept_back.csv and law.csv where there is anything to write."""
+        """Write a file for each of the fields, law.csv, knee.csv and so on, where there is anything to write."""
         if self.laws:
             write_rows(folder / "knee.csv", KneeRow, self.rows, control)
             write_rows(folder / "knee_force.csv", KneeForceRow, self.forces, control)
             write_rows(folder / "clicks.csv", ClickRow, self.clicks, control)
+            write_rows(folder / "per_unit.csv", UnitRow, self.per_unit, control)
             write_rows(folder / "kept_back.csv", PredictedRow, self.predicted, control)
             write_rows(folder / "law.csv", LawRow, self.laws, control)
 
@@ -192,12 +214,14 @@ class Knees:
         """Read and check them again; where the config asked for Bingham alone there are none."""
         if not (folder / "law.csv").is_file():
             return cls()
+        per_unit = folder / "per_unit.csv"  # an earlier version wrote the others alone
         return cls(
             read_rows(folder / "knee.csv", KneeRow, control),
             read_rows(folder / "knee_force.csv", KneeForceRow, control),
             read_rows(folder / "clicks.csv", ClickRow, control),
             read_rows(folder / "kept_back.csv", PredictedRow, control),
             read_rows(folder / "law.csv", LawRow, control),
+            read_rows(per_unit, UnitRow, control) if per_unit.is_file() else (),
         )
 
     @property

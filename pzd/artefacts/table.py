@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal, Self
+
+from pydantic import Field
 
 from pzd.quantities import Control
 from pzd.schema.csvfile import read_rows, write_rows
@@ -32,6 +35,53 @@ class InverseRow(Frozen):
     voltage_V: float | None
 
 
+class SettingRow(Frozen):
+    """Force at one node of a setting between two tested ones; at v = 0 two one-sided rows stand, -0 and +0."""
+
+    setting: str
+    value: float
+    """The number in its name."""
+    lower_setting: str
+    """The tested one below, with the number next to it."""
+    upper_setting: str
+    temperature_degC: float | None
+    voltage_V: float | None
+    velocity_m_per_s: float
+    force_N: float
+    """Linear in the number between the forces of both neighbours."""
+    static_force_N: float
+    """What stands beside it at rest in the middle of the stroke, as a gas force does; a rig records the sum of both."""
+
+
+class SettingLeftOutRow(Frozen):
+    """How well one tested setting is predicted from its neighbours, as if it had not been tested."""
+
+    setting: str
+    lower_setting: str
+    upper_setting: str
+    reached_m_per_s: float = Field(gt=0.0)
+    """Up to which speed all three were tested."""
+    peak_force_N: float = Field(gt=0.0)
+    """Largest force of the setting itself there."""
+    rms_share_of_peak: float = Field(ge=0.0)
+    """R.m.s. difference between the force predicted and that of the setting itself, over both directions."""
+    largest_share_of_peak: float = Field(ge=0.0)
+
+
+def fastest(rows: Sequence[SettingRow]) -> tuple[tuple[SettingRow, SettingRow], ...]:
+    """The rows of the largest speed in rebound and in compression, of each setting, temperature and control signal.
+
+    Parameters
+    ----------
+    rows : of `settings.csv`
+    """
+    found: dict[tuple[str, float | None, float | None], list[SettingRow]] = {}
+    for row in rows:
+        found.setdefault((row.setting, row.temperature_degC, row.voltage_V), []).append(row)
+    ordered = [sorted(mine, key=lambda row: row.velocity_m_per_s) for mine in found.values()]
+    return tuple((mine[-1], mine[0]) for mine in ordered)
+
+
 class TableNotes(Frozen):
     """What the table cannot carry, and where it had to decide."""
 
@@ -54,12 +104,19 @@ class Table:
     force: tuple[ForceRow, ...]
     inverse: tuple[InverseRow, ...]
     notes: TableNotes
+    settings: tuple[SettingRow, ...] = ()
+    """Of settings between tested ones, where the config asks for some."""
+    settings_left_out: tuple[SettingLeftOutRow, ...] = ()
+    """What to think of them, where three settings or more were tested."""
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write force.csv, inverse.csv and notes.json."""
+        """Write force.csv, inverse.csv and notes.json; settings.csv and settings_left_out.csv where there are any."""
         write_rows(folder / "force.csv", ForceRow, self.force, control)
         write_rows(folder / "inverse.csv", InverseRow, self.inverse, control)
         write_json(folder / "notes.json", self.notes, control)
+        if self.settings:
+            write_rows(folder / "settings.csv", SettingRow, self.settings, control)
+            write_rows(folder / "settings_left_out.csv", SettingLeftOutRow, self.settings_left_out, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
@@ -68,4 +125,15 @@ class Table:
             read_rows(folder / "force.csv", ForceRow, control),
             read_rows(folder / "inverse.csv", InverseRow, control),
             read_json(folder / "notes.json", TableNotes, control),
+            *cls.read_settings(folder, control),
+        )
+
+    @staticmethod
+    def read_settings(folder: Path, control: Control) -> tuple[tuple[SettingRow, ...], tuple[SettingLeftOutRow, ...]]:
+        """The force at settings between tested ones, and how well left-out ones are predicted; none where not asked."""
+        if not (folder / "settings.csv").is_file():
+            return (), ()
+        return (
+            read_rows(folder / "settings.csv", SettingRow, control),
+            read_rows(folder / "settings_left_out.csv", SettingLeftOutRow, control),
         )

@@ -72,6 +72,7 @@ def characteristics_tables(found: RunSummary) -> Iterator[tuple[str, list[list[s
         ),
     )
     yield f"warm-up: from the first {AVERAGED} cycles of a long test to its last", _warm_up(here, signal)
+    yield "none of these tests, as it stands: extremes of all samples", _as_it_stands(here, places)
 
 
 def _warm_up(here: Characteristics, signal: str) -> list[list[str]]:
@@ -90,6 +91,21 @@ def _warm_up(here: Characteristics, signal: str) -> list[list[str]]:
     ]
     head = ["setting", signal, "speed [m/s]", "cycles", "T [degC]", "rebound [N]", "compression [N]", "record"]
     return filled(head, rows, 2)
+
+
+def _as_it_stands(here: Characteristics, places: list[str]) -> list[list[str]]:
+    rows = [
+        [
+            *_place(row.setting, row.voltage_V, row.temperature_degC),
+            _course(row.compression_force_N, row.rebound_force_N),
+            _course(row.compression_velocity_m_per_s, row.rebound_velocity_m_per_s),
+            number(row.stroke_m),
+            number(row.duration_s),
+            row.record,
+        ]
+        for row in here.as_it_stands
+    ]
+    return filled([*places, "force [N]", "velocity [m/s]", "stroke [m]", "duration [s]", "record"], rows, len(places))
 
 
 def _course(first: float | None, last: float | None) -> str:

@@ -1,4 +1,4 @@
-"""The knee law as rows of text: rebound and compression in the language of the trade, and the force a click."""
+"""The knee law as rows of text: rebound and compression in the language of the trade, and the force a click or unit."""
 
 from __future__ import annotations
 
@@ -35,6 +35,26 @@ def knee_tables(found: RunSummary) -> Iterator[tuple[str, list[list[str]]]]:
                     number(row.compression_N_per_click),
                 ]
                 for row in knees.clicks
+            ],
+            len(places),
+        ),
+    )
+
+    yield (
+        "force a unit of pressure or length, without the gas, and of the gas force itself",
+        filled(
+            [*places, "from", "speed [m/s]", "rebound", "compression", "gas force"],
+            [
+                [
+                    *_place(row.setting, row.voltage_V, row.temperature_degC),
+                    f"{number(row.from_value)} to {number(row.to_value)} {row.unit}",
+                    number(row.velocity_m_per_s),
+                    *(
+                        f"{number(force)} N/{row.unit}"
+                        for force in (row.rebound_N_per_unit, row.compression_N_per_unit, row.gas_force_N_per_unit)
+                    ),
+                ]
+                for row in knees.per_unit
             ],
             len(places),
         ),

@@ -106,6 +106,7 @@ def show(
     from pzd.cli.characteristics import characteristics_tables
     from pzd.cli.diagnosis import diagnosis_lines
     from pzd.cli.knee import knee_tables
+    from pzd.cli.settings import settings_tables
     from pzd.pipeline.command import opened
     from pzd.pipeline.run_summary import summary_with_stale
 
@@ -125,6 +126,8 @@ def show(
         "diagnosis",
         [[line] for line in diagnosis_lines(found.diagnosis, found.control)] if found.diagnosis else [],
     )
+    for title, rows in settings_tables(found):
+        _section(output, title, rows)
     _section(output, "rides", _rides(found))
     _section(output, "assumed, since the config does not say it", [[line] for line in found.assumed])
     _section(output, "comfort", _comfort(found))

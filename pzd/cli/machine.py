@@ -23,6 +23,8 @@ def run_as_data(run: RunSummary) -> dict[str, Any]:
         "knee": vars(run.knees),
         "parameters": run.parameters,
         "diagnosis": run.diagnosis,
+        "settings": run.settings,
+        "settings_left_out": run.settings_left_out,
         "rides": run.summary,
         "assumed": run.assumed,
         "comfort": run.comfort,

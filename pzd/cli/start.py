@@ -23,6 +23,7 @@ LayoutName = Annotated[
 
 def init(files: RigFiles, layout: LayoutName = None, verbose: Verbose = False) -> int:
     """Print a config for rig files: by the layout that fits, else guessed from the headers."""
+    from pzd.config import EDITORS, SCHEMA
     from pzd.rig.files.guess import guessed
     from pzd.schema.errors import ConfigError
 
@@ -30,7 +31,7 @@ def init(files: RigFiles, layout: LayoutName = None, verbose: Verbose = False) -
     absent = [path for path in files if not path.is_file()]
     if absent:
         raise ConfigError(map(_absent, absent))
-    output.say(*guessed(files, layout))
+    output.say(f"{EDITORS}{SCHEMA.as_uri()}", *guessed(files, layout))
     return DONE
 
 

@@ -47,10 +47,10 @@ def rides_on(
     the table and the rides
     """
     from pzd.simulate.stage import simulate as ride
-    from pzd.table.stage import tabulate
+    from pzd.table.stage import force_table
 
     alone = Diagnosed.undiagnosed(damper)
-    made = tabulate(table, rig, alone, control, setting)
+    made = force_table(table, rig, alone, control, setting)
     rides = ride(simulate, alone, made, 1, Path())
     slopes = [
         row.force_N / row.velocity_m_per_s

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pzd.artefacts import RecordEntry, Rig
-from pzd.config import RunConfig, setting_in_use, validated
+from pzd.config import RunConfig, check_settings, validated
 from pzd.identify.stage import refuse_one_condition
 from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
@@ -169,7 +169,7 @@ def check_setting(given: Opened, entries: Sequence[RecordEntry]) -> None:
 
     Raises
     ------
-    ConfigError : when there are several and it does not, or none is the one it says
+    ConfigError : when there are several and it does not, none is the one it says, or one of the table lies beyond them
     """
     with given.placed():
-        setting_in_use(given.config.setting, [entry.setting for entry in entries])
+        check_settings(given.config, [entry.setting for entry in entries])

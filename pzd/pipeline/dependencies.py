@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from pzd.artefacts import RecordEntry, Rig
-from pzd.config import RunConfig, setting_in_use
+from pzd.config import RunConfig, check_settings
 from pzd.pipeline.sources import code_hash
 from pzd.pipeline.stages import Stage
 from pzd.runs import Run, file_hash, versions
@@ -32,10 +32,10 @@ def setting_of(config: RunConfig, run: Run) -> str | None:
 
     Raises
     ------
-    ConfigError : when it is not clear which one, or there is no such setting
+    ConfigError : when it is not clear which one, there is no such setting, or one of the table lies beyond them
     """
     entries = read_json_list(run.folder / Rig.folder / "records.json", RecordEntry, run.control)
-    return setting_in_use(config.setting, [entry.setting for entry in entries])
+    return check_settings(config, [entry.setting for entry in entries])
 
 
 def block_of(config: BaseModel, annotation: Any) -> tuple[str, BaseModel] | None:

@@ -16,7 +16,10 @@ from pzd.artefacts import (
     ParameterRow,
     Report,
     Rides,
+    SettingLeftOutRow,
+    SettingRow,
     SummaryRow,
+    Table,
 )
 from pzd.config import control_of, validated
 from pzd.pipeline.command import Opened, stale_stages
@@ -51,6 +54,10 @@ class RunSummary:
     """What the tests show without any model."""
     knees: Knees = field(default_factory=Knees)
     """The knee law, where the config asks for it."""
+    settings: tuple[SettingRow, ...] = ()
+    """The force at settings between tested ones, where the config asks for some."""
+    settings_left_out: tuple[SettingLeftOutRow, ...] = ()
+    """How well tested settings are predicted from their neighbours."""
 
 
 def page_of(run: Run) -> Path:
@@ -66,7 +73,7 @@ def run_summary(run: Run) -> RunSummary:
     ConfigError : when there are none
     DataError : when a file of it is at fault
     """
-    manifests = {kind: run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Rides, Report)}
+    manifests = {kind: run.stage_folder(kind.folder).manifest for kind in (Identified, Diagnosed, Table, Rides, Report)}
     there = {kind for kind, manifest in manifests.items() if manifest is not None}
     if not there:
         raise ConfigError(f"{run.folder}: there are no results yet; pzd run {run.config} makes them")
@@ -75,6 +82,7 @@ def run_summary(run: Run) -> RunSummary:
     run = replace(run, control=control)
     identified = run.read(Identified) if Identified in there else Identified((), ())
     comfort = at / Report.folder / "comfort.csv"
+    settings = Table.read_settings(at / Table.folder, control) if Table in there else ((), ())
     return RunSummary(
         at,
         control,
@@ -86,6 +94,8 @@ def run_summary(run: Run) -> RunSummary:
         tuple(dict.fromkeys(mark for manifest in manifests.values() if manifest for mark in manifest.marks)),
         characteristics=identified.characteristics,
         knees=identified.knees,
+        settings=settings[0],
+        settings_left_out=settings[1],
     )
 
 

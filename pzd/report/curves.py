@@ -23,6 +23,7 @@ def characteristics_of(context: ReportContext) -> Characteristics:
         tuple(row for row in found.gas_and_friction if row.setting == context.chosen),
         tuple(row for row in found.steps if row.setting == context.chosen),
         tuple(row for row in found.warm_up if row.setting == context.chosen),
+        tuple(row for row in found.as_it_stands if row.setting == context.chosen),
     )
 
 

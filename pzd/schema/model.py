@@ -2,11 +2,34 @@
 
 from __future__ import annotations
 
+import copy
+import re
 from abc import abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from pzd.quantities import VOLTAGE
+
+
+def under_any_control(schema: dict[str, Any]) -> None:
+    """Let keys of the control signal be called after any one: an editor does not know what `control` says of them.
+
+    Parameters
+    ----------
+    schema : JSON schema of a block; beside `voltage_V` stands a pattern that `current_A` and `rebound_clicks` meet, and
+        no other key of the block
+    """
+    properties: dict[str, Any] = schema.get("properties", {})
+    others = "|".join(map(re.escape, properties))
+    for name, body in properties.items():
+        before, named, after = name.partition(VOLTAGE.name)
+        if named:
+            unit = f"_{VOLTAGE.unit}"
+            after = after.removesuffix(unit) + (r"_\w+" if after.endswith(unit) else "")
+            pattern = rf"^(?!(?:{others})$){before}[A-Za-z]\w*{after}$"
+            schema.setdefault("patternProperties", {})[pattern] = copy.deepcopy(body)
 
 
 class Frozen(BaseModel):
@@ -18,6 +41,7 @@ class Frozen(BaseModel):
         strict=True,
         allow_inf_nan=False,
         use_attribute_docstrings=True,
+        json_schema_extra=under_any_control,
     )
 
     former_keys: ClassVar[Mapping[str, str]] = {}

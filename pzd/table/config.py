@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field
 
+from pzd.artefacts.numbered_settings import Neighbours, neighbours
+from pzd.schema.errors import ConfigError
 from pzd.schema.model import Frozen
 
 
@@ -32,3 +35,27 @@ class TableConfig(Frozen):
     largest force."""
     force_levels: int = Field(default=41, ge=2, le=1000)
     """Force levels of the inverse at each speed, evenly from the least to the largest force there."""
+    settings: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """Settings between tested ones, such as `gap 0.2 mm` between `gap 0.15 mm` and `gap 0.25 mm`, for which
+    `settings.csv` holds the force, linear in the number."""
+
+    def between(self, tested: Sequence[str | None]) -> tuple[Neighbours, ...]:
+        """The wanted settings, each with its neighbours among the tested ones.
+
+        Parameters
+        ----------
+        tested : the settings of the rig's records
+
+        Raises
+        ------
+        ConfigError : when one has no neighbours, with every such place
+        """
+        found, faults = [], []
+        for place, wanted in enumerate(self.settings or ()):
+            try:
+                found.append(neighbours(wanted, tested))
+            except ValueError as error:
+                faults.append(f"table.settings.{place}: {error}")
+        if faults:
+            raise ConfigError(faults)
+        return tuple(found)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from pzd.artefacts import Diagnosed, Rig, Table, TableNotes
+from pzd.artefacts import Diagnosed, Identified, Rig, Table, TableNotes
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.record import Record
@@ -19,7 +20,34 @@ WARM_STEPS = 5
 """Temperatures of the table where an effect of the material, as `temperature_drift`, gives the temperature axis."""
 
 
-def tabulate(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Control, setting: str | None) -> Table:
+def tabulate(
+    table: TableConfig, rig: Rig, identified: Identified, diagnosed: Diagnosed, control: Control, setting: str | None
+) -> Table:
+    """Force over (temperature, voltage, velocity) at steady slip, its inverse, and settings between tested ones.
+
+    Parameters
+    ----------
+    table : the config's block
+    rig : the records, for the speeds that were reached
+    identified : the dampers of all settings, for those between
+    diagnosed : the damper to tabulate
+    control : the control signal, for the words of the notes
+    setting : of the rig's settings, the one in use
+
+    Raises
+    ------
+    ConfigError : when a setting that is asked for does not lie between tested ones
+    """
+    made = force_table(table, rig, diagnosed, control, setting)
+    if table.settings is None:
+        return made
+    from pzd.table.settings import between_settings
+
+    rows, left_out = between_settings(table, rig, identified, control)
+    return replace(made, settings=rows, settings_left_out=left_out)
+
+
+def force_table(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Control, setting: str | None) -> Table:
     """Force over (temperature, voltage, velocity) at steady slip, its inverse, and what it cannot carry.
 
     Parameters

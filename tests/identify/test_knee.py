@@ -27,7 +27,7 @@ from pzd.diagnose.as_fitted import as_fitted
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.knee.choice import law_row
-from pzd.identify.knee.clicks import clicks
+from pzd.identify.knee.clicks import clicks, per_unit
 from pzd.identify.knee.rows import TRADE_SPEEDS
 from pzd.identify.knee.summary import knees
 from pzd.identify.stage import identify
@@ -331,6 +331,35 @@ def test_settings_without_a_number_have_no_clicks() -> None:
 
 def test_a_volt_is_no_click() -> None:
     assert clicks([force_row(None, 0.0, 300.0), force_row(None, 1.0, 310.0)], Control()) == ()
+
+
+@pytest.mark.parametrize("unit", ["psi", "bar", "kPa"])
+def test_of_a_gas_pressure_is_told_the_force_a_unit_and_what_it_makes_of_the_gas_force(unit: str) -> None:
+    forces = [force_row(f"gas {p} {unit}", 5.0, 300.0 + 0.2 * p, gas=-1.5 * p) for p in (200, 100)]
+    (row,) = per_unit(forces, Control())
+    assert (row.setting, row.voltage_V, row.unit) == (f"gas # {unit}", 5.0, unit)
+    assert (row.from_value, row.to_value) == (100.0, 200.0)
+    assert row.rebound_N_per_unit == pytest.approx(0.2)
+    assert row.compression_N_per_unit == pytest.approx(0.1)
+    assert row.gas_force_N_per_unit == pytest.approx(-1.5)
+    assert clicks(forces, Control()) == ()
+
+
+def test_a_gas_pressure_may_be_the_control_signal() -> None:
+    forces = [force_row(None, p, 300.0 + 20.0 * p, gas=-30.0 * p) for p in (5.0, 10.0, 20.0)]
+    rows = per_unit(forces, Control("gas", "bar"))
+    assert [(row.setting, row.voltage_V, row.unit) for row in rows] == [(None, None, "bar")] * 2
+    assert [(row.from_value, row.to_value) for row in rows] == [(5.0, 10.0), (10.0, 20.0)]
+    assert [row.rebound_N_per_unit for row in rows] == pytest.approx([20.0, 20.0])
+    assert [row.gas_force_N_per_unit for row in rows] == pytest.approx([-30.0, -30.0])
+    assert clicks(forces, Control("gas", "bar")) == ()
+
+
+def test_a_clicker_and_a_gas_pressure_in_one_name_are_told_apart() -> None:
+    names = {"C4 100psi": 300.0, "C6 100psi": 340.0, "C4 150psi": 310.0}
+    forces = [force_row(name, None, force) for name, force in names.items()]
+    assert [(row.setting, row.rebound_N_per_click) for row in clicks(forces, Control())] == [("C# 100psi", 20.0)]
+    assert [(row.setting, row.rebound_N_per_unit) for row in per_unit(forces, Control())] == [("C4 #psi", 0.2)]
 
 
 def test_the_trade_reads_its_forces_at_the_speeds_of_a_crank_of_100_mm() -> None:

@@ -16,7 +16,7 @@ from pzd.report.ride_comfort import assess, rated
 from pzd.report.run_numbers import RunNumbers
 from pzd.rig.stage import synthesise
 from pzd.simulate.stage import simulate
-from pzd.table.stage import tabulate
+from pzd.table.stage import force_table
 
 
 @pytest.fixture(scope="package")
@@ -38,7 +38,7 @@ def identified(config: RunConfig, rig: Rig) -> Identified:
 def rides(config: RunConfig, rig: Rig, identified: Identified) -> Rides:
     damper = base_of(identified.rows, config.setting)
     diagnosed = Diagnosed(Diagnosis.model_construct(), damper, damper)
-    table = tabulate(config.table, rig, diagnosed, Control(), config.setting)
+    table = force_table(config.table, rig, diagnosed, Control(), config.setting)
     of_the_paper = config.simulate.model_copy(update={"policies": ("constant", "comfort")})  # the paper knows no other
     return simulate(of_the_paper, diagnosed, table, config.seed, Path())
 

@@ -8,7 +8,18 @@ from pathlib import Path
 import pytest
 from conftest import PLAIN, Run
 
-from pzd.artefacts import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow
+from pzd.artefacts import (
+    AsItStandsRow,
+    Characteristics,
+    ClickRow,
+    KneeForceRow,
+    KneeRow,
+    Knees,
+    LawRow,
+    PredictedRow,
+    UnitRow,
+)
+from pzd.cli.characteristics import characteristics_tables
 from pzd.cli.knee import knee_tables
 from pzd.damper.model import Damper
 from pzd.pipeline.run_summary import RunSummary
@@ -60,7 +71,32 @@ def knees() -> Knees:
     law = LawRow(
         setting="gap 0.25 mm", law="knee", tests=6, W_s_bingham=0.0085, W_s_knee=0.00085, reason="predicts better"
     )
-    return Knees((row,), tuple(forces), (click,), (predicted,), (law,))
+    pressure = UnitRow(
+        setting="gas # psi",
+        voltage_V=None,
+        temperature_degC=None,
+        unit="psi",
+        from_value=100.0,
+        to_value=150.0,
+        velocity_m_per_s=0.131,
+        rebound_N_per_unit=0.17,
+        compression_N_per_unit=0.23,
+        gas_force_N_per_unit=-1.37,
+    )
+    return Knees((row,), tuple(forces), (click,), (predicted,), (law,), (pressure,))
+
+
+def knock() -> AsItStandsRow:
+    return AsItStandsRow(
+        record="knock-7",
+        **PLACE,
+        rebound_force_N=2350.0,
+        compression_force_N=-678.0,
+        rebound_velocity_m_per_s=1.23,
+        compression_velocity_m_per_s=-0.456,
+        stroke_m=0.0321,
+        duration_s=0.654,
+    )
 
 
 def with_knee(run: Run) -> Run:
@@ -69,9 +105,10 @@ def with_knee(run: Run) -> Run:
         "knee", {"beta": 0.4, "F_reb": 900.0, "C_reb": 600.0, "F_comp": 700.0, "C_comp": 500.0}
     )
     diagnosis = run.diagnosed.diagnosis.without_effects("unexplained", "the knee law is handed on", gap=None)
+    shown = replace(run.identified.characteristics, as_it_stands=(knock(),))
     return replace(
         run,
-        identified=replace(run.identified, knees=knees()),
+        identified=replace(run.identified, knees=knees(), characteristics=shown),
         diagnosed=replace(run.diagnosed, diagnosis=diagnosis, damper=damper, plain=damper, parameters=()),
     )
 
@@ -96,6 +133,27 @@ def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_directi
         assert cell in page
     assert "21.5" in page
     assert "Law of the element handed on" in page
+
+
+def test_the_page_has_the_force_a_psi_and_that_of_the_gas_itself(page: str) -> None:
+    for cell in ("gas # psi", "100 to 150\u00a0psi", "0.17\u00a0N/psi", "0.23\u00a0N/psi", "\u22121.37\u00a0N/psi"):
+        assert cell in page
+
+
+def test_the_page_has_the_extremes_of_a_record_that_is_no_test_of_the_trade(page: str) -> None:
+    forces, speeds = ("2\u202f350\u00a0N", "\u2212678\u00a0N"), ("1.23\u00a0m/s", "\u22120.456\u00a0m/s")
+    for cell in ("knock-7", *forces, *speeds, "32.1 mm", "0.654\u00a0s"):
+        assert cell in page
+
+
+def test_the_terminal_has_them_too() -> None:
+    shown = Characteristics(as_it_stands=(knock(),))
+    found = RunSummary(Path(), Control(), (), None, (), (), None, (), characteristics=shown, knees=knees())
+    head, row = dict(characteristics_tables(found))["none of these tests, as it stands: extremes of all samples"]
+    assert row[head.index("force [N]")] == "-678 to 2350"
+    assert row[head.index("velocity [m/s]")] == "-0.456 to 1.23"
+    (told,) = (rows for title, rows in knee_tables(found) if title.startswith("force a unit"))
+    assert told[1][-5:] == ["100 to 150 psi", "0.131", "0.17 N/psi", "0.23 N/psi", "-1.37 N/psi"]
 
 
 def test_the_page_does_not_call_a_knee_a_missing_effect(page: str) -> None:

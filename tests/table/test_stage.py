@@ -13,7 +13,7 @@ from pzd.quantities import Control
 from pzd.record import Record
 from pzd.table.config import TableConfig
 from pzd.table.lookup import Lookup
-from pzd.table.stage import tabulate
+from pzd.table.stage import force_table
 
 # T0 [N], C [N s/m], k [N/m] by voltage [V], as Tables 1 to 3 print them.
 TABLES = {
@@ -46,7 +46,7 @@ def sine(voltage: float | None, temperature: float | None, amplitude: float = 0.
 
 def table_of(damper: Damper, config: TableConfig | None = None, **motion: float) -> Table:
     records = tuple(sine(row.voltage_V, row.temperature_degC, **motion) for row in damper.base)
-    return tabulate(config or TableConfig(), Rig(records, ()), Diagnosed.undiagnosed(damper), Control(), None)
+    return force_table(config or TableConfig(), Rig(records, ()), Diagnosed.undiagnosed(damper), Control(), None)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
@@ -108,7 +108,7 @@ def test_a_force_in_a_gap_of_the_table_is_empty_or_has_the_nearest_voltage() -> 
     damper = damper_of([1])
     records = tuple(sine(U, 22.0, amplitude) for U, amplitude in {0.0: 0.03, 100.0: 0.005, 150.0: 0.03}.items())
     made = [
-        tabulate(
+        force_table(
             TableConfig(outside="error", unreachable=unreachable, voltages_V=(0.0, 100.0, 150.0)),
             Rig(records, ()),
             Diagnosed.undiagnosed(damper),
@@ -144,7 +144,7 @@ def test_each_voltage_is_inside_as_far_as_it_was_driven() -> None:
     damper = damper_of([2])
     amplitudes = {0.0: 0.03, 50.0: 0.03, 100.0: 0.01, 150.0: 0.01}
     records = tuple(sine(U, 22.0, amplitude) for U, amplitude in amplitudes.items())
-    table = tabulate(TableConfig(), Rig(records, ()), Diagnosed.undiagnosed(damper), Control(), None)
+    table = force_table(TableConfig(), Rig(records, ()), Diagnosed.undiagnosed(damper), Control(), None)
     lookup = Lookup.of(table)
     speed = 0.02 * 4 * np.pi
     np.testing.assert_array_equal(lookup.inside([0.0, 50.0, 100.0, 150.0], speed), [True, True, False, False])

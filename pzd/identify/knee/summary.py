@@ -9,7 +9,7 @@ from pzd.artefacts import KneeForceRow, KneeRow, Knees, ParameterRow
 from pzd.artefacts.identified import FALLBACK
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.knee.choice import kept_back, law_row
-from pzd.identify.knee.clicks import clicks
+from pzd.identify.knee.clicks import clicks, per_unit
 from pzd.identify.knee.data import Tests
 from pzd.identify.knee.fit import fit_bingham, fit_knee
 from pzd.identify.knee.rows import knee_forces, knee_row
@@ -67,7 +67,14 @@ def knees(
         law = law_row(config.law, setting, mine, sum(row.setting == setting for row in rows))
         log.info("identify: law %s%s, %s", law.law, f" of {setting}" if setting else "", law.reason)
         laws.append(law)
-    return Knees(tuple(rows), tuple(forces), clicks(forces, control), tuple(row for row, _ in found), tuple(laws))
+    return Knees(
+        tuple(rows),
+        tuple(forces),
+        clicks(forces, control),
+        tuple(row for row, _ in found),
+        tuple(laws),
+        per_unit(forces, control),
+    )
 
 
 def _line(row: KneeRow) -> str:

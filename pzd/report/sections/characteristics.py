@@ -22,7 +22,7 @@ _PAPER_RESPONSE_MS = 9
 def render(context: ReportContext, pictures: Pictures) -> Iterator[Section]:
     """The second section, where there are such tests."""
     found = characteristics_of(context)
-    if not found.peak_velocity and not found.steps and not found.warm_up:
+    if not (found.peak_velocity or found.steps or found.warm_up or found.as_it_stands):
         return
     blocks: list[Block] = [Paragraph(_intro(context)), *galleries(pictures["characteristics"])]
     blocks += [_force_at_speed(context)] if found.peak_velocity else []
@@ -30,6 +30,7 @@ def render(context: ReportContext, pictures: Pictures) -> Iterator[Section]:
     if found.steps:
         blocks += [_steps(context), Paragraph(_beside_the_paper(context))]
     blocks += [_warm_up(context)] if found.warm_up else []
+    blocks += [_as_it_stands(context)] if found.as_it_stands else []
     yield Section("characteristics", "Force over speed, as measured", tuple(blocks))
 
 
@@ -139,6 +140,29 @@ def _warm_up(context: ReportContext) -> TextTable:
     header = (*_settings(context), *_control(context), "speed", "cycles", "temperature", "rebound", "compression")
     title = f"Warm-up: force at the peak speed from the first {AVERAGED} cycles to the last"
     return TextTable(title, (*header, "record"), rows, folded=len(rows) > _FOLD)
+
+
+def _as_it_stands(context: ReportContext) -> TextTable:
+    rows = tuple(
+        (
+            row.record,
+            row.setting or DASH,
+            context.voltage(row.voltage_V),
+            amount(row.temperature_degC, "degC"),
+            amount(row.rebound_force_N, "N"),
+            amount(row.compression_force_N, "N"),
+            amount(row.rebound_velocity_m_per_s, "m/s"),
+            amount(row.compression_velocity_m_per_s, "m/s"),
+            f"{number(1000.0 * row.stroke_m)} mm",
+            amount(row.duration_s, "s"),
+        )
+        for row in characteristics_of(context).as_it_stands
+    )
+    where = ("setting", context.control.name, "temperature")
+    extremes = ("largest force", "smallest force", "largest velocity", "smallest velocity")
+    title = "Records that are none of these tests, as they stand: extremes of all samples"
+    header = ("record", *where, *extremes, "stroke", "duration")
+    return TextTable(title, header, rows, folded=len(rows) > _FOLD).without_empty(*where)
 
 
 def _course(first: float | None, last: float | None, unit: str) -> str:

@@ -12,6 +12,7 @@ from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext, effect_in_words
 from pzd.report.sections.knee import trade_blocks
 from pzd.report.sections.pictures import Pictures, galleries
+from pzd.report.sections.settings import settings_blocks
 from pzd.report.static_force import static_force_at, static_force_in_words
 from pzd.report.wording import DASH, amount, interval, listed, number, unit_of
 
@@ -27,6 +28,7 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     blocks += [_alone(context)] if context.extended or context.fitted_law else []
     blocks += galleries(pictures["damper"])
     blocks += [_force(context)] if context.table.force else []
+    blocks += settings_blocks(context)
     notes = context.table.notes
     if notes.not_monotone:
         blocks += [

@@ -1,10 +1,10 @@
-"""The damper in the language of the trade: rebound and compression, bleed, knee, blow-off, gas, friction, clicks."""
+"""The damper in the language of the trade: rebound and compression, bleed, knee, blow-off, gas, friction, N a click."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from pzd.artefacts import ClickRow
+from pzd.artefacts import ClickRow, UnitRow
 from pzd.artefacts.knee import DIRECTIONS, OF_A_DIRECTION, DirectionOfCondition
 from pzd.report.blocks import Block, Paragraph, TextTable
 from pzd.report.context import ReportContext
@@ -15,7 +15,7 @@ _CONDITION = ("setting", "temperature")
 
 
 def trade_blocks(context: ReportContext) -> Iterator[Block]:
-    """Which law is handed on and why, the knee law of all conditions, and the force a click; else nothing."""
+    """Which law is handed on and why, the knee law of all conditions, and the force a click or unit; else nothing."""
     knees = context.identified.knees
     if not knees.rows:
         return
@@ -28,6 +28,8 @@ def trade_blocks(context: ReportContext) -> Iterator[Block]:
     yield _of_both(context)
     if knees.clicks:
         yield _clicks(context, knees.clicks)
+    if knees.per_unit:
+        yield _per_unit(context, knees.per_unit)
     yield _kept_back(context)
 
 
@@ -92,6 +94,27 @@ def _clicks(context: ReportContext, clicks: Sequence[ClickRow]) -> TextTable:
     )
     header = (*_header(context), "position", "speed", "rebound [N a click]", "compression [N a click]")
     title = "Force a click, without the gas: by how much the magnitude rises with the number of the clicker"
+    return TextTable(title, header, rows, folded=len(rows) > _FOLD).without_empty(context.control.name, *_CONDITION)
+
+
+def _per_unit(context: ReportContext, found: Sequence[UnitRow]) -> TextTable:
+    rows = tuple(
+        (
+            *_place(context, row.setting, row.voltage_V, row.temperature_degC),
+            f"{number(row.from_value)} to {amount(row.to_value, row.unit)}",
+            amount(row.velocity_m_per_s, "m/s"),
+            *(
+                amount(force, f"N/{row.unit}")
+                for force in (row.rebound_N_per_unit, row.compression_N_per_unit, row.gas_force_N_per_unit)
+            ),
+        )
+        for row in found
+    )
+    header = (*_header(context), "from", "speed", "rebound", "compression", "gas force")
+    title = (
+        "Force a unit of pressure or length: by how much the magnitude without the gas rises, and how the gas force "
+        "itself changes, below zero where it pushes the rod out more"
+    )
     return TextTable(title, header, rows, folded=len(rows) > _FOLD).without_empty(context.control.name, *_CONDITION)
 
 
