@@ -2,7 +2,8 @@
 
 Numba keys a cached kernel by the file of the outermost function alone, so an edited law would
 leave a stale kernel behind. The cache folder therefore carries a hash of every source of the
-damper, of every module that compiles, and of the versions: edit a law, and the kernels are new.
+damper, of the laws of the blind benchmark, of every module that compiles, and of the versions:
+edit a law, and the kernels are new.
 """
 
 from __future__ import annotations
@@ -20,15 +21,18 @@ from typing import Any, ParamSpec, TypeVar, cast
 import numba
 import numpy as np
 
+from pzd.own_effects import own_files
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
 
 def sources() -> list[Path]:
-    """Every module of the damper, and every other one that compiles something."""
+    """Every module with laws (the damper's, one's own, the blind benchmark's), and every other one that compiles."""
     package = Path(__file__).parent
     others = (path for path in package.rglob("*.py") if b"pzd.compiled import" in path.read_bytes())
-    return sorted({Path(__file__), *(package / "damper").rglob("*.py"), *others})
+    laws = (path for folder in ("damper", "blind/independent") for path in (package / folder).rglob("*.py"))
+    return sorted({Path(__file__), *laws, *own_files(), *others})
 
 
 def cache_folder() -> Path:

@@ -13,6 +13,7 @@ import pzd
 
 ORDER = (
     "quantities",
+    "own_effects",
     "schema",
     "record",
     "compiled",
@@ -170,3 +171,32 @@ def test_a_set_holds_what_its_folder_holds(name: str, function: str) -> None:
     package = importlib.import_module(name)
     files = {path.stem for path in Path(package.__path__[0]).glob("*.py")} - {"__init__"}
     assert len(getattr(package, function)()) == len(files)
+
+
+JUDGED = ("damper", "rig", "identify", "diagnose", "signals")
+"""What the second generator of the blind benchmark judges, and therefore does not share."""
+
+
+def borrowed(package: Path) -> list[str]:
+    """What the second generator imports of the code that it judges."""
+    return [
+        f"{module.relative_to(package.parent)}:{line}: {name}"
+        for module in sorted((package / "blind" / "independent").rglob("*.py"))
+        for line, name in imported(
+            ast.parse(module.read_text("utf-8")), dotted(module, package), is_package=module.stem == "__init__"
+        )
+        if layer(name) in JUDGED or (layer(name) == "blind" and not name.startswith("pzd.blind.independent"))
+    ]
+
+
+def test_the_second_generator_shares_nothing_with_what_it_judges() -> None:
+    assert (PACKAGE / "blind" / "independent" / "kernel.py").exists()
+    assert borrowed(PACKAGE) == []
+
+
+@pytest.mark.parametrize("line", ["from pzd.damper.element import element_force", "import pzd.blind.sizes"])
+def test_a_loan_of_the_second_generator_is_found(line: str, tmp_path: Path) -> None:
+    module = tmp_path / "pzd" / "blind" / "independent" / "laws" / "wrong.py"
+    module.parent.mkdir(parents=True)
+    module.write_text(f"def f():\n    {line}", encoding="utf-8")
+    assert len(borrowed(tmp_path / "pzd")) == 1

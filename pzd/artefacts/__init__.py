@@ -26,6 +26,7 @@ from pzd.artefacts.diagnosed import (
     Region,
     Value,
 )
+from pzd.artefacts.hypotheses import Hypotheses, HypothesisPoint, HypothesisRow
 from pzd.artefacts.identified import (
     FALLBACK,
     AuxiliaryRow,
@@ -45,6 +46,7 @@ from pzd.artefacts.rides import (
     ENERGY_LIMIT,
     RIDE_COLUMNS,
     Ending,
+    FoundRow,
     Response,
     Ride,
     RideRow,
@@ -77,8 +79,12 @@ __all__ = [
     "Ending",
     "Finding",
     "ForceRow",
+    "FoundRow",
     "Gap",
     "GasAndFrictionRow",
+    "Hypotheses",
+    "HypothesisPoint",
+    "HypothesisRow",
     "Identified",
     "IngestRow",
     "InverseRow",

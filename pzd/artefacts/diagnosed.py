@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from pzd.artefacts.contradictions import contradictions
+from pzd.artefacts.hypotheses import Hypotheses
 from pzd.artefacts.identified import ParameterRow
 from pzd.damper.competing_forms import known
 from pzd.damper.model import Damper
@@ -182,6 +183,8 @@ class Diagnosed:
     """The damper before diagnose."""
     parameters: tuple[ParameterRow, ...] = ()
     """T0, C and k of the damper with their intervals; empty where nobody fitted them."""
+    hypotheses: Hypotheses = field(default_factory=Hypotheses)
+    """Which shape what is left has, where the verdict is `unexplained`; nothing behind diagnose depends on it."""
 
     @classmethod
     def undiagnosed(cls, damper: Damper, plain: Damper | None = None) -> Self:
@@ -190,11 +193,12 @@ class Diagnosed:
         return cls(Diagnosis.without_effects("none", "not diagnosed", gap), damper, plain or damper)
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write diagnosis.json, damper.yaml, plain.yaml and parameters.csv."""
+        """Write diagnosis.json, damper.yaml, plain.yaml, parameters.csv, and hypotheses where any was looked for."""
         write_json(folder / "diagnosis.json", self.diagnosis, control)
         write_yaml_model(folder / "damper.yaml", self.damper, control)
         write_yaml_model(folder / "plain.yaml", self.plain, control)
         write_rows(folder / "parameters.csv", ParameterRow, self.parameters, control)
+        self.hypotheses.write(folder, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
@@ -208,7 +212,7 @@ class Diagnosed:
         told = diagnosis.model_copy(
             update={"parameters": _as_acting(diagnosis, damper, control), "zero_m": damper.zero_m}
         )
-        return cls(told, damper, plain, rows)
+        return cls(told, damper, plain, rows, Hypotheses.read(folder, control))
 
 
 def _as_acting(diagnosis: Diagnosis, damper: Damper, control: Control) -> dict[str, dict[str, Value]]:

@@ -80,9 +80,9 @@ class WheelRow(Frozen):
     rms_dynamic_load_N: float
     """R.m.s. of the force about the static load."""
     min_contact_force_N: float
-    """Smallest force; below 0 the wheel would leave the road, and this car's wheels pull on it instead."""
+    """Smallest force; below 0 the wheel would leave the road, and one without mass pulls on it instead."""
     pulling: float
-    """Share of the time in which the force is 0 or below."""
+    """Share of the time in which the force is 0 or below; a wheel with mass is then off the road."""
 
 
 class WeightedRow(Frozen):
@@ -130,6 +130,22 @@ class Response(Frozen):
     """Why the force may be there before the voltage; empty otherwise."""
 
 
+class FoundRow(Frozen):
+    """One interval of the best found schedule of voltages on a periodic road, or the policy that none of them beats."""
+
+    case: str
+    found_by: str
+    """`search`, or the policy."""
+    evaluations: int
+    """Short rides that the search took."""
+    most_load_N: float
+    """Largest r.m.s. wheel load that was admitted."""
+    from_share_of_period: float | None
+    """Where the interval begins, from where axle 1 meets the rising zero of the road."""
+    voltage_1_V: float | None
+    voltage_2_V: float | None
+
+
 @dataclass(frozen=True, eq=False)
 class Rides:
     """Every ride, its summary, and how quickly the damper responds to a step of voltage."""
@@ -143,6 +159,7 @@ class Rides:
     weighted: tuple[WeightedRow, ...] = ()
     spectrum: tuple[SpectrumRow, ...] = ()
     responses: tuple[Response, ...] = ()
+    found: tuple[FoundRow, ...] = ()
 
     def write(self, folder: Path, control: Control, jobs: int = 1) -> None:
         """Write one CSV a case, so many at the same time, and one table of each kind over all cases."""
@@ -158,6 +175,8 @@ class Rides:
         write_rows(folder / "weighted.csv", WeightedRow, self.weighted, control)
         write_rows(folder / "spectrum.csv", SpectrumRow, self.spectrum, control)
         write_rows(folder / "response.csv", Response, self.responses, control)
+        if self.found:
+            write_rows(folder / "best_found.csv", FoundRow, self.found, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
@@ -176,6 +195,7 @@ class Rides:
             read_rows(folder / "weighted.csv", WeightedRow, control),
             read_rows(folder / "spectrum.csv", SpectrumRow, control),
             read_rows(folder / "response.csv", Response, control),
+            read_rows(folder / "best_found.csv", FoundRow, control) if (folder / "best_found.csv").exists() else (),
         )
 
     def untrusted(self, _: Control) -> tuple[str, ...]:

@@ -14,8 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pzd.blind.case import Places, Scored
+from pzd.blind.config import BlindConfig
 from pzd.blind.diagnosis import Methods, diagnose_case
 from pzd.blind.hide import BenchmarkSetup, hide
+from pzd.blind.hide_independent import hide_independent, plan_independent
 from pzd.blind.plan import PlannedCase, plan
 from pzd.blind.scoring import score_case
 from pzd.schema.errors import DataError
@@ -46,13 +48,18 @@ class Benchmark:
         jobs : processes that work at a time
         afresh : do the finished ones again as well
         """
-        cases = plan(self.setup.blind)
+        cases = self.plan()
         done = {} if afresh else self.finished(cases)
         waiting = [case for case in cases if case.id not in done]
         if waiting:
             self._prepare(waiting)
             done |= self._worked(waiting, len(cases), jobs)
         return tuple(done[case.id] for case in cases)
+
+    def plan(self) -> tuple[PlannedCase, ...]:
+        """Every case, in the order in which they are done."""
+        independent = self.setup.blind.generator == "independent"
+        return plan_independent(self.setup.blind) if independent else plan(self.setup.blind)
 
     def finished(self, cases: Iterable[PlannedCase]) -> dict[str, Scored]:
         """The scores that stand there and were made from the same config and code."""
@@ -83,11 +90,12 @@ class Benchmark:
             done = whole - len(waiting) + len(found)
             self.progress(Progress(done, whole, f"cases, {_duration(left)} left"))
 
+        draws = hide_independent if self.setup.blind.generator == "independent" else hide
         drawing, seeking = (self.pool(min(jobs, len(waiting))) for _ in range(2))
         try:
             _in_turn(
                 waiting,
-                lambda case: drawing.submit(hide, self.setup, case, self.places),
+                lambda case: drawing.submit(draws, self.setup, case, self.places),
                 lambda case: seeking.submit(diagnose_case, self.methods, self.places.case(case.id)),
                 kept,
                 jobs,
@@ -130,6 +138,7 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds > 90.0 else f"{seconds:.0f} s"
 
 
-def folder_of(root: Path, seed: int) -> Places:
-    """Where a benchmark of a seed lies below the benchmark's folder."""
-    return Places(root / f"seed-{seed}")
+def folder_of(root: Path, blind: BlindConfig) -> Places:
+    """Where a benchmark lies below the benchmarks' folder, by its seed and its generator."""
+    kind = "" if blind.generator == "own" else f"{blind.generator}-"
+    return Places(root / f"{kind}seed-{blind.seed}")

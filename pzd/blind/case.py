@@ -23,6 +23,8 @@ class Truth(Frozen):
     form: str | None
     """Form outside the library that was hidden."""
     form_values: dict[str, float]
+    described_by: tuple[str, ...] = ()
+    """Effects of the library with which a verdict is right about the form."""
     damper: Damper
     sizes: dict[str, float]
     """How much each changes the force, as `blind.sizes` counts it."""
@@ -61,6 +63,8 @@ class Scored(Frozen):
     one_frequency: bool
     hidden: str
     """Names of all that was hidden, joined by `+`; `none`."""
+    described_by: tuple[str, ...] = ()
+    """Effects with which a verdict is right about a form outside the library."""
     truth: tuple[str, ...]
     """Effects that were there to be named: what counts as nothing is left out."""
     force_noise: float
@@ -73,6 +77,8 @@ class Scored(Frozen):
     effects: tuple[str, ...]
     rivals: tuple[str, ...]
     confidence: float | None
+    shapes: tuple[str, ...]
+    """Of what is left, as the diagnosis tells them, the best first."""
     inside: dict[str, bool]
     """Of each parameter of a rightly named effect: whether it lies in its 95 % interval."""
     gap_cut: float | None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -53,12 +53,19 @@ class BlindConfig(Frozen):
     `diagnose.nuisance`.
     """
 
+    generator: Literal["own", "independent"] = "own"
+    """Where the rig files come from: the virtual rig, which shares its laws with the diagnosis, or a second generator
+    that shares no line with it and draws its own dampers, campaigns and sensors; then `campaigns` and all below it
+    but `keep_files` say nothing."""
     seed: int = Field(ge=0)
     """Seed of every draw."""
     tuned_on: tuple[int, ...] = ()
     """Seeds that thresholds were tuned on: a scored run with one of them is refused."""
     tuning: bool = False
     """Whether this run tunes: its seed must be one of `tuned_on`, and its figures are no result."""
+    ledger: str | None = None
+    """CSV file, relative to the config, of the seeds that were scored: every scored run is entered, and one whose seed
+    stands there for another config or other code is refused."""
     cases: int = Field(default=1600, ge=1)
     """How many cases; the first n of them are the same whatever the number, and fairly mixed."""
     kinds: Kinds = Kinds()

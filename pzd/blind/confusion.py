@@ -37,7 +37,8 @@ def confusion(cases: Sequence[Scored]) -> Confusion:
     Effects and pairs whose visible gap is below 0.5 % of the peak have rows of their own.
     """
     found = Counter((true_row(case), said(case)) for case in cases)
-    rows = (*nameable(), "pair", "invisible effect", "invisible pair", "none", *FORMS, "invisible form")
+    others = sorted({case.hidden for case in cases if case.kind == "outside"} - set(FORMS))
+    rows = (*nameable(), "pair", "invisible effect", "invisible pair", "none", *FORMS, *others, "invisible form")
     columns = (*nameable(), *SAID)
     kept = tuple(row for row in rows if any(found[row, column] for column in columns))
     return Confusion(kept, columns, np.array([[float(found[row, column]) for column in columns] for row in kept]))

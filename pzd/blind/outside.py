@@ -43,6 +43,8 @@ class Form:
     """(n,) force of about one."""
     ranges: Mapping[str, tuple[float, float]]
     """Its parameters, each drawn evenly between two limits."""
+    named_shapes: tuple[str, ...]
+    """Names of the shapes in `pzd/diagnose/hypotheses/shapes.py` that describe it rightly."""
 
 
 def position_damping(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Array:
@@ -116,13 +118,13 @@ def aeration(motion: Motion, reached: Reached, values: Mapping[str, float]) -> A
 
 
 FORMS: Mapping[str, Form] = {
-    "position_damping": Form(position_damping, {"p": (2.0, 4.0)}),
-    "tapered_rod": Form(tapered_rod, {"side": (-1.0, 1.0)}),
-    "covered_port": Form(covered_port, {"x_p": (-0.3, 0.3)}),
-    "ripple": Form(ripple, {"length": (0.3, 0.8)}),
-    "even_spring": Form(even_spring, {"side": (-1.0, 1.0)}),
-    "tight_spot": Form(tight_spot, {"x_d": (-0.4, 0.4), "width": (0.1, 0.25)}),
-    "rubber": Form(rubber, {"r": (0.2, 0.45)}),
-    "aeration": Form(aeration, {"tau_s": (1.0, 4.0)}),
+    "position_damping": Form(position_damping, {"p": (2.0, 4.0)}, ("|x| v", "x^2 v")),
+    "tapered_rod": Form(tapered_rod, {"side": (-1.0, 1.0)}, ("x v",)),
+    "covered_port": Form(covered_port, {"x_p": (-0.3, 0.3)}, ("x sign v",)),
+    "ripple": Form(ripple, {"length": (0.3, 0.8)}, ("sin 2 pi x/lambda",)),
+    "even_spring": Form(even_spring, {"side": (-1.0, 1.0)}, ("x^2",)),
+    "tight_spot": Form(tight_spot, {"x_d": (-0.4, 0.4), "width": (0.1, 0.25)}, ("sign v about x_p",)),
+    "rubber": Form(rubber, {"r": (0.2, 0.45)}, ("(x behind a play)/r",)),
+    "aeration": Form(aeration, {"tau_s": (1.0, 4.0)}, ("(1 - exp(-t/tau)) v",)),
 }
 """Every form by name."""

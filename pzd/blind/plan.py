@@ -46,9 +46,9 @@ def plan(config: BlindConfig) -> tuple[PlannedCase, ...]:
     config : the shares, the campaigns and the number
     """
     shares: dict[Kind, float] = {kind: getattr(config.kinds, kind) for kind in KINDS}
-    kinds = _mixed(shares)
-    campaigns = {kind: _mixed({c.name: c.share for c in config.campaigns}) for kind in KINDS}
-    what = {(kind, c.name): _in_turn(hideable(c, kind)) for kind in KINDS for c in config.campaigns}
+    kinds = mixed(shares)
+    campaigns = {kind: mixed({c.name: c.share for c in config.campaigns}) for kind in KINDS}
+    what = {(kind, c.name): in_turn(hideable(c, kind)) for kind in KINDS for c in config.campaigns}
     found = []
     for index in range(config.cases):
         kind = next(kinds)
@@ -73,7 +73,7 @@ def hideable(campaign: TestPlan, kind: Kind) -> list[tuple[str, ...]]:
     return sorted(combinations(effects, 2), key=lambda pair: (place[pair[1]] - place[pair[0]]) * 7 % len(effects))
 
 
-def _mixed(shares: Mapping[Key, float]) -> Iterator[Key]:
+def mixed(shares: Mapping[Key, float]) -> Iterator[Key]:
     """Names for ever, at each turn the one that is furthest behind its share."""
     whole = sum(shares.values())
     given = dict.fromkeys(shares, 0)
@@ -84,7 +84,8 @@ def _mixed(shares: Mapping[Key, float]) -> Iterator[Key]:
         yield name
 
 
-def _in_turn(choices: list[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
+def in_turn(choices: list[tuple[str, ...]]) -> Iterator[tuple[str, ...]]:
+    """One choice after the other, for ever."""
     turn = 0
     while True:
         yield choices[turn % len(choices)]

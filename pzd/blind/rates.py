@@ -10,6 +10,7 @@ from itertools import pairwise, product
 import numpy as np
 
 from pzd.blind.case import Scored
+from pzd.blind.outside import FORMS
 from pzd.schema.model import Frozen
 
 Z95 = 1.959963984540054
@@ -88,6 +89,17 @@ def among(case: Scored) -> bool:
 def wrong_single(case: Scored) -> bool:
     """Named one effect, though what was there is not in the library; a failed diagnosis is wrong as well."""
     return case.failure is not None or (case.verdict == "named" and len(case.effects) == 1)
+
+
+def shape_told(case: Scored) -> bool:
+    """The shape of a force outside the library is among the first two that are told of what is left."""
+    return case.hidden in FORMS and bool({*case.shapes[:2]} & {*FORMS[case.hidden].named_shapes})
+
+
+def rightly_outside(case: Scored) -> bool:
+    """Left unexplained, or named by what describes it rightly."""
+    described = bool(case.described_by) and bool(case.effects) and set(case.effects) <= set(case.described_by)
+    return case.verdict == "unexplained" or (case.verdict in ("named", "ambiguous") and described)
 
 
 def false_name(case: Scored) -> bool:

@@ -11,13 +11,15 @@ import numpy as np
 from pzd.blind.case import Scored
 from pzd.blind.confusion import confusion, draw, write_table
 from pzd.blind.rates import CalibrationRow, RateRow, calibration_rows, rate_rows
-from pzd.blind.targets import Line, lines
+from pzd.blind.targets import Line, independent_lines, lines
 from pzd.quantities import Control
 from pzd.schema.csvfile import write_rows
 from pzd.schema.jsonfile import write_json
 
 
-def write(cases: Sequence[Scored], folder: Path, control: Control, *, tuning: bool) -> list[str]:
+def write(
+    cases: Sequence[Scored], folder: Path, control: Control, *, tuning: bool, generator: str = "own"
+) -> list[str]:
     """Write tables and picture beside the scored cases.
 
     Parameters
@@ -26,6 +28,7 @@ def write(cases: Sequence[Scored], folder: Path, control: Control, *, tuning: bo
     folder : takes rates.csv, calibration.csv, confusion.csv, confusion.png and summary.json
     control : the control signal
     tuning : whether the seed is one that thresholds were tuned on
+    generator : where the cases come from, `own` or `independent`
 
     Returns
     -------
@@ -37,7 +40,7 @@ def write(cases: Sequence[Scored], folder: Path, control: Control, *, tuning: bo
     matrix = confusion(cases)
     write_table(matrix, folder / "confusion.csv")
     draw(matrix, folder / "confusion.png")
-    said = lines(cases)
+    said = lines(cases) if generator == "own" else independent_lines(cases)
     write_json(folder / "summary.json", said, control)
     head = f"{len(cases)} cases"
     if tuning:

@@ -17,6 +17,8 @@ from pzd.blind.rates import (
     false_name,
     low_noise,
     right,
+    rightly_outside,
+    shape_told,
     visible,
     wrong_name,
     wrong_single,
@@ -55,6 +57,30 @@ class Line(Frozen):
 def lines(cases: Sequence[Scored]) -> list[Line]:
     """Every line of what the benchmark says, in the order of the printed page."""
     return [*_selection(cases), *_nothing_to_name(cases), *_gap_cuts(cases), *_calibration(cases), *_counts(cases)]
+
+
+def independent_lines(cases: Sequence[Scored]) -> list[Line]:
+    """The same of cases of the second generator, whose forms outside the library say what describes them rightly."""
+    seen = [c for c in cases if c.truth and visible(c)]
+    nothing = [c for c in cases if not c.truth and c.kind != "outside"]
+    outside = [c for c in cases if c.kind == "outside" and visible(c)]
+    strict = [c for c in outside if not c.described_by]
+    return [
+        rate_line("visible", "right, or ambiguous with the truth", seen, _right_or_ambiguous, ">= 95 %"),
+        rate_line("visible", "right name", seen, right),
+        rate_line("visible", "wrong name", seen, wrong_name, "<= 1 %"),
+        rate_line("no effect", "false names", nothing, false_name, "<= 1 %"),
+        rate_line("outside the library, visible", "flagged, or rightly described", outside, rightly_outside, ">= 92 %"),
+        rate_line("outside, described by nothing", "unexplained", strict, _unexplained),
+        rate_line("outside, described by nothing", "a wrong single name", strict, wrong_single),
+        *_gap_cuts(cases),
+        *_calibration(cases),
+        rate_line("all", "failed", cases, lambda c: c.failure is not None),
+    ]
+
+
+def _right_or_ambiguous(case: Scored) -> bool:
+    return right(case) or ambiguous_with_truth(case)
 
 
 # ---------------------------------------------------------------- lines of rates
@@ -108,7 +134,7 @@ def _selection(cases: Sequence[Scored]) -> Iterator[Line]:
         yield rate_line(about, "truth among effects and rivals", mine, among, targets[2])
     faint = [c for c in several if 0.0025 <= c.visible_gap < 0.005]
     with_truth = "right, or ambiguous with the truth"
-    yield rate_line("gap 0.25-0.5 %", with_truth, faint, lambda c: right(c) or ambiguous_with_truth(c), ">= 60 %")
+    yield rate_line("gap 0.25-0.5 %", with_truth, faint, _right_or_ambiguous, ">= 60 %")
     yield rate_line("gap 0.25-0.5 %", "wrong name", faint, wrong_name, "<= 3 %")
     alone = [c for c in single if c.one_frequency]
     yield rate_line("one frequency, visible", "wrong name", [c for c in alone if visible(c)], wrong_name, "<= 2 %")
@@ -130,6 +156,7 @@ def _nothing_to_name(cases: Sequence[Scored]) -> Iterator[Line]:
     outside = [c for c in cases if c.kind == "outside" and visible(c)]
     yield rate_line("outside the library, visible", "a wrong single name", outside, wrong_single, "<= 3 %")
     yield rate_line("outside the library, visible", "unexplained", outside, _unexplained, ">= 92 %")
+    yield rate_line("outside the library, visible", "shape among the first two", outside, shape_told, ">= 60 %")
 
 
 def _unexplained(case: Scored) -> bool:

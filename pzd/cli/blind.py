@@ -10,6 +10,9 @@ from pzd.cli.options import CORES, RUNS, Config, Force, Jobs, Quiet, Runs, Set, 
 from pzd.cli.output import Output
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pzd.blind.config import BlindConfig
     from pzd.blind.hide import BenchmarkSetup
     from pzd.config import RunConfig
 
@@ -35,12 +38,16 @@ def blind(
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
     setup, whole = _setup(given.config), given.config
-    places = folder_of(given.run.folder / FOLDER, setup.blind.seed)
+    places = folder_of(given.run.folder / FOLDER, setup.blind)
     methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
     with given.run.locked("pzd blind"):
-        benchmark = Benchmark(setup, methods, places, _made_from(whole), progress=output.progress)
+        made_from = _made_from(whole)
+        with given.placed():
+            _entered(setup.blind, made_from, config.parent)
+        benchmark = Benchmark(setup, methods, places, made_from, progress=output.progress)
         cases = benchmark.run(jobs, afresh=force)
-        lines = write(cases, places.folder, setup.control, tuning=setup.blind.tuning)
+        tuning, generator = setup.blind.tuning, setup.blind.generator
+        lines = write(cases, places.folder, setup.control, tuning=tuning, generator=generator)
     output.say(*lines, f"tables and picture: {places.folder}")
     return DONE
 
@@ -62,11 +69,24 @@ def _setup(config: RunConfig) -> BenchmarkSetup:
     return BenchmarkSetup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
 
 
+def _entered(blind: BlindConfig, made_from: str, folder: Path) -> None:
+    """Enter a scored run into the ledger, where the config names one."""
+    from datetime import UTC, datetime
+
+    from pzd.blind.ledger import ScoredSeed, enter
+
+    if blind.ledger is None or blind.tuning:
+        return
+    day = datetime.now(UTC).date().isoformat()
+    run = ScoredSeed(seed=blind.seed, generator=blind.generator, made_from=made_from, cases=blind.cases, date=day)
+    enter(folder / blind.ledger, run)
+
+
 def _made_from(config: RunConfig) -> str:
     """Hash of the config's blocks and of the code that a case depends on."""
     from pzd.pipeline.sources import code_hash
 
-    of_the_run = {"blind": {"cases", "keep_files", "tuned_on", "tuning"}}
+    of_the_run = {"blind": {"cases", "keep_files", "ledger", "tuned_on", "tuning"}}
     blocks = config.model_dump_json(
         include={"seed", "control", "rig", "identify", "diagnose", "blind"}, exclude=of_the_run
     )

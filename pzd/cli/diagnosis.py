@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.artefacts import Diagnosis, KeptBack, NextTest, Prediction, Value
+from pzd.artefacts import Diagnosis, Hypotheses, HypothesisRow, KeptBack, NextTest, Prediction, Value
 from pzd.cli.layout import interval, number
 from pzd.quantities import Control
 from pzd.schema.wording import counted
@@ -17,9 +17,14 @@ _VERDICTS = {
 }
 _MOST = 3
 """How many places and candidates are listed."""
+_MOST_SHAPES = 2
+"""How many shapes of what is left, each by itself."""
+NONE_SOUGHT = Hypotheses()
 
 
-def diagnosis_lines(diagnosis: Diagnosis, control: Control, *, every_test: bool = False) -> list[str]:
+def diagnosis_lines(
+    diagnosis: Diagnosis, control: Control, *, every_test: bool = False, hypotheses: Hypotheses = NONE_SOUGHT
+) -> list[str]:
     """The lines: what is missing, where, how sure that is, how far it closes the gap, and what to test next.
 
     Parameters
@@ -27,6 +32,7 @@ def diagnosis_lines(diagnosis: Diagnosis, control: Control, *, every_test: bool 
     diagnosis : the artefact of diagnose
     control : the control signal, for its unit
     every_test : whether the prediction of each kept-back test and each voltage left out is listed too
+    hypotheses : which shape what is left has
     """
     unit = control.unit
     lines = [
@@ -42,7 +48,7 @@ def diagnosis_lines(diagnosis: Diagnosis, control: Control, *, every_test: bool 
         lines.append(f"confidence: {diagnosis.confidence:.0%}")
     if diagnosis.rivals:
         lines.append(f"rivals: {', '.join(diagnosis.rivals)}")
-    lines += _rejected(diagnosis)
+    lines += [*_rejected(diagnosis), *_hypotheses(hypotheses)]
     if diagnosis.next_test:
         lines.append(_next(diagnosis.next_test, unit))
     return lines
@@ -111,6 +117,30 @@ def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
     against = f" against {number(min(adopted))}" if adopted else ""
     for one in others[:_MOST]:
         yield f"not taken: {one.effect}, W_s {number(one.gap_after)}{against} on the tests seen, {one.reason}"
+
+
+def _hypotheses(found: Hypotheses) -> Iterator[str]:
+    """The best shapes of what is left, and what stands beside the best; nothing where none was looked for."""
+    if found.sought and not found.rows:
+        yield "hypothesis: none, no shape of what is left predicts tests kept back beyond two standard errors"
+    for row in found.alone[:_MOST_SHAPES]:
+        yield f"{'hypothesis' if row.place == 1 else 'or'}: {hypothesis(row)}; {row.physics}{of_library(row)}"
+    for row in found.together:
+        yield f"and beside {row.beside}: {hypothesis(row)} together; {row.physics}{of_library(row)}"
+
+
+def hypothesis(row: HypothesisRow) -> str:
+    """A shape with its coefficient, and what it would close."""
+    more = f" and {number(row.second_coefficient)} with the cosine" if row.second_coefficient is not None else ""
+    value = interval(row.coefficient, row.coefficient_low95, row.coefficient_high95)
+    at = f", {row.parameter} = {number(row.parameter_value)} {row.parameter_unit}" if row.parameter else ""
+    closes = f"would close {row.closes:.0%} of the gap on tests kept back"
+    return f"c {row.shape}, c = {value}{more} {row.unit}{at}: {closes}"
+
+
+def of_library(row: HypothesisRow) -> str:
+    """Which effect of the library has the shape; empty where none has."""
+    return f" ({row.library} has this shape)" if row.library else ""
 
 
 def _next(test: NextTest, unit: str) -> str:

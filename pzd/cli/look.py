@@ -124,7 +124,9 @@ def show(
     _section(
         output,
         "diagnosis",
-        [[line] for line in diagnosis_lines(found.diagnosis, found.control)] if found.diagnosis else [],
+        [[line] for line in diagnosis_lines(found.diagnosis, found.control, hypotheses=found.hypotheses)]
+        if found.diagnosis
+        else [],
     )
     for title, rows in settings_tables(found):
         _section(output, title, rows)

@@ -25,6 +25,7 @@ def run_as_data(run: RunSummary) -> dict[str, Any]:
         "diagnosis": run.diagnosis,
         "settings": run.settings,
         "settings_left_out": run.settings_left_out,
+        "hypotheses": run.hypotheses.rows,
         "rides": run.summary,
         "assumed": run.assumed,
         "comfort": run.comfort,

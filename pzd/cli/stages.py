@@ -34,8 +34,10 @@ def _diagnosis(run: Run, *, verbose: bool) -> list[str]:
     from pzd.cli.diagnosis import diagnosis_lines
     from pzd.pipeline.run_summary import run_summary
 
-    found = run_summary(run).diagnosis
-    return diagnosis_lines(found, run.control, every_test=verbose) if found else []
+    found = run_summary(run)
+    if found.diagnosis is None:
+        return []
+    return diagnosis_lines(found.diagnosis, run.control, every_test=verbose, hypotheses=found.hypotheses)
 
 
 _AT_THE_END: dict[str, Callable[..., list[str]]] = {"run": _page, "report": _page, "diagnose": _diagnosis}

@@ -51,11 +51,27 @@ def schema(verbose: Verbose = False) -> int:
     return DONE
 
 
-def effects(as_json: Json = False, verbose: Verbose = False) -> int:
+Propose = Annotated[
+    Path | None,
+    typer.Option(
+        "--propose",
+        metavar="RUN",
+        help="Write the best hypothesis of a run, such as runs/quickstart, as an effect file instead.",
+    ),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder of that file; by default that of PZD_EFFECTS, else `effects`."),
+]
+
+
+def effects(propose: Propose = None, out: Out = None, as_json: Json = False, verbose: Verbose = False) -> int:
     """Print the library of effects."""
     from pzd.damper.effects import library
 
     output = Output(quiet=False, verbose=verbose)
+    if propose is not None:
+        return _propose(propose, out, output)
     if as_json:
         output.say_json(effects_as_data(library().values()))
         return DONE
@@ -66,6 +82,28 @@ def effects(as_json: Json = False, verbose: Verbose = False) -> int:
         for p in effect.parameters
     ]
     output.say(*aligned([head, *rows]))
+    return DONE
+
+
+def _propose(run: Path, out: Path | None, output: Output) -> int:
+    """Write the best hypothesis of a run as an effect file, over none that is there."""
+    from pzd.diagnose.hypotheses.proposal import proposal_of
+    from pzd.own_effects import VARIABLE, own_folder
+    from pzd.pipeline.run_summary import summary_of
+    from pzd.schema.errors import ConfigError
+
+    found = summary_of(run)
+    largest = max((abs(row.voltage_V) for row in found.parameters if row.voltage_V is not None), default=1.0)
+    proposal = proposal_of(found.hypotheses.alone, run.as_posix(), largest)
+    folder = out or own_folder() or Path("effects")
+    file = folder / f"{proposal.name}.py"
+    if file.exists():
+        raise ConfigError(f"{file}: there is a file of that name, which is not written over; move it, or give --out")
+    folder.mkdir(parents=True, exist_ok=True)
+    file.write_text(proposal.text, encoding="utf-8", newline="\n")
+    output.say(*(f"passed over: {why}" for why in proposal.passed_over))
+    output.say(f"effect: {file}, {proposal.row.physics}")
+    output.say(f"to force it: say `diagnose: {{force: [{proposal.name}]}}` in the config, and set {VARIABLE}={folder}")
     return DONE
 
 

@@ -59,7 +59,7 @@ def check_residual(given: Predicted, prepared: Prepared, wanted: Mask, config: N
     predicted, residual = given.force, record.force - given.force
     mask = wanted & counted(prepared)
     rough = _rough_variance(prepared, residual, mask)
-    calm = _jumps(prepared) == 0.0
+    calm = bend_beside_jumps(prepared) == 0.0
     slack = np.zeros(residual.size)
     late = np.zeros(residual.size)
     slack[mask], late[mask] = nuisance(
@@ -72,7 +72,7 @@ def check_residual(given: Predicted, prepared: Prepared, wanted: Mask, config: N
     return _not_repeating(prepared, mask, residual, slack, predicted)
 
 
-def _jumps(prepared: Prepared) -> Array:
+def bend_beside_jumps(prepared: Prepared) -> Array:
     """(n,) how far the force bends beside a jump [N]; 0 elsewhere."""
     record = prepared.record
     return jumps_in_cycles(prepared.cycles, record.time, record.force) if prepared.cycles else jumps(record.force)

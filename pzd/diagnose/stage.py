@@ -60,6 +60,7 @@ def diagnose(
     from pzd.diagnose.data.exclusions import whole_records
     from pzd.diagnose.data.split import split
     from pzd.diagnose.held_out import held_out_gap
+    from pzd.diagnose.hypotheses.rows import hypotheses
     from pzd.diagnose.kept_back import trials_of
     from pzd.diagnose.next_test import reach_of
     from pzd.diagnose.search.forward_selection import select_effects
@@ -101,7 +102,7 @@ def diagnose(
     )
     if selection.adopted:
         rows = base_parameters(selection, decision.verdict, setting)
-    return Diagnosed(diagnosis, found, plain, rows)
+    return Diagnosed(diagnosis, found, plain, rows, hypotheses(trials, found.moved(-zero), control, decision.verdict))
 
 
 def _notes(campaign: Campaign, prediction: Prediction | None, cut_off: Sequence[str]) -> str:

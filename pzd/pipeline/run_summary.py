@@ -11,6 +11,7 @@ from pzd.artefacts import (
     ComfortRow,
     Diagnosed,
     Diagnosis,
+    Hypotheses,
     Identified,
     Knees,
     ParameterRow,
@@ -58,6 +59,8 @@ class RunSummary:
     """The force at settings between tested ones, where the config asks for some."""
     settings_left_out: tuple[SettingLeftOutRow, ...] = ()
     """How well tested settings are predicted from their neighbours."""
+    hypotheses: Hypotheses = field(default_factory=Hypotheses)
+    """Which shape what is left has, where the verdict is `unexplained`."""
 
 
 def page_of(run: Run) -> Path:
@@ -81,13 +84,14 @@ def run_summary(run: Run) -> RunSummary:
     control = control_of(read_yaml(at / CONFIG).data) if (at / CONFIG).is_file() else run.control
     run = replace(run, control=control)
     identified = run.read(Identified) if Identified in there else Identified((), ())
+    diagnosed = run.read(Diagnosed) if Diagnosed in there else None
     comfort = at / Report.folder / "comfort.csv"
     settings = Table.read_settings(at / Table.folder, control) if Table in there else ((), ())
     return RunSummary(
         at,
         control,
         identified.rows,
-        run.read(Diagnosed).diagnosis if Diagnosed in there else None,
+        diagnosed.diagnosis if diagnosed else None,
         read_rows(at / Rides.folder / "summary.csv", SummaryRow, control) if Rides in there else (),
         read_rows(comfort, ComfortRow, control) if Report in there else (),
         page_of(run) if Report in there else None,
@@ -96,6 +100,7 @@ def run_summary(run: Run) -> RunSummary:
         knees=identified.knees,
         settings=settings[0],
         settings_left_out=settings[1],
+        hypotheses=diagnosed.hypotheses if diagnosed else Hypotheses(),
     )
 
 

@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 
 import pzd
+from pzd.own_effects import own_files
 
 PACKAGE = Path(pzd.__file__).parent
 _TYPES_ONLY = re.compile(r"^if TYPE_CHECKING:\n(?:[ \t].*\n|\n)+", re.MULTILINE)
@@ -22,6 +23,8 @@ _FROM = re.compile(r"^[ \t]*from (pzd[\w.]*) import (\([^)]*\)|.*)", re.MULTILIN
 """An import of names, each of which may be a module; in brackets over several lines."""
 _MENTION = re.compile(r"\bpzd(?:\.\w+)+(\.(?=\{))?")
 """A dotted name, in an import or in a text that is imported later; a brace behind its last dot stands for any name."""
+_EFFECTS = "pzd.damper.effects"
+"""What takes in effect files of one's own."""
 _WHOLE_FOLDER = "iter_modules(__path__)"
 """By this a package finds its members, so that all of its folder counts."""
 
@@ -37,12 +40,14 @@ def code_hash(module: str, package: Path = PACKAGE) -> str:
 
     Returns
     -------
-    SHA-256 over the names and contents of all the files
+    SHA-256 over the names and contents of all the files, and of effect files of one's own where effects count
     """
     digest = hashlib.sha256()
     for path in files_used(module, package):
         digest.update(path.relative_to(package).as_posix().encode() + b"\0")
         digest.update(hashlib.sha256(path.read_bytes()).digest())
+    for path in own_files() if _EFFECTS in modules_used(module, package) else ():
+        digest.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 
 

@@ -35,10 +35,14 @@ def assumed(config: SimulateConfig, effects: Collection[str], with_voltage: bool
     return tuple(lines)
 
 
+_NOT_ASSUMED = ("model", "name", "unsprung_mass_kg", "tyre_stiffness_N_per_m", "tyre_damping_Ns_per_m")
+"""Keys of a car that take nothing from the assumed one where they are not given: its wheels have no mass."""
+
+
 def _car(block: CarBlock) -> list[str]:
     if "model" in block.model_fields_set:
         return []
-    unsaid = [key for key in CarBlock.model_fields if key not in ("model", "name") and getattr(block, key) is None]
+    unsaid = [key for key in CarBlock.model_fields if key not in _NOT_ASSUMED and getattr(block, key) is None]
     car = block.car()
     if block.model_fields_set.isdisjoint(set(CarBlock.model_fields) - {"name"}):
         springs = " and ".join(f"{k / 1000.0:g}" for k in car.stiffnesses)

@@ -14,6 +14,7 @@ from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 from pzd.simulate.cars import cars
 from pzd.simulate.policies import policies
+from pzd.simulate.policies.best_found import BestFound
 from pzd.simulate.policies.clipped_lqr import ClippedLqr
 from pzd.simulate.policies.comfort_predictive import ComfortPredictive
 from pzd.simulate.policies.skyhook_add import SkyhookAdd
@@ -35,7 +36,12 @@ KM_PER_H = 1.0 / 3.6
 DEFAULT_CONTROLLED = "comfort"
 """The policy that the report sets beside the others where the config does not say."""
 
-_NO_WHEELS = "; a groundhook damps the motion of wheels with mass, and those of this car have none"
+_UNFIT = {
+    "wheels with mass": "damps the motion of wheels with mass, and those of this car have none; give simulate.car "
+    "unsprung_mass_kg and tyre_stiffness_N_per_m, or leave it out",
+    "wheels without mass": "predicts a car whose wheels follow the road, and those of this car have mass; leave it out",
+}
+"""Why a policy that fits certain cars alone cannot be ridden on another one."""
 
 
 class CarBlock(Frozen):
@@ -61,6 +67,13 @@ class CarBlock(Frozen):
     """Extension of a damper over deflection of its suspension, per axle."""
     dampers_per_axle: Pair | None = None
     """Number of dampers that act at each axle."""
+    unsprung_mass_kg: Pair | None = None
+    """Mass m1, m2 of the wheels of each axle with what moves with them. Without it the wheels have none, and follow
+    the road."""
+    tyre_stiffness_N_per_m: Pair | None = None
+    """Stiffness of the tyres of each axle, all of them together."""
+    tyre_damping_Ns_per_m: Pair | None = None
+    """Damping of the tyres of each axle; by default none."""
 
     @field_validator("model")
     @classmethod
@@ -69,12 +82,31 @@ class CarBlock(Frozen):
             raise ValueError(f"no car is called {name}; there are {', '.join(sorted(cars()))}")
         return name
 
-    @field_validator("spring_stiffness_N_per_m", "motion_ratio", "dampers_per_axle")
+    @field_validator(
+        "spring_stiffness_N_per_m", "motion_ratio", "dampers_per_axle", "unsprung_mass_kg", "tyre_stiffness_N_per_m"
+    )
     @classmethod
     def _positive(cls, pair: Pair | None) -> Pair | None:
         if pair is not None and min(pair) <= 0.0:
             raise ValueError(f"both must be above zero (got {pair[0]:g}, {pair[1]:g})")
         return pair
+
+    @field_validator("tyre_damping_Ns_per_m")
+    @classmethod
+    def _not_negative(cls, pair: Pair | None) -> Pair | None:
+        if pair is not None and min(pair) < 0.0:
+            raise ValueError(f"neither may be below zero (got {pair[0]:g}, {pair[1]:g})")
+        return pair
+
+    @model_validator(mode="after")
+    def _wheels_on_tyres(self) -> CarBlock:
+        car = self.car()
+        if car.wheels_have_mass != (min(car.tyre_stiffnesses) > 0.0):
+            missing = "tyre_stiffness_N_per_m" if car.wheels_have_mass else "unsprung_mass_kg"
+            raise ValueError(f"wheels with mass stand on tyres: give {missing} as well, or neither")
+        if self.tyre_damping_Ns_per_m is not None and not car.wheels_have_mass:
+            raise ValueError("tyre_damping_Ns_per_m: wheels without mass have no tyres; give unsprung_mass_kg as well")
+        return self
 
     @model_validator(mode="after")
     def _comfort_point_in_the_car(self) -> CarBlock:
@@ -99,6 +131,9 @@ class CarBlock(Frozen):
             comfort_point=_first(self.x_K_m, known.comfort_point),
             motion_ratios=self.motion_ratio or known.motion_ratios,
             dampers=self.dampers_per_axle or known.dampers,
+            unsprung_masses=self.unsprung_mass_kg or known.unsprung_masses,
+            tyre_stiffnesses=self.tyre_stiffness_N_per_m or known.tyre_stiffnesses,
+            tyre_dampings=self.tyre_damping_Ns_per_m or known.tyre_dampings,
         )
         return replace(built, name=self.name or (known.name if built == known else "own"))
 
@@ -134,6 +169,8 @@ class SimulateConfig(Frozen):
     """Parameters of the policy `comfort_predictive`."""
     clipped_lqr: ClippedLqr = ClippedLqr()
     """Parameters of the policy `clipped_lqr`."""
+    best_found: BestFound = BestFound()
+    """Parameters of the policy `best_found`."""
     skyhook_add: SkyhookAdd = SkyhookAdd()
     """Parameters of the policy `skyhook_add`."""
     response_speed_m_per_s: float = Field(default=0.2, gt=0.0)
@@ -173,8 +210,7 @@ class SimulateConfig(Frozen):
     def _known_policies(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
         for number, name in enumerate(names or ()):
             if name not in policies():
-                says = f"no policy is called {name}; there are {', '.join(sorted(policies()))}"
-                raise InsideError(says + (_NO_WHEELS if "groundhook" in name else ""), number)
+                raise InsideError(f"no policy is called {name}; there are {', '.join(sorted(policies()))}", number)
         return names
 
     @model_validator(mode="after")
@@ -187,6 +223,7 @@ class SimulateConfig(Frozen):
             listed = getattr(self, field) or ()
             if len(set(listed)) < len(listed):
                 raise ValueError(f"{field}: one is named twice")
+        self._policies_fit_the_car()
         self._bounds_consistent()
         self._controlled_consistent()
         if self.settle_s >= self.duration_s:
@@ -201,6 +238,13 @@ class SimulateConfig(Frozen):
             )
         self._whole_steps("1 / output_rate_Hz", 1.0 / self.output_rate_Hz)
         return self
+
+    def _policies_fit_the_car(self) -> None:
+        mine = "wheels with mass" if self.car.car().wheels_have_mass else "wheels without mass"
+        for number, name in enumerate(self.policies or ()):
+            fits = policies()[name].fits
+            if fits not in ("any car", mine):
+                raise ValueError(f"policies.{number}: {name} {_UNFIT[fits]}")
 
     def _bounds_consistent(self) -> None:
         given = (self.c_min_Ns_per_m is not None, self.c_max_Ns_per_m is not None)

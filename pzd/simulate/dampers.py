@@ -102,8 +102,6 @@ def check_inertance(dynamic: DynamicDamper, car: HalfCar) -> None:
         float(parallel_force(0.0, 0.0, 1.0, row) - parallel_force(0.0, 0.0, 0.0, row)) for row in dynamic.parallel
     )
     per_axle = apart * max(n * r * r for n, r in zip(car.dampers, car.motion_ratios, strict=True))
-    mobility = np.max(
-        np.linalg.eigvalsh(car.force_directions().T @ np.linalg.solve(car.mass_matrix(), car.force_directions()))
-    )
+    mobility = np.max(np.linalg.eigvalsh(car.mobility()))
     if 1.0 + per_axle * mobility <= 0.0:
-        raise DataError(f"3-diagnose/damper.yaml: effects.fluid_inertia: {apart:g} kg outweighs the car's body")
+        raise DataError(f"3-diagnose/damper.yaml: effects.fluid_inertia: {apart:g} kg outweighs what the axles carry")

@@ -6,7 +6,7 @@ from pzd.compiled import compiled
 from pzd.damper.rows import row_at
 from pzd.record import Array
 from pzd.simulate.dynamic_damper import effective_voltage, stored
-from pzd.simulate.kinematics import suspension
+from pzd.simulate.kinematics import road_at, suspension
 from pzd.simulate.ride_model import (
     BEHIND,
     DEFLECTION,
@@ -19,9 +19,13 @@ from pzd.simulate.ride_model import (
     ROAD_WORK,
     SET,
     SINCE,
+    TYRE_LOSS,
     VALVE_WORK,
+    WHEEL_1,
+    WHEEL_RATE_1,
     RideModel,
 )
+from pzd.simulate.tyre import tyre_energy
 
 NOTHING = 1e-12
 """Work that counts as nothing [J]: a ride on a level road."""
@@ -29,14 +33,15 @@ NOTHING = 1e-12
 
 @compiled
 def stored_energy(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> float:
-    """Energy of body, springs and oil springs.
+    """Energy of body, springs and oil springs, and of wheels and tyres where wheels have mass.
 
     Equation: E = m (dz/dt)^2 / 2 + J (dphi/dt)^2 / 2 + sum k_i U_i^2 / 2 + sum n_i k s_i^2 / 2
+    + sum m_i (dzeta_i/dt)^2 / 2 + sum E_tyre
 
     Parameters
     ----------
     time : [s]
-    y : (STATES,) state
+    y : (n,) state
     model, control, workspace : see `ride_model`
 
     Returns
@@ -48,6 +53,11 @@ def stored_energy(time: float, y: Array, model: RideModel, control: Array, works
     energy = 0.5 * car.mass * y[HEAVE_RATE] ** 2 + 0.5 * car.inertia * y[PITCH_RATE] ** 2
     for i in range(2):
         energy += 0.5 * car.stiffness[i] * workspace[DEFLECTION, i] ** 2
+        if car.wheels:
+            road = model.road_coefficients
+            height, _, _ = road_at(road, car.speed * time - road.behind[i])
+            energy += 0.5 * car.unsprung[i] * y[WHEEL_RATE_1 + i] ** 2
+            energy += tyre_energy(car.static_load[i], car.tyre_stiffness[i], height - y[WHEEL_1 + i])
         if model.control_spec.fidelity == DYNAMIC:
             elapsed = time - control[SINCE, 0]
             voltage, _ = effective_voltage(damper, control[SET, i], control[BEHIND:, i], elapsed)
@@ -58,16 +68,17 @@ def stored_energy(time: float, y: Array, model: RideModel, control: Array, works
 def balance_error(change: float, y: Array) -> float:
     """What the energy balance leaves open, as a share of the dissipated energy.
 
-    Equation: (change of stored energy + dissipated - road work - valve work) / dissipated
+    Equation: (change of stored energy + dissipated - road work - valve work) / dissipated, in dampers and tyres
 
     Parameters
     ----------
     change : of the stored energy over the ride [J]
-    y : (STATES,) state at its end; the work on what stands beside the elements counts as stored
+    y : (n,) state at its end; the work on what stands beside the elements counts as stored
 
     Returns
     -------
     share; zero for a ride in which nothing moves
     """
-    left = change + y[PARALLEL_WORK] + y[DISSIPATED] - y[ROAD_WORK] - y[VALVE_WORK]
-    return float(left / max(y[DISSIPATED], NOTHING)) if abs(left) > NOTHING else 0.0
+    lost = y[DISSIPATED] + (y[TYRE_LOSS] if y.size > TYRE_LOSS else 0.0)
+    left = change + y[PARALLEL_WORK] + lost - y[ROAD_WORK] - y[VALVE_WORK]
+    return float(left / max(lost, NOTHING)) if abs(left) > NOTHING else 0.0

@@ -24,6 +24,7 @@ from pzd.simulate.ride_model import (
     BEHIND,
     BODY,
     COMFORT,
+    CONTACT,
     DEFLECTION,
     DISSIPATED,
     DYNAMIC,
@@ -40,20 +41,20 @@ from pzd.simulate.ride_model import (
     PITCH_RATE,
     RATE,
     REBOUND_PUSH,
-    RISE,
+    ROAD_RISE,
     ROAD_WORK,
     RUBBING,
     SET,
     SIDE,
     SINCE,
     SPRINGS,
-    STATES,
     VALVE,
     VALVE_WORK,
     RideModel,
     Vehicle,
 )
 from pzd.simulate.sticking import accelerate
+from pzd.simulate.tyre import move_wheels
 
 
 @inlined
@@ -112,11 +113,11 @@ def motion(time: float, y: Array, model: RideModel, control: Array, workspace: A
     Parameters
     ----------
     time : [s]
-    y : (STATES,) state
+    y : (n,) state: `STATES`, or `STATES_WITH_WHEELS`
     model : what stays the same
     control : what the controller last set
     workspace : filled with deflections, forces and accelerations
-    dy : (STATES,) filled
+    dy : (n,) filled
     """
     car = model.car
     suspension(time, y, car, model.road_coefficients, workspace)
@@ -128,9 +129,13 @@ def motion(time: float, y: Array, model: RideModel, control: Array, workspace: A
     workspace[COMFORT, 0] = car.comfort[0] * load0 + car.comfort[1] * load1
     dy[HEAVE], dy[PITCH] = y[HEAVE_RATE], y[PITCH_RATE]
     dy[HEAVE_RATE], dy[PITCH_RATE] = workspace[BODY, 0], workspace[BODY, 1]
-    for n in range(OIL_1, STATES):
+    for n in range(OIL_1, dy.size):
         dy[n] = 0.0
-    dy[ROAD_WORK] = -load0 * workspace[RISE, 0] - load1 * workspace[RISE, 1]
+    if car.wheels:
+        move_wheels(y, car, (load0, load1), workspace, dy)
+    else:
+        workspace[CONTACT, 0], workspace[CONTACT, 1] = -load0, -load1
+    dy[ROAD_WORK] = workspace[CONTACT, 0] * workspace[ROAD_RISE, 0] + workspace[CONTACT, 1] * workspace[ROAD_RISE, 1]
     for i in range(2):
         if model.control_spec.fidelity == DYNAMIC:
             _book_damper(model, workspace, i, dy)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from pzd.artefacts import AXLE_COLUMNS, Ending, Response, RideRow, Rides, SpectrumRow, WheelRow
+from pzd.artefacts import AXLE_COLUMNS, Ending, FoundRow, Response, RideRow, Rides, SpectrumRow, WheelRow
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.outcome import POINT, Outcome, ride_of, summary_row, wheel_rows
 from pzd.simulate.plan import Case
@@ -44,19 +44,49 @@ def gathered(
     rides, summary, ridden, weighted = [], [], [], []
     wheels: list[WheelRow] = []
     spectrum: list[SpectrumRow] = []
+    found: list[FoundRow] = []
     for case, (held, outcome) in zip(planned, outcomes, strict=True):
         name, (window, ending) = case.name, windows[case.name]
         rides.append(ride_of(name, outcome, _left_out(case, with_voltage)))
         summary.append(summary_row(name, case.road.name, case.policy.name, case.fidelity, outcome, window))
         ridden.append(_ride_row(case, held, outcome.step, window, ending, with_voltage))
+        found += _found_rows(name, held)
         wheels += wheel_rows(name, outcome, window, static)
         fundamental = case.road.frequency_Hz if isinstance(case.road, Sine) else None
         felt = vibration(name, POINT, outcome.comfort, outcome.step, window, fundamental)
         weighted.append(felt.weighted)
         spectrum += felt.spectrum
     return Rides(
-        tuple(rides), tuple(summary), tuple(ridden), tuple(wheels), tuple(weighted), tuple(spectrum), responses
+        tuple(rides),
+        tuple(summary),
+        tuple(ridden),
+        tuple(wheels),
+        tuple(weighted),
+        tuple(spectrum),
+        responses,
+        tuple(found),
     )
+
+
+def _found_rows(case: str, held: Held) -> Iterator[FoundRow]:
+    """The best found schedule, an interval a row, or the policy that none beats."""
+    if held.found is None:
+        return
+    found = held.found
+    intervals: list[tuple[float | None, ...]] = [(None, None, None)]
+    if found.voltages:
+        count = len(found.voltages[0])
+        intervals = [(n / count, one, two) for n, (one, two) in enumerate(zip(*found.voltages, strict=True))]
+    for share, one, two in intervals:
+        yield FoundRow(
+            case=case,
+            found_by=found.by,
+            evaluations=found.evaluations,
+            most_load_N=found.most_load,
+            from_share_of_period=share,
+            voltage_1_V=one,
+            voltage_2_V=two,
+        )
 
 
 def _windows(
@@ -79,7 +109,7 @@ def _windows(
 def _left_out(case: Case, with_voltage: bool) -> tuple[str, ...]:
     """Columns of the history that mean nothing in this case."""
     without = (_VOLTAGE,) if case.fidelity == "ideal" or not with_voltage else ()
-    return without + ((_DEMANDED,) if case.policy.aim == "voltage" else ())
+    return without + ((_DEMANDED,) if case.policy.aim in ("voltage", "schedule") else ())
 
 
 def _ride_row(case: Case, held: Held, step: float, window: Window, ending: Ending, with_voltage: bool) -> RideRow:

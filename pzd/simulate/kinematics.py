@@ -7,6 +7,7 @@ import math
 from pzd.compiled import compiled
 from pzd.record import Array
 from pzd.simulate.ride_model import (
+    CONTACT,
     DEFLECTION,
     HEAVE,
     HEAVE_RATE,
@@ -15,10 +16,14 @@ from pzd.simulate.ride_model import (
     PITCH_RATE,
     RATE,
     RISE,
+    ROAD_RISE,
     SPRINGS,
+    WHEEL_1,
+    WHEEL_RATE_1,
     RoadCoefficients,
     Vehicle,
 )
+from pzd.simulate.tyre import press
 
 
 @compiled
@@ -46,9 +51,10 @@ def road_at(road_coefficients: RoadCoefficients, distance: float) -> tuple[float
 
 @compiled
 def suspension(time: float, y: Array, car: Vehicle, road_coefficients: RoadCoefficients, workspace: Array) -> None:
-    """Fill deflection and its rate, speed and acceleration of the road, and spring force of both axles.
+    """Fill deflection and its rate, speed and acceleration of what the axles stand on, and spring force.
 
-    Equation: U = H^T X - xi, V = dU/dt, S_i = k_i U_i      Source: Makowski and Knap 2021, section 5
+    Equation: U = H^T X - xi, V = dU/dt, S_i = k_i U_i      Source: Makowski and Knap 2021, section 5;
+    where the wheels have mass their height zeta takes the place of that of the road, xi
 
     Parameters
     ----------
@@ -59,8 +65,13 @@ def suspension(time: float, y: Array, car: Vehicle, road_coefficients: RoadCoeff
     """
     for i in range(2):
         height, slope, curvature = road_at(road_coefficients, car.speed * time - road_coefficients.behind[i])
+        workspace[ROAD_RISE, i] = slope * car.speed
         workspace[RISE, i] = slope * car.speed
         workspace[LIFT, i] = curvature * car.speed * car.speed
+        if car.wheels:
+            press(y, car, i, height, workspace)
+            height, workspace[RISE, i] = y[WHEEL_1 + i], y[WHEEL_RATE_1 + i]
+            workspace[LIFT, i] = workspace[CONTACT, i] / car.unsprung[i]
         workspace[DEFLECTION, i] = y[HEAVE] + car.arms[i] * y[PITCH] - height
         workspace[RATE, i] = y[HEAVE_RATE] + car.arms[i] * y[PITCH_RATE] - workspace[RISE, i]
         workspace[SPRINGS, i] = car.stiffness[i] * workspace[DEFLECTION, i]

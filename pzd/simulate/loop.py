@@ -18,6 +18,7 @@ from pzd.simulate.ride_model import (
     ASKED,
     BEHIND,
     COMFORT,
+    CONTACT,
     DEFLECTION,
     DISSIPATED,
     DYNAMIC,
@@ -29,6 +30,7 @@ from pzd.simulate.ride_model import (
     OIL_1,
     PREDICT,
     RATE,
+    SCHEDULE,
     SET,
     SIDE,
     SIDED_RATE,
@@ -47,9 +49,11 @@ from pzd.table.kernel import table_voltage
 OUTSIDE, STEPS_DONE = range(2)
 """Steps beyond what the rig reached, and steps done."""
 TALLIES = 2
+_SAME_PLACE = 1e-9
+"""Of an interval of a schedule: the clock meets its beginning but for rounding."""
 A_K, LOAD_1, LOAD_2, TRAVEL, LOST = range(5)
-"""What is kept of every step: acceleration at K [m/s2], suspension force S + T of each axle [N], larger deflection
-of the two suspensions [m], energy dissipated so far [J]."""
+"""What is kept of every step: acceleration at K [m/s2], what each axle takes off the road's static load [N], S + T
+where the wheels have no mass, larger deflection of the two suspensions [m], energy dissipated so far [J]."""
 COURSE_COLUMNS = 5
 COLUMNS = 16
 """time, z, phi, a_K, and per axle deflection, rate, spring, damper and demanded force, voltage."""
@@ -83,9 +87,9 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
     Parameters
     ----------
     time : [s]
-    y : (STATES,) state; a valve without lag tightens the oil spring at once, which is booked here
+    y : (n,) state; a valve without lag tightens the oil spring at once, which is booked here
     model, control, workspace : see `ride_model`; the control is changed in place
-    scratch : (STATES,) to work in
+    scratch : (n,) to work in
     """
     control_spec, car = model.control_spec, model.car
     if _acts_at_once(control_spec):
@@ -96,10 +100,10 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
         return
     if control_spec.aim == PREDICT:
         predict(time, y, model, control, workspace)
-    elif control_spec.aim != VOLTAGE:
+    elif control_spec.aim not in (VOLTAGE, SCHEDULE):
         demand(control_spec, car, y, control, workspace)
     for i in range(2):
-        _set_voltage(time, y, model, control, i, _wanted_voltage(model, control, workspace, i))
+        _set_voltage(time, y, model, control, i, _wanted_voltage(time, model, control, workspace, i))
     control[SINCE, 0] = time
     for i in range(2):
         if control[SIDE, i] == 0.0:
@@ -107,11 +111,22 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
 
 
 @inlined
-def _wanted_voltage(model: RideModel, control: Array, workspace: Array, axle: int) -> float:
+def scheduled(time: float, model: RideModel, axle: int) -> float:
+    """The voltage [V] that a schedule has for an axle at a time [s], by where axle 1 is in the harmonic of the road."""
+    count = model.control_spec.schedule.shape[1]
+    turns = model.road_coefficients.wavenumber * model.car.speed * time / (2.0 * math.pi)
+    place = min(int((turns - math.floor(turns)) * count + _SAME_PLACE), count - 1)
+    return float(model.control_spec.schedule[axle, place])
+
+
+@inlined
+def _wanted_voltage(time: float, model: RideModel, control: Array, workspace: Array, axle: int) -> float:
     """The voltage that the policy asks of an axle [V]; a force that it asks is noted."""
     aim = model.control_spec.aim
     if aim == VOLTAGE:
         return model.control_spec.voltage
+    if aim == SCHEDULE:
+        return scheduled(time, model, axle)
     if aim == PREDICT:
         return float(model.predictor.candidates[model.predictor.chosen[axle]])
     control[ASKED, axle] = workspace[FORCE, axle]
@@ -183,7 +198,7 @@ def _keep(y: Array, workspace: Array, row: Array) -> None:
     """Fill one row of the course."""
     row[A_K], row[LOST] = workspace[COMFORT, 0], y[DISSIPATED]
     for i in range(2):
-        row[LOAD_1 + i] = workspace[SPRINGS, i] + workspace[FORCE, i]
+        row[LOAD_1 + i] = -workspace[CONTACT, i]
     row[TRAVEL] = max(abs(workspace[DEFLECTION, 0]), abs(workspace[DEFLECTION, 1]))
 
 
@@ -208,7 +223,7 @@ def ride(
 
     Parameters
     ----------
-    y : (STATES,) state; changed in place
+    y : (n,) state; changed in place
     model, control, workspace : see `ride_model`
     steps, h : number and length of the steps of integration [s]
     tolerance : see `advance`

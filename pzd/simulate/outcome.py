@@ -18,6 +18,9 @@ from pzd.simulate.window import Window
 POINT = "K"
 """The point of the car at which comfort is judged."""
 
+VOLTAGES = [len(RIDE_COLUMNS) + (axle + 1) * len(AXLE_COLUMNS) - 1 for axle in range(len(AXLES))]
+"""Columns of the history with the voltage of each axle."""
+
 JERK_CORNER = 80.0
 """Corner of the low-pass behind which the jerk is taken [Hz]: the raw jerk of a law that switches has no r.m.s."""
 _POLES = (math.pi / 8, 3 * math.pi / 8)
@@ -46,7 +49,7 @@ class Outcome:
 
     @property
     def loads(self) -> Array:
-        """(m, 2) suspension force S + T of each axle at every step [N]; where it pulls, it relieves the wheel."""
+        """(m, 2) what each axle takes off the road's static load at every step [N]: S + T of wheels without mass."""
         return self.course[:, LOAD_1 : LOAD_2 + 1]
 
 
@@ -107,7 +110,8 @@ def summary_row(case: str, road: str, policy: str, fidelity: str, outcome: Outco
 def wheel_rows(case: str, outcome: Outcome, window: Window, static: tuple[float, float]) -> Iterator[WheelRow]:
     """The force between wheels and road, an axle a row.
 
-    Equation: N_i = N_i0 - (S_i + T_i), N_i0 the static load        Source: balance of the massless wheel
+    Equation: N_i = N_i0 - (S_i + T_i), N_i0 the static load        Source: balance of the massless wheel;
+    where the wheels have mass N_i is the force of the tyre, see `pzd.simulate.tyre`
 
     Parameters
     ----------

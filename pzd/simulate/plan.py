@@ -9,6 +9,7 @@ from pzd.simulate.config import Fidelity, SimulateConfig
 from pzd.simulate.policies import policies
 from pzd.simulate.policy import Policy
 from pzd.simulate.road import Road
+from pzd.simulate.roads.sine import Sine
 
 WITH_VOLTAGE = ("constant", "best_constant_c", "passive", "best_fixed_voltage", "comfort")
 WITHOUT_VOLTAGE = ("constant", "passive")
@@ -58,20 +59,28 @@ def cases(config: SimulateConfig, with_voltage: bool, changed: bool) -> tuple[Ca
     for road in config.roads:
         for policy in chosen:
             for fidelity in config.fidelities:
-                if not _possible(policy, fidelity, with_voltage):
+                if not _possible(road, policy, fidelity, with_voltage):
                     continue
                 found.append(Case(road, policy, fidelity, plain=False))
                 by_table = fidelity != "ideal" or (config.coefficients is None and policy.aim != "damping")
                 if changed and by_table and policy.tuned is None:
                     found.append(Case(road, policy, fidelity, plain=True))
+    unridden = [policy.name for policy in chosen if not any(case.policy is policy for case in found)]
+    if "best_found" in unridden:
+        raise ConfigError(
+            "simulate.policies: best_found repeats its voltages with the road, at the fidelity dynamic; give a road of "
+            "kind sine and that fidelity, or leave it out"
+        )
     if not found:
         raise ConfigError("simulate.fidelities: none of them can ride any of the policies; add table or dynamic")
     return tuple(found)
 
 
-def _possible(policy: Policy, fidelity: Fidelity, with_voltage: bool) -> bool:
+def _possible(road: Road, policy: Policy, fidelity: Fidelity, with_voltage: bool) -> bool:
     if policy.aim == "predict":  # what it predicts is the damper with its dynamics
         return fidelity == "dynamic"
+    if policy.aim == "schedule":  # it repeats with the road
+        return fidelity == "dynamic" and isinstance(road, Sine)
     if policy.aim == "voltage":
         return fidelity != "ideal" and (with_voltage or policy.tuned is None)
     return with_voltage or fidelity == "ideal"
@@ -82,7 +91,7 @@ def _refuse_without_voltage(config: SimulateConfig, chosen: list[Policy]) -> Non
         f"simulate.policies: {policy.name} sets the voltage of the dampers, and the rig records none; "
         "map a control signal, or ride constant and passive"
         for policy in chosen
-        if policy.controlled or policy.tuned == "voltage"
+        if policy.controlled or policy.tuned in ("voltage", "schedule")
     ]
     if wrong:
         raise ConfigError(wrong)

@@ -10,9 +10,9 @@ from pzd.record import Array
 from pzd.schema.model import Frozen
 from pzd.simulate.car import HalfCar
 
-Aim = Literal["damping", "feedback", "switch", "minimise", "voltage", "predict"]
+Aim = Literal["damping", "feedback", "switch", "minimise", "voltage", "predict", "schedule"]
 """Constant damping; a force proportional to the state; the hardest or the softest damper; the smallest |a_K|; or no
-force but a voltage: one that is held, or the best of many tried ahead."""
+force but a voltage: one that is held, the best of many tried ahead, or a schedule that repeats with the road."""
 TieBreak = Literal["smallest", "equal_share", "largest"]
 """Which of the forces that make |a_K| smallest, see `pzd.simulate.minimise`."""
 
@@ -35,12 +35,15 @@ class Policy:
     meaning: str
     """What it does, in one sentence."""
     aim: Aim
+    fits: Literal["any car", "wheels with mass", "wheels without mass"] = "any car"
+    """Which cars it can be ridden on."""
     controlled: bool = False
     """Whether it answers to the ride, so that the report sets it beside the others; False for what stays as it is."""
     tie_break: TieBreak | Literal["least_load"] | None = None
     """Which forces the aim `minimise` takes of many; by default those that `tie_break` of the config says."""
-    tuned: Literal["voltage", "damping"] | None = None
-    """What is held constant at the value with which a_w is least, for each road and fidelity by itself."""
+    tuned: Literal["voltage", "damping", "schedule"] | None = None
+    """What is searched for so that a_w is least, for each road and fidelity by itself: what is held constant, or a
+    whole schedule of voltages."""
     feedback: Callable[[HalfCar, float, Frozen], Array] | None = None
     """(car, constant damping, its block of the config) -> (2, 8) gains on (deflection 1, 2, its rate 1, 2, z, phi, dz,
     dphi): the force that the aims `damping` and `feedback` ask of each axle."""

@@ -16,11 +16,15 @@ from pzd.simulate.profile import Profile
 HEAVE, PITCH, HEAVE_RATE, PITCH_RATE, OIL_1, OIL_2, DISSIPATED, ROAD_WORK, VALVE_WORK, PARALLEL_WORK = range(10)
 """The state: the body, the elastic deflection of the oil at each axle, and the energies, each by itself."""
 STATES = 10
+WHEEL_1, WHEEL_2, WHEEL_RATE_1, WHEEL_RATE_2, TYRE_LOSS = range(STATES, STATES + 5)
+"""The state goes on so where the wheels have mass: their height above where they stand at rest [m], its rate [m/s], and
+the energy lost in the tyres [J]."""
+STATES_WITH_WHEELS = STATES + 5
 IDEAL, TABLE, DYNAMIC = range(3)
 """How a demanded force comes about."""
 UNBOUNDED, BY_COEFFICIENTS, BY_TABLE = range(3)
 """What bounds a demanded force."""
-FEEDBACK, SWITCH, MINIMISE, VOLTAGE, PREDICT = range(5)
+FEEDBACK, SWITCH, MINIMISE, VOLTAGE, PREDICT, SCHEDULE = range(6)
 """What the policy asks for."""
 SENSED = 8
 """Deflection 1, 2, its rate 1, 2, z, phi, dz, dphi: what a feedback policy reads."""
@@ -47,15 +51,19 @@ SENSED = 8
     COMFORT,
     REBOUND_PUSH,
     COMPRESSION_PUSH,
-) = range(20)
-WORKSPACE_ROWS = 20
+    ROAD_RISE,
+    CONTACT,
+    TYRE_POWER,
+) = range(23)
+WORKSPACE_ROWS = 23
 """Rows of the workspace (WORKSPACE_ROWS, 2), a column an axle: intermediate results of the equations of motion.
 
-Deflection U [m], its rate V [m/s], speed and acceleration of the road, spring force S and damper force T [N], dV/dt,
-mass that the dampers add [kg]; of one damper: oil spring [N], flow [m/s], elastic and rubbing force beside
-the element [N], power of the valve [W]; speed on its side of zero, lowest and highest force; acceleration
-of z and phi; acceleration at K (first column); of an axle that sticks, dV/dt away from V = 0, were it to
-slip to either side."""
+Deflection U [m], its rate V [m/s], speed of the wheel and its acceleration without S + T (those of the road where the
+wheels have no mass), spring force S and damper force T [N], dV/dt, mass that the dampers add [kg]; of one damper: oil
+spring [N], flow [m/s], elastic and rubbing force beside the element [N], power of the valve [W]; speed on its side of
+zero, lowest and highest force; acceleration of z and phi; acceleration at K (first column); of an axle that sticks,
+dV/dt away from V = 0, were it to slip to either side; speed of the road [m/s]; force between wheel and road beyond that
+at rest [N]; power lost in the tyre [W]."""
 ASKED, SET, SIDE, SINCE, HARD, BEHIND = range(6)
 TIE_END = SINCE
 """Rows of the control (BEHIND + d, 2), a column an axle: force asked [N], voltage set [V]; side of V = 0 (+1 rebound,
@@ -77,10 +85,17 @@ class Vehicle(NamedTuple):
     comfort: Two
     """D of eq. (9) [1/kg]."""
     mobility: tuple[float, float, float]
-    """W11, W22 and W12 of W = H^T M^-1 H [1/kg]."""
+    """W11, W22 and W12 of W, see `HalfCar.mobility` [1/kg]."""
     ratio: Two
     dampers: Two
     speed: float
+    wheels: bool
+    """Whether the wheels have mass; what follows counts only then."""
+    unsprung: Two
+    tyre_stiffness: Two
+    tyre_damping: Two
+    static_load: Two
+    """N_10, N_20 [N]."""
 
 
 class RoadCoefficients(NamedTuple):
@@ -121,6 +136,8 @@ class ControlSpec(NamedTuple):
     """Of the aim `SWITCH` [rad/s]."""
     gains: Array
     """(2, SENSED) of the aims `FEEDBACK` and `SWITCH`."""
+    schedule: Array
+    """(2, n) of the aim `SCHEDULE`, over a period of the harmonic of the road [V]."""
 
 
 class RideModel(NamedTuple):
@@ -136,8 +153,8 @@ class RideModel(NamedTuple):
 
 def vehicle(car: HalfCar, speed: float) -> Vehicle:
     """The car as numbers; speed of the vehicle in m/s."""
-    H, D = car.force_directions(), car.force_to_comfort()
-    W = H.T @ np.linalg.solve(car.mass_matrix(), H)
+    H, D, W = car.force_directions(), car.force_to_comfort(), car.mobility()
+    one, two = car.static_loads()
     return Vehicle(
         float(car.mass),
         float(car.pitch_inertia),
@@ -148,6 +165,11 @@ def vehicle(car: HalfCar, speed: float) -> Vehicle:
         (float(car.motion_ratios[0]), float(car.motion_ratios[1])),
         (float(car.dampers[0]), float(car.dampers[1])),
         float(speed),
+        car.wheels_have_mass,
+        (float(car.unsprung_masses[0]), float(car.unsprung_masses[1])),
+        (float(car.tyre_stiffnesses[0]), float(car.tyre_stiffnesses[1])),
+        (float(car.tyre_dampings[0]), float(car.tyre_dampings[1])),
+        (float(one), float(two)),
     )
 
 
@@ -168,6 +190,11 @@ def control(voltage: float) -> Array:
     table[SET] = table[BEHIND:] = voltage
     table[SIDE] = 1.0
     return table
+
+
+def at_rest(car: Vehicle) -> Array:
+    """The state of a car that stands on a level road."""
+    return np.zeros(STATES_WITH_WHEELS if car.wheels else STATES)
 
 
 def workspace() -> Array:

@@ -29,8 +29,8 @@ from pzd.simulate.ride_model import (
     IDEAL,
     MINIMISE,
     PREDICT,
+    SCHEDULE,
     SENSED,
-    STATES,
     SWITCH,
     TABLE,
     UNBOUNDED,
@@ -38,6 +38,7 @@ from pzd.simulate.ride_model import (
     ControlSpec,
     RideModel,
     TableArrays,
+    at_rest,
     control,
     road_coefficients,
     vehicle,
@@ -52,6 +53,7 @@ _AIMS = {
     "minimise": MINIMISE,
     "voltage": VOLTAGE,
     "predict": PREDICT,
+    "schedule": SCHEDULE,
 }
 _SWITCHED = 0.01
 """Share of the tolerance where the voltage of a damper with dynamics jumps once in a control period: on a single bump,
@@ -80,6 +82,20 @@ class Clock:
 
 
 @dataclass(frozen=True)
+class Found:
+    """The most comfortable ride that was found within a bound on the wheel load."""
+
+    by: str
+    """`search`, or the policy that none of the schedules beats."""
+    most_load: float
+    """The bound [N]."""
+    evaluations: int
+    """Rides that the search took."""
+    voltages: tuple[tuple[float, ...], ...] = ()
+    """Of each axle over a period of the road, from where axle 1 meets its rising zero [V]; empty for a policy."""
+
+
+@dataclass(frozen=True)
 class Held:
     """What a policy may hold constant during a ride."""
 
@@ -87,6 +103,8 @@ class Held:
     """Of `passive` and the like, and of every valve before the ride [V]."""
     damping: float
     """c of `constant` and the like, per axle [N s/m]."""
+    found: Found | None = None
+    """What `best_found` came to."""
 
     @classmethod
     def of(cls, config: SimulateConfig, grid: TableArrays) -> Held:
@@ -120,6 +138,7 @@ def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: Dy
         jumps,
         crossover,
         gains,
+        np.array(held.found.voltages) if held.found is not None and held.found.voltages else np.zeros((2, 1)),
     )
 
 
@@ -154,7 +173,8 @@ def ride_case(
     wait()
     car, clock, held = config.car.car(), Clock.of(config), held or Held.of(config, grid)
     speed = config.vehicle_speed_km_per_h * KM_PER_H
-    if case.fidelity == "ideal" and case.policy.aim == "damping" and profile.smooth:
+    linear = case.fidelity == "ideal" and case.policy.aim == "damping" and not car.wheels_have_mass
+    if linear and profile.smooth:
         frequency = profile.wavenumber * speed / (2.0 * np.pi)
         return ride_exactly(
             car,
@@ -192,7 +212,7 @@ def ride_case(
 
 def ride_of_model(model: RideModel, clock: Clock, tolerance: float, name: str, ends: bool) -> Outcome:
     """Ride from rest on a level start, and balance the energies; see `ride_case`."""
-    acts, scratch, y = control(model.control_spec.voltage), workspace(), np.zeros(STATES)
+    acts, scratch, y = control(model.control_spec.voltage), workspace(), at_rest(model.car)
     course = np.zeros((clock.steps + 1, COURSE_COLUMNS))
     history = np.zeros((clock.steps // clock.per_output + 1, COLUMNS))
     tally = np.zeros(TALLIES)
@@ -210,8 +230,8 @@ def ride_of_model(model: RideModel, clock: Clock, tolerance: float, name: str, e
         course,
         history,
         tally,
-        np.zeros((STAGES + 1, STATES)),
-        np.zeros(STATES),
+        np.zeros((STAGES + 1, y.size)),
+        np.zeros(y.size),
     )
     if tally[STEPS_DONE] < clock.steps or not np.all(np.isfinite(y)):
         raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(scratch[1])))))

@@ -23,12 +23,12 @@ from pzd.simulate.ride_model import (
     RATE,
     REBOUND_PUSH,
     SIDE,
-    STATES,
+    WHEEL_RATE_1,
     RideModel,
 )
 
-SCALES = np.array([1e-2, 1e-2, 1e-1, 1e-1, 1e-3, 1e-3, 10.0, 10.0, 10.0, 10.0])
-"""A motion of ordinary size, below which the error is absolute: m, rad, m/s, rad/s, m, J."""
+SCALES = np.array([1e-2, 1e-2, 1e-1, 1e-1, 1e-3, 1e-3, 10.0, 10.0, 10.0, 10.0, 1e-2, 1e-2, 1e-1, 1e-1, 10.0])
+"""A motion of ordinary size, below which the error is absolute: m, rad, m/s, rad/s, m, J; wheels: m, m/s, J."""
 
 _CROSSED = 1e-9  # m/s on the other side of zero
 _SMALLEST = 1e-6  # of the step: what is taken whatever the error
@@ -47,24 +47,24 @@ def trial(
     Parameters
     ----------
     time, dt : [s]
-    y : (STATES,) state
+    y : (n,) state
     model, control, workspace : see `ride_model`
-    stages : (STAGES, STATES) room to work in
-    end : (STATES,) filled
+    stages : (STAGES, n) room to work in
+    end : (n,) filled
 
     Returns
     -------
     largest embedded error, as a share of |y| + `SCALES`
     """
     for i in range(STAGES):
-        for n in range(STATES):
+        for n in range(y.size):
             change = 0.0
             for j in range(i):
                 change += STAGE_WEIGHTS[i, j] * stages[j, n]
             end[n] = y[n] + dt * change
         motion(time + TIMES[i] * dt, end, model, control, workspace, stages[i])
     worst = 0.0
-    for n in range(STATES):
+    for n in range(y.size):
         error = 0.0
         for i in range(STAGES):
             error += ERROR_WEIGHTS[i] * stages[i, n]
@@ -81,6 +81,8 @@ def choose_side(
     impulse = workspace[RATE, axle] / car.mobility[axle]
     y[HEAVE_RATE] -= impulse / car.mass
     y[PITCH_RATE] -= impulse * car.arms[axle] / car.inertia
+    if car.wheels:
+        y[WHEEL_RATE_1 + axle] += impulse / car.unsprung[axle]
     control[SIDE, axle] = 0.0
     motion(time, y, model, control, workspace, dy)
     if workspace[REBOUND_PUSH, axle] > 0.0:
@@ -119,11 +121,11 @@ def advance(
     Parameters
     ----------
     time, h : start and length of the step [s]
-    y : (STATES,) state; changed in place
+    y : (n,) state; changed in place
     model, control, workspace : see `ride_model`
     tolerance : largest local error as a share of the motion; infinite for a fixed step
     first : length of the first piece to try [s]
-    stages, end : room to work in, (STAGES + 1, STATES) and (STATES,)
+    stages, end : room to work in, (STAGES + 1, n) and (n,)
 
     Returns
     -------
@@ -149,7 +151,7 @@ def advance(
         if longest < math.inf and axle < 0:
             dt = longest
             continue
-        for n in range(STATES):
+        for n in range(y.size):
             y[n] = end[n]
         done += dt
         if model.damper.slips and model.control_spec.fidelity == DYNAMIC:

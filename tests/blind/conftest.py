@@ -90,6 +90,7 @@ def case() -> Callable[..., Scored]:
             "effects": ("asymmetry",),
             "rivals": (),
             "confidence": 0.97,
+            "shapes": (),
             "inside": {"asymmetry.alpha": True},
             "gap_cut": 0.95,
             "gap_cut_gains_out": 0.97,

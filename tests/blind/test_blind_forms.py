@@ -11,6 +11,7 @@ from pzd.blind.visible import gap_after_refit
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnose.hypotheses.shapes import SHAPES
 from pzd.record import Array
 
 STROKE, FREQUENCY = 0.02, 2.0
@@ -33,6 +34,13 @@ def force(name: str, motion: Motion) -> Array:
 @pytest.mark.parametrize("name", FORMS)
 def test_a_form_gives_a_force_of_about_one(name: str) -> None:
     assert 0.3 < np.max(np.abs(force(name, sine()))) <= 2.0 + 1e-9
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_form_is_described_by_shapes_that_are_tried(name: str) -> None:
+    named = FORMS[name].named_shapes
+    assert named
+    assert {*named} <= {shape.name for shape in SHAPES}
 
 
 def test_position_damping_vanishes_at_the_middle_and_dissipates() -> None:

@@ -106,6 +106,16 @@ def test_both_of_a_pair_must_be_adopted(case: Make) -> None:
     assert (found.value, found.count) == (0.5, 2)
 
 
+def test_a_shape_is_rightly_told_when_it_is_among_the_first_two(case: Make) -> None:
+    outside = {"kind": "outside", "truth": (), "hidden": "tapered_rod", "verdict": "unexplained", "effects": ()}
+    told = (("x v", "x sign v"), ("x sign v", "x v"), ("x sign v", "x |v| v", "x v"), (), ("sin 2 pi x/lambda",))
+    said = [case(**outside, shapes=shapes) for shapes in told]
+    unseen = case(**{**outside, "visible_gap": 0.004}, shapes=("x v",))
+    found = line([*said, unseen], "outside the library, visible", "shape among the first two")
+    assert (found.value, found.count, found.met) == (0.4, 5, "missed")
+    assert line(said[:2], "outside the library, visible", "shape among the first two").met == "met"
+
+
 def test_calibration_compares_stated_confidence_with_hits(case: Make) -> None:
     said = [case(confidence=0.97)] * 48 + [case(confidence=0.97, effects=("lash",))] * 12
     (row,) = calibration_rows(said)

@@ -15,7 +15,18 @@ from typing import Any
 
 import pytest
 
-from pzd.artefacts import Characteristics, Identified, Rides, Rig, Table, TableNotes, WarmUpRow
+from pzd.artefacts import (
+    Characteristics,
+    Hypotheses,
+    HypothesisPoint,
+    HypothesisRow,
+    Identified,
+    Rides,
+    Rig,
+    Table,
+    TableNotes,
+    WarmUpRow,
+)
 from pzd.damper.model import BaseRow, Damper
 from pzd.identify.characteristics.summary import characteristics
 from pzd.quantities import Control
@@ -289,6 +300,67 @@ def test_a_test_at_a_voltage_between_two_others_is_told_with_what_it_is_for(word
         read.text.count("Between 0 V and 150 V the force is known least.") == 2
     )  # in the headline and where it belongs
     assert "at 75 V" in read.text
+
+
+def with_hypotheses(run: Any, hypotheses: Hypotheses) -> Any:
+    unexplained = run.with_diagnosis(verdict="unexplained", effects=(), parameters={}, confidence=None)
+    return replace(unexplained, diagnosed=replace(unexplained.diagnosed, hypotheses=hypotheses))
+
+
+BYPASS = HypothesisRow(
+    place=1,
+    shape="|x| v",
+    beside=None,
+    coefficient=15000.0,
+    coefficient_low95=14000.0,
+    coefficient_high95=16000.0,
+    unit="N s/m2",
+    second_coefficient=None,
+    parameter=None,
+    parameter_value=None,
+    parameter_unit=None,
+    width_m=None,
+    closes=0.81,
+    standard_errors=4.2,
+    W_s_before=0.002,
+    W_s_after=0.0004,
+    physics="damping that depends on position, as bypass grooves give",
+    library=None,
+    source="Dixon 2007",
+)
+
+
+def point(value: float, voltage: float | None = None) -> HypothesisPoint:
+    return HypothesisPoint(
+        shape="|x| v",
+        argument="|x| v",
+        unit="m2/s",
+        voltage_V=voltage,
+        value=value,
+        left_N=15100.0 * value,
+        scatter_N=3.0,
+        samples=50,
+        fitted_N=15000.0 * value,
+    )
+
+
+def test_a_hypothesis_is_told_in_words_in_a_table_and_in_a_picture(run: Any) -> None:
+    points = tuple(point(value, voltage) for voltage in (0.0, 150.0) for value in (-0.003, 0.0, 0.002))
+    page = with_hypotheses(run, Hypotheses((BYPASS,), points, sought=True)).told().page
+    read = Reader(page)
+    assert (
+        "A hypothesis on what is left: c |x| v, damping that depends on position, as bypass grooves give." in read.text
+    )
+    assert "would close 81 % of the gap on tests kept back" in read.text.replace("\u00a0", " ")
+    assert "15 000 (14 000 to 16 000) N s/m2" in read.text.replace("\u00a0", " ")
+    (alt,) = (of["alt"] for tag, of in read.tags if tag == "img" and "what is left" in (of["alt"] or "").lower())
+    assert "c |x| v reaches \u221245 N at \u22120.003 m2/s" in str(alt)
+
+
+def test_without_a_hypothesis_the_page_says_that_none_predicts_or_says_nothing(words_only: None, run: Any) -> None:
+    none = Reader(with_hypotheses(run, Hypotheses(sought=True)).told().page).text
+    assert "No shape of what is left predicts tests kept back better" in none
+    assert "hypothesis" not in Reader(run.told().page).text.lower()
 
 
 def test_an_unchanged_damper_shows_no_second_curve(run: Any) -> None:

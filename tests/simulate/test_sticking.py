@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,10 +12,11 @@ from pzd.simulate.ride_model import ACCELERATION, FORCE, INERTANCE, LIFT, SIDE, 
 from pzd.simulate.sticking import accelerate
 
 
+@pytest.mark.parametrize("unsprung", [(0.0, 0.0), (90.0, 70.0)])
 @pytest.mark.parametrize("sides", [(1.0, -1.0), (0.0, 1.0), (-1.0, 0.0), (0.0, 0.0)])
-def test_the_suspensions_accelerate_as_body_and_road_do(rng: np.random.Generator, sides) -> None:
-    """dV/dt = H^T d2X/dt2 - d2xi/dt2 with all forces, and zero where an axle sticks."""
-    car = cars()["makowski2021"]
+def test_the_suspensions_accelerate_as_body_and_road_do(rng: np.random.Generator, sides, unsprung) -> None:
+    """dV/dt = H^T d2X/dt2 - d2xi/dt2 with all forces, zero where an axle sticks; wheels with mass take their part."""
+    car = replace(cars()["makowski2021"], unsprung_masses=unsprung)
     for _ in range(20):
         acts, scratch = control(0.0), workspace()
         acts[SIDE] = sides
@@ -23,7 +26,9 @@ def test_the_suspensions_accelerate_as_body_and_road_do(rng: np.random.Generator
         before = scratch[FORCE].copy()
         accelerate(vehicle(car, 25.0), acts, scratch)
         body = car.acceleration(scratch[SPRINGS] + scratch[FORCE])
-        assert scratch[ACCELERATION] == pytest.approx(car.force_directions().T @ body - scratch[LIFT], abs=1e-10)
+        wheels = (scratch[SPRINGS] + scratch[FORCE]) / np.where(np.array(unsprung) > 0.0, unsprung, np.inf)
+        expected = car.force_directions().T @ body - scratch[LIFT] - wheels
+        assert scratch[ACCELERATION] == pytest.approx(expected, abs=1e-10)
         for i, side in enumerate(sides):
             if side == 0.0:
                 assert scratch[ACCELERATION, i] == 0.0

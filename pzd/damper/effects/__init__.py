@@ -1,4 +1,4 @@
-"""The library of effects, one file each; every module here is found by itself."""
+"""The library of effects, one file each; every module here, and in the folder of `PZD_EFFECTS`, is found by itself."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ from pathlib import Path
 
 from pzd.damper.effect import Effect
 from pzd.damper.laws import declared
+from pzd.own_effects import VARIABLE, own_files, own_folder
+from pzd.schema.errors import ConfigError
 
+_OWN = own_folder()
+if _OWN is not None:
+    __path__.append(str(_OWN))
 _PLACES = ("drive", "material", "stroke", "flow", "parallel", "branch", "sensor")
 
 
@@ -21,12 +26,31 @@ def library() -> dict[str, Effect]:
     Raises
     ------
     ImportError : when a file breaks a rule of `pzd.damper.effect`, or two files declare one name
+    ConfigError : when one of `PZD_EFFECTS` does, or that is no folder
     """
+    _check_own()
     found = sorted(effects_in(__name__, pkgutil.iter_modules(__path__)), key=lambda e: (_PLACES.index(e.place), e.name))
     unhidden = [effect.name for effect in found if effect.hidden is None and effect.never_named is None]
     if unhidden:
         raise ImportError(f"{__path__[0]}/{unhidden[0]}.py: says not how the benchmark hides it (`hidden`)")
     return {effect.name: effect for effect in found}
+
+
+def _check_own() -> None:
+    """Refuse effect files of one's own that cannot be taken: their faults are the user's, not the package's."""
+    if _OWN is not None and not _OWN.is_dir():
+        raise ConfigError(f"{VARIABLE}: there is no folder of that name; make it, or unset the variable (got {_OWN})")
+    for file in own_files():
+        if (taken := Path(__path__[0]) / file.name).is_file():
+            raise ConfigError(f"{file}: the library has an effect of that name; rename file and effect ({taken})")
+        try:
+            effect = declared(importlib.import_module(f"{__name__}.{file.stem}"))
+        except Exception as error:
+            raise ConfigError(f"{file}: is no effect file: {type(error).__name__}: {error}") from error
+        if effect.name != file.stem:
+            raise ConfigError(f"{file}: declares the effect {effect.name}, so it must be called {effect.name}.py")
+        if effect.hidden is None and effect.never_named is None:
+            raise ConfigError(f"{file}: says neither how the benchmark hides it (`hidden`) nor why no verdict names it")
 
 
 @cache

@@ -68,6 +68,8 @@ def _style(context: ReportContext, row: SummaryRow) -> tuple[str, str]:
     """Colour and mark of a ride: the policy that the report is about, the others that control, those that hold."""
     if context.simulate.is_controlled(row.policy):
         return FINAL, "s"
+    if policies()[row.policy].tuned == "schedule":
+        return INK, "*"
     return (BASELINE, "^") if policies()[row.policy].controlled else (MEASURED, "o")
 
 

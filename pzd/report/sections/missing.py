@@ -7,6 +7,7 @@ from pzd.damper.competing_forms import known
 from pzd.quantities import Control
 from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
 from pzd.report.context import ReportContext, effect_in_words, effects_in_words
+from pzd.report.sections import hypotheses
 from pzd.report.sections.pictures import Pictures, galleries
 from pzd.report.wording import DASH, amount, interval, listed, number, percent, sentence, unit_of
 
@@ -30,6 +31,7 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
         blocks.append(_prediction(context, diagnosis.prediction))
     if diagnosis.ranking:
         blocks.append(_ranking(diagnosis, context.control))
+    blocks += hypotheses.blocks(context.diagnosed.hypotheses)
     blocks.append(Notes((next_test(context, diagnosis.next_test),)))
     return Section("missing", "What is missing, and how sure that is", tuple(blocks))
 

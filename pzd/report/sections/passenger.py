@@ -11,6 +11,8 @@ from pzd.report.context import Comparison, ReportContext
 from pzd.report.sections import trade_off
 from pzd.report.sections.pictures import Pictures, by_turns
 from pzd.report.wording import DASH, amount, listed, minutes, number, percent
+from pzd.simulate.car import HalfCar
+from pzd.simulate.modes import modes
 from pzd.simulate.policies import policies
 
 COMFORT_TIME = "exposure_time_reduced_comfort"
@@ -26,7 +28,8 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     blocks += _compared(context)
     blocks += by_turns(pictures["passenger"])
     blocks += trade_off.blocks(context, pictures)
-    blocks += [_accelerations(context), _suspension(context), _wheels(context), *_exposures(context), *_daily(context)]
+    blocks += [_accelerations(context), _suspension(context), _wheels(context), _modes(context)]
+    blocks += [*_exposures(context), *_daily(context)]
     worth = _worth(context)
     if worth.rows:
         text = "The same rides on the damper before anything was added to it: what the missing effect is worth."
@@ -69,12 +72,21 @@ def _ride(context: ReportContext) -> str:
     config = context.simulate
     car = config.car.car()
     springs = " and ".join(number(k / 1000.0) for k in car.stiffnesses)
+    wheels = ""
+    if car.wheels_have_mass:
+        masses, tyres = (listed([number(v) for v in pair]) for pair in (car.unsprung_masses, _tyres(car)))
+        wheels = f", wheels of {masses} kg on tyres of {tyres} kN/m"
     return (
         f"A half-car ({car.name}: {amount(car.mass, 'kg', 4)}, springs {springs} kN/m, wheelbase "
-        f"{amount(car.wheelbase, 'm')}) at {amount(config.vehicle_speed_km_per_h, 'km/h')}, judged at point K, "
+        f"{amount(car.wheelbase, 'm')}{wheels}) at {amount(config.vehicle_speed_km_per_h, 'km/h')}, judged at point K, "
         f"{amount(abs(car.comfort_point), 'm')} {'behind' if car.comfort_point > 0.0 else 'ahead of'} the centre of "
         f"gravity. {' '.join(_windows(context))}"
     )
+
+
+def _tyres(car: HalfCar) -> tuple[float, float]:
+    """Stiffness of the tyres of each axle [kN/m]."""
+    return car.tyre_stiffnesses[0] / 1000.0, car.tyre_stiffnesses[1] / 1000.0
 
 
 def _windows(context: ReportContext) -> Iterator[str]:
@@ -208,7 +220,9 @@ def _wheels(context: ReportContext) -> TextTable:
     shown = [(row, by_case[row.case]) for row in _all(context) if row.case in by_case]
     axles = [wheel.axle for wheel in shown[0][1]] if shown else []
     at_rest = [amount(wheel.static_load_N, "N") for wheel in shown[0][1]] if shown else []
-    header = ("road", "dampers", *(f"least force, axle {n}" for n in axles), *(f"pulling, axle {n}" for n in axles))
+    mass = context.simulate.car.car().wheels_have_mass
+    without = "off the road" if mass else "pulling"
+    header = ("road", "dampers", *(f"least force, axle {n}" for n in axles), *(f"{without}, axle {n}" for n in axles))
     rows = tuple(
         (
             row.road,
@@ -218,9 +232,25 @@ def _wheels(context: ReportContext) -> TextTable:
         )
         for row, wheels in shown
     )
-    caption = "Force between wheel and road: the static load less the force of spring and damper"
-    at = f" (at rest {listed(at_rest)}; pulling: share of the time at 0 or below)" if at_rest else ""
+    made = "the force of the tyre" if mass else "the static load less the force of spring and damper"
+    caption = f"Force between wheel and road: {made}"
+    share = "share of the time at 0" if mass else "share of the time at 0 or below"
+    at = f" (at rest {listed(at_rest)}; {without}: {share})" if at_rest else ""
     return TextTable(f"{caption}{at}", header, rows)
+
+
+def _modes(context: ReportContext) -> TextTable:
+    """How the car swings by itself, on dampers of the constant c."""
+    simulate = context.simulate
+    rows = tuple(
+        (mode.name, amount(mode.frequency_Hz, "Hz"), number(mode.damping_ratio))
+        for mode in modes(simulate.car.car(), simulate.constant_damping_Ns_per_m)
+    )
+    c = amount(simulate.constant_damping_Ns_per_m, "N s/m")
+    header = ("motion", "undamped frequency", "damping ratio")
+    return TextTable(
+        f"How the car swings by itself, with c = {c} at each axle and the wheels on the road", header, rows
+    )
 
 
 def _daily(context: ReportContext) -> Iterator[TextTable]:

@@ -58,11 +58,19 @@ def _cares(context: ReportContext) -> Iterator[str]:
     pulling = [row for row in context.rides.wheels if row.pulling > _MUCH]
     if pulling:
         axle = min(pulling, key=lambda row: row.min_contact_force_N)
-        yield (
-            f"the wheels of {len({row.case for row in pulling})} rides pull on the road, which no wheel can; worst "
-            f"axle {axle.axle} of {axle.case}: {amount(axle.min_contact_force_N, 'N')}, and "
-            f"{percent(axle.pulling)} of its time; a real wheel would leave the road"
-        )
+        rides = len({row.case for row in pulling})
+        if context.simulate.car.car().wheels_have_mass:
+            axle = max(pulling, key=lambda row: row.pulling)
+            yield (
+                f"the wheels of {rides} rides leave the road, axle {axle.axle} of {axle.case} for "
+                f"{percent(axle.pulling)} of its time"
+            )
+        else:
+            yield (
+                f"the wheels of {rides} rides pull on the road, which no wheel can; worst "
+                f"axle {axle.axle} of {axle.case}: {amount(axle.min_contact_force_N, 'N')}, and "
+                f"{percent(axle.pulling)} of its time; a real wheel would leave the road"
+            )
     if context.ridden and iso2631_1978.EDITION in context.config.editions:
         yield f"the exposure times of {iso2631_1978.EDITION}, withdrawn in 1997, rest on an {iso2631_1978.TRUST}"
     findings = sum(len(entry.findings) for entry in context.rig.entries)

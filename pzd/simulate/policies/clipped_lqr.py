@@ -7,7 +7,8 @@ axle. The road is white noise of velocity, as a road of ISO 8608 nearly is: with
 
     dU/dt = H^T (dz, dphi) - dxi/dt, M d(dz, dphi)/dt = -H (k U + T)
 
-and the optimal forces are T = -G x, whatever the height of the road.
+and the optimal forces are T = -G x, whatever the height of the road. Wheels with mass are none of its states: it is
+designed as if they had none.
 
 Source: Butsuen 1989, The design of semi-active suspensions for automotive vehicles (thesis, MIT), chapter 3: clipped
 optimal control; the weights are ours.
@@ -66,7 +67,7 @@ def regulator(car: HalfCar, weights: ClippedLqr) -> tuple[Array, Array, Array, A
     A, B = np.zeros((4, 4)), np.zeros((4, 2))
     A[:2, 2:] = H.T
     A[2:, :2], B[2:] = car.acceleration(stiffness), car.acceleration(np.eye(2))
-    carried = np.array(car.static_loads()) / GRAVITY
+    carried = np.array(car.body_loads()) / GRAVITY
     R = np.outer(D, D) + weights.load_weight * np.diag(carried**-2.0)
     N = np.zeros((4, 2))
     N[:2] = stiffness @ R

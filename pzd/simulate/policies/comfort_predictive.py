@@ -16,6 +16,8 @@ front axle (`pzd.simulate.prediction.road_ahead`); the rear axle meets it (a1 + 
 missed of late may come again: the ride is tried with it added and subtracted, and a choice must beat the best voltage
 held on by `margin`, times the share of the road's motion that was not foreseen.
 
+The wheels of the plant have no mass, so that a car whose wheels have is refused.
+
 Source: rollout of base policies, those that hold a voltage: Bertsekas 2017, Dynamic Programming and Optimal Control I,
 section 6.4; cost and road are ours.
 """
@@ -60,5 +62,6 @@ POLICY = Policy(
     "comfort_predictive",
     "of many voltages ahead, tried on a model of car and dampers, those with the least weighted acceleration",
     "predict",
+    fits="wheels without mass",
     controlled=True,
 )

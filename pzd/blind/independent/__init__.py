@@ -1,0 +1,1 @@
+"""A second generator of rig data, written from the laws alone, to try the diagnosis on data of other authorship."""

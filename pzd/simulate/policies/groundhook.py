@@ -1,0 +1,31 @@
+"""Groundhook: each damper is asked for the force of a damper between wheel and ground."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pzd.record import Array
+from pzd.schema.model import Frozen
+from pzd.simulate.car import HalfCar
+from pzd.simulate.policy import Policy
+
+
+def feedback(car: HalfCar, damping: float, own: Frozen) -> Array:
+    """T_i = -c times the velocity of wheel i, dzeta_i/dt = H^T dX/dt - V_i: T presses the wheel upwards.
+
+    Source: Valasek, Novak, Sika and Vaculin 1997, Vehicle System Dynamics 27(5-6)
+    """
+    gains = np.zeros((2, 8))
+    gains[:, 2:4] = damping * np.eye(2)
+    gains[:, 6:8] = -damping * car.force_directions().T
+    return gains
+
+
+POLICY = Policy(
+    "groundhook",
+    "the force of a damper between wheel and ground, where it is within reach",
+    "feedback",
+    fits="wheels with mass",
+    controlled=True,
+    feedback=feedback,
+)

@@ -1,0 +1,155 @@
+"""The second generator integrates its laws to a known tolerance, and means by their names what the library means."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pzd.blind.independent import laws, outside
+from pzd.blind.independent.case import LAWS, OUTSIDE, described_by, module_of
+from pzd.blind.independent.kernel import Parameters, integrated
+from pzd.blind.independent.laws import piezo_hysteresis, sensor_delay, temperature_drift, valve_lag
+from pzd.blind.independent.stand import FINEST
+from pzd.damper.compose import respond
+from pzd.damper.effects import library, nameable
+from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
+from pzd.record import Array
+
+T0, C, K = 300.0, 2700.0, 2e5
+STROKE, OMEGA = 0.02, 2.0 * np.pi * 1.3
+SPEED = STROKE * OMEGA
+IN_KERNEL: dict[str, dict[str, float]] = {
+    "asymmetry": {"alpha": 0.2},
+    "end_stop": {"k_e": 5e6, "x_e": 0.014},
+    "fluid_inertia": {"m": 30.0},
+    "gas_spring": {"k_g": 5e3},
+    "lash": {"delta": 1e-3},
+    "orifice_quadratic": {"q": 2000.0},
+    "preload_offset": {"F_0": 80.0},
+    "relief_valve": {"F_r": 420.0, "C_r": 700.0},
+    "rounded_yield": {"w_s": 0.02},
+    "shear_thinning": {"n": 0.7},
+    "second_branch": {"T0_2": 60.0, "k_2": 3e4},
+    "stribeck_friction": {"F_s": 60.0, "v_s": 0.03},
+}
+FORMS: dict[str, dict[str, float]] = {
+    "frequency_dependent": {"bypass": 0.5, "bypass_lag": 0.1, "bypass_force": 400.0},
+    "thixotropy": {"structure": 0.5, "rebuilding": 0.3, "breakdown": 200.0},
+    "position_grooves": {"groove": 0.4, "groove_end": 0.01, "groove_run_out": 8e-4},
+    "two_stage_blow_off": {"first_force": 400.0, "first_slope": 500.0, "second_force": 480.0, "second_slope": 5e3},
+    "viscoelastic_mount": {"bushing_stiffness": 1e4, "bushing_time": 0.1},
+    "aeration": {"fade": 0.3, "fade_time": 1.0},
+    "late_filling": {"gap": 1e-3},
+    "cubic_spring": {"cubic": 1e7},
+    "smooth_pipe": {"duct": 1500.0},
+    "polytropic_gas": {"charge": 300.0, "column": 0.08},
+    "frame_stick_slip": {"mount_stiffness": 2e6, "mount_holds": 500.0, "mount_slides": 300.0},
+}
+
+
+def sine(step: float, seconds: float = 1.0) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Time and motion on a grid of half steps."""
+    t = np.arange(2 * round(seconds / step) + 1) * 0.5 * step
+    return t, (STROKE * np.sin(OMEGA * t), SPEED * np.cos(OMEGA * t), -SPEED * OMEGA * np.sin(OMEGA * t))
+
+
+def force(step: float, **values: float) -> Array:
+    t, motion = sine(step)
+    ones = np.ones_like(t)
+    return integrated(t, motion, (T0 * ones, C * ones, K * ones), Parameters(**values))
+
+
+def test_every_file_of_a_law_can_be_hidden_and_every_name_of_the_library_has_one() -> None:
+    assert set(LAWS) == set(nameable())
+    assert described_by("second_branch") == ("second_branch",)
+    files = {path.stem for folder in (laws, outside) for path in Path(folder.__path__[0]).glob("*.py")}
+    assert files - {"__init__"} == {*LAWS, *OUTSIDE}
+    assert set(IN_KERNEL) | set(FORMS) == {*LAWS, *OUTSIDE} - {
+        "piezo_hysteresis",
+        "sensor_delay",
+        "temperature_drift",
+        "valve_lag",
+    }
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_what_describes_a_form_outside_is_an_effect_of_the_library(name: str) -> None:
+    assert name == module_of(name).NAME
+    assert set(described_by(name)) <= set(library())
+
+
+@pytest.mark.parametrize("name", [*IN_KERNEL, *(form for form in FORMS if form != "frame_stick_slip")])
+def test_the_longest_step_costs_a_hundred_thousandth_of_the_force(name: str) -> None:
+    values = {**IN_KERNEL, **FORMS}[name]
+    fine = force(FINEST / 8.0, **values)
+    error = np.max(np.abs(force(FINEST, **values) - fine[::8])) / np.max(np.abs(fine))
+    assert error < 1e-5
+
+
+def test_a_slip_of_the_mount_comes_at_the_step_in_which_it_begins() -> None:
+    """Its instant is known to a step, within which the force falls by up to the step over the time of a slip."""
+    fine = force(FINEST / 8.0, **FORMS["frame_stick_slip"])
+    error = force(FINEST, **FORMS["frame_stick_slip"]) - fine[::8]
+    assert np.sqrt(np.mean(error**2)) < 1e-3 * np.max(np.abs(fine))
+    assert np.max(np.abs(fine - force(FINEST / 8.0))) > 0.04 * np.max(np.abs(fine))
+
+
+@pytest.mark.parametrize(("order", "name"), [(3.5, "rounded_yield"), (1.5, "orifice_quadratic")])
+def test_smooth_laws_converge_with_the_fourth_order_and_kinks_with_the_second(order: float, name: str) -> None:
+    fine = force(1e-5, **IN_KERNEL[name])
+    errors = [
+        np.max(np.abs(force(step, **IN_KERNEL[name]) - fine[:: round(step / 1e-5)])) for step in (1e-3, 5e-4, 2.5e-4)
+    ]
+    assert np.log2(errors[0] / errors[2]) / 2.0 > order
+
+
+def test_the_flow_is_that_of_scipy() -> None:
+    from scipy.integrate import solve_ivp
+
+    def rate(t: float, y: Array) -> list[float]:
+        spring = K * (STROKE * np.sin(OMEGA * t) - y[0])
+        over, q = max(abs(spring) - T0, 0.0), 2000.0
+        return [float(np.sign(spring) * (np.sqrt(C * C + 4.0 * q * over) - C) / (2.0 * q))]
+
+    t, (x, _, _) = sine(FINEST, 1.0)
+    solved = solve_ivp(rate, (0.0, 1.0), [0.0], "DOP853", t[::2], rtol=1e-10, atol=1e-13, max_step=1e-4)
+    expected = K * (x[::2] - solved.y[0])
+    found = force(FINEST, q=2000.0)[: expected.size]
+    assert np.max(np.abs(found - expected)) < 1e-5 * np.max(np.abs(expected))
+
+
+@pytest.mark.parametrize("name", IN_KERNEL)
+def test_both_generators_mean_the_same_by_a_name(name: str) -> None:
+    t, (x, v, a) = sine(FINEST)
+    rows = (BaseRow(T0_N=T0, C_Ns_per_m=C, k_N_per_m=K),)
+    damper = Damper(base=rows, effects={name: dict(IN_KERNEL[name])})
+    other = respond(damper, Motion(t[::2], x[::2], v[::2], a[::2]))
+    own = force(FINEST, **IN_KERNEL[name])
+    # sign(v) at a reversal that falls on a sample may be either, and the oil may start from either end of a play
+    late = t[::2] > 0.5
+    steady = late & (np.abs(v[::2]) > 1e-6)
+    assert np.max(np.abs(own - other)[steady]) < 1e-4 * np.max(np.abs(other))
+    assert np.max(np.abs(own - force(FINEST))[steady]) > 0.02 * np.max(np.abs(other))
+
+
+def test_the_laws_of_drive_material_and_sensor_mean_the_same() -> None:
+    step = 1e-3
+    t = np.arange(0.0, 1.0, step)
+    signal = 50.0 + 50.0 * np.sin(9.0 * t)
+    rows = tuple(BaseRow(voltage_V=u, T0_N=u, C_Ns_per_m=1e6, k_N_per_m=1e12) for u in (0.0, 100.0))
+    motion = Motion(t, 1e-9 * t, np.full_like(t, 1e-9), np.zeros_like(t), signal, 20.0 + 5.0 * t)
+    drives = {"valve_lag": {"tau": 0.03}, "piezo_hysteresis": {"r": 8.0}}
+    for name, values in drives.items():
+        given = respond(Damper(base=rows, effects={name: dict(values)}), motion, 50.0)
+        own = (
+            valve_lag.effective(signal, step, values["tau"])
+            if name == "valve_lag"
+            else piezo_hysteresis.effective(signal, values["r"])
+        )
+        assert np.max(np.abs(own - given)[5:]) < 0.5  # of 100 V: the oil spring follows within a sample or two
+    assert temperature_drift.factor(np.array([43.0]), 23.0, 0.01)[0] == pytest.approx(np.exp(-0.2))
+    late = sensor_delay.delayed(t, np.sin(9.0 * t), 0.004)
+    assert np.max(np.abs(late - np.sin(9.0 * (t - 0.004)))[5:]) < 1e-4
