@@ -104,7 +104,7 @@ def resolved(schema: dict[str, Any], data: Any) -> tuple[str, dict[str, Any]] | 
         if "$ref" in way:
             name = way["$ref"].removeprefix("#/$defs/")
             kind = blocks[name]["properties"].get("kind", {}).get("const")
-            if isinstance(data, dict) and kind in (None, data.get("kind")):
+            if isinstance(data, dict) and kind in (None, data.get("kind")) and {*data} <= {*blocks[name]["properties"]}:
                 return name, blocks[name]
         elif way is not schema and (found := resolved(way, data)):
             return found
@@ -116,9 +116,13 @@ def examples(name: str, body: dict[str, Any], data: dict[str, Any]) -> Iterator[
     for key, value in data.items():
         yield name, key, value
         for item in value if isinstance(value, list) else [value]:
-            found = resolved(body.get("properties", {}).get(key, {}), item)
-            if found:
+            schema = body.get("properties", {}).get(key, {})
+            if found := resolved(schema, item):
                 yield from examples(*found, item)
+            of_any_key = schema.get("additionalProperties")
+            for one in item.values() if isinstance(item, dict) and isinstance(of_any_key, dict) else ():
+                if found := resolved(of_any_key, one):
+                    yield from examples(*found, one)
 
 
 def holds_blocks(values: list[Any]) -> bool:

@@ -11,7 +11,7 @@ from pzd.cli.options import CORES, RUNS, Config, Force, Jobs, Quiet, Runs, Set, 
 from pzd.cli.output import Output, complain
 
 if TYPE_CHECKING:
-    from pzd.sweep.campaign import Campaign
+    from pzd.sweep.campaign import SweepRuns
 
 Status = Annotated[bool, typer.Option("--status", help="Print how far it is, and run nothing.")]
 
@@ -31,12 +31,12 @@ def sweep(
     What is finished stays: a sweep that was stopped goes on where it was.
     """
     from pzd.pipeline.command import execute, opened
-    from pzd.sweep.campaign import Campaign
-    from pzd.sweep.task import Base
+    from pzd.sweep.campaign import SweepRuns
+    from pzd.sweep.task import BaseRun
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
-    campaign = Campaign.of(Base(config, runs, tuple(overrides or ())), output.progress)
+    campaign = SweepRuns.of(BaseRun(config, runs, tuple(overrides or ())), output.progress)
     if status:
         output.say(*_status(campaign))
         return DONE
@@ -54,7 +54,7 @@ def sweep(
     return UNTRUSTED if marks or failed else DONE
 
 
-def _status(campaign: Campaign) -> list[str]:
+def _status(campaign: SweepRuns) -> list[str]:
     found = campaign.finished()
     failed = [outcome for outcome in found if outcome.failure is not None]
     lines = [f"{len(found)} of {len(campaign.tasks)} runs done, {len(failed)} of them without a result"]

@@ -34,13 +34,14 @@ class GapMap:
 
 def of_record(context: ReportContext, record: Record) -> tuple[float, float]:
     """W_s of a record before and after diagnose, without the samples that depend on how it began."""
-    part = _begun(record)
+    part = begun(record)
     measured = record.force[part]
     before, after = (criterion(measured - force[part], measured) for force in context.simulated(record))
     return before, after
 
 
-def _begun(record: Record) -> slice:
+def begun(record: Record) -> slice:
+    """The samples of a record that do not depend on how it began."""
     return slice(warm_up(record.displacement), None)
 
 
@@ -52,10 +53,10 @@ def gap_map(context: ReportContext) -> GapMap:
     groups = _groups(context)
     before, after = np.full((2, len(groups), _BINS), np.nan)
     for i, records in enumerate(groups.values()):
-        cells = np.clip(np.digitize(np.concatenate([r.velocity[_begun(r)] for r in records]), edges) - 1, 0, _BINS - 1)
+        cells = np.clip(np.digitize(np.concatenate([r.velocity[begun(r)] for r in records]), edges) - 1, 0, _BINS - 1)
         count = np.bincount(cells, minlength=_BINS)
         for grid, which in ((before, 0), (after, 1)):
-            gap = np.concatenate([(r.force - context.simulated(r)[which])[_begun(r)] for r in records])
+            gap = np.concatenate([(r.force - context.simulated(r)[which])[begun(r)] for r in records])
             square = np.bincount(cells, weights=gap**2, minlength=_BINS)
             with np.errstate(invalid="ignore", divide="ignore"):
                 grid[i] = np.where(count >= _FEWEST, 100.0 / peak * np.sqrt(square / count), np.nan)

@@ -82,7 +82,7 @@ class Clock:
 
 
 @dataclass(frozen=True)
-class Found:
+class BestSchedule:
     """The most comfortable ride that was found within a bound on the wheel load."""
 
     by: str
@@ -103,7 +103,7 @@ class Held:
     """Of `passive` and the like, and of every valve before the ride [V]."""
     damping: float
     """c of `constant` and the like, per axle [N s/m]."""
-    found: Found | None = None
+    found: BestSchedule | None = None
     """What `best_found` came to."""
 
     @classmethod

@@ -21,7 +21,7 @@ Rate = Callable[[Array], tuple[float, float]]
 
 
 @dataclass
-class Search:
+class ScheduleSearch:
     """What was tried so far, and the best of it within the bound."""
 
     rate: Rate
@@ -96,7 +96,7 @@ def square_waves(intervals: int, starts: int, late: float) -> list[Array]:
     ]
 
 
-def best_schedule(search: Search, starts: Sequence[Array], evaluations: int) -> None:
+def best_schedule(search: ScheduleSearch, starts: Sequence[Array], evaluations: int) -> None:
     """Search from every start, then from the best of all.
 
     The first part repeats a half of the period, since a sine is mirrored there and so is a damper that is the same in

@@ -18,8 +18,8 @@ from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
 from pzd.simulate.profile import Profile
 from pzd.simulate.ride_model import TableArrays
-from pzd.simulate.riding import Found, Held, ride_case
-from pzd.simulate.schedule_search import Search, best_schedule, sampled, square_waves
+from pzd.simulate.riding import BestSchedule, Held, ride_case
+from pzd.simulate.schedule_search import ScheduleSearch, best_schedule, sampled, square_waves
 from pzd.simulate.tuning import best_value, damping_range
 from pzd.simulate.window import event_of
 
@@ -76,24 +76,24 @@ class Setup:
         ridden += [(name, self.ridden(replace(case, policy=policies()[name]))[1]) for name in names]
         rated = [(self._rated(outcome, self.config.settle_s), name, outcome) for name, outcome in ridden]
         (discomfort, _), by, best = min((one for one in rated if one[0][1] <= most_load), key=lambda one: one[0][0])
-        search = Search(
+        search = ScheduleSearch(
             lambda voltages: self._short(case, held, voltages),
             float(self.grid.voltages[0]),
             float(self.grid.voltages[-1]),
             most_load,
         )
         best_schedule(search, self._starts(case, best, search), own.evaluations)
-        found = Found(by, most_load, search.tried)
+        found = BestSchedule(by, most_load, search.tried)
         if search.best is not None:
             schedule = tuple(tuple(float(u) for u in axle) for axle in search.best[1])
-            by_search = replace(held, found=Found("search", most_load, search.tried, schedule))
+            by_search = replace(held, found=BestSchedule("search", most_load, search.tried, schedule))
             outcome = self._ride(self.config, case, by_search)
             a, load = self._rated(outcome, self.config.settle_s)
             if a < discomfort and load <= most_load:
                 return by_search, outcome
         return replace(held, found=found), best
 
-    def _starts(self, case: Case, best: Outcome, search: Search) -> list[Array]:
+    def _starts(self, case: Case, best: Outcome, search: ScheduleSearch) -> list[Array]:
         """Where the search starts: at the best of the policies, and at square waves of voltage."""
         own, profile = self.config.best_found, self.profiles[case.road.name]
         speed = self.config.vehicle_speed_km_per_h * KM_PER_H
@@ -114,7 +114,7 @@ class Setup:
             update={"duration_s": steps * h, "tolerance": max(self.config.tolerance, _SCHEDULE_TOLERANCE)}
         )
         schedule = tuple(tuple(float(u) for u in axle) for axle in voltages)
-        outcome = self._ride(config, case, replace(held, found=Found("search", 0.0, 0, schedule)))
+        outcome = self._ride(config, case, replace(held, found=BestSchedule("search", 0.0, 0, schedule)))
         return self._rated(outcome, steps * h - _SHORT_PERIODS * period)
 
     def _rated(self, outcome: Outcome, after: float) -> tuple[float, float]:

@@ -24,7 +24,7 @@ from pzd.sweep.gather import Results, write
 from pzd.sweep.page import decisive, page
 from pzd.sweep.plan import Task, tasks
 from pzd.sweep.scatter import check_scatter
-from pzd.sweep.task import TRIES, Base, Outcome, config_of, outcomes, shared_stages
+from pzd.sweep.task import TRIES, BaseRun, RunResult, config_of, outcomes, shared_stages
 
 FOLDER = "sweep"
 """Where a sweep lies beside the stages of the run."""
@@ -38,17 +38,17 @@ _AHEAD = 4
 
 
 @dataclass(frozen=True)
-class Campaign:
+class SweepRuns:
     """The runs of a sweep, and where what they found is written."""
 
-    base: Base
+    base: BaseRun
     sweep: SweepConfig
     tasks: tuple[Task, ...]
     progress: Listener = no_listener
     """Hears of every chunk that is done."""
 
     @classmethod
-    def of(cls, base: Base, progress: Listener = no_listener) -> Campaign:
+    def of(cls, base: BaseRun, progress: Listener = no_listener) -> SweepRuns:
         """The campaign of a config.
 
         Raises
@@ -114,7 +114,7 @@ class Campaign:
         if self.sweep.damper:
             check_scatter(self.sweep.damper, self.base.opened.run.read(Diagnosed))
 
-    def gather(self, found: Sequence[Outcome], name: str) -> list[str]:
+    def gather(self, found: Sequence[RunResult], name: str) -> list[str]:
         """Write the tables and the page; the lines to print.
 
         Parameters
@@ -131,7 +131,7 @@ class Campaign:
         told += decisive(results)
         return [*told, f"tables and page: {self.folder}"]
 
-    def run(self, jobs: int, *, afresh: bool = False) -> tuple[Outcome, ...]:
+    def run(self, jobs: int, *, afresh: bool = False) -> tuple[RunResult, ...]:
         """What came of every run, in order; what stands there finished and made from the same is not done again.
 
         Parameters
@@ -148,7 +148,7 @@ class Campaign:
             waiting = [chunk for chunk in waiting if self._found(chunk) is None]
         return tuple(outcome for chunk in self.chunks for outcome in self._found(chunk) or ())
 
-    def finished(self) -> tuple[Outcome, ...]:
+    def finished(self) -> tuple[RunResult, ...]:
         """What came of the runs that are done."""
         if not self._is_of_this_config():
             return ()
@@ -166,17 +166,17 @@ class Campaign:
     def _path(self, chunk: Sequence[Task]) -> Path:
         return self._chunks_folder / f"{chunk[0].number:06d}-{chunk[-1].number:06d}.json"
 
-    def _found(self, chunk: Sequence[Task]) -> tuple[Outcome, ...] | None:
+    def _found(self, chunk: Sequence[Task]) -> tuple[RunResult, ...] | None:
         path = self._path(chunk)
         if not path.exists():
             return None
         with suppress(DataError):
-            found = read_json_list(path, Outcome, self.control)
+            found = read_json_list(path, RunResult, self.control)
             if [outcome.task for outcome in found] == [task.number for task in chunk]:
                 return found
         return None
 
-    def _keep(self, chunk: Sequence[Task], found: Sequence[Outcome]) -> None:
+    def _keep(self, chunk: Sequence[Task], found: Sequence[RunResult]) -> None:
         path = self._path(chunk)
         fresh = path.with_suffix(".new")
         write_json(fresh, found, self.control)
@@ -209,7 +209,7 @@ class Campaign:
     def _in_parallel(self, waiting: Sequence[tuple[Task, ...]], jobs: int) -> list[tuple[Task, ...]]:
         """Do chunks at the same time; those that were at work when a process was killed, which ends the pool."""
         left = iter(waiting)
-        flying: dict[Future[tuple[Outcome, ...]], tuple[Task, ...]] = {}
+        flying: dict[Future[tuple[RunResult, ...]], tuple[Task, ...]] = {}
         with ENGINES[self.sweep.engine](jobs, self.sweep.address) as pool:
             while True:
                 for chunk in _some(left, _AHEAD * jobs - len(flying)):
@@ -223,14 +223,14 @@ class Campaign:
                     except Exception:  # noqa: BLE001  # a run tells its own failures; this is the end of a process
                         return list(flying.values())
                     self._keep(flying.pop(future), found)
-                    self._tell()
+                    self._announce()
 
     def _alone(self, chunk: tuple[Task, ...]) -> None:
         """Do a chunk run by run, each in a process of its own: one that kills it again and again is set aside."""
         self._keep(chunk, [self._tried(task) for task in chunk])
-        self._tell()
+        self._announce()
 
-    def _tried(self, task: Task) -> Outcome:
+    def _tried(self, task: Task) -> RunResult:
         reason: Exception | None = None
         for _ in range(TRIES):
             with ENGINES[self.sweep.engine](1, self.sweep.address) as pool:
@@ -238,9 +238,9 @@ class Campaign:
                     return pool.submit(outcomes, self.base, (task,)).result()[0]
                 except Exception as error:  # noqa: BLE001  # a run tells its own failures; this is the process's end
                     reason = error
-        return Outcome(task=task.number, failure=f"the process that did it was lost {TRIES} times: {reason}")
+        return RunResult(task=task.number, failure=f"the process that did it was lost {TRIES} times: {reason}")
 
-    def _tell(self) -> None:
+    def _announce(self) -> None:
         done = sum(self._path(chunk).exists() for chunk in self.chunks)
         self.progress(Progress(done, len(self.chunks), f"chunks of {self.sweep.chunk} runs"))
 

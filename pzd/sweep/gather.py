@@ -19,7 +19,7 @@ from pzd.schema.csvfile import write_rows
 from pzd.schema.model import Frozen
 from pzd.schema.scalars import Scalar
 from pzd.sweep.plan import Task, quantities, with_indices
-from pzd.sweep.task import Outcome
+from pzd.sweep.task import RunResult
 
 LABELS = ("setting", "voltage_V", "temperature_degC", "case", "road", "policy", "fidelity", "point")
 """Columns that say what a row is about; all other numbers are measures of it."""
@@ -73,10 +73,10 @@ class Results:
 
     sweep: SweepConfig
     tasks: tuple[Task, ...]
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[RunResult, ...]
     seed: int = 1
     """Of the resampling."""
-    _by_task: Mapping[int, Outcome] = field(init=False, repr=False)
+    _by_task: Mapping[int, RunResult] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Sort the outcomes by their run."""

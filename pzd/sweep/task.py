@@ -24,7 +24,7 @@ PLAIN = "-plain"
 """Ends the name of a ride on the damper before diagnose."""
 
 
-class Outcome(Frozen):
+class RunResult(Frozen):
     """What came of one run."""
 
     task: int
@@ -35,7 +35,7 @@ class Outcome(Frozen):
 
 
 @dataclass(frozen=True)
-class Base:
+class BaseRun:
     """The config that all runs of a sweep begin with, and where its results stand."""
 
     config: Path
@@ -49,12 +49,12 @@ class Base:
 
 
 @cache
-def _opened(base: Base) -> Opened:
+def _opened(base: BaseRun) -> Opened:
     return opened(base.config, base.runs, base.overrides)
 
 
 @cache
-def _read(base: Base, folder: str) -> Artefact:
+def _read(base: BaseRun, folder: str) -> Artefact:
     """What stands in a stage's folder of the base run, read once in each process."""
     (kind,) = (stage.makes for stage in stages(base.opened.config) if stage.folder == folder)
     return base.opened.run.read(kind)
@@ -78,24 +78,24 @@ def shared_stages(given: Opened, some: Sequence[Task]) -> tuple[Stage, ...]:
     return kept
 
 
-def outcomes(base: Base, chunk: Sequence[Task]) -> tuple[Outcome, ...]:
+def outcomes(base: BaseRun, chunk: Sequence[Task]) -> tuple[RunResult, ...]:
     """What comes of some runs, one after another; one that fails is told, and the others go on."""
     return tuple(_outcome(base, task) for task in chunk)
 
 
-def _outcome(base: Base, task: Task) -> Outcome:
+def _outcome(base: BaseRun, task: Task) -> RunResult:
     failure = ""
     for _ in range(TRIES):
         try:
-            return Outcome(task=task.number, rows=tuple(_rows(base, task)))
+            return RunResult(task=task.number, rows=tuple(_rows(base, task)))
         except UserError as error:
-            return Outcome(task=task.number, failure="; ".join(error.messages))
+            return RunResult(task=task.number, failure="; ".join(error.messages))
         except Exception as error:  # noqa: BLE001  # whatever it is, it is told, and the other runs go on
             failure = f"{type(error).__name__}: {error}"
-    return Outcome(task=task.number, failure=failure)
+    return RunResult(task=task.number, failure=failure)
 
 
-def _rows(base: Base, task: Task) -> Iterator[dict[str, Scalar]]:
+def _rows(base: BaseRun, task: Task) -> Iterator[dict[str, Scalar]]:
     given = base.opened
     config = config_of(given, task)
     sweep = config.sweep

@@ -19,7 +19,7 @@ import pytest
 from pzd.artefacts import Diagnosed, Diagnosis
 from pzd.artefacts.diagnosed import Gap
 from pzd.blind import benchmark as module
-from pzd.blind.benchmark import Benchmark, processes
+from pzd.blind.benchmark import Benchmark
 from pzd.blind.case import Places, Scored
 from pzd.blind.clean import Clean
 from pzd.blind.cuts import gap_cut, gap_cut_of_truth
@@ -33,6 +33,7 @@ from pzd.damper.effects import nameable
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.schema.errors import ConfigError
+from pzd.schema.processes import spawned_pool
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -88,7 +89,7 @@ def test_cases_are_drawn_and_diagnosed_in_processes_of_their_own(
 
     def counted(count: int) -> Executor:
         begun.append(count)
-        return processes(count)
+        return spawned_pool(count)
 
     benchmark = replace(benchmark_of(small("blind.cases=1"), tmp_path), pool=counted)
     (case,) = benchmark.run(jobs=2)
@@ -197,9 +198,9 @@ def test_a_config_that_cannot_be_used_is_refused(
 def test_no_process_outlives_a_benchmark_that_is_killed() -> None:
     text = """
 import os, time
-from pzd.blind.benchmark import processes
+from pzd.schema.processes import spawned_pool
 if __name__ == "__main__":
-    pool = processes(1)
+    pool = spawned_pool(1)
     print(pool.submit(os.getpid).result(), flush=True)
     time.sleep(600)
 """

@@ -148,6 +148,7 @@ def bypass(bypass_records: tuple[Record, ...]) -> Diagnosed:
     return diagnosed(bypass_records, forbid=all_but("gas_spring"))
 
 
+@pytest.mark.ci
 def test_the_hypothesis_changes_nothing_that_is_handed_on(
     bypass: Diagnosed, bypass_records: tuple[Record, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -357,6 +357,22 @@ def test_a_hypothesis_is_told_in_words_in_a_table_and_in_a_picture(run: Any) -> 
     assert "c |x| v reaches \u221245 N at \u22120.003 m2/s" in str(alt)
 
 
+def test_what_is_left_is_drawn_over_three_planes_where_it_has_no_name(run: Any) -> None:
+    def planes(of: Any) -> list[str]:
+        tags = Reader(of.told().page).tags
+        alts = [str(attributes["alt"]) for tag, attributes in tags if tag == "img"]
+        return [alt for alt in alts if alt.startswith("Mean of measured minus simulated force over")]
+
+    found = planes(with_hypotheses(run, Hypotheses(sought=True)))
+    assert [alt.split(" over ")[1].split(" at ")[0] for alt in found] == [
+        "displacement and velocity",
+        "velocity and force",
+        "force and its rate",
+    ]
+    assert all("at 0 V, 150 V" in alt.replace("\u00a0", " ") for alt in found)
+    assert planes(run) == []
+
+
 def test_without_a_hypothesis_the_page_says_that_none_predicts_or_says_nothing(words_only: None, run: Any) -> None:
     none = Reader(with_hypotheses(run, Hypotheses(sought=True)).told().page).text
     assert "No shape of what is left predicts tests kept back better" in none

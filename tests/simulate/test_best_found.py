@@ -13,7 +13,7 @@ from pzd.artefacts import Diagnosed, Rides
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.schedule_search import Search, best_schedule, sampled, square_waves
+from pzd.simulate.schedule_search import ScheduleSearch, best_schedule, sampled, square_waves
 from pzd.simulate.stage import simulate
 
 SINE = {"kind": "sine", "frequency_Hz": 2.25, "label": "road"}
@@ -47,7 +47,7 @@ def test_the_search_finds_the_least_within_the_bound_and_within_its_budget() -> 
     """Discomfort |u - target|^2 + 1 and load mean(u): without the bound at the target, with it where the mean is."""
     target = np.linspace(20.0, 130.0, 8).reshape(2, 4)
     for most_load, expected in ((150.0, target), (60.0, target - 15.0)):
-        search = Search(lambda u: (np.sum((u - target) ** 2) / 1e4 + 1.0, np.mean(u)), 0.0, 150.0, most_load)
+        search = ScheduleSearch(lambda u: (np.sum((u - target) ** 2) / 1e4 + 1.0, np.mean(u)), 0.0, 150.0, most_load)
         best_schedule(search, square_waves(2, 3, 0.2), 900)
         assert search.best is not None
         assert search.tried <= 900
@@ -56,7 +56,7 @@ def test_the_search_finds_the_least_within_the_bound_and_within_its_budget() -> 
 
 
 def test_nothing_beyond_the_bound_is_ever_the_best() -> None:
-    search = Search(lambda u: (float(np.mean(u)), 2.0), 0.0, 150.0, 1.0)
+    search = ScheduleSearch(lambda u: (float(np.mean(u)), 2.0), 0.0, 150.0, 1.0)
     best_schedule(search, square_waves(4, 2, 0.0), 60)
     assert search.best is None
     assert 0 < search.tried <= 60

@@ -24,12 +24,12 @@ from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.progress import Progress
 from pzd.sweep import campaign as of_campaign
-from pzd.sweep.campaign import Campaign
+from pzd.sweep.campaign import SweepRuns
 from pzd.sweep.gather import Results, write
 from pzd.sweep.page import page
 from pzd.sweep.plan import design, tasks
 from pzd.sweep.scatter import check_scatter, scattered
-from pzd.sweep.task import Base, Outcome
+from pzd.sweep.task import BaseRun, RunResult
 
 SMALL = """
 rig:
@@ -71,8 +71,8 @@ def threads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(of_campaign, "ENGINES", dict.fromkeys(("local", "dask"), in_threads))
 
 
-def swept(path: Path, runs: Path, *overrides: str, jobs: int = 1) -> tuple[Campaign, tuple[Outcome, ...]]:
-    campaign = Campaign.of(Base(path, runs, overrides))
+def swept(path: Path, runs: Path, *overrides: str, jobs: int = 1) -> tuple[SweepRuns, tuple[RunResult, ...]]:
+    campaign = SweepRuns.of(BaseRun(path, runs, overrides))
     shared = campaign.last_shared_stage()
     if shared:
         execute(campaign.base.opened, shared, force=False, jobs=1, say=lambda _: None)
@@ -195,7 +195,7 @@ def test_the_indices_are_those_published_for_ishigamis_function() -> None:
     def ishigami(x: float, y: float, z: float) -> float:
         return math.sin(x) + 7.0 * math.sin(y) ** 2 + 0.1 * z**4 * math.sin(x)
 
-    outcomes = tuple(Outcome(task=run.number, rows=({"f": ishigami(**dict(run.drawn))},)) for run in runs)
+    outcomes = tuple(RunResult(task=run.number, rows=({"f": ishigami(**dict(run.drawn))},)) for run in runs)
     found = {row.quantity: row for row in Results(sweep, runs, outcomes).indices}
     assert [found[name].first_order for name in "xyz"] == pytest.approx([0.3139, 0.4424, 0.0], abs=0.01)
     assert [found[name].total_order for name in "xyz"] == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.01)
@@ -210,7 +210,7 @@ def test_the_indices_are_those_published_for_ishigamis_function() -> None:
 def test_a_quantity_that_changes_nothing_has_an_index_of_zero_and_no_interval() -> None:
     sweep = SweepConfig(drawn=dict.fromkeys("xy", UNIT), draws=64)
     runs = tasks(sweep, seed=5)
-    outcomes = tuple(Outcome(task=run.number, rows=({"f": dict(run.drawn)["x"]},)) for run in runs)
+    outcomes = tuple(RunResult(task=run.number, rows=({"f": dict(run.drawn)["x"]},)) for run in runs)
     of_x, of_y = Results(sweep, runs, outcomes).indices
     assert of_x.total_order == pytest.approx(1.0, abs=0.02)
     assert (of_y.total_order, of_y.total_order_low95) == (0.0, None)
@@ -219,7 +219,7 @@ def test_a_quantity_that_changes_nothing_has_an_index_of_zero_and_no_interval() 
 def test_the_spread_counts_the_independent_draws_alone() -> None:
     sweep = SweepConfig(drawn=dict.fromkeys("xy", UNIT), draws=64)
     runs = tasks(sweep, seed=5)
-    outcomes = tuple(Outcome(task=run.number, rows=({"f": dict(run.drawn)["x"]},)) for run in runs)
+    outcomes = tuple(RunResult(task=run.number, rows=({"f": dict(run.drawn)["x"]},)) for run in runs)
     (row,) = Results(sweep, runs, outcomes).spread
     assert row.draws == 128
     assert row.mean == pytest.approx(0.5, abs=0.02)
@@ -229,9 +229,9 @@ def test_the_spread_counts_the_independent_draws_alone() -> None:
 def test_a_run_without_a_result_is_told_and_leaves_no_indices(tmp_path: Path) -> None:
     sweep = SweepConfig(drawn=dict.fromkeys("xy", UNIT), draws=2)
     runs = tasks(sweep, seed=5)
-    whole = tuple(Outcome(task=run.number, rows=({"f": dict(run.drawn)["x"]},)) for run in runs)
+    whole = tuple(RunResult(task=run.number, rows=({"f": dict(run.drawn)["x"]},)) for run in runs)
     assert Results(sweep, runs, whole).indices
-    results = Results(sweep, runs, (Outcome(task=1, failure="too heavy"), *whole[1:]))
+    results = Results(sweep, runs, (RunResult(task=1, failure="too heavy"), *whole[1:]))
     write(results, tmp_path, Control())
     assert results.indices == ()
     assert '1,"x=' in (tmp_path / "failed.csv").read_text()
@@ -276,14 +276,14 @@ def test_a_sweep_goes_on_where_it_was_and_does_not_hang_on_how_it_is_run(small: 
 @pytest.mark.usefixtures("threads")
 def test_other_values_are_another_sweep(small: Path, tmp_path: Path) -> None:
     swept(small, tmp_path)
-    assert Campaign.of(Base(small, tmp_path, ("rig.virtual.0.rate_Hz=250",))).finished() == ()
+    assert SweepRuns.of(BaseRun(small, tmp_path, ("rig.virtual.0.rate_Hz=250",))).finished() == ()
 
 
 @pytest.mark.usefixtures("threads")
 def test_a_value_that_is_no_value_of_the_config_is_refused_before_anything_runs(small: Path, tmp_path: Path) -> None:
     small.write_text(SMALL.replace("seed: [1, 2]", "seed: [1, -2, x]"), encoding="utf-8")
     with pytest.raises(ConfigError) as refused:
-        Campaign.of(Base(small, tmp_path / "runs", ())).last_shared_stage()
+        SweepRuns.of(BaseRun(small, tmp_path / "runs", ())).last_shared_stage()
     assert len(refused.value.messages) == 2
     assert not (tmp_path / "runs").exists()
 
@@ -342,7 +342,7 @@ def test_dask_gives_the_same_bytes_though_a_worker_is_killed(small: Path, tmp_pa
                 os.kill(killed[0], signal.SIGKILL)
 
         overrides = ("sweep.engine=dask", f"sweep.address={cluster.scheduler_address}", "sweep.chunk=1")
-        campaign = Campaign.of(Base(small, tmp_path / "b", overrides), kill_one)
+        campaign = SweepRuns.of(BaseRun(small, tmp_path / "b", overrides), kill_one)
         campaign.gather(campaign.run(2), "small")
     assert killed
     assert files(campaign.folder) == files(alone.folder)

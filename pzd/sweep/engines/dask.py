@@ -44,6 +44,6 @@ def _client(jobs: int, address: str | None) -> Client:
         )
         return Client(cluster)  # type: ignore[no-untyped-call]  # Dask declares no types
     try:
-        return Client(address, timeout=_WAIT_S)  # type: ignore[no-untyped-call]
+        return Client(address, timeout=_WAIT_S)  # type: ignore[no-untyped-call]  # Dask declares no types
     except (OSError, ValueError) as error:
         raise ConfigError(f"sweep.address: no scheduler answers there: {error} (got {address})") from error
