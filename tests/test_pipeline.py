@@ -482,7 +482,10 @@ def test_a_manifest_says_what_was_made_of_what(bench: Bench) -> None:
     assert set(found) == {"stage", "key", "config", "inputs", "outputs", "versions", "finished", "seconds", "marks"}
     assert found["stage"] == "identify"
     assert (bench.run / found["config"]).resolve() == bench.config
-    fitted, shown = {"parameters", "measures", "auxiliary"}, {"pvp", "cvp", "gas_and_friction", "steps", "warm_up"}
+    fitted, shown = (
+        {"parameters", "measures", "auxiliary"},
+        {"pvp", "cvp", "gas_and_friction", "steps", "warm_up", "as_it_stands"},
+    )
     assert set(found["outputs"]) == {f"{name}.csv" for name in fitted | shown}
     assert {"1-rig/records.json", "1-rig/a.csv", "1-rig/b.csv", "seed", "code", "identify.method"} <= set(
         found["inputs"]
