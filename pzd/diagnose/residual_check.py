@@ -9,11 +9,12 @@ import numpy as np
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.input_uncertainty import Predicted
 from pzd.diagnose.fit.prediction import counted
-from pzd.diagnose.thresholds import CYCLE_CHANGE_SIGNIFICANCE
+from pzd.diagnose.thresholds import CYCLE_CHANGE_SIGNIFICANCE, LEAST_HUM
 from pzd.record import Array, Mask, sliced
 from pzd.signals.between_cycles import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.signals.jumps import jumps, jumps_in_cycles, within_a_sample
 from pzd.signals.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
+from pzd.signals.mains import hum
 from pzd.signals.nuisance import NuisanceConfig, nuisance
 from pzd.signals.smooth_residual import fit_smooth_residual
 
@@ -28,7 +29,7 @@ class ResidualCheck:
     residual: Array
     """(n,) measured less predicted force [N]."""
     nuisances: Array
-    """(n,) the part of it that offset, gain and delay of the test explain, and chance beside jumps [N]."""
+    """(n,) the part of it that offset, gain, delay and mains of the test explain, and chance beside jumps [N]."""
     variance: float
     """Of one sample by noise [N^2]."""
     power: float
@@ -39,6 +40,8 @@ class ResidualCheck:
     """Harmonics and noise of the average cycle, where cycles repeat."""
     folded: Array | None
     """(cycles, points) residual less nuisances, where cycles repeat [N]."""
+    hum: float
+    """Amplitude of the mains among the nuisances [N]; 0 where no line stands out."""
     explained: Array | None
     """(n,) square of what the smooth model explains of it, noise's share taken off, where nothing repeats [N^2]."""
 
@@ -58,18 +61,29 @@ def check_residual(given: Predicted, prepared: Prepared, wanted: Mask, config: N
     record = prepared.record
     predicted, residual = given.force, record.force - given.force
     mask = wanted & counted(prepared)
-    rough = _rough_variance(prepared, residual, mask)
+    mains = _mains(prepared, residual, mask)
+    without = residual - mains
+    rough = _rough_variance(prepared, without, mask)
     calm = bend_beside_jumps(prepared) == 0.0
     slack = np.zeros(residual.size)
     late = np.zeros(residual.size)
     slack[mask], late[mask] = nuisance(
-        residual[mask], predicted[mask], record.rate, rough, config, given.timing[mask], calm[mask]
+        without[mask], predicted[mask], record.rate, rough, config, given.timing[mask], calm[mask]
     )
-    slack = np.where(mask & ~calm, _beside_jumps(record.force, predicted, slack, late), slack + late)
+    slack = mains + np.where(mask & ~calm, _beside_jumps(record.force - mains, predicted, slack, late), slack + late)
     folded = _folded(prepared, residual - slack, mask)
     if folded is not None:
-        return _repeating(prepared, mask, residual, slack, folded, given.displacement_variance)
-    return _not_repeating(prepared, mask, residual, slack, predicted)
+        found = _repeating(prepared, mask, residual, slack, folded, given.displacement_variance)
+    else:
+        found = _not_repeating(prepared, mask, residual, slack, predicted)
+    return replace(found, hum=float(np.max(np.abs(mains))))
+
+
+def _mains(prepared: Prepared, residual: Array, mask: Mask) -> Array:
+    """(n,) the wave that the mains make in the force of a test [N]; it nearly repeats from cycle to cycle, as a gap."""
+    record, run = prepared.record, prepared.cycles
+    peak = float(np.max(np.abs(record.force)))
+    return hum(record.time, residual, mask, run.frequency if run else 0.0, LEAST_HUM * peak)
 
 
 def bend_beside_jumps(prepared: Prepared) -> Array:
@@ -103,7 +117,7 @@ def _repeating(
     if trend is not None and trend < CYCLE_CHANGE_SIGNIFICANCE:
         power += _trend_power(folded, error)
     return ResidualCheck(
-        prepared, mask, residual, slack, error.sample_variance, power, probability, error, folded, None
+        prepared, mask, residual, slack, error.sample_variance, power, probability, error, folded, 0.0, None
     )
 
 
@@ -115,7 +129,7 @@ def _not_repeating(prepared: Prepared, mask: Mask, residual: Array, slack: Array
     explained[mask] = fit.explained**2 - fit.spread
     power = float(np.mean(explained[mask]))
     probability = {"smooth": np.array([fit.probability])}
-    return ResidualCheck(prepared, mask, residual, slack, variance, power, probability, None, None, explained)
+    return ResidualCheck(prepared, mask, residual, slack, variance, power, probability, None, None, 0.0, explained)
 
 
 def _folded(prepared: Prepared, residual: Array, mask: Mask) -> Array | None:

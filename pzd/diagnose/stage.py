@@ -14,6 +14,7 @@ from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.record import mid_stroke
 from pzd.rig.config import RigConfig
+from pzd.schema.wording import counted
 
 if TYPE_CHECKING:
     from pzd.damper.model import Damper
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from pzd.diagnose.handed_on import HandedOn
     from pzd.diagnose.kept_back import Trials
     from pzd.diagnose.next_test import Reach
+    from pzd.diagnose.residual_check import ResidualCheck
 
 log = logging.getLogger(__name__)
 
@@ -88,7 +90,7 @@ def diagnose(
     found = selection.fitted.damper.moved(zero) if selection.adopted else plain
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + _notes(campaign, prediction, cut_off),
+        reason=decision.reason + _notes(campaign, prediction, cut_off) + _hum(before),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, trials if handed.by_criterion else None),
@@ -111,6 +113,12 @@ def _notes(campaign: Campaign, prediction: Prediction | None, cut_off: Sequence[
     from pzd.diagnose.verdict import unpredicted, weak
 
     return campaign.work.words + weak(campaign.parts.hold_out) + unpredicted(prediction) + without(cut_off)
+
+
+def _hum(checks: Sequence[ResidualCheck]) -> str:
+    """In how many tests the mains hum, which is taken for no gap."""
+    loud = [check.hum for check in checks if check.hum > 0.0]
+    return f"; mains hum of up to {max(loud):.2g} N in {counted(len(loud), 'test')} is taken for no gap" if loud else ""
 
 
 def _next_test(

@@ -143,6 +143,10 @@ CYCLE_CHANGE_SIGNIFICANCE = 1e-4
 """A change from cycle to cycle counts in the gap where noise alone would show it less often than this.
 
 Reason: a tenth of `significance`, since every test is asked; not tuned."""
+LEAST_HUM = 5e-4
+"""A line of the mains counts as a nuisance of its test from this share of the test's peak on.
+
+Reason: a fifth of `visible`, below which no gap matters; not tuned."""
 CONTRADICTS = 2.0
 """A remainder of so many times `visible` contradicts that these effects are all, whatever they closed.
 

@@ -7,18 +7,12 @@ import numpy as np
 from pzd.artefacts import Finding
 from pzd.record import Array, is_constant, voltage_scale
 from pzd.rig.preflight import Measured
+from pzd.signals.mains import LEAST_RATE, MAINS, line
 
-MAINS = (50.0, 60.0)
-LINES_OFF = 0.2
-"""The mains may be off by this much [Hz]."""
-STANDS_OUT = 3.0
-"""The line is this many times as large as anything in its neighbourhood."""
 SHARE = 0.002
 """Smallest amplitude that is said, as a share of half the range."""
 LABEL_SHARE = 50.0
 """A control signal, temperature or pressure hums where the line is a tenth of what makes another condition."""
-LEAST_RATE = 2.5
-"""Sampling rate over the frequency of the mains from which it can be seen."""
 
 
 def check(test: Measured) -> list[Finding]:
@@ -31,8 +25,8 @@ def check(test: Measured) -> list[Finding]:
         least = SHARE * (0.5 * float(np.ptp(channel.values)) + LABEL_SHARE * (channel.least or 0.0))
         left = _left_by_cycles(test, channel.values)
         for mains in (m for m in MAINS if test.record.rate >= LEAST_RATE * m):
-            amplitude = _line(channel.values, test.record.rate, mains, test.run.frequency if test.run else 0.0)
-            amplitude = amplitude or _line(left, test.record.rate, mains, 0.0)
+            amplitude = line(channel.values, test.record.rate, mains, test.run.frequency if test.run else 0.0)
+            amplitude = amplitude or line(left, test.record.rate, mains, 0.0)
             if amplitude > least:
                 found.append(
                     Finding(
@@ -56,20 +50,3 @@ def _left_by_cycles(test: Measured, values: Array) -> Array:
     phases = np.arange(average.size + 1) / average.size
     left: Array = values[inside] - np.interp(run.phase(time[inside]), phases, np.append(average, average[0]))
     return left
-
-
-def _line(values: Array, rate: float, frequency: float, cycle: float) -> float:
-    """Amplitude of a line that stands out of its neighbourhood, which holds harmonics of the motion; else 0."""
-    if values.size == 0:
-        return 0.0
-    window = np.hanning(values.size)
-    ramp = np.linspace(values[0], values[-1], values.size)
-    spectrum = 2.0 * np.abs(np.fft.rfft((values - ramp) * window)) / window.sum()
-    resolution = rate / values.size
-    off = np.abs(np.fft.rfftfreq(values.size, 1.0 / rate) - frequency)
-    wide = max(LINES_OFF, 1.5 * resolution)
-    inside, around = off <= wide, (off > wide + 3.0 * resolution) & (off <= max(5.0, 3.0 * cycle, 20.0 * resolution))
-    if not inside.any() or not around.any():
-        return 0.0
-    amplitude = float(spectrum[inside].max())
-    return amplitude if amplitude > STANDS_OUT * float(spectrum[around].max()) else 0.0

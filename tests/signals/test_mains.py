@@ -1,0 +1,51 @@
+"""The mains are found where a line of theirs stands out, and taken for nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pzd.record import Array
+from pzd.signals.mains import hum
+
+RATE = 1000.0
+TIME = np.arange(8000) / RATE
+ALL = np.ones(TIME.size, dtype=np.bool_)
+
+
+def wave(frequency: float, amplitude: float) -> Array:
+    phase = 2.0 * np.pi * frequency * TIME + 0.7
+    return np.asarray(amplitude * (np.sin(phase) + 0.3 * np.sin(3.0 * phase)))
+
+
+@pytest.mark.parametrize("frequency", [49.93, 50.0, 60.007])
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_the_wave_of_the_mains_is_found_to_a_percent_also_from_a_part_of_the_samples(
+    rng: np.random.Generator, frequency: float, share: float
+) -> None:
+    made = wave(frequency, 5.0)
+    others = 20.0 * np.sin(2.0 * np.pi * TIME) + rng.standard_normal(TIME.size)
+    wanted = np.floor(TIME) % 2.0 < 2.0 * share
+    found = hum(TIME, made + others, wanted, 1.0, 0.5)
+    # Of 8000 samples with noise of 1, each of four coefficients has an error of sqrt(2/8000) = 0.016.
+    assert float(np.sqrt(np.mean((found - made) ** 2))) < 0.01 * 5.0 + 0.03 / np.sqrt(share)
+
+
+def test_nothing_is_taken_where_no_line_stands_out(rng: np.random.Generator) -> None:
+    friction = 300.0 * np.sign(np.sin(2.0 * np.pi * TIME))  # harmonics 47, 49, 51, 53 beside 50 Hz
+    for values in (rng.standard_normal(TIME.size), friction + rng.standard_normal(TIME.size), np.zeros(TIME.size)):
+        assert not hum(TIME, values, ALL, 1.0, 1e-3).any()
+
+
+def test_a_line_below_what_counts_is_none(rng: np.random.Generator) -> None:
+    values = wave(50.0, 0.4) + 0.1 * rng.standard_normal(TIME.size)
+    assert hum(TIME, values, ALL, 1.0, 0.3).any()
+    assert not hum(TIME, values, ALL, 1.0, 0.5).any()
+
+
+@pytest.mark.parametrize("cycle", [50.0 / 3.0, 10.0, 60.0 / 7.0])
+def test_a_low_harmonic_of_the_motion_at_the_mains_frequency_is_the_motions(cycle: float) -> None:
+    order = round(50.0 / cycle) if cycle != 60.0 / 7.0 else 7
+    values = 5.0 * np.sin(2.0 * np.pi * order * cycle * TIME)
+    assert not hum(TIME, values, ALL, cycle, 0.1).any()
+    assert hum(TIME, values, ALL, 1.0, 0.1).any()
