@@ -214,6 +214,7 @@ def test_a_quantity_that_changes_nothing_has_an_index_of_zero_and_no_interval() 
     of_x, of_y = Results(sweep, runs, outcomes).indices
     assert of_x.total_order == pytest.approx(1.0, abs=0.02)
     assert (of_y.total_order, of_y.total_order_low95) == (0.0, None)
+    assert Results(sweep, runs, outcomes).indices == (of_x, of_y)  # resampled from the seed
 
 
 def test_the_spread_counts_the_independent_draws_alone() -> None:
