@@ -138,7 +138,8 @@ def elsewhere(tmp_path: Path) -> Path:
     """A folder with configs, and nothing else of the repository."""
     shutil.copy(ROOT / "configs" / "quickstart.yaml", tmp_path / "first.yaml")
     shutil.copy(ROOT / "configs" / "quickstart.yaml", tmp_path / "second.yaml")
-    shutil.copy(ROOT / "configs" / "blind.yaml", tmp_path / "blind.yaml")
+    for name in ("blind.yaml", "quickstart.yaml", "sweep.yaml"):  # the last extends the one before
+        shutil.copy(ROOT / "configs" / name, tmp_path / name)
     return tmp_path
 
 
@@ -158,6 +159,7 @@ def test_the_wheel_alone_runs_every_command(installed: Installed, elsewhere: Pat
     pzd("run", "second.yaml", "--set", "seed=2")
     assert "index.html" in pzd("figures", "first.yaml")
     assert pzd("blind", "blind.yaml", "--set", "blind.cases=2")
+    assert "runs, 0 without a result" in pzd("sweep", "sweep.yaml", "--set", "sweep.draws=2")
     assert pzd("show", "first.yaml")
     assert pzd("peers", "first.yaml")
     assert pzd("export", "first.yaml", "--to", "csv")
