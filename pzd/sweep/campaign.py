@@ -53,11 +53,13 @@ class SweepRuns:
 
         Raises
         ------
-        ConfigError : when the config has no block `sweep`
+        ConfigError : when the config has no block `sweep`, or no car that could be ridden
         """
         config = base.opened.config
         if config.sweep is None:
             raise ConfigError("sweep: the config has no such block; configs/sweep.yaml is an example")
+        if config.sweep.until == "simulate" and not config.with_car:
+            raise ConfigError("sweep.until: stages leaves simulate out; say until: diagnose, or add simulate to stages")
         return cls(base, config.sweep, tasks(config.sweep, config.seed), progress)
 
     @property

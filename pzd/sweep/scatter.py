@@ -15,12 +15,11 @@ from pzd.artefacts import Diagnosed
 from pzd.config import Scatter
 from pzd.damper.competing_forms import known
 from pzd.damper.model import PHYSICAL, BaseRow, Damper
+from pzd.diagnose.fit.intervals import LEVEL
 from pzd.schema.errors import ConfigError, DataError
 
 OF_BASE = {"T0": "T0_N", "C": "C_Ns_per_m", "k": "k_N_per_m"}
 """Columns of the Bingham parameters, by their symbol."""
-INTERVAL_95 = 2.0 * 1.959963985
-"""Width of a 95 % interval in standard errors, where the errors are normal."""
 
 
 def check_scatter(asked: Mapping[str, Scatter], diagnosed: Diagnosed) -> None:
@@ -117,4 +116,4 @@ def _moved(value: float, how: Scatter, ends: tuple[float | None, float | None], 
     low, high = ends
     if low is None or high is None:
         raise DataError(f"sweep.damper.{label}: the tests leave no interval for it; give a share, as in {label}: 0.05")
-    return value + z * (high - low) / INTERVAL_95
+    return value + z * (high - low) / (2.0 * LEVEL)

@@ -23,8 +23,6 @@ FEWEST_PARTS = 3
 """Kept-back tests, or halves, from which their scatter says anything."""
 SAME_DIRECTION = 1e-9
 """Relative singular value below which two columns are one."""
-LEVEL = 1.959963984540054
-"""Two-sided 95 % point of the normal distribution."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ import numpy as np
 
 from pzd.artefacts import Hypotheses, HypothesisPoint, HypothesisRow
 from pzd.damper.model import Damper
-from pzd.diagnose.hypotheses.regression import LEVEL, PredictingShapes
+from pzd.diagnose.fit.intervals import LEVEL
+from pzd.diagnose.hypotheses.regression import PredictingShapes
 from pzd.diagnose.hypotheses.residuals import ResidualOfTest, Residuals, groups_of, residuals_of
 from pzd.diagnose.hypotheses.shapes import IN_ONE_UNIT, Shape
 from pzd.diagnose.kept_back import Trials
