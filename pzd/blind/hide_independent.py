@@ -10,7 +10,7 @@ import numpy as np
 from pzd.blind.case import Places, Truth
 from pzd.blind.clean import Clean, write_clean
 from pzd.blind.config import BlindConfig
-from pzd.blind.plan import KINDS, Kind, PlannedCase, in_turn, mixed
+from pzd.blind.plan import Kind, PlannedCase, dealt
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE
@@ -31,16 +31,7 @@ def plan_independent(config: BlindConfig) -> tuple[PlannedCase, ...]:
     """
     from pzd.blind.independent.campaigns import SHARES
 
-    shares: dict[Kind, float] = {kind: getattr(config.kinds, kind) for kind in KINDS}
-    kinds = mixed(shares)
-    campaigns = {kind: mixed(SHARES) for kind in KINDS}
-    what = {(kind, name): in_turn(hideable(name, kind)) for kind in KINDS for name in SHARES}
-    found = []
-    for index in range(config.cases):
-        kind = next(kinds)
-        campaign = next(campaigns[kind])
-        found.append(PlannedCase(index, kind, campaign, next(what[kind, campaign])))
-    return tuple(found)
+    return dealt(config, SHARES, hideable)
 
 
 def hideable(campaign: str, kind: Kind) -> list[tuple[str, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal, TypeVar
@@ -45,14 +45,30 @@ def plan(config: BlindConfig) -> tuple[PlannedCase, ...]:
     ----------
     config : the shares, the campaigns and the number
     """
+    plans = {campaign.name: campaign for campaign in config.campaigns}
+    shares = {name: campaign.share for name, campaign in plans.items()}
+    return dealt(config, shares, lambda name, kind: hideable(plans[name], kind))
+
+
+def dealt(
+    config: BlindConfig, campaigns: Mapping[str, float], hideable_in: Callable[[str, Kind], list[tuple[str, ...]]]
+) -> tuple[PlannedCase, ...]:
+    """Every case of a benchmark, fairly mixed from the first on.
+
+    Parameters
+    ----------
+    config : the shares of what is hidden, and the number
+    campaigns : shares of the campaigns, by name
+    hideable_in : what a campaign can hide of a kind
+    """
     shares: dict[Kind, float] = {kind: getattr(config.kinds, kind) for kind in KINDS}
     kinds = mixed(shares)
-    campaigns = {kind: mixed({c.name: c.share for c in config.campaigns}) for kind in KINDS}
-    what = {(kind, c.name): in_turn(hideable(c, kind)) for kind in KINDS for c in config.campaigns}
+    next_campaign = {kind: mixed(campaigns) for kind in KINDS}
+    what = {(kind, name): in_turn(hideable_in(name, kind)) for kind in KINDS for name in campaigns}
     found = []
     for index in range(config.cases):
         kind = next(kinds)
-        campaign = next(campaigns[kind])
+        campaign = next(next_campaign[kind])
         found.append(PlannedCase(index, kind, campaign, next(what[kind, campaign])))
     return tuple(found)
 
