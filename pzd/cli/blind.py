@@ -45,7 +45,7 @@ def blind(
         made_from = _made_from(whole)
         with given.placed():
             _entered(setup.blind, made_from, config.parent)
-        where = Where(setup.blind, "blind", config.parent)
+        where = Where(setup.blind, FOLDER, config.parent, places.folder / "slurm")
         benchmark = Benchmark(setup, methods, places, made_from, where, output.progress)
         cases = benchmark.run(jobs, afresh=force)
         tuning, generator = setup.blind.tuning, setup.blind.generator

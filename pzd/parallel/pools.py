@@ -19,6 +19,8 @@ class Where:
     """Of the config, for messages."""
     folder: Path
     """Of the config, to which its paths are relative."""
+    logs: Path
+    """Folder for what jobs of SLURM print."""
 
 
 @dataclass(frozen=True)

@@ -153,7 +153,7 @@ class SweepRuns:
             done += 1
             self.progress(Progress(done, len(self.chunks), f"chunks of {self.sweep.chunk} runs"))
 
-        where = Where(self.sweep, FOLDER, self.base.config.parent)
+        where = Where(self.sweep, FOLDER, self.base.config.parent, self.folder / "slurm")
         ChunkedWork((partial(outcomes, self.base.absolute),), keep, _lost, where, _AHEAD).do(waiting, jobs)
         return tuple(outcome for chunk in self.chunks for outcome in self._found(chunk) or ())
 

@@ -78,7 +78,7 @@ def benchmark_of(setup_of: Callable[[RunConfig], BenchmarkSetup]) -> Callable[[R
     def made(config: RunConfig, folder: Path) -> Benchmark:
         setup = setup_of(config)
         methods = Methods(config.identify, config.diagnose, config.rig.limits, setup.control, config.seed)
-        return Benchmark(setup, methods, Places(folder), "test", Where(setup.blind, "blind", folder))
+        return Benchmark(setup, methods, Places(folder), "test", Where(setup.blind, "blind", folder, folder))
 
     return made
 

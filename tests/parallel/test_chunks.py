@@ -56,7 +56,7 @@ def worked(tmp_path: Path, *steps: object, jobs: int = 2) -> tuple[dict[int, int
     def set_aside(task: int, step: int, reason: str) -> None:
         lost.append((step, f"{task}: {reason}"))
 
-    ChunkedWork(steps, keep, set_aside, Where(EngineConfig(), "sweep", tmp_path), 2).do(CHUNKS, jobs)  # type: ignore[arg-type]  # steps of any kind
+    ChunkedWork(steps, keep, set_aside, Where(EngineConfig(), "sweep", tmp_path, tmp_path), 2).do(CHUNKS, jobs)  # type: ignore[arg-type]  # steps of any kind
     return found, lost
 
 

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from distributed import Client
     from distributed.security import Security
 
+NO_DASHBOARD = f"{LOOPBACK}:0"
+"""A scheduler answers questions by HTTP without TLS, whatever it is told: on the loopback alone, then."""
 _WAIT_S = 10.0
 """How long a scheduler at an address may take to answer."""
 
@@ -45,7 +47,11 @@ def pools(where: Where, jobs: int, steps: int) -> Iterator[Pools]:
         if address is None:
             cluster = stack.enter_context(
                 LocalCluster(  # type: ignore[no-untyped-call]  # Dask declares no types
-                    n_workers=jobs, threads_per_worker=1, host=LOOPBACK, dashboard_address=None, security=secured
+                    n_workers=jobs,
+                    threads_per_worker=1,
+                    host=LOOPBACK,
+                    dashboard_address=NO_DASHBOARD,
+                    security=secured,
                 )
             )
             client = Client(cluster)  # type: ignore[no-untyped-call]  # Dask declares no types

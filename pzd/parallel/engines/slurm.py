@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
 from pzd.parallel.config import LOOPBACK, SlurmConfig, is_loopback
-from pzd.parallel.engines.dask import lent, security
+from pzd.parallel.engines.dask import NO_DASHBOARD, lent, security
 from pzd.parallel.pools import Pools, Where
 from pzd.schema.errors import ConfigError
 
@@ -41,15 +43,36 @@ def pools(where: Where, jobs: int, steps: int) -> Iterator[Pools]:
                 processes=asked.cores,
                 protocol=protocol,
                 security=secured,
-                scheduler_options={"host": asked.host, "port": 0, "dashboard_address": None, "dashboard": False},
+                scheduler_options={
+                    "host": asked.host,
+                    "port": 0,
+                    "dashboard_address": NO_DASHBOARD,
+                    "dashboard": False,
+                },
+                log_directory=str(where.logs),
                 worker_extra_args=["--no-dashboard", *own],
             )
         )
-        try:
-            cluster.scale(jobs=asked.jobs)
-            cluster.sync(cluster._correct_state)  # noqa: SLF001  # submits now, so that a refusal is heard here
-        except (OSError, RuntimeError) as error:
-            said = " ".join(str(error).split())
-            raise ConfigError(f"{where.block}.slurm: SLURM takes no jobs of this kind: {said}") from error
+        _check_taken(where, cluster.job_script())
+        cluster.adapt(
+            minimum_jobs=asked.jobs, maximum_jobs=asked.jobs
+        )  # a job that ends before the work has a successor
         client = stack.enter_context(Client(cluster))  # type: ignore[no-untyped-call]  # Dask declares no types
         yield lent(client, steps, asked.jobs * asked.cores)
+
+
+def _check_taken(where: Where, script: str) -> None:
+    """Ask SLURM whether it takes a job, before anything waits for it.
+
+    Raises
+    ------
+    ConfigError : when it does not, or is not there
+    """
+    sbatch = shutil.which("sbatch")
+    if sbatch is None:
+        raise ConfigError(f"{where.block}.engine: sbatch is not on this machine; start where SLURM is (got slurm)")
+    command = [sbatch, "--test-only"]
+    asked = subprocess.run(command, input=script, capture_output=True, text=True, check=False)  # noqa: S603  # of SLURM
+    if asked.returncode != 0:
+        said = " ".join(asked.stderr.split())
+        raise ConfigError(f"{where.block}.slurm: SLURM takes no such job: {said}")
