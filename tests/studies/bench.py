@@ -4,8 +4,8 @@
     python tests/studies/bench.py kernels stages        the force of a damper; fit, ride and comfort
     python tests/studies/bench.py waits files diagnose campaign
 
-Ratios are of processor time, taken in pairs in turn in one process, the median over the pairs. Waits are by the clock, so
-that they hold on an idle machine alone. No figure decides anything but what is printed beside it.
+Ratios are of processor time, taken in pairs in turn in one process, the median over the pairs. Waits are by the clock,
+so that they hold on an idle machine alone. No figure decides anything but what is printed beside it.
 """
 
 from __future__ import annotations

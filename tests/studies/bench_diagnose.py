@@ -3,8 +3,8 @@
     python tests/studies/bench_diagnose.py CONFIG [--records N] [--samples N]
 
 Records and parameters are made first and diagnose is compiled by an earlier process, so that neither counts. While it
-works, a thread looks every 5 ms where it is: in a force (`pzd/damper`), in cleaning (`pzd/signals`, `pzd/diagnose/data`),
-or elsewhere.
+works, a thread looks every 5 ms where it is: in a force (`pzd/damper`), in cleaning (`pzd/signals`,
+`pzd/diagnose/data`), or elsewhere.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def main() -> None:
 
     def look() -> None:
         while not done.wait(EVERY_S):
-            seen[part_of(sys._current_frames().get(working))] += 1  # noqa: SLF001  # there is no other way to look
+            seen[part_of(sys._current_frames().get(working))] += 1
 
     threading.Thread(target=look, daemon=True).start()
     wall, cpu = time.perf_counter(), time.process_time()

@@ -151,7 +151,8 @@ def rides() -> Iterator[Row]:
     other = min(once(lambda: restarted(1e-6)) for _ in range(2))
     peak = np.max(np.abs(truth))
     errors = [float(np.max(np.abs(a[1 : truth.size] - truth[1 : a.size])) / peak) for a in (ours(), restarted(1e-6))]
-    about = f"{mine / RIDE_S * 1e3:.3g} us a ms, error of a_K {errors[0]:.1e}; {other / RIDE_S * 1e3:.3g} us, {errors[1]:.1e}"
+    mine_us, other_us = mine / RIDE_S * 1e3, other / RIDE_S * 1e3
+    about = f"{mine_us:.3g} us a ms, error of a_K {errors[0]:.1e}; {other_us:.3g} us, {errors[1]:.1e}"
     yield Row("half-car, dynamic dampers, 1 kHz, 1e-6, beside solve_ivp", other / mine, "x", 1000.0, about=about)
 
 
@@ -211,8 +212,10 @@ def comfort() -> Iterator[Row]:
 
     times = np.array(list(pairs(ours, other)))
     mine, theirs = np.median(times, axis=0) * 1e3
-    about = f"{mine:.3g} ms, exact response; {theirs:.3g} ms at {factor} kHz, {deviation(factor):.1e}; a_w {ours()[0]:.5g}, "
-    about += f"{other()[0]:.5g}"
+    about = (
+        f"{mine:.3g} ms, exact, a_w {ours()[0]:.5g}; {theirs:.3g} ms at {factor} kHz, error {deviation(factor):.1e}, "
+    )
+    about += f"a_w {other()[0]:.5g}"
     ratio = float(np.median(times[:, 0] / times[:, 1]))
     yield Row("Wk, running r.m.s., VDV of a minute, share of sosfilt's", ratio, "", 0.5, at_least=False, about=about)
 
