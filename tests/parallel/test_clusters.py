@@ -44,7 +44,7 @@ def small(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def slurm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A SLURM of one node; skips where the machine allows none, in a merge too."""
+    """A SLURM of one node; skips where the machine allows none, as in a container without root."""
     pytest.importorskip("dask_jobqueue", reason="pip install pzd[cluster]")
     try:
         with one_node(tmp_path / "slurm") as written:
@@ -58,7 +58,7 @@ def slurm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def certificates(tmp_path: Path) -> Path:
     """A folder with an authority, and a certificate that it signed for 127.0.0.1."""
     if shutil.which("openssl") is None:
-        pytest.skip("openssl is not installed")
+        pytest.skip("openssl is not installed; apt-get install openssl")
     folder = tmp_path / "tls"
     folder.mkdir()
 
