@@ -101,10 +101,12 @@ def _over_voltage(nodes: Array, at_nodes: Array, voltage: Array) -> Array:
     """Piecewise linear over the first axis of (m, n or 1, 3), held beyond its ends."""
     if nodes.size == 1:
         return np.broadcast_to(at_nodes[0], (max(voltage.size, at_nodes.shape[1]), 3))
+    if at_nodes.shape[1] == 1:
+        return np.stack([np.interp(voltage, nodes, column) for column in at_nodes[:, 0].T], axis=-1)
     inside = np.clip(voltage, nodes[0], nodes[-1])
     left = np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, nodes.size - 2)
     share = ((inside - nodes[left]) / (nodes[left + 1] - nodes[left]))[:, None]
-    columns = np.arange(at_nodes.shape[1]) if at_nodes.shape[1] > 1 else np.zeros(1, dtype=int)
+    columns = np.arange(at_nodes.shape[1])
     below, above = at_nodes[left, columns], at_nodes[left + 1, columns]
     return np.asarray(below + share * (above - below))
 

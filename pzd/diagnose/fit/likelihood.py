@@ -74,6 +74,11 @@ class RecordLikelihood:
         return lru_cache(REMEMBERED)(marched)
 
     @property
+    def residuals(self) -> int:
+        """How many residuals it gives: w."""
+        return len(self.frame)
+
+    @property
     def begins_with(self) -> float:
         """Force with which the simulation begins [N]: that of the same phase where the motion repeats."""
         lead = self.first // self.stride
