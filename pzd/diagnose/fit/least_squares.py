@@ -6,7 +6,7 @@ squares is minus the logarithm of the likelihood, and fits of different effects 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,6 +28,8 @@ Reason: the gain of the tests leaves T0, C and k open along one direction, commo
 differences leave of the curvature ends a search up to a standard deviation away from the optimum. A smaller step shows
 the errors of the simulation, see `likelihood.SIMULATION_TOLERANCE`."""
 MOST_EVALUATIONS = 20
+MOST_PASSES = 3
+"""Times that the end of a search is looked at with slopes of its own, and the search goes on from there."""
 PRECISION = 1e-5
 """Relative change of the sum of squares at which a search ends."""
 STIFFER = 2.0
@@ -43,7 +45,6 @@ WIDEST = 3.0
 class Fitted:
     """An optimum: the damper, and what it leaves."""
 
-    problem: Problem
     damper: Damper
     effects: tuple[str, ...]
     searched: Array
@@ -53,15 +54,15 @@ class Fitted:
     simulated: tuple[Array, ...]
     """(n,) an observation, force at the compared samples [N]."""
     unknowns: tuple[Unknown, ...]
-    exact_slopes: Array | None = None
-    """The `slopes`, where the search has them."""
+    prior: Array
+    """(2 b, 3 b + e) slopes of the prior on C and k."""
+    differentiated: Callable[[], Array]
+    """Gives the `slopes`."""
 
     @cached_property
     def slopes(self) -> Array:
         """(w, 3 b + e) derivatives of all residuals by the searched variables."""
-        if self.exact_slopes is not None:
-            return self.exact_slopes
-        return _differences(self.problem, self.unknowns, self.searched, _bounds(self.problem, self.unknowns))
+        return self.differentiated()
 
     @cached_property
     def frame(self) -> Array:
@@ -71,7 +72,7 @@ class Fitted:
     @cached_property
     def covariance(self) -> Array:
         """(3 b + e, 3 b + e) of what was searched, noise alone; infinite for what no test shows."""
-        return _covariance(np.concatenate([self.slopes, _prior(self.problem, len(self.unknowns))]))
+        return _covariance(np.concatenate([self.slopes, self.prior]))
 
     @property
     def misfit(self) -> float:
@@ -100,22 +101,26 @@ def fit(
     problem : what is fitted to what
     effects : names of the effects fitted together with the base rows
     start : (3 b + e,) in the units of the search
-    evaluations : of the model, at most
+    evaluations : of the model, at most, from one set of slopes of its own on
     beside : an optimum of the same problem with the first of these effects, from whose slopes the search starts
     rough : end where slopes that were carried end; otherwise the end is looked at with slopes of its own
     """
     unknowns = problem.unknowns(effects)
     known = None if beside is None else _known(problem, unknowns, start, beside)
     found, slopes, (residuals, forces) = _search(problem, unknowns, start, start.size, evaluations, known, rough=rough)
+
+    def differentiated() -> Array:
+        return _differences(problem, unknowns, found, _bounds(problem, unknowns)) if slopes is None else slopes
+
     return Fitted(
-        problem,
         problem.point(found, unknowns).damper(),
         tuple(effects),
         found,
         tuple(residuals),
         tuple(forces),
         unknowns,
-        slopes,
+        _prior(problem, len(unknowns)),
+        differentiated,
     )
 
 
@@ -168,26 +173,28 @@ def _search(
         _blocks(problem, unknowns, free),
         None if known is None else (begin[:free], known),
     )
-    at, spent, misfit = begin[:free], 0, np.inf
-    while True:
+
+    def jacobian(x: Array) -> Array:
+        return np.concatenate([slopes(x), prior[:, :free]])
+
+    at, misfit = begin[:free], np.inf
+    for _ in range(1 if rough else MOST_PASSES):
         found = least_squares(
             residuals_at,
             at,
-            jac=lambda x: np.concatenate([slopes(x), prior[:, :free]]),
+            jac=jacobian,
             bounds=(low[:free], high[:free]),
             x_scale="jac",
             ftol=PRECISION,
             xtol=PRECISION,
             gtol=PRECISION,
-            max_nfev=evaluations - spent,
+            max_nfev=evaluations,
         )
-        at, spent = found.x, spent + found.nfev
-        gone = misfit - found.cost <= PRECISION * found.cost
-        if rough or slopes.exact or spent >= evaluations or gone:
+        at, gained, misfit = found.x, misfit - found.cost, found.cost
+        if slopes.exact or gained <= PRECISION * misfit:
             break
-        misfit = found.cost
         slopes.renew()
-    return whole(at), found.jac[: -len(prior)] if slopes.exact else None, left_at(at)
+    return whole(at), slopes(at) if slopes.exact else None, left_at(at)
 
 
 def _known(problem: Problem, unknowns: Sequence[Unknown], start: Array, beside: Fitted) -> Array | None:
@@ -196,8 +203,10 @@ def _known(problem: Problem, unknowns: Sequence[Unknown], start: Array, beside: 
     None where that optimum is one of other base rows or other residuals.
     """
     shared = beside.searched.size
-    same = len(beside.problem.base) == len(problem.base) and unknowns[: len(beside.unknowns)] == beside.unknowns
-    if not same or beside.size != sum(o.residuals for o in problem.observations):
+    same_rows = shared == 3 * len(problem.base) + len(beside.unknowns)
+    same_effects = unknowns[: len(beside.unknowns)] == beside.unknowns
+    same_residuals = beside.size == sum(o.residuals for o in problem.observations)
+    if not (same_rows and same_effects and same_residuals):
         return None
     columns = range(shared, start.size)
     new = _differences(problem, unknowns, start, _bounds(problem, unknowns), columns)
