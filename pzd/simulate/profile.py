@@ -13,6 +13,10 @@ _SLOPE = np.array([-1.0, -10.0, 0.0, 10.0, 1.0]) / 24.0
 _CURVATURE = np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6.0
 """Of the basis spline of degree five: its value at the knots, and its derivatives there by the place in knots."""
 _BAND = 4
+_BLOCK = 200_000
+"""Knots whose coefficients are solved for at a time, so that the room for it does not grow with the road."""
+_OVERLAP = 100
+"""Knots over which an end is felt: each coefficient is 0.43 of the one before, and 0.43^100 is 1e-36."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +73,27 @@ def through(heights: Array, spacing: float) -> Profile:
     -------
     the profile above its first height; before the first and behind the last knot the height is held
     """
+    coefficients = np.empty(len(heights) + 4)
+    for first in range(0, len(heights), _BLOCK):
+        start, stop = max(first - _OVERLAP, 0), min(first + _BLOCK + _OVERLAP, len(heights))
+        last = min(first + _BLOCK, len(heights)) if stop < len(heights) else len(heights) + 4
+        coefficients[first:last] = _solved(heights[start:stop] - heights[0])[first - start : last - start]
+        if last > len(heights):
+            break
+    return Profile(spacing=spacing, coefficients=coefficients)
+
+
+def _solved(heights: Array) -> Array:
+    """(n + 4,) coefficients through (n,) heights, slope and curvature 0 at both ends."""
     from scipy.linalg import solve_banded
 
     count = len(heights) + 4
     band, right = np.zeros((2 * _BAND + 1, count)), np.zeros(count)
-    right[2:-2] = heights - heights[0]
+    right[2:-2] = heights
     for n in range(5):
         band[_BAND + 2 - n, n : count - 4 + n] = _AT_KNOTS[n]
     for n in range(5):
         for row, weights in ((0, _SLOPE), (1, _CURVATURE)):
             band[_BAND + row - n, n] = weights[n]
             band[_BAND + 4 - row - n, count - 5 + n] = weights[n]
-    return Profile(spacing=spacing, coefficients=solve_banded((_BAND, _BAND), band, right))
+    return np.asarray(solve_banded((_BAND, _BAND), band, right))

@@ -11,7 +11,7 @@ from pzd.artefacts import Diagnosed, Rides, Table
 from pzd.simulate.config import SimulateConfig
 
 if TYPE_CHECKING:
-    from pzd.simulate.gathering import Judged
+    from pzd.simulate.gathering import RideRows
     from pzd.simulate.outcome import Outcome
     from pzd.simulate.plan import Case
     from pzd.simulate.riding import Held
@@ -67,9 +67,9 @@ def simulate(
 
     gathering = Gathering(simulate, with_voltage)
 
-    def ridden(case: Case) -> Judged | tuple[Held, Outcome]:
+    def ridden(case: Case) -> RideRows | tuple[Held, Outcome]:
         log.info("simulate: %s", case.name)
-        return gathering.of_ride(case, *setups[case.plain].ridden(case))
+        return gathering.of_ride(case, setups[case.plain].ridden)
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         rides = list(pool.map(ridden, planned))
