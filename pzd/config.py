@@ -19,6 +19,7 @@ from pydantic import (
 from pzd.blind.config import BlindConfig
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.identify.config import IdentifyConfig
+from pzd.parallel.config import EngineConfig
 from pzd.quantities import Control
 from pzd.report.config import ReportConfig
 from pzd.rig.config import ControlConfig, RigConfig
@@ -79,7 +80,7 @@ class Normal(Frozen):
 Scatter = Literal["interval"] | Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
-class SweepConfig(Frozen):
+class SweepConfig(EngineConfig):
     """The same run many times: every combination of values, and random draws."""
 
     over: dict[str, tuple[bool | int | float | str, ...]] = Field(default_factory=dict)
@@ -97,11 +98,6 @@ class SweepConfig(Frozen):
     """The stage whose results are gathered."""
     chunk: int = Field(default=8, ge=1)
     """Runs that a worker does at a time; what a chunk found is written when it is done."""
-    engine: Literal["local", "dask"] = "local"
-    """Where it runs: in processes of this machine, or on a Dask cluster (`pip install pzd[cluster]`)."""
-    address: str | None = None
-    """Of the Dask scheduler; by default a cluster of `--jobs` processes on this machine. All workers must see the
-    folder of the results."""
 
     @model_validator(mode="after")
     def _consistent(self) -> SweepConfig:
@@ -117,8 +113,6 @@ class SweepConfig(Frozen):
             raise ValueError(f"draws must be a power of two (got {self.draws})")
         if self.damper and self.until != "simulate":
             raise ValueError(f"damper scatters behind diagnose, and until ends at {self.until}; say until: simulate")
-        if self.address is not None and self.engine != "dask":
-            raise ValueError("address belongs to engine: dask")
         return self
 
 

@@ -15,6 +15,7 @@ ORDER = (
     "quantities",
     "own_effects",
     "schema",
+    "parallel",
     "record",
     "compiled",
     "signals",

@@ -1,28 +1,29 @@
-"""Runs the cases: one pool of processes draws them, another diagnoses them, and the truth is opened last.
+"""Runs the cases: each is drawn, then diagnosed, on any engine; on this machine by processes that do one of the two.
 
-At most `jobs` processes work at a time, so that the seconds of a diagnosis are its own.
+The truth is opened last, here. Each worker has one case at a time, so that the seconds of a diagnosis are its own.
 """
 
 from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
-from pzd.blind.case import Places, Scored
+from pzd.blind.case import Cost, Places, Scored
 from pzd.blind.config import BlindConfig
-from pzd.blind.diagnosis import Methods, diagnose_case
+from pzd.blind.diagnosis import COST, Methods, diagnose_case
 from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.hide_independent import hide_independent, plan_independent
 from pzd.blind.plan import PlannedCase, plan
 from pzd.blind.scoring import score_case
+from pzd.parallel.chunks import ChunkedWork
+from pzd.parallel.pools import Where
 from pzd.schema.errors import DataError
-from pzd.schema.jsonfile import read_json
-from pzd.schema.processes import spawned_pool
+from pzd.schema.jsonfile import read_json, write_json
 from pzd.schema.progress import Listener, Progress, no_listener
 
 
@@ -35,13 +36,15 @@ class Benchmark:
     places: Places
     made_from: str
     """Hash of everything that a case depends on but its number: cases with another one are done again."""
-    pool: Callable[[int], Executor] = spawned_pool
-    """Makes a pool of so many workers."""
+    where: Where
+    """Where the cases are drawn and diagnosed."""
     progress: Listener = no_listener
     """Hears of every case that is done."""
+    undrawn: dict[str, str] = field(default_factory=dict)
+    """Why a case could not be drawn, by its id; filled by `run`."""
 
     def run(self, jobs: int, *, afresh: bool = False) -> tuple[Scored, ...]:
-        """Every case's score; those that stand there finished are not done again.
+        """Every case's score but of those that could not be drawn; those that stand there finished are not done again.
 
         Parameters
         ----------
@@ -54,7 +57,7 @@ class Benchmark:
         if waiting:
             self._prepare(waiting)
             done |= self._worked(waiting, len(cases), jobs)
-        return tuple(done[case.id] for case in cases)
+        return tuple(done[case.id] for case in cases if case.id in done)
 
     def plan(self) -> tuple[PlannedCase, ...]:
         """Every case, in the order in which they are done."""
@@ -82,56 +85,44 @@ class Benchmark:
         begun = time.monotonic()
         found: dict[str, Scored] = {}
 
-        def kept(case: PlannedCase) -> None:
-            found[case.id] = score_case(
-                self.places, case.id, self.made_from, self.setup.control, keep_files=self.setup.blind.keep_files
-            )
-            left = (time.monotonic() - begun) / len(found) * (len(waiting) - len(found))
-            done = whole - len(waiting) + len(found)
-            self.progress(Progress(done, whole, f"cases, {_duration(left)} left"))
+        def keep(chunk: tuple[PlannedCase, ...], failures: Sequence[str | None]) -> None:
+            for case, failure in zip(chunk, failures, strict=True):
+                if failure is not None:
+                    self.undrawn[case.id] = failure
+                else:
+                    found[case.id] = score_case(
+                        self.places, case.id, self.made_from, self.setup.control, keep_files=self.setup.blind.keep_files
+                    )
+                    left = (time.monotonic() - begun) / len(found) * (len(waiting) - len(found))
+                    done = whole - len(waiting) + len(found)
+                    self.progress(Progress(done, whole, f"cases, {_duration(left)} left"))
 
-        draws = hide_independent if self.setup.blind.generator == "independent" else hide
-        drawing, seeking = (self.pool(min(jobs, len(waiting))) for _ in range(2))
-        try:
-            _in_turn(
-                waiting,
-                lambda case: drawing.submit(draws, self.setup, case, self.places),
-                lambda case: seeking.submit(diagnose_case, self.methods, self.places.case(case.id)),
-                kept,
-                jobs,
-            )
-        finally:
-            drawing.shutdown(cancel_futures=True)
-            seeking.shutdown(cancel_futures=True)
+        places = self.places.absolute
+        steps = (partial(_draw, self.setup, places), partial(_diagnose, self.methods, places))
+        ChunkedWork(steps, keep, self._lost, self.where).do([(case,) for case in waiting], jobs)
         return found
 
+    def _lost(self, case: PlannedCase, step: int, reason: str) -> str | None:
+        """Set a case aside: without a truth it has no score, without a diagnosis it is one that failed."""
+        if step == 0:
+            return reason
+        cost = Cost(seconds=0.0, diagnose_seconds=0.0, peak_memory_MB=0.0, failure=reason)
+        write_json(self.places.case(case.id) / COST, cost, self.setup.control)
+        return None
 
-def _in_turn(
-    cases: list[PlannedCase],
-    draw: Callable[[PlannedCase], Future[None]],
-    diagnose: Callable[[PlannedCase], Future[None]],
-    kept: Callable[[PlannedCase], None],
-    jobs: int,
-) -> None:
-    """Draw and diagnose every case, at most `jobs` at work; what is drawn is diagnosed first."""
-    waiting, drawn = list(reversed(cases)), list[PlannedCase]()
-    drawing: dict[Future[None], PlannedCase] = {}
-    seeking: dict[Future[None], PlannedCase] = {}
-    while waiting or drawn or drawing or seeking:
-        while len(drawing) + len(seeking) < jobs and (drawn or waiting):
-            if drawn:
-                case = drawn.pop()
-                seeking[diagnose(case)] = case
-            else:
-                case = waiting.pop()
-                drawing[draw(case)] = case
-        finished, _ = wait([*drawing, *seeking], return_when=FIRST_COMPLETED)
-        for future in finished:
-            future.result()
-            if future in drawing:
-                drawn.append(drawing.pop(future))
-            else:
-                kept(seeking.pop(future))
+
+def _draw(setup: BenchmarkSetup, places: Places, chunk: tuple[PlannedCase, ...]) -> None:
+    """Draw some cases."""
+    draws = hide_independent if setup.blind.generator == "independent" else hide
+    for case in chunk:
+        draws(setup, case, places)
+
+
+def _diagnose(methods: Methods, places: Places, chunk: tuple[PlannedCase, ...]) -> tuple[None, ...]:
+    """Diagnose some cases; nothing that a score would need is handed back."""
+    for case in chunk:
+        diagnose_case(methods, places.case(case.id))
+    return (None,) * len(chunk)
 
 
 def _duration(seconds: float) -> str:

@@ -103,6 +103,11 @@ class Places:
 
     folder: Path
 
+    @property
+    def absolute(self) -> Places:
+        """The same for a process that works in another folder."""
+        return Places(self.folder.absolute())
+
     def case(self, name: str) -> Path:
         """All that the diagnosis of a case sees and writes."""
         return self.folder / "cases" / name

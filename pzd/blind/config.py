@@ -6,6 +6,7 @@ from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from pzd.parallel.config import EngineConfig
 from pzd.rig.stand.config import StandTest
 from pzd.rig.stand.programmes import Warming
 from pzd.schema.model import Frozen
@@ -46,7 +47,7 @@ class TestPlan(Frozen):
         return {block["kind"] for block in blocks} == {"sine"} and len({b["frequency_Hz"] for b in blocks}) == 1
 
 
-class BlindConfig(Frozen):
+class BlindConfig(EngineConfig):
     """A benchmark of the diagnosis.
 
     The stand and the damper are those of `rig.virtual`, the jitter of the force from test to test that of

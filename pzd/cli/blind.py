@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 from typing import TYPE_CHECKING
 
-from pzd.cli.exits import DONE
+from pzd.cli.exits import DONE, UNTRUSTED
 from pzd.cli.options import CORES, RUNS, Config, Force, Jobs, Quiet, Runs, Set, Verbose
-from pzd.cli.output import Output
+from pzd.cli.output import Output, complain
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,6 +33,7 @@ def blind(
     from pzd.blind.benchmark import Benchmark, folder_of
     from pzd.blind.diagnosis import Methods
     from pzd.blind.summary import write
+    from pzd.parallel.pools import Where
     from pzd.pipeline.command import opened
 
     output = Output(quiet=quiet, verbose=verbose)
@@ -44,12 +45,14 @@ def blind(
         made_from = _made_from(whole)
         with given.placed():
             _entered(setup.blind, made_from, config.parent)
-        benchmark = Benchmark(setup, methods, places, made_from, progress=output.progress)
+        where = Where(setup.blind, FOLDER, config.parent, places.folder / "slurm")
+        benchmark = Benchmark(setup, methods, places, made_from, where, output.progress)
         cases = benchmark.run(jobs, afresh=force)
         tuning, generator = setup.blind.tuning, setup.blind.generator
         lines = write(cases, places.folder, setup.control, tuning=tuning, generator=generator)
     output.say(*lines, f"tables and picture: {places.folder}")
-    return DONE
+    complain(f"not to be trusted: case {name} could not be drawn: {why}" for name, why in benchmark.undrawn.items())
+    return UNTRUSTED if benchmark.undrawn else DONE
 
 
 def _setup(config: RunConfig) -> BenchmarkSetup:
@@ -84,9 +87,10 @@ def _entered(blind: BlindConfig, made_from: str, folder: Path) -> None:
 
 def _made_from(config: RunConfig) -> str:
     """Hash of the config's blocks and of the code that a case depends on."""
+    from pzd.parallel.config import HOW
     from pzd.pipeline.sources import code_hash
 
-    of_the_run = {"blind": {"cases", "keep_files", "ledger", "tuned_on", "tuning"}}
+    of_the_run = {"blind": {"cases", "keep_files", "ledger", "tuned_on", "tuning", *HOW}}
     blocks = config.model_dump_json(
         include={"seed", "control", "rig", "identify", "diagnose", "blind"}, exclude=of_the_run
     )

@@ -9,9 +9,10 @@ import numpy as np
 
 from pzd.artefacts import MeasureRow
 from pzd.artefacts.matching import same_motion
+from pzd.identify.repeating import cycles_of
 from pzd.identify.trial import warm_up
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
-from pzd.signals.cycles import Cycles, cycles
+from pzd.signals.cycles import Cycles
 from pzd.signals.reversals import reversals
 from pzd.signals.stretches import separate_tests
 from pzd.signals.work import work
@@ -97,7 +98,7 @@ def peak_speed(loop: Loop) -> float:
 
 def loop_of(record: Record) -> Loop:
     """The record's average cycle where its motion repeats, else all of it after the warm-up."""
-    run = cycles(record.time, record.displacement)
+    run = cycles_of(record)
     if run is None:
         start = warm_up(record.displacement)
         turns = len([i for i in reversals(record.displacement) if i >= start])

@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pzd.identify.repeating import cycles_of
 from pzd.identify.trial import Trial
 from pzd.record import Array, Record
-from pzd.signals.cycles import Cycles, cycles
+from pzd.signals.cycles import Cycles
 from pzd.signals.jumps import jumps, jumps_in_cycles
 from pzd.signals.nuisance import NuisanceConfig, columns_of
 
@@ -100,7 +101,7 @@ def parts_of(
             left,
             slope,
             columns_of(record.force[trial.counted] - left, record.rate, nuisance),
-            cycles(record.time, record.displacement) if constant else None,
+            cycles_of(record) if constant else None,
             constant,
         )
         for record, trial, left, slope in zip(

@@ -5,33 +5,35 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 
 from pzd.artefacts import Diagnosed
 from pzd.config import SweepConfig
+from pzd.parallel.chunks import ChunkedWork
+from pzd.parallel.config import HOW
+from pzd.parallel.pools import Where
 from pzd.pipeline.sources import code_hash
 from pzd.quantities import Control
 from pzd.runs import file_hash
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.jsonfile import read_json_list, write_json
 from pzd.schema.progress import Listener, Progress, no_listener
-from pzd.sweep.engines import ENGINES
 from pzd.sweep.gather import Results, write
 from pzd.sweep.page import decisive, page
 from pzd.sweep.plan import Task, tasks
 from pzd.sweep.scatter import check_scatter
-from pzd.sweep.task import TRIES, BaseRun, RunResult, config_of, outcomes, shared_stages
+from pzd.sweep.task import BaseRun, RunResult, config_of, outcomes, shared_stages
 
 FOLDER = "sweep"
 """Where a sweep lies beside the stages of the run."""
 _MADE_FROM = "made_from.sha256"
 _MOST_TOLD = 5
 """Failures that are printed; failed.csv holds all."""
-_HOW = {"engine", "address", "chunk"}
+_HOW = HOW | {"chunk"}
 """Keys of the block that change nothing of the results."""
 _AHEAD = 4
 """Chunks that wait at each worker: enough that none is idle, few enough that little is lost when it is stopped."""
@@ -72,7 +74,7 @@ class SweepRuns:
         """The control signal."""
         return self.base.opened.run.control
 
-    @property
+    @cached_property
     def chunks(self) -> tuple[tuple[Task, ...], ...]:
         """The runs in parts."""
         size = self.sweep.chunk
@@ -143,11 +145,16 @@ class SweepRuns:
         """
         self._prepare(afresh=afresh)
         waiting = [chunk for chunk in self.chunks if self._found(chunk) is None]
-        while waiting:
-            lost = self._in_parallel(waiting, jobs)
-            for chunk in lost:
-                self._alone(chunk)
-            waiting = [chunk for chunk in waiting if self._found(chunk) is None]
+        done = len(self.chunks) - len(waiting)
+
+        def keep(chunk: Sequence[Task], found: Sequence[RunResult]) -> None:
+            nonlocal done
+            self._keep(chunk, found)
+            done += 1
+            self.progress(Progress(done, len(self.chunks), f"chunks of {self.sweep.chunk} runs"))
+
+        where = Where(self.sweep, FOLDER, self.base.config.parent, self.folder / "slurm")
+        ChunkedWork((partial(outcomes, self.base.absolute),), keep, _lost, where, _AHEAD).do(waiting, jobs)
         return tuple(outcome for chunk in self.chunks for outcome in self._found(chunk) or ())
 
     def finished(self) -> tuple[RunResult, ...]:
@@ -208,48 +215,6 @@ class SweepRuns:
         }
         return hashlib.sha256(json.dumps([blocks, files, code_hash("pzd.sweep.task")]).encode()).hexdigest()
 
-    def _in_parallel(self, waiting: Sequence[tuple[Task, ...]], jobs: int) -> list[tuple[Task, ...]]:
-        """Do chunks at the same time; those that were at work when a process was killed, which ends the pool."""
-        left = iter(waiting)
-        flying: dict[Future[tuple[RunResult, ...]], tuple[Task, ...]] = {}
-        with ENGINES[self.sweep.engine](jobs, self.sweep.address) as pool:
-            while True:
-                for chunk in _some(left, _AHEAD * jobs - len(flying)):
-                    flying[pool.submit(outcomes, self.base, chunk)] = chunk
-                if not flying:
-                    return []
-                done, _ = wait(flying, return_when=FIRST_COMPLETED)
-                for future in done:
-                    try:
-                        found = future.result()
-                    except Exception:  # noqa: BLE001  # a run tells its own failures; this is the end of a process
-                        return list(flying.values())
-                    self._keep(flying.pop(future), found)
-                    self._announce()
 
-    def _alone(self, chunk: tuple[Task, ...]) -> None:
-        """Do a chunk run by run, each in a process of its own: one that kills it again and again is set aside."""
-        self._keep(chunk, [self._tried(task) for task in chunk])
-        self._announce()
-
-    def _tried(self, task: Task) -> RunResult:
-        reason: Exception | None = None
-        for _ in range(TRIES):
-            with ENGINES[self.sweep.engine](1, self.sweep.address) as pool:
-                try:
-                    return pool.submit(outcomes, self.base, (task,)).result()[0]
-                except Exception as error:  # noqa: BLE001  # a run tells its own failures; this is the process's end
-                    reason = error
-        return RunResult(task=task.number, failure=f"the process that did it was lost {TRIES} times: {reason}")
-
-    def _announce(self) -> None:
-        done = sum(self._path(chunk).exists() for chunk in self.chunks)
-        self.progress(Progress(done, len(self.chunks), f"chunks of {self.sweep.chunk} runs"))
-
-
-def _some(left: Iterator[tuple[Task, ...]], count: int) -> Iterator[tuple[Task, ...]]:
-    for _ in range(max(count, 0)):
-        chunk = next(left, None)
-        if chunk is None:
-            return
-        yield chunk
+def _lost(task: Task, step: int, reason: str) -> RunResult:
+    return RunResult(task=task.number, failure=reason)

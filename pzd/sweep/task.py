@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 from pzd.artefacts import Artefact, Diagnosed, Identified, Rides
 from pzd.config import RunConfig, validated
+from pzd.parallel.chunks import TRIES
 from pzd.pipeline.command import Opened, opened
 from pzd.pipeline.in_memory import InMemory, unaffected
 from pzd.pipeline.stages import Stage, stages
@@ -18,8 +19,6 @@ from pzd.schema.scalars import Scalar
 from pzd.sweep.plan import Task
 from pzd.sweep.scatter import scattered
 
-TRIES = 3
-"""How often a run is tried that fails by what is no mistake of the config or the data."""
 PLAIN = "-plain"
 """Ends the name of a ride on the damper before diagnose."""
 
@@ -41,6 +40,11 @@ class BaseRun:
     config: Path
     runs: Path
     overrides: tuple[str, ...]
+
+    @property
+    def absolute(self) -> BaseRun:
+        """The same for a process that works in another folder."""
+        return replace(self, config=self.config.absolute(), runs=self.runs.absolute())
 
     @property
     def opened(self) -> Opened:

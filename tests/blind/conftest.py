@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,8 @@ from pzd.blind.case import Places, Scored
 from pzd.blind.diagnosis import Methods
 from pzd.blind.hide import BenchmarkSetup
 from pzd.config import RunConfig, load
+from pzd.parallel import chunks
+from pzd.parallel.pools import Pools, Where
 
 SMALL = """
 rig:
@@ -56,14 +59,26 @@ def setup_of() -> Callable[[RunConfig], BenchmarkSetup]:
     return made
 
 
+@contextmanager
+def in_threads(where: Where, jobs: int, steps: int) -> Iterator[Pools]:
+    with ThreadPoolExecutor(jobs) as pool:
+        yield Pools([pool] * steps, jobs)
+
+
+@pytest.fixture
+def threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Threads in place of processes, which take long to start."""
+    monkeypatch.setattr(chunks, "ENGINES", {"local": in_threads})
+
+
 @pytest.fixture
 def benchmark_of(setup_of: Callable[[RunConfig], BenchmarkSetup]) -> Callable[[RunConfig, Path], Benchmark]:
-    """The benchmark of a config in a folder, threads in place of processes, which take long to start."""
+    """The benchmark of a config in a folder."""
 
     def made(config: RunConfig, folder: Path) -> Benchmark:
         setup = setup_of(config)
         methods = Methods(config.identify, config.diagnose, config.rig.limits, setup.control, config.seed)
-        return Benchmark(setup, methods, Places(folder), "test", ThreadPoolExecutor)
+        return Benchmark(setup, methods, Places(folder), "test", Where(setup.blind, "blind", folder, folder))
 
     return made
 

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
-from concurrent.futures import Executor
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pzd.artefacts import Diagnosed, Diagnosis
 from pzd.artefacts.diagnosed import Gap
-from pzd.blind import benchmark as module
 from pzd.blind.benchmark import Benchmark
 from pzd.blind.case import Places, Scored
 from pzd.blind.clean import Clean
@@ -32,6 +34,10 @@ from pzd.damper.compose import respond
 from pzd.damper.effects import nameable
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.parallel import chunks
+from pzd.parallel.chunks import ChunkedWork
+from pzd.parallel.engines import local
+from pzd.parallel.pools import Pools, Where
 from pzd.schema.errors import ConfigError
 from pzd.schema.processes import spawned_pool
 
@@ -51,6 +57,23 @@ blind:
   campaigns: [{name: one, tests: [{waveform: WAVE}]}]
 """.replace("WAVE", "{kind: sine, frequency_Hz: 1, amplitude_m: 0.02}")
 SECOND = SMALL.splitlines()[3].replace("{damper", "{setting: other, damper") + "\n"
+NOTHING_HIDDEN = """
+rig:
+  virtual:
+    - damper: {base: [{voltage_V: 0, T0_N: 301, C_Ns_per_m: 2720, k_N_per_m: 199000}]}
+      voltages_V: [0]
+      rate_Hz: 250
+      tests: [{waveform: {kind: sine, frequency_Hz: 1, amplitude_m: 0.02}}]
+blind:
+  seed: 77
+  cases: 8
+  kinds: {single: 0, pair: 0, none: 1, outside: 0}
+  campaigns:
+    - name: two_tests
+      tests:
+        - {waveform: {kind: sine, frequency_Hz: 1, amplitude_m: 0.02}, cycles: 4}
+        - {waveform: {kind: sine, frequency_Hz: 2, amplitude_m: 0.01}, cycles: 6}
+"""
 COSTS = {"seconds", "diagnose_seconds", "peak_memory_MB"}
 
 
@@ -59,6 +82,7 @@ def content(case: Scored) -> dict[str, object]:
 
 
 @pytest.mark.ci
+@pytest.mark.usefixtures("threads")
 def test_a_run_stops_and_goes_on_and_does_not_hang_on_the_number_of_processes(
     small: Small, benchmark_of: BenchmarkOf, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -77,13 +101,13 @@ def test_a_run_stops_and_goes_on_and_does_not_hang_on_the_number_of_processes(
     def refuse(*_: object) -> None:
         raise AssertionError("a finished case was begun again")
 
-    monkeypatch.setattr(module, "_in_turn", refuse)
+    monkeypatch.setattr(ChunkedWork, "do", refuse)
     assert benchmark_of(small(), tmp_path / "one").run(jobs=1) == both
 
 
 @pytest.mark.ci
 def test_cases_are_drawn_and_diagnosed_in_processes_of_their_own(
-    small: Small, benchmark_of: BenchmarkOf, tmp_path: Path
+    small: Small, benchmark_of: BenchmarkOf, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: list[int] = []
 
@@ -91,8 +115,8 @@ def test_cases_are_drawn_and_diagnosed_in_processes_of_their_own(
         begun.append(count)
         return spawned_pool(count)
 
-    benchmark = replace(benchmark_of(small("blind.cases=1"), tmp_path), pool=counted)
-    (case,) = benchmark.run(jobs=2)
+    monkeypatch.setattr(local, "spawned_pool", counted)
+    (case,) = benchmark_of(small("blind.cases=1"), tmp_path).run(jobs=2)
     assert begun == [1, 1]
     assert case.failure is None
     assert case.peak_memory_MB > 0.0
@@ -212,6 +236,91 @@ if __name__ == "__main__":
     while running(worker):
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+@pytest.mark.ci
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds processes in /proc")
+def test_scores_are_the_same_though_a_worker_and_then_the_benchmark_are_killed(tmp_path: Path) -> None:
+    path = tmp_path / "killed.yaml"
+    path.write_text(NOTHING_HIDDEN, encoding="utf-8")
+
+    def command(folder: str) -> list[str]:
+        return [sys.executable, "-m", "pzd", "blind", str(path), "--runs", str(tmp_path / folder), "--jobs", "2", "-q"]
+
+    def scores(folder: str) -> dict[str, dict[str, object]]:
+        found = {each.name: json.loads(each.read_text("utf-8")) for each in tmp_path.glob(f"{folder}/**/scored/*.json")}
+        return {name: {key: z for key, z in score.items() if key not in COSTS} for name, score in found.items()}
+
+    def wait_for(count: int) -> None:
+        deadline = time.monotonic() + 300.0
+        while len(scores("killed")) < count:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+
+    subprocess.run(command("whole"), check=True, cwd=ROOT)
+    with subprocess.Popen(command("killed"), cwd=ROOT) as benchmark:
+        wait_for(1)
+        os.kill(workers_of(benchmark.pid)[0], signal.SIGKILL)
+        wait_for(3)
+        left = workers_of(benchmark.pid)
+        benchmark.kill()
+    assert len(scores("killed")) < 8
+    deadline = time.monotonic() + 60.0
+    while any(running(worker) for worker in left):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    subprocess.run(command("killed"), check=True, cwd=ROOT)
+    assert len(scores("whole")) == 8
+    assert scores("killed") == scores("whole")
+    assert all(score["failure"] is None for score in scores("killed").values())
+
+
+def test_a_diagnosis_that_kills_its_process_every_time_is_a_failed_case(
+    small: Small, benchmark_of: BenchmarkOf, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _with_losses(monkeypatch, step=1)
+    benchmark = benchmark_of(small("blind.cases=1"), tmp_path)
+    (case,) = benchmark.run(jobs=1)
+    assert case.failure == "the process that did it was lost 3 times: it was killed"
+    assert case.verdict is None
+    assert benchmark.finished(benchmark.plan()) == {case.id: case}
+
+
+def test_a_case_that_cannot_be_drawn_has_no_score_and_is_told(
+    small: Small, benchmark_of: BenchmarkOf, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _with_losses(monkeypatch, step=0)
+    benchmark = benchmark_of(small("blind.cases=1"), tmp_path)
+    assert benchmark.run(jobs=1) == ()
+    assert benchmark.undrawn == {"00000": "the process that did it was lost 3 times: it was killed"}
+
+
+def _with_losses(monkeypatch: pytest.MonkeyPatch, step: int) -> None:
+    """Let every process of one step be lost."""
+
+    class Lost(ThreadPoolExecutor):
+        def submit(self, *given: Any, **more: Any) -> Future[Any]:
+            future: Future[Any] = Future()
+            future.set_exception(BrokenProcessPool())
+            return future
+
+    @contextmanager
+    def engine(where: Where, jobs: int, steps: int) -> Iterator[Pools]:
+        with Lost(jobs) as lost, ThreadPoolExecutor(jobs) as sound:
+            yield Pools([lost if i == step else sound for i in range(steps)], jobs)
+
+    monkeypatch.setattr(chunks, "ENGINES", {"local": engine})
+
+
+def workers_of(parent: int) -> list[int]:
+    """The processes of its pools."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            above = int((place / "stat").read_text().rpartition(")")[2].split()[1])
+            if above == parent and b"spawn_main" in (place / "cmdline").read_bytes():
+                found.append(int(place.name))
+    return found
 
 
 def running(process: int) -> bool:

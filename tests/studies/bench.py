@@ -1,64 +1,71 @@
-"""How long a user waits, and how fast the kernels are.
+"""How fast pzd is: each figure beside what is wanted, and beside a peer that does the same work.
 
-    python tests/studies/bench.py               both
-    python tests/studies/bench.py kernels       the kernels alone, beside other solvers; into runs/bench/bench.json
+    python tests/studies/bench.py                       all; into runs/bench/bench.json
+    python tests/studies/bench.py kernels stages        the force of a damper; fit, ride and comfort
+    python tests/studies/bench.py waits files diagnose campaign
 
-Prints each wait beside its limit, and exits 1 where one is above. No ratio of a kernel decides anything.
+Ratios are of processor time, taken in pairs in turn in one process, the median over the pairs. Waits are by the clock,
+so that they hold on an idle machine alone. No figure decides anything but what is printed beside it.
 """
 
 from __future__ import annotations
 
+import json
 import os
-import subprocess
+import platform
 import sys
 import tempfile
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 
-from bench_kernels import measure
+import bench_commands
+import bench_kernels
+import bench_stages
+from bench_table import PAIRS, Row
 
 ROOT = Path(__file__).resolve().parents[2]
-CONFIG = ROOT / "configs" / "quickstart.yaml"
-PAPER = ROOT / "configs" / "paper.yaml"
+OUT = ROOT / "runs" / "bench" / "bench.json"
 
 
-def seconds(*arguments: object, folder: Path) -> float:
-    """How long a command takes; it must exit 0."""
-    command = [sys.executable, "-m", "pzd", *map(str, arguments)]
-    folder.mkdir(exist_ok=True)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(folder / "cache")}
-    start = time.perf_counter()
-    subprocess.run(command, env=environment, cwd=folder, stdout=subprocess.DEVNULL, check=True)
-    return time.perf_counter() - start
+def parts(folder: Path) -> dict[str, Callable[[], Iterator[Row]]]:
+    """What can be asked for."""
+    return {
+        "kernels": bench_kernels.rows,
+        "stages": bench_stages.rows,
+        "waits": partial(bench_commands.waits, folder / "waits"),
+        "files": partial(bench_commands.files, folder),
+        "diagnose": partial(bench_commands.diagnoses, folder / "diagnose"),
+        "campaign": partial(bench_commands.campaign, folder / "campaign"),
+    }
 
 
-def waits(folder: Path) -> Iterator[tuple[str, float, float]]:
-    """What is waited for, how long it takes and how long it may take [s]."""
-    yield "pzd --help, best of 5", min(seconds("--help", folder=folder) for _ in range(5)), 0.2
-    yield "pzd run, nothing compiled yet", seconds("run", CONFIG, folder=folder), 30.0
-    yield "pzd run again, all fresh", seconds("run", CONFIG, folder=folder), 2.0
-    yield "pzd run, all anew, kernels compiled", seconds("run", CONFIG, "--runs", "anew", folder=folder), 10.0
-    yield "make figures, from nothing", seconds("figures", PAPER, folder=folder / "elsewhere"), 120.0
-
-
-def main() -> int:
-    """Measure and print."""
-    late = 0 if sys.argv[1:] == ["kernels"] else too_long()
-    measure(ROOT / "runs" / "bench" / "bench.json")
-    return 1 if late else 0
-
-
-def too_long() -> int:
-    """How many waits are above their limits; prints all of them."""
+def main() -> None:
+    """Measure, print a table, write it as JSON."""
+    found: list[Row] = []
     with tempfile.TemporaryDirectory() as name:
-        late = 0
-        for what, took, limit in waits(Path(name)):
-            late += took > limit
-            sys.stdout.write(f"{what:<40}{took:8.2f} s   at most {limit:g} s{'   TOO LONG' if took > limit else ''}\n")
-            sys.stdout.flush()
-    return late
+        known = parts(Path(name))
+        for part in sys.argv[1:] or known:
+            for row in known[part]():
+                row.say()
+                found.append(row)
+    met = sum(row.met is True for row in found)
+    sys.stdout.write(f"{met} of {sum(row.target is not None for row in found)} targets met\n")
+    busy = os.getloadavg()[0]
+    machine = {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count(), "load": busy}
+    versions = {"python": platform.python_version()} | {name: version(name) for name in ("numpy", "scipy", "numba")}
+    told = {
+        "machine": machine,
+        "versions": versions,
+        "pairs": PAIRS,
+        "rows": [{**asdict(row), "met": row.met} for row in found],
+    }
+    OUT.parent.mkdir(parents=True, exist_ok=True)
+    OUT.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    sys.stdout.write(f"written to {OUT}; load of the machine at the end {busy:.1f}\n")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

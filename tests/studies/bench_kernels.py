@@ -7,19 +7,13 @@ median over the pairs.
 
 from __future__ import annotations
 
-import json
 import math
-import os
-import platform
-import sys
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
-from pathlib import Path
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numba
 import numpy as np
+from bench_table import LEAST_SECONDS, PAIRS, Row, once, pairs
 from scipy.integrate import solve_ivp
 
 from pzd.damper.columns import STROKE_AND_FLOW
@@ -30,9 +24,9 @@ from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
 Array = np.ndarray
 STEP = 1e-3
 SAMPLES = 10_000
-PAIRS = 9
-LEAST_SECONDS = 0.02
-"""A side of a pair is repeated until it takes this long, so that the clock does not count."""
+SIZES = (1250, 2500, 5000, 10_000)
+LARGEST_ERROR = 1e-10
+"""Of a plain damper, as a share of the peak."""
 SUBSTEPS = 8
 TRUTH_SUBSTEPS = 8192
 """Of a Runge-Kutta scheme of order 4, which its kinks at stick make one of order 2: less than 1e-10 of peak is left."""
@@ -45,7 +39,7 @@ TARGETS = {
     ("orifice", "lsoda"): 500.0,
     ("moving voltage", "lsoda"): 300.0,
 }
-"""Ratios of issue 22."""
+"""Smallest ratios that are wanted."""
 
 
 @dataclass(frozen=True)
@@ -173,39 +167,31 @@ def compared(rng: np.random.Generator) -> Iterator[Compared]:
             yield Compared(work, peer, SAMPLES, PAIRS, ours_ns, errors[0], peer_ns, errors[1], ratio, target)
 
 
-def pairs(ours: Callable[[], Array], other: Callable[[], Array]) -> Iterator[tuple[float, float]]:
-    """Seconds for one call of each, taken in turn."""
-    for f in (ours, other):
-        f()  # compiles
-    counts = [max(1, math.ceil(LEAST_SECONDS / once(f))) for f in (ours, other)]
-    for _ in range(PAIRS):
-        yield tuple(once(f, count) for f, count in zip((ours, other), counts, strict=True))
+def rows(seed: int = 22) -> Iterator[Row]:
+    """Every comparison, growth with the samples, and what is not there."""
+    names = {"lsoda": f"solve_ivp LSODA {LSODA_TOLERANCE:g}", "rk4": f"numba RK4 of {SUBSTEPS} substeps"}
+    for one in compared(np.random.default_rng(seed)):
+        sides = f"{one.ours_ns:.3g} ns a sample, error {one.ours_error:.1e}; {one.peer_ns:.3g} ns, {one.peer_error:.1e}"
+        yield Row(f"force, {one.work}, beside {names[one.peer]}", one.ratio, "x", one.target, about=sides)
+        if (one.work, one.peer) == ("plain", "lsoda"):
+            yield Row("force, plain: error, share of the peak", one.ours_error, "", LARGEST_ERROR, at_least=False)
+    yield from _growth(np.random.default_rng(seed))
 
 
-def once(f: Callable[[], Array], count: int = 1) -> float:
-    """Seconds of the processor for one call, as the mean of so many."""
-    start = time.process_time()
-    for _ in range(count):
-        f()
-    return (time.process_time() - start) / count
+def _growth(rng: np.random.Generator) -> Iterator[Row]:
+    motion = multisine(rng)
+    for work, parameters in dampers(motion).items():
+        times = []
+        for count in SIZES:
+            part = Motion(*(channel[:count] for channel in (motion.time, motion.displacement, motion.velocity)),
+                          motion.acceleration[:count])  # fmt: skip
+            steps, some = sampling_steps(part.time), parameters[:count]
 
+            def force(part: Motion = part, steps: Array = steps, some: Array = some) -> Array:
+                return integrated_force(some, part, steps, 0.0, SIMULATION_TOLERANCE)
 
-def measure(path: Path) -> None:
-    """Compare, print a table, write it as JSON."""
-    say = sys.stdout.write
-    say("\nForce of a damper, nanoseconds for each sample, and largest error as a share of the peak\n")
-    say(f"{'damper':<16}{'ours':>8}{'error':>10}   {'other solver':<22}{'takes':>10}{'error':>10}{'ratio':>9}\n")
-    names = {"lsoda": f"solve_ivp LSODA {LSODA_TOLERANCE:g}", "rk4": f"numba RK4, {SUBSTEPS} substeps"}
-    found = []
-    for one in compared(np.random.default_rng(22)):
-        aim = "" if one.target is None else f"   wanted {one.target:g}"
-        say(f"{one.work:<16}{one.ours_ns:>8.1f}{one.ours_error:>10.1e}   {names[one.peer]:<22}{one.peer_ns:>10.0f}")
-        say(f"{one.peer_error:>10.1e}{one.ratio:>9.1f}{aim}\n")
-        sys.stdout.flush()
-        found.append(asdict(one))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    machine = {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count()}
-    versions = {"python": platform.python_version()} | {name: version(name) for name in ("numpy", "scipy", "numba")}
-    text = json.dumps({"machine": machine, "versions": versions, "step_s": STEP, "force": found}, indent=2)
-    path.write_text(text + "\n", encoding="utf-8")
-    say(f"written to {path}\n")
+            force()
+            times.append(min(once(force, math.ceil(LEAST_SECONDS / once(force))) for _ in range(5)))
+        exponent = float(np.polyfit(np.log(SIZES), np.log(times), 1)[0])
+        yield Row(f"force, {work}: growth with samples, exponent", exponent, "", 1.05, at_least=False,
+                  about=f"{SIZES[0]} to {SIZES[-1]} samples")  # fmt: skip

@@ -7,7 +7,7 @@ import math
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,11 +19,12 @@ import pytest
 from pzd.artefacts import Diagnosed, ParameterRow
 from pzd.config import SweepConfig
 from pzd.damper.model import BaseRow, Damper
+from pzd.parallel import chunks
+from pzd.parallel.pools import Pools, Where
 from pzd.pipeline.command import execute
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.progress import Progress
-from pzd.sweep import campaign as of_campaign
 from pzd.sweep.campaign import SweepRuns
 from pzd.sweep.gather import Results, write
 from pzd.sweep.page import page
@@ -60,15 +61,15 @@ def small(tmp_path: Path) -> Path:
 
 
 @contextmanager
-def in_threads(jobs: int, address: str | None) -> Iterator[Executor]:
+def in_threads(where: Where, jobs: int, steps: int) -> Iterator[Pools]:
     with ThreadPoolExecutor(jobs) as pool:
-        yield pool
+        yield Pools([pool] * steps, jobs)
 
 
 @pytest.fixture
 def threads(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every engine be threads of this process, which start at once."""
-    monkeypatch.setattr(of_campaign, "ENGINES", dict.fromkeys(("local", "dask"), in_threads))
+    monkeypatch.setattr(chunks, "ENGINES", dict.fromkeys(("local", "dask"), in_threads))
 
 
 def swept(path: Path, runs: Path, *overrides: str, jobs: int = 1) -> tuple[SweepRuns, tuple[RunResult, ...]]:
@@ -304,18 +305,18 @@ def test_a_run_that_kills_its_process_is_set_aside_and_the_others_go_on(
 
         def submit(self, function: Callable[..., Any], /, *given: Any, **more: Any) -> Future[Any]:
             future: Future[Any] = Future()
-            chunk: Sequence[Any] = given[1]
+            chunk: Sequence[Any] = given[0]
             if any(task.number == 3 for task in chunk):
                 future.set_exception(BrokenProcessPool("it was killed"))
                 return future
             return super().submit(function, *given, **more)
 
     @contextmanager
-    def engine(jobs: int, address: str | None) -> Iterator[Executor]:
+    def engine(where: Where, jobs: int, steps: int) -> Iterator[Pools]:
         with Killed(jobs) as pool:
-            yield pool
+            yield Pools([pool] * steps, jobs)
 
-    monkeypatch.setattr(of_campaign, "ENGINES", {"local": engine})
+    monkeypatch.setattr(chunks, "ENGINES", {"local": engine})
     _, found = swept(small, tmp_path)
     assert [outcome.task for outcome in found if outcome.failure] == [3]
     assert "lost 3 times: it was killed" in str(found[2].failure)

@@ -11,8 +11,9 @@ import numpy as np
 from pzd.artefacts.characteristics import Kind
 from pzd.artefacts.matching import same_motion
 from pzd.identify.characteristics.strokes import Stroke
+from pzd.identify.repeating import cycles_of
 from pzd.record import Array, Record
-from pzd.signals.cycles import cycles, settled
+from pzd.signals.cycles import settled
 from pzd.signals.reversals import reversals
 from pzd.signals.stretches import separate_tests
 
@@ -85,7 +86,7 @@ def _of_constant_speed(strokes: Sequence[Stroke], cycle: Cycle | None) -> list[S
 
 def settled_cycle(record: Record) -> Cycle | None:
     """The average of the cycles in which motion and force repeat, or the only cycle of a record that closes."""
-    run = cycles(record.time, record.displacement)
+    run = cycles_of(record)
     if run is None:
         return _single_cycle(record)
     run = settled(run, record.time, record.force)

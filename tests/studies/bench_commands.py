@@ -1,0 +1,156 @@
+"""How long a user waits: commands, many rig files, diagnose, a campaign of a sweep."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from bench_table import Row
+
+from pzd.damper.element import element_force
+
+ROOT = Path(__file__).resolve().parents[2]
+STUDIES = ROOT / "tests" / "studies"
+CONFIG = ROOT / "configs" / "quickstart.yaml"
+
+
+def run(*arguments: object, folder: Path, module: str = "pzd") -> tuple[float, float, str]:
+    """Seconds by the clock and of processors that a command takes, and what it prints; it must exit 0."""
+    command = [sys.executable, *(("-m", module) if module else ()), *map(str, arguments)]
+    folder.mkdir(exist_ok=True)
+    path = f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    environment = {**os.environ, "XDG_CACHE_HOME": str(folder / "cache"), "PYTHONPATH": path}
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(command)}: {done.stderr}")
+    wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout + done.stderr
+
+
+def waits(folder: Path) -> Iterator[Row]:
+    """What a user types first."""
+
+    def row(work: str, least: float, *arguments: object) -> Row:
+        wall, cpu, _ = run(*arguments, folder=folder)
+        return Row(work, wall, "s", least, at_least=False, about=f"{cpu:.3g} CPU-s")
+
+    yield min((row("pzd --help, best of 5", 0.2, "--help") for _ in range(5)), key=lambda row: row.figure)
+    yield row("quickstart, nothing compiled", 25.0, "run", CONFIG)
+    yield row("quickstart again, all fresh", 0.7, "run", CONFIG)
+    yield row("quickstart anew, compiled", 6.0, "run", CONFIG, "--runs", "anew")
+
+
+FILES, ROWS = 100, 10_000
+WHOLE = 1000
+RIG = """
+rig:
+  files:
+    - {path: files/*.csv}
+"""
+
+
+def files(folder: Path) -> Iterator[Row]:
+    """Rig CSVs to parameters.csv, their copies written; a tenth is done, and told ten times."""
+    place = folder / "many"
+    (place / "files").mkdir(parents=True)
+    rng = np.random.default_rng(22)
+    t = np.arange(ROWS) * 1e-3
+    header = "time_s,displacement_m,force_N,voltage_V"
+    for number in range(FILES):
+        voltage = 25.0 * (number % 5)
+        x = (0.01 + 0.02 * rng.random()) * np.sin(2.0 * np.pi * (0.5 + 2.0 * rng.random()) * t)
+        force = element_force(x, 1e-3, 300.0 + 5.0 * voltage, 2700.0, 2e5, 0.0)
+        force += 5.0 * rng.standard_normal(ROWS)
+        path = place / "files" / f"{'ab'[number % 2]}{number:04d}.csv"
+        columns = np.column_stack([t, x, force, np.full(ROWS, voltage)])
+        np.savetxt(path, columns, fmt="%.7g", delimiter=",", header=header, comments="")
+    for name, count in (("half", FILES // 2), ("many", FILES)):
+        (place / f"{name}.yaml").write_text(RIG.replace("*", "a*") if count < FILES else RIG, encoding="utf-8")
+    run("identify", place / "half.yaml", folder=place)  # compiles
+    times = {
+        (name, jobs): run("identify", place / f"{name}.yaml", "--force", "--runs", f"{name}-{jobs}", "--jobs", jobs,
+                          folder=place, module="pzd")
+        for name, jobs in (("half", 1), ("many", 1), ("many", 2))
+    }  # fmt: skip
+    scale = WHOLE / FILES
+    wall, cpu, said = times["many", 2]
+    fitting = float(re.search(r"identify\s+done in ([\d.]+) s", said)[1])
+    exponent = float(np.log2(times["many", 1][1] / times["half", 1][1]))
+    about = f"{FILES} files in {wall:.3g} s, {cpu:.3g} CPU-s; growth of time with files: exponent {exponent:.2f}"
+    yield Row("1,000 rig CSVs of 10^4 rows to parameters.csv", wall * scale, "s", 10.0, at_least=False, about=about)
+    yield Row("  of which the stage identify", fitting * scale, "s", 2.0, at_least=False)
+    yield Row("  with two processes beside one", times["many", 1][0] / wall, "x", 1.7)
+
+
+CAMPAIGNS = {"clean": 4.0, "rich": 20.0, "switching": 30.0}
+MEMORY_MB = 400.0
+
+
+def diagnoses(folder: Path) -> Iterator[Row]:
+    """Diagnose alone on the three campaigns of tests/studies/speed."""
+    script = STUDIES / "bench_diagnose.py"
+    folder.mkdir(exist_ok=True)
+
+    def measured(name: str, *more: object) -> dict[str, object]:
+        _, _, said = run(script, STUDIES / "speed" / f"{name}.yaml", *more, folder=folder, module="")
+        told: dict[str, object] = json.loads(said.splitlines()[-1])
+        return told
+
+    measured("clean", "--records", 4, "--samples", 2000)  # compiles
+    for name, target in CAMPAIGNS.items():
+        told = measured(name)
+        shares = ", ".join(f"{part} {share:.0%}" for part, share in told["shares"].items())
+        about = f"{told['cpu_seconds']:.3g} CPU-s; {shares}; {told['verdict']} {' '.join(told['effects'])}"
+        yield Row(f"diagnose, {name}", told["seconds"], "s", target, at_least=False, about=about)
+        yield Row("  peak memory", told["peak_memory_MB"], "MB", MEMORY_MB, at_least=False,
+                  about=f"{told['memory_before_MB']:.0f} MB before it began")  # fmt: skip
+    for what, sizes in (("samples", (1500, 3000, 6000)), ("records", (6, 11, 22))):
+        times = [float(measured("clean", f"--{what}", size)["cpu_seconds"]) for size in sizes]
+        exponent = float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
+        about = ", ".join(f"{size}: {spent:.3g} CPU-s" for size, spent in zip(sizes, times, strict=True))
+        yield Row(f"  growth with {what}, clean, exponent", exponent, "", 1.1, at_least=False, about=about)
+
+
+CAMPAIGN = {"identify": (2048, 128, "runs of 5 identifications"), "rides": (2048, 32, "rides of 60 s")}
+"""How many runs there are, how many are done, after half of them to see that the time of a run is constant."""
+WHOLE_S = 360.0
+MOST_MB = 2000.0
+
+
+def campaign(folder: Path) -> Iterator[Row]:
+    """10,240 identifications and 2048 rides of one minute, told from a part of them."""
+    whole, peak = 0.0, 0.0
+    for name, (count, draws, what) in CAMPAIGN.items():
+        config = STUDIES / "campaign" / f"{name}.yaml"
+        run("sweep", config, "--set", "sweep.draws=2", folder=folder)  # compiles
+        spent = []
+        for some in (draws // 2, draws):
+            place = ("--runs", f"runs-{some}")
+            run("sweep", config, *place, "--set", "sweep.draws=2", folder=folder)  # makes what all runs share
+            spent.append(run("sweep", config, *place, "--set", f"sweep.draws={some}", "--jobs", 2, folder=folder)[:2])
+        (half, half_cpu), (wall, cpu) = spent
+        each, each_cpu = (2.0 * (total - part) / draws for total, part in ((wall, half), (cpu, half_cpu)))
+        start = half_cpu - 0.5 * draws * each_cpu
+        whole += wall + each * (count - draws)
+        peak = max(peak, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024.0)
+        about = f"{each_cpu:.3g} CPU-s a run, {start:.2g} CPU-s once; {count} in {wall + each * (count - draws):.0f} s"
+        yield Row(f"campaign, {draws} {what}", wall, "s", about=about)
+    yield Row("campaign of 10,240 identifications and 2048 rides", whole, "s", WHOLE_S, at_least=False)
+    yield Row("  parent and two workers, as if each were the largest", 3.0 * peak, "MB", MOST_MB, at_least=False)
+
+
+def rows(folder: Path) -> Iterator[Row]:
+    """All."""
+    yield from waits(folder)
+    yield from files(folder)
+    yield from diagnoses(folder / "diagnose")
+    yield from campaign(folder / "campaign")
