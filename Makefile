@@ -52,7 +52,7 @@ blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the verdic
 	$(BIN)/pzd blind configs/blind.yaml
 
 .PHONY: bench
-bench: $(DEV)  ## Print how long a user waits, beside the limits, and how fast the kernels are beside other solvers
+bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that does the same work; half an hour
 	$(BIN)/python tests/studies/bench.py
 
 .PHONY: coverage-study

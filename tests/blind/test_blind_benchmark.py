@@ -122,6 +122,15 @@ def test_cases_are_drawn_and_diagnosed_in_processes_of_their_own(
     assert case.peak_memory_MB > 0.0
 
 
+@pytest.mark.ci
+def test_a_dask_cluster_gives_the_same_scores(small: Small, benchmark_of: BenchmarkOf, tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="pip install pzd[cluster]")
+    here = benchmark_of(small(), tmp_path / "here").run(jobs=2)
+    there = benchmark_of(small("blind.engine=dask"), tmp_path / "there").run(jobs=2)
+    assert [content(case) for case in there] == [content(case) for case in here]
+    assert [case.failure for case in there] == [None, None]
+
+
 def test_the_diagnosis_is_given_a_folder_without_the_truth(
     small: Small, setup_of: SetupOf, benchmark_of: BenchmarkOf, tmp_path: Path
 ) -> None:

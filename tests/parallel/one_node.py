@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import shutil
 import socket
 import subprocess
@@ -51,7 +50,7 @@ def _configured(folder: Path) -> Path:
     for name in ("state", "spool"):
         (folder / name).mkdir()
     key = folder / "munge.key"
-    key.write_bytes(secrets.token_bytes(1024))
+    key.write_bytes(os.urandom(1024))
     key.chmod(0o600)
     node = socket.gethostname().partition(".")[0]
     lines = {

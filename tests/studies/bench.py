@@ -2,7 +2,7 @@
 
     python tests/studies/bench.py                       all; into runs/bench/bench.json
     python tests/studies/bench.py kernels stages        the force of a damper; fit, ride and comfort
-    python tests/studies/bench.py waits files diagnose campaign
+    python tests/studies/bench.py waits files diagnose campaign engines
 
 Ratios are of processor time, taken in pairs in turn in one process, the median over the pairs. Waits are by the clock,
 so that they hold on an idle machine alone. No figure decides anything but what is printed beside it.
@@ -22,6 +22,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import bench_commands
+import bench_engines
 import bench_kernels
 import bench_stages
 from bench_table import PAIRS, Row
@@ -38,6 +39,7 @@ def parts(folder: Path) -> dict[str, Callable[[], Iterator[Row]]]:
         "waits": partial(bench_commands.waits, folder / "waits"),
         "files": partial(bench_commands.files, folder),
         "diagnose": partial(bench_commands.diagnoses, folder / "diagnose"),
+        "engines": bench_engines.rows,
         "campaign": partial(bench_commands.campaign, folder / "campaign"),
     }
 

@@ -22,12 +22,21 @@ STUDIES = ROOT / "tests" / "studies"
 CONFIG = ROOT / "configs" / "quickstart.yaml"
 
 
-def run(*arguments: object, folder: Path, module: str = "pzd") -> tuple[float, float, str]:
-    """Seconds by the clock and of processors that a command takes, and what it prints; it must exit 0."""
+def run(*arguments: object, folder: Path, module: str = "pzd", afresh: bool = False) -> tuple[float, float, str]:
+    """Seconds by the clock and of processors that a command takes, and what it prints; it must exit 0.
+
+    Parameters
+    ----------
+    arguments : of the command
+    folder : in which it runs
+    module : that is run; empty where the first argument is a script
+    afresh : whether its kernels are those of the folder alone
+    """
     command = [sys.executable, *(("-m", module) if module else ()), *map(str, arguments)]
     folder.mkdir(exist_ok=True)
     path = f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    environment = {**os.environ, "XDG_CACHE_HOME": str(folder / "cache"), "PYTHONPATH": path}
+    own = {"XDG_CACHE_HOME": str(folder / "cache")} if afresh else {}
+    environment = {**os.environ, **own, "PYTHONPATH": path}
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode != 0:
@@ -40,7 +49,7 @@ def waits(folder: Path) -> Iterator[Row]:
     """What a user types first."""
 
     def row(work: str, least: float, *arguments: object) -> Row:
-        wall, cpu, _ = run(*arguments, folder=folder)
+        wall, cpu, _ = run(*arguments, folder=folder, afresh=True)
         return Row(work, wall, "s", least, at_least=False, about=f"{cpu:.3g} CPU-s")
 
     yield min((row("pzd --help, best of 5", 0.2, "--help") for _ in range(5)), key=lambda row: row.figure)
@@ -146,11 +155,3 @@ def campaign(folder: Path) -> Iterator[Row]:
         yield Row(f"campaign, {draws} {what}", wall, "s", about=about)
     yield Row("campaign of 10,240 identifications and 2048 rides", whole, "s", WHOLE_S, at_least=False)
     yield Row("  parent and two workers, as if each were the largest", 3.0 * peak, "MB", MOST_MB, at_least=False)
-
-
-def rows(folder: Path) -> Iterator[Row]:
-    """All."""
-    yield from waits(folder)
-    yield from files(folder)
-    yield from diagnoses(folder / "diagnose")
-    yield from campaign(folder / "campaign")
