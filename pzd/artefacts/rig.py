@@ -74,7 +74,7 @@ class IngestRow(Frozen):
     record: str
     file: str
     """Name of the file, without its folder."""
-    step: Literal["read", "left out", "rename", "unit", "sign", "value", "cut", "fixture"]
+    step: Literal["read", "left out", "rename", "unit", "sign", "value", "cut", "clock", "fixture"]
     quantity: str | None
     """The quantity concerned; empty for the file as a whole."""
     was: str

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pzd.record import Array
 
-_MEMORY_S = 20.0
+MEMORY_S = 20.0
 """The 0.4 Hz high-pass forgets as exp(-1.8 t): after 20 s nothing is left that could wrap round."""
 _RAMP_S = 1.0
 """The last value runs out over this time: a drop to zero would ring at the Nyquist frequency."""
@@ -123,7 +123,7 @@ def weighted(acceleration: Array, rate: float, weighting: Weighting = WK) -> Arr
 
     ramp = 0.5 + 0.5 * np.cos(np.linspace(0.0, np.pi, round(_RAMP_S * rate)))
     whole = np.concatenate([acceleration, acceleration[-1] * ramp])
-    length = next_fast_len(whole.size + round(_MEMORY_S * rate), real=True)
+    length = next_fast_len(whole.size + round(MEMORY_S * rate), real=True)
     frequency = (np.arange(length // 2 + 1) * (rate / length)).astype(np.float64)
     spectrum = np.fft.rfft(whole, length)
     spectrum *= response(weighting, frequency)

@@ -6,6 +6,7 @@ import inspect
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from types import ModuleType
 
 from pzd.damper.effect import Effect, Place
@@ -71,6 +72,7 @@ def functions(effect: Effect, module: ModuleType) -> dict[str, Callable[..., flo
     return {name: vars(module)[name] for name in LAWS[effect.place] if callable(vars(module).get(name))}
 
 
+@cache
 def arguments(function: Callable[..., float]) -> tuple[str, ...]:
     """Names of what a function takes."""
     return tuple(inspect.signature(function).parameters)

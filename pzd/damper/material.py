@@ -5,7 +5,7 @@ Over temperature first, at each voltage, then over voltage; the effects of the m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -47,7 +47,13 @@ def material(damper: Damper, voltage: Array | float | None, temperature: Array |
     at_nodes = np.stack([_over_temperature(rows, temperature) for _, rows in groups])
     nodes = np.array([node for node, _ in groups])
     values = _over_voltage(nodes, at_nodes, np.atleast_1d(0.0 if voltage is None else voltage))
-    return values * _factors(damper, None if voltage is None else np.atleast_1d(voltage), temperature)
+    at = None if voltage is None else np.atleast_1d(voltage)
+    given = {
+        effect.name: {p.name: column(damper, effect.name, p.name, at) for p in effect.parameters}
+        for effect in acting("material")
+        if effect.name in damper.effects
+    }
+    return values * material_factors(given, temperature, damper.reference_temperature_degC)
 
 
 def by_voltage(rows: Sequence[BaseRow]) -> list[tuple[float, list[BaseRow]]]:
@@ -101,10 +107,12 @@ def _over_voltage(nodes: Array, at_nodes: Array, voltage: Array) -> Array:
     """Piecewise linear over the first axis of (m, n or 1, 3), held beyond its ends."""
     if nodes.size == 1:
         return np.broadcast_to(at_nodes[0], (max(voltage.size, at_nodes.shape[1]), 3))
+    if at_nodes.shape[1] == 1:
+        return np.stack([np.interp(voltage, nodes, column) for column in at_nodes[:, 0].T], axis=-1)
     inside = np.clip(voltage, nodes[0], nodes[-1])
     left = np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, nodes.size - 2)
     share = ((inside - nodes[left]) / (nodes[left + 1] - nodes[left]))[:, None]
-    columns = np.arange(at_nodes.shape[1]) if at_nodes.shape[1] > 1 else np.zeros(1, dtype=int)
+    columns = np.arange(at_nodes.shape[1])
     below, above = at_nodes[left, columns], at_nodes[left + 1, columns]
     return np.asarray(below + share * (above - below))
 
@@ -113,15 +121,26 @@ _FACTORS = {"friction_factor": 0, "damping_factor": 1, "stiffness_factor": 2}
 """Laws of the material by the column of T0, C and k that they multiply."""
 
 
-def _factors(damper: Damper, voltage: Array | None, temperature: Array | float | None) -> Array:
-    """(n, 3) or (1, 3) product of the factors of every material effect on T0, C and k."""
+def material_factors(
+    effects: Mapping[str, Mapping[str, Array]], temperature: Array | float | None, reference: float | None
+) -> Array:
+    """(n, 3) or (1, 3) product of the factors of every material effect on T0, C and k.
+
+    Parameters
+    ----------
+    effects : parameters by effect and name, (1,) or (n,) each; those of other places are not looked at
+    temperature : (n,) or a number [degC]; None where the damper has a single one: then nothing acts
+    reference : at which the factors are 1 [degC]
+    """
     factors = np.ones((1, 3))
     for effect in acting("material"):
-        if effect.name not in damper.effects or temperature is None:
+        if effect.name not in effects or temperature is None:
             continue
-        given = {p.name: column(damper, effect.name, p.name, voltage) for p in effect.parameters}
-        given["temperature"] = np.atleast_1d(np.asarray(temperature, dtype=np.float64))
-        given["reference"] = np.array([damper.reference_temperature_degC or 0.0])
+        given = {
+            **effects[effect.name],
+            "temperature": np.atleast_1d(np.asarray(temperature, dtype=np.float64)),
+            "reference": np.array([reference or 0.0]),
+        }
         for name, law in functions(effect, module_of(effect)).items():
             factor = np.atleast_1d(law(**{argument: given[argument] for argument in arguments(law)}))
             factors = np.repeat(factors, max(factor.size // len(factors), 1), axis=0)

@@ -118,7 +118,8 @@ def _slopes(
     """Derivatives of the rate of the integrated variable by itself and by time."""
     p = row_in(step, at)
     if explicit:
-        by_y = -p[K] * stroke_slope(y, side, p) / smooth_slope(w, p, side)
+        rise = relief_slope(p, side) if regime == RELIEF else smooth_slope(w, p, side)
+        by_y = -p[K] * stroke_slope(y, side, p) / rise
     else:
         nudge = _NUDGE * max(y, p[K] * 1e-9)
         by_y = (_rate(y + nudge, w, at, regime, side, step, explicit) - rate) / nudge

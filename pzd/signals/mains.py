@@ -66,8 +66,6 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
     -------
     (n,) in the unit of the channel; zero where no line stands out
     """
-    from scipy.signal import zoom_fft
-
     wave, rate = np.zeros(values.size), (values.size - 1) / float(time[-1] - time[0])
     if np.count_nonzero(wanted) <= 2 * len(HARMONICS):
         return wave
@@ -77,6 +75,8 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
             continue
         if line(values, rate, mains, cycle) <= least:
             continue
+        from scipy.signal import zoom_fft  # it takes 0.7 s to load, and few records hum
+
         points = 1 + int(np.ceil(2.0 * LINES_OFF * values.size / rate / _STEP))
         near = np.linspace(mains - LINES_OFF, mains + LINES_OFF, points)
         spectrum = zoom_fft(level * np.hanning(level.size), [near[0], near[-1]], m=points, fs=rate, endpoint=True)

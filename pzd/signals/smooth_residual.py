@@ -68,10 +68,12 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array) -> Sm
     for _ in range(ROUNDS):
         noise = autoregression([residual - explained]).with_white(QUIETEST)
         flat = noise.whitened(residual)
-        left, sizes, right = np.linalg.svd(noise.whitened(terms), full_matrices=False)
+        whitened = noise.whitened(terms)
+        _, sizes, right = np.linalg.svd(np.linalg.qr(whitened, mode="r"))
         rank = int(np.count_nonzero(sizes > SINGULAR * sizes[0]))
-        to_samples = terms @ (right[:rank].T / sizes[:rank])
-        taken = left[:, :rank].T @ flat
+        orthonormal = right[:rank].T / sizes[:rank]
+        to_samples = terms @ orthonormal
+        taken = orthonormal.T @ (whitened.T @ flat)
         explained = to_samples @ taken
     spread = np.sum(to_samples**2, axis=1) if noise.innovation > 0.0 else np.zeros(residual.size)
     free = flat.size - rank - noise.coefficients.size

@@ -36,12 +36,11 @@ KM_PER_H = 1.0 / 3.6
 DEFAULT_CONTROLLED = "comfort"
 """The policy that the report sets beside the others where the config does not say."""
 
-_UNFIT = {
-    "wheels with mass": "damps the motion of wheels with mass, and those of this car have none; give simulate.car "
-    "unsprung_mass_kg and tyre_stiffness_N_per_m, or leave it out",
-    "wheels without mass": "predicts a car whose wheels follow the road, and those of this car have mass; leave it out",
-}
-"""Why a policy that fits certain cars alone cannot be ridden on another one."""
+_UNFIT = (
+    "damps the motion of wheels with mass, and those of this car have none; give simulate.car unsprung_mass_kg and "
+    "tyre_stiffness_N_per_m, or leave it out"
+)
+"""Why a policy that fits wheels with mass alone cannot be ridden on the paper's car."""
 
 
 class CarBlock(Frozen):
@@ -240,11 +239,9 @@ class SimulateConfig(Frozen):
         return self
 
     def _policies_fit_the_car(self) -> None:
-        mine = "wheels with mass" if self.car.car().wheels_have_mass else "wheels without mass"
         for number, name in enumerate(self.policies or ()):
-            fits = policies()[name].fits
-            if fits not in ("any car", mine):
-                raise ValueError(f"policies.{number}: {name} {_UNFIT[fits]}")
+            if policies()[name].fits == "wheels with mass" and not self.car.car().wheels_have_mass:
+                raise ValueError(f"policies.{number}: {name} {_UNFIT}")
 
     def _bounds_consistent(self) -> None:
         given = (self.c_min_Ns_per_m is not None, self.c_max_Ns_per_m is not None)

@@ -2,70 +2,172 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 
-from pzd.artefacts import AXLE_COLUMNS, Ending, FoundRow, Response, RideRow, Rides, SpectrumRow, WheelRow
+from pzd.artefacts import (
+    AXLE_COLUMNS,
+    Ending,
+    FoundRow,
+    Response,
+    Ride,
+    RideRow,
+    Rides,
+    SpectrumRow,
+    SummaryRow,
+    WeightedRow,
+    WheelRow,
+)
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.outcome import POINT, Outcome, ride_of, summary_row, wheel_rows
+from pzd.simulate.pieces import Pieces, Rows, longest_piece
 from pzd.simulate.plan import Case
-from pzd.simulate.riding import Held
+from pzd.simulate.riding import Clock, Held, Take
 from pzd.simulate.roads.sine import Sine
 from pzd.simulate.vibration import vibration
-from pzd.simulate.window import Window, event_of, of_event, settled
+from pzd.simulate.window import Event, Window, event_of, of_event, settled
 
 _DEMANDED, _VOLTAGE = AXLE_COLUMNS[-2:]
 
 
-def gathered(
-    config: SimulateConfig,
-    planned: Sequence[Case],
-    outcomes: Sequence[tuple[Held, Outcome]],
-    with_voltage: bool,
-    responses: tuple[Response, ...],
-) -> Rides:
-    """The artefact of the stage.
+@dataclass(frozen=True, eq=False)
+class RideRows:
+    """One ride as the artefact holds it: its history, and a row or more of each table."""
+
+    ride: Ride
+    summary: SummaryRow
+    ridden: RideRow
+    wheels: tuple[WheelRow, ...]
+    weighted: WeightedRow
+    spectrum: tuple[SpectrumRow, ...]
+    found: tuple[FoundRow, ...]
+
+
+def rows_of_ride(
+    config: SimulateConfig, case: Case, held: Held, outcome: Outcome, window: Window, ending: Ending, voltage: bool
+) -> RideRows:
+    """Take the numbers of a ride in its window.
 
     Parameters
     ----------
     config : the block
-    planned : the cases
-    outcomes : of each case, what it held constant and how it went
-    with_voltage : whether the rig has a control signal
-    responses : to a step of the voltage
-
-    Returns
-    -------
-    histories, and a row or more of each table a case
+    case, held, outcome : what was ridden, what it held constant, and how it went
+    window, ending : in which it is judged, and how its motion ends
+    voltage : whether the rig has a control signal
     """
-    windows: dict[str, tuple[Window, Ending]] = {}
-    for road in config.roads:
-        windows |= _windows(config, road.name, planned, outcomes)
-    static = config.car.car().static_loads()
-    rides, summary, ridden, weighted = [], [], [], []
-    wheels: list[WheelRow] = []
-    spectrum: list[SpectrumRow] = []
-    found: list[FoundRow] = []
-    for case, (held, outcome) in zip(planned, outcomes, strict=True):
-        name, (window, ending) = case.name, windows[case.name]
-        rides.append(ride_of(name, outcome, _left_out(case, with_voltage)))
-        summary.append(summary_row(name, case.road.name, case.policy.name, case.fidelity, outcome, window))
-        ridden.append(_ride_row(case, held, outcome.step, window, ending, with_voltage))
-        found += _found_rows(name, held)
-        wheels += wheel_rows(name, outcome, window, static)
-        fundamental = case.road.frequency_Hz if isinstance(case.road, Sine) else None
-        felt = vibration(name, POINT, outcome.comfort, outcome.step, window, fundamental)
-        weighted.append(felt.weighted)
-        spectrum += felt.spectrum
-    return Rides(
-        tuple(rides),
-        tuple(summary),
-        tuple(ridden),
-        tuple(wheels),
-        tuple(weighted),
-        tuple(spectrum),
-        responses,
-        tuple(found),
+    rows = _in_window(config, case, outcome, window)
+    return _of_rows(case, held, outcome, window, ending, voltage, rows)
+
+
+def _in_window(config: SimulateConfig, case: Case, outcome: Outcome, window: Window, lead: int | None = None) -> Rows:
+    """The numbers of a ride, or of a piece of it, in a window."""
+    name = case.name
+    fundamental = case.road.frequency_Hz if isinstance(case.road, Sine) else None
+    felt = vibration(name, POINT, outcome.comfort, outcome.step, window, fundamental, lead or 0)
+    bands = felt.spectrum
+    if lead is not None and fundamental is not None:
+        bands = vibration(name, POINT, outcome.comfort, outcome.step, window, None).spectrum
+    return (
+        summary_row(name, case.road.name, case.policy.name, case.fidelity, outcome, window),
+        tuple(wheel_rows(name, outcome, window, config.car.car().static_loads())),
+        felt.weighted,
+        felt.spectrum,
+        bands,
     )
+
+
+def _of_rows(
+    case: Case, held: Held, outcome: Outcome, window: Window, ending: Ending, voltage: bool, rows: Rows
+) -> RideRows:
+    summary, wheels, felt, spectrum, _ = rows
+    return RideRows(
+        ride_of(case.name, outcome, _left_out(case, voltage)),
+        summary,
+        _ride_row(case, held, outcome.step, window, ending, voltage),
+        tuple(wheels),
+        felt,
+        tuple(spectrum),
+        tuple(_found_rows(case.name, held)),
+    )
+
+
+class Gathering:
+    """Rides are judged as soon as their window is known, and then forgotten but for their histories.
+
+    On a road that goes on and on that is at once, and a long ride is judged piece by piece while it goes. Those over a
+    single event wait for each other, since they are judged over the same time.
+    """
+
+    def __init__(self, config: SimulateConfig, with_voltage: bool) -> None:
+        """Gather the rides of a config, on a rig with a control signal or without one."""
+        self._config, self._with_voltage = config, with_voltage
+
+    def of_ride(
+        self, case: Case, ridden: Callable[[Case, Take | None], tuple[Held, Outcome]]
+    ) -> RideRows | tuple[Held, Outcome]:
+        """Ride a case, and judge it unless it goes over a single event.
+
+        Parameters
+        ----------
+        case : the case
+        ridden : rides it, see `Setup.ridden`
+        """
+        if event_of(case.road, self._config) is not None:
+            return ridden(case, None)
+        clock = Clock.of(self._config)
+        window = settled(self._config.settle_s, clock.step, clock.steps)
+        if clock.steps < longest_piece(clock.step) or case.policy.tuned == "schedule":
+            held, outcome = ridden(case, None)
+            return rows_of_ride(self._config, case, held, outcome, window, "end of the ride", self._with_voltage)
+        pieces = Pieces(window.first, clock.step, partial(_in_window, self._config, case))
+        held, outcome = ridden(case, pieces.take)
+        rows = pieces.joined(outcome)
+        return _of_rows(case, held, outcome, window, "end of the ride", self._with_voltage, rows)
+
+    def all(
+        self,
+        planned: Sequence[Case],
+        rides: Sequence[RideRows | tuple[Held, Outcome]],
+        responses: tuple[Response, ...],
+    ) -> Rides:
+        """The artefact of the stage.
+
+        Parameters
+        ----------
+        planned : the cases
+        rides : of each case what `of_ride` gave
+        responses : to a step of the voltage
+
+        Returns
+        -------
+        histories, and a row or more of each table a case
+        """
+        every = {case.name: ride for case, ride in zip(planned, rides, strict=True) if isinstance(ride, RideRows)}
+        for road in self._config.roads:
+            over = [(c, r) for c, r in zip(planned, rides, strict=True) if c.road.name == road.name]
+            event = event_of(road, self._config)
+            if event is not None and over:
+                every |= self._over_event(event, [(c, *ride) for c, ride in over if not isinstance(ride, RideRows)])
+        found = [every[case.name] for case in planned]
+        return Rides(
+            tuple(one.ride for one in found),
+            tuple(one.summary for one in found),
+            tuple(one.ridden for one in found),
+            tuple(row for one in found for row in one.wheels),
+            tuple(one.weighted for one in found),
+            tuple(row for one in found for row in one.spectrum),
+            responses,
+            tuple(row for one in found for row in one.found),
+        )
+
+    def _over_event(self, event: Event, ridden: Sequence[tuple[Case, Held, Outcome]]) -> dict[str, RideRows]:
+        """All rides over the single event of one road, judged over the same time."""
+        window, endings = of_event(event, ridden[0][2].step, [outcome.comfort for _, _, outcome in ridden])
+        return {
+            case.name: rows_of_ride(self._config, case, held, outcome, window, ending, self._with_voltage)
+            for (case, held, outcome), ending in zip(ridden, endings, strict=True)
+        }
 
 
 def _found_rows(case: str, held: Held) -> Iterator[FoundRow]:
@@ -87,23 +189,6 @@ def _found_rows(case: str, held: Held) -> Iterator[FoundRow]:
             voltage_1_V=one,
             voltage_2_V=two,
         )
-
-
-def _windows(
-    config: SimulateConfig, road: str, planned: Sequence[Case], outcomes: Sequence[tuple[Held, Outcome]]
-) -> dict[str, tuple[Window, Ending]]:
-    """The window of all rides over one road, and how the motion of each ends, by case."""
-    pairs = zip(planned, outcomes, strict=True)
-    mine = [(case, outcome) for case, (_, outcome) in pairs if case.road.name == road]
-    if not mine:
-        return {}
-    case, first = mine[0]
-    event = event_of(case.road, config)
-    if event is None:
-        window = settled(config.settle_s, first.step, len(first.comfort) - 1)
-        return {case.name: (window, "end of the ride") for case, _ in mine}
-    window, endings = of_event(event, first.step, [outcome.comfort for _, outcome in mine])
-    return {case.name: (window, ending) for (case, _), ending in zip(mine, endings, strict=True)}
 
 
 def _left_out(case: Case, with_voltage: bool) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ from pzd.simulate.ride_model import (
     RoadCoefficients,
     Vehicle,
 )
+from pzd.simulate.spline import spline_at
 from pzd.simulate.tyre import press
 
 
@@ -33,20 +34,11 @@ def road_at(road_coefficients: RoadCoefficients, distance: float) -> tuple[float
     height = road_coefficients.amplitude * math.sin(phase)
     slope = road_coefficients.amplitude * road_coefficients.wavenumber * math.cos(phase)
     curvature = -road_coefficients.wavenumber * road_coefficients.wavenumber * height
-    count = road_coefficients.coefficients.shape[0]
-    if count == 0:
+    if road_coefficients.coefficients.size == 0:
         return height, slope, curvature
-    place = distance / road_coefficients.spacing
-    if place <= 0.0:
-        return height + road_coefficients.coefficients[0, 0], slope, curvature
-    knot = min(int(place), count - 1)
-    c = road_coefficients.coefficients[knot]
-    if place >= count:
-        d = road_coefficients.spacing
-        return height + c[0] + d * (c[1] + d * (c[2] + d * c[3])), slope, curvature
-    d = (place - knot) * road_coefficients.spacing
-    height += c[0] + d * (c[1] + d * (c[2] + d * c[3]))
-    return height, slope + c[1] + d * (2.0 * c[2] + 3.0 * d * c[3]), curvature + 2.0 * c[2] + 6.0 * d * c[3]
+    spacing = road_coefficients.spacing
+    above, rising, bending = spline_at(road_coefficients.coefficients, distance / spacing)
+    return height + above, slope + rising / spacing, curvature + bending / (spacing * spacing)
 
 
 @compiled

@@ -46,9 +46,9 @@ from pzd.simulate.ride_model import (
 from pzd.simulate.stepper import advance, choose_side
 from pzd.table.kernel import table_voltage
 
-OUTSIDE, STEPS_DONE = range(2)
-"""Steps beyond what the rig reached, and steps done."""
-TALLIES = 2
+OUTSIDE, STEPS_DONE, NEXT_PIECE = range(3)
+"""Steps beyond what the rig reached, steps done, and length of the piece of a step to try next [s]."""
+TALLIES = 3
 _SAME_PLACE = 1e-9
 """Of an interval of a schedule: the clock meets its beginning but for rounding."""
 A_K, LOAD_1, LOAD_2, TRAVEL, LOST = range(5)
@@ -208,6 +208,8 @@ def ride(
     model: RideModel,
     control: Array,
     workspace: Array,
+    first: int,
+    last: int,
     steps: int,
     h: float,
     tolerance: float,
@@ -219,33 +221,32 @@ def ride(
     stages: Array,
     end: Array,
 ) -> None:
-    """Ride from time 0 through a number of steps.
+    """Ride on, from one step to another; from step 0 on at rest.
 
     Parameters
     ----------
     y : (n,) state; changed in place
     model, control, workspace : see `ride_model`
-    steps, h : number and length of the steps of integration [s]
+    first, last : steps to be kept, the last one not
+    steps, h : number and length of the steps of integration in the whole ride [s]
     tolerance : see `advance`
     per_control, per_output : steps between two acts of the controller, and between two rows of the history
-    course : (steps + 1, COURSE_COLUMNS) what is kept of every step, filled
+    course : (last - first, COURSE_COLUMNS) what is kept of these steps, filled
     history : (steps // per_output + 1, COLUMNS) filled
     tally : (TALLIES,) filled; fewer steps are done where the table ends
     stages, end : room to work in, see `advance`
     """
     scratch = stages[STAGES]
-    motion(0.0, y, model, control, workspace, scratch)
-    for i in range(2):
-        control[SIDE, i] = 1.0 if workspace[RATE, i] >= 0.0 else -1.0
-        if model.control_spec.jumps and workspace[RATE, i] == 0.0:
-            choose_side(i, 0.0, y, model, control, workspace, scratch)
-    dt = h
-    for n in range(steps + 1):
+    if first == 0:
+        tally[NEXT_PIECE] = h
+        _start(y, model, control, workspace, scratch)
+    dt = tally[NEXT_PIECE]
+    for n in range(first, last):
         time = n * h
         if n % per_control == 0:
             set_control(time, y, model, control, workspace, scratch)
         motion(time, y, model, control, workspace, scratch)
-        _keep(y, workspace, course[n])
+        _keep(y, workspace, course[n - first])
         tally[STEPS_DONE] = n
         if math.isnan(workspace[COMFORT, 0]):
             return
@@ -255,3 +256,14 @@ def ride(
             _note(time, y, model, control, workspace, history[n // per_output])
         if n < steps:
             dt = advance(time, h, y, model, control, workspace, tolerance, min(dt, h), stages, end)
+    tally[NEXT_PIECE] = dt
+
+
+@inlined
+def _start(y: Array, model: RideModel, control: Array, workspace: Array, scratch: Array) -> None:
+    """Find to which side each axle sets off, or that it sticks."""
+    motion(0.0, y, model, control, workspace, scratch)
+    for i in range(2):
+        control[SIDE, i] = 1.0 if workspace[RATE, i] >= 0.0 else -1.0
+        if model.control_spec.jumps and workspace[RATE, i] == 0.0:
+            choose_side(i, 0.0, y, model, control, workspace, scratch)

@@ -35,7 +35,7 @@ class Policy:
     meaning: str
     """What it does, in one sentence."""
     aim: Aim
-    fits: Literal["any car", "wheels with mass", "wheels without mass"] = "any car"
+    fits: Literal["any car", "wheels with mass"] = "any car"
     """Which cars it can be ridden on."""
     controlled: bool = False
     """Whether it answers to the ride, so that the report sets it beside the others; False for what stays as it is."""

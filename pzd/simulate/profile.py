@@ -8,10 +8,20 @@ import numpy as np
 
 from pzd.record import Array
 
+_AT_KNOTS = np.array([1.0, 26.0, 66.0, 26.0, 1.0]) / 120.0
+_SLOPE = np.array([-1.0, -10.0, 0.0, 10.0, 1.0]) / 24.0
+_CURVATURE = np.array([1.0, 2.0, -6.0, 2.0, 1.0]) / 6.0
+"""Of the basis spline of degree five: its value at the knots, and its derivatives there by the place in knots."""
+_BAND = 4
+_BLOCK = 200_000
+"""Knots whose coefficients are solved for at a time, so that the room for it does not grow with the road."""
+_OVERLAP = 100
+"""Knots over which an end is felt: each coefficient is 0.43 of the one before, and 0.43^100 is 1e-36."""
+
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """One harmonic plus a cubic spline over distance; either may be absent.
+    """One harmonic plus a spline of degree five over distance; either may be absent.
 
     The spline is flat before its first and behind its last knot.
     """
@@ -22,13 +32,13 @@ class Profile:
     """Of the harmonic [rad/m]."""
     spacing: float = 1.0
     """Distance between two knots of the spline [m]."""
-    coefficients: Array = field(default_factory=lambda: np.zeros((0, 4)))
-    """(n, 4) height = c0 + c1 d + c2 d^2 + c3 d^3 with d the distance behind knot i."""
+    coefficients: Array = field(default_factory=lambda: np.zeros(0))
+    """(n + 4,) of the spline over n knots [m], see `pzd.simulate.spline`."""
 
     @property
     def smooth(self) -> bool:
         """Whether the harmonic is the whole road."""
-        return len(self.coefficients) == 0
+        return self.coefficients.size == 0
 
     def height(self, distance: Array) -> Array:
         """Height of the road.
@@ -44,28 +54,46 @@ class Profile:
         harmonic: Array = self.amplitude * np.sin(self.wavenumber * distance)
         if self.smooth:
             return harmonic
-        count = len(self.coefficients)
-        place = np.clip(distance / self.spacing, 0.0, count)
-        knot = np.minimum(place.astype(int), count - 1)
-        d = (place - knot) * self.spacing
-        c = self.coefficients[knot]
-        total: Array = harmonic + c[:, 0] + d * (c[:, 1] + d * (c[:, 2] + d * c[:, 3]))
-        return total
+        from pzd.simulate.spline import fill_values
+
+        splined = np.empty(len(distance))
+        fill_values(self.coefficients, np.asarray(distance, dtype=np.float64) / self.spacing, splined)
+        return harmonic + splined
 
 
 def through(heights: Array, spacing: float) -> Profile:
-    """The twice continuously differentiable road through given heights, level at both ends.
+    """The four times continuously differentiable road through given heights, level at both ends.
 
     Parameters
     ----------
-    heights : (n,) at equal distances [m]
+    heights : (n,) at equal distances [m], two or more
     spacing : distance between them [m]
 
     Returns
     -------
     the profile above its first height; before the first and behind the last knot the height is held
     """
-    from scipy.interpolate import CubicSpline
+    coefficients = np.empty(len(heights) + 4)
+    for first in range(0, len(heights), _BLOCK):
+        start, stop = max(first - _OVERLAP, 0), min(first + _BLOCK + _OVERLAP, len(heights))
+        last = min(first + _BLOCK, len(heights)) if stop < len(heights) else len(heights) + 4
+        coefficients[first:last] = _solved(heights[start:stop] - heights[0])[first - start : last - start]
+        if last > len(heights):
+            break
+    return Profile(spacing=spacing, coefficients=coefficients)
 
-    spline = CubicSpline(spacing * np.arange(len(heights)), heights - heights[0], bc_type="clamped")
-    return Profile(spacing=spacing, coefficients=np.ascontiguousarray(spline.c[::-1].T))
+
+def _solved(heights: Array) -> Array:
+    """(n + 4,) coefficients through (n,) heights, slope and curvature 0 at both ends."""
+    from scipy.linalg import solve_banded
+
+    count = len(heights) + 4
+    band, right = np.zeros((2 * _BAND + 1, count)), np.zeros(count)
+    right[2:-2] = heights
+    for n in range(5):
+        band[_BAND + 2 - n, n : count - 4 + n] = _AT_KNOTS[n]
+    for n in range(5):
+        for row, weights in ((0, _SLOPE), (1, _CURVATURE)):
+            band[_BAND + row - n, n] = weights[n]
+            band[_BAND + 4 - row - n, count - 5 + n] = weights[n]
+    return np.asarray(solve_banded((_BAND, _BAND), band, right))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from pzd.record import Array
 from pzd.schema.errors import DataError
 from pzd.simulate.car import HalfCar
 from pzd.simulate.config import KM_PER_H, SimulateConfig
@@ -17,6 +19,7 @@ from pzd.simulate.linear import ride_exactly
 from pzd.simulate.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALLIES, ride
 from pzd.simulate.minimise import LEAST_LOAD, TIE_BREAKS
 from pzd.simulate.outcome import Outcome
+from pzd.simulate.pieces import longest_piece
 from pzd.simulate.plan import Case
 from pzd.simulate.precompile import wait
 from pzd.simulate.prediction.planning import LEVELS, predictor_of
@@ -45,6 +48,8 @@ from pzd.simulate.ride_model import (
     workspace,
 )
 
+Take = Callable[[int, Array], None]
+"""Takes the rows of the course from a step on, which are written over afterwards."""
 _FIDELITIES = {"ideal": IDEAL, "table": TABLE, "dynamic": DYNAMIC}
 _AIMS = {
     "damping": FEEDBACK,
@@ -150,6 +155,7 @@ def ride_case(
     damper: DynamicDamper,
     ends: bool,
     held: Held | None = None,
+    take: Take | None = None,
 ) -> Outcome:
     """Ride one case.
 
@@ -161,6 +167,7 @@ def ride_case(
     grid, damper : the damper as table and with its dynamics
     ends : whether the table ends where the rig did, so that a ride beyond is refused
     held : by default what the config says
+    take : takes the course piece by piece, so that the outcome has none; by default it has all of it
 
     Returns
     -------
@@ -173,7 +180,7 @@ def ride_case(
     wait()
     car, clock, held = config.car.car(), Clock.of(config), held or Held.of(config, grid)
     speed = config.vehicle_speed_km_per_h * KM_PER_H
-    linear = case.fidelity == "ideal" and case.policy.aim == "damping" and not car.wheels_have_mass
+    linear = take is None and case.fidelity == "ideal" and case.policy.aim == "damping" and not car.wheels_have_mass
     if linear and profile.smooth:
         frequency = profile.wavenumber * speed / (2.0 * np.pi)
         return ride_exactly(
@@ -207,38 +214,48 @@ def ride_case(
         ),
     )
     sharper = _SWITCHED if case.policy.aim != "voltage" and case.fidelity == "dynamic" else 1.0
-    return ride_of_model(model, clock, sharper * config.tolerance, case.name, ends)
+    return ride_of_model(model, clock, sharper * config.tolerance, case.name, ends, take)
 
 
-def ride_of_model(model: RideModel, clock: Clock, tolerance: float, name: str, ends: bool) -> Outcome:
+def ride_of_model(
+    model: RideModel, clock: Clock, tolerance: float, name: str, ends: bool, take: Take | None = None
+) -> Outcome:
     """Ride from rest on a level start, and balance the energies; see `ride_case`."""
     acts, scratch, y = control(model.control_spec.voltage), workspace(), at_rest(model.car)
-    course = np.zeros((clock.steps + 1, COURSE_COLUMNS))
+    count = clock.steps + 1
+    course = np.zeros((count if take is None else min(longest_piece(clock.step), count), COURSE_COLUMNS))
     history = np.zeros((clock.steps // clock.per_output + 1, COLUMNS))
     tally = np.zeros(TALLIES)
     before = stored_energy(0.0, y, model, acts, scratch)
-    ride(
-        y,
-        model,
-        acts,
-        scratch,
-        clock.steps,
-        clock.step,
-        tolerance,
-        clock.per_control,
-        clock.per_output,
-        course,
-        history,
-        tally,
-        np.zeros((STAGES + 1, y.size)),
-        np.zeros(y.size),
-    )
-    if tally[STEPS_DONE] < clock.steps or not np.all(np.isfinite(y)):
-        raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(scratch[1])))))
+    stages, end = np.zeros((STAGES + 1, y.size)), np.zeros(y.size)
+    for first in range(0, count, len(course)):
+        last = min(first + len(course), count)
+        ride(
+            y,
+            model,
+            acts,
+            scratch,
+            first,
+            last,
+            clock.steps,
+            clock.step,
+            tolerance,
+            clock.per_control,
+            clock.per_output,
+            course,
+            history,
+            tally,
+            stages,
+            end,
+        )
+        if tally[STEPS_DONE] < last - 1 or not np.all(np.isfinite(y)):
+            raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(scratch[1])))))
+        if take is not None:
+            take(first, course[: last - first])
     change = stored_energy(clock.steps * clock.step, y, model, acts, scratch) - before
     return Outcome(
         history=history,
-        course=course,
+        course=course if take is None else np.zeros((0, COURSE_COLUMNS)),
         step=clock.step,
         outside=float(tally[OUTSIDE] / (clock.steps + 1)),
         energy_error=balance_error(change, y),

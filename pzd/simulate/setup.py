@@ -14,11 +14,12 @@ from pzd.signals.root_mean_square import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.dynamic_damper import DynamicDamper
 from pzd.simulate.outcome import VOLTAGES, Outcome
+from pzd.simulate.pieces import PIECE_S, MeanSquare
 from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
 from pzd.simulate.profile import Profile
 from pzd.simulate.ride_model import TableArrays
-from pzd.simulate.riding import Held, RideFound, ride_case
+from pzd.simulate.riding import Held, RideFound, Take, ride_case
 from pzd.simulate.schedule_search import ScheduleSearch, best_schedule, sampled, square_waves
 from pzd.simulate.tuning import best_value, damping_range
 from pzd.simulate.window import event_of
@@ -44,8 +45,8 @@ class Setup:
     ends: bool
     """Whether the table ends where the rig did."""
 
-    def ridden(self, case: Case) -> tuple[Held, Outcome]:
-        """Ride one case; what its policy holds constant stands beside the ride.
+    def ridden(self, case: Case, take: Take | None = None) -> tuple[Held, Outcome]:
+        """Ride one case; what its policy holds constant stands beside the ride; see `ride_case` for `take`.
 
         Raises
         ------
@@ -61,10 +62,10 @@ class Setup:
             low, high = (math.log(c) for c in damping_range(self.grid, self.config.coefficients))
             best = best_value(lambda c: self._a_w(case, replace(held, damping=math.exp(c))), low, high)
             held = replace(held, damping=math.exp(best))
-        return held, self._ride(self.config, case, held)
+        return held, self._ride(self.config, case, held, take)
 
-    def _ride(self, config: SimulateConfig, case: Case, held: Held) -> Outcome:
-        return ride_case(config, case, self.profiles[case.road.name], self.grid, self.oil, self.ends, held)
+    def _ride(self, config: SimulateConfig, case: Case, held: Held, take: Take | None = None) -> Outcome:
+        return ride_case(config, case, self.profiles[case.road.name], self.grid, self.oil, self.ends, held, take)
 
     def _best_found(self, case: Case) -> tuple[Held, Outcome]:
         """The most comfortable of the other policies and of the schedules of a search, within the bound on the load."""
@@ -129,7 +130,10 @@ class Setup:
     def _a_w(self, case: Case, held: Held) -> float:
         """Weighted r.m.s. of the acceleration at K of a ride [m/s2], from the settling time or the event on."""
         rough = self.config.model_copy(update={"tolerance": max(self.config.tolerance, _SEARCH_TOLERANCE)})
-        outcome = self._ride(rough, case, held)
-        event = event_of(case.road, self.config)
-        first = round((self.config.settle_s if event is None else event.entry) / outcome.step)
-        return rms(weighted(outcome.comfort, 1.0 / outcome.step)[first:])
+        event, step = event_of(case.road, self.config), self.config.integration_step_s
+        first = round((self.config.settle_s if event is None else event.entry) / step)
+        if self.config.duration_s > PIECE_S:
+            mean = MeanSquare(first, step)
+            self._ride(rough, case, held, mean.take)
+            return mean.root()
+        return rms(weighted(self._ride(rough, case, held).comfort, 1.0 / step)[first:])

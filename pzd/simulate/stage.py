@@ -11,6 +11,7 @@ from pzd.artefacts import Diagnosed, Rides, Table
 from pzd.simulate.config import SimulateConfig
 
 if TYPE_CHECKING:
+    from pzd.simulate.gathering import RideRows
     from pzd.simulate.outcome import Outcome
     from pzd.simulate.plan import Case
     from pzd.simulate.riding import Held
@@ -40,7 +41,7 @@ def simulate(
     """
     from pzd.simulate.config import KM_PER_H
     from pzd.simulate.dampers import check_inertance, dynamic_damper_of, grid_of, table_of
-    from pzd.simulate.gathering import gathered
+    from pzd.simulate.gathering import Gathering
     from pzd.simulate.limits import checked_temperature, checked_voltage
     from pzd.simulate.plan import cases
     from pzd.simulate.response import responses
@@ -64,11 +65,13 @@ def simulate(
         check_inertance(oil, simulate.car.car())
         setups[plain] = Setup(simulate, profiles, grid, oil, table.notes.outside == "error")
 
-    def ridden(case: Case) -> tuple[Held, Outcome]:
+    gathering = Gathering(simulate, with_voltage)
+
+    def ridden(case: Case) -> RideRows | tuple[Held, Outcome]:
         log.info("simulate: %s", case.name)
-        return setups[case.plain].ridden(case)
+        return gathering.of_ride(case, setups[case.plain].ridden)
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
-        outcomes = list(pool.map(ridden, planned))
+        rides = list(pool.map(ridden, planned))
     answered = responses(simulate, diagnosed.damper, temperature) if with_voltage else ()
-    return gathered(simulate, planned, outcomes, with_voltage, answered)
+    return gathering.all(planned, rides, answered)

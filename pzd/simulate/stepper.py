@@ -2,7 +2,7 @@
 
 The right-hand side is continuous but for the crossing of V = 0 where a dry friction turns round:
 there the step is cut at the crossing, and the axle goes on slipping or sticks. Everywhere else the
-embedded error halves the step as often as the tolerance asks.
+embedded error shortens the step as often as the tolerance asks.
 """
 
 from __future__ import annotations
@@ -30,10 +30,14 @@ from pzd.simulate.ride_model import (
 SCALES = np.array([1e-2, 1e-2, 1e-1, 1e-1, 1e-3, 1e-3, 10.0, 10.0, 10.0, 10.0, 1e-2, 1e-2, 1e-1, 1e-1, 10.0])
 """A motion of ordinary size, below which the error is absolute: m, rad, m/s, rad/s, m, J; wheels: m, m/s, J."""
 
-_CROSSED = 1e-9  # m/s on the other side of zero
+_CROSSED = 1e-9  # m/s on the other side of zero: the moment lies between this speed and twice as much
+_PUSHED = 1e-6  # m/s2: an axle that sticks slips between no push and this one
 _SMALLEST = 1e-6  # of the step: what is taken whatever the error
-_SHARP = 1e-13  # of the step: how closely the moment is found at which an axle turns round or sticks
+_SHARP = 1e-13  # of the step: how closely the moment is found at which an axle turns round or sticks, where it jumps
 _MOST_CUTS = 50
+_AIM = 0.5  # of what is let pass: where the moment is looked for
+_INSIDE = 1e-3  # of a bracket: no guess is closer to its ends
+_HALVED = 4  # every so many guesses the bracket is halved, so that it shrinks whatever the law
 
 
 @inlined
@@ -92,15 +96,81 @@ def choose_side(
 
 
 @inlined
-def leaver(control: Array, workspace: Array) -> int:
-    """The first axle that has left its side of V = 0 or its stick, by the workspace as it is; -1 where none has."""
-    for i in range(2):
-        side = control[SIDE, i]
-        if side == 0.0 and max(workspace[REBOUND_PUSH, i], workspace[COMPRESSION_PUSH, i]) > 0.0:
-            return i
-        if side * workspace[RATE, i] < -_CROSSED:
-            return i
-    return -1
+def beyond(control: Array, workspace: Array, axle: int) -> float:
+    """How far an axle has left its side of V = 0 or its stick, as a share of what is let pass; not above 0 before."""
+    side = control[SIDE, axle]
+    if side == 0.0:
+        return float(max(workspace[REBOUND_PUSH, axle], workspace[COMPRESSION_PUSH, axle]) / _PUSHED)
+    return float(-side * workspace[RATE, axle] / _CROSSED - 1.0)
+
+
+@inlined
+def farthest(model: RideModel, control: Array, workspace: Array) -> float:
+    """The larger `beyond` of both axles; -1 where the force does not jump at V = 0."""
+    if not model.control_spec.jumps:
+        return -1.0
+    return max(beyond(control, workspace, 0), beyond(control, workspace, 1))
+
+
+@inlined
+def guess(number: int, shortest: float, longest: float, before: float, behind: float) -> float:
+    """Where in a bracket the moment may lie at which an axle leaves its side or its stick.
+
+    Source: false position; Dowell and Jarratt 1971, BIT 11 (Illinois), with a halving now and then
+
+    Parameters
+    ----------
+    number : of guesses before
+    shortest, longest : the bracket [s]
+    before, behind : `farthest` at its ends, or half of it where an end did not move
+    """
+    share = 0.5
+    if number % _HALVED != _HALVED - 1:
+        share = min(max((_AIM - before) / (max(behind, 1.0) - before), _INSIDE), 1.0 - _INSIDE)
+    return shortest + share * (longest - shortest)
+
+
+@compiled
+def cut(
+    time: float,
+    longest: float,
+    sharp: float,
+    before: float,
+    y: Array,
+    model: RideModel,
+    control: Array,
+    workspace: Array,
+    stages: Array,
+    end: Array,
+) -> tuple[float, float]:
+    """Cut a piece of a step right behind a moment at which an axle leaves its side or its stick.
+
+    Parameters
+    ----------
+    time, longest : start and length of the piece, at the end of which they have changed [s]
+    sharp : how closely the moment is found where `farthest` jumps there [s]
+    before : `farthest` at the start, below 0
+    y, model, control, workspace, stages, end : see `advance`
+
+    Returns
+    -------
+    the length that is left [s], and its embedded error, see `trial`
+    """
+    shortest, behind, moved, number = 0.0, farthest(model, control, workspace), 0, 0
+    while longest - shortest > sharp:
+        dt = guess(number, shortest, longest, before, behind)
+        worst = trial(time, dt, y, model, control, workspace, stages, end)
+        now = farthest(model, control, workspace)
+        if 0.0 < now <= 1.0:
+            return dt, worst
+        if now > 0.0:
+            before *= 0.5 if moved > 0 else 1.0
+            longest, behind, moved = dt, now, 1
+        else:
+            behind *= 0.5 if moved < 0 else 1.0
+            shortest, before, moved = dt, min(now, -_AIM), -1
+        number += 1
+    return longest, trial(time, longest, y, model, control, workspace, stages, end)
 
 
 @compiled
@@ -122,7 +192,7 @@ def advance(
     ----------
     time, h : start and length of the step [s]
     y : (n,) state; changed in place
-    model, control, workspace : see `ride_model`
+    model, control, workspace : see `ride_model`; the workspace as `motion` left it at the start
     tolerance : largest local error as a share of the motion; infinite for a fixed step
     first : length of the first piece to try [s]
     stages, end : room to work in, (STAGES + 1, n) and (n,)
@@ -132,33 +202,32 @@ def advance(
     length of the piece to try next [s]
     """
     done, dt, cuts = 0.0, first, 0
-    shortest, longest = 0.0, math.inf
+    before = min(farthest(model, control, workspace), -_AIM)
     while done < h * (1.0 - 1e-12):
-        dt = min(dt, h - done)
+        dt = tried = min(dt, h - done)
         worst = trial(time + done, dt, y, model, control, workspace, stages, end)
+        if cuts < _MOST_CUTS and farthest(model, control, workspace) > 0.0:
+            dt, worst = cut(time + done, dt, _SHARP * h, before, y, model, control, workspace, stages, end)
+            cuts += 1
         growth = 0.9 * (tolerance / max(worst, 1e-3 * tolerance)) ** 0.2 if tolerance < math.inf else 5.0
-        if worst > tolerance and dt > _SMALLEST * h and longest == math.inf:
+        if worst > tolerance and dt > _SMALLEST * h:
             dt *= max(growth, 0.1)
-            continue
-        axle = leaver(control, workspace) if model.control_spec.jumps and cuts < _MOST_CUTS else -1
-        if axle >= 0:
-            longest = dt
-        elif longest < math.inf:
-            shortest = dt
-        if longest - shortest > _SHARP * h and longest < math.inf:
-            dt = 0.5 * (shortest + longest)
-            continue
-        if longest < math.inf and axle < 0:
-            dt = longest
             continue
         for n in range(y.size):
             y[n] = end[n]
         done += dt
         if model.damper.slips and model.control_spec.fidelity == DYNAMIC:
             remember_step(time + done, model, control, workspace)
-        dt *= min(growth, 5.0)
-        if axle >= 0:
-            cuts += 1
-            shortest, longest, dt = 0.0, math.inf, h - done
-            choose_side(axle, time + done, y, model, control, workspace, stages[STAGES])
+        if model.control_spec.jumps:
+            _choose_sides(time + done, y, model, control, workspace, stages[STAGES])
+            before = min(farthest(model, control, workspace), -_AIM)
+        dt = tried if dt < tried else dt * min(growth, 5.0)
     return dt
+
+
+@inlined
+def _choose_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array) -> None:
+    """Let every axle that is beyond its side slip to the other one or stick."""
+    for i in range(2):
+        if beyond(control, workspace, i) > 0.0:
+            choose_side(i, time, y, model, control, workspace, dy)

@@ -46,3 +46,17 @@ class Unevenness(Road):
         spacing = self.length_m / _KNOTS
         place = spacing * np.arange(round(self.start_m / spacing) + _KNOTS + 2)
         return through(self.height_m * self.shape(np.clip((place - self.start_m) / self.length_m, 0.0, 1.0)), spacing)
+
+
+def flanked(along: Array, flank: float) -> Array:
+    """Height as a share of its largest: up over a flank, level, and down over another one.
+
+    Equation: (1 - cos(pi min(s, 1 - s, f) / f)) / 2
+
+    Parameters
+    ----------
+    along : (n,) share s of the length, 0 to 1
+    flank : share f of the length that each flank takes, up to a half
+    """
+    rise = np.minimum(np.minimum(along, 1.0 - along), flank) / flank
+    return np.asarray(0.5 * (1.0 - np.cos(np.pi * rise)))

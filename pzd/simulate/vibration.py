@@ -8,6 +8,7 @@ import numpy as np
 
 from pzd.artefacts import SpectrumRow, WeightedRow
 from pzd.comfort.iso2631_1997 import evaluate
+from pzd.comfort.measures import maximum_transient
 from pzd.comfort.spectrum import Components, harmonics, third_octaves
 from pzd.comfort.weighting import WK, weighted
 from pzd.record import Array
@@ -29,7 +30,7 @@ class Vibration:
 
 
 def vibration(
-    case: str, point: str, acceleration: Array, step: float, window: Window, fundamental: float | None
+    case: str, point: str, acceleration: Array, step: float, window: Window, fundamental: float | None, lead: int = 0
 ) -> Vibration:
     """Weight the whole ride from its start, then keep the window.
 
@@ -40,13 +41,15 @@ def vibration(
     step : [s]
     window : in which the ride is judged
     fundamental : frequency of the road, None where it is not harmonic [Hz]
+    lead : steps before the window into which the running r.m.s. of its first second reaches
 
     Returns
     -------
     what the passenger feels
     """
     rate = 1.0 / step
-    found = evaluate(weighted(acceleration, rate)[window.steps], rate)
+    history = weighted(acceleration, rate)
+    found = evaluate(history[window.steps], rate)
     row = WeightedRow(
         case=case,
         point=point,
@@ -54,7 +57,7 @@ def vibration(
         duration_s=found.duration,
         a_w_m_per_s2=found.a_w,
         peak_m_per_s2=found.peak,
-        MTVV_m_per_s2=found.mtvv,
+        MTVV_m_per_s2=maximum_transient(history[window.first - lead : window.last + 1], rate) if lead else found.mtvv,
         VDV_m_per_s1_75=found.vdv,
     )
     parts, method = components(acceleration[window.steps], rate, fundamental)

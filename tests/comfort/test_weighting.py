@@ -41,6 +41,33 @@ def test_the_same_formula_without_the_upward_step_gives_wd() -> None:
     assert np.abs(factors(WD, "f_nominal_Hz") / table - 1.0)[kept].max() < 0.0062
 
 
+@pytest.mark.parametrize("weighting", [WK, WD], ids=["Wk", "Wd"])
+def test_the_response_is_the_analytic_one_from_half_a_hertz_to_80(weighting: Weighting) -> None:
+    rows = [row for row in printed() if 0.49 < row["f_true_Hz_10^(n/10)"] < 81.0]
+    name = "Wk" if weighting is WK else "Wd"
+    table = np.array([row[f"{name}_x1000_analytic_at_true"] for row in rows])
+    found = 1000.0 * np.abs(response(weighting, np.array([row["f_true_Hz_10^(n/10)"] for row in rows])))
+    assert len(rows) == 23
+    assert np.abs(found / table - 1.0).max() < 1e-4
+
+
+@pytest.mark.parametrize("weighting", [WK, WD], ids=["Wk", "Wd"])
+@pytest.mark.parametrize("rate", [200.0, 250.0, 1000.0, 4000.0])
+def test_a_sine_at_every_true_centre_is_weighted_to_a_thousandth_at_any_rate(weighting: Weighting, rate: float) -> None:
+    """Over whole periods of a settled sine, by its projection on sine and cosine."""
+    name = "Wk" if weighting is WK else "Wd"
+    for row in printed():
+        frequency = row["f_true_Hz_10^(n/10)"]
+        if not 0.49 < frequency < 81.0:
+            continue
+        time = np.arange(round(40.0 * rate)) / rate
+        settled = slice(round(12.0 * rate), round(32.0 * rate))
+        found = weighted(np.sin(2.0 * np.pi * frequency * time), rate, weighting)[settled]
+        shape = np.stack([f(2.0 * np.pi * frequency * time[settled]) for f in (np.sin, np.cos)], axis=1)
+        size = np.linalg.norm(np.linalg.lstsq(shape, found, rcond=None)[0])
+        assert 1000.0 * size == pytest.approx(row[f"{name}_x1000_analytic_at_true"], rel=1e-3)
+
+
 @pytest.mark.parametrize(("frequency", "factor"), [(2.25, 0.5740), (4.5, 1.0143)])
 def test_wk_at_the_papers_frequencies(frequency: float, factor: float) -> None:
     assert abs(response(WK, np.array([frequency]))[0]) == pytest.approx(factor, abs=5e-5)

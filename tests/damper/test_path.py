@@ -222,6 +222,24 @@ def test_a_scheme_of_fixed_steps_is_of_order_five(effects: dict, moving: bool) -
     assert np.log(coarse / fine) / np.log(8.0) > 4.8
 
 
+def test_behind_an_open_relief_valve_moving_parameters_cost_no_order() -> None:
+    """Its slope stands in the method's derivative; with the shut valve's there, a step needed twelve pieces."""
+    opened = with_effects({"relief_valve": {"F_r": 900.0, "C_r": 400.0}})
+    first, last = (row_of(element_rows(opened, np.array([u]), None)[0]) for u in (60.0, 70.0))
+
+    def after(steps: int) -> float:
+        state, share = np.array([8e-3, 0.0, 0.0, 0.0]), np.linspace(0.0, 1.0, steps + 1)
+        rows = [tuple(a + s * (b - a) if a != b else a for a, b in zip(first, last, strict=True)) for s in share]
+        u = 0.2 + 0.1 * share
+        for i in range(steps):
+            advance(state, TimeStep(4e-3 / steps, u[i], u[i + 1], rows[i], rows[i + 1], True), 1e9, False)
+        return float(state[DEFLECTION])
+
+    truth = after(256)
+    coarse, fine = (abs(after(steps) - truth) for steps in (1, 4))
+    assert np.log(coarse / fine) / np.log(4.0) > 4.5
+
+
 @pytest.mark.parametrize("effects", FLOWS[:4], ids="+".join)
 def test_at_the_tolerance_of_the_diagnosis_the_force_is_right_to_1e_6_of_peak(effects: dict) -> None:
     motion, damper = sine(40.0), with_effects(effects)

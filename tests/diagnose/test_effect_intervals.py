@@ -36,13 +36,13 @@ def linear(rng: np.random.Generator, pulled: float) -> tuple[Fitted, float]:
     own = pulled / np.linalg.norm(slopes[:, :, 3], axis=1) * rng.standard_normal(TESTS)
     residuals = rng.standard_normal((TESTS, 40)) - slopes[:, :, 3] * own[:, None]
     jacobian, left = np.concatenate(slopes), np.concatenate(residuals)
-    covariance = np.linalg.inv(jacobian.T @ jacobian)
-    step = -covariance @ jacobian.T @ left
+    step = -np.linalg.inv(jacobian.T @ jacobian) @ jacobian.T @ left
     left = left + jacobian @ step
     parameter = library()["fluid_inertia"].parameters[0]
     unknowns = (Unknown("fluid_inertia", parameter, 1.0),)
     split_left = tuple(left.reshape(TESTS, 40))
-    return Fitted(damper_of(), (), step, split_left, (), jacobian, covariance, unknowns), float(step[3])
+    fitted = Fitted(damper_of(), (), step, split_left, (), unknowns, np.zeros((0, 4)), lambda: jacobian)
+    return fitted, float(step[3])
 
 
 def share_inside(rng: np.random.Generator, pulled: float, errors: Callable[[Fitted], Array]) -> float:

@@ -62,7 +62,7 @@ def ride(damper: Damper, table: Table) -> Rider:
         speed = config.vehicle_speed_km_per_h / 3.6
         profile = case.road.profile(Way(speed, speed * config.duration_s, 1, Path()))
         if generic:
-            profile = replace(profile, coefficients=np.zeros((1, 4)))  # a level spline beside the sine
+            profile = replace(profile, coefficients=np.zeros(6))  # a level spline beside the sine
         grid, dynamic = grid_of(with_table, None), dynamic_damper_of(on, 22.0, config.valve_response_s)
         return ride_case(config, case, profile, grid, dynamic, with_table.notes.outside == "error")
 

@@ -193,7 +193,7 @@ def test_a_car_that_stands_keeps_standing(ride) -> None:
 # ---------------------------------------------------------------- policies
 
 
-RIDDEN = sorted(name for name, policy in policies().items() if policy.fits != "wheels without mass")
+RIDDEN = sorted(policies())
 
 
 @pytest.mark.parametrize("fidelity", ["ideal", "table", "dynamic"])
@@ -209,8 +209,10 @@ def test_the_energies_balance_on_the_road_and_off_it(ride, policy, fidelity) -> 
 @pytest.mark.parametrize("fidelity", ["ideal", "table", "dynamic"])
 @pytest.mark.parametrize("policy", RIDDEN)
 def test_every_policy_that_fits_rides_on_every_kind_of_road(ride, policy, fidelity) -> None:
-    if fidelity == "ideal" and policies()[policy].aim == "voltage":
+    if fidelity == "ideal" and policies()[policy].aim in ("voltage", "predict"):
         pytest.skip("a voltage is no demanded force")
+    if fidelity == "table" and policies()[policy].aim == "predict":
+        pytest.skip("what it predicts is the damper with its dynamics")
     for road in ({"kind": "iso8608", "road_class": "C"}, {"kind": "sine", "frequency_Hz": 2.25}, BUMPY[0]):
         outcome = ride(policy, fidelity, car=WHEELS, roads=[road], bounds="table", duration_s=3.0, settle_s=1.0)
         assert abs(outcome.energy_error) < 1e-6
@@ -245,7 +247,6 @@ def test_a_groundhook_asks_for_a_damper_between_wheel_and_ground(ride) -> None:
     ("given", "says"),
     [
         ({"policies": ["groundhook"]}, r"policies\.0: groundhook damps the motion of wheels with mass.*unsprung_mass"),
-        ({"policies": ["comfort_predictive"], "car": WHEELS}, "comfort_predictive predicts a car whose wheels follow"),
         ({"car": {"unsprung_mass_kg": [90, 80]}}, "give tyre_stiffness_N_per_m as well"),
         ({"car": {"tyre_stiffness_N_per_m": [4e5, 4e5]}}, "give unsprung_mass_kg as well"),
         ({"car": {"tyre_damping_Ns_per_m": [100, 100]}}, "wheels without mass have no tyres"),

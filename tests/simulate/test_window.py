@@ -97,6 +97,24 @@ def test_a_w_is_that_of_every_step_whatever_the_rate_of_the_files() -> None:
     assert coarse.rides[0].columns["time_s"].size < 0.1 * fine.rides[0].columns["time_s"].size
 
 
+@pytest.mark.parametrize("fidelity", ["ideal", "table", pytest.param("dynamic", marks=pytest.mark.ci)])
+def test_a_w_is_that_of_the_ride_whatever_tolerance_and_knots(fidelity, monkeypatch) -> None:
+    """To 1e-4, on a random road: a tolerance ten times closer and looser, and knots of the road half as far apart.
+
+    Laws that switch between a hard and a soft damper once a control period are left out: where they chatter, the next
+    digit of the state decides which one they take.
+    """
+    roads, policies = [{"kind": "iso8608", "road_class": "C", "seed": 5}], ["constant", "passive", "comfort", "skyhook"]
+    if fidelity == "ideal":
+        policies.remove("passive")
+    given = {"roads": roads, "policies": policies, "fidelities": [fidelity], "duration_s": 5.0, "settle_s": 2.0}
+    found = [[row.a_w_m_per_s2 for row in rides(tolerance=t, **given).weighted] for t in (1e-9, 1e-10, 1e-8)]
+    monkeypatch.setattr("pzd.simulate.roads.iso8608._KNOTS_A_WAVE", 32)
+    found.append([row.a_w_m_per_s2 for row in rides(**given).weighted])
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], rel=1e-4)
+
+
 def test_a_w_on_a_sine_is_its_closed_form() -> None:
     """Constant damping at `ideal` is linear: a tone, weighted by the response at its frequency."""
     found = rides(policies=["constant"], fidelities=["ideal"], roads=[{"kind": "sine", "frequency_Hz": 4.5}])

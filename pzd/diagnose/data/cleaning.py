@@ -1,8 +1,11 @@
-"""Records made ready for the diagnosis: displacement freed of its noise, without a filter of fixed corner.
+"""Records made ready for the diagnosis: displacement and temperature freed of noise, without a filter of fixed corner.
 
 Noise of the displacement goes through a stiff oil spring into the force, and a second derivative
 makes it look like inertia. Where the motion repeats, cycles are averaged and only harmonics well
 above their own scatter are kept; where it does not, the spectrum is cut where it sinks into noise.
+
+Noise and steps of a temperature would go through a drift of the oil into the force, which follows the oil and not its
+sensor.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from numpy.typing import NDArray
 from pzd.record import Array, Record, is_constant, sliced, voltage_scale
 from pzd.signals.between_cycles import pure_error
 from pzd.signals.cycles import Cycles, cycles, drift, settled
-from pzd.signals.smoothing import motion_below
+from pzd.signals.smoothing import HIGHEST, low_pass, motion_below
 from pzd.signals.stretches import separate_tests
 
 Motion = tuple[Array, Array, Array]
@@ -41,7 +44,8 @@ class Prepared:
     """One record as the diagnosis sees it."""
 
     record: Record
-    """With cleaned displacement and its derivatives; only the repeating run where there is one."""
+    """With cleaned displacement and its derivatives, and smoothed temperature; only the repeating run where there is
+    one."""
     cycles: Cycles | None
     """The run of cycles, where motion and voltage both repeat."""
     lead: Record | None
@@ -88,7 +92,7 @@ def about(prepared: Sequence[Prepared], zero: float) -> tuple[Prepared, ...]:
 
 
 def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
-    """Every record of one rig, its displacement cleaned; several tests in one record are as many, of its name."""
+    """Every record of one rig, cleaned; several tests in one record are as many, of its name."""
     scale = voltage_scale(records)
     still = [(record, is_constant(record, scale)) for record in records]
     return tuple(
@@ -96,7 +100,8 @@ def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
     )
 
 
-def _prepared(record: Record, constant: bool) -> Prepared:
+def _prepared(raw: Record, constant: bool) -> Prepared:
+    record = _even_temperature(raw)
     run = cycles(record.time, record.displacement)
     if run is None:
         return Prepared(_smoothed(record), None, None, constant)
@@ -116,6 +121,13 @@ def _prepared(record: Record, constant: bool) -> Prepared:
     early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
     lead = _led_in(cleaned, early, motion(early))
     return Prepared(cleaned, run, lead, constant, _drawn(lead, average))
+
+
+def _even_temperature(record: Record) -> Record:
+    """The record with the temperature of the oil in place of what a noisy sensor of some resolution makes of it."""
+    if record.temperature is None or np.ptp(record.temperature) == 0.0:
+        return record
+    return replace(record, temperature=low_pass(record.temperature, HIGHEST))
 
 
 def _moved(record: Record, motion: Motion) -> Record:

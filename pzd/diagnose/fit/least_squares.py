@@ -6,12 +6,15 @@ squares is minus the logarithm of the likelihood, and fits of different effects 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from pzd.damper.model import Damper
+from pzd.diagnose.fit.carried_slopes import CarriedSlopes
+from pzd.diagnose.fit.likelihood import RecordLikelihood
 from pzd.diagnose.fit.parameters import Problem, Unknown, simulated
 from pzd.record import Array
 
@@ -25,6 +28,8 @@ Reason: the gain of the tests leaves T0, C and k open along one direction, commo
 differences leave of the curvature ends a search up to a standard deviation away from the optimum. A smaller step shows
 the errors of the simulation, see `likelihood.SIMULATION_TOLERANCE`."""
 MOST_EVALUATIONS = 20
+MOST_PASSES = 3
+"""Times that the end of a search is looked at with slopes of its own, and the search goes on from there."""
 PRECISION = 1e-5
 """Relative change of the sum of squares at which a search ends."""
 STIFFER = 2.0
@@ -48,11 +53,26 @@ class Fitted:
     """(w,) an observation, in units of noise."""
     simulated: tuple[Array, ...]
     """(n,) an observation, force at the compared samples [N]."""
-    slopes: Array
-    """(w, 3 b + e) derivatives of all residuals by the searched variables."""
-    covariance: Array
-    """(3 b + e, 3 b + e) of what was searched, noise alone; infinite for what no test shows."""
     unknowns: tuple[Unknown, ...]
+    prior: Array
+    """(2 b, 3 b + e) slopes of the prior on C and k."""
+    differentiated: Callable[[], Array]
+    """Gives the `slopes`."""
+
+    @cached_property
+    def slopes(self) -> Array:
+        """(w, 3 b + e) derivatives of all residuals by the searched variables."""
+        return self.differentiated()
+
+    @cached_property
+    def frame(self) -> Array:
+        """(w, 3 b + e) orthonormal columns: what of a residual the searched variables can take up."""
+        return np.asarray(np.linalg.qr(self.slopes).Q)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(3 b + e, 3 b + e) of what was searched, noise alone; infinite for what no test shows."""
+        return _covariance(np.concatenate([self.slopes, self.prior]))
 
     @property
     def misfit(self) -> float:
@@ -65,7 +85,15 @@ class Fitted:
         return sum(r.size for r in self.residuals)
 
 
-def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int = MOST_EVALUATIONS) -> Fitted:
+def fit(
+    problem: Problem,
+    effects: Sequence[str],
+    start: Array,
+    evaluations: int = MOST_EVALUATIONS,
+    *,
+    beside: Fitted | None = None,
+    rough: bool = False,
+) -> Fitted:
     """The optimum reached from a starting point, by trust-region least squares within the limits.
 
     Parameters
@@ -73,20 +101,26 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
     problem : what is fitted to what
     effects : names of the effects fitted together with the base rows
     start : (3 b + e,) in the units of the search
-    evaluations : of the model, at most
+    evaluations : of the model, at most, from one set of slopes of its own on
+    beside : an optimum of the same problem with the first of these effects, from whose slopes the search starts
+    rough : end where slopes that were carried end; otherwise the end is looked at with slopes of its own
     """
     unknowns = problem.unknowns(effects)
-    found, slopes, (residuals, forces) = _search(problem, unknowns, start, start.size, evaluations)
-    prior = _prior(problem, len(unknowns))
+    known = None if beside is None else _known(problem, unknowns, start, beside)
+    found, slopes, (residuals, forces) = _search(problem, unknowns, start, start.size, evaluations, known, rough=rough)
+
+    def differentiated() -> Array:
+        return _differences(problem, unknowns, found, _bounds(problem, unknowns)) if slopes is None else slopes
+
     return Fitted(
         problem.point(found, unknowns).damper(),
         tuple(effects),
         found,
         tuple(residuals),
         tuple(forces),
-        slopes,
-        _covariance(np.concatenate([slopes, prior])),
         unknowns,
+        _prior(problem, len(unknowns)),
+        differentiated,
     )
 
 
@@ -99,9 +133,19 @@ def misfit_of(problem: Problem, damper: Damper) -> float:
 
 
 def _search(
-    problem: Problem, unknowns: Sequence[Unknown], start: Array, free: int, evaluations: int
-) -> tuple[Array, Array, Left]:
-    """Where a search over the first `free` variables ends, (3 b + e,), with slopes, residuals and forces there."""
+    problem: Problem,
+    unknowns: Sequence[Unknown],
+    start: Array,
+    free: int,
+    evaluations: int,
+    known: Array | None = None,
+    *,
+    rough: bool = False,
+) -> tuple[Array, Array | None, Left]:
+    """Where a search over the first `free` variables ends, (3 b + e,), with residuals and forces there.
+
+    And with the slopes there (w, free), where they are exact.
+    """
     from scipy.optimize import least_squares
 
     low, high = _bounds(problem, unknowns)
@@ -111,33 +155,79 @@ def _search(
     def whole(x: Array) -> Array:
         return np.concatenate([x, begin[free:]])
 
-    known: dict[bytes, Left] = {}
+    evaluated: dict[bytes, Left] = {}
 
     def left_at(x: Array) -> Left:
         """Asked twice of each point, for its residuals and for its slopes."""
         key = x.tobytes()
-        if key not in known:
-            known[key] = _residuals(problem, unknowns, whole(x))
-        return known[key]
+        if key not in evaluated:
+            evaluated[key] = _residuals(problem, unknowns, whole(x))
+        return evaluated[key]
 
     def residuals_at(x: Array) -> Array:
         return np.concatenate([*left_at(x)[0], prior[:, : centre.size] @ (x[: centre.size] - centre)])
 
-    def slopes_at(x: Array) -> Array:
-        return np.concatenate([_slopes(problem, unknowns, whole(x), (low[:free], high[:free])), prior[:, :free]])
-
-    found = least_squares(
-        residuals_at,
-        begin[:free],
-        jac=slopes_at,
-        bounds=(low[:free], high[:free]),
-        x_scale="jac",
-        ftol=PRECISION,
-        xtol=PRECISION,
-        gtol=PRECISION,
-        max_nfev=evaluations,
+    slopes = CarriedSlopes(
+        lambda x: np.concatenate(left_at(x)[0]),
+        lambda x: _differences(problem, unknowns, whole(x), (low[:free], high[:free])),
+        _blocks(problem, unknowns, free),
+        None if known is None else (begin[:free], known),
     )
-    return whole(found.x), np.asarray(found.jac, dtype=np.float64)[: -len(prior)], left_at(found.x)
+
+    def jacobian(x: Array) -> Array:
+        return np.concatenate([slopes(x), prior[:, :free]])
+
+    at, misfit = begin[:free], np.inf
+    for _ in range(1 if rough else MOST_PASSES):
+        found = least_squares(
+            residuals_at,
+            at,
+            jac=jacobian,
+            bounds=(low[:free], high[:free]),
+            x_scale="jac",
+            ftol=PRECISION,
+            xtol=PRECISION,
+            gtol=PRECISION,
+            max_nfev=evaluations,
+        )
+        at, gained, misfit = found.x, misfit - found.cost, found.cost
+        if slopes.exact or gained <= PRECISION * misfit:
+            break
+        slopes.renew()
+    return whole(at), slopes(at) if slopes.exact else None, left_at(at)
+
+
+def _known(problem: Problem, unknowns: Sequence[Unknown], start: Array, beside: Fitted) -> Array | None:
+    """(w, 3 b + e) slopes at a start: those of an optimum for what it has, differences for the rest.
+
+    None where that optimum is one of other base rows or other residuals.
+    """
+    shared = beside.searched.size
+    same_rows = shared == 3 * len(problem.base) + len(beside.unknowns)
+    same_effects = unknowns[: len(beside.unknowns)] == beside.unknowns
+    same_residuals = beside.size == sum(o.residuals for o in problem.observations)
+    if not (same_rows and same_effects and same_residuals):
+        return None
+    columns = range(shared, start.size)
+    new = _differences(problem, unknowns, start, _bounds(problem, unknowns), columns)
+    return np.hstack([beside.slopes, new[:, shared:]])
+
+
+def _blocks(problem: Problem, unknowns: Sequence[Unknown], free: int) -> list[tuple[slice, list[int]]]:
+    """The residuals of each observation, and which of the first `free` variables move them."""
+    ends = np.cumsum([0, *(o.residuals for o in problem.observations)])
+    return [
+        (slice(int(begin), int(end)), _moving(problem, unknowns, o, free))
+        for o, begin, end in zip(problem.observations, ends[:-1], ends[1:], strict=True)
+    ]
+
+
+def _moving(problem: Problem, unknowns: Sequence[Unknown], o: RecordLikelihood, free: int) -> list[int]:
+    """Which of the first `free` variables move the force of an observation: a test moves with its own voltage alone."""
+    rows = 3 * len(problem.base)
+    own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(rows)
+    effects = [j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]]
+    return [*own, *(rows + j for j in effects if rows + j < free)]
 
 
 def _prior(problem: Problem, effects: int) -> Array:
@@ -166,26 +256,29 @@ def _residuals(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Left:
     return [o.in_noise(o.measured - f) for o, f in zip(problem.observations, forces, strict=True)], forces
 
 
-def _slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array]) -> Array:
+def _differences(
+    problem: Problem,
+    unknowns: Sequence[Unknown],
+    x: Array,
+    limits: tuple[Array, Array],
+    wanted: Sequence[int] | None = None,
+) -> Array:
     """(w, free) derivatives of the residuals by central differences, one-sided at the limits (free,) of the search.
 
-    A test moves with its own voltage alone.
+    Only the `wanted` columns, where some are given; the others are zero.
     """
-    rows = len(problem.base)
     low, high = limits
     free = low.size
     below, above = np.maximum(x[:free] - DIFFERENCE, low), np.minimum(x[:free] + DIFFERENCE, high)
-    points = [tuple(problem.point(_with(x, j, at[j]), unknowns) for at in (below, above)) for j in range(free)]
+    asked = range(free) if wanted is None else wanted
+    points = {j: tuple(problem.point(_with(x, j, at[j]), unknowns) for at in (below, above)) for j in asked}
     blocks = []
     for o in problem.observations:
-        own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(3 * rows)
-        moving = [
-            j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]
-        ]
-        columns = [*own, *(3 * rows + j for j in moving if 3 * rows + j < free)]
+        columns = [j for j in _moving(problem, unknowns, o, free) if j in points]
         change = [np.subtract(*(simulated(point, o) for point in points[j])) for j in columns]
-        block = np.zeros((o.in_noise(o.measured).size, free))
-        block[:, columns] = o.in_noise(np.stack(change, axis=-1) / (above - below)[columns])
+        block = np.zeros((o.residuals, free))
+        if columns:
+            block[:, columns] = o.in_noise(np.stack(change, axis=-1) / (above - below)[columns])
         blocks.append(block)
     return np.concatenate(blocks)
 

@@ -66,12 +66,16 @@ class RecordLikelihood:
     @cached_property
     def element(self) -> Callable[[bytes], Array]:
         """(m,) force [N] of the element by its parameter row, (1, r) as bytes; effects beside it leave it as it is."""
+        return lru_cache(REMEMBERED)(lambda row: self.marched(np.frombuffer(row)[np.newaxis]))
 
-        def marched(row: bytes) -> Array:
-            rows = np.frombuffer(row)[np.newaxis]
-            return integrated_force(rows, self.motion, self.steps, self.begins_with, SIMULATION_TOLERANCE)
+    def marched(self, rows: Array) -> Array:
+        """(m,) force [N] of the element by its parameter rows, (1, r) or (m, r)."""
+        return integrated_force(rows, self.motion, self.steps, self.begins_with, SIMULATION_TOLERANCE)
 
-        return lru_cache(REMEMBERED)(marched)
+    @property
+    def residuals(self) -> int:
+        """How many residuals it gives: w."""
+        return len(self.frame)
 
     @property
     def begins_with(self) -> float:

@@ -10,9 +10,10 @@ from typing import cast
 import numpy as np
 
 from pzd.damper.competing_forms import known
-from pzd.damper.compose import constant_rows, with_parallel
+from pzd.damper.compose import constant_rows, constant_value, with_parallel
 from pzd.damper.effect import Effect, Parameter, Scales, Search
-from pzd.damper.material import by_voltage
+from pzd.damper.laws import ELEMENT
+from pzd.damper.material import by_voltage, material_factors
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnose.fit.likelihood import RecordLikelihood, response
 from pzd.diagnose.work import Work
@@ -227,14 +228,25 @@ def simulated(point: Point, observation: RecordLikelihood) -> Array:
     """(n,) force at the compared samples of an observation [N]."""
     o = observation
     point.problem.work.add(o.motion.time.size)
-    if o.place >= 0 and not any(known()[name].place == "material" for name in point.effects):
-        friction, damping, stiffness = point.base[o.place]
-        effects = point.at(o.place)
-        rows, parallel = constant_rows(friction, damping, stiffness, effects)
-        force = with_parallel(o.element(rows.tobytes()), parallel, o.motion.about(point.zero))
-        sensors = {name: values for name, values in effects.items() if known()[name].place == "sensor"}
-        return o.at_compared(o.shown(force, sensors))
-    damper = point.damper()
-    if o.place >= 0:
-        damper = damper.model_copy(update={"base": damper.base[o.place : o.place + 1]})
-    return response(o, damper)
+    if o.place < 0:
+        return response(o, point.damper())
+    friction, damping, stiffness = point.base[o.place]
+    effects = point.at(o.place)
+    rows, parallel = constant_rows(friction, damping, stiffness, effects)
+    rows = _with_material(rows, point, o, effects)
+    force = o.element(rows.tobytes()) if len(rows) == 1 else o.marched(rows)
+    force = with_parallel(force, parallel, o.motion.about(point.zero))
+    sensors = {name: values for name, values in effects.items() if known()[name].place == "sensor"}
+    return o.at_compared(o.shown(force, sensors))
+
+
+def _with_material(rows: Array, point: Point, o: RecordLikelihood, effects: Mapping[str, Mapping[str, float]]) -> Array:
+    """The parameter row (1, r) of one observation as its temperature makes it: (1, r), or (m, r) where that moves."""
+    acting = {name: values for name, values in effects.items() if known()[name].place == "material"}
+    if not acting:
+        return rows
+    given = {name: {key: np.array([value]) for key, value in values.items()} for name, values in acting.items()}
+    factors = material_factors(given, constant_value(o.motion.temperature), point.problem.reference)
+    found = np.repeat(rows, len(factors), axis=0)
+    found[:, : len(ELEMENT)] *= factors
+    return found

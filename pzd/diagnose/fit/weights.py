@@ -29,6 +29,10 @@ INSTANT = 1e-6
 """Delay by which the slope of a force over time is taken [s]."""
 LATEST = 3.0
 """At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope."""
+HIDDEN = 1e-3
+"""A nuisance that moves all residuals together by less [standard deviations of one] is left out.
+
+Reason: it would change the misfit by a millionth."""
 DISCREPANCY = 0.3
 """Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
 fitted: a model that still lacks something must not be bent to where the noise happens to be smallest."""
@@ -225,11 +229,22 @@ def with_nuisances(
             *([] if timing is None else [timing]),
         ]
     )
-    left, size, right = np.linalg.svd(bare.in_noise(columns), full_matrices=False)
+    left, size, right = _principal(bare.in_noise(columns))
     likeliest = right[:, 0] @ (size / (1.0 + size**2) * (left.T @ bare.in_noise(bare.measured - force)))
     delay = nuisance.delay_s * float(np.clip(likeliest, -LATEST, LATEST))
     measured = bare.measured - (shown(delay) - force - delay * late)
     return replace(bare, measured=measured, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
+
+
+def _principal(columns: Array) -> tuple[Array, Array, Array]:
+    """Singular value decomposition (w, q), (q,), (q, p) of what (w, p) nuisances do, without what noise hides.
+
+    By the eigenvalues of the (p, p) products: what they lose of small singular values lies below `HIDDEN`.
+    """
+    squares, right = np.linalg.eigh(columns.T @ columns)
+    shown = squares > HIDDEN**2
+    size = np.sqrt(squares[shown])
+    return columns @ (right[:, shown] / size), size, right[:, shown].T
 
 
 def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLikelihood:

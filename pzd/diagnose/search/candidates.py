@@ -91,6 +91,8 @@ def candidates(
         if effect.name not in (*before.effects, *forbidden) and seen_in(problem, effect)
     ]
 
+    _ = before.frame  # asked of by every candidate: computed once, before they go to threads of their own
+
     def one(effect: Effect) -> Candidate:
         unlikely = silent and without_promise(problem, before, effect)
         return (_barely if unlikely else candidate)(problem, before, effect)
@@ -171,9 +173,9 @@ def converged(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
     effect = known()[found.effect]
     problem = _for(problem, effect)
     others = [np.concatenate([_base(problem, before), s]) for s in promising_starts(problem, before, effect)[1:]]
-    fits = [fit(problem, found.fitted.effects, start) for start in others]
+    fits = [fit(problem, found.fitted.effects, start, rough=True) for start in others]
     best = min([found.fitted, *fits], key=lambda f: f.misfit)
-    return _from(problem, before, found.effect, best.searched, MOST_EVALUATIONS_OF_BEST)
+    return _from(problem, before, found.effect, best.searched, MOST_EVALUATIONS_OF_BEST, rough=False)
 
 
 def _for(problem: Problem, effect: Effect) -> Problem:
@@ -188,9 +190,17 @@ def _base(problem: Problem, before: Fitted) -> Array:
 
 
 def _from(
-    problem: Problem, before: Fitted, effect: str, start: Array, evaluations: int = MOST_EVALUATIONS
+    problem: Problem,
+    before: Fitted,
+    effect: str,
+    start: Array,
+    evaluations: int = MOST_EVALUATIONS,
+    *,
+    rough: bool = True,
 ) -> Candidate:
-    fitted = fit(problem, (*before.effects, effect), start, evaluations)
+    """An effect fitted from a start; `rough` where only how much it pays is asked."""
+    beside = before if rough else None
+    fitted = fit(problem, (*before.effects, effect), start, evaluations, beside=beside, rough=rough)
     pays = delta_bic(before, fitted)
     if len(problem.base) < len(before.damper.base):
         # Fewer base rows alone may pay already; that is not the effect's merit, nor are the parameters that they save.

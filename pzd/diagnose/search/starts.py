@@ -23,19 +23,17 @@ def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[A
     starts = starts_of(problem, before, effect)
     if len(starts) == 1:
         return starts
-    frame, _ = np.linalg.qr(before.slopes)
-    promised = [_promised_misfit(problem, before, effect, start, frame) for start in starts]
+    promised = [_promised_misfit(problem, before, effect, start) for start in starts]
     return [starts[i] for i in np.argsort(promised, kind="stable")]
 
 
 def most_promising(problem: Problem, before: Fitted, effects: Sequence[Effect], count: int) -> list[Effect]:
     """The effects from whose starting values one linearised step promises the smallest misfits, best first."""
-    frame, _ = np.linalg.qr(before.slopes)
     promised = []
     for effect in effects:
         own = problem.growing(effect)
         starts = starts_of(own, before, effect)
-        promised.append(min(_promised_misfit(own, before, effect, start, frame) for start in starts))
+        promised.append(min(_promised_misfit(own, before, effect, start) for start in starts))
     return [effects[i] for i in np.argsort(promised, kind="stable")[:count]]
 
 
@@ -43,10 +41,9 @@ def without_promise(problem: Problem, before: Fitted, effect: Effect) -> bool:
     """Whether a faint effect of one parameter promises nothing; one of more may act where nobody looks yet."""
     if len(effect.parameters) > 1:
         return False
-    frame, _ = np.linalg.qr(before.slopes)
     starts = starts_of(problem, before, effect)
     faint = (*starts, *(fainter(problem, before, effect, start, FAINT) for start in starts))
-    promised = min(_promised_misfit(problem, before, effect, start, frame) for start in faint)
+    promised = min(_promised_misfit(problem, before, effect, start) for start in faint)
     return before.misfit - promised < LEAST_PROMISE
 
 
@@ -83,8 +80,8 @@ def _searched(unknown: Unknown, start: float) -> float:
     return float(np.log(max(start, 1.0 / BOUND))) if unknown.parameter.search.logarithmic else start
 
 
-def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Array, frame: Array) -> float:
-    """Sum of squares after one linearised step from a start, `frame` spanning what the base rows can take up."""
+def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Array) -> float:
+    """Sum of squares after one linearised step from a start."""
     effects = (*before.effects, effect.name)
     unknowns = problem.unknowns(effects)
     here = np.concatenate([before.searched, start])
@@ -98,7 +95,7 @@ def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Ar
         forces = [simulated(point, o) for point in points]
         residuals.append(o.in_noise(o.measured - forces[0]))
         slopes.append(o.in_noise(np.stack([forces[0] - f for f in forces[1:]], axis=-1) / DIFFERENCE))
-    r, columns = np.concatenate(residuals), np.concatenate(slopes)
+    r, columns, frame = np.concatenate(residuals), np.concatenate(slopes), before.frame
     r, columns = r - frame @ (frame.T @ r), columns - frame @ (frame.T @ columns)
     size = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(size > 0.0, size, 1.0)

@@ -12,6 +12,7 @@ from pathlib import Path
 from pzd.quantities import Control
 from pzd.rig.config import FilesEntry, Limits
 from pzd.rig.files.channels import channels
+from pzd.rig.files.clock import on_regular_clock
 from pzd.rig.files.fixture import Freed, damper_alone
 from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import Layout, layouts
@@ -76,4 +77,4 @@ def _read_file(path: Path, layout: Layout) -> list[tuple[Test, Freed]]:
     sheet = read_sheet(path, entry, layout.wanted(), layout.place)
     tests = split_into_tests(channels(sheet, layout), sheet, layout, values, setting)
     refuse(tests, layout)
-    return [(test, damper_alone(test, entry.fixture)) for test in tests]
+    return [(test, damper_alone(test, entry.fixture)) for test in map(on_regular_clock, tests)]

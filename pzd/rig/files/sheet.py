@@ -32,7 +32,7 @@ class Wanted:
 class ReadingStep:
     """One thing that was done on the way from a file to its records, for the ingest report."""
 
-    step: Literal["read", "left out", "rename", "unit", "sign", "value", "cut", "fixture"]
+    step: Literal["read", "left out", "rename", "unit", "sign", "value", "cut", "clock", "fixture"]
     quantity: str | None
     """The quantity concerned; None for the file as a whole."""
     was: str

@@ -5,18 +5,18 @@ followed by each pair out of a few `tails` until `horizon_s`. The pair is set wi
 
     J = integral a_w^2 + sum_i lambda_i L_i^2 dt,   lambda_i = load_weight A / B (B_i / B)^4
 
-a_w = Wk a_K, the weighting of ISO 2631-1:1997 with what it remembers; L_i = S_i + T_i, the dynamic load of each wheel;
-B_i the mean square of L_i of late; A and B those of a_w and of the larger load at the fixed voltage with the least A,
-which ride along on the plant over the road that was met. So one weight serves roads of any height, and loads that
-leave those of the fixed voltage soon cost more than comfort brings.
+a_w = Wk a_K, the weighting of ISO 2631-1:1997 with what it remembers; L_i, the dynamic load of each wheel: S_i + T_i,
+or where the wheels have mass the force of the tyre, beyond that at rest; B_i the mean square of L_i of late; A and B
+those of a_w and of the larger load at the fixed voltage with the least A, which ride along on the plant over the road
+that was met. So one weight serves roads of any height, and loads that leave those of the fixed voltage soon cost more
+than comfort brings.
 
-The plant has the state of the oil, the lag of the valve and the adopted effects (`pzd.simulate.prediction.plant`).
-Body, oil and acceleration are sensed exactly. The road ahead is known, or forecast from what has passed under the
-front axle (`pzd.simulate.prediction.road_ahead`); the rear axle meets it (a1 + a2) / speed later. What the forecasts
-missed of late may come again: the ride is tried with it added and subtracted, and a choice must beat the best voltage
-held on by `margin`, times the share of the road's motion that was not foreseen.
-
-The wheels of the plant have no mass, so that a car whose wheels have is refused.
+The plant has the state of the oil, the lag of the valve, the adopted effects and the wheels
+(`pzd.simulate.prediction.plant`). Body, wheels, oil, acceleration and the road under each axle are sensed exactly. The
+road ahead is known, or forecast from what has passed under the front axle (`pzd.simulate.prediction.road_ahead`); the
+rear axle meets it (a1 + a2) / speed later. What the forecasts missed of late may come again: the ride is tried with it
+added and subtracted, and a choice must beat the best voltage held on by `margin`, times the share of the road's motion
+that was not foreseen.
 
 Source: rollout of base policies, those that hold a voltage: Bertsekas 2017, Dynamic Programming and Optimal Control I,
 section 6.4; cost and road are ours.
@@ -62,6 +62,5 @@ POLICY = Policy(
     "comfort_predictive",
     "of many voltages ahead, tried on a model of car and dampers, those with the least weighted acceleration",
     "predict",
-    fits="wheels without mass",
     controlled=True,
 )

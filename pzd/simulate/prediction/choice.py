@@ -8,6 +8,7 @@ from pzd.compiled import compiled, inlined
 from pzd.damper.kernels import effective_voltage_after, keep_voltage
 from pzd.record import Array
 from pzd.simulate.dynamic_damper import DynamicDamper
+from pzd.simulate.kinematics import road_at
 from pzd.simulate.prediction.fixed import ride_fixed, weigh_loads
 from pzd.simulate.prediction.plant import predicted, weigh
 from pzd.simulate.prediction.predictor import (
@@ -19,21 +20,19 @@ from pzd.simulate.prediction.predictor import (
     OBSERVATIONS,
     OBSERVED,
     TAIL,
+    WHEELS,
     Predictor,
 )
 from pzd.simulate.prediction.road_ahead import EXPECTED, fill_forecast, fill_known, learn, unforeseen
 from pzd.simulate.ride_model import (
     BEHIND,
     COMFORT,
-    DEFLECTION,
+    CONTACT,
     FLOW,
-    FORCE,
-    HEAVE,
     OIL_2,
-    PITCH,
     SET,
     SINCE,
-    SPRINGS,
+    WHEEL_1,
     RideModel,
 )
 
@@ -42,12 +41,12 @@ NOW, END, HOLDING = range(3)
 
 
 @compiled
-def observe(y: Array, model: RideModel, workspace: Array) -> bool:
+def observe(time: float, model: RideModel, workspace: Array) -> bool:
     """Take note of acceleration and road once a control period; whether it is time to choose.
 
     Parameters
     ----------
-    y : (STATES,) state
+    time : [s]
     model : the ride; the memory of its predictor is changed
     workspace : as `motion` left it
     """
@@ -57,9 +56,9 @@ def observe(y: Array, model: RideModel, workspace: Array) -> bool:
     weigh(plan.felt, 0, plan.felt[ACCELERATION], felt, plan.modes[OBSERVED], plan.residues)
     plan.felt[ACCELERATION] = felt
     for i in range(2):
-        load = workspace[SPRINGS, i] + workspace[FORCE, i]
+        load, road = workspace[CONTACT, i], model.road_coefficients
         plan.met[i, 0] = plan.met[i, 1]
-        plan.met[i, 1] = y[HEAVE] + model.car.arms[i] * y[PITCH] - workspace[DEFLECTION, i]
+        plan.met[i, 1], _, _ = road_at(road, model.car.speed * time - road.behind[i])
         plan.felt[MEAN_LOAD_1 + i] += (1.0 - plan.forgotten) * (load * load - plan.felt[MEAN_LOAD_1 + i])
     plan.felt[OBSERVATIONS] = number + 1
     rise = plan.met[0, 1] - plan.met[0, 0] - plan.observation_s * plan.speeds[EXPECTED]
@@ -73,7 +72,7 @@ def observe(y: Array, model: RideModel, workspace: Array) -> bool:
 @compiled
 def predict(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Observe, and choose anew where it is time; see `choose`."""
-    if observe(y, model, workspace):
+    if observe(time, model, workspace):
         choose(time, y, model, control, workspace)
 
 
@@ -87,7 +86,7 @@ def choose(time: float, y: Array, model: RideModel, control: Array, workspace: A
     Parameters
     ----------
     time : [s]
-    y : (STATES,) state
+    y : (n,) state
     model : the ride; the rooms of its predictor are filled
     control, workspace : what the controller last set, and the workspace as `motion` left it, see `ride_model`
     """
@@ -95,12 +94,7 @@ def choose(time: float, y: Array, model: RideModel, control: Array, workspace: A
     _look_ahead(time, model)
     weigh_loads(plan)
     _fill_levels(time, model.damper, plan, control)
-    for n in range(OIL_2 + 1):
-        plan.states[NOW, n] = y[n]
-    for i in range(2):
-        plan.states[NOW, OIL_2 + 1 + i] = workspace[FLOW, i]
-    for n in range(2 * MODES):
-        plan.states[NOW, BODY_AND_OIL + n] = plan.felt[n]
+    _fill_now(y, model, workspace)
     held, tails, best = plan.candidates.size, plan.tails.size, math.inf
     if not plan.known:
         best = _best_held_on(model) * (1.0 - plan.margin * unforeseen(plan))
@@ -116,6 +110,21 @@ def choose(time: float, y: Array, model: RideModel, control: Array, workspace: A
             if cost < best:
                 best = cost
                 plan.chosen[0], plan.chosen[1], plan.chosen[2], plan.chosen[3] = i, j, a, b
+
+
+@inlined
+def _fill_now(y: Array, model: RideModel, workspace: Array) -> None:
+    """Fill the state of the plant by that of the ride."""
+    now, felt = model.predictor.states[NOW], model.predictor.felt
+    for n in range(OIL_2 + 1):
+        now[n] = y[n]
+    for i in range(2):
+        now[OIL_2 + 1 + i] = workspace[FLOW, i]
+    for n in range(2 * MODES):
+        now[BODY_AND_OIL + n] = felt[n]
+    if model.car.wheels:
+        for n in range(4):
+            now[WHEELS + n] = y[WHEEL_1 + n]
 
 
 @compiled

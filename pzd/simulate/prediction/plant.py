@@ -1,6 +1,6 @@
 """The half-car on its identified dampers in fixed steps: how a ride goes on under voltages that are given ahead.
 
-The same equations as `pzd.simulate.equations`, for a controller that tries many voltages: the body by velocity
+The same equations as `pzd.simulate.equations`, for a controller that tries many voltages: body and wheels by velocity
 Verlet, the oil by its exponential, both of order two and stable however quickly the oil relaxes; no energies are
 booked, and dry friction beside the element is rounded where the speed crosses zero.
 """
@@ -14,8 +14,10 @@ from pzd.damper.flow import breakaway, flow_force
 from pzd.damper.kernels import C, K, branch_steady, parallel_force, row_of
 from pzd.damper.regimes import spring_force
 from pzd.record import Array
-from pzd.simulate.prediction.predictor import BODY_AND_OIL, LOAD_1, LOAD_2, MODES, WEIGHTED, Predictor
+from pzd.simulate.equations import body_acceleration
+from pzd.simulate.prediction.predictor import BODY_AND_OIL, LOAD_1, LOAD_2, MODES, WEIGHTED, WHEELS, Predictor
 from pzd.simulate.ride_model import Vehicle
+from pzd.simulate.tyre import contact_force
 
 _ROUNDED = 5e-3
 """Speed over which dry friction beside the element turns round [m/s]: the plant has no events."""
@@ -96,7 +98,8 @@ def predicted(
 ) -> float:
     """Bring the state through as many steps as the road has, and sum what the ride costs.
 
-    Equation: J = integral a_w^2 + lambda (L_1^2 + L_2^2) dt, a_w = Wk a_K, L_i = S_i + T_i
+    Equation: J = integral a_w^2 + lambda (L_1^2 + L_2^2) dt, a_w = Wk a_K, L_i = S_i + T_i; where the wheels have mass
+    L_i = N_i0 - N_i, see `pzd.simulate.tyre`
 
     Parameters
     ----------
@@ -113,52 +116,83 @@ def predicted(
     cost [m2/s3]; infinite where it goes beyond `most`
     """
     z, phi, dz, dphi, e1, e2, w1, w2 = state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7]
+    g1, g2 = _wheel(car, state[WHEELS], heights[0, 0]), _wheel(car, state[WHEELS + 1], heights[1, 0])
+    dg1, dg2 = state[WHEELS + 2], state[WHEELS + 3]
     h, modes = plan.steps[kind], plan.modes[kind]
-    r1, r2 = car.ratio[0], car.ratio[1]
-    n1, n2 = car.dampers[0] * r1, car.dampers[1] * r2
-    alone = plan.parallel.shape[1] == 0
-    u1 = z + car.arms[0] * phi - heights[0, 0]
-    u2 = z + car.arms[1] * phi - heights[1, 0]
-    load1 = car.stiffness[0] * u1 + n1 * spring(plan, levels1[0], e1)
-    load2 = car.stiffness[1] * u2 + n2 * spring(plan, levels2[0], e2)
-    if not alone:
-        v1 = dz + car.arms[0] * dphi - (heights[0, 1] - heights[0, 0]) / h
-        v2 = dz + car.arms[1] * dphi - (heights[1, 1] - heights[1, 0]) / h
-        load1 += n1 * parallel_load(r1 * u1, r1 * v1, plan.parallel[levels1[0]])
-        load2 += n2 * parallel_load(r2 * u2, r2 * v2, plan.parallel[levels2[0]])
-    az = -(load1 + load2) / car.mass
-    aphi = -(car.arms[0] * load1 + car.arms[1] * load2) / car.inertia
+    rise1, rise2 = (heights[0, 1] - heights[0, 0]) / h, (heights[1, 1] - heights[1, 0]) / h
+    u1 = z + car.arms[0] * phi - g1
+    u2 = z + car.arms[1] * phi - g2
+    load1 = _load(car, plan, 0, levels1[0], u1, dz + car.arms[0] * dphi - _wheel(car, dg1, rise1), e1)
+    load2 = _load(car, plan, 1, levels2[0], u2, dz + car.arms[1] * dphi - _wheel(car, dg2, rise2), e2)
+    held1 = _dynamic_load(car, 0, load1, heights[0, 0] - g1, rise1 - dg1)
+    held2 = _dynamic_load(car, 1, load2, heights[1, 0] - g2, rise2 - dg2)
+    az, aphi = body_acceleration(car, load1, load2)
+    ag1, ag2 = _wheel_acceleration(car, 0, load1 - held1), _wheel_acceleration(car, 1, load2 - held2)
     felt = car.comfort[0] * load1 + car.comfort[1] * load2
-    weight1, weight2 = plan.load_weights[0], plan.load_weights[1]
     weighted = cost = 0.0
     for n in range(heights.shape[1] - 1):
         z += h * (dz + 0.5 * h * az)
         phi += h * (dphi + 0.5 * h * aphi)
-        before1, before2 = u1, u2
-        u1 = z + car.arms[0] * phi - heights[0, n + 1]
-        u2 = z + car.arms[1] * phi - heights[1, n + 1]
+        before1, before2, was1, was2 = u1, u2, g1, g2
+        g1 = _wheel(car, g1 + h * (dg1 + 0.5 * h * ag1), heights[0, n + 1])
+        g2 = _wheel(car, g2 + h * (dg2 + 0.5 * h * ag2), heights[1, n + 1])
+        u1 = z + car.arms[0] * phi - g1
+        u2 = z + car.arms[1] * phi - g2
         v1, v2 = (u1 - before1) / h, (u2 - before2) / h
-        e1, w1 = oil_after(plan, kind, levels1[2 * n + 1], e1, r1 * v1, w1, h)
-        e2, w2 = oil_after(plan, kind, levels2[2 * n + 1], e2, r2 * v2, w2, h)
-        load1 = car.stiffness[0] * u1 + n1 * spring(plan, levels1[2 * n + 2], e1)
-        load2 = car.stiffness[1] * u2 + n2 * spring(plan, levels2[2 * n + 2], e2)
-        if not alone:
-            load1 += n1 * parallel_load(r1 * u1, r1 * v1, plan.parallel[levels1[2 * n + 2]])
-            load2 += n2 * parallel_load(r2 * u2, r2 * v2, plan.parallel[levels2[2 * n + 2]])
-        lift, turn = az, aphi
-        az = -(load1 + load2) / car.mass
-        aphi = -(car.arms[0] * load1 + car.arms[1] * load2) / car.inertia
-        dz += 0.5 * h * (lift + az)
-        dphi += 0.5 * h * (turn + aphi)
+        e1, w1 = oil_after(plan, kind, levels1[2 * n + 1], e1, car.ratio[0] * v1, w1, h)
+        e2, w2 = oil_after(plan, kind, levels2[2 * n + 1], e2, car.ratio[1] * v2, w2, h)
+        load1 = _load(car, plan, 0, levels1[2 * n + 2], u1, v1, e1)
+        load2 = _load(car, plan, 1, levels2[2 * n + 2], u2, v2, e2)
+        closer1, closer2 = heights[0, n + 1] - heights[0, n] - g1 + was1, heights[1, n + 1] - heights[1, n] - g2 + was2
+        held1 = _dynamic_load(car, 0, load1, heights[0, n + 1] - g1, closer1 / h)
+        held2 = _dynamic_load(car, 1, load2, heights[1, n + 1] - g2, closer2 / h)
+        lift, turn, rise1, rise2 = az, aphi, ag1, ag2
+        az, aphi = body_acceleration(car, load1, load2)
+        ag1, ag2 = _wheel_acceleration(car, 0, load1 - held1), _wheel_acceleration(car, 1, load2 - held2)
+        dz, dphi = dz + 0.5 * h * (lift + az), dphi + 0.5 * h * (turn + aphi)
+        dg1, dg2 = dg1 + 0.5 * h * (rise1 + ag1), dg2 + 0.5 * h * (rise2 + ag2)
         was = felt
         felt = car.comfort[0] * load1 + car.comfort[1] * load2
         weighted = weigh(state, BODY_AND_OIL, was, felt, modes, plan.residues)
-        cost += h * (weighted * weighted + weight1 * load1 * load1 + weight2 * load2 * load2)
+        cost += h * (weighted * weighted + plan.load_weights[0] * held1 * held1 + plan.load_weights[1] * held2 * held2)
         if cost > most:
             return math.inf
     state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7] = z, phi, dz, dphi, e1, e2, w1, w2
-    state[WEIGHTED], state[LOAD_1], state[LOAD_2] = weighted, load1, load2
+    state[WEIGHTED], state[LOAD_1], state[LOAD_2] = weighted, held1, held2
+    if car.wheels:
+        state[WHEELS], state[WHEELS + 1], state[WHEELS + 2], state[WHEELS + 3] = g1, g2, dg1, dg2
     return cost
+
+
+@inlined
+def _load(car: Vehicle, plan: Predictor, axle: int, level: int, u: float, v: float, e: float) -> float:
+    """Force S + T of an axle [N] at a deflection [m], its rate [m/s] and the elastic deflection of the oil [m]."""
+    ratio = car.ratio[axle]
+    n = car.dampers[axle] * ratio
+    load = car.stiffness[axle] * u + n * spring(plan, level, e)
+    if plan.parallel.shape[1] > 0:
+        load += n * parallel_load(ratio * u, ratio * v, plan.parallel[level])
+    return load
+
+
+@inlined
+def _wheel(car: Vehicle, own: float, road: float) -> float:
+    """Of a wheel: its own height [m] or its rate [m/s] where it has mass, else that of the road."""
+    return own if car.wheels else road
+
+
+@inlined
+def _dynamic_load(car: Vehicle, axle: int, load: float, squeeze: float, rate: float) -> float:
+    """What an axle takes off the road's static load [N], by S + T [N] and how the tyre is squeezed [m], [m/s]."""
+    if not car.wheels:
+        return load
+    return -contact_force(car.static_load[axle], car.tyre_stiffness[axle], car.tyre_damping[axle], squeeze, rate)
+
+
+@inlined
+def _wheel_acceleration(car: Vehicle, axle: int, force: float) -> float:
+    """Acceleration of the wheels of an axle [m/s2] under what suspension and road leave [N]; 0 without mass."""
+    return force / car.unsprung[axle] if car.wheels else 0.0
 
 
 @inlined

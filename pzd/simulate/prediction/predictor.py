@@ -11,9 +11,11 @@ BODY_AND_OIL = 8
 MODES = 4
 """Pairs of poles of the weighting Wk."""
 WEIGHTED, LOAD_1, LOAD_2 = range(BODY_AND_OIL + 2 * MODES, BODY_AND_OIL + 2 * MODES + 3)
-PLANT = BODY_AND_OIL + 2 * MODES + 3
+WHEELS = LOAD_2 + 1
+PLANT = WHEELS + 4
 """State of the plant: the above, real and imaginary part of every mode of the weighting, and what they come to:
-weighted acceleration [m/s2] and load of each wheel [N]."""
+weighted acceleration [m/s2] and dynamic load of each wheel [N]; height [m] of the wheels of both axles, then its rate
+[m/s], which stay 0 where they have no mass."""
 OBSERVED, HELD, TAIL = range(3)
 """Steps for which `Predictor.modes` is laid out: between two observations, while a voltage is held, behind it."""
 ACCELERATION, OBSERVATIONS, MEAN_LOAD_1, MEAN_LOAD_2 = range(2 * MODES, 2 * MODES + 4)

@@ -71,8 +71,10 @@ class Iso8608(Road):
             following = self._piece([*seed, number], 2 * half)
             parts.append(np.cos(fade) * piece[half:] + np.sin(fade) * following[:half])
             piece = following
-        rising = np.clip(spacing * np.arange(knots + 1) / _RUN_IN, 0.0, 1.0)
-        return through(np.concatenate(parts)[: knots + 1] * rising * rising * (3.0 - 2.0 * rising), spacing)
+        heights = np.concatenate(parts)[: knots + 1]
+        rising = spacing * np.arange(min(math.ceil(_RUN_IN / spacing), knots + 1)) / _RUN_IN
+        heights[: rising.size] *= rising * rising * (3.0 - 2.0 * rising)
+        return through(heights, spacing)
 
     def _piece(self, seed: list[int], knots: int) -> Array:
         """(knots,) heights of one piece [m], of a draw of its own."""

@@ -1,0 +1,112 @@
+"""The page as a browser shows it, on a small screen and on a large one, and as it prints."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHROMIUM = shutil.which("chromium")
+QUIET = (
+    "--headless",
+    "--no-sandbox",  # a root of a container has none
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--no-first-run",
+    "--hide-scrollbars",
+    "--allow-file-access-from-files",
+    "--virtual-time-budget=20000",
+    "--enable-logging=stderr",
+)
+pytestmark = [
+    pytest.mark.ci,
+    pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: apt-get install chromium"),
+]
+
+FRAME = """<!doctype html><title>none</title><iframe id="page" src="report.html" width="{width}" height="900"
+style="border: 0"></iframe><script>
+addEventListener("load", () => {{
+  const inside = document.getElementById("page").contentWindow, page = inside.document, root = page.documentElement;
+  const every = [...page.querySelectorAll("*")], style = (e) => inside.getComputedStyle(e);
+  const says = (e) => e.getAttribute("alt") || e.getAttribute("aria-label") || e.querySelector?.("title")?.textContent;
+  const named = (e) => `${{e.tagName}}.${{e.className}} ${{(e.textContent || "").trim().slice(0, 40)}}`;
+  const scrolled = (e) => e && e !== page.body && (/auto|scroll/.test(style(e).overflowX) || scrolled(e.parentElement));
+  document.title = JSON.stringify({{
+    width: inside.innerWidth,
+    scroll: root.scrollWidth,
+    requests: inside.performance.getEntriesByType("resource").map((e) => e.name).filter((n) => !n.startsWith("data:")),
+    pictures: page.querySelectorAll("img, svg").length,
+    silent: [...page.querySelectorAll("img, svg:not([aria-hidden=true])")].filter((e) => !says(e)).map(named),
+    broken: [...page.querySelectorAll("img")].filter((e) => !e.naturalWidth).map(named),
+    wide: every.filter((e) => e.getBoundingClientRect().right > inside.innerWidth + 1 && !scrolled(e)).map(named),
+    cut: every.filter((e) => style(e).overflowX === "hidden" && e.scrollWidth > e.clientWidth + 1).map(named),
+  }});
+}});
+</script>"""
+"""A window of Chromium is never narrower than 500 pixels, a frame in it is."""
+
+
+@pytest.fixture(scope="module")
+def page(run: Any) -> str:
+    """The page of the whole run."""
+    return str(run.told().page)
+
+
+def chromium(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run Chromium without a window, and nothing of its own kept."""
+    assert CHROMIUM is not None
+    profile = f"--user-data-dir={folder / 'profile'}"
+    command = [CHROMIUM, *QUIET, profile, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
+
+
+def shown(page: str, width: int, folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """What a page is like in a frame of so many pixels, and what its console says."""
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    (folder / "frame.html").write_text(FRAME.format(width=width), encoding="utf-8")
+    done = chromium(folder, "--window-size=1500,1000", "--dump-dom", (folder / "frame.html").as_uri())
+    title = re.search(r"<title>(.*?)</title>", done.stdout, re.DOTALL)
+    assert title is not None, done.stderr
+    console = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    return json.loads(unescape(title[1])), console
+
+
+@pytest.mark.parametrize("width", [400, 1400])
+def test_the_page_fits_the_screen_asks_for_nothing_and_says_what_its_pictures_show(page, width, tmp_path) -> None:
+    seen, console = shown(page, width, tmp_path)
+    assert seen["width"] == width
+    assert seen["scroll"] <= width
+    assert seen["pictures"] > 5
+    assert [seen[name] for name in ("requests", "silent", "broken", "wide", "cut")] == [[]] * 5
+    assert console == []
+
+
+def test_what_is_wrong_with_a_page_is_seen(tmp_path) -> None:
+    """A page with every fault: else the test above would pass whatever it looked at."""
+    page = """<body><img src="data:,x"><img alt="far" src="https://example.org/far.png">
+    <div style="width: 900px">wide</div><div style="overflow: hidden; width: 90px"><p style="width: 300px">cut</p></div>
+    <script>console.error("wrong")</script>"""
+    seen, console = shown(page, 400, tmp_path)
+    assert seen["requests"] == ["https://example.org/far.png"]
+    assert len(seen["silent"]) == 1
+    assert len(seen["broken"]) == 2
+    assert [len(seen[name]) > 0 for name in ("wide", "cut")] == [True, True]
+    assert seen["scroll"] > 400
+    assert any("wrong" in line for line in console)
+
+
+def test_the_page_prints(page: str, tmp_path: Path) -> None:
+    """To PDF, in several pages, each with something on it."""
+    (tmp_path / "report.html").write_text(page, encoding="utf-8")
+    target = tmp_path / "report.pdf"
+    chromium(tmp_path, f"--print-to-pdf={target}", "--no-pdf-header-footer", (tmp_path / "report.html").as_uri())
+    printed = target.read_bytes()
+    assert printed.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) > 3
+    assert len(printed) > 50_000
