@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
+from pzd.artefacts.repeating import cycles_of
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
 from pzd.record import Array, Record, clock_fault
 from pzd.schema.csvfile import read_columns, write_columns
@@ -17,7 +18,7 @@ from pzd.schema.jsonfile import read_json_list, write_json
 from pzd.schema.model import Frozen
 from pzd.schema.processes import parallel_map
 from pzd.schema.yamlfile import read_yaml
-from pzd.signals.cycles import Cycles, cycles
+from pzd.signals.cycles import Cycles
 from pzd.signals.reversals import reversals
 from pzd.signals.work import work
 
@@ -188,7 +189,7 @@ def _rms(channel: Array) -> float:
 def _contradictions(entry: RecordEntry, record: Record, control: Control) -> dict[str, str]:
     """What an entry says otherwise than its file, by its key, after an edit of one of them to another unit or sign."""
     faults: dict[str, str] = {}
-    for name, holds in extent(record, cycles(record.time, record.displacement)).items():
+    for name, holds in extent(record, cycles_of(record)).items():
         said = getattr(entry, name)
         if (said is None and (holds is None or name in _MAY_BE_LEFT_OUT)) or _agree(name, said, holds):
             continue

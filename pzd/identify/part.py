@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.identify.repeating import cycles_of
+from pzd.artefacts.repeating import cycles_of
 from pzd.identify.trial import Trial
 from pzd.record import Array, Record
 from pzd.signals.cycles import Cycles

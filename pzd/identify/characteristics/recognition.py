@@ -10,8 +10,8 @@ import numpy as np
 
 from pzd.artefacts.characteristics import Kind
 from pzd.artefacts.matching import same_motion
+from pzd.artefacts.repeating import cycles_of
 from pzd.identify.characteristics.strokes import Stroke
-from pzd.identify.repeating import cycles_of
 from pzd.record import Array, Record
 from pzd.signals.cycles import settled
 from pzd.signals.reversals import reversals
