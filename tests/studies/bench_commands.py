@@ -111,7 +111,7 @@ def diagnoses(folder: Path) -> Iterator[Row]:
 
     def measured(name: str, *more: object) -> dict[str, object]:
         _, _, said = run(script, STUDIES / "speed" / f"{name}.yaml", *more, folder=folder, module="")
-        told: dict[str, object] = json.loads(said.splitlines()[-1])
+        told: dict[str, object] = json.loads(next(line for line in said.splitlines() if line.startswith("{")))
         return told
 
     measured("clean", "--records", 4, "--samples", 2000)  # compiles
