@@ -1,4 +1,4 @@
-"""A spline of order five over evenly spaced knots, by its coefficients: four times continuously differentiable.
+"""A spline of degree five over evenly spaced knots, by its coefficients: four times continuously differentiable.
 
 An integrator of order five keeps its order across knots of such a road; a cubic one would force it to shorter steps.
 """

@@ -14,7 +14,7 @@ from pzd.simulate.profile import Profile, through
 from pzd.simulate.road import Road, Way
 
 _KNOTS_A_WAVE = 40
-"""Of the shortest wave: a cubic spline is then 2e-6 of its amplitude off."""
+"""Of the shortest wave: a spline of degree five is then 1e-9 of its amplitude off."""
 _MARGIN = 100
 """Knots behind the ride: the end of a spline is felt through fewer than these."""
 
