@@ -10,13 +10,18 @@ import os
 import subprocess
 import sys
 import zlib
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
 from installed import Installed
+
+from pzd.parallel import chunks
+from pzd.parallel.pools import Pools, Where
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -173,3 +178,16 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
     subprocess.run([*pip, "--require-hashes", "-r", str(ROOT / "requirements.lock")], check=True)
     subprocess.run([*pip, "--no-deps", str(wheel)], check=True)
     return Installed(folder)
+
+
+@contextmanager
+def in_threads(where: Where, jobs: int, steps: int) -> Iterator[Pools]:
+    """An engine of threads of this process, which start at once."""
+    with ThreadPoolExecutor(jobs) as pool:
+        yield Pools([pool] * steps, jobs)
+
+
+@pytest.fixture
+def threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Threads in place of the processes of every engine, which take long to start."""
+    monkeypatch.setattr(chunks, "ENGINES", dict.fromkeys(chunks.ENGINES, in_threads))

@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from pzd.artefacts.repeating import cycles_of
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
 from pzd.record import Array, Record, clock_fault
 from pzd.schema.csvfile import read_columns, write_columns
@@ -19,6 +18,7 @@ from pzd.schema.model import Frozen
 from pzd.schema.processes import parallel_map
 from pzd.schema.yamlfile import read_yaml
 from pzd.signals.cycles import Cycles
+from pzd.signals.repeating import cycles_of
 from pzd.signals.reversals import reversals
 from pzd.signals.work import work
 

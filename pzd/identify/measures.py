@@ -9,10 +9,10 @@ import numpy as np
 
 from pzd.artefacts import MeasureRow
 from pzd.artefacts.matching import same_motion
-from pzd.artefacts.repeating import cycles_of
 from pzd.identify.trial import warm_up
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
 from pzd.signals.cycles import Cycles
+from pzd.signals.repeating import cycles_of
 from pzd.signals.reversals import reversals
 from pzd.signals.stretches import separate_tests
 from pzd.signals.work import work

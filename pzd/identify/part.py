@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.artefacts.repeating import cycles_of
 from pzd.identify.trial import Trial
 from pzd.record import Array, Record
 from pzd.signals.cycles import Cycles
 from pzd.signals.jumps import jumps, jumps_in_cycles
 from pzd.signals.nuisance import NuisanceConfig, columns_of
+from pzd.signals.repeating import cycles_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pzd.record import Array
 from pzd.signals.departure import FEW, TOLERATED, departure
 from pzd.signals.edges import ROUNDS, averaged, force_span, motion_span
+from pzd.signals.mains import MAINS
 from pzd.signals.period import Repeats, repeats
 from pzd.signals.smoothing import HIGHEST, low_pass
 
@@ -24,8 +25,6 @@ REFINEMENTS = 6
 """Rounds of the refinement of the period; each squares the error."""
 CORNER = 3
 """Points at either end of the cycle that the period is not fitted to."""
-MAINS = (50.0, 60.0)
-"""Frequencies of the mains, whose hum and harmonics of it sensors pick up [Hz]."""
 MAINS_BAND = 0.5
 """Either side of a mains frequency, what it wanders by and what the ends of a run blur [Hz]."""
 SLOW = 20.0

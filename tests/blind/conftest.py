@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,8 +12,7 @@ from pzd.blind.case import Places, Scored
 from pzd.blind.diagnosis import Methods
 from pzd.blind.hide import BenchmarkSetup
 from pzd.config import RunConfig, load
-from pzd.parallel import chunks
-from pzd.parallel.pools import Pools, Where
+from pzd.parallel.pools import Where
 
 SMALL = """
 rig:
@@ -57,18 +54,6 @@ def setup_of() -> Callable[[RunConfig], BenchmarkSetup]:
         return BenchmarkSetup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
 
     return made
-
-
-@contextmanager
-def in_threads(where: Where, jobs: int, steps: int) -> Iterator[Pools]:
-    with ThreadPoolExecutor(jobs) as pool:
-        yield Pools([pool] * steps, jobs)
-
-
-@pytest.fixture
-def threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Threads in place of processes, which take long to start."""
-    monkeypatch.setattr(chunks, "ENGINES", {"local": in_threads})
 
 
 @pytest.fixture

@@ -60,18 +60,6 @@ def small(tmp_path: Path) -> Path:
     return path
 
 
-@contextmanager
-def in_threads(where: Where, jobs: int, steps: int) -> Iterator[Pools]:
-    with ThreadPoolExecutor(jobs) as pool:
-        yield Pools([pool] * steps, jobs)
-
-
-@pytest.fixture
-def threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let every engine be threads of this process, which start at once."""
-    monkeypatch.setattr(chunks, "ENGINES", dict.fromkeys(("local", "dask"), in_threads))
-
-
 def swept(path: Path, runs: Path, *overrides: str, jobs: int = 1) -> tuple[SweepRuns, tuple[RunResult, ...]]:
     campaign = SweepRuns.of(BaseRun(path, runs, overrides))
     shared = campaign.last_shared_stage()

@@ -10,10 +10,10 @@ import numpy as np
 
 from pzd.artefacts.characteristics import Kind
 from pzd.artefacts.matching import same_motion
-from pzd.artefacts.repeating import cycles_of
 from pzd.identify.characteristics.strokes import Stroke
 from pzd.record import Array, Record
 from pzd.signals.cycles import settled
+from pzd.signals.repeating import cycles_of
 from pzd.signals.reversals import reversals
 from pzd.signals.stretches import separate_tests
 
