@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from pzd.damper.branch import any_slips, branch_forces
-from pzd.damper.columns import DRIVE, NEUTRAL, PARALLEL, STROKE_AND_FLOW, Column, acting
+from pzd.damper.columns import DRIVE, NEUTRAL, PARALLEL, STROKE_AND_FLOW, acting
 from pzd.damper.competing_forms import module_of
 from pzd.damper.drive import effective_voltage
 from pzd.damper.element import element_force
@@ -24,6 +24,11 @@ from pzd.record import Array
 
 TOLERANCE = 1e-9
 """Admissible error of one piece of the path, as a share of the force."""
+
+_NEUTRAL_ROW = np.array([[0.0, 0.0, 0.0, *(NEUTRAL[column] for column in STROKE_AND_FLOW)]])
+_NEUTRAL_PARALLEL = np.array([[NEUTRAL[column] for column in PARALLEL]])
+_IN_ROW = {column: K + 1 + i for i, column in enumerate(STROKE_AND_FLOW)}
+_IN_PARALLEL = {column: i for i, column in enumerate(PARALLEL)}
 
 _EVEN = 1e-6  # of the median sampling interval
 
@@ -98,12 +103,17 @@ def constant_rows(
     friction: float, damping: float, stiffness: float, effects: Mapping[str, Mapping[str, float]]
 ) -> tuple[Array, Array | None]:
     """The (1, r) and (1, m) rows for `integrated_force` and `with_parallel` at constant voltage and temperature."""
-
-    def values(columns: Sequence[Column]) -> list[float]:
-        return [effects.get(name, {}).get(parameter, NEUTRAL[name, parameter]) for name, parameter in columns]
-
-    row = np.array([[friction, damping, stiffness, *values(STROKE_AND_FLOW)]])
-    return row, np.array([values(PARALLEL)]) if any(name in effects for name, _ in PARALLEL) else None
+    row, parallel = _NEUTRAL_ROW.copy(), _NEUTRAL_PARALLEL.copy()
+    row[0, [T0, C, K]] = friction, damping, stiffness
+    beside = False
+    for name, values in effects.items():
+        for parameter, value in values.items():
+            if (place := _IN_ROW.get((name, parameter))) is not None:
+                row[0, place] = value
+            elif (place := _IN_PARALLEL.get((name, parameter))) is not None:
+                parallel[0, place] = value
+                beside = True
+    return row, parallel if beside else None
 
 
 def constant_value(channel: Array | None) -> Array | None:
@@ -210,7 +220,7 @@ def steady_force(
     v, u = speeds.ravel(), voltages.ravel()
     effective = None if voltage is None else u
     rows = element_rows(damper, effective, temperature)
-    rows = np.broadcast_to(rows, (v.size, rows.shape[1]))
+    rows = np.array(np.broadcast_to(rows, (v.size, rows.shape[1])))
     side = np.copysign(1.0, v)
     force = np.array([s * flow_force(abs(w), row_of(row), s) for w, s, row in zip(v, side, rows, strict=True)])
     parallel = columns_of(damper, PARALLEL, effective)

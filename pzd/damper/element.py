@@ -58,6 +58,24 @@ def element_force(
     return force
 
 
+def element_forces(displacement: Array, step: float, elements: Array) -> Array:
+    """Force of many Bingham elements under one sampled displacement, linear between samples, from zero force on.
+
+    Parameters
+    ----------
+    displacement : (n,) extension x [m]
+    step : sampling interval [s]
+    elements : (m, 3) T0 [N], C [N s/m] and k [N/m]
+
+    Returns
+    -------
+    (m, n) force [N]
+    """
+    forces = np.empty((len(elements), displacement.size))
+    _march_each(displacement, _STRAIGHT, np.array([step]), elements, forces, _NO_SLOPES)
+    return forces
+
+
 def element_force_sensitivities(
     displacement: Array,
     step: Array | float,
@@ -184,6 +202,14 @@ def _march(
             side = _side(end, T0)
         F = end
         force[i] = F
+
+
+@compiled
+def _march_each(x: Array, v: Array, steps: Array, elements: Array, forces: Array, slopes: Array) -> None:
+    """The same for many elements (m, 3), into (m, n) forces."""
+    for i in range(len(elements)):
+        T0, C, k = elements[i]
+        _march(x, v, steps, T0, C, k, 0.0, forces[i], slopes)
 
 
 @inlined

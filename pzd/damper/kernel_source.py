@@ -68,6 +68,8 @@ def _rows() -> Iterator[str]:
     yield from _function("with_stroke_of(p, q)", f"return ({taken},)")
     same = " and ".join(f"p[{i}] == q[{i}]" for i in moved) or "True"
     yield from _function("stroke_moves(p, q)", f"return not ({same})")
+    alike = " and ".join(f"p[{i}] == q[{i}]" for i in range(len(ELEMENT), _WIDTH)) or "True"
+    yield from _function("effects_alike(p, q)", f"return {alike}")
     yield from _function("plain(p)", f"return {_none_on([*acting('stroke'), *acting('flow')])}")
 
 

@@ -54,6 +54,8 @@ with_stroke_of: Callable[[Row, Row], Row] = _MODULE.with_stroke_of
 """A row with the parameters of the stroke effects of another one."""
 stroke_moves: Callable[[Row, Row], bool] = _MODULE.stroke_moves
 """Whether two rows differ in a parameter of a stroke effect."""
+effects_alike: Callable[[Row, Row], bool] = _MODULE.effects_alike
+"""Whether two rows differ in T0, C and k alone."""
 plain: Callable[[Row], bool] = _MODULE.plain
 """Whether no stroke or flow effect acts: the element of the paper alone."""
 

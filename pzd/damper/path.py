@@ -17,6 +17,7 @@ import numpy as np
 from pzd.compiled import compiled
 from pzd.damper.flow import breakaway, relief, smooth_force
 from pzd.damper.kernels import T0, C, K, Row, interpolate, row_of, stroke_slope
+from pzd.damper.moving_element import UNSOLVED, goes_straight, whole_step
 from pzd.damper.pieces import TimeStep, extension_speed, piece, row_in
 from pzd.damper.regimes import (
     SMOOTH,
@@ -244,5 +245,10 @@ def _march(
         h = steps[min(i - 1, steps.size - 1)]
         mean = (displacement[i] - displacement[i - 1]) / h
         half = 0.5 * (velocity[i] - velocity[i - 1]) if velocity.size > 1 else 0.0
-        advance(state, TimeStep(h, mean - half, mean + half, p0, p1, moving), tolerance, False)
+        step = TimeStep(h, mean - half, mean + half, p0, p1, moving)
+        end, speed = whole_step(state[DEFLECTION], step, tolerance) if goes_straight(p0, p1) else UNSOLVED
+        if math.isnan(end):
+            advance(state, step, tolerance, False)
+        else:
+            state[DEFLECTION], state[SPEED] = end, speed
         force[i] = spring_force(state[DEFLECTION], p1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pzd.damper.element import element_force, element_force_sensitivities
+from pzd.damper.element import element_force, element_force_sensitivities, element_forces
 
 STEP = 1e-3
 
@@ -76,6 +76,13 @@ def test_sensitivities_are_the_limit_of_central_differences(rng: np.random.Gener
     _, slopes = element_force_sensitivities(x, STEP, *values, 0.0, velocity)
     expected = difference / (2 * step[column])
     assert np.max(np.abs(slopes[:, column] - expected)) <= 1e-6 * np.max(np.abs(expected))
+
+
+def test_many_elements_at_once_give_what_each_gives_by_itself(rng: np.random.Generator) -> None:
+    x = np.cumsum(rng.standard_normal(500)) * 1e-3
+    elements = np.column_stack([rng.uniform(100, 1000, 20), rng.uniform(500, 5000, 20), rng.uniform(1e5, 1e6, 20)])
+    each = [element_force(x, 2e-3, *element) for element in elements]
+    np.testing.assert_array_equal(element_forces(x, 2e-3, elements), each)
 
 
 def test_steady_slip_gives_friction_plus_viscous_force() -> None:

@@ -21,6 +21,7 @@ from pzd.damper.element import element_force
 from pzd.damper.kernels import row_of
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.damper.moving_element import whole_step
 from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance, march
 from pzd.damper.pieces import TimeStep
 from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
@@ -44,6 +45,10 @@ FLOWS = [
     {"lash": {"delta": 4e-4}, "rounded_yield": {"w_s": 0.03}, "orifice_quadratic": {"q": 2000.0}},
     {"shear_thinning": {"n": 0.8}, "relief_valve": {"F_r": 900.0, "C_r": 400.0}, "asymmetry": {"alpha": -0.1}},
 ]
+
+
+NEUTRAL_ROW = tuple(constant_rows(1.0, 1.0, 1.0, {})[0][0, 3:])
+"""Columns of a parameter row behind T0, C and k, without any effect."""
 
 
 def sine(voltage: np.ndarray | float, frequency: float = 3.0, amplitude: float = 0.02) -> Motion:
@@ -339,3 +344,45 @@ def test_a_step_from_one_edge_of_the_smooth_flow_past_the_other_is_cut_at_both(r
         whole = march(x[[0, -1]], np.full(2, speed), np.array([long]), rows, force, TOLERANCE)[-1]
         fine = march(x, np.full(parts + 1, speed), np.array([long / parts]), rows, force, TOLERANCE)[-1]
         assert whole == pytest.approx(fine, abs=1e-9 * 1800.0)
+
+
+@pytest.mark.parametrize("stiffness", [2e4, 2e5, 2e7])
+def test_a_step_with_moving_parameters_converges_with_order_four(stiffness: float) -> None:
+    """Stiff or soft: what the polynomial of a whole step misses falls with the fourth power of its length."""
+    first, last = (300.0, 2700.0, stiffness, *NEUTRAL_ROW), (420.0, 2300.0, 1.3 * stiffness, *NEUTRAL_ROW)
+    missed = [abs(in_parts(first, last, parts) - marched_step(first, last)) * stiffness / 900.0 for parts in (1, 2, 4)]
+    assert missed[0] < 1e-3
+    assert missed[2] < 1e-10 or np.log2(missed[0] / missed[2]) / 2 > 3.7, missed
+
+
+def test_a_step_with_moving_parameters_is_cut_where_it_would_miss_more_than_asked(rng) -> None:
+    """Of rows that move by up to a half in one step, those taken at once are as exact as those that are cut."""
+    taken = 0
+    for _ in range(300):
+        stiffness, spread = 10 ** rng.uniform(4, 7), 10 ** rng.uniform(-4, -0.3)
+        first = (300.0, 2700.0, stiffness, *NEUTRAL_ROW)
+        last = tuple(a * (1 + spread * rng.uniform(-1, 1)) for a in first[:3]) + NEUTRAL_ROW
+        end, _ = whole_step(900.0 / stiffness, TimeStep(STEP, 0.3, 0.5, first, last, True), TOLERANCE)
+        if np.isfinite(end):
+            taken += 1
+            assert abs(end - marched_step(first, last)) * stiffness < TOLERANCE * 900.0
+    assert 50 < taken < 300
+
+
+def in_parts(first: tuple, last: tuple, parts: int) -> float:
+    """Elastic deflection [m] after a step from 0.3 to 0.5 m/s that is taken in equal parts."""
+    end = 900.0 / first[2]
+    for i in range(parts):
+        begin, until = i / parts, (i + 1) / parts
+        p, q = (
+            tuple(a + (b - a) * at if a != b else a for a, b in zip(first, last, strict=True)) for at in (begin, until)
+        )
+        end, _ = whole_step(end, TimeStep(STEP / parts, 0.3 + 0.2 * begin, 0.3 + 0.2 * until, p, q, True), np.inf)
+    return end
+
+
+def marched_step(first: tuple, last: tuple) -> float:
+    """The same by pieces whose length follows from their error."""
+    state = np.array([900.0 / first[2], 0.0, 0.0, 0.0])
+    advance(state, TimeStep(STEP, 0.3, 0.5, first, last, True), 1e-11, False)
+    return state[DEFLECTION]

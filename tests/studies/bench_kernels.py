@@ -18,6 +18,7 @@ from scipy.integrate import solve_ivp
 
 from pzd.damper.columns import STROKE_AND_FLOW
 from pzd.damper.compose import constant_rows, integrated_force, sampling_steps
+from pzd.damper.element import element_force, element_forces
 from pzd.damper.motion import Motion
 from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
 
@@ -31,6 +32,9 @@ SUBSTEPS = 8
 TRUTH_SUBSTEPS = 8192
 """Of a Runge-Kutta scheme of order 4, which its kinks at stick make one of order 2: less than 1e-10 of peak is left."""
 LSODA_TOLERANCE = 1e-6
+CANDIDATES = 32
+CYCLE = 500
+"""Samples of the record that many candidates are tried on: what the preflight looks at."""
 ORIFICE = 3000.0
 """q [N s2/m2]."""
 TARGETS = {
@@ -175,7 +179,25 @@ def rows(seed: int = 22) -> Iterator[Row]:
         yield Row(f"force, {one.work}, beside {names[one.peer]}", one.ratio, "x", one.target, about=sides)
         if (one.work, one.peer) == ("plain", "lsoda"):
             yield Row("force, plain: error, share of the peak", one.ours_error, "", LARGEST_ERROR, at_least=False)
+    yield _at_once(np.random.default_rng(seed))
     yield from _growth(np.random.default_rng(seed))
+
+
+def _at_once(rng: np.random.Generator) -> Row:
+    """Many candidates for one record in one call, beside a call each."""
+    x = multisine(rng).displacement[:CYCLE]
+    elements = np.column_stack([rng.uniform(*span, CANDIDATES) for span in ((100, 1000), (500, 5000), (1e5, 1e6))])
+
+    def together() -> Array:
+        return element_forces(x, STEP, elements)
+
+    def each() -> list[Array]:
+        return [element_force(x, STEP, *element) for element in elements]
+
+    times = np.array(list(pairs(together, each)))
+    about = f"{CYCLE} samples; both give the same bytes: {np.array_equal(together(), each())}"
+    ratio = float(np.median(times[:, 0] / times[:, 1]))
+    return Row(f"{CANDIDATES} candidates at once, beside a call each", ratio, "", 0.9, at_least=False, about=about)
 
 
 def _growth(rng: np.random.Generator) -> Iterator[Row]:
