@@ -26,6 +26,9 @@ from pzd.quantities import Control
 
 Verdict = Literal["named", "ambiguous", "none", "unexplained"]
 
+NOT_SEARCHED = "promises too little to be searched for"
+"""The reason of a candidate whose figures are those of a trace of it, see `candidates.candidates`."""
+
 
 @dataclass(frozen=True)
 class Decision:
@@ -163,7 +166,8 @@ def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:
         for c in step.tried:
             if step.tried is not selection.deciding(c.effect):
                 continue
-            reason = selection.reasons.get(c.effect, "does not pay" if c.delta_bic > 0.0 else "explains less")
+            reason = "does not pay" if c.delta_bic > 0.0 else "explains less"
+            reason = selection.reasons.get(c.effect, reason if c.searched else NOT_SEARCHED)
             rows[c.effect] = Ranked(
                 effect=c.effect,
                 gap_after=evidence.criterion(c.fitted),

@@ -5,13 +5,14 @@ Fine enough to tell an offset or a delay from the damper's own hysteresis, far t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from pzd.damper.element import element_force
+from pzd.damper.element import element_forces
 from pzd.record import Array
 from pzd.rig.preflight import Measured
 from pzd.signals.cycles import Cycles
@@ -61,6 +62,17 @@ class ReferenceFit:
         return self.left_without > VISIBLE and self.left < 0.5 * self.left_without
 
 
+class TriedElements(NamedTuple):
+    """Elements of many T0 / k and C / k."""
+
+    pairs: Sequence[tuple[float, float]]
+    """(g,) T0 / k [m] and C / k [s]."""
+    steps: tuple[float, float]
+    """From one to the next, in logarithms."""
+    forces: Array
+    """(g, n) without offset, spring and inertia, of unit length."""
+
+
 @lru_cache(maxsize=1)
 def fit_reference(test: Measured) -> tuple[Piece, ReferenceFit]:
     """Part of a record and the element that fits its force undelayed; remembered for the checks that share it."""
@@ -107,32 +119,54 @@ def fitted(part: Piece, forces: Array) -> ReferenceFit:
     part : the displacement
     forces : (m, n) [N]
     """
-    x = part.displacement
-    free = _free_terms(x)
+    free = _free_terms(part.displacement)
     targets, unexplained = _unit(forces, free), _unexplained_share(forces, free)
-    half = 0.5 * float(np.ptp(x))
-    longest = max(2.0 * part.step, min(0.1, 0.1 * part.step * x.size))
+
+    def closest(tried: TriedElements) -> tuple[int, int, float]:
+        """The element and the force that fit best, and the share of the squares that is left."""
+        left = unexplained * (1.0 - np.maximum(tried.forces @ targets.T, 0.0) ** 2)
+        element, force = (int(i) for i in np.unravel_index(int(np.argmin(left)), left.shape))
+        return element, force, float(left[element, force])
+
+    tried = _first_tried(part)
+    element, force, left = closest(tried)
+    for _ in range(_ZOOMS):
+        about = zip(tried.pairs[element], tried.steps, strict=True)
+        tried = _tried(part, [(np.log(value) - step, np.log(value) + step) for value, step in about], _ZOOM)
+        element, force, left = closest(tried)
+    return ReferenceFit(left, float(unexplained[force]), force, *tried.pairs[element])
+
+
+@lru_cache(maxsize=1)
+def _first_tried(part: Piece) -> TriedElements:
+    """Every element that a record may show; remembered for the checks that share it."""
+    half = 0.5 * float(np.ptp(part.displacement))
+    longest = max(2.0 * part.step, min(0.1, 0.1 * part.step * part.displacement.size))
     spans = [(np.log(2e-3 * half), np.log(0.7 * half)), (np.log(0.2 * part.step), np.log(longest))]
-    counts = _GRID
-    for _ in range(1 + _ZOOMS):
-        frictions, lags = (np.linspace(*span, count) for span, count in zip(spans, counts, strict=True))
-        pairs = [(float(np.exp(u)), float(np.exp(w))) for u in frictions for w in lags]
-        elements = _unit(np.stack([unit_force(part, *pair) for pair in pairs]), free)
-        left = unexplained * (1.0 - np.maximum(elements @ targets.T, 0.0) ** 2)
-        best, force = (int(i) for i in np.unravel_index(int(np.argmin(left)), left.shape))
-        spans = [
-            (np.log(value) - (grid[1] - grid[0]), np.log(value) + (grid[1] - grid[0]))
-            for value, grid in zip(pairs[best], (frictions, lags), strict=True)
-        ]
-        counts = _ZOOM
-    return ReferenceFit(float(left[best, force]), float(unexplained[force]), force, *pairs[best])
+    return _tried(part, spans, _GRID)
 
 
-def unit_force(part: Piece, friction_extension: float, lag: float) -> Array:
-    """Force (n,) of the element over its stiffness [m], in the second pass where the motion is closed."""
+def _tried(part: Piece, spans: Sequence[tuple[float, float]], counts: tuple[int, int]) -> TriedElements:
+    """Elements between the logarithms of two values each."""
+    frictions, lags = (np.linspace(*span, count) for span, count in zip(spans, counts, strict=True))
+    pairs = [(float(np.exp(u)), float(np.exp(w))) for u in frictions for w in lags]
+    forces = unit_forces(part, pairs)
+    steps = float(frictions[1] - frictions[0]), float(lags[1] - lags[0])
+    return TriedElements(pairs, steps, _unit(forces, _free_terms(part.displacement)))
+
+
+def unit_forces(part: Piece, pairs: Sequence[tuple[float, float]]) -> Array:
+    """Forces (g, n) of elements over their stiffness [m], in the second pass where the motion is closed.
+
+    Parameters
+    ----------
+    part : the displacement
+    pairs : g of T0 / k [m] and C / k [s]
+    """
     x = part.displacement
     passes = np.concatenate((x, x)) if part.closed else x
-    return element_force(passes, part.step, friction_extension, lag, 1.0)[-x.size :]
+    elements = np.column_stack([np.array(pairs), np.ones(len(pairs))])
+    return element_forces(passes, part.step, elements)[:, -x.size :]
 
 
 def _free_terms(x: Array) -> Array:

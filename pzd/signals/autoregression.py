@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -55,10 +56,17 @@ class Autoregression:
         """(p + 1,) coefficients 1, -a_1, ... -a_p of the filter that gives w from e."""
         return np.concatenate([np.ones(1), -self.coefficients])
 
-    @property
+    @cached_property
     def variance(self) -> float:
         """Variance of the noise itself: the density summed over all frequencies."""
-        return float(np.mean(self.density((np.arange(GRID) + 0.5) / GRID)))
+        return float(np.mean(self._density_on_grid))
+
+    @cached_property
+    def _density_on_grid(self) -> Array:
+        """(GRID,) density in the middle of `GRID` bands of equal width, by a transform of the whitening filter."""
+        taps = self.whitening_filter
+        response = np.fft.fft(taps * np.exp(-1j * np.pi * np.arange(taps.size) / GRID), GRID)
+        return np.asarray(self.innovation / np.abs(response) ** 2)
 
     def with_white(self, share: float) -> Autoregression:
         """The noise together with white noise of a share of its variance, by a model of the same order.
@@ -71,8 +79,7 @@ class Autoregression:
         if p == 0 or self.innovation <= 0.0:
             return self
         shares = (np.arange(GRID) + 0.5) / GRID
-        density = self.density(shares)
-        r = np.array([np.mean(density * np.cos(2.0 * np.pi * shares * lag)) for lag in range(p + 1)])
+        r = np.array([np.mean(self._density_on_grid * np.cos(2.0 * np.pi * shares * lag)) for lag in range(p + 1)])
         r[0] *= 1.0 + share
         a = solve_toeplitz(r[:p], r[1:])
         return Autoregression(a, float(r[0] - a @ r[1:]))

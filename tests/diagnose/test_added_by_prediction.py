@@ -97,6 +97,7 @@ def test_nothing_is_added_to_a_damper_that_lacks_nothing(rng: np.random.Generato
     assert found is None
 
 
+@pytest.mark.ci
 def test_no_more_is_added_than_the_config_allows_nor_what_it_forbids(rng: np.random.Generator) -> None:
     truth = damper_of(TWO, preload_offset={"F_0": 150.0}, gas_spring={"k_g": 8000.0})
     records = records_of(truth, rng)

@@ -13,7 +13,7 @@ from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import UNTOUCHED, split
 from pzd.diagnose.fit.least_squares import fit
-from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
+from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE, RecordLikelihood
 from pzd.diagnose.fit.parameters import simulated
 from pzd.diagnose.search.evidence import evidence_of
 from pzd.signals.nuisance import NuisanceConfig
@@ -69,3 +69,14 @@ def test_effects_beside_the_element_leave_what_is_remembered_of_it(asked: Callab
         alone = damper.model_copy(update={"base": damper.base[observation.place : observation.place + 1]})
         whole = respond(alone, observation.motion, observation.begins_with, SIMULATION_TOLERANCE)
         np.testing.assert_allclose(force, observation.at_compared(whole), rtol=1e-12)
+
+
+def test_a_remembered_element_takes_the_kernel_that_is_compiled_already(
+    asked: Callable[[int], Campaign], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A row that may only be read is another type to the compiler, and the march takes ten seconds to compile."""
+    (record, *_) = evidence_of(asked(1), PLAIN).whole.observations
+    writeable = []
+    monkeypatch.setattr(RecordLikelihood, "marched", lambda _, rows: writeable.append(rows.flags.writeable))
+    record.element(constant_rows(401.0, 2500.0, 4e5, {})[0].tobytes())
+    assert writeable == [True]

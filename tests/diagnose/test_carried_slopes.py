@@ -77,7 +77,10 @@ def problem(rng: np.random.Generator) -> Problem:
     return evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper_of(TWO)).whole
 
 
-@pytest.mark.parametrize("effect", ["rounded_yield", "shear_thinning", "relief_valve"])
+@pytest.mark.parametrize(
+    "effect",
+    ["relief_valve", *(pytest.param(name, marks=pytest.mark.ci) for name in ("rounded_yield", "shear_thinning"))],
+)
 def test_a_search_ends_where_one_with_differences_at_every_point_does(
     problem: Problem, effect: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

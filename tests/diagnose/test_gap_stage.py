@@ -88,6 +88,7 @@ def test_a_missing_effect_is_named_and_told_where_it_acts(
     assert gap.hold_out == "records"
 
 
+@pytest.mark.ci
 def test_a_misfit_at_one_voltage_is_told_there(rng: np.random.Generator) -> None:
     records = tuple(
         sine(damper_of(asymmetry={"alpha": 0.15 if U == 150.0 else 0.0}), U, f, 0.03, rng)
@@ -108,7 +109,8 @@ def test_one_sine_a_voltage_holds_out_cycles_and_says_that_this_is_weak(rng: np.
     assert "weak" in found.reason
 
 
-@pytest.mark.parametrize("displacement_noise", [pytest.param(0.0, marks=pytest.mark.ci), 5e-5])
+@pytest.mark.ci
+@pytest.mark.parametrize("displacement_noise", [0.0, 5e-5])
 def test_roads_without_a_missing_effect_are_within_the_noise(
     rng: np.random.Generator, displacement_noise: float
 ) -> None:

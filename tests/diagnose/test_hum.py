@@ -38,6 +38,7 @@ def test_an_effect_is_named_through_the_hum(rng: np.random.Generator) -> None:
     assert q == pytest.approx(4000.0, rel=0.05)
 
 
+@pytest.mark.ci
 def test_without_hum_nothing_is_said_of_it(rng: np.random.Generator) -> None:
     records = sines(damper_of(TWO), rng, TWO, jitter=0.005, cycles=8)
     assert "hum" not in diagnosed(records, forbid=all_but("preload_offset")).diagnosis.reason

@@ -65,7 +65,13 @@ FORCES: dict[str, tuple[Force, float]] = {
 }
 
 
-@pytest.mark.parametrize("shape", FORCES)
+IN_THE_GATE = ("|x| v", "x^2", "(x behind a play)/r")
+"""One that needs the velocity, one that does not, and one that remembers."""
+
+
+@pytest.mark.parametrize(
+    "shape", [shape if shape in IN_THE_GATE else pytest.param(shape, marks=pytest.mark.ci) for shape in FORCES]
+)
 def test_the_shape_of_what_is_left_comes_first_with_its_coefficient(shape: str, rng: np.random.Generator) -> None:
     force, coefficient = FORCES[shape]
     found = told(records_with(force, rng))
@@ -94,6 +100,7 @@ def test_what_a_tests_own_gain_offset_and_delay_make_hardly_counts(rng: np.rando
     assert np.all(np.sum(by_own[test.counts] ** 2, axis=0) > 50.0 * test.noise)
 
 
+@pytest.mark.ci
 def test_gains_of_single_tests_hide_no_shape_and_make_none(rng: np.random.Generator) -> None:
     force, coefficient = FORCES["x v"]
     best = told(records_with(force, rng, jitter=0.02)).alone[0]
@@ -116,6 +123,7 @@ def test_what_a_single_test_shows_predicts_no_other_and_is_not_told(rng: np.rand
     assert told(records).rows == ()
 
 
+@pytest.mark.ci
 def test_a_second_shape_is_told_beside_the_first(rng: np.random.Generator) -> None:
     first, second = FORCES["|x| v"][0], FORCES["x^2"][0]
     found = told(records_with(lambda r: 2.0 * first(r) + second(r), rng))

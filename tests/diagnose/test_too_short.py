@@ -66,8 +66,9 @@ def test_what_is_said_is_that_nothing_is_known_and_what_to_record(rng: np.random
     assert test.peak_speed_m_per_s <= np.max(np.abs(record.velocity))
 
 
+@pytest.mark.ci
 def test_a_run_on_a_short_record_goes_to_its_end(
-    rng: np.random.Generator, pzd: Callable[..., object], tmp_path: Path
+    rng: np.random.Generator, pzd_here: Callable[..., object], tmp_path: Path
 ) -> None:
     record = shortened(rng, MISSING, 1.2, 200.0)
     np.savetxt(
@@ -80,13 +81,13 @@ def test_a_run_on_a_short_record_goes_to_its_end(
     rides = "simulate: {policies: [passive], fidelities: [table], duration_s: 4, settle_s: 2,\n"
     rides += "  roads: [{kind: sine, frequency_Hz: 2.25}]}\n"
     (tmp_path / "short.yaml").write_text(f"rig:\n  files:\n    - path: short.csv\n{rides}")
-    ended = pzd("run", "short.yaml", cwd=tmp_path)
+    ended = pzd_here("run", "short.yaml", cwd=tmp_path)
     assert ended.stderr == ""
     written = json.loads((tmp_path / "runs/short/3-diagnose/diagnosis.json").read_text())
     assert written["gap"] is None
     page = (tmp_path / "runs/short/6-report/report.html").read_text()
     assert "Not settled by these tests" in page
     assert "The gap could not be measured." in page
-    shown = pzd("show", "short.yaml", cwd=tmp_path)
+    shown = pzd_here("show", "short.yaml", cwd=tmp_path)
     assert "gap: could not be measured" in shown.stdout
     assert "next test: sine, ten cycles" in shown.stdout

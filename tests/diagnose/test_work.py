@@ -25,6 +25,7 @@ def test_a_search_that_may_compute_nothing_adopts_nothing_and_says_so(records: t
     assert "ended by diagnose.most_evaluations (1 forces)" in found.reason
 
 
+@pytest.mark.ci
 def test_what_was_adopted_before_the_end_is_kept_whatever_the_number_of_threads(records: tuple[Record, ...]) -> None:
     """One round fits in: of the two effects that are missing one is adopted."""
     samples = sum(record.time.size for record in records)

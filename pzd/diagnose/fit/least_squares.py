@@ -14,31 +14,38 @@ import numpy as np
 
 from pzd.damper.model import Damper
 from pzd.diagnose.fit.carried_slopes import CarriedSlopes
-from pzd.diagnose.fit.likelihood import RecordLikelihood
+from pzd.diagnose.fit.differences import blocks, differences
 from pzd.diagnose.fit.parameters import Problem, Unknown, simulated
 from pzd.record import Array
 
 Left = tuple[list[Array], list[Array]]
 """Residuals in units of noise and simulated forces, an observation each."""
 
-DIFFERENCE = 3e-3
-"""Step of the searched variables to either side for their slopes.
-
-Reason: the gain of the tests leaves T0, C and k open along one direction, common to them all, so that what forward
-differences leave of the curvature ends a search up to a standard deviation away from the optimum. A smaller step shows
-the errors of the simulation, see `likelihood.SIMULATION_TOLERANCE`."""
 MOST_EVALUATIONS = 20
+"""Evaluations of the model in a search, at most, unless said otherwise.
+
+Reason: time; what is adopted is searched on, see `thresholds.MOST_EVALUATIONS_OF_BEST`."""
 MOST_PASSES = 3
 """Times that the end of a search is looked at with slopes of its own, and the search goes on from there."""
 PRECISION = 1e-5
-"""Relative change of the sum of squares at which a search ends."""
+"""Relative change of the sum of squares at which a search ends.
+
+Reason: of ten thousand squares of noise a tenth of one, far less than `adopt_bic` asks for."""
 STIFFER = 2.0
-"""By this factor the search may exceed the fastest element."""
+"""By this factor the search may exceed the fastest element.
+
+Reason: room for an optimum at the limit that identify found; a stiffer element cannot be told from a rigid one by
+these samples."""
 USUAL = 1.5
 """Prior standard deviation of ln C and ln k about their starting values: holds a row still where the tests do not
-show it (C under an open relief valve, k of a soft drive), and nowhere else."""
+show it (C under an open relief valve, k of a soft drive), and nowhere else.
+
+Reason: a factor of e^1.5 = 4.5 either way is no surprise between what identify reads from loops and an optimum with an
+effect beside it."""
 WIDEST = 3.0
-"""C and k stay within e^3 = 20 times their starting values."""
+"""C and k stay within e^3 = 20 times their starting values.
+
+Reason: two standard deviations of `USUAL`; what ends there is not shown by the tests."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +117,7 @@ def fit(
     found, slopes, (residuals, forces) = _search(problem, unknowns, start, start.size, evaluations, known, rough=rough)
 
     def differentiated() -> Array:
-        return _differences(problem, unknowns, found, _bounds(problem, unknowns)) if slopes is None else slopes
+        return differences(problem, unknowns, found, _bounds(problem, unknowns)) if slopes is None else slopes
 
     return Fitted(
         problem.point(found, unknowns).damper(),
@@ -169,8 +176,8 @@ def _search(
 
     slopes = CarriedSlopes(
         lambda x: np.concatenate(left_at(x)[0]),
-        lambda x: _differences(problem, unknowns, whole(x), (low[:free], high[:free])),
-        _blocks(problem, unknowns, free),
+        lambda x: differences(problem, unknowns, whole(x), (low[:free], high[:free])),
+        blocks(problem, unknowns, free),
         None if known is None else (begin[:free], known),
     )
 
@@ -209,25 +216,8 @@ def _known(problem: Problem, unknowns: Sequence[Unknown], start: Array, beside: 
     if not (same_rows and same_effects and same_residuals):
         return None
     columns = range(shared, start.size)
-    new = _differences(problem, unknowns, start, _bounds(problem, unknowns), columns)
+    new = differences(problem, unknowns, start, _bounds(problem, unknowns), columns)
     return np.hstack([beside.slopes, new[:, shared:]])
-
-
-def _blocks(problem: Problem, unknowns: Sequence[Unknown], free: int) -> list[tuple[slice, list[int]]]:
-    """The residuals of each observation, and which of the first `free` variables move them."""
-    ends = np.cumsum([0, *(o.residuals for o in problem.observations)])
-    return [
-        (slice(int(begin), int(end)), _moving(problem, unknowns, o, free))
-        for o, begin, end in zip(problem.observations, ends[:-1], ends[1:], strict=True)
-    ]
-
-
-def _moving(problem: Problem, unknowns: Sequence[Unknown], o: RecordLikelihood, free: int) -> list[int]:
-    """Which of the first `free` variables move the force of an observation: a test moves with its own voltage alone."""
-    rows = 3 * len(problem.base)
-    own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(rows)
-    effects = [j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]]
-    return [*own, *(rows + j for j in effects if rows + j < free)]
 
 
 def _prior(problem: Problem, effects: int) -> Array:
@@ -254,39 +244,6 @@ def _residuals(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Left:
     point = problem.point(x, unknowns)
     forces = [simulated(point, o) for o in problem.observations]
     return [o.in_noise(o.measured - f) for o, f in zip(problem.observations, forces, strict=True)], forces
-
-
-def _differences(
-    problem: Problem,
-    unknowns: Sequence[Unknown],
-    x: Array,
-    limits: tuple[Array, Array],
-    wanted: Sequence[int] | None = None,
-) -> Array:
-    """(w, free) derivatives of the residuals by central differences, one-sided at the limits (free,) of the search.
-
-    Only the `wanted` columns, where some are given; the others are zero.
-    """
-    low, high = limits
-    free = low.size
-    below, above = np.maximum(x[:free] - DIFFERENCE, low), np.minimum(x[:free] + DIFFERENCE, high)
-    asked = range(free) if wanted is None else wanted
-    points = {j: tuple(problem.point(_with(x, j, at[j]), unknowns) for at in (below, above)) for j in asked}
-    blocks = []
-    for o in problem.observations:
-        columns = [j for j in _moving(problem, unknowns, o, free) if j in points]
-        change = [np.subtract(*(simulated(point, o) for point in points[j])) for j in columns]
-        block = np.zeros((o.residuals, free))
-        if columns:
-            block[:, columns] = o.in_noise(np.stack(change, axis=-1) / (above - below)[columns])
-        blocks.append(block)
-    return np.concatenate(blocks)
-
-
-def _with(x: Array, j: int, value: float) -> Array:
-    moved = x.copy()
-    moved[j] = value
-    return moved
 
 
 def _covariance(jacobian: Array) -> Array:

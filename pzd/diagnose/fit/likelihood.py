@@ -66,7 +66,7 @@ class RecordLikelihood:
     @cached_property
     def element(self) -> Callable[[bytes], Array]:
         """(m,) force [N] of the element by its parameter row, (1, r) as bytes; effects beside it leave it as it is."""
-        return lru_cache(REMEMBERED)(lambda row: self.marched(np.frombuffer(row)[np.newaxis]))
+        return lru_cache(REMEMBERED)(lambda row: self.marched(np.frombuffer(row)[np.newaxis].copy()))
 
     def marched(self, rows: Array) -> Array:
         """(m,) force [N] of the element by its parameter rows, (1, r) or (m, r)."""

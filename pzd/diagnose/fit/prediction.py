@@ -18,10 +18,14 @@ from pzd.signals.reversals import reversals
 FEWEST_IN_HALF_CYCLE = 25
 """Samples of the fastest half cycle from which a parabola between them is exact enough: 1e-4 of the force."""
 PREDICTION_TOLERANCE = 1e-7
-"""Of the damper's path, as a share of the force."""
+"""Of the damper's path, as a share of the force.
+
+Reason: far below `weights.RESOLUTION`; see `likelihood.SIMULATION_TOLERANCE`."""
 
 WARMS = 0.5
-"""A temperature that moves by less [K] counts as standing still."""
+"""A temperature that moves by less [K] counts as standing still.
+
+Reason: about the resolution of a thermocouple; not tuned."""
 STEP = 0.1
 """A voltage that moves by more from one sample to the next [share of its range in the record] has stepped."""
 ENDS = 0.02

@@ -24,28 +24,48 @@ from pzd.signals.reversals import reversals
 from pzd.signals.smooth_residual import fit_smooth_residual
 
 RESOLUTION = 3e-4
-"""No force is believed to be known better than this share of the record's peak (r.m.s.)."""
+"""No force is believed to be known better than this share of the record's peak (r.m.s.).
+
+Reason: a good load cell is right to 0.03 % of its range; without a floor a quiet record would decide
+alone. Not tuned."""
 INSTANT = 1e-6
-"""Delay by which the slope of a force over time is taken [s]."""
+"""Delay by which the slope of a force over time is taken [s].
+
+Reason: far below a sample, far above the rounding of a time stamp."""
 LATEST = 3.0
-"""At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope."""
+"""At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope.
+
+Reason: the customary bound for what a normal prior still allows."""
 HIDDEN = 1e-3
 """A nuisance that moves all residuals together by less [standard deviations of one] is left out.
 
 Reason: it would change the misfit by a millionth."""
 DISCREPANCY = 0.3
 """Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
-fitted: a model that still lacks something must not be bent to where the noise happens to be smallest."""
+fitted: a model that still lacks something must not be bent to where the noise happens to be smallest.
+
+Reason: 0 believes the quietest harmonics whatever the model lacks, 1 leaves no evidence; about a tenth of the squares.
+Not tuned."""
 MOST_HARMONICS = 80
-"""Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart."""
+"""Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart.
+
+Reason: harmonics of a force whose slope jumps, as at yield, fall with their square: those beyond are below 2e-4 of
+the first, and `RESOLUTION` is no finer."""
 UNWEIGHTED = 0.05
-"""What a plain element leaves [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k."""
+"""What a plain element leaves [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k.
+
+Reason: what identify leaves of a damper that lacks a law is of this size; the priors hold only what no test
+shows. Not tuned."""
 CYCLE_POINTS = 256
-"""A cycle is simulated on at least this many points."""
+"""A cycle is simulated on at least this many points.
+
+Reason: three points for each of the harmonics that are compared."""
 FEWEST_SAMPLES = 2 * CYCLE_POINTS
 """Fewer samples of a motion that does not repeat do not show what colour their noise has."""
 MOST_POINTS = 2048
-"""And on no more: the harmonics that are compared need no finer grid, however slow the test."""
+"""And on no more: the harmonics that are compared need no finer grid, however slow the test.
+
+Reason: 25 points for each of the harmonics that are compared."""
 
 
 def record_likelihood(

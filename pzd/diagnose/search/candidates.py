@@ -14,15 +14,18 @@ from pzd.damper.effects import library, nameable
 from pzd.diagnose.fit.least_squares import MOST_EVALUATIONS, Fitted, fit
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.prediction import WARMS, ends
-from pzd.diagnose.search.starts import fainter, promising_starts, starts_of, without_promise
+from pzd.diagnose.search.starts import fainter, promise, promising_starts, starts_of
 from pzd.diagnose.thresholds import (
     AT_EDGE,
     FAINTER_STARTS,
     FIRST_EVALUATIONS,
+    LEAST_PROMISE,
     MOST_EVALUATIONS_OF_BEST,
     MOVING_VOLTAGE,
+    SLIGHT_PROMISE,
     STARTS_TRIED,
     WORSE_THAN_CONTAINED,
+    WORTH_FITTING,
     WORTH_SEARCHING,
 )
 from pzd.record import Array
@@ -43,6 +46,8 @@ class Candidate:
     """R.m.s. by which it moves the simulated force, as a share of each record's peak."""
     varies: bool = False
     """Whether its parameters are by voltage: an effect adopted before, or one that is only looked for so."""
+    searched: bool = True
+    """Whether its optimum was searched for; else it stands as faint as it is looked for."""
 
 
 def seen_in(problem: Problem, effect: Effect) -> bool:
@@ -93,14 +98,19 @@ def candidates(
 
     _ = before.frame  # asked of by every candidate: computed once, before they go to threads of their own
 
-    def one(effect: Effect) -> Candidate:
-        unlikely = silent and without_promise(problem, before, effect)
-        return (_barely if unlikely else candidate)(problem, before, effect)
+    def promised(effect: Effect) -> float:
+        return promise(problem, before, effect) if _for(problem, effect) is problem else np.inf
 
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
-        found = list(pool.map(one, tried))
-        best = min((c.delta_bic for c in found), default=0.0)
-        worth = WORTH_SEARCHING * best
+        gains = list(pool.map(promised, tried))
+        best = max((gain for gain in gains if np.isfinite(gain)), default=0.0)
+        least = max(LEAST_PROMISE if silent else SLIGHT_PROMISE, WORTH_FITTING * best)
+
+        def one(effect: Effect, gain: float) -> Candidate:
+            return (candidate if gain >= least else _barely)(problem, before, effect)
+
+        found = list(pool.map(one, tried, gains))
+        worth = WORTH_SEARCHING * min((c.delta_bic for c in found), default=0.0)
         found = list(pool.map(lambda c: finished(problem, before, c) if c.delta_bic < worth else c, found))
     return tuple(sorted(found, key=lambda c: c.delta_bic))
 
@@ -142,7 +152,7 @@ def _switched_off(effect: Effect, fitted: Fitted) -> bool:
 def _barely(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     """An effect as faint as it is looked for."""
     start = fainter(problem, before, effect, starts_of(problem, before, effect)[0], FAINTER_STARTS[-1])
-    return _from(problem, before, effect.name, np.concatenate([before.searched, start]), 1)
+    return replace(_from(problem, before, effect.name, np.concatenate([before.searched, start]), 1), searched=False)
 
 
 def best_competing_form(problem: Problem, before: Fitted) -> Candidate:

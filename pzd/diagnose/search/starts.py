@@ -8,9 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from pzd.damper.effect import Effect
-from pzd.diagnose.fit.least_squares import DIFFERENCE, Fitted
+from pzd.diagnose.fit.differences import DIFFERENCE
+from pzd.diagnose.fit.least_squares import Fitted
 from pzd.diagnose.fit.parameters import BOUND, Problem, Unknown, simulated
-from pzd.diagnose.thresholds import FAINT, LEAST_PROMISE
+from pzd.diagnose.thresholds import FAINT
 from pzd.record import Array
 
 
@@ -37,14 +38,11 @@ def most_promising(problem: Problem, before: Fitted, effects: Sequence[Effect], 
     return [effects[i] for i in np.argsort(promised, kind="stable")[:count]]
 
 
-def without_promise(problem: Problem, before: Fitted, effect: Effect) -> bool:
-    """Whether a faint effect of one parameter promises nothing; one of more may act where nobody looks yet."""
-    if len(effect.parameters) > 1:
-        return False
+def promise(problem: Problem, before: Fitted, effect: Effect) -> float:
+    """By how much a linearised step lowers the misfit at most, from an effect's starting values or from near none."""
     starts = starts_of(problem, before, effect)
     faint = (*starts, *(fainter(problem, before, effect, start, FAINT) for start in starts))
-    promised = min(_promised_misfit(problem, before, effect, start) for start in faint)
-    return before.misfit - promised < LEAST_PROMISE
+    return before.misfit - min(_promised_misfit(problem, before, effect, start) for start in faint)
 
 
 def starts_of(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:

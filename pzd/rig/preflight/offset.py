@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.artefacts import Finding, RecordEntry
 from pzd.rig.preflight import Measured
-from pzd.rig.reference_fit import fit_reference, unit_force
+from pzd.rig.reference_fit import fit_reference, unit_forces
 
 SHARE = 0.04
 """Offset that is said, as a share of half the force's range."""
@@ -29,7 +29,7 @@ def check(test: Measured) -> list[Finding]:
     """
     part, element = fit_reference(test)
     force = part.force_later(np.zeros(1))[0]
-    unit = unit_force(part, element.friction_extension, element.lag)
+    (unit,) = unit_forces(part, [(element.friction_extension, element.lag)])
     slips = min(np.mean(sign * unit > element.friction_extension) for sign in (1.0, -1.0))
     if slips < SLIPS or not element.explains():
         return []
