@@ -107,8 +107,24 @@ def cycles(time: Array, displacement: Array) -> Cycles | None:
     if found is None:
         return None
     run = _refined(time, displacement, found)
-    folded = run.fold(time, displacement if run.count >= FEW else low_pass(displacement, HIGHEST))
-    return None if departure(_without_hum(folded - drift(folded), run.period)) > TOLERATED else run
+    if run.count >= FEW:
+        folded, ends = run.fold(time, displacement), 0
+    else:
+        folded, ends = _smoothed(run, time, displacement)
+    folded = _without_hum(folded - drift(folded), run.period)
+    return None if departure(folded[:, ends : folded.shape[1] - ends]) > TOLERATED else run
+
+
+def _smoothed(run: Cycles, time: Array, displacement: Array) -> tuple[Array, int]:
+    """(count, points) of the run alone smoothed, and how many points at either end of a cycle count for nothing.
+
+    A start out of rest is as quick as noise: smoothed with it, the motion would keep its noise. A run may begin a
+    little before the motion does.
+    """
+    ends = max(CORNER, run.points(time) // 50)
+    shut_out = ends * run.period / run.points(time)
+    inside = (time >= run.start + shut_out) & (time <= run.end - shut_out)
+    return run.fold(time[inside], low_pass(displacement[inside], HIGHEST)), ends
 
 
 def _without_hum(folded: Array, period: float) -> Array:

@@ -81,10 +81,28 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
         near = np.linspace(mains - LINES_OFF, mains + LINES_OFF, points)
         spectrum = zoom_fft(level * np.hanning(level.size), [near[0], near[-1]], m=points, fs=rate, endpoint=True)
         found = near[int(np.argmax(np.abs(spectrum)))]
-        phases = [2.0 * np.pi * h * found * time for h in HARMONICS if rate > 2.0 * h * found]
-        columns = np.column_stack([f(phase) for phase in phases for f in (np.cos, np.sin)])
-        wave += columns @ np.linalg.lstsq(columns[wanted], level[wanted], rcond=None)[0]
+        found = float(np.clip(found + _off(found, time, level, wanted), near[0], near[-1]))
+        waves = _waves(found, time)
+        wave += waves @ np.linalg.lstsq(waves[wanted], level[wanted], rcond=None)[0]
     return wave
+
+
+def _waves(frequency: float, time: Array) -> Array:
+    """Cosine and sine of each harmonic that the rate can show, (n, 2 times harmonics)."""
+    rate = (time.size - 1) / float(time[-1] - time[0])
+    phases = [2.0 * np.pi * h * frequency * time for h in HARMONICS if rate > 2.0 * h * frequency]
+    return np.column_stack([f(phase) for phase in phases for f in (np.cos, np.sin)])
+
+
+def _off(frequency: float, time: Array, level: Array, wanted: Mask) -> float:
+    """How far the least squares lie from a frequency of the grid [Hz]: a step of Gauss and Newton, by all harmonics."""
+    waves = _waves(frequency, time)
+    sizes = np.linalg.lstsq(waves[wanted], level[wanted], rcond=None)[0]
+    cosines, sines = waves[:, ::2], waves[:, 1::2]
+    rising = 2.0 * np.pi * time[:, np.newaxis] * np.array(HARMONICS[: cosines.shape[1]])
+    slope = np.sum(rising * (sizes[1::2] * cosines - sizes[::2] * sines), axis=1)
+    more = np.column_stack([waves, slope])
+    return float(np.linalg.lstsq(more[wanted], level[wanted], rcond=None)[0][-1])
 
 
 def _of_motion(mains: float, cycle: float, resolution: float) -> bool:

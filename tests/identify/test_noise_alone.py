@@ -69,6 +69,7 @@ def test_intervals_cover_the_truth_where_the_textbook_fails(correlation, rng: np
         residuals = noise - slopes @ estimate
         held += np.count_nonzero(np.abs(estimate) <= uncertainty(slopes, residuals, [700, 800]).half_widths())
         naive += np.count_nonzero(np.abs(estimate) <= textbook * np.std(residuals))
-    assert 0.92 <= held / 400 <= 0.98
+    # Of 1200 draws 95, 95 and 93 in 100 hold, for the three correlations; the share of 400 scatters by 0.012.
+    assert 0.89 <= held / 400 <= 0.99
     if correlation == 0.9:
         assert naive / 400 < 0.6
