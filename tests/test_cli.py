@@ -364,6 +364,40 @@ def test_check_says_what_it_found_and_writes_nothing(typed: Terminal, tmp_path: 
     assert files_below(tmp_path) == before
 
 
+BINARY = b"$KD_DEFINITION\n#:KRBI\nD:long section 1,m\n" + b"$" * 72 + b"\n\x00\x7f\xc0\x00"
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "content", "says"),
+    [
+        ("file", "gone.csv", None, "there is no such file; the path counts from the config (got gone.csv)"),
+        (
+            "file",
+            "short.csv",
+            b"distance_m,height_m\n0,0\n100,0.01\n",
+            "make simulate.duration_s 4 s or less, or",
+        ),
+        ("file", "wrong.csv", b"s,z\n0,0\n", "wrong.csv:1: the header must be distance_m,height_m (got s,z)"),
+        ("opencrg", "binary.crg", BINARY, "of the forms LRFI and LDFI are read; save it as one of them (got KRBI)"),
+        ("opencrg", "zip.crg", b"PK\x03\x04\xff\x00", "no line of $ signs begins the data; is it an OpenCRG file?"),
+    ],
+)
+@pytest.mark.parametrize("flags", [(), ("--json",)], ids=["text", "json"])
+def test_check_opens_the_roads_and_tells_where_and_what_to_do(
+    typed: Terminal, tmp_path: Path, kind, name, content, says, flags
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    config = typed.config.read_text(encoding="utf-8")
+    roads = f"simulate:\n  roads:\n    - {{kind: sine, frequency_Hz: 2}}\n    - {{kind: {kind}, path: {name}}}\n"
+    typed.config.write_text(f"{config}\n{roads}", encoding="utf-8")
+    line = typed.config.read_text(encoding="utf-8").splitlines().index(roads.splitlines()[3]) + 1
+    assert typed("check", "first.yaml", *flags) == 2
+    assert len(typed.err) == 1
+    assert re.match(rf"first\.yaml:{line}:\d+: simulate\.roads\.1\.path: ", typed.err[0])
+    assert says in typed.err[0]
+
+
 def test_show_prints_the_numbers_of_the_run_and_writes_nothing(typed: Terminal, tmp_path: Path) -> None:
     typed("run", "first.yaml")
     before = files_below(tmp_path)

@@ -165,8 +165,7 @@ class Rides:
         """Write one CSV a case, so many at the same time, and one table of each kind over all cases."""
 
         def written(ride: Ride) -> None:
-            columns = {name: ride.columns.get(name) for name in _RIDE_HEADER}
-            write_columns(folder / f"{ride.case}.csv", columns, control)
+            write_columns(folder / f"{ride.case}.csv", ride.columns, control, _RIDE_HEADER)
 
         parallel_map(written, self.rides, jobs)
         write_rows(folder / "summary.csv", SummaryRow, self.summary, control)

@@ -40,8 +40,8 @@ def check(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
-    """Check config and rig records; write nothing but the page of --plot."""
-    from pzd.pipeline.command import check_setting, opened, preflight
+    """Check config, rig records and road files; write nothing but the page of --plot."""
+    from pzd.pipeline.command import check_roads, check_setting, opened, preflight
     from pzd.schema.jsonfile import plain_data
 
     output = Output(quiet=quiet, verbose=verbose)
@@ -56,10 +56,12 @@ def check(
     if as_json:
         output.say_json(plain_data({"config": config.as_posix(), "records": entries}, given.run.control))
         check_setting(given, entries)
+        check_roads(given)
         return DONE
     for entry in entries:
         output.say(*_entry(entry), *(_ingested(ingested, entry.name) if verbose else ()))
     check_setting(given, entries)
+    check_roads(given)
     found = sum(len(entry.findings) for entry in entries)
     wrote = f"the records are drawn in {plot}" if plot is not None else "nothing was written"
     output.say(f"{counted(len(entries), 'record')}, {counted(found, 'finding')}; the config is in order, {wrote}")

@@ -164,6 +164,19 @@ def preflight(given: Opened) -> Rig:
     return made
 
 
+def check_roads(given: Opened) -> None:
+    """Check that the roads of the config are there, can be read and are as long as the ride.
+
+    Raises
+    ------
+    ConfigError : when one is not
+    """
+    from pzd.simulate.stage import profiles_of
+
+    with given.placed():
+        profiles_of(given.config.simulate, given.config.seed, given.run.config.parent)
+
+
 def check_setting(given: Opened, entries: Sequence[RecordEntry]) -> None:
     """Check that the config says which setting of the rig's records the stages from diagnose on are about.
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import csv
 import io
-import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import Any, TypeVar, get_args
@@ -29,6 +28,8 @@ from pzd.schema.wording import worded
 Row = TypeVar("Row", bound=Frozen)
 Columns = dict[str, NDArray[np.float64]]
 
+_WRITTEN = 10_000
+"""Rows whose numbers are turned into text at a time, so that the room for it does not grow with the file."""
 _MOST_FAULTS = 20
 """Faults that one file's message lists before it only counts them."""
 
@@ -129,26 +130,38 @@ def _columns_of(
     return names
 
 
-def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64] | None], control: Control) -> None:
+def write_columns(
+    path: Path, columns: Mapping[str, NDArray[np.float64] | None], control: Control, header: Sequence[str] | None = None
+) -> None:
     """Write arrays of one length as columns, each number so that it reads back exactly.
 
-    None stands for a column that is absent: its cells are empty.
+    None stands for a column that is absent, as does a name in the header alone: its cells are empty.
 
     Raises
     ------
     ValueError : when a number is not finite or the lengths differ, which no reader would take
     """
-    length = max((values.size for values in columns.values() if values is not None), default=0)
-    wrong = [name for name, values in columns.items() if values is not None and not np.isfinite(values).all()]
-    if wrong:
-        raise ValueError(f"{path.name}: {', '.join(wrong)} must hold finite numbers")
-    cells = [
-        itertools.repeat("", length) if values is None else map(repr, np.asarray(values, dtype=np.float64).tolist())
-        for values in columns.values()
-    ]
+    names = header or tuple(columns)
+    length = max((values.size for values in map(columns.get, names) if values is not None), default=0)
+    for first in range(0, length, _WRITTEN):
+        wrong = [n for n, v in _block(columns, names, first) if v is not None and not np.isfinite(v).all()]
+        if wrong:
+            raise ValueError(f"{path.name}: {', '.join(wrong)} must hold finite numbers")
     with path.open("w", newline="", encoding="utf-8") as file:
-        file.write(",".join(control.renamed(name) for name in columns) + "\n")
-        file.writelines(f"{','.join(row)}\n" for row in zip(*cells, strict=True))
+        file.write(",".join(control.renamed(name) for name in names) + "\n")
+        for first in range(0, length, _WRITTEN):
+            empty = [""] * min(length - first, _WRITTEN)
+            cells = [empty if v is None else map(repr, v.tolist()) for _, v in _block(columns, names, first)]
+            file.writelines(f"{','.join(row)}\n" for row in zip(*cells, strict=True))
+
+
+def _block(
+    columns: Mapping[str, NDArray[np.float64] | None], names: Sequence[str], first: int
+) -> Iterator[tuple[str, NDArray[np.float64] | None]]:
+    """Some rows of each column, which is asked for anew, so that a column in a file is mapped no longer than that."""
+    for name in names:
+        values = columns.get(name)
+        yield name, None if values is None else np.array(values[first : first + _WRITTEN], dtype=np.float64)
 
 
 def read_columns(path: Path, header: Sequence[str], control: Control, optional: Sequence[str] = ()) -> Columns:

@@ -169,9 +169,9 @@ def slipping_forces(damper: DynamicDamper, axle: int, x: float, v: float, row: A
     v : its speed [m/s]; the sign bit of 0 picks the side
     row : of the parallel effects
     """
-    memory = damper.memory[axle]
-    travel = x - memory[0]
-    stored = branch_stored(travel, math.copysign(1.0, v), memory[1:], row)
+    memory, side = damper.memory[axle], math.copysign(1.0, v)
+    travel = side * max(side * (x - memory[0]), 0.0)  # a rounding the other way would count as turning round
+    stored = branch_stored(travel, side, memory[1:], row)
     return stored, branch_force(travel, memory[1:], row) - stored
 
 

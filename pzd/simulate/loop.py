@@ -232,7 +232,7 @@ def ride(
     tolerance : see `advance`
     per_control, per_output : steps between two acts of the controller, and between two rows of the history
     course : (last - first, COURSE_COLUMNS) what is kept of these steps, filled
-    history : (steps // per_output + 1, COLUMNS) filled
+    history : (m, COLUMNS) a row for each of these steps that is a multiple of `per_output`, filled
     tally : (TALLIES,) filled; fewer steps are done where the table ends
     stages, end : room to work in, see `advance`
     """
@@ -240,7 +240,7 @@ def ride(
     if first == 0:
         tally[NEXT_PIECE] = h
         _start(y, model, control, workspace, scratch)
-    dt = tally[NEXT_PIECE]
+    dt, noted = tally[NEXT_PIECE], 0
     for n in range(first, last):
         time = n * h
         if n % per_control == 0:
@@ -253,7 +253,8 @@ def ride(
         if beyond_reach(model, control, workspace):
             tally[OUTSIDE] += 1.0
         if n % per_output == 0:
-            _note(time, y, model, control, workspace, history[n // per_output])
+            _note(time, y, model, control, workspace, history[noted])
+            noted += 1
         if n < steps:
             dt = advance(time, h, y, model, control, workspace, tolerance, min(dt, h), stages, end)
     tally[NEXT_PIECE] = dt

@@ -11,7 +11,7 @@ from pydantic import Field
 from typing_extensions import override
 
 from pzd.record import Array
-from pzd.schema.errors import ConfigError
+from pzd.schema.errors import ConfigError, DataError, FilesError
 from pzd.simulate.profile import Profile, through
 from pzd.simulate.road import Road, Way
 
@@ -43,7 +43,10 @@ class MeasuredRoad(Road):
             raise ConfigError(
                 f"{way.key}.path: there is no such file; the path counts from the config (got {self.path})"
             )
-        place, height = self.heights(path, way.key)
+        try:
+            place, height = self.heights(path, way.key)
+        except (DataError, FilesError) as error:
+            raise ConfigError(f"{way.key}.path: {message}" for message in error.messages) from error
         length = float(place[-1] - place[0])
         if length < way.distance * (1.0 - _SAME):
             raise ConfigError(

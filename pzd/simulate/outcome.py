@@ -13,6 +13,7 @@ from pzd.record import Array
 from pzd.signals.recursion import all_pole
 from pzd.signals.root_mean_square import rms
 from pzd.simulate.loop import A_K, LOAD_1, LOAD_2, LOST, TRAVEL
+from pzd.simulate.spilled import SpilledRows, columns_of
 from pzd.simulate.window import Window
 
 POINT = "K"
@@ -31,8 +32,9 @@ _POLES = (math.pi / 8, 3 * math.pi / 8)
 class Outcome:
     """One ride, computed."""
 
-    history: Array
-    """(n, 16) rows thinned to the rate of output, columns as in the artefact `Ride`."""
+    history: Array | SpilledRows
+    """(n, 16) rows thinned to the rate of output, columns as in the artefact `Ride`; in a file where the ride was taken
+    piece by piece."""
     course: Array
     """(m, COURSE_COLUMNS) what is kept of every step, see `pzd.simulate.loop`."""
     step: float
@@ -136,5 +138,4 @@ def ride_of(case: str, outcome: Outcome, without: tuple[str, ...]) -> Ride:
     """The history as the artefact holds it; columns that mean nothing in this ride are left out."""
     names = RIDE_COLUMNS + tuple(name.format(axle) for axle in AXLES for name in AXLE_COLUMNS)
     left_out = {name.format(axle) for name in without for axle in AXLES}
-    columns = {n: np.ascontiguousarray(c) for n, c in zip(names, outcome.history.T, strict=True) if n not in left_out}
-    return Ride(case, columns)
+    return Ride(case, columns_of(outcome.history, names, left_out))

@@ -47,6 +47,7 @@ from pzd.simulate.ride_model import (
     vehicle,
     workspace,
 )
+from pzd.simulate.spilled import SpilledRows
 
 Take = Callable[[int, Array], None]
 """Takes the rows of the course from a step on, which are written over afterwards."""
@@ -224,7 +225,8 @@ def ride_of_model(
     acts, scratch, y = control(model.control_spec.voltage), workspace(), at_rest(model.car)
     count = clock.steps + 1
     course = np.zeros((count if take is None else min(longest_piece(clock.step), count), COURSE_COLUMNS))
-    history = np.zeros((clock.steps // clock.per_output + 1, COLUMNS))
+    history = np.zeros((-(-len(course) // clock.per_output), COLUMNS))
+    spilled = None if take is None else SpilledRows(COLUMNS)
     tally = np.zeros(TALLIES)
     before = stored_energy(0.0, y, model, acts, scratch)
     stages, end = np.zeros((STAGES + 1, y.size)), np.zeros(y.size)
@@ -250,11 +252,12 @@ def ride_of_model(
         )
         if tally[STEPS_DONE] < last - 1 or not np.all(np.isfinite(y)):
             raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(scratch[1])))))
-        if take is not None:
+        if take is not None and spilled is not None:
             take(first, course[: last - first])
+            spilled.add(history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
     change = stored_energy(clock.steps * clock.step, y, model, acts, scratch) - before
     return Outcome(
-        history=history,
+        history=history if spilled is None else spilled,
         course=course if take is None else np.zeros((0, COURSE_COLUMNS)),
         step=clock.step,
         outside=float(tally[OUTSIDE] / (clock.steps + 1)),

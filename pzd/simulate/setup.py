@@ -99,7 +99,8 @@ class Setup:
         own, profile = self.config.best_found, self.profiles[case.road.name]
         speed = self.config.vehicle_speed_km_per_h * KM_PER_H
         period = 2.0 * math.pi / (profile.wavenumber * speed)
-        settled = best.history[best.history[:, 0] >= self.config.settle_s]
+        history = np.asarray(best.history)
+        settled = history[history[:, 0] >= self.config.settle_s]
         like = sampled(settled[:, 0], settled[:, VOLTAGES], period, own.intervals // 2)
         late = self.config.car.car().wheelbase / speed / period
         shares = (like - search.low) / max(search.high - search.low, np.finfo(np.float64).tiny)

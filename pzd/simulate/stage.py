@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pzd.artefacts import Diagnosed, Rides, Table
+from pzd.schema.errors import ConfigError
 from pzd.simulate.config import SimulateConfig
 
 if TYPE_CHECKING:
     from pzd.simulate.gathering import RideRows
     from pzd.simulate.outcome import Outcome
     from pzd.simulate.plan import Case
+    from pzd.simulate.profile import Profile
     from pzd.simulate.riding import Held
 
 log = logging.getLogger(__name__)
@@ -39,24 +41,18 @@ def simulate(
         temperature or a voltage lies outside of the table
     DataError : when a ride needs the table where it ends
     """
-    from pzd.simulate.config import KM_PER_H
     from pzd.simulate.dampers import check_inertance, dynamic_damper_of, grid_of, table_of
     from pzd.simulate.gathering import Gathering
     from pzd.simulate.limits import checked_temperature, checked_voltage
     from pzd.simulate.plan import cases
     from pzd.simulate.response import responses
-    from pzd.simulate.road import Way
     from pzd.simulate.setup import Setup
 
     with_voltage = all(row.voltage_V is not None for row in diagnosed.damper.base)
     planned = cases(simulate, with_voltage, diagnosed.damper != diagnosed.plain)
     temperature = checked_temperature(simulate, table)
     checked_voltage(simulate, table)
-    speed = simulate.vehicle_speed_km_per_h * KM_PER_H
-    profiles = {
-        road.name: road.profile(Way(speed, speed * simulate.duration_s, seed, folder, f"simulate.roads.{n}"))
-        for n, road in enumerate(simulate.roads)
-    }
+    profiles = profiles_of(simulate, seed, folder)
     setups = {}
     for plain in {case.plain for case in planned} | {False}:
         damper = diagnosed.plain if plain else diagnosed.damper
@@ -75,3 +71,34 @@ def simulate(
         rides = list(pool.map(ridden, planned))
     answered = responses(simulate, diagnosed.damper, temperature) if with_voltage else ()
     return gathering.all(planned, rides, answered)
+
+
+def profiles_of(simulate: SimulateConfig, seed: int, folder: Path) -> dict[str, Profile]:
+    """Every road that the config asks for, by its name.
+
+    Parameters
+    ----------
+    simulate : the config's block
+    seed : of the run, for roads that are drawn
+    folder : of the config, for roads that are read
+
+    Raises
+    ------
+    ConfigError : when a file cannot be used, is missing, or is too short for the ride, or the ride ends before an event
+    """
+    from pzd.simulate.config import KM_PER_H
+    from pzd.simulate.road import Way
+
+    speed = simulate.vehicle_speed_km_per_h * KM_PER_H
+    profiles: dict[str, Profile] = {}
+    wrong: list[str] = []
+    for n, road in enumerate(simulate.roads):
+        try:
+            profiles[road.name] = road.profile(
+                Way(speed, speed * simulate.duration_s, seed, folder, f"simulate.roads.{n}")
+            )
+        except ConfigError as error:
+            wrong += error.messages
+    if wrong:
+        raise ConfigError(wrong)
+    return profiles

@@ -72,7 +72,10 @@ def trial(
         error = 0.0
         for i in range(STAGES):
             error += ERROR_WEIGHTS[i] * stages[i, n]
-        worst = max(worst, abs(dt * error) / (SCALES[n] + abs(y[n])))
+        share = abs(dt * error) / (SCALES[n] + abs(y[n]))
+        if not share < math.inf:  # a stage of too long a step overflowed
+            return math.inf
+        worst = max(worst, share)
     return worst
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pzd.quantities import Control
+from pzd.schema import csvfile
 from pzd.schema.csvfile import read_columns, read_rows, write_columns, write_rows
 from pzd.schema.errors import DataError
 from pzd.schema.model import Frozen
@@ -123,6 +124,17 @@ def test_columns_read_back_with_every_bit(tmp_path: Path, rng: np.random.Generat
         found = read_columns(tmp_path / "a.csv", HEADER, CURRENT, OPTIONAL)
         assert all(np.array_equal(found[name], columns[name]) for name in HEADER)
         assert (tmp_path / "a.csv").read_text().startswith("time_s,force_N,current_A\n")
+
+
+def test_a_long_file_is_written_block_by_block_with_the_same_bytes(tmp_path: Path, rng, monkeypatch) -> None:
+    columns = {name: rng.standard_normal(50) for name in HEADER}
+    written = []
+    for rows in (1000, 7):
+        monkeypatch.setattr(csvfile, "_WRITTEN", rows)
+        write_columns(tmp_path / "a.csv", columns, VOLTAGE, [*HEADER[:2], "absent", *HEADER[2:]])
+        written.append((tmp_path / "a.csv").read_bytes())
+    assert written[1] == written[0]
+    assert len(written[0].splitlines()) == 51
 
 
 def test_one_line_is_enough(tmp_path: Path) -> None:

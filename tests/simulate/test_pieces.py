@@ -12,6 +12,7 @@ from simulate_dampers import table_of
 
 from pzd.artefacts import Diagnosed, Rides
 from pzd.damper.model import Damper
+from pzd.quantities import Control
 from pzd.simulate import pieces, profile
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.profile import through
@@ -27,11 +28,11 @@ def ridden(damper: Damper, **given: object) -> Rides:
 
 
 def test_the_numbers_of_a_ride_in_pieces_are_those_of_the_whole(damper, monkeypatch) -> None:
-    """Pieces of 4 s, the settling time in the second one; two voltages of the search must be told apart alike."""
-    given = {"duration_s": 15.0, "settle_s": 5.0, "output_rate_Hz": 100.0}
+    """Pieces of 3 s, the settling time in the second one; two voltages of the search must be told apart alike."""
+    given = {"duration_s": 9.0, "settle_s": 4.0, "output_rate_Hz": 100.0}
     whole = ridden(damper, **given)
-    monkeypatch.setattr(pieces, "PIECE_S", 4.0)
-    monkeypatch.setattr("pzd.simulate.setup.PIECE_S", 4.0)
+    monkeypatch.setattr(pieces, "PIECE_S", 3.0)
+    monkeypatch.setattr("pzd.simulate.setup.PIECE_S", 3.0)
     parts = ridden(damper, **given)
     for table in ("summary", "wheels", "weighted", "ridden"):
         for one, other in zip(getattr(whole, table), getattr(parts, table), strict=True):
@@ -59,14 +60,17 @@ def test_a_transient_across_two_pieces_counts_as_one(damper, monkeypatch) -> Non
 
 
 @pytest.mark.ci
-def test_a_ride_five_times_as_long_takes_no_more_memory(damper, monkeypatch) -> None:
-    """But for its history, here a row a second."""
+def test_a_ride_five_times_as_long_takes_no_more_memory(damper, tmp_path, monkeypatch) -> None:
+    """Its history neither: a row a step goes to a file piece by piece."""
     monkeypatch.setattr(pieces, "PIECE_S", 10.0)
     monkeypatch.setattr("pzd.simulate.setup.PIECE_S", 10.0)
     peaks = []
     for seconds in (60.0, 60.0, 300.0):
         tracemalloc.start()
-        ridden(damper, duration_s=seconds, output_rate_Hz=1.0, roads=ROADS[1:], policies=["passive", "constant"])
+        rides = ridden(
+            damper, duration_s=seconds, output_rate_Hz=1000.0, roads=ROADS[1:], policies=["passive", "constant"]
+        )
+        rides.write(tmp_path, Control())
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[2] < 1.1 * peaks[1]

@@ -10,6 +10,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 from pzd.damper.compose import respond
 from pzd.damper.motion import Motion
+from pzd.simulate.dampers import dynamic_damper_of
+from pzd.simulate.dynamic_damper import slipping_forces
 from pzd.simulate.loop import LOST
 from pzd.simulate.outcome import low_passed_jerk
 
@@ -58,6 +60,16 @@ def test_the_energies_balance(ride, policy, fidelity) -> None:
 @pytest.mark.parametrize("tie_break", ["smallest", "equal_share", "largest"])
 def test_the_energies_balance_for_every_tie_break_and_bound(ride, bounds, tie_break) -> None:
     assert abs(ride(bounds=bounds, tie_break=tie_break, **SHORT).energy_error) < 2e-7
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
+def test_an_oil_that_relaxes_in_microseconds_is_ridden_whatever_the_tolerance(ride, damper, tolerance) -> None:
+    """A measured fluid that thins, F'(w) / k down to 4e-6 s: a step of 1 ms that overflows is taken back."""
+    rows = tuple(row.model_copy(update={"T0_N": 1e-7, "C_Ns_per_m": 690.0, "k_N_per_m": 3.4e7}) for row in damper.base)
+    thin = damper.model_copy(update={"base": rows}).with_effect("shear_thinning", {"n": 0.27})
+    outcome = ride("passive", "dynamic", on=thin, road=1, duration_s=0.1, settle_s=0.05, tolerance=tolerance)
+    assert np.all(np.isfinite(outcome.course))
+    assert abs(outcome.energy_error) < 1e-6
 
 
 @pytest.mark.parametrize("valve", [0.0, 0.0039])
@@ -215,3 +227,18 @@ def test_the_jerk_of_a_sine_is_its_derivative_behind_the_low_pass() -> None:
     jerk = low_passed_jerk(np.sin(w * time), step)[2000:]
     gain = abs(sosfreqz(butter(4, 80.0, fs=1000.0, output="sos"), [30.0], fs=1000.0)[1][0])
     assert np.sqrt(2.0) * np.sqrt(np.mean(jerk**2)) == pytest.approx(gain * np.sin(w * step) / step, rel=1e-3)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_rounding_of_the_way_does_not_turn_a_slipping_branch_round(damper, side) -> None:
+    """At the place where a step began the branch goes on slipping, be the extension a last digit to either side."""
+    branch = damper.with_effect("second_branch", {"T0_2": 100.0, "k_2": 1e6})
+    dynamic = dynamic_damper_of(branch, 22.0, 0.0)
+    dynamic.memory[0] = side * np.array([0.01, 1e-4])
+    forces = [
+        slipping_forces(dynamic, 0, side * 0.01 * (1.0 + digit), 0.1 * side, dynamic.parallel[0])
+        for digit in (0.0, 1e-16, -3e-16)
+    ]
+    assert forces[1] == pytest.approx(forces[0], abs=1e-6)
+    assert forces[2] == pytest.approx(forces[0], abs=1e-6)
+    assert forces[0] == pytest.approx((0.0, 100.0 * side), abs=1e-6)

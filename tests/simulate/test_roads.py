@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from pzd.schema.errors import ConfigError, DataError
+from pzd.schema.errors import ConfigError
 from pzd.signals.iso8608 import classes
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.kinematics import road_at
@@ -198,7 +198,7 @@ def test_an_opencrg_file_that_cannot_be_believed_is_refused(tmp_path, old, new, 
     assert old in text
     text = text.replace("$" * 72, "$") if old == "$$$$" else text.replace(old, new, 1)
     (tmp_path / "road.crg").write_text(text, encoding="utf-8")
-    with pytest.raises(DataError, match=message):
+    with pytest.raises(ConfigError, match=message):
         read({"kind": "opencrg", "path": "road.crg"}).roads[0].profile(Way(25.0, 1.0, 1, tmp_path))
 
 
@@ -292,7 +292,7 @@ def test_a_ride_that_ends_before_the_event_is_refused(kind: str) -> None:
 )
 def test_a_road_file_that_cannot_be_believed_is_refused_with_its_line(tmp_path, text, message) -> None:
     (tmp_path / "road.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(DataError, match=message):
+    with pytest.raises(ConfigError, match=message):
         read({"kind": "file", "path": "road.csv"}).roads[0].profile(Way(25.0, 20.0, 1, tmp_path))
 
 

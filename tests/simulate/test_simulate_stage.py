@@ -260,6 +260,7 @@ def test_a_damper_that_was_never_tested_at_0_volts_is_passive_at_its_lowest(damp
 BY_VOLTAGE = {"at_voltage_V": (0.0, 150.0), "k_g": (1000.0, 40000.0)}
 
 
+@pytest.mark.ci
 def test_rides_at_the_same_time_are_the_same(damper) -> None:
     parallel = damper.with_effect("gas_spring", BY_VOLTAGE)
     given = (config(), Diagnosed.undiagnosed(parallel, damper), table_of(parallel), 1, Path())

@@ -89,6 +89,7 @@ def test_a_motion_counts_as_dead_a_whole_second_after_the_event() -> None:
     assert (window.first, window.last, set(endings)) == (250, 2500, {"motion died away"})
 
 
+@pytest.mark.ci
 def test_a_w_is_that_of_every_step_whatever_the_rate_of_the_files() -> None:
     given = {"roads": [{"kind": "iso8608"}], "policies": ["comfort"], "fidelities": ["dynamic"]}
     given |= {"duration_s": 6.0, "settle_s": 3.0}

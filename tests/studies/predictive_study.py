@@ -1,16 +1,18 @@
 """What `comfort_predictive` gains over the best fixed voltage, and what it costs in wheel load and time.
 
-    PYTHONPATH=. python tests/studies/predictive_study.py [--runs DIR] [CONFIG ...]
+    PYTHONPATH=. python tests/studies/predictive_study.py [--runs DIR] [--duration S] [CONFIG ...]
 
 By default on the dampers of configs/quickstart.yaml and configs/utfsm.yaml, which are identified first where they are
 not. Each rides six roads at fidelity `dynamic`, at the best fixed voltage of that road, then by `comfort_predictive`
-with its default parameters, the road known and unknown. A line a road: a_w at the best fixed voltage, and with both;
-r.m.s. load of the wheel whose load is larger, in relation to the same at the best fixed voltage; time of the processor
-for a ms of ride at a fixed voltage and with both. Last, how many roads meet what the policy is meant to do.
+with its default parameters, the road known and unknown. Rides last `--duration` seconds, 16 by default, and are judged
+over their second half; over the bump until the motion has died away. A line a road: a_w at the best fixed voltage, and
+with both; r.m.s. load of the wheel whose load is larger, in relation to the same at the best fixed voltage; time of the
+processor for a ms of ride at a fixed voltage and with both. Last, how many roads meet what the policy is meant to do.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 import time
@@ -56,11 +58,12 @@ class Measured:
     us_per_ms: float
 
 
-def setup_of(path: Path, runs: Path, **given: object) -> Setup:
-    """The damper of a config, identified and diagnosed, in the car; parameters of the policy are given."""
+def setup_of(path: Path, runs: Path, duration: float = 16.0, **given: object) -> Setup:
+    """The damper of a config, identified and diagnosed, in the car; length of a ride [s], parameters of the policy."""
     run = opened(path, runs)
     execute(run, "table", force=False, jobs=2, say=lambda line: sys.stderr.write(f"{path.stem}: {line}\n"))
-    block = {"roads": ROADS, "fidelities": ["dynamic"], "comfort_predictive": given}
+    lasting = {"duration_s": duration, "settle_s": 0.5 * duration}
+    block = {"roads": ROADS, "fidelities": ["dynamic"], **lasting, "comfort_predictive": given}
     config = SimulateConfig.model_validate_json(json.dumps(block))
     diagnosed, table = run.run.read(Diagnosed), run.run.read(Table)
     temperature = checked_temperature(config, table)
@@ -106,9 +109,9 @@ def ridden(setup: Setup, road: Road, policy: str, window: Window | None = None) 
     return measured(setup, road, outcome, window, seconds), window, held.voltage
 
 
-def study(path: Path, runs: Path) -> None:
+def study(path: Path, runs: Path, duration: float) -> None:
     """Ride all roads on the damper of a config, and print."""
-    sides = {known: setup_of(path, runs, road=known) for known in ("known", "unknown")}
+    sides = {known: setup_of(path, runs, duration, road=known) for known in ("known", "unknown")}
     better: dict[str, list[float]] = {known: [] for known in sides}
     loads: dict[str, list[float]] = {known: [] for known in sides}
     slowest = dict.fromkeys(sides, 0.0)
@@ -137,18 +140,17 @@ def study(path: Path, runs: Path) -> None:
 
 def main() -> None:
     """Read the command line."""
-    given = sys.argv[1:]
-    runs = Path("runs")
-    if "--runs" in given:
-        place = given.index("--runs")
-        runs = Path(given[place + 1])
-        del given[place : place + 2]
+    options = argparse.ArgumentParser()
+    options.add_argument("--runs", type=Path, default=Path("runs"))
+    options.add_argument("--duration", type=float, default=16.0)
+    options.add_argument("configs", type=Path, nargs="*")
+    given = options.parse_args()
     sys.stdout.write(
         f"{'damper':<11}{'road':<13}{'held':>7}{'fixed':>8}{'known':>9}{'':>7}{'load':>6}{'unknown':>9}{'':>7}{'load':>6}"
         "   us a ms\n"
     )
-    for path in given or CONFIGS:
-        study(Path(path), runs)
+    for path in given.configs or CONFIGS:
+        study(Path(path), given.runs, given.duration)
 
 
 if __name__ == "__main__":

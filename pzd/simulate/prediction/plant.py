@@ -34,6 +34,9 @@ def oil_after(
     Equation: e' = e + h (v - theta w' - (1 - theta) w), |F(e')| = flow curve (w'), theta = (3 + z) / (6 + z),
     z = h k / C      Source: Liniger and Willoughby 1970, SIAM J. Numer. Anal. 7(1): fitted to exp(-z), L-stable
 
+    An oil much faster than the step is quasi-static in it: theta -> 1 and e -> 0, so w' -> v and |F| is the flow curve
+    at the speed of the rod, or what holds a rod that sticks; the error is of order one in C / k.
+
     Parameters
     ----------
     plan, kind : see `Predictor`
