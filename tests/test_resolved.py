@@ -74,9 +74,9 @@ def test_every_value_of_a_shipped_config_is_there_once(name: str) -> None:
     assert {key for key, value in data.items() if value is not None} <= {one.path.split(".")[0] for one in found}
 
 
-def test_it_needs_no_run(config: Path, pzd: Callable[..., CompletedProcess[str]]) -> None:
-    done = pzd("show", config, "--resolved", "--runs", config.parent / "runs")
+def test_it_needs_no_run(config: Path, pzd_here: Callable[..., CompletedProcess[str]]) -> None:
+    done = pzd_here("show", config, "--resolved", "--runs", config.parent / "runs")
     assert done.returncode == 0, done.stderr
     assert any(line.split() == ["seed", "7", f"{config}:1:7"] for line in done.stdout.splitlines())
-    listed = json.loads(pzd("show", config, "--resolved", "--json").stdout)
+    listed = json.loads(pzd_here("show", config, "--resolved", "--json").stdout)
     assert {"path": "identify.method", "value": "separable", "origin": "default"} in listed

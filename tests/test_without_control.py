@@ -97,9 +97,11 @@ def test_only_the_ride_may_be_left_out(tmp_path: Path, stages: str, fault: str) 
         load(config)
 
 
-def test_the_ride_that_is_left_out_is_no_command(tmp_path: Path, pzd: Callable[..., CompletedProcess[str]]) -> None:
+def test_the_ride_that_is_left_out_is_no_command(
+    tmp_path: Path, pzd_here: Callable[..., CompletedProcess[str]]
+) -> None:
     config = tmp_path / "c.yaml"
     config.write_text(CONFIG, encoding="utf-8")
-    done = pzd("simulate", config)
+    done = pzd_here("simulate", config)
     assert done.returncode == 2
     assert done.stderr == "pzd simulate: stages leaves simulate out; add it to stages of the config\n"

@@ -85,8 +85,8 @@ EXACT = {
     ),
 }
 """Dampers that an FMU carries exactly; together they have every effect that one can carry."""
-QUICK = ("plain", "passive", "stiff", "rig", "all")
-"""Those for the gate: the element, what may be absent, the steepest spring, and every effect. Each is compiled."""
+QUICK = ("plain", "all")
+"""Those for the gate: the element, and every effect. Each is compiled."""
 
 
 @dataclass(frozen=True)

@@ -164,6 +164,7 @@ def test_implausible_cars_are_refused() -> None:
     assert not plausible(replace(car, distances=(2.2, 0.5), comfort_point=0.0))
 
 
+@pytest.mark.ci
 def test_refining_comes_closer_and_stays_plausible(rows: tuple[CarRow, ...]) -> None:
     start = min((r for r in rows if r.tie_break == "largest" and r.found == "survey"), key=lambda r: r.miss)
     car = refined(start.car, "largest")

@@ -43,6 +43,7 @@ def test_every_claim_is_printed() -> None:
     assert len(claims()) == len(GIVEN)
 
 
+@pytest.mark.ci
 def test_the_command_prints_a_topic_and_refuses_what_is_none() -> None:
     def run(*topics: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([sys.executable, "-m", "pzd.paper", *topics], capture_output=True, text=True, check=False)

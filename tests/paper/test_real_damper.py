@@ -41,12 +41,14 @@ def test_controlled_peaks_of_a_real_damper(rides_by_gap: Mapping[str, SettingRid
     assert [row.peak_abs_aK_m_per_s2 for row in rows] == pytest.approx(PEAKS[gap, fidelity], rel=0.01)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("gap", LEAST_DAMPING)
 def test_no_voltage_is_as_soft_as_c_min(rides_by_gap: Mapping[str, SettingRides], config: RunConfig, gap: str) -> None:
     assert rides_by_gap[gap].least_damping == pytest.approx(LEAST_DAMPING[gap], rel=0.01)
     assert rides_by_gap[gap].least_damping > 4.0 * config.simulate.c_min_Ns_per_m
 
 
+@pytest.mark.ci
 def test_the_smaller_gap_is_harder_than_constant_c(
     rides_by_gap: Mapping[str, SettingRides], beside: dict[str, ReferenceRow]
 ) -> None:

@@ -66,6 +66,7 @@ def test_a_task_whose_process_is_killed_every_time_is_set_aside_and_all_others_a
     assert lost == [(0, f"5: the process that did it was lost {TRIES} times: it was killed")]
 
 
+@pytest.mark.ci
 def test_a_task_whose_process_is_killed_once_has_its_result(tmp_path: Path) -> None:
     found, lost = worked(tmp_path, KilledOnce(tmp_path / "mark"))
     assert (tmp_path / "mark").exists()
@@ -73,6 +74,7 @@ def test_a_task_whose_process_is_killed_once_has_its_result(tmp_path: Path) -> N
     assert lost == []
 
 
+@pytest.mark.ci
 def test_a_loss_in_the_second_of_two_steps_is_told_as_such(tmp_path: Path) -> None:
     found, lost = worked(tmp_path, doubled, killed_by_five, jobs=1)
     assert found == {task: None if task == 5 else 2 * task for task in range(12)}

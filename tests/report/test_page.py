@@ -257,6 +257,7 @@ def test_with_and_without_the_missing_effect_stand_side_by_side(read: Reader) ->
     assert "With and without the missing effect" in read.text
 
 
+@pytest.mark.ci
 def test_pictures_drawn_at_the_same_time_are_the_same(page: str, run: Any) -> None:
     assert run.told(jobs=3).page == page
 
@@ -360,6 +361,7 @@ def test_a_hypothesis_is_told_in_words_in_a_table_and_in_a_picture(run: Any) -> 
     assert "c |x| v reaches \u221245 N at \u22120.003 m2/s" in str(alt)
 
 
+@pytest.mark.ci
 def test_what_is_left_is_drawn_over_three_planes_where_it_has_no_name(run: Any) -> None:
     def planes(of: Any) -> list[str]:
         tags = Reader(of.told().page).tags
@@ -425,6 +427,7 @@ def test_a_damper_without_control_and_without_a_car_is_told_without_either(run: 
     assert "no temperature was recorded" in read.text
 
 
+@pytest.mark.ci
 def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any) -> None:
     """The table leaves it to the static balance; a rig measures it, and the page tells what a rig measures."""
     damper = run.diagnosed.damper.with_effect("preload_offset", {"F_0": 90.0})

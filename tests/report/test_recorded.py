@@ -74,18 +74,20 @@ def write_config(folder: Path) -> Path:
     return config
 
 
-def test_check_writes_that_page_only(tmp_path: Path, pzd: Callable[..., CompletedProcess[str]]) -> None:
+def test_check_writes_that_page_only(tmp_path: Path, pzd_here: Callable[..., CompletedProcess[str]]) -> None:
     config = write_config(tmp_path)
-    done = pzd("check", config, "--plot", tmp_path / "p.html", cwd=tmp_path)
+    done = pzd_here("check", config, "--plot", tmp_path / "p.html", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert f"the records are drawn in {tmp_path / 'p.html'}" in done.stdout
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "c.yaml", "p.html"]
 
 
-def test_a_record_is_never_overwritten_by_the_page(tmp_path: Path, pzd: Callable[..., CompletedProcess[str]]) -> None:
+def test_a_record_is_never_overwritten_by_the_page(
+    tmp_path: Path, pzd_here: Callable[..., CompletedProcess[str]]
+) -> None:
     config = write_config(tmp_path)
     before = (tmp_path / "a.csv").read_bytes()
-    done = pzd("check", config, "--plot", tmp_path / "a.csv", cwd=tmp_path)
+    done = pzd_here("check", config, "--plot", tmp_path / "a.csv", cwd=tmp_path)
     assert done.returncode == 2
     assert "must end in .html" in done.stderr
     assert (tmp_path / "a.csv").read_bytes() == before

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
-from conftest import PLAIN, Run
 
 from pzd.artefacts import (
     AsItStandsRow,
@@ -99,9 +99,9 @@ def knock() -> AsItStandsRow:
     )
 
 
-def with_knee(run: Run) -> Run:
+def with_knee(run: Any) -> Any:
     """The run on a damper with the knee law, handed on as it was fitted."""
-    damper = Damper(base=PLAIN.base).with_effect(
+    damper = Damper(base=run.diagnosed.plain.base).with_effect(
         "knee", {"beta": 0.4, "F_reb": 900.0, "C_reb": 600.0, "F_comp": 700.0, "C_comp": 500.0}
     )
     diagnosis = run.diagnosed.diagnosis.without_effects("unexplained", "the knee law is handed on", gap=None)
@@ -114,7 +114,7 @@ def with_knee(run: Run) -> Run:
 
 
 @pytest.fixture(scope="module")
-def page(run: Run, tmp_path_factory: pytest.TempPathFactory) -> str:
+def page(run, tmp_path_factory: pytest.TempPathFactory) -> str:
     folder = tmp_path_factory.mktemp("page")
     return with_knee(run).told(folder=folder).page
 
@@ -163,7 +163,7 @@ def test_the_page_does_not_call_a_knee_a_missing_effect(page: str) -> None:
     assert "library of effects does not explain" not in page
 
 
-def test_without_a_knee_law_the_page_says_nothing_of_it(run: Run, tmp_path: Path) -> None:
+def test_without_a_knee_law_the_page_says_nothing_of_it(run, tmp_path: Path) -> None:
     assert "knee" not in run.told(folder=tmp_path).page
 
 

@@ -231,16 +231,17 @@ def test_a_run_without_a_result_is_told_and_leaves_no_indices(tmp_path: Path) ->
 # ------------------------------------------------------------ running it
 
 
+@pytest.mark.ci
 @pytest.mark.usefixtures("threads")
 def test_a_run_of_a_sweep_is_the_run_with_these_values_set(
-    small: Path, tmp_path: Path, pzd: Callable[..., Any]
+    small: Path, tmp_path: Path, pzd_here: Callable[..., Any]
 ) -> None:
     campaign, _ = swept(small, tmp_path / "runs")
     with (campaign.folder / "results.csv").open() as file:
         row = list(csv.DictReader(file))[3]
     key = "rig.virtual.0.damper.base.0.T0_N"
     assert (row["task"], row[key], row["seed"]) == ("4", "200", "2")
-    done = pzd("identify", small, "--runs", tmp_path / "other", "--set", f"{key}=200", "--set", "seed=2", "-q")
+    done = pzd_here("identify", small, "--runs", tmp_path / "other", "--set", f"{key}=200", "--set", "seed=2", "-q")
     assert done.returncode == 0, done.stderr
     with (tmp_path / "other" / "small" / "2-identify" / "parameters.csv").open() as file:
         (alone,) = csv.DictReader(file)
@@ -248,6 +249,7 @@ def test_a_run_of_a_sweep_is_the_run_with_these_values_set(
     assert abs(float(row["T0_N"]) - 200.0) < 20.0
 
 
+@pytest.mark.ci
 @pytest.mark.usefixtures("threads")
 def test_a_sweep_goes_on_where_it_was_and_does_not_hang_on_how_it_is_run(small: Path, tmp_path: Path) -> None:
     campaign, found = swept(small, tmp_path / "a")

@@ -28,7 +28,7 @@ from pzd.paper.published import published
 
 SMALL, LARGE = "gap 0.15 mm", "gap 0.25 mm"
 PHOTOGRAPHS = {2, 3, 20}
-ALL, SOME = tuple(range(1, 21)), (2, 4, 10, 19)
+ALL = tuple(range(1, 21))
 
 
 def entry(setting: str, base: list[dict[str, float]], sines: list[tuple[float, float]], warm: list[float]) -> Any:
@@ -87,12 +87,10 @@ def data() -> FigureData:
     return FigureData(records, identified, rides_of_setting, config.simulate, config.table, control, LARGE)
 
 
-@pytest.fixture(scope="module", params=[SOME, pytest.param(ALL, marks=pytest.mark.ci)], ids=["some", "all"])
-def figure_set(data: FigureData, request: pytest.FixtureRequest) -> FigureSet:
-    """A photograph, loops of the stand, a scheme and the rides; behind `make ci` all twenty, which take longer."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pzd.paper.figures.draw.library", lambda: {number: library()[number] for number in request.param})
-        return drawn(data)
+@pytest.fixture(scope="module")
+def figure_set(data: FigureData) -> FigureSet:
+    """All twenty, which takes some seconds."""
+    return drawn(data)
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +104,7 @@ def test_all_twenty_figures_have_their_file() -> None:
     assert tuple(library()) == ALL
 
 
+@pytest.mark.ci
 def test_every_figure_but_the_photographs_is_drawn_as_png_and_svg(figure_set: FigureSet, folder: Path) -> None:
     for one in figure_set.entries:
         if one.figure in PHOTOGRAPHS:
@@ -122,7 +121,6 @@ def test_every_figure_but_the_photographs_is_drawn_as_png_and_svg(figure_set: Fi
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("figure_set", [ALL], indirect=True, ids=["all"])
 def test_the_same_bytes_come_out_again(data: FigureData, figure_set: FigureSet) -> None:
     assert drawn(data).files == figure_set.files
 
@@ -145,6 +143,7 @@ with mpl.rc_context(PAPER_STYLE):
     assert text == [hashlib.sha256(one).hexdigest() for one in mine]
 
 
+@pytest.mark.ci
 def test_the_manifest_lists_every_figure_with_its_files(figure_set: FigureSet, folder: Path) -> None:
     listed = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     assert [one["figure"] for one in listed] == [one.figure for one in figure_set.entries]
@@ -154,6 +153,7 @@ def test_the_manifest_lists_every_figure_with_its_files(figure_set: FigureSet, f
                 assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
 
 
+@pytest.mark.ci
 def test_the_index_shows_every_figure_with_relative_links_and_no_script(figure_set: FigureSet, folder: Path) -> None:
     text = (folder / "index.html").read_text(encoding="utf-8")
     shown = [one.figure for one in figure_set.entries]
@@ -165,6 +165,7 @@ def test_the_index_shows_every_figure_with_relative_links_and_no_script(figure_s
         assert library()[number].title in text.replace("&#39;", "'")
 
 
+@pytest.mark.ci
 def test_measured_peaks_stand_beside_the_papers_in_the_caption(figure_set: FigureSet) -> None:
     captions = {one.figure: " ".join(p.caption for p in one.pictures) for one in figure_set.entries}
     peaks = {name: row.number for name, row in published().items() if row.quantity == "peak_force"}
@@ -180,6 +181,7 @@ def caption_of(number: int, part: str, figure_set: FigureSet) -> str:
     return next(picture.caption for picture in figure.pictures if part in picture.png)
 
 
+@pytest.mark.ci
 def test_figure_19_shows_the_four_peaks_within_1_percent(figure_set: FigureSet) -> None:
     caption = caption_of(19, "acceleration", figure_set)
     pairs = re.findall(r"c-(?:const\.|control) ([\d.]+) m/s², paper ([\d.]+)", caption)
@@ -187,6 +189,7 @@ def test_figure_19_shows_the_four_peaks_within_1_percent(figure_set: FigureSet) 
     assert all(float(ours) == pytest.approx(float(theirs.rstrip(".")), rel=0.01) for ours, theirs in pairs)
 
 
+@pytest.mark.ci
 def test_figure_19_says_that_the_wheels_pull_on_the_road(figure_set: FigureSet) -> None:
     """The paper's half-car has no unsprung masses, so nothing in its equations keeps the wheels on the road."""
     caption = caption_of(19, "acceleration", figure_set)
@@ -195,6 +198,7 @@ def test_figure_19_says_that_the_wheels_pull_on_the_road(figure_set: FigureSet) 
     assert "-3.2 kN at axle 2 at 4.5 Hz, 0 or less 26% of the time" in caption
 
 
+@pytest.mark.ci
 def test_the_real_damper_cannot_reach_c_min(figure_set: FigureSet) -> None:
     caption = caption_of(19, "fidelity", figure_set)
     floors = [float(n) for n in re.findall(r"at least (\d+) N s/m", caption)]
@@ -202,6 +206,7 @@ def test_the_real_damper_cannot_reach_c_min(figure_set: FigureSet) -> None:
     assert min(floors) > 750.0
 
 
+@pytest.mark.ci
 def test_a_run_without_the_papers_tests_says_what_it_lacks(data: FigureData) -> None:
     identified, rig = data.identified, data.rig
     poorer = replace(
