@@ -70,7 +70,8 @@ class ChunkedWork(Generic[T, R]):
                         lost.append(chunk)
                 if not flying:
                     return [chunk for some in ready for chunk in reversed(some)], lost
-                for future in wait(flying, return_when=FIRST_COMPLETED).done:
+                done = wait(flying, return_when=FIRST_COMPLETED).done
+                for future in [given for given in flying if given in done]:  # a set has no order: errors would change
                     step, chunk = flying.pop(future)
                     try:
                         found = future.result()

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, Future
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from pzd.parallel.chunks import TRIES, ChunkedWork
 from pzd.parallel.config import EngineConfig
-from pzd.parallel.pools import Where
+from pzd.parallel.engines import ENGINES
+from pzd.parallel.pools import Pools, Where
 from pzd.schema.errors import DataError
 
 CHUNKS = tuple((first, first + 1) for first in range(0, 12, 2))
@@ -84,3 +88,23 @@ def test_a_loss_in_the_second_of_two_steps_is_told_as_such(tmp_path: Path) -> No
 def test_what_the_user_can_mend_ends_the_work_at_once(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="cannot do 0"):
         worked(tmp_path, refused, jobs=1)
+
+
+class AtOnce(Executor):
+    """Has done a chunk as soon as it is given one."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except DataError as error:
+            future.set_exception(error)
+        return future
+
+
+def test_of_several_mistakes_found_at_the_same_time_the_first_chunk_s_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(ENGINES, "local", lambda where, jobs, steps: nullcontext(Pools([AtOnce()], jobs)))
+    with pytest.raises(DataError, match="cannot do 0"):
+        worked(tmp_path, refused, jobs=len(CHUNKS))
