@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -718,14 +717,8 @@ Command = Callable[..., "subprocess.CompletedProcess[str]"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent)}
 
 
-def test_help_takes_a_moment_and_lists_every_command(pzd: Command) -> None:
-    spent = []
-    for _ in range(3):
-        begun = resource.getrusage(resource.RUSAGE_CHILDREN)
-        printed = pzd("--help")
-        ended = resource.getrusage(resource.RUSAGE_CHILDREN)
-        spent.append(ended.ru_utime - begun.ru_utime + ended.ru_stime - begun.ru_stime)
-    assert min(spent) < 0.2  # of the processor, so that a busy machine is no fault
+def test_help_lists_every_command(pzd: Command) -> None:
+    printed = pzd("--help")
     assert (printed.returncode, printed.stderr) == (0, "")
     listed = re.findall(r"^  ([a-z]+)  +\S", printed.stdout.partition("Commands:")[2], re.MULTILINE)
     assert listed == COMMANDS
@@ -754,6 +747,15 @@ def test_the_shell_completes_commands_and_options(words: str, completed: list[st
 def test_every_command_explains_itself(typed: Terminal, command: str) -> None:
     assert typed(command, "--help") == 0
     assert typed.out[0].startswith(f"Usage: pzd {command} ")
+
+
+def test_help_imports_neither_numbers_nor_what_checks_them() -> None:
+    text = (
+        "import sys\nfrom pzd.cli.app import status\nstatus(['--help'])\n"
+        f"print([name for name in {(*HEAVY, 'numpy', 'pydantic', 'yaml')!r} if name in sys.modules], file=sys.stderr)"
+    )
+    printed = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, env=ENVIRONMENT)
+    assert printed.stderr == "[]\n"
 
 
 def test_nothing_heavy_is_imported_to_find_that_all_is_fresh() -> None:
@@ -873,7 +875,7 @@ main()
 """
 
 
-def test_an_interrupted_command_ends_in_a_second_and_the_next_one_goes_on(typed: Terminal, tmp_path: Path) -> None:
+def test_an_interrupted_command_does_not_wait_for_its_threads_and_the_next_one_goes_on(typed: Terminal, tmp_path: Path) -> None:
     here = Path(__file__).resolve().parent
     command = [sys.executable, "-c", SLOW.format(here=str(here), root=str(here.parent))]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
@@ -884,13 +886,10 @@ def test_an_interrupted_command_ends_in_a_second_and_the_next_one_goes_on(typed:
             assert running.stdout is not None
             assert any(line == "at work\n" for line in running.stdout), running.communicate()
             running.send_signal(signal.SIGINT)
-            begun = time.monotonic()
-            _, err = running.communicate(timeout=20.0)
-            took = time.monotonic() - begun
+            _, err = running.communicate(timeout=20.0)  # its threads would sleep for a minute
         finally:
             running.kill()
     assert running.returncode == 130
-    assert took < 5.0  # a second, on a machine that is not busy; its threads sleep for a minute
     assert err == "interrupted; finished stages stand, the one at work left what was there before\n"
     assert typed("run", "first.yaml") == 0
     assert typed.out[0] == "ingest     fresh: nothing it depends on has changed"

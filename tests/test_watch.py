@@ -168,14 +168,12 @@ def test_a_new_file_a_mistake_and_its_mending(watching: Watching, tmp_path: Path
     assert watching.until(report)[0] == "data/c.csv: gone"
 
 
-def test_ctrl_c_ends_it_within_a_second_and_the_next_run_goes_on(
+def test_ctrl_c_ends_it_and_the_next_run_goes_on(
     watching: Watching, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     watching.until("report: runs/first/6-report/report.html")
-    pressed = time.monotonic()
     watching.running.send_signal(signal.SIGINT)
     assert watching.running.wait(timeout=PATIENCE_S) == 130
-    assert time.monotonic() - pressed < 2.0  # a second, and one more for a busy machine
     assert watching.until("left what was there before")[-1].startswith("interrupted; ")
     monkeypatch.chdir(tmp_path)
     assert status(["run", "first.yaml"]) == 0
