@@ -875,7 +875,9 @@ main()
 """
 
 
-def test_an_interrupted_command_does_not_wait_for_its_threads_and_the_next_one_goes_on(typed: Terminal, tmp_path: Path) -> None:
+def test_an_interrupted_command_does_not_wait_for_its_threads_and_the_next_one_goes_on(
+    typed: Terminal, tmp_path: Path
+) -> None:
     here = Path(__file__).resolve().parent
     command = [sys.executable, "-c", SLOW.format(here=str(here), root=str(here.parent))]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
