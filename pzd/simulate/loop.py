@@ -14,6 +14,7 @@ from pzd.simulate.dynamic_damper import effective_voltage, place, stored
 from pzd.simulate.equations import motion
 from pzd.simulate.minimise import LARGEST, farther_end
 from pzd.simulate.prediction.choice import predict
+from pzd.simulate.prediction.predictor import Predictor
 from pzd.simulate.ride_model import (
     ASKED,
     BEHIND,
@@ -28,7 +29,6 @@ from pzd.simulate.ride_model import (
     LOW,
     MINIMISE,
     OIL_1,
-    PREDICT,
     RATE,
     SCHEDULE,
     SET,
@@ -81,7 +81,15 @@ def _choose_ends(y: Array, model: RideModel, control: Array, workspace: Array) -
 
 
 @compiled
-def set_control(time: float, y: Array, model: RideModel, control: Array, workspace: Array, scratch: Array) -> None:
+def set_control(
+    time: float,
+    y: Array,
+    model: RideModel,
+    plan: Predictor | None,
+    control: Array,
+    workspace: Array,
+    scratch: Array,
+) -> None:
     """Let the controller act once: what it asks of each axle, and the voltage that gives it by the table.
 
     Parameters
@@ -89,6 +97,7 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
     time : [s]
     y : (n,) state; a valve without lag tightens the oil spring at once, which is booked here
     model, control, workspace : see `ride_model`; the control is changed in place
+    plan : of the aim `PREDICT`; without it nothing of the prediction is compiled
     scratch : (n,) to work in
     """
     control_spec, car = model.control_spec, model.car
@@ -98,12 +107,15 @@ def set_control(time: float, y: Array, model: RideModel, control: Array, workspa
     _choose_ends(y, model, control, workspace)
     if control_spec.fidelity == IDEAL:
         return
-    if control_spec.aim == PREDICT:
-        predict(time, y, model, control, workspace)
-    elif control_spec.aim not in (VOLTAGE, SCHEDULE):
-        demand(control_spec, car, y, control, workspace)
-    for i in range(2):
-        _set_voltage(time, y, model, control, i, _wanted_voltage(time, model, control, workspace, i))
+    if plan is not None:
+        predict(time, y, model, plan, control, workspace)
+        for i in range(2):
+            _set_voltage(time, y, model, control, i, float(plan.candidates[plan.chosen[i]]))
+    else:
+        if control_spec.aim not in (VOLTAGE, SCHEDULE):
+            demand(control_spec, car, y, control, workspace)
+        for i in range(2):
+            _set_voltage(time, y, model, control, i, _wanted_voltage(time, model, control, workspace, i))
     control[SINCE, 0] = time
     for i in range(2):
         if control[SIDE, i] == 0.0:
@@ -127,8 +139,6 @@ def _wanted_voltage(time: float, model: RideModel, control: Array, workspace: Ar
         return model.control_spec.voltage
     if aim == SCHEDULE:
         return scheduled(time, model, axle)
-    if aim == PREDICT:
-        return float(model.predictor.candidates[model.predictor.chosen[axle]])
     control[ASKED, axle] = workspace[FORCE, axle]
     return _voltage_for(model, axle, workspace[FORCE, axle], workspace[RATE, axle], control[SET, axle])
 
@@ -206,6 +216,7 @@ def _keep(y: Array, workspace: Array, row: Array) -> None:
 def ride(
     y: Array,
     model: RideModel,
+    plan: Predictor | None,
     control: Array,
     workspace: Array,
     first: int,
@@ -227,6 +238,7 @@ def ride(
     ----------
     y : (n,) state; changed in place
     model, control, workspace : see `ride_model`
+    plan : see `set_control`
     first, last : steps to be kept, the last one not
     steps, h : number and length of the steps of integration in the whole ride [s]
     tolerance : see `advance`
@@ -244,7 +256,7 @@ def ride(
     for n in range(first, last):
         time = n * h
         if n % per_control == 0:
-            set_control(time, y, model, control, workspace, scratch)
+            set_control(time, y, model, plan, control, workspace, scratch)
         motion(time, y, model, control, workspace, scratch)
         _keep(y, workspace, course[n - first])
         tally[STEPS_DONE] = n

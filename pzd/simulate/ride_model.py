@@ -10,7 +10,6 @@ from pzd.damper.columns import acting
 from pzd.record import Array
 from pzd.simulate.car import HalfCar
 from pzd.simulate.dynamic_damper import DynamicDamper
-from pzd.simulate.prediction.predictor import Predictor
 from pzd.simulate.profile import Profile
 
 HEAVE, PITCH, HEAVE_RATE, PITCH_RATE, OIL_1, OIL_2, DISSIPATED, ROAD_WORK, VALVE_WORK, PARALLEL_WORK = range(10)
@@ -148,7 +147,6 @@ class RideModel(NamedTuple):
     control_spec: ControlSpec
     grid: TableArrays
     damper: DynamicDamper
-    predictor: Predictor
 
 
 def vehicle(car: HalfCar, speed: float) -> Vehicle:

@@ -22,7 +22,8 @@ from pzd.simulate.outcome import Outcome
 from pzd.simulate.pieces import longest_piece
 from pzd.simulate.plan import Case
 from pzd.simulate.precompile import wait
-from pzd.simulate.prediction.planning import LEVELS, predictor_of
+from pzd.simulate.prediction.planning import predictor_of
+from pzd.simulate.prediction.predictor import Predictor
 from pzd.simulate.profile import Profile
 from pzd.simulate.ride_model import (
     BY_COEFFICIENTS,
@@ -204,22 +205,22 @@ def ride_case(
         control_spec_of(config, case, car, damper, held),
         grid,
         own,
-        predictor_of(
-            config.comfort_predictive,
-            config.control_period_s,
-            own,
-            car,
-            speed,
-            grid.voltages,
-            LEVELS if case.policy.aim == "predict" else 1,
-        ),
     )
+    plan = None
+    if case.policy.aim == "predict":
+        plan = predictor_of(config.comfort_predictive, config.control_period_s, own, car, speed, grid.voltages)
     sharper = _SWITCHED if case.policy.aim != "voltage" and case.fidelity == "dynamic" else 1.0
-    return ride_of_model(model, clock, sharper * config.tolerance, case.name, ends, take)
+    return ride_of_model(model, plan, clock, sharper * config.tolerance, case.name, ends, take)
 
 
 def ride_of_model(
-    model: RideModel, clock: Clock, tolerance: float, name: str, ends: bool, take: Take | None = None
+    model: RideModel,
+    plan: Predictor | None,
+    clock: Clock,
+    tolerance: float,
+    name: str,
+    ends: bool,
+    take: Take | None = None,
 ) -> Outcome:
     """Ride from rest on a level start, and balance the energies; see `ride_case`."""
     acts, scratch, y = control(model.control_spec.voltage), workspace(), at_rest(model.car)
@@ -235,6 +236,7 @@ def ride_of_model(
         ride(
             y,
             model,
+            plan,
             acts,
             scratch,
             first,

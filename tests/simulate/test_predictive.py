@@ -27,7 +27,7 @@ from pzd.simulate.policies import policies
 from pzd.simulate.prediction.choice import NOW, choose
 from pzd.simulate.prediction.planning import predictor_of
 from pzd.simulate.prediction.plant import oil_after, predicted
-from pzd.simulate.prediction.predictor import HELD, LOAD_1, LOAD_2, WHEELS
+from pzd.simulate.prediction.predictor import HELD, LOAD_1, LOAD_2, WHEELS, Predictor
 from pzd.simulate.ride_model import (
     COMFORT,
     CONTACT,
@@ -67,27 +67,27 @@ def settings(**given: object) -> SimulateConfig:
     return SimulateConfig.model_validate_json(json.dumps({"policies": ["comfort_predictive"], **given}))
 
 
-def model_of(damper: Damper, policy: str, voltage: float, **given: object) -> RideModel:
-    """A ride on the paper's first road."""
+def model_of(damper: Damper, policy: str, voltage: float, **given: object) -> tuple[RideModel, Predictor]:
+    """A ride on the paper's first road, and what predicts it."""
     config = settings(**given)
     speed, car = config.vehicle_speed_km_per_h * KM_PER_H, config.car.car()
     case = Case(config.roads[0], policies()[policy], "dynamic", plain=False)
     dynamic, grid = dynamic_damper_of(damper, 22.0, config.valve_response_s), grid_of(table_of(damper), None)
-    return RideModel(
+    model = RideModel(
         vehicle(car, speed),
         road_coefficients(case.road.profile(Way(speed, speed * config.duration_s, 1, Path())), car.wheelbase),
         control_spec_of(config, case, car, dynamic, Held(voltage, 0.0)),
         grid,
         dynamic,
-        predictor_of(config.comfort_predictive, config.control_period_s, dynamic, car, speed, grid.voltages),
     )
+    return model, predictor_of(config.comfort_predictive, config.control_period_s, dynamic, car, speed, grid.voltages)
 
 
 def ahead(model: RideModel, y, acts, room, start: float, seconds: float) -> np.ndarray:
     """Bring a ride forward by the integrator of the loop, its voltage set once at the start; the largest motion."""
     peak = np.abs(y)
     scratch, stages, end = np.zeros_like(y), np.zeros((STAGES + 1, y.size)), np.zeros_like(y)
-    set_control(start, y, model, acts, room, scratch)
+    set_control(start, y, model, None, acts, room, scratch)
     for n in range(round(seconds / STEP)):
         advance(start + n * STEP, STEP, y, model, acts, room, 1e-9, STEP, stages, end)
         peak = np.maximum(peak, np.abs(y))
@@ -114,15 +114,14 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
         damper = damper.with_effect(name, values)
     road = [{"kind": "iso8608", "road_class": "C", "seed": 1}]
     given = {"roads": road, "car": car, "comfort_predictive": {"road": "known", "hold_s": 0.02, "horizon_s": 0.04}}
-    before, room, acts = model_of(damper, "passive", 75.0, **given), workspace(), control(75.0)
+    before, room, acts = model_of(damper, "passive", 75.0, **given)[0], workspace(), control(75.0)
     y = at_rest(before.car)
     peak = ahead(before, y, acts, room, 0.0, 1.5)
-    predicting = model_of(damper, "comfort_predictive", 75.0, **given)
-    choose(1.5, y, predicting, acts, room)
-    plan, state = predicting.predictor, np.array(predicting.predictor.states[NOW])
-    levels = plan.hold_levels
+    predicting, plan = model_of(damper, "comfort_predictive", 75.0, **given)
+    choose(1.5, y, predicting, plan, acts, room)
+    state, levels = np.array(plan.states[NOW]), plan.hold_levels
     predicted(predicting.car, plan, state, levels[0, candidate], levels[1, candidate], plan.hold_heights[0], HELD, 1e9)
-    after = model_of(damper, "passive", float(plan.candidates[candidate]), **given)
+    after, _ = model_of(damper, "passive", float(plan.candidates[candidate]), **given)
     ahead(after, y, acts, room, 1.5, 0.02)
     assert np.max(np.abs(state[:OIL_1] - y[:OIL_1]) / peak[:OIL_1]) < motion_off
     if car:
@@ -143,7 +142,7 @@ def test_an_oil_far_faster_than_the_step_is_quasi_static_with_an_error_in_propor
     T0, C, a, lags = damper.base[0].T0_N, damper.base[0].C_Ns_per_m, 10.0, []
     for relaxation in (1e-5, 1e-6, 1e-7):
         rows = tuple(r.model_copy(update={"k_N_per_m": r.C_Ns_per_m / relaxation}) for r in damper.base)
-        plan = model_of(damper.model_copy(update={"base": rows}), "comfort_predictive", 0.0).predictor
+        _, plan = model_of(damper.model_copy(update={"base": rows}), "comfort_predictive", 0.0)
         h, k = float(plan.steps[HELD]), C / relaxation
         e, flow = (T0 + C * 0.2) / k, 0.2
         for n in range(20):

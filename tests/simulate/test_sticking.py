@@ -13,7 +13,6 @@ from pzd.simulate.dampers import dynamic_damper_of, grid_of
 from pzd.simulate.equations import motion
 from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
-from pzd.simulate.prediction.planning import predictor_of
 from pzd.simulate.profile import Profile
 from pzd.simulate.ride_model import (
     ACCELERATION,
@@ -75,7 +74,6 @@ def test_an_axle_is_stopped_by_an_impulse_between_body_and_wheel(damper, table, 
         control_spec_of(config, case, car, dynamic, Held(0.0, 0.0)),
         grid,
         dynamic,
-        predictor_of(config.comfort_predictive, 1e-3, dynamic, car, 25.0, grid.voltages, 1),
     )
     y, acts, room = at_rest(model.car), control(0.0), workspace()
     y[HEAVE_RATE], y[PITCH_RATE] = 0.3, -0.1

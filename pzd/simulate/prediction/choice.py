@@ -41,16 +41,16 @@ NOW, END, HOLDING = range(3)
 
 
 @compiled
-def observe(time: float, model: RideModel, workspace: Array) -> bool:
+def observe(time: float, model: RideModel, plan: Predictor, workspace: Array) -> bool:
     """Take note of acceleration and road once a control period; whether it is time to choose.
 
     Parameters
     ----------
     time : [s]
-    model : the ride; the memory of its predictor is changed
+    model : the ride
+    plan : its memory is changed
     workspace : as `motion` left it
     """
-    plan = model.predictor
     number = int(plan.felt[OBSERVATIONS])
     felt = workspace[COMFORT, 0]
     weigh(plan.felt, 0, plan.felt[ACCELERATION], felt, plan.modes[OBSERVED], plan.residues)
@@ -70,14 +70,14 @@ def observe(time: float, model: RideModel, workspace: Array) -> bool:
 
 
 @compiled
-def predict(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+def predict(time: float, y: Array, model: RideModel, plan: Predictor, control: Array, workspace: Array) -> None:
     """Observe, and choose anew where it is time; see `choose`."""
-    if observe(time, model, workspace):
-        choose(time, y, model, control, workspace)
+    if observe(time, model, plan, workspace):
+        choose(time, y, model, plan, control, workspace)
 
 
 @compiled
-def choose(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+def choose(time: float, y: Array, model: RideModel, plan: Predictor, control: Array, workspace: Array) -> None:
     """Choose the voltages with which the ride ahead costs least; they are left in `Predictor.chosen`.
 
     Equation: (U_1, U_2) = Arg min over U, W in finite sets of J(U for the hold, then W), J of `predicted`
@@ -87,35 +87,35 @@ def choose(time: float, y: Array, model: RideModel, control: Array, workspace: A
     ----------
     time : [s]
     y : (n,) state
-    model : the ride; the rooms of its predictor are filled
+    model : the ride
+    plan : its rooms are filled
     control, workspace : what the controller last set, and the workspace as `motion` left it, see `ride_model`
     """
-    plan = model.predictor
-    _look_ahead(time, model)
+    _look_ahead(time, model, plan)
     weigh_loads(plan)
     _fill_levels(time, model.damper, plan, control)
-    _fill_now(y, model, workspace)
+    _fill_now(y, model, plan, workspace)
     held, tails, best = plan.candidates.size, plan.tails.size, math.inf
     if not plan.known:
-        best = _best_held_on(model) * (1.0 - plan.margin * unforeseen(plan))
+        best = _best_held_on(model, plan) * (1.0 - plan.margin * unforeseen(plan))
     last1, last2, after1, after2 = plan.chosen[0], plan.chosen[1], plan.chosen[2], plan.chosen[3]
     for m in range(held * held):  # the last choice first: what costs more is not followed to its end
         i, j = (last1 + m // held) % held, (last2 + m % held) % held
-        first = _held_cost(model, i, j, best)
+        first = _held_cost(model, plan, i, j, best)
         if first >= best:
             continue
         for n in range(tails * tails):
             a, b = (after1 + n // tails) % tails, (after2 + n % tails) % tails
-            cost = _tail_cost(model, i * tails + a, j * tails + b, first, best)
+            cost = _tail_cost(model, plan, i * tails + a, j * tails + b, first, best)
             if cost < best:
                 best = cost
                 plan.chosen[0], plan.chosen[1], plan.chosen[2], plan.chosen[3] = i, j, a, b
 
 
 @inlined
-def _fill_now(y: Array, model: RideModel, workspace: Array) -> None:
+def _fill_now(y: Array, model: RideModel, plan: Predictor, workspace: Array) -> None:
     """Fill the state of the plant by that of the ride."""
-    now, felt = model.predictor.states[NOW], model.predictor.felt
+    now, felt = plan.states[NOW], plan.felt
     for n in range(OIL_2 + 1):
         now[n] = y[n]
     for i in range(2):
@@ -128,13 +128,13 @@ def _fill_now(y: Array, model: RideModel, workspace: Array) -> None:
 
 
 @compiled
-def _best_held_on(model: RideModel) -> float:
+def _best_held_on(model: RideModel, plan: Predictor) -> float:
     """Cost of the best voltage that is also a tail, held on at both axles; it is left in `Predictor.chosen`."""
-    plan, best = model.predictor, math.inf
+    best = math.inf
     held, tails = plan.candidates.size, plan.tails.size
     for a in range(tails):
         i = int(a * (held - 1.0) / max(tails - 1, 1) + 0.5)
-        cost = _tail_cost(model, i * tails + a, i * tails + a, _held_cost(model, i, i, best), best)
+        cost = _tail_cost(model, plan, i * tails + a, i * tails + a, _held_cost(model, plan, i, i, best), best)
         if cost < best:
             best = cost
             plan.chosen[0], plan.chosen[1], plan.chosen[2], plan.chosen[3] = i, i, a, a
@@ -142,9 +142,9 @@ def _best_held_on(model: RideModel) -> float:
 
 
 @compiled
-def _look_ahead(time: float, model: RideModel) -> None:
+def _look_ahead(time: float, model: RideModel, plan: Predictor) -> None:
     """Fill the road ahead in every course that it may take."""
-    plan, car, road = model.predictor, model.car, model.road_coefficients
+    car, road = model.car, model.road_coefficients
     hold = plan.hold_steps * plan.steps[HELD]
     if plan.known:
         fill_known(time, car, road, plan.steps[HELD], plan.hold_heights[0])
@@ -158,9 +158,9 @@ def _look_ahead(time: float, model: RideModel) -> None:
 
 
 @inlined
-def _held_cost(model: RideModel, i: int, j: int, most: float) -> float:
+def _held_cost(model: RideModel, plan: Predictor, i: int, j: int, most: float) -> float:
     """Cost of holding a pair of candidates in all courses together; their states are left in `Predictor.states`."""
-    plan, cost = model.predictor, 0.0
+    cost = 0.0
     for course in range(plan.courses):
         state, levels = plan.states[HOLDING + course], plan.hold_levels
         _copy(plan.states[NOW], state)
@@ -179,9 +179,8 @@ def _held_cost(model: RideModel, i: int, j: int, most: float) -> float:
 
 
 @inlined
-def _tail_cost(model: RideModel, a: int, b: int, cost: float, most: float) -> float:
+def _tail_cost(model: RideModel, plan: Predictor, a: int, b: int, cost: float, most: float) -> float:
     """Cost of what was held and of a pair of tails behind it, in all courses together."""
-    plan = model.predictor
     for course in range(plan.courses):
         if cost < most:
             state, levels = plan.states[END], plan.tail_levels

@@ -44,7 +44,6 @@ def predictor_of(
     car: HalfCar,
     vehicle_speed: float,
     voltages: Array,
-    levels: int = LEVELS,
 ) -> Predictor:
     """The predictor before its first observation.
 
@@ -56,10 +55,9 @@ def predictor_of(
     car : the half-car
     vehicle_speed : [m/s]
     voltages : (m,) of the table, rising [V]
-    levels : of the effective voltage
     """
     lowest, highest = float(voltages[0]), float(voltages[-1])
-    spacing = (highest - lowest) / max(levels - 1, 1) or 1.0
+    spacing = (highest - lowest) / (LEVELS - 1) or 1.0
     hold_steps = math.ceil(settings.hold_s / HOLD_STEP * (1.0 - 1e-9))
     tail = settings.horizon_s - settings.hold_s
     tail_steps = math.ceil(tail / TAIL_STEP * (1.0 - 1e-9))
@@ -84,13 +82,13 @@ def predictor_of(
         residues=np.stack([residues.real, residues.imag], axis=1),
         modes=np.stack([_modes(poles, h) for h in steps]),
         chosen=np.zeros(4, dtype=np.intp),
-        fixed_levels=np.repeat(np.linspace(0, levels - 1, _FIXED).astype(np.intp)[:, np.newaxis], 3, axis=1),
+        fixed_levels=np.repeat(np.linspace(0, LEVELS - 1, _FIXED).astype(np.intp)[:, np.newaxis], 3, axis=1),
         hold_levels=np.zeros((2, settings.voltages, 2 * hold_steps + 1), dtype=np.intp),
         tail_levels=np.zeros((2, settings.voltages * settings.tails, 2 * tail_steps + 1), dtype=np.intp),
         hold_heights=np.zeros((_courses(settings), 2, hold_steps + 1)),
         tail_heights=np.zeros((_courses(settings), 2, tail_steps + 1)),
         kept=np.zeros((2, 2, damper.drive.size)),
-        **_damper_over(damper, lowest + spacing * np.arange(levels, dtype=np.float64), steps),
+        **_damper_over(damper, lowest + spacing * np.arange(LEVELS, dtype=np.float64), steps),
         **_memory(settings, control_period, car, vehicle_speed),
     )
 
