@@ -63,6 +63,10 @@ bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that 
 coverage-study: $(DEV)  ## Print how often the intervals of identify hold the truth; some minutes
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/identify $(BIN)/python tests/studies/coverage_study.py
 
+.PHONY: sensitivity
+sensitivity: $(DEV)  ## Print what the verdicts owe to each threshold, halved and doubled; a quarter of an hour
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/sensitivity.py
+
 .PHONY: format
 format: $(DEV)  ## Format the code and mend what ruff can mend
 	$(BIN)/ruff format .

@@ -1,0 +1,300 @@
+"""What the verdicts owe to each threshold, halved and doubled on the cases of a benchmark: `make sensitivity`.
+
+    python tests/studies/sensitivity.py [cases, default 24] [seed, default 1]
+
+The cases are the first ones of configs/blind.yaml on a seed for tuning: single effects, pairs, none, and what is not
+in the library. Each is drawn and identified once. Where a threshold acts after the search, the verdict is reached anew
+from the search that stands there; where it acts in the search, that is done again, and only what it asks of the tests
+for the first time is computed: every fit is kept. Printed are, for every threshold, the cases whose verdict, names or
+rivals change, and the changes in how many are right and wrong. Counts are rounded up when halved; of a level of chance
+the logarithm is halved and doubled.
+"""
+
+from __future__ import annotations
+
+import pickle
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from hashlib import sha256
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pzd.artefacts import base_of
+from pzd.blind import rates
+from pzd.blind.case import Places, Scored, Truth
+from pzd.blind.hide import BenchmarkSetup, hide
+from pzd.blind.plan import PlannedCase, plan
+from pzd.blind.scoring import counted
+from pzd.config import RunConfig, load
+from pzd.damper.effect import Effect
+from pzd.damper.model import Damper
+from pzd.diagnose import kept_back, residual_check, thresholds
+from pzd.diagnose.campaign import Campaign
+from pzd.diagnose.conclusion import concluded
+from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.data.cleaning import about, prepare
+from pzd.diagnose.data.exclusions import whole_records
+from pzd.diagnose.data.split import split
+from pzd.diagnose.fit.least_squares import Fitted, fit, misfit_of
+from pzd.diagnose.fit.likelihood import RecordLikelihood
+from pzd.diagnose.fit.parameters import Problem
+from pzd.diagnose.kept_back import Trials
+from pzd.diagnose.search.evidence import evidence_of
+from pzd.diagnose.search.forward_selection import select_effects
+from pzd.diagnose.search.selection import Selection
+from pzd.diagnose.search.starts import promise
+from pzd.identify.stage import identify
+from pzd.record import mid_stroke
+from pzd.rig.config import FilesEntry, RigConfig
+from pzd.rig.stage import ingest
+from pzd.schema.jsonfile import read_json
+
+CONFIG = Path(__file__).resolve().parents[2] / "configs" / "blind.yaml"
+TABLE = tuple(name for name in vars(thresholds) if name.isupper())
+IN_CONFIG = (
+    *("significance", "visible", "negligible", "unexplained_share"),
+    *("adopt_bic", "rival_bic", "most_effects", "most_added"),
+)
+CHANCES = ("significance", "HALVES_SIGNIFICANCE", "CYCLE_CHANGE_SIGNIFICANCE")
+AFTER = ("verdict", "missed", "handed_on", "added_by_prediction", "trends_of_tests", "hypotheses.regression")
+"""Modules of pzd.diagnose that act on a search that is over."""
+AFTER_IN_CONFIG = ("unexplained_share", "most_added")
+
+Answer = tuple[str, frozenset[str], frozenset[str]]
+"""Verdict, effects and rivals."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case as far as no threshold acts."""
+
+    truth: Truth
+    campaign: Campaign
+    plain: Damper
+
+
+class Kept:
+    """Gives what a function of a problem or of a campaign gave before, where all that it depends on is the same."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.function = function
+        self.found: dict[object, Any] = {}
+        self.held: dict[int, tuple[object, str]] = {}
+
+    def __call__(self, problem: Problem | Campaign, *given: Any, **named: Any) -> Any:
+        key = (
+            self._thresholds(),
+            self._said(problem),
+            *map(self._said, given),
+            *((name, self._said(one)) for name, one in named.items()),
+        )
+        if key not in self.found:
+            self.found[key] = self.function(problem, *given, **named)
+        return self.found[key]
+
+    def _thresholds(self) -> str:
+        """Those that act inside of the function."""
+        within = vars(sys.modules[self.function.__module__])
+        return repr([within[name] for name in TABLE if name in within])
+
+    def _said(self, given: Any) -> object:
+        """What tells an argument from another one."""
+        if isinstance(given, np.ndarray):
+            return given.tobytes()
+        if isinstance(given, Damper):
+            return given.model_dump_json()
+        if isinstance(given, Effect):
+            return given.name
+        if isinstance(given, Problem | RecordLikelihood | Fitted | Campaign):
+            if id(given) not in self.held:  # the object is held as well, so that no other one takes its number
+                self.held[id(given)] = given, sha256(pickle.dumps(self._content(given))).hexdigest()
+            return self.held[id(given)][1]
+        return given if isinstance(given, Hashable) else tuple(given)
+
+    def _content(self, given: Problem | RecordLikelihood | Fitted | Campaign) -> tuple[object, ...]:
+        if isinstance(given, Campaign):
+            return (id(given),)
+        if isinstance(given, Problem):
+            rows = tuple(row.model_dump_json() for row in given.base)
+            rest = given.scales, given.fastest, given.reference, sorted(given.varying)
+            return (*map(self._said, given.observations), rows, repr(rest))
+        if isinstance(given, Fitted):
+            return given.damper.model_dump_json(), given.effects, given.searched.tobytes(), repr(given.misfit)
+        arrays = given.compared, given.measured, given.weights, given.frame, given.shrink
+        return given.name, given.place, given.first, given.stride, *(array.tobytes() for array in arrays)
+
+
+def keep_fits() -> None:
+    """Let every module of the diagnosis ask for its fits where they are kept."""
+    for function in (fit, misfit_of, promise, evidence_of, kept_back.trials_of):
+        kept = Kept(function)
+        for key, module in list(sys.modules.items()):
+            for name, value in list(vars(module).items()) if key.startswith("pzd.diagnose.") else ():
+                if value is function:
+                    setattr(module, name, kept)
+
+
+@dataclass(frozen=True)
+class Searched:
+    """A search that is over."""
+
+    selection: Selection
+    trials: Trials
+
+
+def names() -> tuple[str, ...]:
+    """Every threshold: those of the table, then those of the config."""
+    return (*TABLE, *IN_CONFIG)
+
+
+def users(name: str) -> list[Any]:
+    """The modules that have a threshold of the table."""
+    return [m for key, m in sys.modules.items() if key.startswith("pzd.diagnose.") and name in vars(m)]
+
+
+def acts_after(name: str) -> bool:
+    """Whether a threshold acts on a search that is over and nowhere else."""
+    if name in IN_CONFIG:
+        return name in AFTER_IN_CONFIG
+    within = {module.__name__.removeprefix("pzd.diagnose.") for module in users(name)} - {"thresholds"}
+    return within <= set(AFTER)
+
+
+def scaled(name: str, value: Any, factor: float) -> Any:
+    """A threshold at half or twice its value."""
+    if isinstance(value, Mapping):
+        return {key: scaled(name, one, factor) for key, one in value.items()}
+    if isinstance(value, tuple):
+        return tuple(scaled(name, one, factor) for one in value)
+    if isinstance(value, int):
+        return max(ceil(factor * value), 1)
+    return value ** (1.0 / factor) if name in CHANCES else factor * value
+
+
+@contextmanager
+def instead(name: str, factor: float, config: DiagnoseConfig) -> Iterator[DiagnoseConfig]:
+    """The config with a threshold at a multiple of its value, wherever it stands."""
+    if name in IN_CONFIG:
+        yield config.model_copy(update={name: scaled(name, getattr(config, name), factor)})
+        return
+    value, where = getattr(thresholds, name), users(name)
+    for module in where:
+        setattr(module, name, scaled(name, value, factor))
+    try:
+        yield config
+    finally:
+        for module in where:
+            setattr(module, name, value)
+
+
+def searched(case: Case, config: DiagnoseConfig, *, checked: bool) -> Searched:
+    """The search of a case, as the stage does it; with the residuals that were checked before, where these stand."""
+    campaign = case.campaign if checked else replace(case.campaign, _expected={}, _checks={})
+    trials = kept_back.trials_of(campaign, case.plain, config.visible)
+    return Searched(select_effects(campaign, case.plain, config, 1), trials)
+
+
+def answered(found: Searched, config: DiagnoseConfig) -> Answer:
+    """What is said of a search."""
+    handed, decision = concluded(found.selection, found.trials, config, "V")
+    return decision.verdict, frozenset(handed.selection.adopted), frozenset(handed.selection.rivals)
+
+
+def outcome(case: PlannedCase, truth: Truth, answer: Answer) -> str:
+    """`right`, `wrong` or, where it is neither, `open`."""
+    verdict, effects, rivals = answer
+    score = Scored.model_construct(
+        kind=case.kind, hidden=truth.form or "", described_by=truth.described_by, truth=counted(truth), failure=None,
+        verdict=verdict, effects=tuple(effects), rivals=tuple(rivals),
+    )  # fmt: skip
+    judged: dict[str, tuple[rates.Predicate, rates.Predicate]] = {
+        "none": (lambda s: s.verdict == "none", rates.false_name),
+        "outside": (rates.rightly_outside, rates.wrong_single),
+    }
+    well, ill = judged.get(case.kind, (lambda s: rates.right(s) or rates.ambiguous_with_truth(s), rates.wrong_name))
+    return "right" if well(score) else "wrong" if ill(score) else "open"
+
+
+def prepared_case(config: RunConfig, setup: BenchmarkSetup, case: PlannedCase) -> Case:
+    """A case drawn, ingested, identified and cleaned."""
+    with tempfile.TemporaryDirectory() as folder:
+        places = Places(Path(folder))
+        hide(setup, case, places)
+        truth = read_json(places.truth(case.id), Truth, setup.control)
+        rig = ingest(RigConfig(files=(FilesEntry(path="rig/*.csv"),)), setup.control, places.case(case.id))
+        identified = identify(config.identify, rig, config.seed)
+        recorded = prepare(whole_records(rig, None)[0])
+    prepared = about(recorded, mid_stroke(each.record.displacement for each in recorded))
+    group = config.identify.group
+    parts = split(prepared, group.voltage_V, group.temperature_degC)
+    return Case(truth, Campaign(prepared, parts, config.diagnose.nuisance), base_of(identified.rows, None))
+
+
+def replayed(seed: int, cases: int, number: int) -> tuple[str, dict[tuple[str, float], str], set[tuple[str, float]]]:
+    """One case: its outcome, that with every threshold halved and doubled, and where the answer changes."""
+    config = load(CONFIG)
+    assert config.blind is not None
+    assert config.rig.virtual is not None
+    blind = config.blind.model_copy(update={"seed": seed, "cases": cases, "tuning": True})
+    setup = BenchmarkSetup(blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
+    case = plan(blind)[number]
+    keep_fits()
+    prepared = prepared_case(config, setup, case)
+    judged: Callable[[Answer], str] = partial(outcome, case, prepared.truth)
+    stands = searched(prepared, config.diagnose, checked=True)
+    usual = answered(stands, config.diagnose)
+    outcomes, changed = {}, set()
+    for name in names():
+        for factor in (0.5, 2.0):
+            with instead(name, factor, config.diagnose) as other:
+                checked = residual_check not in users(name)
+                found = stands if acts_after(name) else searched(prepared, other, checked=checked)
+                answer = answered(found, other)
+            outcomes[name, factor] = judged(answer)
+            if answer != usual:
+                changed.add((name, factor))
+    return judged(usual), outcomes, changed
+
+
+def say(line: str) -> None:
+    """Print at once: this takes long."""
+    print(line, flush=True)  # noqa: T201  # this is what the study is for
+
+
+def main(cases: int = 24, seed: int = 1) -> None:
+    """Print a row a threshold."""
+    begun = time.monotonic()
+    usual: list[str] = []
+    gained = {(name, factor, kind): 0 for name in names() for factor in (0.5, 2.0) for kind in ("right", "wrong")}
+    changes = dict.fromkeys(((name, factor) for name in names() for factor in (0.5, 2.0)), 0)
+    with ProcessPoolExecutor(2) as pool:
+        for stood, outcomes, changed in pool.map(partial(replayed, seed, cases), range(cases)):
+            usual.append(stood)
+            for key, now in outcomes.items():
+                changes[key] += key in changed
+                for kind in ("right", "wrong"):
+                    gained[*key, kind] += int(now == kind) - int(stood == kind)
+            say(f"case {len(usual)} of {cases}, {time.monotonic() - begun:.0f} s")
+    say(f"\n{cases} cases of seed {seed}: {usual.count('right')} right, {usual.count('wrong')} wrong as it stands")
+    say(f"{'threshold':28} {'acts':7} {'halved: changed right wrong':>28} {'doubled: changed right wrong':>30}")
+    for name in names():
+        told = [
+            f"{changes[name, f]:18d} {gained[name, f, 'right']:+5d} {gained[name, f, 'wrong']:+5d}" for f in (0.5, 2.0)
+        ]
+        say(f"{name:28} {'after' if acts_after(name) else 'search':7} {told[0]} {told[1]}")
+    still = [name for name in names() if not changes[name, 0.5] + changes[name, 2.0]]
+    say(f"\n{len(still)} of {len(names())} thresholds change no answer, halved or doubled")
+    say(f"{np.ceil((time.monotonic() - begun) / 60.0):.0f} min")
+
+
+if __name__ == "__main__":
+    main(*(int(word) for word in sys.argv[1:]))
