@@ -15,15 +15,15 @@ def listings(text: str) -> list[tuple[str, str]]:
     return re.findall(r"^<!-- printed by: (.*?) -->\n```\w+\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-def same(shown: str, printed: str) -> bool:
+def same(shown: str, printed: str, agreement: float = AGREEMENT) -> bool:
     """Whether two lines say the same: equal but for blanks and the last digits of their numbers."""
     if NUMBER.sub("#", shown).split() != NUMBER.sub("#", printed).split():
         return False
     pairs = zip(NUMBER.findall(shown), NUMBER.findall(printed), strict=True)
-    return all(math.isclose(float(one), float(other), rel_tol=AGREEMENT) for one, other in pairs)
+    return all(math.isclose(float(one), float(other), rel_tol=agreement) for one, other in pairs)
 
 
-def missing(shown: str, printed: str) -> list[str]:
+def missing(shown: str, printed: str, agreement: float = AGREEMENT) -> list[str]:
     """The lines of a listing that a command has not printed."""
     said = printed.splitlines()
-    return [line for line in shown.splitlines() if not any(same(line, other) for other in said)]
+    return [line for line in shown.splitlines() if not any(same(line, other, agreement) for other in said)]

@@ -38,6 +38,10 @@ DONE, UNTRUSTED = 0, 4
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 pytestmark = pytest.mark.ci
 
+BETWEEN_PROCESSORS = 0.1
+"""Relative difference of a number that another processor may make of a diagnosis: rounding ends its searches at another
+point of a flat bottom. Of a voltage left out, W_s was seen 3 % apart; a coefficient of two digits moves by a tenth."""
+
 
 def measured(config: Path) -> list[str]:
     """The patterns of the rig files that a config reads."""
@@ -95,4 +99,4 @@ def test_a_config_runs_from_end_to_end_and_once_only(config: Path, pzd: Command,
     for command, shown in shown_of(config):
         told = pzd(*shlex.split(command)[1:], "--runs", tmp_path)
         assert told.returncode == first.returncode, told.stdout + told.stderr
-        assert missing(shown, told.stdout) == []
+        assert missing(shown, told.stdout, BETWEEN_PROCESSORS) == []
