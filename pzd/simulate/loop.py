@@ -96,8 +96,9 @@ def set_control(
     ----------
     time : [s]
     y : (n,) state; a valve without lag tightens the oil spring at once, which is booked here
-    model, control, workspace : see `ride_model`; the control is changed in place
+    model : see `ride_model`
     plan : of the aim `PREDICT`; without it nothing of the prediction is compiled
+    control, workspace : see `ride_model`; the control is changed in place
     scratch : (n,) to work in
     """
     control_spec, car = model.control_spec, model.car
@@ -237,8 +238,9 @@ def ride(
     Parameters
     ----------
     y : (n,) state; changed in place
-    model, control, workspace : see `ride_model`
+    model : see `ride_model`
     plan : see `set_control`
+    control, workspace : see `ride_model`
     first, last : steps to be kept, the last one not
     steps, h : number and length of the steps of integration in the whole ride [s]
     tolerance : see `advance`
