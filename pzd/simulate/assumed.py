@@ -1,10 +1,11 @@
-"""What a ride assumes where the config does not say it: which car, which lag of the valve, which bounds."""
+"""What a ride assumes where the config does not say it: car, lag of the valve, bounds, sensors and supply."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 
-from pzd.simulate.config import CarBlock, SimulateConfig
+from pzd.simulate.car_block import CarBlock
+from pzd.simulate.config import SimulateConfig
 from pzd.simulate.policies import policies
 
 
@@ -32,6 +33,12 @@ def assumed(config: SimulateConfig, effects: Collection[str], with_voltage: bool
     controls = config.policies is None or any(policies()[name].controlled for name in config.policies)
     if with_voltage and controls and "ideal" in config.fidelities and not said & {"bounds", "c_min_Ns_per_m"}:
         lines.append("ideal forces are bounded by the damper's own table (simulate.bounds)")
+    if with_voltage and controls and set(config.fidelities) != {"ideal"}:
+        perfect = {
+            "sensors": "controllers see the ride exactly and at once (simulate.sensors)",
+            "supply": "the voltage that they ask for is set exactly and at once (simulate.supply)",
+        }
+        lines += [line for key, line in perfect.items() if key not in said]
     return tuple(lines)
 
 

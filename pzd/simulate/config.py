@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import operator
-from dataclasses import replace
 from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -11,8 +10,8 @@ from pydantic import Field, field_validator, model_validator
 
 from pzd.schema.errors import InsideError
 from pzd.schema.model import Frozen
-from pzd.simulate.car import HalfCar
-from pzd.simulate.cars import cars
+from pzd.simulate.car_block import CarBlock
+from pzd.simulate.electronics import Sensors, Supply
 from pzd.simulate.policies import policies
 from pzd.simulate.policies.best_found import BestFound
 from pzd.simulate.policies.clipped_lqr import ClippedLqr
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 else:
     RoadBlock = Annotated[reduce(operator.or_, roads().values()), Field(discriminator="kind")]
 
-Pair = tuple[float, float]
 KM_PER_H = 1.0 / 3.6
 """[m/s]"""
 DEFAULT_CONTROLLED = "comfort"
@@ -41,104 +39,6 @@ _UNFIT = (
     "tyre_stiffness_N_per_m, or leave it out"
 )
 """Why a policy that fits wheels with mass alone cannot be ridden on the paper's car."""
-
-
-class CarBlock(Frozen):
-    """The car: one of the library, and whatever is to be different from it."""
-
-    name: str | None = None
-    """What the report calls it. By default the name of the model, or `own` where a value differs from it."""
-    model: str = "makowski2021"
-    """Name of the car in the library."""
-    mass_kg: float | None = Field(default=None, gt=0.0)
-    """Body mass m."""
-    pitch_inertia_kgm2: float | None = Field(default=None, gt=0.0)
-    """Moment of inertia J_y about the centre of gravity."""
-    a1_m: float | None = Field(default=None, gt=0.0)
-    """Distance from the centre of gravity to axle 1, which leads."""
-    a2_m: float | None = Field(default=None, gt=0.0)
-    """Distance from the centre of gravity to axle 2, which follows."""
-    spring_stiffness_N_per_m: Pair | None = None
-    """Spring stiffness k1, k2 at the axles."""
-    x_K_m: float | None = None
-    """Place of point K, where comfort is judged: from the centre of gravity, positive towards axle 2."""
-    motion_ratio: Pair | None = None
-    """Extension of a damper over deflection of its suspension, per axle."""
-    dampers_per_axle: Pair | None = None
-    """Number of dampers that act at each axle."""
-    unsprung_mass_kg: Pair | None = None
-    """Mass m1, m2 of the wheels of each axle with what moves with them. Without it the wheels have none, and follow
-    the road."""
-    tyre_stiffness_N_per_m: Pair | None = None
-    """Stiffness of the tyres of each axle, all of them together."""
-    tyre_damping_Ns_per_m: Pair | None = None
-    """Damping of the tyres of each axle; by default none."""
-
-    @field_validator("model")
-    @classmethod
-    def _in_library(cls, name: str) -> str:
-        if name not in cars():
-            raise ValueError(f"no car is called {name}; there are {', '.join(sorted(cars()))}")
-        return name
-
-    @field_validator(
-        "spring_stiffness_N_per_m", "motion_ratio", "dampers_per_axle", "unsprung_mass_kg", "tyre_stiffness_N_per_m"
-    )
-    @classmethod
-    def _positive(cls, pair: Pair | None) -> Pair | None:
-        if pair is not None and min(pair) <= 0.0:
-            raise ValueError(f"both must be above zero (got {pair[0]:g}, {pair[1]:g})")
-        return pair
-
-    @field_validator("tyre_damping_Ns_per_m")
-    @classmethod
-    def _not_negative(cls, pair: Pair | None) -> Pair | None:
-        if pair is not None and min(pair) < 0.0:
-            raise ValueError(f"neither may be below zero (got {pair[0]:g}, {pair[1]:g})")
-        return pair
-
-    @model_validator(mode="after")
-    def _wheels_on_tyres(self) -> CarBlock:
-        car = self.car()
-        if car.wheels_have_mass != (min(car.tyre_stiffnesses) > 0.0):
-            missing = "tyre_stiffness_N_per_m" if car.wheels_have_mass else "unsprung_mass_kg"
-            raise ValueError(f"wheels with mass stand on tyres: give {missing} as well, or neither")
-        if self.tyre_damping_Ns_per_m is not None and not car.wheels_have_mass:
-            raise ValueError("tyre_damping_Ns_per_m: wheels without mass have no tyres; give unsprung_mass_kg as well")
-        return self
-
-    @model_validator(mode="after")
-    def _comfort_point_in_the_car(self) -> CarBlock:
-        car = self.car()
-        low, high = -car.distances[0] - car.wheelbase, car.distances[1] + car.wheelbase
-        if not low <= car.comfort_point <= high:
-            raise ValueError(
-                f"x_K_m must lie within the car, no farther than its wheelbase beyond an axle: "
-                f"from {low:.4g} to {high:.4g} m (got {car.comfort_point:g})"
-            )
-        return self
-
-    def car(self) -> HalfCar:
-        """The car of the library with what the config changes; it keeps its name only where that is nothing."""
-        known = cars()[self.model]
-        built = HalfCar(
-            name=known.name,
-            mass=_first(self.mass_kg, known.mass),
-            pitch_inertia=_first(self.pitch_inertia_kgm2, known.pitch_inertia),
-            distances=(_first(self.a1_m, known.distances[0]), _first(self.a2_m, known.distances[1])),
-            stiffnesses=self.spring_stiffness_N_per_m or known.stiffnesses,
-            comfort_point=_first(self.x_K_m, known.comfort_point),
-            motion_ratios=self.motion_ratio or known.motion_ratios,
-            dampers=self.dampers_per_axle or known.dampers,
-            unsprung_masses=self.unsprung_mass_kg or known.unsprung_masses,
-            tyre_stiffnesses=self.tyre_stiffness_N_per_m or known.tyre_stiffnesses,
-            tyre_dampings=self.tyre_damping_Ns_per_m or known.tyre_dampings,
-        )
-        return replace(built, name=self.name or (known.name if built == known else "own"))
-
-
-def _first(given: float | None, known: float) -> float:
-    return known if given is None else given
 
 
 class SimulateConfig(Frozen):
@@ -189,6 +89,10 @@ class SimulateConfig(Frozen):
     """Temperature of the dampers during the ride, within those of the table; by default its lowest."""
     control_period_s: float = Field(default=0.001, gt=0.0)
     """The voltage is set this often; `ideal` acts at every instant."""
+    sensors: Sensors | None = None
+    """What the controller sees at the fidelities `table` and `dynamic`; by default all, exactly and at once."""
+    supply: Supply | None = None
+    """What becomes of the voltage that it asks for there; by default it is set exactly and at once."""
     valve_response_s: float = Field(default=0.0039, ge=0.0)
     """Time constant of the valve in `dynamic` where the damper has no `valve_lag` of its own: 0.0039 s
     reaches 90 % in the 9 ms that the paper states."""
@@ -236,7 +140,20 @@ class SimulateConfig(Frozen):
                 f"comfort_predictive.hold_s must be a whole number of control_period_s (got {periods:g} periods)"
             )
         self._whole_steps("1 / output_rate_Hz", 1.0 / self.output_rate_Hz)
+        self._electronics_consistent()
         return self
+
+    def _electronics_consistent(self) -> None:
+        given = [name for name in ("sensors", "supply") if getattr(self, name) is not None]
+        if given and set(self.fidelities) == {"ideal"}:
+            raise ValueError(
+                f"{given[0]}: ideal forces need neither sensors nor a supply; ride table or dynamic as well"
+            )
+        sensors = self.sensors or Sensors()
+        for name, time in (("period_s", sensors.period_s or self.control_period_s), ("delay_s", sensors.delay_s)):
+            periods = time / self.control_period_s
+            if abs(periods - round(periods)) > 1e-6 * max(periods, 1.0):
+                raise ValueError(f"sensors.{name} must be a whole number of control_period_s (got {periods:g} periods)")
 
     def _policies_fit_the_car(self) -> None:
         for number, name in enumerate(self.policies or ()):

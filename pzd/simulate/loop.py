@@ -5,174 +5,38 @@ from __future__ import annotations
 import math
 
 from pzd.compiled import compiled, inlined
-from pzd.damper.kernels import keep_voltage
-from pzd.damper.rows import row_at
 from pzd.record import Array
-from pzd.simulate.demand import bounds_of, choose_hardness, demand, spring_acceleration
+from pzd.simulate.controller import set_control
 from pzd.simulate.dormand_prince import STAGES
-from pzd.simulate.dynamic_damper import effective_voltage, place, stored
+from pzd.simulate.dynamic_damper import place
 from pzd.simulate.equations import motion
-from pzd.simulate.minimise import LARGEST, farther_end
-from pzd.simulate.prediction.choice import predict
 from pzd.simulate.prediction.predictor import Predictor
 from pzd.simulate.ride_model import (
     ASKED,
-    BEHIND,
     COMFORT,
     CONTACT,
     DEFLECTION,
     DISSIPATED,
-    DYNAMIC,
     FORCE,
-    HIGH,
     IDEAL,
-    LOW,
-    MINIMISE,
-    OIL_1,
     RATE,
-    SCHEDULE,
     SET,
     SIDE,
-    SIDED_RATE,
-    SINCE,
     SPRINGS,
-    SWITCH,
-    TIE_END,
-    VALVE_WORK,
-    VOLTAGE,
-    ControlSpec,
     RideModel,
 )
+from pzd.simulate.sensing import Electronics
 from pzd.simulate.stepper import advance, choose_side
-from pzd.table.kernel import table_voltage
 
 OUTSIDE, STEPS_DONE, NEXT_PIECE = range(3)
 """Steps beyond what the rig reached, steps done, and length of the piece of a step to try next [s]."""
 TALLIES = 3
-_SAME_PLACE = 1e-9
-"""Of an interval of a schedule: the clock meets its beginning but for rounding."""
 A_K, LOAD_1, LOAD_2, TRAVEL, LOST = range(5)
 """What is kept of every step: acceleration at K [m/s2], what each axle takes off the road's static load [N], S + T
 where the wheels have no mass, larger deflection of the two suspensions [m], energy dissipated so far [J]."""
 COURSE_COLUMNS = 5
 COLUMNS = 16
 """time, z, phi, a_K, and per axle deflection, rate, spring, damper and demanded force, voltage."""
-
-
-@inlined
-def _acts_at_once(control_spec: ControlSpec) -> bool:
-    """Whether nothing is left to the clock: `ideal` forces are, but for the choice between two that lie apart."""
-    chooses = control_spec.aim == SWITCH or (control_spec.aim == MINIMISE and control_spec.tie == LARGEST)
-    return control_spec.fidelity == IDEAL and not chooses
-
-
-@inlined
-def _choose_ends(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
-    """Fill the bounds of both axles, and what stays as it is until the controller acts again."""
-    control_spec, car = model.control_spec, model.car
-    for i in range(2):
-        workspace[LOW, i], workspace[HIGH, i] = bounds_of(control_spec, car, model.grid, i, workspace[RATE, i])
-        workspace[SIDED_RATE, i] = workspace[RATE, i]
-    if control_spec.aim == SWITCH:
-        choose_hardness(control_spec, car, y, control, workspace)
-    if control_spec.aim == MINIMISE and control_spec.tie == LARGEST:
-        a0 = spring_acceleration(car, workspace[DEFLECTION])
-        control[TIE_END, 1] = farther_end(a0, car.comfort, workspace[LOW], workspace[HIGH])
-
-
-@compiled
-def set_control(
-    time: float,
-    y: Array,
-    model: RideModel,
-    plan: Predictor | None,
-    control: Array,
-    workspace: Array,
-    scratch: Array,
-) -> None:
-    """Let the controller act once: what it asks of each axle, and the voltage that gives it by the table.
-
-    Parameters
-    ----------
-    time : [s]
-    y : (n,) state; a valve without lag tightens the oil spring at once, which is booked here
-    model : see `ride_model`
-    plan : of the aim `PREDICT`; without it nothing of the prediction is compiled
-    control, workspace : see `ride_model`; the control is changed in place
-    scratch : (n,) to work in
-    """
-    control_spec, car = model.control_spec, model.car
-    if _acts_at_once(control_spec):
-        return
-    motion(time, y, model, control, workspace, scratch)
-    _choose_ends(y, model, control, workspace)
-    if control_spec.fidelity == IDEAL:
-        return
-    if plan is not None:
-        predict(time, y, model, plan, control, workspace)
-        for i in range(2):
-            _set_voltage(time, y, model, control, i, float(plan.candidates[plan.chosen[i]]))
-    else:
-        if control_spec.aim not in (VOLTAGE, SCHEDULE):
-            demand(control_spec, car, y, control, workspace)
-        for i in range(2):
-            _set_voltage(time, y, model, control, i, _wanted_voltage(time, model, control, workspace, i))
-    control[SINCE, 0] = time
-    for i in range(2):
-        if control[SIDE, i] == 0.0:
-            choose_side(i, time, y, model, control, workspace, scratch)
-
-
-@inlined
-def scheduled(time: float, model: RideModel, axle: int) -> float:
-    """The voltage [V] that a schedule has for an axle at a time [s], by where axle 1 is in the harmonic of the road."""
-    count = model.control_spec.schedule.shape[1]
-    turns = model.road_coefficients.wavenumber * model.car.speed * time / (2.0 * math.pi)
-    place = min(int((turns - math.floor(turns)) * count + _SAME_PLACE), count - 1)
-    return float(model.control_spec.schedule[axle, place])
-
-
-@inlined
-def _wanted_voltage(time: float, model: RideModel, control: Array, workspace: Array, axle: int) -> float:
-    """The voltage that the policy asks of an axle [V]; a force that it asks is noted."""
-    aim = model.control_spec.aim
-    if aim == VOLTAGE:
-        return model.control_spec.voltage
-    if aim == SCHEDULE:
-        return scheduled(time, model, axle)
-    control[ASKED, axle] = workspace[FORCE, axle]
-    return _voltage_for(model, axle, workspace[FORCE, axle], workspace[RATE, axle], control[SET, axle])
-
-
-@inlined
-def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, otherwise: float) -> float:
-    """The voltage that gives a force of the axle within its bounds; a rounding beyond them is let pass."""
-    grid, car = model.grid, model.car
-    ratio = car.ratio[axle]
-    alone = force / (car.dampers[axle] * ratio)
-    for share in (0.0, 1e-12, -1e-12):
-        voltage = table_voltage(
-            grid.voltages, grid.speeds, grid.rebound, grid.compression, alone * (1.0 + share), ratio * velocity
-        )
-        if not math.isnan(voltage):
-            return voltage
-    return otherwise
-
-
-@compiled
-def _set_voltage(time: float, y: Array, model: RideModel, control: Array, axle: int, voltage: float) -> None:
-    damper, elapsed = model.damper, time - control[SINCE, 0]
-    was, _ = effective_voltage(damper, control[SET, axle], control[BEHIND:, axle], elapsed)
-    keep_voltage(control[SET, axle], elapsed, control[BEHIND:, axle], damper.drive)
-    control[SET, axle] = voltage
-    if model.control_spec.fidelity == DYNAMIC:
-        now, _ = effective_voltage(damper, voltage, control[BEHIND:, axle], 0.0)
-        if now != was:
-            e = y[OIL_1 + axle]
-            change = stored(e, row_at(damper.voltages, damper.rows, now)) - stored(
-                e, row_at(damper.voltages, damper.rows, was)
-            )
-            y[VALVE_WORK] += model.car.dampers[axle] * change
 
 
 @inlined
@@ -218,6 +82,7 @@ def ride(
     y: Array,
     model: RideModel,
     plan: Predictor | None,
+    electronics: Electronics | None,
     control: Array,
     workspace: Array,
     first: int,
@@ -239,7 +104,7 @@ def ride(
     ----------
     y : (n,) state; changed in place
     model : see `ride_model`
-    plan : see `set_control`
+    plan, electronics : see `set_control`; the noise of as many acts as are due
     control, workspace : see `ride_model`
     first, last : steps to be kept, the last one not
     steps, h : number and length of the steps of integration in the whole ride [s]
@@ -258,7 +123,7 @@ def ride(
     for n in range(first, last):
         time = n * h
         if n % per_control == 0:
-            set_control(time, y, model, plan, control, workspace, scratch)
+            set_control(time, y, model, plan, electronics, control, workspace, scratch)
         motion(time, y, model, control, workspace, scratch)
         _keep(y, workspace, course[n - first])
         tally[STEPS_DONE] = n

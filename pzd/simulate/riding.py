@@ -48,6 +48,7 @@ from pzd.simulate.ride_model import (
     vehicle,
     workspace,
 )
+from pzd.simulate.sensing import Electronics, electronics_of, with_noise
 from pzd.simulate.spilled import SpilledRows
 
 Take = Callable[[int, Array], None]
@@ -210,12 +211,15 @@ def ride_case(
     if case.policy.aim == "predict":
         plan = predictor_of(config.comfort_predictive, config.control_period_s, own, car, speed, grid.voltages)
     sharper = _SWITCHED if case.policy.aim != "voltage" and case.fidelity == "dynamic" else 1.0
-    return ride_of_model(model, plan, clock, sharper * config.tolerance, case.name, ends, take)
+    states = at_rest(model.car).size
+    electronics = electronics_of(config.sensors, config.supply, config.control_period_s, states)
+    return ride_of_model(model, plan, electronics, clock, sharper * config.tolerance, case.name, ends, take)
 
 
 def ride_of_model(
     model: RideModel,
     plan: Predictor | None,
+    electronics: Electronics | None,
     clock: Clock,
     tolerance: float,
     name: str,
@@ -231,12 +235,17 @@ def ride_of_model(
     tally = np.zeros(TALLIES)
     before = stored_energy(0.0, y, model, acts, scratch)
     stages, end = np.zeros((STAGES + 1, y.size)), np.zeros(y.size)
+    rng = np.random.default_rng(0 if electronics is None else electronics.seed)
     for first in range(0, count, len(course)):
         last = min(first + len(course), count)
+        if electronics is not None:
+            acts_due = -(-last // clock.per_control) - -(-first // clock.per_control)
+            electronics = with_noise(electronics, rng, acts_due)
         ride(
             y,
             model,
             plan,
+            electronics,
             acts,
             scratch,
             first,

@@ -35,7 +35,8 @@ from pzd.quantities import Control
 from pzd.record import conditions
 from pzd.report.config import ReportConfig
 from pzd.report.plots import characteristic, library
-from pzd.simulate.config import CarBlock, SimulateConfig
+from pzd.simulate.car_block import CarBlock
+from pzd.simulate.config import SimulateConfig
 
 HERE = Path(__file__).parent
 ORDER = ["tested", "characteristics", "model", "missing", "damper", "passenger", "trust", "made"]

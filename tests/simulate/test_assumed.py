@@ -14,14 +14,17 @@ def lines(given: dict[str, object], effects: tuple[str, ...] = (), with_voltage:
 
 def test_without_a_word_in_the_config_car_valve_and_bounds_are_assumed() -> None:
     said = lines({}).split("\n")
-    assert len(said) == 3
+    assert len(said) == 5
     assert said[0] == "the car is makowski2021: 1200 kg on springs of 47.5 and 47.5 kN/m (simulate.car)"
     assert "3.9 ms" in said[1]
     assert "the damper's own table (simulate.bounds)" in said[2]
+    assert "see the ride exactly and at once (simulate.sensors)" in said[3]
+    assert "set exactly and at once (simulate.supply)" in said[4]
 
 
 def test_what_the_config_says_is_not_assumed_though_it_is_the_default() -> None:
     said = {"car": {"model": "makowski2021"}, "valve_response_s": 0.0039, "bounds": "table"}
+    said |= {"sensors": None, "supply": None}
     assert lines(said) == ""
     assert lines({**said, "bounds": None, "c_min_Ns_per_m": 750, "c_max_Ns_per_m": 45000}) == ""
 
@@ -40,4 +43,6 @@ def test_nothing_is_said_of_what_no_ride_needs() -> None:
     assert "bounds" not in lines({"fidelities": ["dynamic"]})
     assert "bounds" not in lines({"policies": ["constant", "passive"]})
     assert lines({}, with_voltage=False).startswith("the car is makowski2021")
+    assert "simulate.sensors" not in lines({"fidelities": ["ideal"]})
+    assert "simulate.supply" not in lines({"policies": ["constant", "passive"]})
     assert "\n" not in lines({}, with_voltage=False)

@@ -18,10 +18,10 @@ from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
 from pzd.signals.root_mean_square import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
+from pzd.simulate.controller import set_control
 from pzd.simulate.dampers import dynamic_damper_of, grid_of
 from pzd.simulate.dormand_prince import STAGES
 from pzd.simulate.equations import motion
-from pzd.simulate.loop import set_control
 from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
 from pzd.simulate.prediction.choice import NOW, choose
@@ -87,7 +87,7 @@ def ahead(model: RideModel, y, acts, room, start: float, seconds: float) -> np.n
     """Bring a ride forward by the integrator of the loop, its voltage set once at the start; the largest motion."""
     peak = np.abs(y)
     scratch, stages, end = np.zeros_like(y), np.zeros((STAGES + 1, y.size)), np.zeros_like(y)
-    set_control(start, y, model, None, acts, room, scratch)
+    set_control(start, y, model, None, None, acts, room, scratch)
     for n in range(round(seconds / STEP)):
         advance(start + n * STEP, STEP, y, model, acts, room, 1e-9, STEP, stages, end)
         peak = np.maximum(peak, np.abs(y))
@@ -118,7 +118,7 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
     y = at_rest(before.car)
     peak = ahead(before, y, acts, room, 0.0, 1.5)
     predicting, plan = model_of(damper, "comfort_predictive", 75.0, **given)
-    choose(1.5, y, predicting, plan, acts, room)
+    choose(1.5, 0.0, y, predicting, plan, acts, room)
     state, levels = np.array(plan.states[NOW]), plan.hold_levels
     predicted(predicting.car, plan, state, levels[0, candidate], levels[1, candidate], plan.hold_heights[0], HELD, 1e9)
     after, _ = model_of(damper, "passive", float(plan.candidates[candidate]), **given)

@@ -1,13 +1,14 @@
 """What `comfort_predictive` gains over the best fixed voltage, and what it costs in wheel load and time.
 
-    PYTHONPATH=. python tests/studies/predictive_study.py [--runs DIR] [--duration S] [CONFIG ...]
+    PYTHONPATH=. python tests/studies/predictive_study.py [--runs DIR] [--duration S] [--electronics] [CONFIG ...]
 
 By default on the dampers of configs/quickstart.yaml and configs/utfsm.yaml, which are identified first where they are
 not. Each rides six roads at fidelity `dynamic`, at the best fixed voltage of that road, then by `comfort_predictive`
 with its default parameters, the road known and unknown. Rides last `--duration` seconds, 16 by default, and are judged
 over their second half; over the bump until the motion has died away. A line a road: a_w at the best fixed voltage, and
 with both; r.m.s. load of the wheel whose load is larger, in relation to the same at the best fixed voltage; time of the
-processor for a ms of ride at a fixed voltage and with both. Last, how many roads meet what the policy is meant to do.
+processor for a ms of ride at a fixed voltage and with both. With `--electronics` the policy sees by sensors and sets
+its voltage by a supply, as `ELECTRONICS` says. Last, how many roads meet what the policy is meant to do.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -42,6 +44,24 @@ ROADS = (
     {"kind": "iso8608", "road_class": "C", "seed": 2, "label": "iso8608-C-2"},
     {"kind": "bump"},
 )
+ELECTRONICS = {
+    "sensors": {
+        "period_s": 0.002,
+        "delay_s": 0.002,
+        "noise": {
+            "deflection_m": 1e-4,
+            "deflection_rate_m_per_s": 5e-3,
+            "heave_m": 1e-4,
+            "pitch_rad": 1e-4,
+            "heave_rate_m_per_s": 5e-3,
+            "pitch_rate_rad_per_s": 2e-3,
+            "acceleration_m_per_s2": 0.05,
+        },
+    },
+    "supply": {"slew_per_s": 3e4},
+}
+"""What a production car carries, in round numbers: a bus of 500 Hz with one message of delay, potentiometers of a tenth
+of a millimetre, accelerometers of 50 mm/s2 and what a controller integrates from them; 150 V in 5 ms."""
 MORE_LOAD = 1.10
 """What the larger load may be, in relation to that at the best fixed voltage."""
 TARGET_US = 150.0
@@ -58,12 +78,14 @@ class Measured:
     us_per_ms: float
 
 
-def setup_of(path: Path, runs: Path, duration: float = 16.0, **given: object) -> Setup:
-    """The damper of a config, identified and diagnosed, in the car; length of a ride [s], parameters of the policy."""
+def setup_of(
+    path: Path, runs: Path, duration: float = 16.0, electronics: Mapping[str, object] | None = None, **given: object
+) -> Setup:
+    """The damper of a config in the car; length of a ride [s], blocks of the ride, parameters of the policy."""
     run = opened(path, runs)
     execute(run, "table", force=False, jobs=2, say=lambda line: sys.stderr.write(f"{path.stem}: {line}\n"))
     lasting = {"duration_s": duration, "settle_s": 0.5 * duration}
-    block = {"roads": ROADS, "fidelities": ["dynamic"], **lasting, "comfort_predictive": given}
+    block = {"roads": ROADS, "fidelities": ["dynamic"], **lasting, "comfort_predictive": given, **(electronics or {})}
     config = SimulateConfig.model_validate_json(json.dumps(block))
     diagnosed, table = run.run.read(Diagnosed), run.run.read(Table)
     temperature = checked_temperature(config, table)
@@ -109,9 +131,9 @@ def ridden(setup: Setup, road: Road, policy: str, window: Window | None = None) 
     return measured(setup, road, outcome, window, seconds), window, held.voltage
 
 
-def study(path: Path, runs: Path, duration: float) -> None:
+def study(path: Path, runs: Path, duration: float, electronics: Mapping[str, object]) -> None:
     """Ride all roads on the damper of a config, and print."""
-    sides = {known: setup_of(path, runs, duration, road=known) for known in ("known", "unknown")}
+    sides = {known: setup_of(path, runs, duration, electronics, road=known) for known in ("known", "unknown")}
     better: dict[str, list[float]] = {known: [] for known in sides}
     loads: dict[str, list[float]] = {known: [] for known in sides}
     slowest = dict.fromkeys(sides, 0.0)
@@ -143,6 +165,7 @@ def main() -> None:
     options = argparse.ArgumentParser()
     options.add_argument("--runs", type=Path, default=Path("runs"))
     options.add_argument("--duration", type=float, default=16.0)
+    options.add_argument("--electronics", action="store_true")
     options.add_argument("configs", type=Path, nargs="*")
     given = options.parse_args()
     sys.stdout.write(
@@ -150,7 +173,7 @@ def main() -> None:
         "   us a ms\n"
     )
     for path in given.configs or CONFIGS:
-        study(Path(path), given.runs, given.duration)
+        study(Path(path), given.runs, given.duration, ELECTRONICS if given.electronics else {})
 
 
 if __name__ == "__main__":

@@ -12,8 +12,8 @@ that was met. So one weight serves roads of any height, and loads that leave tho
 than comfort brings.
 
 The plant has the state of the oil, the lag of the valve, the adopted effects and the wheels
-(`pzd.simulate.prediction.plant`). Body, wheels, oil, acceleration and the road under each axle are sensed exactly. The
-road ahead is known, or forecast from what has passed under the front axle (`pzd.simulate.prediction.road_ahead`); the
+(`pzd.simulate.prediction.plant`). Body, wheels, oil, acceleration and the road under each axle are sensed exactly, or
+as `simulate.sensors` gives them. The road ahead is known, or forecast from what has passed under the front axle (`pzd.simulate.prediction.road_ahead`); the
 rear axle meets it (a1 + a2) / speed later. What the forecasts missed of late may come again: the ride is tried with it
 added and subtracted, and a choice must beat the best voltage held on by `margin`, times the share of the road's motion
 that was not foreseen.

@@ -35,21 +35,25 @@ from pzd.simulate.ride_model import (
     WHEEL_1,
     RideModel,
 )
+from pzd.simulate.sensing import Electronics, copy_into
 
 NOW, END, HOLDING = range(3)
 """Rows of `Predictor.states`."""
 
 
 @compiled
-def observe(time: float, model: RideModel, plan: Predictor, workspace: Array) -> bool:
+def observe(
+    sampled: float, model: RideModel, plan: Predictor, electronics: Electronics | None, workspace: Array
+) -> bool:
     """Take note of acceleration and road once a control period; whether it is time to choose.
 
     Parameters
     ----------
-    time : [s]
+    sampled : when what the controller sees was [s]
     model : the ride
     plan : its memory is changed
-    workspace : as `motion` left it
+    electronics : see `set_control`; its noise is in the height of the road under the axles
+    workspace : as `motion` left it, or as the sensors gave it
     """
     number = int(plan.felt[OBSERVATIONS])
     felt = workspace[COMFORT, 0]
@@ -58,7 +62,9 @@ def observe(time: float, model: RideModel, plan: Predictor, workspace: Array) ->
     for i in range(2):
         load, road = workspace[CONTACT, i], model.road_coefficients
         plan.met[i, 0] = plan.met[i, 1]
-        plan.met[i, 1], _, _ = road_at(road, model.car.speed * time - road.behind[i])
+        plan.met[i, 1], _, _ = road_at(road, model.car.speed * sampled - road.behind[i])
+        if electronics is not None:
+            plan.met[i, 1] += electronics.height_off[i]
         plan.felt[MEAN_LOAD_1 + i] += (1.0 - plan.forgotten) * (load * load - plan.felt[MEAN_LOAD_1 + i])
     plan.felt[OBSERVATIONS] = number + 1
     rise = plan.met[0, 1] - plan.met[0, 0] - plan.observation_s * plan.speeds[EXPECTED]
@@ -70,14 +76,25 @@ def observe(time: float, model: RideModel, plan: Predictor, workspace: Array) ->
 
 
 @compiled
-def predict(time: float, y: Array, model: RideModel, plan: Predictor, control: Array, workspace: Array) -> None:
+def predict(
+    time: float,
+    age: float,
+    y: Array,
+    model: RideModel,
+    plan: Predictor,
+    electronics: Electronics | None,
+    control: Array,
+    workspace: Array,
+) -> None:
     """Observe, and choose anew where it is time; see `choose`."""
-    if observe(time, model, plan, workspace):
-        choose(time, y, model, plan, control, workspace)
+    if observe(time - age, model, plan, electronics, workspace):
+        choose(time, age, y, model, plan, control, workspace)
 
 
 @compiled
-def choose(time: float, y: Array, model: RideModel, plan: Predictor, control: Array, workspace: Array) -> None:
+def choose(
+    time: float, age: float, y: Array, model: RideModel, plan: Predictor, control: Array, workspace: Array
+) -> None:
     """Choose the voltages with which the ride ahead costs least; they are left in `Predictor.chosen`.
 
     Equation: (U_1, U_2) = Arg min over U, W in finite sets of J(U for the hold, then W), J of `predicted`
@@ -86,12 +103,13 @@ def choose(time: float, y: Array, model: RideModel, plan: Predictor, control: Ar
     Parameters
     ----------
     time : [s]
+    age : of state and workspace, by which they lie behind the voltages that are set [s]
     y : (n,) state
     model : the ride
     plan : its rooms are filled
     control, workspace : what the controller last set, and the workspace as `motion` left it, see `ride_model`
     """
-    _look_ahead(time, model, plan)
+    _look_ahead(time - age, model, plan)
     weigh_loads(plan)
     _fill_levels(time, model.damper, plan, control)
     _fill_now(y, model, plan, workspace)
@@ -163,7 +181,7 @@ def _held_cost(model: RideModel, plan: Predictor, i: int, j: int, most: float) -
     cost = 0.0
     for course in range(plan.courses):
         state, levels = plan.states[HOLDING + course], plan.hold_levels
-        _copy(plan.states[NOW], state)
+        copy_into(plan.states[NOW], state)
         heights = plan.hold_heights[course]
         cost += predicted(
             model.car,
@@ -184,7 +202,7 @@ def _tail_cost(model: RideModel, plan: Predictor, a: int, b: int, cost: float, m
     for course in range(plan.courses):
         if cost < most:
             state, levels = plan.states[END], plan.tail_levels
-            _copy(plan.states[HOLDING + course], state)
+            copy_into(plan.states[HOLDING + course], state)
             heights = plan.tail_heights[course]
             cost += predicted(
                 model.car,
@@ -199,24 +217,18 @@ def _tail_cost(model: RideModel, plan: Predictor, a: int, b: int, cost: float, m
     return cost
 
 
-@inlined
-def _copy(origin: Array, target: Array) -> None:
-    for n in range(origin.size):
-        target[n] = origin[n]
-
-
 @compiled
 def _fill_levels(time: float, damper: DynamicDamper, plan: Predictor, control: Array) -> None:
     """Fill the levels of the effective voltage under every candidate, and under every tail behind it."""
     hold = plan.hold_steps * plan.steps[HELD]
     for axle in range(2):
         now, behind = plan.kept[0, axle], plan.kept[1, axle]
-        _copy(control[BEHIND:, axle], now)
+        copy_into(control[BEHIND:, axle], now)
         keep_voltage(control[SET, axle], time - control[SINCE, 0], now, damper.drive)
         for i in range(plan.candidates.size):
             _follow(plan, damper, plan.candidates[i], plan.steps[HELD], now, plan.hold_levels[axle, i])
             for j in range(plan.tails.size):
-                _copy(now, behind)
+                copy_into(now, behind)
                 keep_voltage(plan.candidates[i], hold, behind, damper.drive)
                 levels = plan.tail_levels[axle, i * plan.tails.size + j]
                 _follow(plan, damper, plan.tails[j], plan.steps[TAIL], behind, levels)

@@ -1,0 +1,204 @@
+"""The controller's view of a ride, late, sampled and noisy, and the voltage that its supply makes of what it asks."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pzd.compiled import compiled, inlined
+from pzd.record import Array
+from pzd.simulate.electronics import Noise, Sensors, Supply
+from pzd.simulate.ride_model import (
+    BODY,
+    COMFORT,
+    DEFLECTION,
+    HEAVE,
+    HEAVE_RATE,
+    PITCH,
+    PITCH_RATE,
+    RATE,
+    SENSED,
+    WORKSPACE_ROWS,
+    Vehicle,
+)
+
+CHANNELS = SENSED + 1
+"""Those of a feedback policy, then the acceleration of the body."""
+ACTS, NEXT_NOISE = range(2)
+
+
+class Electronics(NamedTuple):
+    """Sensors and supply as numbers, and what the sensors remember."""
+
+    period: float
+    """Of the controller [s]."""
+    every: int
+    """Control periods from one sample to the next."""
+    delay: int
+    """Control periods."""
+    deviations: Array
+    """(CHANNELS,) standard deviations of the noise."""
+    seed: int
+    """Of the noise."""
+    noise: Array
+    """(n, CHANNELS) numbers of unit variance, a row for each act of the controller to come; see `with_noise`."""
+    counts: Array
+    """(2,) acts so far, and the next row of the noise."""
+    states: Array
+    """(m, n) samples of the state, the latest m in a ring; then those of workspace and height of the road."""
+    workspaces: Array
+    heights_off: Array
+    """(m, 2) error of the height of the road under each axle, body less suspension [m]."""
+    state: Array
+    """(n,) what the controller sees; then of workspace and height of the road."""
+    workspace: Array
+    height_off: Array
+    step: float
+    """Distance of the values that can be set; 0 where every value can [V]."""
+    most_change: float
+    """Of the voltage in a control period [V]."""
+    most_energy: float
+    """Of U^2 in a control period [V2]."""
+
+
+def electronics_of(sensors: Sensors | None, supply: Supply | None, period: float, states: int) -> Electronics | None:
+    """Sensors and supply as numbers; None where both are perfect.
+
+    Parameters
+    ----------
+    sensors, supply : the config's blocks
+    period : of the controller [s]
+    states : length of the state
+    """
+    if sensors is None and supply is None:
+        return None
+    seen, given = sensors or Sensors(), supply or Supply()
+    every, delay = round((seen.period_s or period) / period), round(seen.delay_s / period)
+    slots = -(-delay // every) + 1
+    energy = math.inf
+    if given.power_W is not None and given.capacitance_F is not None:
+        energy = 2.0 * given.power_W / given.capacitance_F * period
+    return Electronics(
+        period,
+        every,
+        delay,
+        _deviations(seen.noise),
+        seen.seed,
+        np.zeros((0, CHANNELS)),
+        np.zeros(2),
+        np.zeros((slots, states)),
+        np.zeros((slots, WORKSPACE_ROWS, 2)),
+        np.zeros((slots, 2)),
+        np.zeros(states),
+        np.zeros((WORKSPACE_ROWS, 2)),
+        np.zeros(2),
+        given.step or 0.0,
+        math.inf if given.slew_per_s is None else given.slew_per_s * period,
+        energy,
+    )
+
+
+def _deviations(noise: Noise) -> Array:
+    """By channel: deflection 1, 2, its rate 1, 2, z, phi, dz, dphi, acceleration."""
+    return np.array(
+        [
+            noise.deflection_m,
+            noise.deflection_m,
+            noise.deflection_rate_m_per_s,
+            noise.deflection_rate_m_per_s,
+            noise.heave_m,
+            noise.pitch_rad,
+            noise.heave_rate_m_per_s,
+            noise.pitch_rate_rad_per_s,
+            noise.acceleration_m_per_s2,
+        ]
+    )
+
+
+def with_noise(electronics: Electronics, rng: np.random.Generator, acts: int) -> Electronics:
+    """With the noise of so many acts to come; the same numbers come whatever number of them is drawn at a time."""
+    electronics.counts[NEXT_NOISE] = 0.0
+    return electronics._replace(noise=rng.standard_normal((acts, CHANNELS)))
+
+
+@inlined
+def copy_into(origin: Array, target: Array) -> None:
+    """Copy (n,) numbers; a slice would need memory of its own."""
+    for n in range(origin.size):
+        target[n] = origin[n]
+
+
+@compiled
+def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) -> float:
+    """Take a sample where it is time, and fill what the controller sees; how old that is [s].
+
+    Parameters
+    ----------
+    y : (n,) state
+    car : the half-car
+    workspace : as `motion` left it, see `ride_model`
+    electronics : `state`, `workspace` and `height_off` are filled
+    """
+    number, every = int(electronics.counts[ACTS]), electronics.every
+    slots = electronics.states.shape[0]
+    if number % every == 0:
+        _sample(y, car, workspace, electronics, (number // every) % slots)
+    sample = max(number - electronics.delay, 0) // every
+    copy_into(electronics.states[sample % slots], electronics.state)
+    copy_into(electronics.heights_off[sample % slots], electronics.height_off)
+    for row in range(WORKSPACE_ROWS):
+        copy_into(electronics.workspaces[sample % slots, row], electronics.workspace[row])
+    electronics.counts[ACTS] += 1.0
+    electronics.counts[NEXT_NOISE] += 1.0
+    return (number - sample * every) * electronics.period
+
+
+@compiled
+def _sample(y: Array, car: Vehicle, workspace: Array, electronics: Electronics, slot: int) -> None:
+    """Fill one sample, its noise with it."""
+    noise, deviations = electronics.noise[int(electronics.counts[NEXT_NOISE])], electronics.deviations
+    seen, room = electronics.states[slot], electronics.workspaces[slot]
+    copy_into(y, seen)
+    for row in range(WORKSPACE_ROWS):
+        copy_into(workspace[row], room[row])
+    seen[HEAVE] += deviations[4] * noise[4]
+    seen[PITCH] += deviations[5] * noise[5]
+    seen[HEAVE_RATE] += deviations[6] * noise[6]
+    seen[PITCH_RATE] += deviations[7] * noise[7]
+    room[BODY, 0] += deviations[8] * noise[8]
+    room[COMFORT, 0] += deviations[8] * noise[8]
+    for i in range(2):
+        room[DEFLECTION, i] += deviations[i] * noise[i]
+        room[RATE, i] += deviations[2 + i] * noise[2 + i]
+        above = deviations[4] * noise[4] + car.arms[i] * deviations[5] * noise[5]
+        electronics.heights_off[slot, i] = above - deviations[i] * noise[i]
+
+
+@compiled
+def supplied(asked: float, was: float, low: float, high: float, electronics: Electronics) -> float:
+    """The voltage that the supply sets [V].
+
+    Equation: abs(U - U_0) <= slew h; abs(U abs(U) - U_0 abs(U_0)) <= 2 P h / C, which is the energy C U^2 / 2 that a
+    power P moves in a control period h; then the nearest of the values that can be set
+
+    Parameters
+    ----------
+    asked, was : what the controller asks for, and what is set [V]
+    low, high : of the table [V]
+    electronics : the supply
+    """
+    voltage = min(max(asked, was - electronics.most_change), was + electronics.most_change)
+    energy = was * abs(was)
+    most, least = energy + electronics.most_energy, energy - electronics.most_energy
+    voltage = min(max(voltage, _root(least)), _root(most))
+    if electronics.step > 0.0:
+        voltage = electronics.step * round(voltage / electronics.step)
+    return min(max(voltage, low), high)
+
+
+@compiled
+def _root(energy: float) -> float:
+    """U of U abs(U)."""
+    return math.copysign(math.sqrt(abs(energy)), energy)
