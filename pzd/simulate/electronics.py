@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from pzd.schema.model import Frozen
 
 
-class Noise(Frozen):
+class SensorNoise(Frozen):
     """White noise of the sensors, by its standard deviation in a sample."""
 
     deflection_m: float = Field(default=0.0, ge=0.0)
@@ -33,7 +33,7 @@ class Sensors(Frozen):
     """A sample is taken this often, and held until the next. By default in every control period."""
     delay_s: float = Field(default=0.0, ge=0.0)
     """The controller acts on what was this long ago."""
-    noise: Noise = Noise()
+    noise: SensorNoise = SensorNoise()
     """White noise of every sample."""
     seed: int = Field(default=1, ge=0)
     """Of the noise; every policy meets the same."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
-from pzd.simulate.electronics import Noise, Sensors, Supply
+from pzd.simulate.electronics import SensorNoise, Sensors, Supply
 from pzd.simulate.ride_model import (
     BODY,
     COMFORT,
@@ -100,7 +100,7 @@ def electronics_of(sensors: Sensors | None, supply: Supply | None, period: float
     )
 
 
-def _deviations(noise: Noise) -> Array:
+def _deviations(noise: SensorNoise) -> Array:
     """By channel: deflection 1, 2, its rate 1, 2, z, phi, dz, dphi, acceleration."""
     return np.array(
         [

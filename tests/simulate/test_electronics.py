@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from pzd.simulate.car_block import CarBlock
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.electronics import Noise, Sensors, Supply
+from pzd.simulate.electronics import SensorNoise, Sensors, Supply
 from pzd.simulate.ride_model import BODY, COMFORT, DEFLECTION, HEAVE, PITCH, RATE, at_rest, vehicle, workspace
 from pzd.simulate.sensing import Electronics, electronics_of, sense, supplied, with_noise
 
@@ -61,7 +61,7 @@ def test_the_controller_sees_the_last_sample_that_is_old_enough(rng, every, dela
 
 def test_noise_has_the_deviation_of_each_sensor_and_is_white(rng) -> None:
     acts = 20_000
-    known = electronics(rng, acts, Sensors(noise=Noise(**NOISE)), None)
+    known = electronics(rng, acts, Sensors(noise=SensorNoise(**NOISE)), None)
     y, room, rows = at_rest(CAR), workspace(), []
     for _ in range(acts):
         sense(y, CAR, room, known)
@@ -79,11 +79,11 @@ def test_noise_has_the_deviation_of_each_sensor_and_is_white(rng) -> None:
     assert np.max(np.abs(apart)) < 5.0 / math.sqrt(acts)
 
 
-def test_the_noise_is_the_same_in_pieces_as_at_once(rng) -> None:
-    made = electronics_of(Sensors(noise=Noise(heave_m=1.0)), None, PERIOD, 10)
+def test_the_noise_is_the_same_in_pieces_as_at_once(generator_for) -> None:
+    made = electronics_of(Sensors(noise=SensorNoise(heave_m=1.0)), None, PERIOD, 10)
     assert made is not None
-    whole = with_noise(made, np.random.default_rng(made.seed), 30).noise
-    drawing = np.random.default_rng(made.seed)
+    whole = with_noise(made, generator_for("noise"), 30).noise
+    drawing = generator_for("noise")
     pieces = [with_noise(made, drawing, acts).noise for acts in (7, 1, 22)]
     assert np.array_equal(np.vstack(pieces), whole)
 
