@@ -89,9 +89,9 @@ class SimulateConfig(Frozen):
     """Temperature of the dampers during the ride, within those of the table; by default its lowest."""
     control_period_s: float = Field(default=0.001, gt=0.0)
     """The voltage is set this often; `ideal` acts at every instant."""
-    sensors: Sensors | None = None
+    sensors: Sensors = Sensors()
     """What the controller sees at the fidelities `table` and `dynamic`; by default all, exactly and at once."""
-    supply: Supply | None = None
+    supply: Supply = Supply()
     """What becomes of the voltage that it asks for there; by default it is set exactly and at once."""
     valve_response_s: float = Field(default=0.0039, ge=0.0)
     """Time constant of the valve in `dynamic` where the damper has no `valve_lag` of its own: 0.0039 s
@@ -144,13 +144,15 @@ class SimulateConfig(Frozen):
         return self
 
     def _electronics_consistent(self) -> None:
-        given = [name for name in ("sensors", "supply") if getattr(self, name) is not None]
+        given = [
+            name for name, perfect in (("sensors", Sensors()), ("supply", Supply())) if getattr(self, name) != perfect
+        ]
         if given and set(self.fidelities) == {"ideal"}:
             raise ValueError(
                 f"{given[0]}: ideal forces need neither sensors nor a supply; ride table or dynamic as well"
             )
-        sensors = self.sensors or Sensors()
-        for name, time in (("period_s", sensors.period_s or self.control_period_s), ("delay_s", sensors.delay_s)):
+        sampled = self.sensors.period_s or self.control_period_s
+        for name, time in (("period_s", sampled), ("delay_s", self.sensors.delay_s)):
             periods = time / self.control_period_s
             if abs(periods - round(periods)) > 1e-6 * max(periods, 1.0):
                 raise ValueError(f"sensors.{name} must be a whole number of control_period_s (got {periods:g} periods)")

@@ -27,7 +27,7 @@ class SensorNoise(Frozen):
 
 
 class Sensors(Frozen):
-    """What the controller sees of the ride. Without this block it sees all exactly and at once."""
+    """What the controller sees of the ride: without a word all, exactly and at once."""
 
     period_s: float | None = Field(default=None, gt=0.0)
     """A sample is taken this often, and held until the next. By default in every control period."""
@@ -40,7 +40,7 @@ class Sensors(Frozen):
 
 
 class Supply(Frozen):
-    """What becomes of the voltage that the controller asks for. Without this block it is set exactly and at once."""
+    """What becomes of the voltage that the controller asks for: without a word it is set, exactly and at once."""
 
     step: float | None = Field(default=None, gt=0.0)
     """Distance of the values that can be set, in the unit of the control signal."""

@@ -63,7 +63,7 @@ class Electronics(NamedTuple):
     """Of U^2 in a control period [V2]."""
 
 
-def electronics_of(sensors: Sensors | None, supply: Supply | None, period: float, states: int) -> Electronics | None:
+def electronics_of(sensors: Sensors, supply: Supply, period: float, states: int) -> Electronics | None:
     """Sensors and supply as numbers; None where both are perfect.
 
     Parameters
@@ -72,20 +72,19 @@ def electronics_of(sensors: Sensors | None, supply: Supply | None, period: float
     period : of the controller [s]
     states : length of the state
     """
-    if sensors is None and supply is None:
+    if sensors == Sensors() and supply == Supply():
         return None
-    seen, given = sensors or Sensors(), supply or Supply()
-    every, delay = round((seen.period_s or period) / period), round(seen.delay_s / period)
+    every, delay = round((sensors.period_s or period) / period), round(sensors.delay_s / period)
     slots = -(-delay // every) + 1
     energy = math.inf
-    if given.power_W is not None and given.capacitance_F is not None:
-        energy = 2.0 * given.power_W / given.capacitance_F * period
+    if supply.power_W is not None and supply.capacitance_F is not None:
+        energy = 2.0 * supply.power_W / supply.capacitance_F * period
     return Electronics(
         period,
         every,
         delay,
-        _deviations(seen.noise),
-        seen.seed,
+        _deviations(sensors.noise),
+        sensors.seed,
         np.zeros((0, CHANNELS)),
         np.zeros(2),
         np.zeros((slots, states)),
@@ -94,8 +93,8 @@ def electronics_of(sensors: Sensors | None, supply: Supply | None, period: float
         np.zeros(states),
         np.zeros((WORKSPACE_ROWS, 2)),
         np.zeros(2),
-        given.step or 0.0,
-        math.inf if given.slew_per_s is None else given.slew_per_s * period,
+        supply.step or 0.0,
+        math.inf if supply.slew_per_s is None else supply.slew_per_s * period,
         energy,
     )
 

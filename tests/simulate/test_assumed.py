@@ -24,7 +24,7 @@ def test_without_a_word_in_the_config_car_valve_and_bounds_are_assumed() -> None
 
 def test_what_the_config_says_is_not_assumed_though_it_is_the_default() -> None:
     said = {"car": {"model": "makowski2021"}, "valve_response_s": 0.0039, "bounds": "table"}
-    said |= {"sensors": None, "supply": None}
+    said |= {"sensors": {}, "supply": {}}
     assert lines(said) == ""
     assert lines({**said, "bounds": None, "c_min_Ns_per_m": 750, "c_max_Ns_per_m": 45000}) == ""
 
