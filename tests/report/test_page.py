@@ -37,6 +37,7 @@ from pzd.report.config import ReportConfig
 from pzd.report.plots import characteristic, library
 from pzd.simulate.car_block import CarBlock
 from pzd.simulate.config import SimulateConfig
+from pzd.simulate.electronics import SensorNoise, Sensors, Supply
 
 HERE = Path(__file__).parent
 ORDER = ["tested", "characteristics", "model", "missing", "damper", "passenger", "trust", "made"]
@@ -503,6 +504,20 @@ def test_an_untrusted_ride_is_marked(words_only: None, run: Any) -> None:
     read = Reader(replace(run, rides=replace(run.rides, summary=summary)).told().page)
     assert "not to be trusted as they stand" in read.text
     assert "energy error 1.0e-03" in read.text
+
+
+def test_sensors_and_supply_are_told_where_the_config_has_them_and_assumed_perfect_where_not(
+    words_only: None, run: Any
+) -> None:
+    sensors = Sensors(delay_s=0.003, noise=SensorNoise(deflection_m=1e-4, pitch_rate_rad_per_s=2e-3))
+    given = SimulateConfig(sensors=sensors, supply=Supply(step=0.5, power_W=17.0, capacitance_F=1e-5))
+    told = Reader(replace(run, simulate=given).told().page).text
+    assert "a sample every 1 ms, 3 ms late with noise of deflection 0.1 mm and pitch rate 2 mrad/s r.m.s." in told
+    assert "sets values 0.5 V apart and charges 10 uF with 17 W" in told
+    assert "simulate.sensors" not in told
+    without = Reader(run.told().page).text
+    assert "controllers see the ride exactly and at once (simulate.sensors)" in without
+    assert "a sample every" not in without
 
 
 @pytest.mark.ci
