@@ -27,6 +27,7 @@ from pzd.simulate.ride_model import (
 CHANNELS = SENSED + 1
 """Those of a feedback policy, then the acceleration of the body."""
 ACTS, NEXT_NOISE = range(2)
+"""Of `Electronics.counts`."""
 
 
 class Electronics(NamedTuple):
@@ -47,12 +48,13 @@ class Electronics(NamedTuple):
     counts: Array
     """(2,) acts so far, and the next row of the noise."""
     states: Array
-    """(m, n) samples of the state, the latest m in a ring; then those of workspace and height of the road."""
+    """(m, n) samples of the state, the latest m in a ring."""
     workspaces: Array
+    """(m, WORKSPACE_ROWS, 2) those of the workspace, see `ride_model`."""
     heights_off: Array
     """(m, 2) error of the height of the road under each axle, body less suspension [m]."""
     state: Array
-    """(n,) what the controller sees; then of workspace and height of the road."""
+    """(n,) the sample that the controller sees, and so the two that follow."""
     workspace: Array
     height_off: Array
     step: float
