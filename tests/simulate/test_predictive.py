@@ -1,4 +1,7 @@
-"""`comfort_predictive`: its plant against ours, what it knows of the road, and what it may do."""
+"""`comfort_predictive`: its plant against ours, what it knows of the road, and what it may do.
+
+Its rides stand behind `make ci`: they take a minute to compile.
+"""
 
 from __future__ import annotations
 
@@ -167,6 +170,7 @@ def test_the_modes_of_the_weighting_are_the_weighting() -> None:
     assert np.max(np.abs(summed - response(WK, frequency))) < 1e-12
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("road", ["known", "unknown"])
 @pytest.mark.parametrize("kind", [0, 1])
 def test_it_sets_voltages_of_the_table_once_a_hold_and_the_energies_balance(ride, road, kind) -> None:
@@ -184,6 +188,7 @@ def test_it_sets_voltages_of_the_table_once_a_hold_and_the_energies_balance(ride
         assert np.all(changed % 10 == 0)
 
 
+@pytest.mark.ci
 def test_on_a_known_sine_it_beats_both_ends_of_the_voltage_without_more_load(ride) -> None:
     """4.5 Hz, where the softest voltage is the best of those held."""
     given = {**SHORT, "roads": [{"kind": "sine", "frequency_Hz": 4.5}], "comfort_predictive": {"road": "known"}}
@@ -213,6 +218,7 @@ def test_on_wheels_with_mass_it_beats_every_held_voltage_on_a_sine_and_a_random_
         assert found[5][1] < 1.1 * best[1]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("car", [{}, WHEELS_ON_TYRES], ids=["wheels follow the road", "wheels with mass"])
 def test_a_road_is_never_seen_before_it_is_met_where_it_is_unknown(ride, tmp_path, car) -> None:
     """A bump or a hole behind another bump: the voltages are the same until axle 1 meets it; not where it is known."""
@@ -241,6 +247,7 @@ def test_a_road_is_never_seen_before_it_is_met_where_it_is_unknown(ride, tmp_pat
         assert np.array_equal(*voltages) == alike
 
 
+@pytest.mark.ci
 def test_a_sine_is_forecast_from_what_has_passed(ride) -> None:
     """Unknown or known, a road that repeats is ridden alike: a_w within 3 %."""
     road = [{"kind": "sine", "frequency_Hz": 4.5}]
@@ -251,6 +258,7 @@ def test_a_sine_is_forecast_from_what_has_passed(ride) -> None:
     assert found[1] == pytest.approx(found[0], rel=0.03)
 
 
+@pytest.mark.ci
 def test_the_same_bytes_for_any_number_of_jobs(damper, tmp_path) -> None:
     roads = [{"kind": "sine", "frequency_Hz": f} for f in (2.25, 4.5)]
     given = settings(roads=roads, duration_s=1.0, settle_s=0.2)
