@@ -110,7 +110,7 @@ def kernels_compiled_once(request: pytest.FixtureRequest) -> Generator[None, Non
     from filelock import FileLock
 
     from pzd.compiled import cache_folder
-    from pzd.simulate.precompile import mark
+    from pzd.simulate.compiled_ahead import mark
 
     with FileLock(cache_folder() / "tests.lock"):
         respond_once()

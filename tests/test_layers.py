@@ -93,6 +93,40 @@ def test_imports_point_down_only() -> None:
     assert [fault for module in MODULES for fault in faults(module, PACKAGE)] == []
 
 
+def rounds(package: Path) -> list[str]:
+    """Modules that import each other, directly or through others, one line for each round that is found."""
+    modules = {dotted(path, package): path for path in sorted(package.rglob("*.py")) if path.name != "__init__.py"}
+    uses: dict[str, list[str]] = {}
+    for own, path in modules.items():
+        names = (name for _, name in imported(ast.parse(path.read_text(encoding="utf-8")), own, is_package=False))
+        found = {name if name in modules else name.rpartition(".")[0] for name in names}
+        uses[own] = sorted((found & set(modules)) - {own})
+    done: set[str] = set()
+
+    def from_here(own: str, way: tuple[str, ...]) -> Iterator[str]:
+        if own in way:
+            yield " -> ".join((*way[way.index(own) :], own))
+        elif own not in done:
+            for used in uses[own]:
+                yield from from_here(used, (*way, own))
+            done.add(own)
+
+    return [line for own in uses for line in from_here(own, ())]
+
+
+def test_no_modules_import_each_other() -> None:
+    assert rounds(PACKAGE) == []
+
+
+def test_a_round_of_imports_is_found(tmp_path: Path) -> None:
+    package = tmp_path / "pzd"
+    package.mkdir()
+    (package / "one.py").write_text("from pzd.two import a\n", encoding="utf-8")
+    (package / "two.py").write_text("def a():\n    import pzd.three\n", encoding="utf-8")
+    (package / "three.py").write_text("from pzd import one\n", encoding="utf-8")
+    assert rounds(package) == ["pzd.one -> pzd.two -> pzd.three -> pzd.one"]
+
+
 def users_of(part: str, package: Path) -> set[str]:
     """The layers that import one, wherever in the file."""
     return {

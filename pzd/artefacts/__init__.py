@@ -14,8 +14,8 @@ from pzd.artefacts.characteristics import (
     StepRow,
     WarmUpRow,
 )
-from pzd.artefacts.diagnosed import (
-    Diagnosed,
+from pzd.artefacts.diagnosed import Diagnosed
+from pzd.artefacts.diagnosis import (
     Diagnosis,
     Gap,
     KeptBack,

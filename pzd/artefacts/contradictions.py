@@ -7,17 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from pzd.artefacts.diagnosis import Diagnosis, Value
 from pzd.artefacts.identified import ParameterRow
 from pzd.damper.model import PHYSICAL, Damper
 from pzd.damper.nature import against_nature
 from pzd.quantities import Control
 from pzd.schema.errors import DataError
 from pzd.schema.yamlfile import Document, read_yaml
-
-if TYPE_CHECKING:
-    from pzd.artefacts.diagnosed import Diagnosis, Value
 
 OTHER_UNIT = 100.0
 """From this ratio on two values of one parameter are in different units; the least between two units is 1000."""

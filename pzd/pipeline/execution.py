@@ -110,7 +110,7 @@ class Pipeline:
 
     def _run(self, stage: Stage, inputs: dict[str, str]) -> None:
         if self._compiles:
-            from pzd.simulate.precompile import in_background
+            from pzd.simulate.compiled_ahead import in_background
 
             in_background()
             self._compiles = False

@@ -1,76 +1,14 @@
-"""Compiles the kernels of the ride ahead, in a process of its own: `python -m pzd.simulate.precompile`.
-
-On a new machine this takes as long as all the stages before; a second core does it meanwhile.
-"""
+"""Compiles the kernels of the ride by riding: `python -m pzd.simulate.precompile`, see `compiled_ahead`."""
 
 from __future__ import annotations
 
-import hashlib
-import os
-import subprocess
-import sys
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
-from threading import Thread
-from typing import TYPE_CHECKING
 
 from pzd.artefacts import Diagnosed, ForceRow, Table, TableNotes
 from pzd.damper.model import BaseRow, Damper
+from pzd.simulate.compiled_ahead import lock, mark
 from pzd.simulate.config import SimulateConfig
-
-if TYPE_CHECKING:
-    from filelock import FileLock
-
-_LOCK = "ride-compiling.lock"
-
-
-def mark(folder: Path) -> Path:
-    """The file in a folder of kernels that says that those of this copy of pzd are compiled.
-
-    Numba keeps them by path and time of their sources, so that those of another copy of the same text are no use.
-    """
-    from pzd.compiled import sources
-
-    kept_by = ((os.fspath(path), path.stat().st_mtime_ns) for path in sources())
-    return folder / f"ride-compiled-{hashlib.sha256(repr(list(kept_by)).encode()).hexdigest()[:16]}"
-
-
-def _lock(folder: Path) -> FileLock:
-    """One for all threads of a process: the ride that compiles does not wait for itself."""
-    from filelock import FileLock
-
-    return FileLock(folder / _LOCK, thread_local=False, is_singleton=True)
-
-
-@cache
-def in_background() -> None:
-    """Start compiling, once at most and unless it was done before; nothing depends on it.
-
-    A thread waits for the process, so that it is reaped; a command that is done earlier does not wait, and
-    the process goes on by itself and leaves its kernels for the next.
-    """
-    from pzd.compiled import cache_folder
-
-    if not mark(cache_folder()).exists():
-        Thread(target=_compile, daemon=True).start()
-
-
-@cache
-def wait() -> None:
-    """Wait for the process that compiles the kernels of the ride, if there is one: twice would take as long again."""
-    from pzd.compiled import cache_folder
-
-    folder = cache_folder()
-    if not mark(folder).exists():
-        with _lock(folder):
-            pass
-
-
-def _compile() -> None:
-    quiet = subprocess.DEVNULL
-    command = [sys.executable, "-m", __name__]
-    subprocess.run(command, stdin=quiet, stdout=quiet, stderr=quiet, check=False)  # noqa: S603  # our own module
 
 
 def _smallest_ride() -> None:
@@ -99,7 +37,7 @@ def _once(folder: Path) -> None:
     """Compile into the folder, unless it was done or another process is at it."""
     from filelock import Timeout
 
-    with suppress(Timeout), _lock(folder).acquire(blocking=False):
+    with suppress(Timeout), lock(folder).acquire(blocking=False):
         if not mark(folder).exists():
             _smallest_ride()
             mark(folder).touch()

@@ -10,6 +10,7 @@ import numpy as np
 from pzd.record import Array
 from pzd.schema.errors import DataError
 from pzd.simulate.car import HalfCar
+from pzd.simulate.compiled_ahead import wait
 from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.dampers import rubs
 from pzd.simulate.dormand_prince import STAGES
@@ -21,7 +22,6 @@ from pzd.simulate.minimise import LEAST_LOAD, TIE_BREAKS
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.pieces import longest_piece
 from pzd.simulate.plan import Case
-from pzd.simulate.precompile import wait
 from pzd.simulate.prediction.planning import predictor_of
 from pzd.simulate.prediction.predictor import Predictor
 from pzd.simulate.profile import Profile

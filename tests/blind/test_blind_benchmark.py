@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from pzd.artefacts import Diagnosed, Diagnosis
-from pzd.artefacts.diagnosed import Gap
+from pzd.artefacts.diagnosis import Gap
 from pzd.blind.benchmark import Benchmark
 from pzd.blind.case import Places, Scored
 from pzd.blind.clean import Clean

@@ -14,12 +14,12 @@ from simulate_dampers import damper_after_table_2, table_of
 from pzd.artefacts import Table
 from pzd.damper.model import Damper
 from pzd.paper.published import published
+from pzd.simulate.compiled_ahead import wait
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.dampers import dynamic_damper_of, grid_of
 from pzd.simulate.outcome import Outcome
 from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
-from pzd.simulate.precompile import wait
 from pzd.simulate.riding import ride_case
 from pzd.simulate.road import Way
 

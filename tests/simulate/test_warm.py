@@ -12,28 +12,29 @@ import pytest
 from filelock import FileLock
 
 from pzd import compiled
-from pzd.simulate import precompile as warm
+from pzd.simulate import compiled_ahead as ahead
+from pzd.simulate import precompile
 
 
 @pytest.fixture
 def rides(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """One entry for each ride that would have been compiled."""
     done: list[str] = []
-    monkeypatch.setattr(warm, "_smallest_ride", lambda: done.append("ride"))
+    monkeypatch.setattr(precompile, "_smallest_ride", lambda: done.append("ride"))
     return done
 
 
 def test_what_was_compiled_is_not_compiled_again(rides: list[str], tmp_path: Path) -> None:
     for _ in range(2):
-        warm._once(tmp_path)
+        precompile._once(tmp_path)
     assert rides == ["ride"]
 
 
 def test_a_second_process_leaves_the_compiling_to_the_first(rides: list[str], tmp_path: Path) -> None:
-    with FileLock(tmp_path / warm._LOCK):
-        warm._once(tmp_path)
+    with FileLock(tmp_path / ahead.LOCK):
+        precompile._once(tmp_path)
         assert rides == []
-    warm._once(tmp_path)
+    precompile._once(tmp_path)
     assert rides == ["ride"]
 
 
@@ -41,12 +42,12 @@ def test_a_ride_waits_for_the_process_that_compiles_and_not_for_itself(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(warm, "_smallest_ride", warm.wait.__wrapped__)
-    warm._once(tmp_path)  # would never end
-    assert warm.mark(tmp_path).exists()
-    warm.mark(tmp_path).unlink()
-    waiting = threading.Thread(target=warm.wait.__wrapped__)
-    with FileLock(tmp_path / warm._LOCK):
+    monkeypatch.setattr(precompile, "_smallest_ride", ahead.wait.__wrapped__)
+    precompile._once(tmp_path)  # would never end
+    assert ahead.mark(tmp_path).exists()
+    ahead.mark(tmp_path).unlink()
+    waiting = threading.Thread(target=ahead.wait.__wrapped__)
+    with FileLock(tmp_path / ahead.LOCK):
         waiting.start()
         waiting.join(0.2)
         assert waiting.is_alive()
@@ -61,12 +62,12 @@ def test_what_another_copy_of_pzd_compiled_is_no_use(monkeypatch: pytest.MonkeyP
     for changed in (1, 2):
         source.touch()
         os.utime(source, (changed, changed))
-        marks.add(warm.mark(tmp_path))
+        marks.add(ahead.mark(tmp_path))
     monkeypatch.setattr(compiled, "sources", lambda: [tmp_path / "copy" / "law.py"])
     (tmp_path / "copy").mkdir()
     (tmp_path / "copy" / "law.py").touch()
     os.utime(tmp_path / "copy" / "law.py", (2, 2))
-    assert len(marks | {warm.mark(tmp_path)}) == 3
+    assert len(marks | {ahead.mark(tmp_path)}) == 3
 
 
 def test_a_command_starts_one_process_and_reaps_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -79,14 +80,14 @@ def test_a_command_starts_one_process_and_reaps_it(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(compiled, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(subprocess, "Popen", Started)
-    warm.in_background.cache_clear()
+    ahead.in_background.cache_clear()
     before = set(threading.enumerate())
     for _ in range(3):
-        warm.in_background()
+        ahead.in_background()
     for thread in set(threading.enumerate()) - before:
         thread.join(60.0)
     assert [process.returncode for process in begun] == [0]
-    warm.mark(tmp_path).touch()
-    warm.in_background.cache_clear()
-    warm.in_background()
+    ahead.mark(tmp_path).touch()
+    ahead.in_background.cache_clear()
+    ahead.in_background()
     assert len(begun) == 1

@@ -8,41 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pzd.paper.figures.canvas import PAPER_STYLE, encoded
+from pzd.paper.figures.entry import FigureEntry, FigureFiles
 from pzd.paper.figures.figure import PaperFigure
+from pzd.paper.figures.index import page
 from pzd.paper.figures.numbered import library
 from pzd.paper.figures.sources import FigureData
 from pzd.quantities import Control
 from pzd.schema.jsonfile import write_json
-from pzd.schema.model import Frozen
 
 FOLDER = "figures"
 """Beside the stages in the run's folder."""
-
-
-class FigureFiles(Frozen):
-    """One picture of a figure."""
-
-    png: str
-    svg: str
-    """Names of its files."""
-    alt: str
-    caption: str
-    """What it shows, with its numbers beside the paper's."""
-    sha256: dict[str, str]
-    """Hash of each file."""
-
-
-class FigureEntry(Frozen):
-    """One figure of the paper as the manifest lists it."""
-
-    figure: int
-    title: str
-    source: str
-    """`stand`, `model`, `rides`, `scheme`, `computed` in its place, or `photograph`."""
-    made_from: str
-    pictures: tuple[FigureFiles, ...]
-    missing: str | None
-    """Why nothing is drawn; None where something is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +29,6 @@ class FigureSet:
 
     def write(self, folder: Path) -> None:
         """Write the pictures, manifest.json and index.html."""
-        from pzd.paper.figures.index import page
-
         for name, content in self.files.items():
             (folder / name).write_bytes(content)
         write_json(folder / "manifest.json", self.entries, Control())

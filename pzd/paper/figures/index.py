@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from pzd.paper.figures.draw import FigureEntry
+from pzd.paper.figures.entry import FigureEntry
 
 
 def page(entries: Sequence[FigureEntry]) -> str:
