@@ -94,7 +94,8 @@ def test_a_search_ends_where_one_with_differences_at_every_point_does(
     monkeypatch.setattr(carried_slopes, "TRUSTED", 0.0)
     monkeypatch.setattr(carried_slopes, "SAME_PLACE", 0.0)
     anew = fit(problem, (effect,), start)
-    assert between - before < problem.work.spent - between
+    # as much where every step shows what was carried to be wrong by a tenth, one draw in ten
+    assert between - before <= problem.work.spent - between
     assert carried.misfit == pytest.approx(anew.misfit, rel=1e-4)
     moved = carried.searched - anew.searched
     assert moved @ np.linalg.solve(anew.covariance, moved) < 0.25 * moved.size
