@@ -94,8 +94,10 @@ def test_a_search_ends_where_one_with_differences_at_every_point_does(
     monkeypatch.setattr(carried_slopes, "TRUSTED", 0.0)
     monkeypatch.setattr(carried_slopes, "SAME_PLACE", 0.0)
     anew = fit(problem, (effect,), start)
-    # as much where every step shows what was carried to be wrong by a tenth, one draw in ten
-    assert between - before <= problem.work.spent - between
+    # A look whether slopes can be carried costs one simulation a record, differences there about ten: where the effect
+    # is not the hidden one, it may be no at every point.
+    most = 1.0 if effect == "rounded_yield" else 1.1
+    assert between - before < most * (problem.work.spent - between)
     assert carried.misfit == pytest.approx(anew.misfit, rel=1e-4)
     moved = carried.searched - anew.searched
     assert moved @ np.linalg.solve(anew.covariance, moved) < 0.25 * moved.size
