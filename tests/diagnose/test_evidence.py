@@ -69,8 +69,9 @@ def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(rn
         single = noise**2 / run.points(prepared.record.time) / run.count
         # An average over harmonics 0 to 3, of which one is kept.
         shares.append(4.0 * variance[1] / (k**2 * single))
-    # Never too sure: of 60 draws the smallest is 0.85. What noise lets through besides makes the median 1.2, sd 0.3.
-    assert min(shares) > 0.7
+    # Never half as unsure as it must be: of 400 draws the smallest is 0.68. What noise lets through besides makes the
+    # median 1.2, sd 0.3.
+    assert min(shares) > 0.5
     assert 0.9 < np.median(shares) < 1.6
 
 

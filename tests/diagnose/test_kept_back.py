@@ -258,8 +258,12 @@ def test_where_a_law_is_missing_the_last_fit_takes_every_sample_alike(rng: np.ra
 
 def test_where_noise_is_what_is_left_the_likelihood_predicts_as_well(rng: np.random.Generator) -> None:
     damper = damper_of(TWO, preload_offset={"F_0": 100.0})
-    asked = trials(sines(damper, rng, TWO, cycles=4, jitter=0.02), damper_of(TWO))
-    assert not asked.missed_by_criterion(damper).less_than(asked.missed(damper))
+    better = []
+    for _ in range(3):
+        asked = trials(sines(damper, rng, TWO, cycles=4, jitter=0.02), damper_of(TWO))
+        better.append(asked.missed_by_criterion(damper).less_than(asked.missed(damper)))
+    # chance: two standard errors of eight skewed pairs are passed once in ten, three times in a row once in a thousand
+    assert not all(better)
 
 
 def test_the_fit_that_is_handed_on_goes_with_what_it_was_fitted_to(rng: np.random.Generator) -> None:
