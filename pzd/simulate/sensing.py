@@ -26,6 +26,8 @@ from pzd.simulate.ride_model import (
 
 CHANNELS = SENSED + 1
 """Those of a feedback policy, then the acceleration of the body."""
+_DEFLECTION, _RATE, _HEAVE, _PITCH, _HEAVE_RATE, _PITCH_RATE, _ACCELERATION = 0, 2, 4, 5, 6, 7, 8
+"""Where each begins; deflection and its rate have a channel an axle."""
 ACTS, NEXT_NOISE = range(2)
 """Of `Electronics.counts`."""
 
@@ -159,30 +161,31 @@ def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) ->
 @compiled
 def _sample(y: Array, car: Vehicle, workspace: Array, electronics: Electronics, slot: int) -> None:
     """Fill one sample, its noise with it."""
-    noise, deviations = electronics.noise[int(electronics.counts[NEXT_NOISE])], electronics.deviations
+    drawn, deviations = electronics.noise[int(electronics.counts[NEXT_NOISE])], electronics.deviations
     seen, room = electronics.states[slot], electronics.workspaces[slot]
     copy_into(y, seen)
     for row in range(WORKSPACE_ROWS):
         copy_into(workspace[row], room[row])
-    seen[HEAVE] += deviations[4] * noise[4]
-    seen[PITCH] += deviations[5] * noise[5]
-    seen[HEAVE_RATE] += deviations[6] * noise[6]
-    seen[PITCH_RATE] += deviations[7] * noise[7]
-    room[BODY, 0] += deviations[8] * noise[8]
-    room[COMFORT, 0] += deviations[8] * noise[8]
+    height, angle = deviations[_HEAVE] * drawn[_HEAVE], deviations[_PITCH] * drawn[_PITCH]
+    seen[HEAVE] += height
+    seen[PITCH] += angle
+    seen[HEAVE_RATE] += deviations[_HEAVE_RATE] * drawn[_HEAVE_RATE]
+    seen[PITCH_RATE] += deviations[_PITCH_RATE] * drawn[_PITCH_RATE]
+    room[BODY, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
+    room[COMFORT, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
     for i in range(2):
-        room[DEFLECTION, i] += deviations[i] * noise[i]
-        room[RATE, i] += deviations[2 + i] * noise[2 + i]
-        above = deviations[4] * noise[4] + car.arms[i] * deviations[5] * noise[5]
-        electronics.heights_off[slot, i] = above - deviations[i] * noise[i]
+        deflection = deviations[_DEFLECTION + i] * drawn[_DEFLECTION + i]
+        room[DEFLECTION, i] += deflection
+        room[RATE, i] += deviations[_RATE + i] * drawn[_RATE + i]
+        electronics.heights_off[slot, i] = height + car.arms[i] * angle - deflection
 
 
 @compiled
 def supplied(asked: float, was: float, low: float, high: float, electronics: Electronics) -> float:
     """The voltage that the supply sets [V].
 
-    Equation: abs(U - U_0) <= slew h; abs(U abs(U) - U_0 abs(U_0)) <= 2 P h / C, which is the energy C U^2 / 2 that a
-    power P moves in a control period h; then the nearest of the values that can be set
+    Equation: towards the nearest U of the values that can be set, as far as abs(U - U_0) <= slew h and
+    abs(U abs(U) - U_0 abs(U_0)) <= 2 P h / C, the energy C U^2 / 2 that a power P moves in a control period h
 
     Parameters
     ----------
@@ -190,13 +193,14 @@ def supplied(asked: float, was: float, low: float, high: float, electronics: Ele
     low, high : of the table [V]
     electronics : the supply
     """
-    voltage = min(max(asked, was - electronics.most_change), was + electronics.most_change)
+    voltage = asked
+    if electronics.step > 0.0:
+        voltage = electronics.step * round(asked / electronics.step)
+    voltage = min(max(voltage, low), high)
+    voltage = min(max(voltage, was - electronics.most_change), was + electronics.most_change)
     energy = was * abs(was)
     most, least = energy + electronics.most_energy, energy - electronics.most_energy
-    voltage = min(max(voltage, _root(least)), _root(most))
-    if electronics.step > 0.0:
-        voltage = electronics.step * round(voltage / electronics.step)
-    return min(max(voltage, low), high)
+    return min(max(voltage, _root(least)), _root(most))
 
 
 @compiled

@@ -152,6 +152,23 @@ def test_slew_steps_and_the_ends_of_the_table_bound_what_is_set(rng) -> None:
     assert supplied(149.9, 0.0, 0.0, 149.8, coarse) == 149.8
 
 
+def test_a_supply_whose_steps_are_wider_than_it_moves_in_a_period_arrives_all_the_same(rng) -> None:
+    both = electronics(rng, 1, supply=Supply(step=5.0, slew_per_s=500.0))
+    voltage = 0.0
+    course = [voltage := supplied(11.0, voltage, 0.0, 150.0, both) for _ in range(25)]
+    assert course[:3] == pytest.approx([0.5, 1.0, 1.5])
+    assert course[-1] == pytest.approx(10.0)
+
+
+def test_the_seed_decides_the_noise_of_a_ride(ride) -> None:
+    first, again, other = (
+        np.asarray(ride("comfort", "table", sensors={"noise": NOISE, "seed": seed}, bounds="table", **SHORT).history)
+        for seed in (1, 1, 2)
+    )
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first[:, VOLTAGE_1], other[:, VOLTAGE_1])
+
+
 def test_in_a_ride_the_supply_moves_no_more_energy_than_its_power(ride) -> None:
     power, capacitance = 2.0, 1e-5
     weak = {"power_W": power, "capacitance_F": capacitance}
