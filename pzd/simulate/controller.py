@@ -6,10 +6,8 @@ import math
 
 from pzd.compiled import compiled, inlined
 from pzd.damper.kernels import keep_voltage
-from pzd.damper.rows import row_at
 from pzd.record import Array
 from pzd.simulate.demand import bounds_of, choose_hardness, demand, spring_acceleration
-from pzd.simulate.dynamic_damper import effective_voltage, stored
 from pzd.simulate.equations import motion
 from pzd.simulate.minimise import LARGEST, farther_end
 from pzd.simulate.prediction.choice import predict
@@ -18,13 +16,11 @@ from pzd.simulate.ride_model import (
     ASKED,
     BEHIND,
     DEFLECTION,
-    DYNAMIC,
     FORCE,
     HIGH,
     IDEAL,
     LOW,
     MINIMISE,
-    OIL_1,
     RATE,
     SCHEDULE,
     SET,
@@ -33,7 +29,6 @@ from pzd.simulate.ride_model import (
     SINCE,
     SWITCH,
     TIE_END,
-    VALVE_WORK,
     VOLTAGE,
     ControlSpec,
     RideModel,
@@ -51,6 +46,13 @@ def _acts_at_once(control_spec: ControlSpec) -> bool:
     """Whether nothing is left to the clock: `ideal` forces are, but for the choice between two that lie apart."""
     chooses = control_spec.aim == SWITCH or (control_spec.aim == MINIMISE and control_spec.tie == LARGEST)
     return control_spec.fidelity == IDEAL and not chooses
+
+
+@inlined
+def _stays(control_spec: ControlSpec, control: Array) -> bool:
+    """Whether the voltage of a policy that holds one is set already."""
+    set_already = control[SET, 0] == control_spec.voltage and control[SET, 1] == control_spec.voltage
+    return control_spec.aim == VOLTAGE and set_already
 
 
 @inlined
@@ -83,7 +85,7 @@ def set_control(
     Parameters
     ----------
     time : [s]
-    y : (n,) state; a valve without lag tightens the oil spring at once, which is booked here
+    y : (n,) state
     model : see `ride_model`
     plan : of the aim `PREDICT`; without it nothing of the prediction is compiled
     electronics : sensors and supply; without it the controller sees all, and its voltage is set, exactly and at once
@@ -91,7 +93,7 @@ def set_control(
     scratch : (n,) to work in
     """
     control_spec, car = model.control_spec, model.car
-    if _acts_at_once(control_spec):
+    if _acts_at_once(control_spec) or _stays(control_spec, control):
         return
     motion(time, y, model, control, workspace, scratch)
     if control_spec.fidelity == IDEAL:
@@ -105,12 +107,12 @@ def set_control(
     if plan is not None:
         predict(time, age, seen, model, plan, electronics, control, room)
         for i in range(2):
-            _set_voltage(time, y, model, electronics, control, i, float(plan.candidates[plan.chosen[i]]))
+            _set_voltage(time, model, electronics, control, i, float(plan.candidates[plan.chosen[i]]))
     else:
         if control_spec.aim not in (VOLTAGE, SCHEDULE):
             demand(control_spec, car, seen, control, room)
         for i in range(2):
-            _set_voltage(time, y, model, electronics, control, i, _wanted_voltage(time, model, control, room, i))
+            _set_voltage(time, model, electronics, control, i, _wanted_voltage(time, model, control, room, i))
     control[SINCE, 0] = time
     for i in range(2):
         if control[SIDE, i] == 0.0:
@@ -156,25 +158,15 @@ def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, oth
 @compiled
 def _set_voltage(
     time: float,
-    y: Array,
     model: RideModel,
     electronics: Electronics | None,
     control: Array,
     axle: int,
     asked: float,
 ) -> None:
-    damper, elapsed, voltage = model.damper, time - control[SINCE, 0], asked
+    voltage = asked
     if electronics is not None:
         voltages = model.grid.voltages
         voltage = supplied(asked, control[SET, axle], voltages[0], voltages[-1], electronics)
-    was, _ = effective_voltage(damper, control[SET, axle], control[BEHIND:, axle], elapsed)
-    keep_voltage(control[SET, axle], elapsed, control[BEHIND:, axle], damper.drive)
+    keep_voltage(control[SET, axle], time - control[SINCE, 0], control[BEHIND:, axle], model.damper.drive)
     control[SET, axle] = voltage
-    if model.control_spec.fidelity == DYNAMIC:
-        now, _ = effective_voltage(damper, voltage, control[BEHIND:, axle], 0.0)
-        if now != was:
-            e = y[OIL_1 + axle]
-            change = stored(e, row_at(damper.voltages, damper.rows, now)) - stored(
-                e, row_at(damper.voltages, damper.rows, was)
-            )
-            y[VALVE_WORK] += model.car.dampers[axle] * change

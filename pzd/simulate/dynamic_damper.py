@@ -15,17 +15,12 @@ from pzd.damper.kernels import (
     branches_follow,
     effective_voltage_after,
     parallel_force,
-    row_of,
-    stroke_moves,
-    with_stroke_of,
 )
 from pzd.damper.regimes import spring_energy, spring_force
-from pzd.damper.rows import row_at
 from pzd.record import Array
 from pzd.table.kernel import bracket
 
 _TINY = 1e-300  # m/s: a speed that only carries its sign
-_DIFFERENCE = 1e-4  # of an interval of voltage: the parameters are linear in it, the energy of the spring is nearly
 
 
 class DynamicDamper(NamedTuple):
@@ -67,18 +62,9 @@ def parallel_at(damper: DynamicDamper, voltage: float, row: Array) -> None:
         )
 
 
-@inlined
-def row_slope(voltages: Array, rows: Array, voltage: float, column: int) -> float:
-    """Derivative of one parameter by the effective voltage."""
-    if voltages.size == 1 or voltage <= voltages[0] or voltage >= voltages[-1]:
-        return 0.0
-    i = bracket(voltages, voltage)
-    return float((rows[i + 1, column] - rows[i, column]) / (voltages[i + 1] - voltages[i]))
-
-
 @compiled
-def effective_voltage(damper: DynamicDamper, voltage: float, kept: Array, elapsed: float) -> tuple[float, float]:
-    """Voltage as the valve feels it [V] and its rate [V/s], a time after the voltage was set.
+def effective_voltage(damper: DynamicDamper, voltage: float, kept: Array, elapsed: float) -> float:
+    """Voltage as the valve feels it [V], a time after the voltage was set.
 
     Parameters
     ----------
@@ -87,7 +73,8 @@ def effective_voltage(damper: DynamicDamper, voltage: float, kept: Array, elapse
     kept : (d,) voltage behind each drive effect when it was set [V]
     elapsed : time since [s]
     """
-    return effective_voltage_after(voltage, elapsed, kept, damper.drive)
+    effective, _ = effective_voltage_after(voltage, elapsed, kept, damper.drive)
+    return effective
 
 
 @inlined
@@ -105,34 +92,6 @@ def flowing(e: float, row: Row, guess: float) -> tuple[float, float]:
 def stored(e: float, row: Row) -> float:
     """Energy of the oil spring [J] at its elastic deflection [m]."""
     return spring_energy(e, row, row[K])
-
-
-@compiled
-def valve_power(damper: DynamicDamper, e: float, row: Row, voltage: float, rate: float) -> float:
-    """Power with which the valve tightens the oil spring [W] while the effective voltage moves at `rate` [V/s].
-
-    Equation: rate dE/dU at constant deflection, E = k integral s de      Source: first law, the state being y
-    """
-    if rate == 0.0:
-        return 0.0
-    power = spring_energy(e, row, row_slope(damper.voltages, damper.rows, voltage, K))
-    return (power + _stroke_slope(damper, e, row, voltage)) * rate
-
-
-@compiled
-def _stroke_slope(damper: DynamicDamper, e: float, row: Row, voltage: float) -> float:
-    """Derivative of the energy of the oil spring by the effective voltage [J/V], by the stroke effects alone."""
-    nodes = damper.voltages
-    if nodes.size == 1 or voltage <= nodes[0] or voltage >= nodes[-1]:
-        return 0.0
-    i = bracket(nodes, voltage)
-    if not stroke_moves(row_of(damper.rows[i]), row_of(damper.rows[i + 1])):
-        return 0.0
-    low = max(voltage - _DIFFERENCE * (nodes[i + 1] - nodes[i]), nodes[i])
-    high = min(voltage + _DIFFERENCE * (nodes[i + 1] - nodes[i]), nodes[i + 1])
-    ahead = spring_energy(e, with_stroke_of(row, row_at(nodes, damper.rows, high)), row[K])
-    behind = spring_energy(e, with_stroke_of(row, row_at(nodes, damper.rows, low)), row[K])
-    return float((ahead - behind) / (high - low))
 
 
 @inlined

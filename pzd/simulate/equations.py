@@ -15,7 +15,6 @@ from pzd.simulate.dynamic_damper import (
     remember,
     rubbing_force,
     slipping_forces,
-    valve_power,
 )
 from pzd.simulate.kinematics import suspension
 from pzd.simulate.quasistatic import quasistatic_forces
@@ -35,7 +34,9 @@ from pzd.simulate.ride_model import (
     HEAVE_RATE,
     INERTANCE,
     OIL_1,
+    OIL_DEFLECTION,
     OIL_FORCE,
+    OIL_WORK,
     PARALLEL_WORK,
     PITCH,
     PITCH_RATE,
@@ -48,8 +49,6 @@ from pzd.simulate.ride_model import (
     SIDE,
     SINCE,
     SPRINGS,
-    VALVE,
-    VALVE_WORK,
     RideModel,
     Vehicle,
 )
@@ -66,18 +65,18 @@ def body_acceleration(car: Vehicle, load0: float, load1: float) -> tuple[float, 
     return -(load0 + load1) / car.mass, -(car.arms[0] * load0 + car.arms[1] * load1) / car.inertia
 
 
-@compiled
+@inlined
 def dynamic_forces(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
-    """Fill the workspace's forces from the state of the oil, and what each damper does with its energy."""
+    """Fill the workspace's forces from where the oil has flowed to."""
     car, damper = model.car, model.damper
     elapsed = time - control[SINCE, 0]
     for i in range(2):
         ratio, n = car.ratio[i], car.dampers[i]
-        voltage, moving = effective_voltage(damper, control[SET, i], control[BEHIND:, i], elapsed)
+        voltage = effective_voltage(damper, control[SET, i], control[BEHIND:, i], elapsed)
         row = row_at(damper.voltages, damper.rows, voltage)
-        e = y[OIL_1 + i]
+        e = ratio * workspace[DEFLECTION, i] - y[OIL_1 + i]
+        workspace[OIL_DEFLECTION, i] = e
         workspace[OIL_FORCE, i], workspace[FLOW, i] = flowing(e, row, abs(workspace[FLOW, i]))
-        workspace[VALVE, i] = valve_power(damper, e, row, voltage, moving)
         if damper.alone:
             workspace[FORCE, i] = n * ratio * workspace[OIL_FORCE, i]
             continue
@@ -101,9 +100,17 @@ def remember_step(time: float, model: RideModel, control: Array, workspace: Arra
     """Bring what remembers beside the elements to the end of a step [s] in which no axle turned round; see `motion`."""
     damper = model.damper
     for i in range(2):
-        voltage, _ = effective_voltage(damper, control[SET, i], control[BEHIND:, i], time - control[SINCE, 0])
+        voltage = effective_voltage(damper, control[SET, i], control[BEHIND:, i], time - control[SINCE, 0])
         parallel_at(damper, voltage, damper.scratch)
         remember(damper, i, model.car.ratio[i] * workspace[DEFLECTION, i], damper.scratch)
+
+
+@compiled
+def relax_oil(time: float, y: Array, model: RideModel, workspace: Array) -> None:
+    """Let the oil of every damper flow to where its spring bears nothing, as it does while the car stands."""
+    suspension(time, y, model.car, model.road_coefficients, workspace)
+    for i in range(2):
+        y[OIL_1 + i] = model.car.ratio[i] * workspace[DEFLECTION, i]
 
 
 @compiled
@@ -143,7 +150,7 @@ def motion(time: float, y: Array, model: RideModel, control: Array, workspace: A
             dy[DISSIPATED] += workspace[FORCE, i] * workspace[RATE, i]
 
 
-@compiled
+@inlined
 def _act(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Fill the damper forces, and dV/dt of both axles."""
     if model.control_spec.fidelity == DYNAMIC:
@@ -153,7 +160,7 @@ def _act(time: float, y: Array, model: RideModel, control: Array, workspace: Arr
     accelerate(model.car, control, workspace)
 
 
-@inlined
+@compiled
 def _try_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Fill how each sticking axle would be pushed away from V = 0, were it to slip to the one or the other side."""
     for i in range(2):
@@ -170,7 +177,7 @@ def _book_damper(model: RideModel, workspace: Array, axle: int, dy: Array) -> No
     """Book the powers of the dampers of one axle, and the motion of its oil."""
     n, speed = model.car.dampers[axle], model.car.ratio[axle] * workspace[RATE, axle]
     inertia = workspace[INERTANCE, axle] * workspace[ACCELERATION, axle] * workspace[RATE, axle]
-    dy[OIL_1 + axle] = speed - workspace[FLOW, axle]
+    dy[OIL_1 + axle] = workspace[FLOW, axle]
     dy[DISSIPATED] += n * (workspace[OIL_FORCE, axle] * workspace[FLOW, axle] + workspace[RUBBING, axle] * speed)
-    dy[VALVE_WORK] += n * workspace[VALVE, axle]
+    dy[OIL_WORK] += n * workspace[OIL_FORCE, axle] * (speed - workspace[FLOW, axle])
     dy[PARALLEL_WORK] += n * speed * workspace[ELASTIC, axle] + inertia

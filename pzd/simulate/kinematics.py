@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pzd.compiled import compiled
+from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.ride_model import (
     CONTACT,
@@ -30,10 +30,12 @@ from pzd.simulate.tyre import press
 @compiled
 def road_at(road_coefficients: RoadCoefficients, distance: float) -> tuple[float, float, float]:
     """Height [m] of the road at a distance [m], its slope [-] and its curvature [1/m]."""
-    phase = road_coefficients.wavenumber * distance
-    height = road_coefficients.amplitude * math.sin(phase)
-    slope = road_coefficients.amplitude * road_coefficients.wavenumber * math.cos(phase)
-    curvature = -road_coefficients.wavenumber * road_coefficients.wavenumber * height
+    height = slope = curvature = 0.0
+    if road_coefficients.amplitude != 0.0:
+        phase = road_coefficients.wavenumber * distance
+        height = road_coefficients.amplitude * math.sin(phase)
+        slope = road_coefficients.amplitude * road_coefficients.wavenumber * math.cos(phase)
+        curvature = -road_coefficients.wavenumber * road_coefficients.wavenumber * height
     if road_coefficients.coefficients.size == 0:
         return height, slope, curvature
     spacing = road_coefficients.spacing
@@ -41,7 +43,7 @@ def road_at(road_coefficients: RoadCoefficients, distance: float) -> tuple[float
     return height + above, slope + rising / spacing, curvature + bending / (spacing * spacing)
 
 
-@compiled
+@inlined
 def suspension(time: float, y: Array, car: Vehicle, road_coefficients: RoadCoefficients, workspace: Array) -> None:
     """Fill deflection and its rate, speed and acceleration of what the axles stand on, and spring force.
 

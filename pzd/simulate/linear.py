@@ -97,7 +97,7 @@ def ride_exactly(
         course=np.column_stack([comfort, forces, np.max(np.abs(deflection), axis=1), lost]),
         step=step,
         outside=float(np.mean(np.any(too_fast, axis=1))),
-        energy_error=balance_error(change, energy),
+        energy_error=balance_error(change, 0.0, energy),
     )
 
 

@@ -124,7 +124,7 @@ def ride(
         time = n * h
         if n % per_control == 0:
             set_control(time, y, model, plan, electronics, control, workspace, scratch)
-        motion(time, y, model, control, workspace, scratch)
+        motion(time, y, model, control, workspace, stages[0])
         _keep(y, workspace, course[n - first])
         tally[STEPS_DONE] = n
         if math.isnan(workspace[COMFORT, 0]):

@@ -37,7 +37,7 @@ def tabled(car: Vehicle, grid: TableArrays, axle: int, voltage: float, velocity:
     return car.dampers[axle] * ratio * force
 
 
-@compiled
+@inlined
 def quasistatic_forces(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Fill the workspace's forces for axles that slip; one that sticks is left to what holds it."""
     control_spec = model.control_spec

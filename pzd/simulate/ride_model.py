@@ -12,9 +12,12 @@ from pzd.simulate.car import HalfCar
 from pzd.simulate.dynamic_damper import DynamicDamper
 from pzd.simulate.profile import Profile
 
-HEAVE, PITCH, HEAVE_RATE, PITCH_RATE, OIL_1, OIL_2, DISSIPATED, ROAD_WORK, VALVE_WORK, PARALLEL_WORK = range(10)
-"""The state: the body, the elastic deflection of the oil at each axle, and the energies, each by itself."""
+HEAVE, PITCH, HEAVE_RATE, PITCH_RATE, OIL_1, OIL_2, DISSIPATED, ROAD_WORK, OIL_WORK, PARALLEL_WORK = range(10)
+"""The state: the body, the flow y of the oil in one damper of each axle [m], and the energies, each by itself: lost in
+the dampers, given by the road, put into the oil springs by motion and into what is elastic beside the elements [J]."""
 STATES = 10
+ENERGIES = DISSIPATED
+"""The first of them."""
 WHEEL_1, WHEEL_2, WHEEL_RATE_1, WHEEL_RATE_2, TYRE_LOSS = range(STATES, STATES + 5)
 """The state goes on so where the wheels have mass: their height above where they stand at rest [m], its rate [m/s], and
 the energy lost in the tyres [J]."""
@@ -38,11 +41,11 @@ SENSED = 8
     FORCE,
     ACCELERATION,
     INERTANCE,
+    OIL_DEFLECTION,
     OIL_FORCE,
     FLOW,
     ELASTIC,
     RUBBING,
-    VALVE,
     SIDED_RATE,
     LOW,
     HIGH,
@@ -58,11 +61,11 @@ WORKSPACE_ROWS = 23
 """Rows of the workspace (WORKSPACE_ROWS, 2), a column an axle: intermediate results of the equations of motion.
 
 Deflection U [m], its rate V [m/s], speed of the wheel and its acceleration without S + T (those of the road where the
-wheels have no mass), spring force S and damper force T [N], dV/dt, mass that the dampers add [kg]; of one damper: oil
-spring [N], flow [m/s], elastic and rubbing force beside the element [N], power of the valve [W]; speed on its side of
-zero, lowest and highest force; acceleration of z and phi; acceleration at K (first column); of an axle that sticks,
-dV/dt away from V = 0, were it to slip to either side; speed of the road [m/s]; force between wheel and road beyond that
-at rest [N]; power lost in the tyre [W]."""
+wheels have no mass), spring force S and damper force T [N], dV/dt, mass that the dampers add [kg]; of one damper:
+elastic deflection of the oil [m], force of the oil spring [N], flow [m/s], elastic and rubbing force beside the
+element [N]; speed on its side of zero, lowest and highest force; acceleration of z and phi; acceleration at K (first
+column); of an axle that sticks, dV/dt away from V = 0, were it to slip to either side; speed of the road [m/s]; force
+between wheel and road beyond that at rest [N]; power lost in the tyre [W]."""
 ASKED, SET, SIDE, SINCE, HARD, BEHIND = range(6)
 TIE_END = SINCE
 """Rows of the control (BEHIND + d, 2), a column an axle: force asked [N], voltage set [V]; side of V = 0 (+1 rebound,

@@ -15,7 +15,8 @@ from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.dampers import rubs
 from pzd.simulate.dormand_prince import STAGES
 from pzd.simulate.dynamic_damper import DynamicDamper
-from pzd.simulate.energy import balance_error, stored_energy
+from pzd.simulate.energy import balance_error, oil_energy, stored_energy
+from pzd.simulate.equations import relax_oil
 from pzd.simulate.linear import ride_exactly
 from pzd.simulate.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALLIES, ride
 from pzd.simulate.minimise import LEAST_LOAD, TIE_BREAKS
@@ -32,6 +33,7 @@ from pzd.simulate.ride_model import (
     FEEDBACK,
     IDEAL,
     MINIMISE,
+    OIL_WORK,
     PREDICT,
     SCHEDULE,
     SENSED,
@@ -63,9 +65,6 @@ _AIMS = {
     "predict": PREDICT,
     "schedule": SCHEDULE,
 }
-_SWITCHED = 0.01
-"""Share of the tolerance where the voltage of a damper with dynamics jumps once in a control period: on a single bump,
-which dissipates little, the work of the valve was else up to 7e-6 of it off, and 6e-7 at a tenth."""
 
 
 @dataclass(frozen=True)
@@ -210,10 +209,9 @@ def ride_case(
     plan = None
     if case.policy.aim == "predict":
         plan = predictor_of(config.comfort_predictive, config.control_period_s, own, car, speed, grid.voltages)
-    sharper = _SWITCHED if case.policy.aim != "voltage" and case.fidelity == "dynamic" else 1.0
     states = at_rest(model.car).size
     electronics = electronics_of(config.sensors, config.supply, config.control_period_s, states)
-    return ride_of_model(model, plan, electronics, clock, sharper * config.tolerance, case.name, ends, take)
+    return ride_of_model(model, plan, electronics, clock, config.tolerance, case.name, ends, take)
 
 
 def ride_of_model(
@@ -233,7 +231,8 @@ def ride_of_model(
     history = np.zeros((-(-len(course) // clock.per_output), COLUMNS))
     spilled = None if take is None else SpilledRows(COLUMNS)
     tally = np.zeros(TALLIES)
-    before = stored_energy(0.0, y, model, acts, scratch)
+    relax_oil(0.0, y, model, scratch)
+    before, oil_before = stored_energy(0.0, y, model, scratch), oil_energy(0.0, y, model, acts, scratch)
     stages, end = np.zeros((STAGES + 1, y.size)), np.zeros(y.size)
     rng = np.random.default_rng(0 if electronics is None else electronics.seed)
     for first in range(0, count, len(course)):
@@ -266,13 +265,16 @@ def ride_of_model(
         if take is not None and spilled is not None:
             take(first, course[: last - first])
             spilled.add(history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
-    change = stored_energy(clock.steps * clock.step, y, model, acts, scratch) - before
+    ended = clock.steps * clock.step
+    oil_change = float(y[OIL_WORK])
+    if model.control_spec.aim == VOLTAGE:
+        oil_change = oil_energy(ended, y, model, acts, scratch) - oil_before
     return Outcome(
         history=history if spilled is None else spilled,
         course=course if take is None else np.zeros((0, COURSE_COLUMNS)),
         step=clock.step,
         outside=float(tally[OUTSIDE] / (clock.steps + 1)),
-        energy_error=balance_error(change, y),
+        energy_error=balance_error(stored_energy(ended, y, model, scratch) - before, oil_change, y),
     )
 
 

@@ -27,8 +27,6 @@ from pzd.simulate.window import event_of
 _SHORT_SETTLE, _SHORT_PERIODS = 2.5, 3.0
 """A schedule is tried for so long before its window [s], and for so many periods in it: what the start leaves is then
 below 1 % of the motion. The best is ridden in full before it counts."""
-_SCHEDULE_TOLERANCE = 1e-4
-"""Of these short rides: a_w moves by less than 1e-4 of itself, as it is taken 100 times closer, see `ride_case`."""
 _SEARCH_TOLERANCE = 1e-6
 """Of the rides that are only compared: a_w moves by less than 1e-4 of itself."""
 
@@ -113,7 +111,7 @@ class Setup:
         control = round(self.config.control_period_s / h)
         steps = control * math.ceil((_SHORT_SETTLE + _SHORT_PERIODS * period) / (h * control))
         config = self.config.model_copy(
-            update={"duration_s": steps * h, "tolerance": max(self.config.tolerance, _SCHEDULE_TOLERANCE)}
+            update={"duration_s": steps * h, "tolerance": max(self.config.tolerance, _SEARCH_TOLERANCE)}
         )
         schedule = tuple(tuple(float(u) for u in axle) for axle in voltages)
         outcome = self._ride(config, case, replace(held, found=RideFound("search", 0.0, 0, schedule)))

@@ -18,17 +18,22 @@ from pzd.simulate.equations import motion, remember_step
 from pzd.simulate.ride_model import (
     COMPRESSION_PUSH,
     DYNAMIC,
+    ENERGIES,
     HEAVE_RATE,
+    OIL_1,
+    OIL_2,
     PITCH_RATE,
     RATE,
     REBOUND_PUSH,
     SIDE,
+    STATES,
     WHEEL_RATE_1,
     RideModel,
 )
 
 SCALES = np.array([1e-2, 1e-2, 1e-1, 1e-1, 1e-3, 1e-3, 10.0, 10.0, 10.0, 10.0, 1e-2, 1e-2, 1e-1, 1e-1, 10.0])
-"""A motion of ordinary size, below which the error is absolute: m, rad, m/s, rad/s, m, J; wheels: m, m/s, J."""
+"""A motion of ordinary size, below which the error is absolute; that of the oil always is, which flows much farther
+than its spring is deflected: m, rad, m/s, rad/s, m, J; wheels: m, m/s, J."""
 
 _CROSSED = 1e-9  # m/s on the other side of zero: the moment lies between this speed and twice as much
 _PUSHED = 1e-6  # m/s2: an axle that sticks slips between no push and this one
@@ -38,6 +43,16 @@ _MOST_CUTS = 50
 _AIM = 0.5  # of what is let pass: where the moment is looked for
 _INSIDE = 1e-3  # of a bracket: no guess is closer to its ends
 _HALVED = 4  # every so many guesses the bracket is halved, so that it shrinks whatever the law
+
+
+@inlined
+def _reach(i: int, dt: float, first: int, last: int, y: Array, stages: Array, end: Array) -> None:
+    """Fill a part of the state at which a stage stands; no motion depends on the energies before the last one."""
+    for n in range(first, last):
+        change = 0.0
+        for j in range(i):
+            change += STAGE_WEIGHTS[i, j] * stages[j, n]
+        end[n] = y[n] + dt * change
 
 
 @inlined
@@ -53,26 +68,25 @@ def trial(
     time, dt : [s]
     y : (n,) state
     model, control, workspace : see `ride_model`
-    stages : (STAGES, n) room to work in
+    stages : (STAGES, n) derivatives; the first is that at the start, the others are filled, the last is that at the end
     end : (n,) filled
 
     Returns
     -------
-    largest embedded error, as a share of |y| + `SCALES`
+    largest embedded error, as a share of |y| + `SCALES`, that of the oil of `SCALES` alone
     """
-    for i in range(STAGES):
-        for n in range(y.size):
-            change = 0.0
-            for j in range(i):
-                change += STAGE_WEIGHTS[i, j] * stages[j, n]
-            end[n] = y[n] + dt * change
+    for i in range(1, STAGES):
+        _reach(i, dt, 0, y.size if i == STAGES - 1 else ENERGIES, y, stages, end)
+        if model.car.wheels:
+            _reach(i, dt, STATES, y.size, y, stages, end)
         motion(time + TIMES[i] * dt, end, model, control, workspace, stages[i])
     worst = 0.0
     for n in range(y.size):
         error = 0.0
         for i in range(STAGES):
             error += ERROR_WEIGHTS[i] * stages[i, n]
-        share = abs(dt * error) / (SCALES[n] + abs(y[n]))
+        size = SCALES[n] if OIL_1 <= n <= OIL_2 else SCALES[n] + abs(y[n])
+        share = abs(dt * error) / size
         if not share < math.inf:  # a stage of too long a step overflowed
             return math.inf
         worst = max(worst, share)
@@ -196,9 +210,10 @@ def advance(
     time, h : start and length of the step [s]
     y : (n,) state; changed in place
     model, control, workspace : see `ride_model`; the workspace as `motion` left it at the start
+    stages : (STAGES + 1, n) the first is the derivative at the start; the others are room to work in
+    end : (n,) room to work in
     tolerance : largest local error as a share of the motion; infinite for a fixed step
     first : length of the first piece to try [s]
-    stages, end : room to work in, (STAGES + 1, n) and (n,)
 
     Returns
     -------
@@ -219,18 +234,29 @@ def advance(
         for n in range(y.size):
             y[n] = end[n]
         done += dt
+        if not worst < math.inf:  # the shortest piece overflowed, too: the ride is lost, see `ride`
+            return h
         if model.damper.slips and model.control_spec.fidelity == DYNAMIC:
             remember_step(time + done, model, control, workspace)
+        turned = False
         if model.control_spec.jumps:
-            _choose_sides(time + done, y, model, control, workspace, stages[STAGES])
+            turned = _choose_sides(time + done, y, model, control, workspace, stages[STAGES])
             before = min(farthest(model, control, workspace), -_AIM)
+        if turned:
+            motion(time + done, y, model, control, workspace, stages[0])
+        else:
+            for n in range(y.size):
+                stages[0, n] = stages[STAGES - 1, n]
         dt = tried if dt < tried else dt * min(growth, 5.0)
     return dt
 
 
 @inlined
-def _choose_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array) -> None:
-    """Let every axle that is beyond its side slip to the other one or stick."""
+def _choose_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array) -> bool:
+    """Let every axle that is beyond its side slip to the other one or stick; whether there was one."""
+    turned = False
     for i in range(2):
         if beyond(control, workspace, i) > 0.0:
             choose_side(i, time, y, model, control, workspace, dy)
+            turned = True
+    return turned

@@ -276,7 +276,7 @@ def main(cases: int = 24, seed: int = 1) -> None:
     usual: list[str] = []
     gained = {(name, factor, kind): 0 for name in names() for factor in (0.5, 2.0) for kind in ("right", "wrong")}
     changes = dict.fromkeys(((name, factor) for name in names() for factor in (0.5, 2.0)), 0)
-    with ProcessPoolExecutor(2) as pool:
+    with ProcessPoolExecutor(2, max_tasks_per_child=1) as pool:  # what is kept of a case goes with it: a GB
         for stood, outcomes, changed in pool.map(partial(replayed, seed, cases), range(cases)):
             usual.append(stood)
             for key, now in outcomes.items():

@@ -29,7 +29,8 @@ from pzd.simulate.ride_model import (
     COMFORT,
     CONTACT,
     FLOW,
-    OIL_2,
+    OIL_1,
+    OIL_DEFLECTION,
     SET,
     SINCE,
     WHEEL_1,
@@ -134,10 +135,11 @@ def choose(
 def _fill_now(y: Array, model: RideModel, plan: Predictor, workspace: Array) -> None:
     """Fill the state of the plant by that of the ride."""
     now, felt = plan.states[NOW], plan.felt
-    for n in range(OIL_2 + 1):
+    for n in range(OIL_1):
         now[n] = y[n]
     for i in range(2):
-        now[OIL_2 + 1 + i] = workspace[FLOW, i]
+        now[OIL_1 + i] = workspace[OIL_DEFLECTION, i]
+        now[OIL_1 + 2 + i] = workspace[FLOW, i]
     for n in range(2 * MODES):
         now[BODY_AND_OIL + n] = felt[n]
     if model.car.wheels:
