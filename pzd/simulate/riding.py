@@ -232,7 +232,7 @@ def ride_of_model(
     spilled = None if take is None else SpilledRows(COLUMNS)
     tally = np.zeros(TALLIES)
     relax_oil(0.0, y, model, scratch)
-    before, oil_before = stored_energy(0.0, y, model, scratch), oil_energy(0.0, y, model, acts, scratch)
+    before = stored_energy(0.0, y, model, scratch)
     stages, end = np.zeros((STAGES + 1, y.size)), np.zeros(y.size)
     rng = np.random.default_rng(0 if electronics is None else electronics.seed)
     for first in range(0, count, len(course)):
@@ -266,15 +266,16 @@ def ride_of_model(
             take(first, course[: last - first])
             spilled.add(history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
     ended = clock.steps * clock.step
-    oil_change = float(y[OIL_WORK])
+    change = stored_energy(ended, y, model, scratch) - before
+    oil_change = y[OIL_WORK]
     if model.control_spec.aim == VOLTAGE:
-        oil_change = oil_energy(ended, y, model, acts, scratch) - oil_before
+        oil_change = oil_energy(ended, y, model, acts, scratch)  # which was 0 at the start
     return Outcome(
         history=history if spilled is None else spilled,
         course=course if take is None else np.zeros((0, COURSE_COLUMNS)),
         step=clock.step,
         outside=float(tally[OUTSIDE] / (clock.steps + 1)),
-        energy_error=balance_error(stored_energy(ended, y, model, scratch) - before, oil_change, y),
+        energy_error=balance_error(change, oil_change, y),
     )
 
 

@@ -210,10 +210,10 @@ def advance(
     time, h : start and length of the step [s]
     y : (n,) state; changed in place
     model, control, workspace : see `ride_model`; the workspace as `motion` left it at the start
-    stages : (STAGES + 1, n) the first is the derivative at the start; the others are room to work in
-    end : (n,) room to work in
     tolerance : largest local error as a share of the motion; infinite for a fixed step
     first : length of the first piece to try [s]
+    stages : (STAGES + 1, n) the first is the derivative at the start; the others are room to work in
+    end : (n,) room to work in
 
     Returns
     -------
