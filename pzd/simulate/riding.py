@@ -265,11 +265,9 @@ def ride_of_model(
         if take is not None and spilled is not None:
             take(first, course[: last - first])
             spilled.add(history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
-    ended = clock.steps * clock.step
+    ended, moves = clock.steps * clock.step, model.control_spec.aim != VOLTAGE
     change = stored_energy(ended, y, model, scratch) - before
-    oil_change = y[OIL_WORK]
-    if model.control_spec.aim == VOLTAGE:
-        oil_change = oil_energy(ended, y, model, acts, scratch)  # which was 0 at the start
+    oil_change = y[OIL_WORK] if moves else oil_energy(ended, y, model, acts, scratch)  # none at the start
     return Outcome(
         history=history if spilled is None else spilled,
         course=course if take is None else np.zeros((0, COURSE_COLUMNS)),
