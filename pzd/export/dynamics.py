@@ -21,8 +21,9 @@ from pzd.record import Array
 from pzd.schema.errors import ConfigError
 
 CARRIED = (
-    *("asymmetry", "end_stop", "fluid_inertia", "gas_spring", "lash", "orifice_quadratic", "piezo_hysteresis"),
-    *("preload_offset", "relief_valve", "knee", "second_branch", "stribeck_friction", "temperature_drift"),
+    *("accumulator", "asymmetry", "end_stop", "fluid_inertia", "gas_spring", "lash", "orifice_quadratic"),
+    *("piezo_hysteresis", "preload_offset", "relief_valve", "knee", "second_branch", "stribeck_friction"),
+    "temperature_drift",
 )
 """Effects whose path under held inputs is a closed form, piece by piece; `sources/element.c` holds them."""
 VARIABLES = (

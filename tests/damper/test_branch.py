@@ -9,6 +9,7 @@ from pzd.damper.branch import branch_forces
 from pzd.damper.competing_forms import module_of
 from pzd.damper.compose import constant_rows, parallel_rows, respond, static_force, steady_force
 from pzd.damper.effects import library, nameable
+from pzd.damper.laws import arguments
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.rig.stand.frame import force_in_frame
@@ -159,11 +160,23 @@ def test_the_rate_is_the_derivative_of_what_a_travel_makes() -> None:
     """The half-car books by it what is stored and what slips."""
     for effect in (effect for effect in library().values() if effect.place == "branch"):
         laws = module_of(effect)
-        values = {p.name: p.neutral or 100.0 for p in effect.parameters}
+        given = {p.name: p.neutral or 100.0 for p in effect.parameters}
+        to, by = ({n: given[n] for n in arguments(f) if n in given} for f in (laws.advance, laws.rate))
         for side in (-1.0, 1.0):
-            for deflection in (0.0, 0.5e-3, laws.advance(0.0, side * np.inf, **values)):
-                moved = laws.advance(deflection, side * 1e-9, **values) - deflection
-                assert moved / (side * 1e-9) == pytest.approx(laws.rate(deflection, side, **values), abs=1e-6)
+            for deflection in (0.0, 0.5e-3, laws.advance(0.0, side * np.inf, **to)):
+                moved = laws.advance(deflection, side * 1e-9, **to) - deflection
+                assert moved / (side * 1e-9) == pytest.approx(laws.rate(deflection, side, **by), abs=1e-6)
+
+
+def test_two_travels_to_one_side_are_their_sum_and_a_step_may_be_cut_anywhere(rng: np.random.Generator) -> None:
+    for effect in (effect for effect in library().values() if effect.place == "branch"):
+        advance = module_of(effect).advance
+        given = {p.name: p.neutral or 100.0 for p in effect.parameters}
+        values = {name: given[name] for name in arguments(advance) if name in given}
+        for before, first, second in rng.normal(0.0, 2e-3, (100, 3)):
+            deflection, same_way = advance(0.0, before, **values), abs(first) * np.sign(second)
+            ended = advance(deflection, same_way + second, **values)
+            assert advance(advance(deflection, same_way, **values), second, **values) == pytest.approx(ended, abs=1e-14)
 
 
 def test_no_verdict_names_it() -> None:

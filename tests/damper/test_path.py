@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from pzd.damper.columns import STROKE_AND_FLOW
 from pzd.damper.compose import (
     TOLERANCE,
     constant_rows,
@@ -24,6 +23,7 @@ from pzd.damper.motion import Motion
 from pzd.damper.moving_element import whole_step
 from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance, march
 from pzd.damper.pieces import TimeStep
+from pzd.damper.regimes import spring_force
 from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
 
 STEP = 1e-3
@@ -44,6 +44,16 @@ FLOWS = [
     {"lash": {"delta": (2e-4, 9e-4), "at_voltage_V": (0.0, 150.0)}},
     {"lash": {"delta": 4e-4}, "rounded_yield": {"w_s": 0.03}, "orifice_quadratic": {"q": 2000.0}},
     {"shear_thinning": {"n": 0.8}, "relief_valve": {"F_r": 900.0, "C_r": 400.0}, "asymmetry": {"alpha": -0.1}},
+    {"cavitation": {"d_c": 2e-3, "s_c": 4e-4}},
+    {"cavitation": {"d_c": (-2e-3, -1e-3), "s_c": (4e-4, 1e-3), "at_voltage_V": (0.0, 150.0)}},
+    {"frame_compliance": {"d_f": 1e-3, "s_f": 4e-4}},
+    {"frame_compliance": {"d_f": (2e-3, 1e-3), "s_f": (4e-4, 1e-3), "at_voltage_V": (0.0, 150.0)}},
+    {
+        "lash": {"delta": 4e-4},
+        "cavitation": {"d_c": 1e-3, "s_c": 4e-4},
+        "frame_compliance": {"d_f": 1e-3, "s_f": 1e-3},
+        "relief_valve": {"F_r": 900.0, "C_r": 400.0},
+    },
 ]
 
 
@@ -67,19 +77,35 @@ def with_effects(effects: dict) -> Damper:
     return damper
 
 
+def squeezed(e: float, d: float, half: float) -> float:
+    """What is left of a deflection behind something that takes d s/(|s| + half) of it."""
+    return brentq(lambda s: s + d * s / (abs(s) + half) - e, -abs(e), abs(e), xtol=1e-18, rtol=1e-14) if e else 0.0
+
+
 def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
     """dF/dt written out by hand and integrated by LSODA piece by piece, w(F) found by bracketing."""
     values = {name: v for effect in damper.effects.values() for name, v in effect.items()}
     q, n, ws = values.get("q", 0.0), values.get("n", 1.0), values.get("w_s", 0.0)
     alpha, play = values.get("alpha", 0.0), np.broadcast_to(values.get("delta", 0.0), 2)
     F_r, C_r = values.get("F_r", np.inf), values.get("C_r", 1.0)
+    pocket, mount = (
+        [np.broadcast_to(values.get(name, neutral), 2) for name, neutral in pair]
+        for pair in ((("d_c", 0.0), ("s_c", 1.0)), (("d_f", 0.0), ("s_f", 1.0)))
+    )
 
     def parameters(u: float) -> tuple[float, float, float]:
         share = u / 150.0
         return 300 + 1000 * share, 2700 - 200 * share, 2e5 + 2e5 * share
 
-    def delta(u: float) -> float:
-        return play[0] + (play[1] - play[0]) * u / 150.0
+    def at(nodes: np.ndarray, u: float) -> float:
+        return float(nodes[0] + (nodes[1] - nodes[0]) * u / 150.0)
+
+    def extension(e: float, u: float) -> float:
+        """Of the oil spring: the free play is taken up first, then pocket and mount are squeezed."""
+        e = np.sign(e) * max(abs(e) - at(play, u) / 2, 0.0)
+        d = at(pocket[0], u)
+        e = squeezed(e, abs(d) * (d * e > 0.0), at(pocket[1], u))
+        return squeezed(e, at(mount[0], u), at(mount[1], u))
 
     def speed(F: float, T0: float, C: float) -> float:
         side = 1 + alpha * np.sign(F)
@@ -98,7 +124,7 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
         share = (t - motion.time[i]) / STEP
         voltage = motion.voltage[i] + share * (motion.voltage[i + 1] - motion.voltage[i])
         T0, C, k = parameters(voltage)
-        F = k * np.sign(e[0]) * max(abs(e[0]) - delta(voltage) / 2, 0.0)
+        F = k * extension(e[0], voltage)
         half = 0.5 * (motion.velocity[i + 1] - motion.velocity[i])
         u = (motion.displacement[i + 1] - motion.displacement[i]) / STEP + half * (2 * share - 1)
         return [u - np.sign(F) * speed(F, T0, C)]
@@ -107,8 +133,7 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
     for i in range(until - 1):
         run = solve_ivp(rate, motion.time[i : i + 2], [e], "RK45", rtol=1e-9, atol=1e-13, args=(i,), max_step=STEP / 4)
         e = run.y[0, -1]
-        k, free = parameters(motion.voltage[i + 1])[2], delta(motion.voltage[i + 1]) / 2
-        forces.append(k * np.sign(e) * max(abs(e) - free, 0.0))
+        forces.append(parameters(motion.voltage[i + 1])[2] * extension(e, motion.voltage[i + 1]))
     return np.array(forces)
 
 
@@ -277,8 +302,7 @@ def test_the_parabola_inside_a_step_makes_a_sampled_sine_four_hundred_times_bett
 def test_energy_goes_into_the_spring_the_oil_and_the_valve_and_nowhere_else(effects: dict) -> None:
     motion = sine(75 + 70 * np.sin(2 * np.pi * 2.3 * TIME))
     rows = element_rows(with_effects(effects), motion.voltage, None)
-    state, stored, work = np.zeros(STATES), 0.0, 0.0
-    play = 3 + STROKE_AND_FLOW.index(("lash", "delta"))
+    state, work = np.zeros(STATES), 0.0
     points, weights = np.polynomial.legendre.leggauss(4)
     for i in range(len(TIME) - 1):
         p0, p1 = row_of(rows[i]), row_of(rows[i + 1])
@@ -290,9 +314,10 @@ def test_energy_goes_into_the_spring_the_oil_and_the_valve_and_nowhere_else(effe
             probe, u = state.copy(), mean + half * (2 * share - 1)
             advance(probe, TimeStep(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, False)
             e = probe[DEFLECTION]
-            work += 0.5 * w * STEP * middle[2] * np.sign(e) * max(abs(e) - middle[play] / 2, 0.0) * u
+            work += 0.5 * w * STEP * spring_force(e, middle) * u
         advance(state, TimeStep(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, True)
-    stored = 0.5 * rows[-1, 2] * max(abs(state[DEFLECTION]) - rows[-1, play] / 2, 0.0) ** 2
+    wound = np.linspace(0.0, state[DEFLECTION], 2001)
+    stored = np.trapezoid([spring_force(e, row_of(rows[-1])) for e in wound], wound)
     assert state[DISSIPATED] > 0.0
     assert abs(stored + state[DISSIPATED] - state[VALVE_WORK] - work) <= 2e-6 * state[DISSIPATED]
 

@@ -190,6 +190,7 @@ def test_lengths_and_masses_are_one_value_at_every_voltage(rng: np.random.Genera
     fitted = fit(whole, ("end_stop", "preload_offset"), whole.start_with(truth))
     assert [c.effect for c in by_voltage(whole, fitted)] == ["preload_offset"]
     assert {name for name, effect in library().items() if effect.same_at_every_voltage} == {
+        "accumulator",
         "end_stop",
         "fluid_inertia",
     }

@@ -11,6 +11,7 @@ from campaign import damper_of, sine, waveform
 from scipy.integrate import solve_ivp
 
 from pzd.damper.compose import respond
+from pzd.damper.hysteresis import hysteresis_after
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.campaign import Campaign
@@ -24,7 +25,6 @@ from pzd.diagnose.peer import Peer, PeerForm, StrokeMotion
 from pzd.diagnose.peer_fit import FittedTest, PeerFit, between_voltages, fit_peer
 from pzd.diagnose.peer_prediction import KeptBackTests
 from pzd.diagnose.peers import peers
-from pzd.diagnose.peers.bouc_wen import hysteresis_after
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig
 

@@ -49,6 +49,7 @@ BESIDE = {
     "fluid_inertia": {"m": 12.0},
     "gas_spring": {"k_g": 3000.0},
     "preload_offset": {"F_0": -80.0},
+    "accumulator": {"F_g": 250.0, "L": 0.04},
     "end_stop": {"k_e": 3e4, "x_e": 0.02},
     "stribeck_friction": {"F_s": 120.0, "v_s": 0.05},
     "second_branch": {"T0_2": (60.0, 300.0), "k_2": (9e4, 4e4), "at_voltage_V": (0.0, 150.0)},

@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from pzd.compiled import compiled
+from pzd.damper.hysteresis import hysteresis_after
 from pzd.diagnose.peer import Coefficient, Peer, PeerForm, ShapeParameter, StrokeMotion
 from pzd.record import Array
 
@@ -22,8 +23,6 @@ STEEPNESS = np.geomspace(1.0, 3000.0, 9)
 """rho of the grid times the largest amplitude: from a hysteresis that never saturates to one that is nearly a step."""
 UNLOADING = (0.5, 0.8, 1.2, 2.0, 5.0, 20.0)
 """sigma of the grid: from an unloading as stiff as at z = 0 to one that is nearly a step."""
-STRAIGHT = 1e-9
-"""Below this `2 sigma - 1` the unloading is straight to rounding."""
 
 
 def columns(exponent: int, motion: StrokeMotion, shape: Array) -> Array:
@@ -40,37 +39,6 @@ def grid(motions: Sequence[StrokeMotion]) -> Array:
     """(g, 2) rho [1/m] and sigma [-] from which the search begins."""
     widest = max(float(np.max(np.abs(motion.displacement))) for motion in motions)
     return np.array([(steep / widest, sigma) for steep in STEEPNESS for sigma in UNLOADING])
-
-
-@compiled
-def hysteresis_after(z: float, travel: float, rho: float, sigma: float, exponent: int) -> float:
-    """The hysteretic variable [-] after a travel of the rod to one side [m].
-
-    Equation: dq/ds = 1 + (2 sigma - 1) |q|^n for q < 0, 1 - q^n for q >= 0, q = z sign(dx), s = rho |dx|
-                                        Source: Wen 1976, normalised as by Ikhouane and Rodellar 2005; n = 1, 2 solved
-    """
-    side = 1.0 if travel > 0.0 else -1.0
-    s, q = rho * abs(travel), side * z
-    if q < 0.0:
-        ratio, p = 2.0 * sigma - 1.0, -q
-        root = np.sqrt(ratio)
-        if ratio < STRAIGHT:
-            way, p = p, p - s
-        elif exponent == 1:
-            way = np.log1p(ratio * p) / ratio
-            p = ((1.0 + ratio * p) * np.exp(-ratio * s) - 1.0) / ratio
-        else:
-            way = np.arctan(root * p) / root
-            p = np.tan(root * max(way - s, 0.0)) / root
-        if s < way:
-            return -side * float(p)
-        s, q = s - way, 0.0
-    if exponent == 1:
-        loaded = 1.0 - (1.0 - q) * np.exp(-s)
-    else:
-        t = np.tanh(s)
-        loaded = (q + t) / (1.0 + q * t)
-    return side * float(loaded)
 
 
 @compiled

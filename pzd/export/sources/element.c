@@ -170,6 +170,8 @@ static double parallel(double x, double v, double a, const double *p)
         force += copysign(p[END_STOP_K_E] * beyond * beyond, x);
     if (p[STRIBECK_FRICTION_F_S] != 0.0 && v != 0.0)
         force += copysign(p[STRIBECK_FRICTION_F_S] * exp(-slow * slow), v);
+    if (p[ACCUMULATOR_F_G] != 0.0)
+        force -= p[ACCUMULATOR_F_G] * pow(fmax(1.0 + x / p[ACCUMULATOR_L], 0.05), -1.3);
     return force;
 }
 
