@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,7 @@ class Record:
     temperature: Array | None = None
     pressure: Array | None = None
 
-    @property
+    @cached_property
     def rate(self) -> float:
         """Sampling rate [Hz], from the median step, or the mean of the usual ones where a coarse clock rounds them."""
         steps = np.diff(self.time)

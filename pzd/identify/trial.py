@@ -10,7 +10,6 @@ criterion; so is the rest behind the motion.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,10 +57,13 @@ class Trial:
 
 def trial_of(record: Record) -> Trial:
     """The record made ready for fitting, its warm-up and the rest after it left out."""
+    from pzd.signals.cubic import cubic_through
+
     time, factor, positions = _fine_time(record)
+    clock = record.time if positions is not None else np.linspace(record.time[0], record.time[-1], record.time.size)
     return Trial(
         record.name,
-        _spline(record.time, record.displacement, positions is None)(time),
+        cubic_through(clock, record.displacement, time),
         float((time[-1] - time[0]) / (time.size - 1)),
         factor,
         record.force,
@@ -116,9 +118,3 @@ def _fine_time(record: Record) -> tuple[Array, int, Array | None]:
     count = int(np.ceil((time[-1] - time[0]) * record.rate * factor)) + 1
     fine = np.linspace(time[0], time[-1], count)
     return fine, factor, (time - time[0]) / (fine[1] - fine[0])
-
-
-def _spline(time: Array, channel: Array, regular: bool) -> Any:
-    from scipy.interpolate import CubicSpline
-
-    return CubicSpline(np.linspace(time[0], time[-1], time.size) if regular else time, channel)

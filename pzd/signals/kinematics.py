@@ -13,6 +13,7 @@ import numpy as np
 from pzd.record import Array
 from pzd.signals.cycles import Cycles
 from pzd.signals.smoothing import HIGHEST, low_pass
+from pzd.signals.step import usual_step
 
 STANDARD_ERRORS = 4.0
 """A harmonic is kept where its mean exceeds this many standard errors of its scatter over cycles."""
@@ -119,7 +120,7 @@ def _smoothed(time: Array, displacement: Array, highest: float) -> Kinematics:
     from scipy.interpolate import CubicSpline
 
     steps = np.diff(time)
-    step = max(float(np.median(steps)), float(time[-1] - time[0]) / (4.0 * time.size))
+    step = max(usual_step(time), float(time[-1] - time[0]) / (4.0 * time.size))
     regular = bool(np.all(np.abs(steps - step) < 1e-3 * step))
     grid = time if regular else np.arange(time[0], time[-1] + 0.5 * step, step)
     values = displacement if regular else np.interp(grid, time, displacement)

@@ -111,4 +111,10 @@ def _stretches(time: Array, displacement: Array) -> list[Stretch]:
 
 
 def _alike(amplitudes: Array, periods: Array) -> bool:
-    return all(float(np.ptp(values)) <= ALIKE * float(np.median(values)) for values in (amplitudes, periods))
+    return all(_within(values) for values in (amplitudes, periods))
+
+
+def _within(values: Array) -> bool:
+    """Whether positive values scatter by no more than the share of their median, which is no less than the least."""
+    scatter = float(np.ptp(values))
+    return scatter <= ALIKE * float(values.min()) or scatter <= ALIKE * float(np.median(values))
