@@ -14,10 +14,10 @@ import pzd
 ORDER = (
     "quantities",
     "own_effects",
+    "compiled",
     "schema",
     "parallel",
     "record",
-    "compiled",
     "signals",
     "damper",
     "artefacts",
