@@ -136,9 +136,9 @@ def _channels(record: Record) -> Mapping[str, Array | None]:
 
 def _as_read(record: Record) -> Record:
     """The record itself where its channels are so already, for what is remembered of it goes by the record."""
-    given = {field.name: getattr(record, field.name) for field in fields(record)}
-    channels = {name: np.ascontiguousarray(v, np.float64) for name, v in given.items() if isinstance(v, np.ndarray)}
-    return record if all(given[name] is v for name, v in channels.items()) else replace(record, **channels)
+    given: list[Any] = [getattr(record, field.name) for field in fields(record)]
+    read: list[Any] = [np.ascontiguousarray(v, np.float64) if isinstance(v, np.ndarray) else v for v in given]
+    return record if all(a is b for a, b in zip(given, read, strict=True)) else Record(*read)
 
 
 def _read_record(folder: Path, number: int, entry: RecordEntry, control: Control) -> Record:

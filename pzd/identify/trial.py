@@ -10,6 +10,7 @@ criterion; so is the rest behind the motion.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,22 @@ class Trial:
     """(n,) whether the sample enters the criterion."""
     positions: Array | None = None
     """(n,) where the samples lie on the fine grid, in fine steps; None where every `factor`-th one is a sample."""
+
+    @property
+    def every(self) -> int:
+        """Fine steps from one simulated force that is needed to the next."""
+        return self.factor if self.positions is None else 1
+
+    def met(self, simulated: Array) -> Array:
+        """What of a simulated signal, every so many fine steps, (n,) or (n, p), stands against the counted samples."""
+        return (simulated if self.positions is None else self.at_samples(simulated))[self._counted_rows]
+
+    @cached_property
+    def _counted_rows(self) -> slice | NDArray[np.bool_]:
+        """The counted samples: nearly always one piece, which need not be picked out one by one."""
+        rows = np.flatnonzero(self.counted)
+        whole = rows.size > 0 and rows[-1] - rows[0] == rows.size - 1
+        return slice(int(rows[0]), int(rows[-1]) + 1) if whole else self.counted
 
     def at_samples(self, fine: Array) -> Array:
         """What a fine signal, (m,) or (m, p), reads at the n samples."""
