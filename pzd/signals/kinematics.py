@@ -108,11 +108,11 @@ def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:
     spectrum = np.where(significant_harmonics(folded), np.fft.rfft(folded.mean(axis=0)), 0.0)
     rate = 2j * np.pi * np.arange(spectrum.size) * run.frequency
     fine = 8 * points
-    cycle = [np.fft.irfft(spectrum * rate**order, fine) * (fine / points) for order in range(3)]
+    cycle = np.stack([np.fft.irfft(spectrum * rate**order, fine) * (fine / points) for order in range(3)], axis=1)
     grid = np.linspace(0.0, 1.0, fine + 1)
     phase = run.phase(time[run.inside(time)])
-    wrapped = [CubicSpline(grid, np.append(values, values[0]), bc_type="periodic")(phase) for values in cycle]
-    return Kinematics(*wrapped)
+    wrapped = CubicSpline(grid, np.concatenate((cycle, cycle[:1])), bc_type="periodic")(phase)
+    return Kinematics(*np.ascontiguousarray(wrapped.T))
 
 
 def _smoothed(time: Array, displacement: Array, highest: float) -> Kinematics:
