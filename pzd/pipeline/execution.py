@@ -139,7 +139,7 @@ class Pipeline:
         if name == "setting":
             return self.setting()
         given = {"seed": self.config.seed, "folder": self.run.config.parent}
-        return (given | {"jobs": self.jobs, "progress": self.progress})[name]
+        return (given | {"jobs": self.jobs, "progress": self.progress, "preflight": True})[name]
 
     def setting(self) -> str | None:
         """The setting in use, by the config and the records of the run."""

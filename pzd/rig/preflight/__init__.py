@@ -84,18 +84,19 @@ def findings(test: Measured) -> tuple[Finding, ...]:
     return (*test.remarks, *(finding for module in checks().values() for finding in module.check(test)))
 
 
-def examined(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:
+def examined(tests: Sequence[Callable[[], Measured]], jobs: int, preflight: bool = True) -> Rig:
     """The artefact of the rig: every record, and an entry about each with what the checks found.
 
     Parameters
     ----------
     tests : each makes one record
     jobs : records made and examined at the same time
+    preflight : whether they are examined; an entry has no findings otherwise
     """
 
     def listed(given: Callable[[], Measured]) -> tuple[Record, Cycles | None, RecordEntry, tuple[IngestRow, ...]]:
         test = given()
-        return test.record, test.run, _entry(test), test.ingested
+        return test.record, test.run, _entry(test, findings(test) if preflight else ()), test.ingested
 
     found = parallel_map(listed, tests, jobs)
     for record, run, _, _ in found:
@@ -106,12 +107,12 @@ def examined(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:
     return Rig(tuple(record for record, *_ in found), entries, tuple(row for *_, rows in found for row in rows))
 
 
-def _entry(test: Measured) -> RecordEntry:
+def _entry(test: Measured, found: tuple[Finding, ...]) -> RecordEntry:
     record = test.record
     return RecordEntry(
         name=record.name,
         setting=record.setting,
-        findings=findings(test),
+        findings=found,
         removed=test.removed,
         **extent(record, test.run),
     )
