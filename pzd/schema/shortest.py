@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from pzd.compiled import compiled
 
-Array = NDArray[np.float64]
 Text = NDArray[np.uint8]
 Powers = NDArray[np.uint64]
 
@@ -26,7 +25,7 @@ _ZEROS = 4
 """Zeros behind the point up to which, less one, `repr` writes no exponent."""
 
 
-def shortest_lines(table: Array, present: NDArray[np.bool_]) -> bytes:
+def shortest_lines(table: NDArray[np.float64], present: NDArray[np.bool_]) -> bytes:
     """Rows of a CSV file, one line a row.
 
     Parameters
@@ -60,7 +59,12 @@ def _powers() -> tuple[Powers, Powers]:
 
 @compiled
 def _fill_lines(
-    table: Array, present: NDArray[np.bool_], upper: Powers, lower: Powers, text: Text, end: NDArray[np.int64]
+    table: NDArray[np.float64],
+    present: NDArray[np.bool_],
+    upper: Powers,
+    lower: Powers,
+    text: Text,
+    end: NDArray[np.int64],
 ) -> None:
     """Fill the text of the rows, and where it ends."""
     bits = table.view(np.uint64)
