@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,7 @@ class Record:
     temperature: Array | None = None
     pressure: Array | None = None
 
-    @property
+    @cached_property
     def rate(self) -> float:
         """Sampling rate [Hz], from the median step, or the mean of the usual ones where a coarse clock rounds them."""
         steps = np.diff(self.time)
@@ -98,7 +99,7 @@ class Condition:
     records: tuple[Record, ...]
 
 
-def glitches(values: Array) -> NDArray[np.int64]:
+def glitches(values: Array, away: Array | None = None) -> NDArray[np.int64]:
     """Rows of up to three samples that jump away from their neighbours and back.
 
     They stand out of the running median of seven samples by ten robust standard deviations of what stands
@@ -107,8 +108,9 @@ def glitches(values: Array) -> NDArray[np.int64]:
     Parameters
     ----------
     values : (n,) of any channel
+    away : (n,) their deviation from their neighbours, where it is known
     """
-    deviation = np.abs(from_neighbours(values))
+    deviation = np.abs(from_neighbours(values) if away is None else away)
     noise = 1.4826 * float(np.median(deviation))
     steepest = float(np.percentile(np.abs(np.diff(values)), 99.0)) if values.size > 1 else 0.0
     low, high = np.percentile(values, (0.5, 99.5))
@@ -133,8 +135,9 @@ def without_glitches(values: Array) -> Array:
     usual = float(np.median(np.abs(values)))
     if float(np.ptp(values)) <= CONSTANT_SHARE * usual:
         return values
-    rows = glitches(values)
-    rows = rows[np.abs(from_neighbours(values)[rows]) > CONSTANT_SHARE * usual]
+    away = from_neighbours(values)
+    rows = glitches(values, away)
+    rows = rows[np.abs(away[rows]) > CONSTANT_SHARE * usual]
     return np.delete(values, rows) if rows.size else values
 
 

@@ -32,6 +32,7 @@ def element_force(
     stiffness: float,
     initial_force: float = 0.0,
     velocity: Array | None = None,
+    every: int = 1,
 ) -> Array:
     """Force of the Bingham element under a sampled displacement.
 
@@ -47,14 +48,15 @@ def element_force(
     initial_force : F at the first sample [N]
     velocity : (n,) extension speed [m/s], whose change bends the displacement to a parabola inside each step;
         None: linear between samples
+    every : from the first sample on, the force of every so many-th is kept
 
     Returns
     -------
-    (n,) force [N]
+    (n,) force [N], or as many of them as are kept
     """
-    force = np.empty(displacement.size)
+    force = np.empty(_kept(displacement.size, every))
     bend, steps = _STRAIGHT if velocity is None else velocity, np.atleast_1d(np.asarray(step, dtype=np.float64))
-    _march(displacement, bend, steps, friction, damping, stiffness, initial_force, force, _NO_SLOPES)
+    _march(displacement, bend, steps, friction, damping, stiffness, initial_force, force, _NO_SLOPES, every)
     return force
 
 
@@ -84,6 +86,7 @@ def element_force_sensitivities(
     stiffness: float,
     initial_force: float = 0.0,
     velocity: Array | None = None,
+    every: int = 1,
 ) -> tuple[Array, Array]:
     """Force of the Bingham element and its derivatives by T0, C and k, the initial force held.
 
@@ -92,16 +95,21 @@ def element_force_sensitivities(
 
     Parameters
     ----------
-    displacement, step, friction, damping, stiffness, initial_force, velocity : as `element_force`
+    displacement, step, friction, damping, stiffness, initial_force, velocity, every : as `element_force`
 
     Returns
     -------
-    (n,) force [N] and (n, 3) dF/dT0 [-], dF/dC [m/s], dF/dk [m]
+    (n,) force [N] and (n, 3) dF/dT0 [-], dF/dC [m/s], dF/dk [m], or as many of them as are kept
     """
-    force, slopes = np.empty(displacement.size), np.empty((displacement.size, 3))
+    kept = _kept(displacement.size, every)
+    force, slopes = np.empty(kept), np.empty((kept, 3))
     bend, steps = _STRAIGHT if velocity is None else velocity, np.atleast_1d(np.asarray(step, dtype=np.float64))
-    _march(displacement, bend, steps, friction, damping, stiffness, initial_force, force, slopes)
+    _march(displacement, bend, steps, friction, damping, stiffness, initial_force, force, slopes, every)
     return force, slopes
+
+
+def _kept(samples: int, every: int) -> int:
+    return -(-samples // every)
 
 
 class Element(NamedTuple):
@@ -171,15 +179,25 @@ def stick(F: float, k: float, u0: float, u1: float, time: float) -> float:
 
 @compiled
 def _march(
-    x: Array, v: Array, steps: Array, T0: float, C: float, k: float, F: float, force: Array, slopes: Array
+    x: Array, v: Array, steps: Array, T0: float, C: float, k: float, F: float, force: Array, slopes: Array, every: int
 ) -> None:
-    """Fill force and, where it is not empty, slopes: most steps lie in one regime, the others are cut."""
+    """Fill force and, where it is not empty, slopes: most steps lie in one regime, the others are cut.
+
+    Every so many-th sample has a row; one of slopes is brought along until it stands for the sample that it is for.
+    """
     element, over = Element(T0, C, k), relaxation(steps[0], C, k)
     force[0] = F
     for column in range(3 if slopes.size else 0):
         slopes[0, column] = 0.0
-    side = _side(F, T0)
+    side, row, left = _side(F, T0), 0, 0
     for i in range(1, x.size):
+        if left == 0:
+            row, left = row + 1, every
+            for column in range(3 if row < len(slopes) else 0):
+                slopes[row, column] = slopes[row - 1, column]
+        if row == force.size:
+            break  # no sample is kept any more
+        left -= 1
         h = steps[min(i - 1, steps.size - 1)]
         if h != over.time:
             over = relaxation(h, C, k)
@@ -192,16 +210,13 @@ def _march(
         else:
             end = slip(F, side * T0, u0, u1, over)
             whole = side * end > T0 and (side * u0 >= 0.0 or side * u1 <= 0.0)
-        if slopes.size:
-            for column in range(3):
-                slopes[i, column] = slopes[i - 1, column]
-            if whole:
-                _carry(slopes[i : i + 1], F, side, u0, u1, element, over)
+        if slopes.size and whole:
+            _carry(slopes[row : row + 1], F, side, u0, u1, element, over)
         if not whole:
-            end = _cut(F, u0, u1, h, element, slopes[i : i + 1])
+            end = _cut(F, u0, u1, h, element, slopes[row : row + 1])
             side = _side(end, T0)
         F = end
-        force[i] = F
+        force[row] = F
 
 
 @compiled
@@ -209,7 +224,7 @@ def _march_each(x: Array, v: Array, steps: Array, elements: Array, forces: Array
     """The same for many elements (m, 3), into (m, n) forces."""
     for i in range(len(elements)):
         T0, C, k = elements[i]
-        _march(x, v, steps, T0, C, k, 0.0, forces[i], slopes)
+        _march(x, v, steps, T0, C, k, 0.0, forces[i], slopes, 1)
 
 
 @inlined

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pzd.artefacts import MeasureRow
-from pzd.artefacts.matching import same_motion
+from pzd.artefacts.matching import SAME_MOTION, same_motion
 from pzd.identify.trial import warm_up
 from pzd.record import SAME_TEMPERATURE, Array, Record, is_constant, voltage_scale
 from pzd.signals.cycles import Cycles
@@ -44,7 +45,8 @@ def measures(records: Sequence[Record]) -> tuple[MeasureRow, ...]:
     scale = voltage_scale(records)
     still = [(record, is_constant(record, scale)) for record in records]
     rows = [_row(test, constant) for r, constant in still for test in (separate_tests(r) if constant else (r,))]
-    return tuple(row.model_copy(update={"dynamic_range": _dynamic_range(row, rows)}) for row in rows)
+    alike = _Alike(rows)
+    return tuple(row.model_copy(update={"dynamic_range": _dynamic_range(row, alike.to(row))}) for row in rows)
 
 
 def equivalent_damping(work_done: float, velocity: Array, step: float) -> float:
@@ -138,11 +140,29 @@ def _row(record: Record, still: bool) -> MeasureRow:
     )
 
 
-def _dynamic_range(row: MeasureRow, rows: Sequence[MeasureRow]) -> float | None:
+class _Alike:
+    """Finds the tests like one among many: by setting and speed first, for of a thousand few are alike."""
+
+    def __init__(self, rows: Sequence[MeasureRow]) -> None:
+        self.rows: dict[str | None, list[tuple[float, int, MeasureRow]]] = {}
+        for number, row in enumerate(rows):
+            if row.voltage_V is not None and row.frequency_Hz is not None:
+                self.rows.setdefault(row.setting, []).append((row.peak_velocity_m_per_s, number, row))
+        for of_setting in self.rows.values():
+            of_setting.sort(key=lambda entry: entry[:2])
+
+    def to(self, row: MeasureRow) -> list[MeasureRow]:
+        """The tests with a voltage and a frequency that are the same but for the voltage, in the rows' order."""
+        speed, mine = row.peak_velocity_m_per_s, self.rows.get(row.setting, [])
+        low = bisect_left(mine, speed * (1.0 - 2.0 * SAME_MOTION), key=lambda entry: entry[0])
+        high = bisect_right(mine, speed * (1.0 + 2.0 * SAME_MOTION), key=lambda entry: entry[0])
+        return [r for _, _, r in sorted(mine[low:high], key=lambda entry: entry[1]) if _same_test(r, row)]
+
+
+def _dynamic_range(row: MeasureRow, others: Sequence[MeasureRow]) -> float | None:
     """Peak force over that of the lowest voltage at the same speed, setting and temperature."""
     if row.voltage_V is None or row.frequency_Hz is None:
         return None
-    others = [r for r in rows if r.voltage_V is not None and r.frequency_Hz is not None and _same_test(r, row)]
     lowest = min(others, key=lambda r: r.voltage_V or 0.0)
     if lowest.voltage_V == max(r.voltage_V or 0.0 for r in others):
         return None
@@ -153,4 +173,4 @@ def _same_test(a: MeasureRow, b: MeasureRow) -> bool:
     speeds = a.peak_velocity_m_per_s, b.peak_velocity_m_per_s
     strokes = a.amplitude_m, b.amplitude_m
     warm = abs((a.temperature_degC or 0.0) - (b.temperature_degC or 0.0)) <= SAME_TEMPERATURE
-    return a.setting == b.setting and warm and same_motion(*speeds) and same_motion(*strokes)
+    return warm and same_motion(*speeds) and same_motion(*strokes)

@@ -56,7 +56,7 @@ class Objective:
         """(N,) force of the element [N]."""
         return np.concatenate(
             [
-                t.at_samples(element_force(t.displacement, t.step, *parameters, float(t.force[0])))[t.counted]
+                t.met(element_force(t.displacement, t.step, *parameters, float(t.force[0]), every=t.every))
                 for t in self.trials
             ]
         )
@@ -74,9 +74,11 @@ class Objective:
         """(N,) force of the element and (N, 3) its derivatives by T0, C and k."""
         forces, slopes = [], []
         for t in self.trials:
-            force, slope = element_force_sensitivities(t.displacement, t.step, *parameters, float(t.force[0]))
-            forces.append(t.at_samples(force)[t.counted])
-            slopes.append(t.at_samples(slope)[t.counted])
+            force, slope = element_force_sensitivities(
+                t.displacement, t.step, *parameters, float(t.force[0]), every=t.every
+            )
+            forces.append(t.met(force))
+            slopes.append(t.met(slope))
         return np.concatenate(forces), np.concatenate(slopes)
 
     def _projected(self, values: Array) -> Array:

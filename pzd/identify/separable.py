@@ -6,6 +6,8 @@ linearly from the rest and only delta = T0/k and tau = C/k are searched.
 
 from __future__ import annotations
 
+from typing import overload
+
 import numpy as np
 
 from pzd.damper.element import element_force
@@ -22,6 +24,8 @@ DESCENTS = 3
 """How many of the best grid points are followed down."""
 SAME_OPTIMUM = 1e-6
 """Two descents whose criteria differ by less, relative, have reached the same optimum."""
+_REMEMBERED = 2
+"""Points whose forces are kept: where a descent stands, and where it has just tried to go."""
 TOLERANCE = 1e-12
 """Tolerance of the least squares, relative, on parameters and criterion."""
 
@@ -29,15 +33,20 @@ TOLERANCE = 1e-12
 def fit_separable(objective: Objective) -> Fit:
     """The global optimum of the criterion, from the graphical starting values and the grid.
 
-    Starts are followed down until the best optimum has been reached twice.
+    Starts are followed down until the best optimum has been reached twice. A second descent need not end: on one whose
+    criterion has come this close to an optimum that is known, another does not lie by chance.
     """
     best = descend(objective, graphical_start(objective.trials))
     for start in grid_starts(objective):
-        fit = descend(objective, start)
-        if abs(fit.criterion - best.criterion) <= SAME_OPTIMUM * best.criterion:
+        fit = descend(objective, start, best.criterion)
+        if fit is None:
             return best
         best = min(best, fit, key=lambda f: f.criterion)
     return best
+
+
+class _Reached(Exception):  # noqa: N818  # nothing went wrong
+    """A descent has come to an optimum that is known."""
 
 
 def grid_starts(objective: Objective, count: int = DESCENTS) -> list[Bingham]:
@@ -60,49 +69,75 @@ def grid_starts(objective: Objective, count: int = DESCENTS) -> list[Bingham]:
     return [objective.clipped(start) for _, start in sorted(found)[:count]]
 
 
-def descend(objective: Objective, start: Bingham) -> Fit:
-    """The optimum reached from a starting point by trust-region least squares within the bounds."""
+@overload
+def descend(objective: Objective, start: Bingham) -> Fit: ...
+@overload
+def descend(objective: Objective, start: Bingham, known: float) -> Fit | None: ...
+def descend(objective: Objective, start: Bingham, known: float | None = None) -> Fit | None:
+    """The optimum reached from a starting point by trust-region least squares within the bounds.
+
+    Parameters
+    ----------
+    objective : what is minimised
+    start : where from
+    known : criterion of an optimum that is known already
+
+    Returns
+    -------
+    the optimum; None as soon as the known one is reached, which is that much of the way saved
+    """
     from scipy.optimize import least_squares
 
     stroke = objective.scales[2]
     norm = np.sqrt(objective.energy)
     low, high = objective.search_bounds
 
-    def reduced(x: Array) -> Array:
+    def reduced(fit: Fit) -> Array:
         """(4, 4) triangle whose last column and first three have the products of residuals and slopes."""
-        parameters = from_search(x, stroke)
-        residuals, slopes = objective.residuals_and_slopes(parameters)
-        together = np.column_stack([-slopes @ search_slopes(parameters, stroke), residuals]) / norm
+        together = np.column_stack([fit.slopes @ -search_slopes(fit.parameters, stroke), fit.residuals])
+        together /= norm
         return np.asarray(np.linalg.qr(together, mode="r"))
 
-    memory: dict[bytes, Array] = {}
+    memory: dict[bytes, tuple[Fit, Array]] = {}
 
-    def at(x: Array) -> Array:
+    def at(x: Array) -> tuple[Fit, Array]:
         key = x.tobytes()
         if key not in memory:
-            memory.clear()
-            memory[key] = reduced(x)
+            if len(memory) == _REMEMBERED:
+                memory.pop(next(iter(memory)))
+            fit = _fit_at(objective, from_search(x, stroke))
+            memory[key] = fit, reduced(fit)
         return memory[key]
 
     def residuals_at(x: Array) -> Array:
-        return at(x)[:, 3]
+        fit, triangle = at(x)
+        if known is not None and abs(fit.criterion - known) <= SAME_OPTIMUM * known:
+            raise _Reached
+        return triangle[:, 3]
 
     def slopes_at(x: Array) -> Array:
-        return at(x)[:, :3]
+        return at(x)[1][:, :3]
 
     inside = np.clip(to_search(start, stroke), low + 1e-9, high - 1e-9)
-    found = least_squares(
-        residuals_at,
-        inside,
-        jac=slopes_at,
-        bounds=(low, high),
-        x_scale="jac",
-        xtol=TOLERANCE,
-        ftol=TOLERANCE,
-        gtol=TOLERANCE,
-        max_nfev=100,
-    )
-    parameters = from_search(found.x, stroke)
+    try:
+        found = least_squares(
+            residuals_at,
+            inside,
+            jac=slopes_at,
+            bounds=(low, high),
+            x_scale="jac",
+            xtol=TOLERANCE,
+            ftol=TOLERANCE,
+            gtol=TOLERANCE,
+            max_nfev=100,
+        )
+    except _Reached:
+        return None
+    return at(found.x)[0]
+
+
+def _fit_at(objective: Objective, parameters: Bingham) -> Fit:
+    """The parameters as a fit, however good."""
     residuals, slopes = objective.residuals_and_slopes(parameters)
     return Fit(parameters, float(residuals @ residuals) / objective.energy, residuals, slopes)
 

@@ -10,7 +10,7 @@ criterion; so is the rest behind the motion.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,22 @@ class Trial:
     positions: Array | None = None
     """(n,) where the samples lie on the fine grid, in fine steps; None where every `factor`-th one is a sample."""
 
+    @property
+    def every(self) -> int:
+        """Fine steps from one simulated force that is needed to the next."""
+        return self.factor if self.positions is None else 1
+
+    def met(self, simulated: Array) -> Array:
+        """What of a simulated signal, every so many fine steps, (n,) or (n, p), stands against the counted samples."""
+        return (simulated if self.positions is None else self.at_samples(simulated))[self._counted_rows]
+
+    @cached_property
+    def _counted_rows(self) -> slice | NDArray[np.bool_]:
+        """The counted samples: nearly always one piece, which need not be picked out one by one."""
+        rows = np.flatnonzero(self.counted)
+        whole = rows.size > 0 and rows[-1] - rows[0] == rows.size - 1
+        return slice(int(rows[0]), int(rows[-1]) + 1) if whole else self.counted
+
     def at_samples(self, fine: Array) -> Array:
         """What a fine signal, (m,) or (m, p), reads at the n samples."""
         if self.positions is None:
@@ -58,10 +74,13 @@ class Trial:
 
 def trial_of(record: Record) -> Trial:
     """The record made ready for fitting, its warm-up and the rest after it left out."""
+    from scipy.interpolate import CubicSpline
+
     time, factor, positions = _fine_time(record)
+    clock = record.time if positions is not None else np.linspace(record.time[0], record.time[-1], record.time.size)
     return Trial(
         record.name,
-        _spline(record.time, record.displacement, positions is None)(time),
+        CubicSpline(clock, record.displacement)(time),
         float((time[-1] - time[0]) / (time.size - 1)),
         factor,
         record.force,
@@ -116,9 +135,3 @@ def _fine_time(record: Record) -> tuple[Array, int, Array | None]:
     count = int(np.ceil((time[-1] - time[0]) * record.rate * factor)) + 1
     fine = np.linspace(time[0], time[-1], count)
     return fine, factor, (time - time[0]) / (fine[1] - fine[0])
-
-
-def _spline(time: Array, channel: Array, regular: bool) -> Any:
-    from scipy.interpolate import CubicSpline
-
-    return CubicSpline(np.linspace(time[0], time[-1], time.size) if regular else time, channel)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from pzd.artefacts import Artefact
+from pzd.artefacts import Artefact, Rig
 from pzd.config import RunConfig
 from pzd.pipeline.dependencies import block_of, changes, dependencies, is_artefact, key_of, setting_of
 from pzd.pipeline.stages import Stage
@@ -36,7 +36,7 @@ class Pipeline:
     marks: dict[str, tuple[str, ...]] = field(default_factory=dict)
     """Why the results so far are not to be trusted, by folder."""
     _in_hand: dict[str, tuple[dict[str, str], Artefact]] = field(default_factory=dict)
-    """Artefacts that were read back, by folder, with the hashes of the files that they were read from."""
+    """Artefacts that were read back, or that read back as they are, by folder, with the hashes of their files."""
     _compiles: bool = False
     """Whether the ride's kernels may still have to be compiled, which a second core can do meanwhile."""
 
@@ -119,6 +119,8 @@ class Pipeline:
         marks = self._carried(stage, self._untrusted(artefact))
         seconds = time.monotonic() - begun
         self.run.write(stage.name, artefact, inputs, key_of(inputs), marks, seconds, self.jobs)
+        if isinstance(artefact, Rig):
+            self._in_hand[stage.folder] = self.run.outputs(stage.folder), artefact.as_read()
         self.marks[stage.folder] = marks
         self._say(stage, f"done in {seconds:.1f} s: {self.run.folder / stage.folder}")
 
@@ -127,7 +129,7 @@ class Pipeline:
         return stage.function(**{name: self._argument(name, kind) for name, kind in stage.takes.items()})
 
     def _argument(self, name: str, annotation: Any) -> Any:
-        """What a parameter of a stage is given; artefacts are read back from their files, never passed on."""
+        """What a parameter of a stage is given; artefacts are what their files hold, however they were made."""
         if is_artefact(annotation):
             return self.read_back(annotation)
         if block := block_of(self.config, annotation):
@@ -137,14 +139,17 @@ class Pipeline:
         if name == "setting":
             return self.setting()
         given = {"seed": self.config.seed, "folder": self.run.config.parent}
-        return (given | {"jobs": self.jobs, "progress": self.progress})[name]
+        return (given | {"jobs": self.jobs, "progress": self.progress, "preflight": True})[name]
 
     def setting(self) -> str | None:
         """The setting in use, by the config and the records of the run."""
         return setting_of(self.config, self.run)
 
     def read_back(self, kind: type[Artefact]) -> Artefact:
-        """An artefact as its files have it: read and checked once, and again where they have changed since."""
+        """An artefact as its files have it: read and checked once, and again where they have changed since.
+
+        The records are as they were written, to the last bit, and by far the most there is to read.
+        """
         now = self.run.outputs(kind.folder)
         files, artefact = self._in_hand.get(kind.folder, ({}, None))
         if artefact is None or files != now:

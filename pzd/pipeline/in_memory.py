@@ -17,7 +17,10 @@ Made = TypeVar("Made", Rig, Identified, Diagnosed, Rides)
 
 @dataclass
 class InMemory(Pipeline):
-    """A pipeline whose artefacts are handed on as they are, and written nowhere."""
+    """A pipeline whose artefacts are handed on as they are, and written nowhere.
+
+    No report is made of them, which alone tells what the preflight finds: the records are not examined.
+    """
 
     artefacts: dict[str, Artefact] = field(default_factory=dict)
     """By folder."""
@@ -39,6 +42,10 @@ class InMemory(Pipeline):
     def read_back(self, kind: type[Artefact]) -> Artefact:
         """An artefact that a stage asks for."""
         return self.artefacts[kind.folder]
+
+    def _argument(self, name: str, annotation: Any) -> Any:
+        """What a parameter of a stage is given."""
+        return False if name == "preflight" else super()._argument(name, annotation)
 
     def setting(self) -> str | None:
         """The setting in use."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 
-def ingest(rig: RigConfig, control: Control, folder: Path, jobs: int = 1) -> Rig:
+def ingest(rig: RigConfig, control: Control, folder: Path, jobs: int = 1, preflight: bool = True) -> Rig:
     """Read the measured files that the config names.
 
     Parameters
@@ -30,6 +30,7 @@ def ingest(rig: RigConfig, control: Control, folder: Path, jobs: int = 1) -> Rig
     control : the control signal
     folder : the config's folder, which relative paths start from
     jobs : tests worked on at the same time
+    preflight : whether the records are examined, which changes nothing about them
 
     Raises
     ------
@@ -42,12 +43,12 @@ def ingest(rig: RigConfig, control: Control, folder: Path, jobs: int = 1) -> Rig
 
     if rig.files is None:
         raise ConfigError("rig: this config has a virtual stand and no files; use synthesise (got rig.virtual)")
-    found = examined(read(rig.files, rig.limits, control, folder), jobs)
+    found = examined(read(rig.files, rig.limits, control, folder), jobs, preflight)
     log.info("read %d tests", len(found.records))
     return found
 
 
-def synthesise(rig: RigConfig, seed: int, control: Control, folder: Path, jobs: int = 1) -> Rig:
+def synthesise(rig: RigConfig, seed: int, control: Control, folder: Path, jobs: int = 1, preflight: bool = True) -> Rig:
     """Test the virtual dampers that the config names.
 
     Parameters
@@ -57,6 +58,7 @@ def synthesise(rig: RigConfig, seed: int, control: Control, folder: Path, jobs: 
     control : the control signal, whose unit stands in the names of the records
     folder : the config's folder, for motions that are read from a file
     jobs : records taken at the same time
+    preflight : whether the records are examined, which changes nothing about them
 
     Raises
     ------
@@ -72,7 +74,7 @@ def synthesise(rig: RigConfig, seed: int, control: Control, folder: Path, jobs: 
         partial(_taken, take, planned, rig.limits, control) for entry, take in takers for planned in entry.plan(control)
     ]
     log.info("taking %d records", len(tests))
-    return examined(tests, jobs)
+    return examined(tests, jobs, preflight)
 
 
 def _taken(

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from pzd.quantities import Control
+from pzd.schema.decimals import lines
 from pzd.schema.errors import DataError, at
 from pzd.schema.model import Frozen
 from pzd.schema.nearest import nearest
@@ -147,12 +148,10 @@ def write_columns(
         wrong = [n for n, v in _block(columns, names, first) if v is not None and not np.isfinite(v).all()]
         if wrong:
             raise ValueError(f"{path.name}: {', '.join(wrong)} must hold finite numbers")
-    with path.open("w", newline="", encoding="utf-8") as file:
-        file.write(",".join(control.renamed(name) for name in names) + "\n")
+    with path.open("wb") as file:
+        file.write(f"{','.join(control.renamed(name) for name in names)}\n".encode())
         for first in range(0, length, _WRITTEN):
-            empty = [""] * min(length - first, _WRITTEN)
-            cells = [empty if v is None else map(repr, v.tolist()) for _, v in _block(columns, names, first)]
-            file.writelines(f"{','.join(row)}\n" for row in zip(*cells, strict=True))
+            file.write(lines([v for _, v in _block(columns, names, first)], min(length - first, _WRITTEN)))
 
 
 def _block(

@@ -18,6 +18,7 @@ from pzd.signals.edges import ROUNDS, averaged, force_span, motion_span
 from pzd.signals.mains import MAINS
 from pzd.signals.period import Repeats, repeats
 from pzd.signals.smoothing import HIGHEST, low_pass
+from pzd.signals.step import usual_step
 
 FITTED_POINTS = 1000
 """Points of a cycle that the period is fitted to, at least, as far as there are samples."""
@@ -77,7 +78,7 @@ class Cycles:
 
     def points(self, time: Array) -> int:
         """Samples in one cycle, rounded down: the length of a folded cycle."""
-        return max(int(np.floor(self.period / float(np.median(np.diff(time))) + 1e-6)), 4)
+        return max(int(np.floor(self.period / usual_step(time) + 1e-6)), 4)
 
     def fold(self, time: Array, values: Array) -> Array:
         """One row a cycle (count, points), from a cubic through the samples."""
@@ -189,7 +190,7 @@ def _whole(time: Array, found: Repeats, period: float) -> Cycles:
 
     What is left over goes to the front, where a transient may linger; a little of it keeps the run from the end.
     """
-    step = float(np.median(np.diff(time)))
+    step = usual_step(time)
     end = min(found.end, float(time[-1]) + step)
     count = max(int((end - found.start + 0.5 * step) / period), 2)
     left_over = max(end - found.start - count * period, 0.0)
@@ -235,5 +236,4 @@ def _cubic(time: Array, values: Array, at: Array) -> Array:
     from scipy.interpolate import CubicSpline
 
     near = (time >= at[0] - 8 * (time[1] - time[0])) & (time <= at[-1] + 8 * (time[1] - time[0]))
-    result: Array = CubicSpline(time[near], values[near])(at)
-    return result
+    return np.asarray(CubicSpline(time[near], values[near])(at))

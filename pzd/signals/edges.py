@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array
+from pzd.signals.step import usual_step
 
 Span = tuple[float, float]
 """Start and end [s]."""
@@ -33,7 +34,7 @@ ROUNDS = 4
 
 def averaged(time: Array, values: Array, period: float, points: int) -> tuple[Array, Array]:
     """So many points a cycle or some more, both ends of the record among them, averaged with the samples around."""
-    every = max(int(period / float(np.median(np.diff(time)))) // points, 1)
+    every = max(int(period / usual_step(time)) // points, 1)
     at = np.unique(np.append(np.arange(0, time.size, every), time.size - 1))
     reach = np.minimum(every // 2, np.minimum(at, time.size - 1 - at))
     sums = np.concatenate(([0.0], np.cumsum(values - values[0])))
@@ -81,7 +82,7 @@ def _course(time: Array, values: Array, period: float, span: Span) -> tuple[Arra
     """Averages of the values over equal parts of the period, and how many of these make a cycle."""
     from scipy.interpolate import CubicSpline
 
-    step = float(np.median(np.diff(time)))
+    step = usual_step(time)
     points = min(POINTS, max(int(period / step + 1e-6), 4))
     start, end = max(span[0], float(time[0])), min(span[1], float(time[-1]))
     width = period / points

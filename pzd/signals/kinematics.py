@@ -13,6 +13,7 @@ import numpy as np
 from pzd.record import Array
 from pzd.signals.cycles import Cycles
 from pzd.signals.smoothing import HIGHEST, low_pass
+from pzd.signals.step import usual_step
 
 STANDARD_ERRORS = 4.0
 """A harmonic is kept where its mean exceeds this many standard errors of its scatter over cycles."""
@@ -107,11 +108,11 @@ def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:
     spectrum = np.where(significant_harmonics(folded), np.fft.rfft(folded.mean(axis=0)), 0.0)
     rate = 2j * np.pi * np.arange(spectrum.size) * run.frequency
     fine = 8 * points
-    cycle = [np.fft.irfft(spectrum * rate**order, fine) * (fine / points) for order in range(3)]
+    cycle = np.stack([np.fft.irfft(spectrum * rate**order, fine) * (fine / points) for order in range(3)], axis=1)
     grid = np.linspace(0.0, 1.0, fine + 1)
     phase = run.phase(time[run.inside(time)])
-    wrapped = [CubicSpline(grid, np.append(values, values[0]), bc_type="periodic")(phase) for values in cycle]
-    return Kinematics(*wrapped)
+    wrapped = CubicSpline(grid, np.concatenate((cycle, cycle[:1])), bc_type="periodic")(phase)
+    return Kinematics(*np.ascontiguousarray(wrapped.T))
 
 
 def _smoothed(time: Array, displacement: Array, highest: float) -> Kinematics:
@@ -119,7 +120,7 @@ def _smoothed(time: Array, displacement: Array, highest: float) -> Kinematics:
     from scipy.interpolate import CubicSpline
 
     steps = np.diff(time)
-    step = max(float(np.median(steps)), float(time[-1] - time[0]) / (4.0 * time.size))
+    step = max(usual_step(time), float(time[-1] - time[0]) / (4.0 * time.size))
     regular = bool(np.all(np.abs(steps - step) < 1e-3 * step))
     grid = time if regular else np.arange(time[0], time[-1] + 0.5 * step, step)
     values = displacement if regular else np.interp(grid, time, displacement)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pzd.record import Array, Mask
@@ -23,23 +25,27 @@ _STEP = 0.01
 phase at either end."""
 
 
-def line(values: Array, rate: float, frequency: float, cycle: float) -> float:
-    """Amplitude of a line that stands out of its neighbourhood, which holds harmonics of the motion; else 0.
+def lines(values: Array, rate: float, frequencies: Sequence[float], cycle: float) -> list[float]:
+    """Amplitudes of lines that stand out of their neighbourhood, which holds harmonics of the motion; else 0.
 
     Parameters
     ----------
     values : (n,) of any channel
     rate : sampling rate [Hz]
-    frequency : of the line [Hz]
+    frequencies : of the lines [Hz]
     cycle : frequency of the motion, 0 where it does not repeat [Hz]
     """
-    if values.size == 0:
-        return 0.0
+    if values.size == 0 or not frequencies:
+        return [0.0] * len(frequencies)
     window = np.hanning(values.size)
     ramp = np.linspace(values[0], values[-1], values.size)
     spectrum = 2.0 * np.abs(np.fft.rfft((values - ramp) * window)) / window.sum()
-    resolution = rate / values.size
-    off = np.abs(np.fft.rfftfreq(values.size, 1.0 / rate) - frequency)
+    resolution, places = rate / values.size, np.fft.rfftfreq(values.size, 1.0 / rate)
+    return [_standing_out(spectrum, np.abs(places - frequency), resolution, cycle) for frequency in frequencies]
+
+
+def _standing_out(spectrum: Array, off: Array, resolution: float, cycle: float) -> float:
+    """Amplitude of the line in a spectrum, by how far its places are off the line."""
     wide = max(LINES_OFF, 1.5 * resolution)
     inside, around = off <= wide, (off > wide + 3.0 * resolution) & (off <= max(5.0, 3.0 * cycle, 20.0 * resolution))
     if not inside.any() or not around.any():
@@ -70,10 +76,9 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
     if np.count_nonzero(wanted) <= 2 * len(HARMONICS):
         return wave
     level = values - values[wanted].mean()
-    for mains in MAINS:
-        if rate < LEAST_RATE * mains or _of_motion(mains, cycle, rate / values.size):
-            continue
-        if line(values, rate, mains, cycle) <= least:
+    asked = [m for m in MAINS if rate >= LEAST_RATE * m and not _of_motion(m, cycle, rate / values.size)]
+    for mains, amplitude in zip(asked, lines(values, rate, asked, cycle), strict=True):
+        if amplitude <= least:
             continue
         from scipy.signal import zoom_fft  # it takes 0.7 s to load, and few records hum
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pzd.record import Array
 from pzd.signals.smoothing import HIGHEST, low_pass
+from pzd.signals.step import usual_step
 
 MOST_SAMPLES = 2**18
 """Longer records are thinned to this many samples for the search."""
@@ -64,13 +65,13 @@ def repeats(time: Array, displacement: Array) -> Repeats | None:
     first, last = moving(displacement)
     if last - first < 2 * LEAST_POINTS:
         return None
-    step = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / MOST_SAMPLES)
+    step = max(usual_step(time), float(time[-1] - time[0]) / MOST_SAMPLES)
     grid = np.arange(time[0], time[-1] + 0.5 * step, step)
     x = np.interp(grid, time, displacement)
     least = LEAST_SHARE * float(time[last] - time[first]) / step
     smooth = low_pass(x, HIGHEST)
     # Few cycles drown between ramps as long, most of all to one side, whose mean goes up and down: look inside as well.
-    outer = int(RAMPS * (last - first) * float(np.median(np.diff(time))) / step)
+    outer = int(RAMPS * (last - first) * usual_step(time) / step)
     inner = x[int((time[first] - time[0]) / step) + outer : int((time[last] - time[0]) / step) - outer]
     for candidate in chain.from_iterable(_candidates(part) for part in (x, inner)):
         lag, section = candidate, _section(x, smooth, candidate, least)

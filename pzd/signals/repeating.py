@@ -16,3 +16,8 @@ def cycles_of(record: Record) -> Cycles | None:
     if record not in _found:
         _found[record] = cycles(record.time, record.displacement)
     return _found[record]
+
+
+def remember(record: Record, run: Cycles | None) -> None:
+    """Keep the cycles of a record that were found where it was made, perhaps in another process."""
+    _found[record] = run

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -60,14 +61,26 @@ def steps(time: Array, displacement: Array) -> tuple[tuple[Stretch, Stretch], ..
     )
 
 
+_apart: WeakKeyDictionary[Record, tuple[Record, ...]] = WeakKeyDictionary()
+"""The tests of records that hold several, and none of those that hold one: what is kept must not hold its record."""
+
+
 def separate_tests(record: Record) -> tuple[Record, ...]:
     """The tests that one record holds, each under its name; the record itself where it holds one.
 
-    The first begins and the last ends with the record; what lies between two stretches belongs to neither.
+    The first begins and the last ends with the record; what lies between two stretches belongs to neither. They are
+    the same records whoever asks, so that what is remembered of one is found once.
     """
+    if record not in _apart:
+        _apart[record] = _found_in(record)
+    return _apart[record] or (record,)
+
+
+def _found_in(record: Record) -> tuple[Record, ...]:
+    """The tests of a record that holds several."""
     found = sorted({s for pair in steps(record.time, record.displacement) for s in pair}, key=lambda s: s.first)
     if not found:
-        return (record,)
+        return ()
     starts = [-np.inf, *(s.start for s in found[1:])]
     ends = [*(s.end for s in found[:-1]), np.inf]
     return tuple(
@@ -111,4 +124,10 @@ def _stretches(time: Array, displacement: Array) -> list[Stretch]:
 
 
 def _alike(amplitudes: Array, periods: Array) -> bool:
-    return all(float(np.ptp(values)) <= ALIKE * float(np.median(values)) for values in (amplitudes, periods))
+    return all(_within(values) for values in (amplitudes, periods))
+
+
+def _within(values: Array) -> bool:
+    """Whether positive values scatter by no more than the share of their median, which is no less than the least."""
+    scatter = float(np.ptp(values))
+    return scatter <= ALIKE * float(values.min()) or scatter <= ALIKE * float(np.median(values))

@@ -142,3 +142,15 @@ def test_the_element_never_gives_energy_back(rng: np.random.Generator) -> None:
         force = element_force(x, STEP, 400.0, 2500.0, 4e5)
         work = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(x))])
         assert np.min(work - 0.5 * force**2 / 4e5) > -1e-3
+
+
+@pytest.mark.parametrize("every", [2, 7])
+@pytest.mark.parametrize("samples", [1, 2, 57, 60])
+def test_the_samples_that_are_kept_are_those_of_all(rng: np.random.Generator, every: int, samples: int) -> None:
+    displacement = 0.01 * np.cumsum(rng.standard_normal(samples))
+    given = (displacement, 1e-3, 300.0, 2000.0, 2e5, 50.0)
+    force, slopes = element_force_sensitivities(*given)
+    kept, kept_slopes = element_force_sensitivities(*given, every=every)
+    assert np.array_equal(kept, force[::every])
+    assert np.array_equal(kept_slopes, slopes[::every])
+    assert np.array_equal(element_force(*given, every=every), force[::every])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from written_files import CANONICAL, FORCE, TIME, V, X, lines, refused, run, write, wrong
 
+from pzd.artefacts import Rig
 from pzd.damper.element import element_force
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
@@ -294,3 +296,22 @@ def test_a_spike_and_a_tare_are_findings_and_no_refusal(tmp_path: Path) -> None:
     rig = run(tmp_path)
     assert "spikes" in {finding.check for finding in rig.entries[0].findings}
     assert "offset" in {finding.check for finding in rig.entries[1].findings}
+
+
+def test_records_that_are_handed_on_are_those_in_the_files(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", lines(CANONICAL))
+    made = run(tmp_path)
+    (record,) = made.records
+    made = replace(made, records=(replace(record, force=np.repeat(record.force, 2)[::2]),))
+    folder = tmp_path / Rig.folder
+    folder.mkdir()
+    made.write(folder, Control())
+    handed, read = made.as_read(), Rig.read(folder, Control())
+    assert handed.entries == read.entries
+    assert handed.ingested == read.ingested
+    for field in fields(record):
+        one, other = (getattr(rig.records[0], field.name) for rig in (handed, read))
+        assert np.array_equal(one, other)
+        assert not isinstance(one, np.ndarray) or (one.dtype == other.dtype and one.flags.c_contiguous)
+    assert made.as_read().records[0] is not made.records[0]
+    assert handed.as_read().records[0] is handed.records[0]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
+from pzd.damper.columns import acting
 from pzd.damper.compose import respond
 from pzd.damper.motion import Motion
 from pzd.simulate.dampers import dynamic_damper_of
@@ -243,7 +244,8 @@ def test_a_rounding_of_the_way_does_not_turn_a_slipping_branch_round(damper, sid
     """At the place where a step began the branch goes on slipping, be the extension a last digit to either side."""
     branch = damper.with_effect("second_branch", {"T0_2": 100.0, "k_2": 1e6})
     dynamic = dynamic_damper_of(branch, 22.0, 0.0)
-    dynamic.memory[0] = side * np.array([0.01, 1e-4])
+    slid = [1e-4 if effect.name == "second_branch" else 0.0 for effect in acting("branch")]
+    dynamic.memory[0] = side * np.array([0.01, *slid])
     forces = [
         slipping_forces(dynamic, 0, side * 0.01 * (1.0 + digit), 0.1 * side, dynamic.parallel[0])
         for digit in (0.0, 1e-16, -3e-16)

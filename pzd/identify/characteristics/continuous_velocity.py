@@ -51,4 +51,6 @@ def thinned(values: Array) -> Array:
     """Means of (n,) values over `POINTS` parts as equal as can be; the values themselves where there are no more."""
     if values.size <= POINTS:
         return values
-    return np.array([float(part.mean()) for part in np.array_split(values, POINTS)])
+    size, longer = divmod(values.size, POINTS)
+    long, short = np.split(values, [longer * (size + 1)])
+    return np.concatenate([part.reshape(-1, length).mean(axis=1) for part, length in ((long, size + 1), (short, size))])

@@ -22,6 +22,7 @@ from pzd.rig.config import Limits
 from pzd.schema.processes import parallel_map
 from pzd.signals.cycles import Cycles
 from pzd.signals.kinematics import Kinematics
+from pzd.signals.repeating import remember
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,7 @@ class Measured:
 
     record: Record
     run: Cycles | None
+    """Of the record's clock and displacement, as `cycles` finds it."""
     clean: Kinematics
     limits: Limits
     removed: str | None = None
@@ -82,32 +84,35 @@ def findings(test: Measured) -> tuple[Finding, ...]:
     return (*test.remarks, *(finding for module in checks().values() for finding in module.check(test)))
 
 
-def examined(tests: Sequence[Callable[[], Measured]], jobs: int) -> Rig:
+def examined(tests: Sequence[Callable[[], Measured]], jobs: int, preflight: bool = True) -> Rig:
     """The artefact of the rig: every record, and an entry about each with what the checks found.
 
     Parameters
     ----------
     tests : each makes one record
     jobs : records made and examined at the same time
+    preflight : whether they are examined; an entry has no findings otherwise
     """
 
-    def listed(given: Callable[[], Measured]) -> tuple[Record, RecordEntry, tuple[IngestRow, ...]]:
+    def listed(given: Callable[[], Measured]) -> tuple[Record, Cycles | None, RecordEntry, tuple[IngestRow, ...]]:
         test = given()
-        return test.record, _entry(test), test.ingested
+        return test.record, test.run, _entry(test, findings(test) if preflight else ()), test.ingested
 
     found = parallel_map(listed, tests, jobs)
-    entries = tuple(entry for _, entry, _ in found)
+    for record, run, _, _ in found:
+        remember(record, run)
+    entries = tuple(entry for _, _, entry, _ in found)
     for module in checks().values():
         entries = module.compared(entries) if hasattr(module, "compared") else entries
-    return Rig(tuple(record for record, _, _ in found), entries, tuple(row for _, _, rows in found for row in rows))
+    return Rig(tuple(record for record, *_ in found), entries, tuple(row for *_, rows in found for row in rows))
 
 
-def _entry(test: Measured) -> RecordEntry:
+def _entry(test: Measured, found: tuple[Finding, ...]) -> RecordEntry:
     record = test.record
     return RecordEntry(
         name=record.name,
         setting=record.setting,
-        findings=findings(test),
+        findings=found,
         removed=test.removed,
         **extent(record, test.run),
     )

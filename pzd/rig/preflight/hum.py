@@ -7,7 +7,7 @@ import numpy as np
 from pzd.artefacts import Finding
 from pzd.record import Array, is_constant, voltage_scale
 from pzd.rig.preflight import Measured
-from pzd.signals.mains import LEAST_RATE, MAINS, line
+from pzd.signals.mains import LEAST_RATE, MAINS, lines
 
 SHARE = 0.002
 """Smallest amplitude that is said, as a share of half the range."""
@@ -24,9 +24,11 @@ def check(test: Measured) -> list[Finding]:
             continue  # a stepped signal has lines of its own
         least = SHARE * (0.5 * float(np.ptp(channel.values)) + LABEL_SHARE * (channel.least or 0.0))
         left = _left_by_cycles(test, channel.values)
-        for mains in (m for m in MAINS if test.record.rate >= LEAST_RATE * m):
-            amplitude = line(channel.values, test.record.rate, mains, test.run.frequency if test.run else 0.0)
-            amplitude = amplitude or line(left, test.record.rate, mains, 0.0)
+        wanted = [mains for mains in MAINS if test.record.rate >= LEAST_RATE * mains]
+        whole = lines(channel.values, test.record.rate, wanted, test.run.frequency if test.run else 0.0)
+        beside = lines(left, test.record.rate, wanted, 0.0)
+        for mains, of_whole, of_left in zip(wanted, whole, beside, strict=True):
+            amplitude = of_whole or of_left
             if amplitude > least:
                 found.append(
                     Finding(

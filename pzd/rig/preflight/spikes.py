@@ -17,7 +17,8 @@ def check(test: Measured) -> list[Finding]:
     """Samples of a channel that jump away from their neighbours and back."""
     found: list[Finding] = []
     for channel in test.channels():
-        deviation, rows = np.abs(from_neighbours(channel.values)), glitches(channel.values)
+        away = from_neighbours(channel.values)
+        deviation, rows = np.abs(away), glitches(channel.values, away)
         if channel.least is None:
             rows = rows[(rows >= EDGE) & (rows < deviation.size - EDGE)]
         else:
@@ -32,7 +33,7 @@ def check(test: Measured) -> list[Finding]:
                     check="spikes",
                     where=f"{channel.name}, {counted(rows.size, 'sample')}, "
                     f"the largest at {test.record.time[worst]:.6g} s",
-                    size=float(from_neighbours(channel.values)[worst]),
+                    size=float(away[worst]),
                     unit=channel.unit,
                     follows=f"not corrected; {what}",
                 )
