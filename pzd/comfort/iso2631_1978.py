@@ -8,7 +8,7 @@ stands: a 1976 report of the Royal Aircraft Establishment puts 1.2 m/s2 at 5 Hz 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from importlib.resources import files
 from typing import Literal
 
@@ -64,10 +64,16 @@ class Chart:
     """(n, m) r.m.s. acceleration [m/s2]"""
 
     def levels_at(self, frequency: float) -> Array:
-        """(m,) boundary at one frequency [m/s2 r.m.s.], interpolated log-log between the centres."""
-        place = np.log(frequency)
-        columns = np.log(self.level).T
-        return np.exp([np.interp(place, np.log(self.frequency), column) for column in columns])
+        """(m,) boundary at one frequency [m/s2 r.m.s.], interpolated log-log between the centres, held beyond them."""
+        centres, levels = self._logarithms
+        place = min(max(np.log(frequency), centres[0]), centres[-1])
+        i = min(max(int(np.searchsorted(centres, place)), 1), centres.size - 1)
+        share = (place - centres[i - 1]) / (centres[i] - centres[i - 1])
+        return np.asarray(np.exp(levels[i - 1] + share * (levels[i] - levels[i - 1])))
+
+    @cached_property
+    def _logarithms(self) -> tuple[Array, Array]:
+        return np.log(self.frequency), np.log(self.level)
 
 
 @cache
@@ -93,17 +99,25 @@ def exposure(acceleration: float, frequency: float, boundary: Boundary) -> Expos
     the time, and where on the chart it lies
     """
     table = chart()
-    if not table.frequency[0] * (1 - _SAME) <= frequency <= table.frequency[-1] * (1 + _SAME):
+    if not _covers(table, frequency):
         return Exposure(None, f"not covered: {NOT_COVERED}", frequency)
-    levels = FACTORS[boundary] * table.levels_at(frequency)
+    minutes, remark = _time(acceleration, FACTORS[boundary] * table.levels_at(frequency), table.minutes)
+    return Exposure(minutes, remark, frequency)
+
+
+def _covers(table: Chart, frequency: float) -> bool:
+    return bool(table.frequency[0] * (1 - _SAME) <= frequency <= table.frequency[-1] * (1 + _SAME))
+
+
+def _time(acceleration: float, levels: Array, times: Array) -> tuple[float, str]:
+    """Time [min] at which the (m,) levels of a boundary [m/s2] reach an acceleration, and where on the chart it is."""
     if acceleration > levels[-1] * (1.0 + _SAME):
-        return Exposure(0.0, "over the chart", frequency)
+        return 0.0, "over the chart"
     if acceleration >= levels[-1] * (1.0 - _SAME):
-        return Exposure(FLAT_TOP_MIN, "4 min or less", frequency)
+        return FLAT_TOP_MIN, "4 min or less"
     if acceleration < levels[0] * (1.0 - _SAME):
-        return Exposure(LONGEST_MIN, "beyond the chart (more than 24 h)", frequency)
-    minutes = np.exp(np.interp(np.log(acceleration), np.log(levels), np.log(table.minutes)))
-    return Exposure(float(minutes), "", frequency)
+        return LONGEST_MIN, "beyond the chart (more than 24 h)"
+    return float(np.exp(np.interp(np.log(acceleration), np.log(levels), np.log(times)))), ""
 
 
 def shortest(components: Components, boundary: Boundary) -> Exposure:
@@ -112,8 +126,9 @@ def shortest(components: Components, boundary: Boundary) -> Exposure:
     A component below 1 Hz or above 80 Hz has no time. It is weighed as if it lay at the nearer end of the chart: where
     it would govern there the vibration is not covered by the standard, and no time is given.
     """
+    table = chart()
     rated = [
-        (*_severity(float(level), float(frequency), boundary), exposure(float(level), float(frequency), boundary))
+        _rated(float(level), float(frequency), boundary, table)
         for frequency, level in zip(components.frequency, components.rms, strict=True)
     ]
     covered = [item for item in rated if item[2].minutes is not None]
@@ -123,9 +138,10 @@ def shortest(components: Components, boundary: Boundary) -> Exposure:
     return min(covered, key=lambda item: item[:2])[2]
 
 
-def _severity(acceleration: float, frequency: float, boundary: Boundary) -> tuple[float, float]:
-    """Time at the nearest frequency of the chart [min], and how far the level is above its lowest line, negative."""
-    table = chart()
+def _rated(acceleration: float, frequency: float, boundary: Boundary, table: Chart) -> tuple[float, float, Exposure]:
+    """Time at the nearest frequency of the chart [min]; how far it is above the lowest line there, negative; itself."""
     nearest = min(max(frequency, float(table.frequency[0])), float(table.frequency[-1]))
-    found = exposure(acceleration, nearest, boundary)
-    return found.minutes or 0.0, -float(acceleration / FACTORS[boundary] / table.levels_at(nearest)[0])
+    levels = FACTORS[boundary] * table.levels_at(nearest)
+    minutes, remark = _time(acceleration, levels, table.minutes)
+    itself = Exposure(minutes, remark, frequency) if _covers(table, frequency) else Exposure(None, "", frequency)
+    return minutes, -float(acceleration / levels[0]), itself
