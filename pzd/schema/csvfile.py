@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from pzd.quantities import Control
-from pzd.schema.decimals import lines
+from pzd.schema.decimals import lines, numbers
 from pzd.schema.errors import DataError, at
 from pzd.schema.model import Frozen
 from pzd.schema.nearest import nearest
@@ -181,7 +181,7 @@ def read_columns(path: Path, header: Sequence[str], control: Control, optional: 
     filled = [i for i in range(len(names)) if i not in empty]
     _check_empty(path, body, {i: control.renamed(names[i]) for i in empty})
     try:
-        table = _parsed(body, filled)
+        table = _parsed(body, filled, len(names))
     except ValueError:
         table = None
     if table is None or not np.isfinite(table).all():
@@ -189,7 +189,12 @@ def read_columns(path: Path, header: Sequence[str], control: Control, optional: 
     return {names[i]: np.ascontiguousarray(table[:, n]) for n, i in enumerate(filled)} if table is not None else {}
 
 
-def _parsed(body: str, columns: Sequence[int]) -> NDArray[np.float64]:
+def _parsed(body: str, columns: Sequence[int], width: int) -> NDArray[np.float64]:
+    if len(columns) == width:
+        try:
+            return numbers(body, width)
+        except ValueError:
+            pass  # written by hand, perhaps: what JSON does not know may be a number for others
     return np.loadtxt(io.StringIO(body), delimiter=",", comments=None, usecols=columns, ndmin=2)
 
 

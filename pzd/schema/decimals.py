@@ -1,4 +1,4 @@
-"""Columns of numbers as lines of text, each number as a shortest decimal that reads back exactly."""
+"""Columns of numbers as lines of text, each number as a shortest decimal that reads back exactly, and read back."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 _ROWS = TypeAdapter(list[tuple[float | None, ...]])
+_NUMBERS = TypeAdapter(list[float])
 
 
 def lines(columns: Sequence[NDArray[np.float64] | None], rows: int) -> bytes:
@@ -26,3 +27,14 @@ def lines(columns: Sequence[NDArray[np.float64] | None], rows: int) -> bytes:
     cells = [[None] * rows if column is None else column.tolist() for column in columns]
     arrays = _ROWS.dump_json(list(zip(*cells, strict=True)))
     return arrays[2:-2].replace(b"],[", b"\n").replace(b"null", b"") + b"\n" if rows else b""
+
+
+def numbers(body: str, columns: int) -> NDArray[np.float64]:
+    """What such lines hold, none of them with an empty cell: (rows, columns).
+
+    Raises
+    ------
+    ValueError : where a cell is no number as JSON has them, or the cells do not fill such rows
+    """
+    array = "[" + body.strip().replace("\n", ",") + "]"
+    return np.array(_NUMBERS.validate_json(array, strict=True)).reshape(-1, columns)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.schema.decimals import lines
+from pzd.schema.decimals import lines, numbers
 
 EDGES = [0.0, -0.0, 1.0, 0.1, 0.3, 2.0 / 3.0, 5e-324, 2.2250738585072014e-308, 1.7976931348623157e308, 1e15, 1e16, 1e22]
 EDGES += [1e23, 9999999999999998.0, 12345678901234567.0, 1e-4, 1e-5, 123456.0, -1e-7, 1e100, 9.5, 99999.0, 100000.0]
@@ -20,6 +20,7 @@ def all_read_back(values: np.ndarray) -> None:
     """Bit for bit, and as short as `repr` has them."""
     cells = lines([values], values.size).decode().split("\n")[:-1]
     assert np.array([float(cell) for cell in cells]).tobytes() == values.tobytes()
+    assert numbers("\n".join(cells), 1).tobytes() == values.tobytes()
     assert [digits(cell) for cell in cells] == [digits(repr(value)) for value in values.tolist()]
 
 
@@ -50,3 +51,9 @@ def test_a_block_of_rows_is_written_as_the_rows_alone_are(rng: np.random.Generat
 def test_empty_columns() -> None:
     assert lines([None, None], 2) == b",\n,\n"
     assert lines([np.empty(0)], 0) == b""
+
+
+@pytest.mark.parametrize("body", ["1.0,2.0\n3.0,\n", "1.0,true\n", '1.0,"2.0"\n', "1.0,2.0\n3.0\n", "1.0,[2.0]\n"])
+def test_what_is_no_table_of_numbers(body: str) -> None:
+    with pytest.raises(ValueError):
+        numbers(body, 2)
