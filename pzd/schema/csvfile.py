@@ -181,21 +181,12 @@ def read_columns(path: Path, header: Sequence[str], control: Control, optional: 
     filled = [i for i in range(len(names)) if i not in empty]
     _check_empty(path, body, {i: control.renamed(names[i]) for i in empty})
     try:
-        table = _parsed(body, filled, len(names))
+        table = numbers(body, filled, len(names))
     except ValueError:
         table = None
     if table is None or not np.isfinite(table).all():
         _refuse(path, _bad_cells(path, body, {i: control.renamed(names[i]) for i in filled}))
     return {names[i]: np.ascontiguousarray(table[:, n]) for n, i in enumerate(filled)} if table is not None else {}
-
-
-def _parsed(body: str, columns: Sequence[int], width: int) -> NDArray[np.float64]:
-    if len(columns) == width:
-        try:
-            return numbers(body, width)
-        except ValueError:
-            pass  # written by hand, perhaps: what JSON does not know may be a number for others
-    return np.loadtxt(io.StringIO(body), delimiter=",", comments=None, usecols=columns, ndmin=2)
 
 
 def _check_counts(path: Path, body: str, wanted: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 
 import numpy as np
@@ -29,12 +30,17 @@ def lines(columns: Sequence[NDArray[np.float64] | None], rows: int) -> bytes:
     return arrays[2:-2].replace(b"],[", b"\n").replace(b"null", b"") + b"\n" if rows else b""
 
 
-def numbers(body: str, columns: int) -> NDArray[np.float64]:
-    """What such lines hold, none of them with an empty cell: (rows, columns).
+def numbers(body: str, columns: Sequence[int], width: int) -> NDArray[np.float64]:
+    """What so many columns of such lines hold, each `width` cells long: (rows, columns).
 
     Raises
     ------
-    ValueError : where a cell is no number as JSON has them, or the cells do not fill such rows
+    ValueError : where a cell is no number
     """
-    array = "[" + body.strip().replace("\n", ",") + "]"
-    return np.array(_NUMBERS.validate_json(array, strict=True)).reshape(-1, columns)
+    if len(columns) == width:
+        try:
+            cells = _NUMBERS.validate_json("[" + body.strip().replace("\n", ",") + "]", strict=True)
+            return np.array(cells).reshape(-1, width)
+        except ValueError:
+            pass  # written by hand, perhaps: what JSON does not know may be a number for others
+    return np.loadtxt(io.StringIO(body), delimiter=",", comments=None, usecols=columns, ndmin=2)

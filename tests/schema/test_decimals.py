@@ -20,7 +20,7 @@ def all_read_back(values: np.ndarray) -> None:
     """Bit for bit, and as short as `repr` has them."""
     cells = lines([values], values.size).decode().split("\n")[:-1]
     assert np.array([float(cell) for cell in cells]).tobytes() == values.tobytes()
-    assert numbers("\n".join(cells), 1).tobytes() == values.tobytes()
+    assert numbers("\n".join(cells), [0], 1).tobytes() == values.tobytes()
     assert [digits(cell) for cell in cells] == [digits(repr(value)) for value in values.tolist()]
 
 
@@ -53,7 +53,15 @@ def test_empty_columns() -> None:
     assert lines([np.empty(0)], 0) == b""
 
 
+def test_what_json_does_not_know() -> None:
+    assert numbers("+1.,.5\n 2.0 ,-3E1\n", [0, 1], 2).tolist() == [[1.0, 0.5], [2.0, -30.0]]
+
+
+def test_some_of_the_columns() -> None:
+    assert numbers("1.0,,2.0\n3.0,,4.0\n", [0, 2], 3).tolist() == [[1.0, 2.0], [3.0, 4.0]]
+
+
 @pytest.mark.parametrize("body", ["1.0,2.0\n3.0,\n", "1.0,true\n", '1.0,"2.0"\n', "1.0,2.0\n3.0\n", "1.0,[2.0]\n"])
 def test_what_is_no_table_of_numbers(body: str) -> None:
     with pytest.raises(ValueError):
-        numbers(body, 2)
+        numbers(body, [0, 1], 2)
