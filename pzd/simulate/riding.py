@@ -210,7 +210,7 @@ def ride_case(
     if case.policy.aim == "predict":
         plan = predictor_of(config.comfort_predictive, config.control_period_s, own, car, speed, grid.voltages)
     states = at_rest(model.car).size
-    electronics = electronics_of(config.sensors, config.supply, config.control_period_s, states)
+    electronics = electronics_of(config.sensors, config.supply, config.control_period_s, states, model.car.arms)
     return ride_of_model(model, plan, electronics, clock, config.tolerance, case.name, ends, take)
 
 

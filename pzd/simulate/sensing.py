@@ -28,6 +28,8 @@ CHANNELS = SENSED + 1
 """Those of a feedback policy, then the acceleration of the body."""
 _DEFLECTION, _RATE, _HEAVE, _PITCH, _HEAVE_RATE, _PITCH_RATE, _ACCELERATION = 0, 2, 4, 5, 6, 7, 8
 """Where each begins; deflection and its rate have a channel an axle."""
+_LEAST_GAIN = 0.02
+"""What a rise between two samples misses of the road is forgotten after some fifty of them."""
 ACTS, NEXT_NOISE = range(2)
 """Of `Electronics.counts`."""
 
@@ -53,12 +55,14 @@ class Electronics(NamedTuple):
     """(m, n) samples of the state, the latest m in a ring."""
     workspaces: Array
     """(m, WORKSPACE_ROWS, 2) those of the workspace, see `ride_model`."""
-    heights_off: Array
-    """(m, 2) error of the height of the road under each axle, body less suspension [m]."""
+    roads_off: Array
+    """(m, 2, 2) error of the height [m] of the road, body less suspension, and of its rise [m/s], under each axle."""
     state: Array
     """(n,) the sample that the controller sees, and so the two that follow."""
     workspace: Array
-    height_off: Array
+    road_off: Array
+    road_gains: Array
+    """(2,) share of a new height that is believed beside the rise since the last one, see `road_gain`."""
     step: float
     """Distance of the values that can be set; 0 where every value can [V]."""
     most_change: float
@@ -67,7 +71,9 @@ class Electronics(NamedTuple):
     """Of U^2 in a control period [V2]."""
 
 
-def electronics_of(sensors: Sensors, supply: Supply, period: float, states: int) -> Electronics | None:
+def electronics_of(
+    sensors: Sensors, supply: Supply, period: float, states: int, arms: tuple[float, float]
+) -> Electronics | None:
     """Sensors and supply as numbers; None where both are perfect.
 
     Parameters
@@ -75,6 +81,7 @@ def electronics_of(sensors: Sensors, supply: Supply, period: float, states: int)
     sensors, supply : the config's blocks
     period : of the controller [s]
     states : length of the state
+    arms : of the axles, from the centre of gravity [m]
     """
     if sensors == Sensors() and supply == Supply():
         return None
@@ -93,14 +100,35 @@ def electronics_of(sensors: Sensors, supply: Supply, period: float, states: int)
         np.zeros(2),
         np.zeros((slots, states)),
         np.zeros((slots, WORKSPACE_ROWS, 2)),
-        np.zeros((slots, 2)),
+        np.zeros((slots, 2, 2)),
         np.zeros(states),
         np.zeros((WORKSPACE_ROWS, 2)),
-        np.zeros(2),
+        np.zeros((2, 2)),
+        np.array([road_gain(sensors.noise, arm, every * period) for arm in arms]),
         supply.step or 0.0,
         math.inf if supply.slew_per_s is None else supply.slew_per_s * period,
         energy,
     )
+
+
+def road_gain(noise: SensorNoise, arm: float, step: float) -> float:
+    """Share of a new height of the road that is believed, beside the last one and the rise since then.
+
+    Equation: K = (s sqrt(s^2 + 4) - s^2) / 2, s = h sigma_rise / sigma_height
+    Source: steady Kalman filter of a height whose rate is measured; Bar-Shalom, Li and Kirubarajan 2001, sec. 5.2
+
+    Parameters
+    ----------
+    noise : of the channels: height and rise are those of the body less those of the suspension
+    arm : of the axle, from the centre of gravity [m]
+    step : from one sample to the next [s]
+    """
+    height = math.hypot(noise.heave_m, arm * noise.pitch_rad, noise.deflection_m)
+    rise = math.hypot(noise.heave_rate_m_per_s, arm * noise.pitch_rate_rad_per_s, noise.deflection_rate_m_per_s)
+    if height == 0.0:
+        return 1.0
+    s = step * rise / height
+    return max(0.5 * s * (math.sqrt(s * s + 4.0) - s), _LEAST_GAIN)
 
 
 def _deviations(noise: SensorNoise) -> Array:
@@ -142,7 +170,7 @@ def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) ->
     y : (n,) state
     car : the half-car
     workspace : as `motion` left it, see `ride_model`
-    electronics : `state`, `workspace` and `height_off` are filled
+    electronics : `state`, `workspace` and `road_off` are filled
     """
     number, every = int(electronics.counts[ACTS]), electronics.every
     slots = electronics.states.shape[0]
@@ -150,7 +178,8 @@ def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) ->
         _sample(y, car, workspace, electronics, (number // every) % slots)
     sample = max(number - electronics.delay, 0) // every
     copy_into(electronics.states[sample % slots], electronics.state)
-    copy_into(electronics.heights_off[sample % slots], electronics.height_off)
+    for row in range(2):
+        copy_into(electronics.roads_off[sample % slots, row], electronics.road_off[row])
     for row in range(WORKSPACE_ROWS):
         copy_into(electronics.workspaces[sample % slots, row], electronics.workspace[row])
     electronics.counts[ACTS] += 1.0
@@ -169,15 +198,18 @@ def _sample(y: Array, car: Vehicle, workspace: Array, electronics: Electronics, 
     height, angle = deviations[_HEAVE] * drawn[_HEAVE], deviations[_PITCH] * drawn[_PITCH]
     seen[HEAVE] += height
     seen[PITCH] += angle
-    seen[HEAVE_RATE] += deviations[_HEAVE_RATE] * drawn[_HEAVE_RATE]
-    seen[PITCH_RATE] += deviations[_PITCH_RATE] * drawn[_PITCH_RATE]
+    rate, turning = deviations[_HEAVE_RATE] * drawn[_HEAVE_RATE], deviations[_PITCH_RATE] * drawn[_PITCH_RATE]
+    seen[HEAVE_RATE] += rate
+    seen[PITCH_RATE] += turning
     room[BODY, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
     room[COMFORT, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
     for i in range(2):
         deflection = deviations[_DEFLECTION + i] * drawn[_DEFLECTION + i]
         room[DEFLECTION, i] += deflection
-        room[RATE, i] += deviations[_RATE + i] * drawn[_RATE + i]
-        electronics.heights_off[slot, i] = height + car.arms[i] * angle - deflection
+        lengthening = deviations[_RATE + i] * drawn[_RATE + i]
+        room[RATE, i] += lengthening
+        electronics.roads_off[slot, 0, i] = height + car.arms[i] * angle - deflection
+        electronics.roads_off[slot, 1, i] = rate + car.arms[i] * turning - lengthening
 
 
 @compiled

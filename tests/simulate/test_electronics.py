@@ -12,7 +12,19 @@ from pydantic import ValidationError
 from pzd.simulate.car_block import CarBlock
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.electronics import SensorNoise, Sensors, Supply
-from pzd.simulate.ride_model import BODY, COMFORT, DEFLECTION, HEAVE, PITCH, RATE, at_rest, vehicle, workspace
+from pzd.simulate.ride_model import (
+    BODY,
+    COMFORT,
+    DEFLECTION,
+    HEAVE,
+    HEAVE_RATE,
+    PITCH,
+    PITCH_RATE,
+    RATE,
+    at_rest,
+    vehicle,
+    workspace,
+)
 from pzd.simulate.sensing import Electronics, electronics_of, sense, supplied, with_noise
 
 SHORT = {"duration_s": 2.0, "settle_s": 1.0, "output_rate_Hz": 1000.0}
@@ -36,7 +48,7 @@ NOISE = {
 
 
 def electronics(rng: np.random.Generator, acts: int, sensors: Sensors = EXACT, supply: Supply = AT_ONCE) -> Electronics:
-    made = electronics_of(sensors, supply, PERIOD, at_rest(CAR).size)
+    made = electronics_of(sensors, supply, PERIOD, at_rest(CAR).size, CAR.arms)
     assert made is not None
     return with_noise(made, rng, acts)
 
@@ -72,7 +84,8 @@ def test_noise_has_the_deviation_of_each_sensor_and_is_white(rng) -> None:
         rows.append([*seen[DEFLECTION], *seen[RATE], *state[:4], seen[BODY, 0]])
         assert seen[COMFORT, 0] == seen[BODY, 0]
         height = state[HEAVE] + CAR.arms[1] * state[PITCH] - seen[DEFLECTION, 1]
-        assert known.height_off[1] == pytest.approx(height, abs=1e-15)
+        rise = state[HEAVE_RATE] + CAR.arms[1] * state[PITCH_RATE] - seen[RATE, 1]
+        assert known.road_off[:, 1] == pytest.approx([height, rise], abs=1e-15)
     errors = np.array(rows)
     given = [NOISE[name] for name in NOISE]
     expected = np.array([given[0], given[0], given[1], given[1], *given[2:]])
@@ -83,7 +96,7 @@ def test_noise_has_the_deviation_of_each_sensor_and_is_white(rng) -> None:
 
 
 def test_the_noise_is_the_same_in_pieces_as_at_once(generator_for) -> None:
-    made = electronics_of(Sensors(noise=SensorNoise(heave_m=1.0)), AT_ONCE, PERIOD, 10)
+    made = electronics_of(Sensors(noise=SensorNoise(heave_m=1.0)), AT_ONCE, PERIOD, 10, CAR.arms)
     assert made is not None
     whole = with_noise(made, generator_for("noise"), 30).noise
     drawing = generator_for("noise")

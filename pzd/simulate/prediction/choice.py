@@ -8,7 +8,6 @@ from pzd.compiled import compiled, inlined
 from pzd.damper.kernels import effective_voltage_after, keep_voltage
 from pzd.record import Array
 from pzd.simulate.dynamic_damper import DynamicDamper
-from pzd.simulate.kinematics import road_at
 from pzd.simulate.prediction.fixed import ride_fixed, weigh_loads
 from pzd.simulate.prediction.plant import predicted, weigh
 from pzd.simulate.prediction.predictor import (
@@ -24,6 +23,7 @@ from pzd.simulate.prediction.predictor import (
     Predictor,
 )
 from pzd.simulate.prediction.road_ahead import EXPECTED, fill_forecast, fill_known, learn, unforeseen
+from pzd.simulate.prediction.road_met import height_met
 from pzd.simulate.ride_model import (
     BEHIND,
     COMFORT,
@@ -53,7 +53,7 @@ def observe(
     sampled : when what the controller sees was [s]
     model : the ride
     plan : its memory is changed
-    electronics : see `set_control`; its noise is in the height of the road under the axles
+    electronics : see `set_control`; its noise is in the road under the axles
     workspace : as `motion` left it, or as the sensors gave it
     """
     number = int(plan.felt[OBSERVATIONS])
@@ -61,11 +61,9 @@ def observe(
     weigh(plan.felt, 0, plan.felt[ACCELERATION], felt, plan.modes[OBSERVED], plan.residues)
     plan.felt[ACCELERATION] = felt
     for i in range(2):
-        load, road = workspace[CONTACT, i], model.road_coefficients
+        load = workspace[CONTACT, i]
         plan.met[i, 0] = plan.met[i, 1]
-        plan.met[i, 1], _, _ = road_at(road, model.car.speed * sampled - road.behind[i])
-        if electronics is not None:
-            plan.met[i, 1] += electronics.height_off[i]
+        plan.met[i, 1] = height_met(sampled, i, model, plan, electronics)
         plan.felt[MEAN_LOAD_1 + i] += (1.0 - plan.forgotten) * (load * load - plan.felt[MEAN_LOAD_1 + i])
     plan.felt[OBSERVATIONS] = number + 1
     rise = plan.met[0, 1] - plan.met[0, 0] - plan.observation_s * plan.speeds[EXPECTED]

@@ -91,9 +91,12 @@ class Predictor(NamedTuple):
     """(f, 3) recent mean squares of weighted acceleration and loads in that ride."""
     met: Array
     """(2, 2) height under both axles at the last observation and now [m]."""
+    tracked: Array
+    """(2, 4) under each axle: height [m] and rise [m/s] of the last sample, when it was, how long it is held [s]."""
     speeds: Array
-    """(ORDER + 4,) last mean speeds of the road, the newest first [m/s]; height at the last choice [m], speed
-    forecast for the period that goes on [m/s], recent squares of what such forecasts missed, and of the speeds."""
+    """(ORDER + 5,) last mean speeds of the road, the newest first [m/s]; height at the last choice [m], speed
+    forecast for the period that goes on [m/s], recent squares of what such forecasts missed, and of the speeds; the
+    fastest of late [m/s]."""
     forecasts: Array
     """(n, n) speeds that each of the last n choices forecast for the n periods behind it, in turn [m/s]."""
     skill: Array

@@ -14,7 +14,9 @@ _RIDGE = 1e-4
 """Of the mean square of the speeds, added to it: a pure sine leaves most directions of the fit undetermined."""
 _STILL = 1e-12
 """Mean square of the speeds below which the road is level [m2/s2]."""
-HEIGHT, EXPECTED, MISSED, PASSED = range(ORDER, ORDER + 4)
+_FAINT = 0.01**2 / (1.0 - _FORGOTTEN)
+"""Added to it as well [m2/s2]: a road that rises by 10 mm/s or less, or the noise of its sensors, teaches nothing."""
+HEIGHT, EXPECTED, MISSED, PASSED, FASTEST = range(ORDER, ORDER + 5)
 """Places in `Predictor.speeds`."""
 
 
@@ -49,6 +51,7 @@ def learn(plan: Predictor, height: float) -> None:
     speeds[0], speeds[HEIGHT] = speed, height
     speeds[MISSED] = _FORGOTTEN * speeds[MISSED] + (speed - speeds[EXPECTED]) ** 2
     speeds[PASSED] = _FORGOTTEN * speeds[PASSED] + speed * speed
+    speeds[FASTEST] = max(_FORGOTTEN * speeds[FASTEST], abs(speed))
     _score_forecasts(plan, speed)
     _forecast(plan, height)
 
@@ -68,6 +71,7 @@ def _forecast(plan: Predictor, height: float) -> None:
     """Forecast speeds and heights under axle 1 [m] for the periods to come, and what they may miss."""
     period, theta, window = plan.observation_s * plan.every, plan.rooms[ORDER], plan.rooms[ORDER + 1]
     number, count = int(plan.felt[OBSERVATIONS]) // plan.every, plan.skill.shape[1]
+    fastest = plan.speeds[FASTEST]
     _solve(plan.moments, plan.rooms, theta)
     for i in range(ORDER):
         window[i] = plan.speeds[i]
@@ -75,6 +79,7 @@ def _forecast(plan: Predictor, height: float) -> None:
         following = 0.0
         for i in range(ORDER):
             following += theta[i] * window[i]
+        following = min(max(following, -fastest), fastest)
         for i in range(ORDER - 1, 0, -1):
             window[i] = window[i - 1]
         window[0] = plan.forecasts[number % count, n] = following
@@ -109,7 +114,7 @@ def _solve(moments: Array, room: Array, theta: Array) -> None:
     if power < _STILL:
         return
     for i in range(ORDER):
-        room[i, i] += _RIDGE * power
+        room[i, i] += _RIDGE * power + _FAINT
     _triangular(room)
     for i in range(ORDER - 1, -1, -1):
         theta[i] = room[i, ORDER]
