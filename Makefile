@@ -64,7 +64,7 @@ coverage-study: $(DEV)  ## Print how often the intervals of identify hold the tr
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=.:tests/identify $(BIN)/python tests/studies/coverage_study.py
 
 .PHONY: sensitivity
-sensitivity: $(DEV)  ## Print what the verdicts owe to each threshold, halved and doubled; a quarter of an hour
+sensitivity: $(DEV)  ## Print what the verdicts owe to each threshold, halved and doubled; half an hour
 	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/sensitivity.py
 
 .PHONY: format
