@@ -48,7 +48,7 @@ def element_force(
     initial_force : F at the first sample [N]
     velocity : (n,) extension speed [m/s], whose change bends the displacement to a parabola inside each step;
         None: linear between samples
-    every : from the first sample on, the force of every so many-th is kept
+    every : n to keep the force of every n-th sample alone, the first among them
 
     Returns
     -------

@@ -59,13 +59,9 @@ def _tuple(entry: str) -> str:
 def _rows() -> Iterator[str]:
     stroke = {effect.name for effect in acting("stroke")}
     moved = [len(ELEMENT) + i for i, (name, _) in enumerate(STROKE_AND_FLOW) if name in stroke]
-    kept = [i for i in range(_WIDTH) if i not in moved]
     yield from _function("mix(a, b, share)", "return a if a == b else a + (b - a) * share")  # equal infinities stand
     yield from _function("interpolate(p, q, t)", f"return {_tuple('mix(p[#], q[#], t)')}")
     yield from _function("row_of(a)", f"return {_tuple('a[#]')}")
-    entries = {**dict.fromkeys(moved, "q"), **dict.fromkeys(kept, "p")}
-    taken = ", ".join(f"{entries[i]}[{i}]" for i in range(_WIDTH))
-    yield from _function("with_stroke_of(p, q)", f"return ({taken},)")
     same = " and ".join(f"p[{i}] == q[{i}]" for i in moved) or "True"
     yield from _function("stroke_moves(p, q)", f"return not ({same})")
     alike = " and ".join(f"p[{i}] == q[{i}]" for i in range(len(ELEMENT), _WIDTH)) or "True"

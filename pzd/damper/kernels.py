@@ -50,8 +50,6 @@ interpolate: Callable[[Row, Row, float], Row] = _MODULE.interpolate
 """The parameter row at a share of the way from one to the other."""
 row_of: Callable[[Array], Row] = _MODULE.row_of
 """An array as a parameter row."""
-with_stroke_of: Callable[[Row, Row], Row] = _MODULE.with_stroke_of
-"""A row with the parameters of the stroke effects of another one."""
 stroke_moves: Callable[[Row, Row], bool] = _MODULE.stroke_moves
 """Whether two rows differ in a parameter of a stroke effect."""
 effects_alike: Callable[[Row, Row], bool] = _MODULE.effects_alike

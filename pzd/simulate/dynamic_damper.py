@@ -8,7 +8,6 @@ from typing import NamedTuple
 from pzd.compiled import compiled, inlined
 from pzd.damper.flow import flow_speed
 from pzd.damper.kernels import (
-    K,
     Row,
     branch_force,
     branch_stored,
@@ -16,7 +15,7 @@ from pzd.damper.kernels import (
     effective_voltage_after,
     parallel_force,
 )
-from pzd.damper.regimes import spring_energy, spring_force
+from pzd.damper.regimes import spring_force
 from pzd.record import Array
 from pzd.table.kernel import bracket
 
@@ -86,12 +85,6 @@ def flowing(e: float, row: Row, guess: float) -> tuple[float, float]:
     force = spring_force(e, row)
     side = 1.0 if force >= 0.0 else -1.0
     return force, side * flow_speed(abs(force), row, side, guess)
-
-
-@compiled
-def stored(e: float, row: Row) -> float:
-    """Energy of the oil spring [J] at its elastic deflection [m]."""
-    return spring_energy(e, row, row[K])
 
 
 @inlined

@@ -32,6 +32,8 @@ _LEAST_GAIN = 0.02
 """What a rise between two samples misses of the road is forgotten after some fifty of them."""
 ACTS, NEXT_NOISE = range(2)
 """Of `Electronics.counts`."""
+HEIGHT_OFF, RISE_OFF = range(2)
+"""Rows of `Electronics.road_off`."""
 
 
 class Electronics(NamedTuple):
@@ -178,7 +180,7 @@ def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) ->
         _sample(y, car, workspace, electronics, (number // every) % slots)
     sample = max(number - electronics.delay, 0) // every
     copy_into(electronics.states[sample % slots], electronics.state)
-    for row in range(2):
+    for row in (HEIGHT_OFF, RISE_OFF):
         copy_into(electronics.roads_off[sample % slots, row], electronics.road_off[row])
     for row in range(WORKSPACE_ROWS):
         copy_into(electronics.workspaces[sample % slots, row], electronics.workspace[row])
@@ -208,8 +210,8 @@ def _sample(y: Array, car: Vehicle, workspace: Array, electronics: Electronics, 
         room[DEFLECTION, i] += deflection
         lengthening = deviations[_RATE + i] * drawn[_RATE + i]
         room[RATE, i] += lengthening
-        electronics.roads_off[slot, 0, i] = height + car.arms[i] * angle - deflection
-        electronics.roads_off[slot, 1, i] = rate + car.arms[i] * turning - lengthening
+        electronics.roads_off[slot, HEIGHT_OFF, i] = height + car.arms[i] * angle - deflection
+        electronics.roads_off[slot, RISE_OFF, i] = rate + car.arms[i] * turning - lengthening
 
 
 @compiled

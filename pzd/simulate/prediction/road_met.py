@@ -7,7 +7,7 @@ from pzd.record import Array
 from pzd.simulate.kinematics import road_at
 from pzd.simulate.prediction.predictor import OBSERVATIONS, Predictor
 from pzd.simulate.ride_model import RideModel
-from pzd.simulate.sensing import Electronics
+from pzd.simulate.sensing import HEIGHT_OFF, RISE_OFF, Electronics
 
 HEIGHT, RISE, SAMPLED, HELD = range(4)
 """Places in `Predictor.tracked`."""
@@ -29,11 +29,11 @@ def height_met(sampled: float, axle: int, model: RideModel, plan: Predictor, ele
     height, slope, _ = road_at(road, speed * sampled - road.behind[axle])
     if electronics is None:
         return height
-    height += electronics.road_off[0, axle]
+    height += electronics.road_off[HEIGHT_OFF, axle]
     return joined(
         sampled,
         height,
-        speed * slope + electronics.road_off[1, axle],
+        speed * slope + electronics.road_off[RISE_OFF, axle],
         electronics.road_gains[axle],
         plan.observation_s,
         plan.felt[OBSERVATIONS] == 0.0,
