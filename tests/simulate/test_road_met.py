@@ -17,7 +17,7 @@ from pzd.simulate.electronics import SensorNoise
 from pzd.simulate.prediction.planning import predictor_of
 from pzd.simulate.prediction.predictor import OBSERVATIONS, Predictor
 from pzd.simulate.prediction.road_ahead import learn
-from pzd.simulate.prediction.road_met import joined
+from pzd.simulate.prediction.road_met import filtered_height
 from pzd.simulate.sensing import road_gain
 
 STEP, ARM = 2e-3, 1.2
@@ -40,7 +40,7 @@ def height_error(noise: SensorNoise, gain: float, rng: np.random.Generator) -> f
     rise_off = math.hypot(noise.heave_rate_m_per_s, ARM * noise.pitch_rate_rad_per_s, noise.deflection_rate_m_per_s)
     seen, rising = height + off * rng.standard_normal(time.size), rise + rise_off * rng.standard_normal(time.size)
     tracked = np.zeros(4)
-    found = [joined(t, seen[n], rising[n], gain, STEP, n == 0, tracked) for n, t in enumerate(time)]
+    found = [filtered_height(t, seen[n], rising[n], gain, STEP, n == 0, tracked) for n, t in enumerate(time)]
     return rms((np.array(found) - height)[2000:])
 
 
@@ -55,12 +55,12 @@ def test_no_other_gain_knows_the_height_better(generator_for) -> None:
 
 def test_heights_without_noise_are_believed() -> None:
     assert road_gain(SensorNoise(deflection_rate_m_per_s=0.1), ARM, STEP) == 1.0
-    assert joined(STEP, 0.03, 5.0, 1.0, STEP, False, np.zeros(4)) == 0.03
+    assert filtered_height(STEP, 0.03, 5.0, 1.0, STEP, False, np.zeros(4)) == 0.03
 
 
 def test_between_two_samples_the_road_goes_on_with_its_rise() -> None:
     tracked = np.zeros(4)
-    found = [joined(0.0, 0.01, 0.5, 0.1, 1e-3, n == 0, tracked) for n in range(3)]
+    found = [filtered_height(0.0, 0.01, 0.5, 0.1, 1e-3, n == 0, tracked) for n in range(3)]
     assert found == pytest.approx([0.01, 0.0105, 0.011])
 
 

@@ -1,4 +1,4 @@
-"""The road under the axles, as the sensors give it: the height of each sample joined to the rise since the last one."""
+"""Height of the road under the axles, as the sensors give it: each sample by a Kalman filter with the rise measured."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def height_met(sampled: float, axle: int, model: RideModel, plan: Predictor, ele
     if electronics is None:
         return height
     height += electronics.road_off[HEIGHT_OFF, axle]
-    return joined(
+    return filtered_height(
         sampled,
         height,
         speed * slope + electronics.road_off[RISE_OFF, axle],
@@ -42,10 +42,10 @@ def height_met(sampled: float, axle: int, model: RideModel, plan: Predictor, ele
 
 
 @compiled
-def joined(
+def filtered_height(
     sampled: float, height: float, rise: float, gain: float, period: float, first: bool, tracked: Array
 ) -> float:
-    """The height [m] by a sample's height [m] and rise [m/s]; between two samples it goes on with the rise.
+    """Height of the road [m] by a sample of height [m] and rise [m/s]; between two samples it goes on with the rise.
 
     Equation: x = x_0 + h (v_0 + v) / 2, then x + K (z - x)      Source: see `pzd.simulate.sensing.road_gain`
     """
