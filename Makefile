@@ -52,8 +52,12 @@ figures: $(RUNTIME)  ## Draw the figures of the paper into runs/paper/figures
 	$(BIN)/pzd figures configs/paper.yaml
 
 .PHONY: blind
-blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the verdicts can be trusted; about an hour
+blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the verdicts can be trusted; an hour and a half
 	$(BIN)/pzd blind configs/blind.yaml
+
+.PHONY: blind-motions
+blind-motions: $(RUNTIME)  ## As `make blind`, on two tones, sweeps, roads, moving voltages, warming alone; three hours
+	$(BIN)/pzd blind configs/blind-motions.yaml
 
 .PHONY: bench
 bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that does the same work; half an hour

@@ -63,6 +63,8 @@ def trend_of_tests(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
     config : how small a probability is believed, and what is visible
     """
     checks = [c for c in campaign.checks(damper) if c.prepared.constant and c.wanted.any()]
+    if not checks:
+        return None
     condition = np.array([nearest_row(damper.base, c.prepared) for c in checks])
     own, sizes = _own(checks)
     pairs = [

@@ -54,6 +54,15 @@ def test_gains_that_follow_the_frequency_are_a_trend(rng: np.random.Generator) -
     assert 0.7 * 0.05 < found.size < 0.05
 
 
+def test_where_the_voltage_moves_in_every_test_no_trend_is_sought(rng: np.random.Generator) -> None:
+    records = [
+        replace(r, voltage=np.where(np.sin(3.0 * r.time) > 0.0, max(TWO), min(TWO)))
+        for r in frequency_dependent(rng, 0.05)
+        if r.voltage is not None
+    ]
+    assert trend(tuple(records)) is None
+
+
 def test_voltages_as_a_rig_records_them_are_one_condition(rng: np.random.Generator) -> None:
     """No two tests hold a voltage to the last digit."""
     records = [

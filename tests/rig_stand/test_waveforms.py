@@ -20,9 +20,10 @@ SIZES: dict[str, dict[str, object]] = {
     "sweep": {"low_Hz": 0.5, "high_Hz": 6.0, "amplitude_m": 0.02, "amplitude_at_high_m": 0.005},
     "random": {"low_Hz": 0.5, "high_Hz": 10.0, "rms_m": 0.006},
     "road": {"road_class": "C", "vehicle_speed_km_per_h": 72.0},
+    "tones": {"frequencies_Hz": (1.0, 2.5), "amplitudes_m": (0.02, 0.005)},
     "file": {"path": "motion.csv"},
 }
-REPEATING = sorted(set(SIZES) - {"file"})
+REPEATING = sorted(set(SIZES) - {"file", "tones"})
 
 
 @pytest.fixture
@@ -146,6 +147,13 @@ def test_sweep_goes_from_low_to_high_and_back() -> None:
     assert np.abs(x).max() <= 0.02
 
 
+def test_two_tones_are_the_sum_of_their_sines() -> None:
+    time = np.linspace(-1.0, 9.0, 777)
+    alone = [course(made("sine", frequency_Hz=f, amplitude_m=a))(time) for f, a in ((1.0, 0.02), (2.5, 0.005))]
+    for together, first, second in zip(course(made("tones"))(time), *alone, strict=True):
+        np.testing.assert_allclose(together, first + second, rtol=0, atol=1e-14 * np.abs(together).max())
+
+
 def test_road_scaled_to_a_peak_reaches_it(seed: int) -> None:
     x, _, _ = one_cycle(made("road", peak_m=0.015), seed=seed)
     assert np.abs(x).max() == pytest.approx(0.015, rel=1e-3)
@@ -177,7 +185,7 @@ def test_a_missing_or_backward_file_is_the_users_fault(tmp_path: Path) -> None:
         course(made("file"), folder=tmp_path)
 
 
-@pytest.mark.parametrize("kind", REPEATING)
+@pytest.mark.parametrize("kind", sorted(set(SIZES) - {"file"}))
 def test_a_test_starts_from_rest_and_is_untouched_when_recording_begins(kind: str) -> None:
     waveform = made(kind)
     lead = waveform.settling_time
@@ -202,6 +210,9 @@ def test_a_test_starts_from_rest_and_is_untouched_when_recording_begins(kind: st
         ("random", {"high_Hz": 0.1}, "no multiple"),
         ("road", {"road_class": "Z"}, "a road class is one of A, B"),
         ("sine", {"label": "a b"}, "label"),
+        ("tones", {"amplitudes_m": (0.01, 0.01, 0.01)}, "a frequency and an amplitude .got 2 and 3"),
+        ("tones", {"frequencies_Hz": (0.0, 1.0)}, "above 0"),
+        ("tones", {"frequencies_Hz": (1.0, 1.0)}, "no two tones"),
     ],
 )
 def test_impossible_motions_are_refused(kind: str, changes: dict[str, object], message: str) -> None:

@@ -31,8 +31,8 @@ class StandTest(Frozen):
     waveform: WaveformBlock
     """The motion of the actuator."""
     cycles: float | None = Field(default=None, gt=0.0)
-    """Length in cycles of the waveform; by default 10 of a sine or triangle, 2 of a sweep, random motion or road,
-    1 of a file."""
+    """Length in cycles of the waveform; by default 10 of a sine or triangle and of the lowest of several tones, 2 of a
+    sweep, random motion or road, 1 of a file."""
     duration_s: float | None = Field(default=None, gt=0.0)
     """Length in seconds, instead of cycles."""
     voltages_V: tuple[Voltage, ...] | None = Field(default=None, min_length=1)
