@@ -73,6 +73,8 @@ class BlindConfig(EngineConfig):
     """Shares of what is hidden."""
     campaigns: tuple[TestPlan, ...] = Field(min_length=1)
     """What the stand runs; every case runs one campaign."""
+    by_campaign: bool = False
+    """Whether each campaign gets rates of its own in what is printed, beside the targets."""
     sizes: tuple[float, float] = (0.02, 0.2)
     """Smallest and largest effect, as a share of the peak of the record that it changes most: the amplitude of the sine
     that has the r.m.s. of the change."""

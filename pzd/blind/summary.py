@@ -11,14 +11,20 @@ import numpy as np
 from pzd.blind.case import Scored
 from pzd.blind.confusion import confusion, draw, write_table
 from pzd.blind.rates import CalibrationRow, RateRow, calibration_rows, rate_rows
-from pzd.blind.targets import Line, independent_lines, lines
+from pzd.blind.targets import Line, campaign_lines, independent_lines, lines
 from pzd.quantities import Control
 from pzd.schema.csvfile import write_rows
 from pzd.schema.jsonfile import write_json
 
 
 def write(
-    cases: Sequence[Scored], folder: Path, control: Control, *, tuning: bool, generator: str = "own"
+    cases: Sequence[Scored],
+    folder: Path,
+    control: Control,
+    *,
+    tuning: bool,
+    generator: str = "own",
+    by_campaign: bool = False,
 ) -> list[str]:
     """Write tables and picture beside the scored cases.
 
@@ -29,6 +35,7 @@ def write(
     control : the control signal
     tuning : whether the seed is one that thresholds were tuned on
     generator : where the cases come from, `own` or `independent`
+    by_campaign : whether each campaign gets rates of its own as well
 
     Returns
     -------
@@ -41,6 +48,8 @@ def write(
     write_table(matrix, folder / "confusion.csv")
     draw(matrix, folder / "confusion.png")
     said = lines(cases) if generator == "own" else independent_lines(cases)
+    if by_campaign:
+        said = [*said, *campaign_lines(cases)]
     write_json(folder / "summary.json", said, control)
     head = f"{len(cases)} cases"
     if tuning:

@@ -59,6 +59,23 @@ def lines(cases: Sequence[Scored]) -> list[Line]:
     return [*_selection(cases), *_nothing_to_name(cases), *_gap_cuts(cases), *_calibration(cases), *_counts(cases)]
 
 
+def campaign_lines(cases: Sequence[Scored]) -> list[Line]:
+    """How far the verdicts hold on each campaign alone, the campaigns in the order of their first case."""
+    found = []
+    for name in dict.fromkeys(case.campaign for case in cases):
+        mine = [c for c in cases if c.campaign == name]
+        seen = [c for c in mine if c.truth and visible(c)]
+        nothing = [c for c in mine if not c.truth and c.kind != "outside"]
+        outside = [c for c in mine if c.kind == "outside" and visible(c)]
+        found += [
+            rate_line(f"{name}, visible", "right, or ambiguous with the truth", seen, _right_or_ambiguous, ">= 95 %"),
+            rate_line(f"{name}, visible", "wrong name", seen, wrong_name, "<= 1 %"),
+            rate_line(f"{name}, no effect", "false names", nothing, false_name, "<= 1 %"),
+            rate_line(f"{name}, outside the library, visible", "unexplained", outside, _unexplained, ">= 92 %"),
+        ]
+    return found
+
+
 def independent_lines(cases: Sequence[Scored]) -> list[Line]:
     """The same of cases of the second generator, whose forms outside the library say what describes them rightly."""
     seen = [c for c in cases if c.truth and visible(c)]

@@ -49,7 +49,8 @@ def blind(
         benchmark = Benchmark(setup, methods, places, made_from, where, output.progress)
         cases = benchmark.run(jobs, afresh=force)
         tuning, generator = setup.blind.tuning, setup.blind.generator
-        lines = write(cases, places.folder, setup.control, tuning=tuning, generator=generator)
+        by_campaign = setup.blind.by_campaign
+        lines = write(cases, places.folder, setup.control, tuning=tuning, generator=generator, by_campaign=by_campaign)
     output.say(*lines, f"tables and picture: {places.folder}")
     complain(f"not to be trusted: case {name} could not be drawn: {why}" for name, why in benchmark.undrawn.items())
     return UNTRUSTED if benchmark.undrawn else DONE

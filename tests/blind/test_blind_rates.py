@@ -12,7 +12,7 @@ from pzd.blind.case import Scored
 from pzd.blind.confusion import confusion
 from pzd.blind.rates import Z95, Rate, calibration_rows, rate_rows
 from pzd.blind.summary import write
-from pzd.blind.targets import Line, lines
+from pzd.blind.targets import Line, campaign_lines, lines
 from pzd.quantities import Control
 
 Make = Callable[..., Scored]
@@ -52,6 +52,31 @@ def test_right_is_exactly_what_was_there(case: Make) -> None:
     assert line(said, about, "wrong name").value == pytest.approx(0.4)
     assert line(said, about, "truth among effects and rivals").value == pytest.approx(0.6)
     assert rate_rows(said)[0].truth_and_more == pytest.approx(0.2)
+
+
+def test_each_campaign_has_rates_of_its_own(case: Make) -> None:
+    outside: dict[str, object] = {"kind": "outside", "truth": ()}
+    said = [
+        case(campaign="swept"),
+        case(campaign="road", verdict="ambiguous", rivals=("lash",)),
+        case(campaign="road", effects=("lash",)),
+        case(campaign="road", verdict="unexplained"),
+        case(campaign="swept", kind="none", truth=(), verdict="none", effects=()),
+        case(campaign="road", kind="none", truth=(), effects=("lash",)),
+        case(campaign="road", **outside, verdict="unexplained", effects=()),
+        case(campaign="road", **outside, verdict="none", effects=()),
+    ]
+    told = {(one.about, one.figure): (one.value, one.count) for one in campaign_lines(said)}
+    assert told == {
+        ("swept, visible", "right, or ambiguous with the truth"): (1.0, 1),
+        ("swept, visible", "wrong name"): (0.0, 1),
+        ("swept, no effect", "false names"): (0.0, 1),
+        ("swept, outside the library, visible", "unexplained"): (None, 0),
+        ("road, visible", "right, or ambiguous with the truth"): (pytest.approx(1 / 3), 3),
+        ("road, visible", "wrong name"): (pytest.approx(1 / 3), 3),
+        ("road, no effect", "false names"): (1.0, 1),
+        ("road, outside the library, visible", "unexplained"): (0.5, 2),
+    }
 
 
 def test_a_failed_diagnosis_is_wrong_wherever_it_happens(case: Make) -> None:
