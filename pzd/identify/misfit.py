@@ -11,7 +11,7 @@ nothing is said here, for a lag of the valve looks like any misfit; diagnose loo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -73,7 +73,8 @@ def misfit_of(parts: Sequence[Part]) -> Misfit:
             continue
         folded = part.folded(cleared)
         if folded is None:
-            fit = fit_smooth_residual(cleared, sliced(part.record, part.counted), part.force - part.residuals)
+            record = replace(sliced(part.record, part.counted), voltage=None)  # it stands still, but for noise
+            fit = fit_smooth_residual(cleared, record, part.force - part.residuals)
             smooth.append(np.array([fit.probability]))
             power.append(float(np.mean(fit.explained**2 - fit.spread)))
         else:

@@ -16,6 +16,8 @@ from whole_diagnosis import diagnosed
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.diagnose.data.cleaning import prepare
+from pzd.diagnose.fit.prediction import ENDS, counted
 from pzd.record import Array, Record
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
@@ -23,8 +25,8 @@ from pzd.signals.kinematics import kinematics
 pytestmark = pytest.mark.ci
 
 RATE, FINER, DURATION, LEAD = 500, 16, 20.0, 2.0
-NOISE, SENSOR = 5.0, 2e-6
-"""Of the force [N] and of the displacement [m]."""
+NOISE, SENSOR, VOLTMETER = 5.0, 2e-6, 0.1
+"""Of the force [N], of the displacement [m] and of the voltage [V]."""
 PLAIN = Damper(
     base=(
         BaseRow(voltage_V=0.0, T0_N=400.0, C_Ns_per_m=2500.0, k_N_per_m=4.0e5),
@@ -86,6 +88,7 @@ def records(damper: Damper, motion: Callable[[Array], Array], rng: Generator) ->
             t, seen, measured, volts = (c[round(LEAD * RATE) * FINER :: FINER] for c in (fine, share * x, force, U))
             measured = measured + NOISE * rng.standard_normal(t.size)
             seen = seen + SENSOR * rng.standard_normal(t.size)
+            volts = volts + VOLTMETER * rng.standard_normal(t.size)
             clean = kinematics(t, seen, cycles(t, seen))
             name = f"{row.voltage_V:g}V-{share:g}"
             found.append(Record(name, None, t, seen, clean.velocity, clean.acceleration, measured, volts))
@@ -105,6 +108,13 @@ def test_what_is_hidden_is_named_with_its_size(motion: str, effect: str, rng: Ge
     found = diagnosed(records(PLAIN.with_effect(effect, {parameter: size}), MOTIONS[motion], rng)).diagnosis
     assert (found.verdict, found.effects) == ("named", (effect,))
     assert found.parameters[effect][parameter].value == pytest.approx(size, rel=0.05)
+
+
+def test_noise_of_a_voltage_that_stands_still_is_no_step(rng: Generator) -> None:
+    """Samples beside a step of the voltage are left out; noise once passed for steps, and left a tenth of them."""
+    inside = 1.0 - 2.0 * ENDS
+    for each in prepare(records(PLAIN, MOTIONS["a sweep"], rng)):
+        assert np.mean(counted(each)) == pytest.approx(inside, abs=0.02)
 
 
 def two_speeds(t: Array) -> Array:

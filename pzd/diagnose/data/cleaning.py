@@ -5,7 +5,7 @@ makes it look like inertia. Where the motion repeats, cycles are averaged and on
 above their own scatter are kept; where it does not, the spectrum is cut where it sinks into noise.
 
 Noise and steps of a temperature would go through a drift of the oil into the force, which follows the oil and not its
-sensor.
+sensor. Noise of a voltage that stands still would look like steps of the voltage.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class Prepared:
     """One record as the diagnosis sees it."""
 
     record: Record
-    """With cleaned displacement and its derivatives, and smoothed temperature; only the repeating run where there is
-    one."""
+    """With cleaned displacement and its derivatives, smoothed temperature, and a voltage that stands still at its
+    median; only the repeating run where there is one."""
     cycles: Cycles | None
     """The run of cycles, where motion and voltage both repeat."""
     lead: Record | None
@@ -101,7 +101,7 @@ def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
 
 
 def _prepared(raw: Record, constant: bool) -> Prepared:
-    record = _even_temperature(raw)
+    record = _even_temperature(_held_voltage(raw) if constant else raw)
     run = cycles(record.time, record.displacement)
     if run is None:
         return Prepared(_smoothed(record), None, None, constant)
@@ -121,6 +121,12 @@ def _prepared(raw: Record, constant: bool) -> Prepared:
     early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
     lead = _led_in(cleaned, early, motion(early))
     return Prepared(cleaned, run, lead, constant, _drawn(lead, average))
+
+
+def _held_voltage(record: Record) -> Record:
+    """The record with its median voltage in place of what a noisy sensor makes of one that stands still."""
+    voltage = record.median_voltage()
+    return record if voltage is None else replace(record, voltage=np.full(record.time.size, voltage))
 
 
 def _even_temperature(record: Record) -> Record:

@@ -88,5 +88,5 @@ def force_error(damper: Damper, prepared: Prepared) -> Array | float:
 
 
 def _simulated(damper: Damper, record: Record) -> Array:
-    motion, stride = motion_of(record, constant=True)
+    motion, stride = motion_of(record)
     return respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)[::stride]

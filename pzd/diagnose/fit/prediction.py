@@ -35,18 +35,17 @@ ENDS = 0.02
 def predicted_force(damper: Damper, prepared: Prepared) -> Array:
     """(n,) force that the damper gives under the record's cleaned motion [N]."""
     record = prepared.lead or prepared.record
-    motion, stride = motion_of(record, constant=prepared.constant)
+    motion, stride = motion_of(record)
     force = respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)
     return force[::stride][prepared.lead_samples :]
 
 
-def motion_of(record: Record, *, constant: bool) -> tuple[Motion, int]:
+def motion_of(record: Record) -> tuple[Motion, int]:
     """The record's motion, on a finer grid where its samples are too far apart for a parabola between them.
 
     Parameters
     ----------
-    record : displacement cleaned
-    constant : whether the voltage counts as standing still, at its median; so does a temperature that hardly moves
+    record : cleaned; a temperature that hardly moves counts as standing still, at its median
 
     Returns
     -------
@@ -55,10 +54,9 @@ def motion_of(record: Record, *, constant: bool) -> tuple[Motion, int]:
     half_cycle = min(np.diff(reversals(record.displacement)), default=record.displacement.size)
     stride = max(int(np.ceil(FEWEST_IN_HALF_CYCLE / max(half_cycle, 1))), 1)
     motion = Motion.of(record) if stride == 1 else _refined(record, stride)
-    if constant:
-        motion = replace(motion, voltage=_held(motion.voltage))
     if motion.temperature is not None and not warms(motion.temperature):
-        motion = replace(motion, temperature=_held(motion.temperature))
+        held = np.full(motion.temperature.size, np.median(motion.temperature))
+        motion = replace(motion, temperature=held)
     return motion, stride
 
 
@@ -83,10 +81,6 @@ def _refined(record: Record, stride: int) -> Motion:
     displacement, velocity, acceleration = (CubicSpline(samples, channel)(fine) for channel in smooth)
     held = (None if c is None else np.interp(fine, samples, c) for c in (record.voltage, record.temperature))
     return Motion(np.interp(fine, samples, record.time), displacement, velocity, acceleration, *held)
-
-
-def _held(channel: Array | None) -> Array | None:
-    return None if channel is None else np.full(channel.size, np.median(channel))
 
 
 def counted(prepared: Prepared) -> NDArray[np.bool_]:

@@ -192,7 +192,7 @@ def _of_samples(
     if left > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left)
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
-    motion, factor = motion_of(record, constant=p.constant)
+    motion, factor = motion_of(record)
     rows = int(np.count_nonzero(unbroken(compared, noise)))
     bare = RecordLikelihood(
         record.name,
