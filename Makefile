@@ -7,7 +7,7 @@ RUNTIME := .venv/.runtime
 DEV := .venv/.dev
 PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-compile
 LOCK := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest \
-        --generate-hashes --no-emit-index-url --custom-compile-command "make lock"
+        --generate-hashes --no-strip-extras --no-emit-index-url --custom-compile-command "make lock"
 
 # Each module is compiled to bytecode where it is first imported: most modules of the packages never are, and a
 # command that may not keep the bytecode takes twice as long to start.

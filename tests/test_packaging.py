@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib.util
 import json
 import re
 import shutil
@@ -34,7 +35,7 @@ PYTHONS = ("3.11", "3.12", "3.13")
 
 def pins(lock: str) -> dict[str, Requirement]:
     """Every pin of a lock by its canonical name."""
-    lines = re.findall(r"^(\S+==[^\\\n]+?)\s*\\$", (ROOT / lock).read_text(encoding="utf-8"), re.MULTILINE)
+    lines = re.findall(r"^(\S[^=\n]*==[^\\\n]+?)\s*\\$", (ROOT / lock).read_text(encoding="utf-8"), re.MULTILINE)
     return {canonicalize_name(pin.name): pin for pin in map(Requirement, lines)}
 
 
@@ -52,6 +53,21 @@ def test_a_lock_pins_and_hashes_everything_and_names_no_host(lock: str) -> None:
     assert len(entries) == len(pins(lock))
     assert all("--hash=sha256:" in entry for entry in entries)
     assert not re.search(r"://|--(find-links|index-url|extra-index-url|trusted-host)", text)
+
+
+def test_a_package_that_another_wants_with_an_extra_is_pinned_with_it() -> None:
+    # Beside a pin of `coverage` alone, pip takes the newest release for `coverage[toml]` and refuses it as not pinned.
+    locked = pins("requirements-dev.lock")
+    installed = {name for name in locked if importlib.util.find_spec(name.replace("-", "_"))}
+    wanted = {
+        (canonicalize_name(need.name), extra)
+        for name in installed
+        for need in map(Requirement, distribution(name).requires or ())
+        if need.marker is None or any(need.marker.evaluate({"extra": extra}) for extra in {"", *locked[name].extras})
+        for extra in need.extras
+    }
+    assert ("coverage", "toml") in wanted
+    assert {(name, extra) for name, extra in wanted if extra not in locked[name].extras} == set()
 
 
 def test_the_lock_satisfies_what_the_project_declares() -> None:
