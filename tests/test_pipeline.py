@@ -19,7 +19,7 @@ from pzd.config import load
 from pzd.damper.effects import library
 from pzd.pipeline.command import execute, opened, stale_stages
 from pzd.pipeline.execution import Pipeline
-from pzd.pipeline.sources import PACKAGE, _file, _imports_of, code_hash, modules_used
+from pzd.pipeline.sources import PACKAGE, _file, _imports_of, _modules, code_hash, modules_used
 from pzd.pipeline.stages import Stage, stages
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
@@ -206,6 +206,7 @@ def edited(path: Path | None) -> None:
         file.write("# edited\n")
     code_hash.cache_clear()
     _imports_of.cache_clear()
+    _modules.cache_clear()
 
 
 def test_a_comment_in_what_no_stage_imports_reruns_nothing(bench: Bench, copied: Path) -> None:

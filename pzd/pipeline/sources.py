@@ -101,18 +101,21 @@ def _imports_of(name: str, package: Path) -> frozenset[str]:
 
 def _below(name: str, package: Path) -> set[str]:
     """Every module of a package and of the packages in it."""
-    folder = package.parent.joinpath(*name.split("."))
-    return {
-        ".".join(path.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__")
-        for path in folder.rglob("*.py")
-    }
+    return {one for one in _modules(package) if one == name or one.startswith(f"{name}.")}
 
 
 def _file(name: str, package: Path) -> Path | None:
     """The file of a module or package; None where there is none of that name."""
-    path = package.parent.joinpath(*name.split("."))
-    candidates = (path.with_suffix(".py"), path / "__init__.py")
-    return next((candidate for candidate in candidates if candidate.is_file()), None)
+    return _modules(package).get(name)
+
+
+@cache
+def _modules(package: Path) -> dict[str, Path]:
+    """The file of every module and package, by its full name, from one walk through the folders."""
+    return {
+        ".".join(path.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in package.rglob("*.py")
+    }
 
 
 def _data(folder: Path) -> Iterator[Path]:

@@ -7,6 +7,7 @@ has one whose average cycle would take away more than noise (two tones, a beat).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,10 @@ from pzd.signals.step import usual_step
 FITTED_POINTS = 1000
 """Points of a cycle that the period is fitted to, at least, as far as there are samples."""
 REFINEMENTS = 6
-"""Rounds of the refinement of the period; each squares the error."""
+"""Rounds of the refinement of the period, at most; each squares the error."""
+SETTLED = 1e-9
+"""Share of the period by which a round of the refinement moves it where more rounds would add nothing: after the next
+it would be beyond rounding."""
 CORNER = 3
 """Points at either end of the cycle that the period is not fitted to."""
 MAINS_BAND = 0.5
@@ -82,9 +86,16 @@ class Cycles:
 
     def fold(self, time: Array, values: Array) -> Array:
         """One row a cycle (count, points), from a cubic through the samples."""
+        instants = self.instants(time)
+        reach = 8 * (time[1] - time[0])
+        near = (time >= instants[0, 0] - reach) & (time <= instants[-1, -1] + reach)
+        return _cubic(time[near], values[near])(instants)
+
+    def instants(self, time: Array) -> Array:
+        """Times (count, points) of the points of the cycles [s]."""
         points = self.points(time)
         steps = np.arange(self.count * points) / points
-        return _cubic(time, values, self.start + steps * self.period).reshape(self.count, points)
+        return (self.start + steps * self.period).reshape(self.count, points)
 
     def mean(self, time: Array, values: Array) -> Array:
         """The average cycle (points,)."""
@@ -179,9 +190,13 @@ def _refined(time: Array, displacement: Array, found: Repeats) -> Cycles:
 def _fitted(time: Array, coarse: Array, displacement: Array, found: Repeats) -> Cycles:
     """Fit the period to few cycles first, so that a shift never exceeds a small part of the cycle."""
     run = _whole(time, found, found.period)
+    course = _cubic(coarse, displacement)
     for round_number in range(REFINEMENTS):
         used = Cycles(run.period, run.start, min(run.count, 3 * 4**round_number))
-        run = _whole(time, found, run.period + _shift_per_cycle(coarse, displacement, used))
+        shift = _shift_per_cycle(used, course(used.instants(coarse)))
+        run = _whole(time, found, run.period + shift)
+        if used.count == run.count and abs(shift) < SETTLED * run.period:
+            break
     return run
 
 
@@ -199,13 +214,12 @@ def _whole(time: Array, found: Repeats, period: float) -> Cycles:
     return Cycles(period, float(time[first]), count)
 
 
-def _shift_per_cycle(time: Array, displacement: Array, run: Cycles) -> float:
+def _shift_per_cycle(run: Cycles, folded: Array) -> float:
     """How much later each cycle comes than the last [s], by least squares on the average cycle.
 
     Equation: shift_i = - sum((x_i - m) m') / sum(m'^2), m the average cycle      Source: first-order Taylor series
     """
     order = np.arange(run.count, dtype=np.float64) - (run.count - 1) / 2.0
-    folded = run.fold(time, displacement)
     folded = folded - drift(folded)
     average: Array = folded.mean(axis=0)
     slope = np.asarray((np.roll(average, -1) - np.roll(average, 1)) * average.size / (2.0 * run.period))
@@ -232,8 +246,8 @@ def drift(folded: Array) -> Array:
     return found
 
 
-def _cubic(time: Array, values: Array, at: Array) -> Array:
+def _cubic(time: Array, values: Array) -> Callable[[Array], Array]:
     from scipy.interpolate import CubicSpline
 
-    near = (time >= at[0] - 8 * (time[1] - time[0])) & (time <= at[-1] + 8 * (time[1] - time[0]))
-    return np.asarray(CubicSpline(time[near], values[near])(at))
+    course: Callable[[Array], Array] = CubicSpline(time, values)
+    return course
