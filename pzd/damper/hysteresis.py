@@ -1,16 +1,16 @@
-"""The hysteretic variable of Bouc and Wen over the travel of the rod: its equation solved for exponents 1 and 2."""
+"""The hysteretic variable of Bouc and Wen over the travel of the rod: its equation solved for exponents 1 and 2.
+
+Plain functions: `pzd.compiled` makes machine code of them with the laws that call them.
+"""
 
 from __future__ import annotations
 
 import math
 
-from pzd.compiled import compiled
-
 STRAIGHT = 1e-9
 """Below this `2 sigma - 1` the unloading is straight to rounding."""
 
 
-@compiled
 def hysteresis_after(z: float, travel: float, rho: float, sigma: float, exponent: int) -> float:
     """The hysteretic variable after a travel of the rod to one side.
 
@@ -53,7 +53,6 @@ def hysteresis_after(z: float, travel: float, rho: float, sigma: float, exponent
     return side * loaded
 
 
-@compiled
 def hysteresis_rate(z: float, side: float, sigma: float, exponent: int) -> float:
     """Derivative of the hysteretic variable by rho times the travel, to a side (+1 or -1) [-]: the same equation."""
     q = side * z

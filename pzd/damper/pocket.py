@@ -2,16 +2,15 @@
 
 Equation: e = s + d s/(s + s_d), for s >= 0: Boyle's law of a pocket of length d at a static force p A, s_d = p A/k;
 below 0 it goes on straight. e is the elastic deflection, s = F/k the extension of the oil spring behind it.
+
+Plain functions: `pzd.compiled` makes machine code of them with the laws that call them.
 """
 
 from __future__ import annotations
 
 import math
 
-from pzd.compiled import compiled
 
-
-@compiled
 def deflection_with(extension: float, length: float, half: float) -> float:
     """Deflection e [m] of both at an extension of the oil spring [m].
 
@@ -24,7 +23,6 @@ def deflection_with(extension: float, length: float, half: float) -> float:
     return extension * (1.0 + length / half) if extension <= 0.0 else extension * (1.0 + length / (extension + half))
 
 
-@compiled
 def extension_behind(deflection: float, length: float, half: float) -> float:
     """Extension of the oil spring s [m] at a deflection of both [m]: the same solved for s, without cancellation."""
     if deflection <= 0.0:
@@ -34,7 +32,6 @@ def extension_behind(deflection: float, length: float, half: float) -> float:
     return 2.0 * half * deflection / (b + root) if b > 0.0 else 0.5 * (root - b)
 
 
-@compiled
 def extension_slope(deflection: float, length: float, half: float) -> float:
     """Derivative of the extension by the deflection [-]."""
     s = max(extension_behind(deflection, length, half), 0.0)
