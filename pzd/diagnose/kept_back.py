@@ -213,7 +213,7 @@ class Trials:
             peak = float(np.max(np.abs(p.record.force)))
             limit = residual.size * (self.visible * peak) ** 2
             if i in self._alone:
-                limit += float(np.sum(columns_of(force, p.record.rate, self.campaign.nuisance) ** 2))
+                limit += float(np.sum(columns_of(force, p.record.rate, self.campaign.nuisance, kept) ** 2))
             records.append(i)
             about_mean = force - force.mean()
             rows.append((residual @ residual, force @ force, about_mean @ about_mean, limit))

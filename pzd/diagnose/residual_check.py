@@ -10,7 +10,7 @@ from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.input_uncertainty import Predicted
 from pzd.diagnose.fit.prediction import counted
 from pzd.diagnose.thresholds import CYCLE_CHANGE_SIGNIFICANCE, LEAST_HUM
-from pzd.record import Array, Mask, sliced
+from pzd.record import Array, Mask
 from pzd.signals.between_cycles import PureError, harmonics_of, pure_error, repeatable_power
 from pzd.signals.jumps import jumps, jumps_in_cycles, within_a_sample
 from pzd.signals.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
@@ -68,7 +68,7 @@ def check_residual(given: Predicted, prepared: Prepared, wanted: Mask, config: N
     slack = np.zeros(residual.size)
     late = np.zeros(residual.size)
     slack[mask], late[mask] = nuisance(
-        without[mask], predicted[mask], record.rate, rough, config, given.timing[mask], calm[mask]
+        without[mask], predicted[mask], record.rate, rough, config, given.timing[mask], calm[mask], mask
     )
     slack = mains + np.where(mask & ~calm, _beside_jumps(record.force - mains, predicted, slack, late), slack + late)
     folded = _folded(prepared, residual - slack, mask)
@@ -122,7 +122,7 @@ def _repeating(
 
 
 def _not_repeating(prepared: Prepared, mask: Mask, residual: Array, slack: Array, predicted: Array) -> ResidualCheck:
-    fit = fit_smooth_residual((residual - slack)[mask], sliced(prepared.record, mask), predicted[mask])
+    fit = fit_smooth_residual((residual - slack)[mask], prepared.record, predicted[mask], mask)
     left = (residual - slack)[mask] - fit.explained
     variance = min(fit.noise.variance, float(np.mean(left**2)) + float(np.mean(fit.spread)))
     explained = np.zeros(residual.size)

@@ -86,7 +86,7 @@ def _own(checks: Sequence[ResidualCheck]) -> tuple[Array, Array]:
     found, size = [], []
     for check in checks:
         force = (check.prepared.record.force - check.residual)[check.wanted]
-        columns = columns_of(force, check.prepared.record.rate, UNIT)
+        columns = columns_of(force, check.prepared.record.rate, UNIT, check.wanted)
         found.append(np.linalg.lstsq(columns, check.residual[check.wanted], rcond=None)[0])
         size.append(np.sqrt(np.mean(columns**2, axis=0)) / check.peak)
     return np.array(found).reshape(-1, 3), np.mean(np.array(size).reshape(-1, 3), axis=0)

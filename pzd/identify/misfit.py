@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pzd.identify.part import Part
-from pzd.record import Array, sliced
+from pzd.record import Array
 from pzd.signals.between_cycles import pure_error, repeatable_power
 from pzd.signals.jumps import within_a_sample
 from pzd.signals.lack_of_fit import by_harmonics, pooled
@@ -73,8 +73,8 @@ def misfit_of(parts: Sequence[Part]) -> Misfit:
             continue
         folded = part.folded(cleared)
         if folded is None:
-            record = replace(sliced(part.record, part.counted), voltage=None)  # it stands still, but for noise
-            fit = fit_smooth_residual(cleared, record, part.force - part.residuals)
+            record = replace(part.record, voltage=None)  # it stands still, but for noise
+            fit = fit_smooth_residual(cleared, record, part.force - part.residuals, part.counted)
             smooth.append(np.array([fit.probability]))
             power.append(float(np.mean(fit.explained**2 - fit.spread)))
         else:

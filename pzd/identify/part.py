@@ -100,7 +100,7 @@ def parts_of(
             trial.counted,
             left,
             slope,
-            columns_of(record.force[trial.counted] - left, record.rate, nuisance),
+            columns_of(record.force[trial.counted] - left, record.rate, nuisance, trial.counted),
             cycles_of(record) if constant else None,
             constant,
         )

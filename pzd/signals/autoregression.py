@@ -14,6 +14,9 @@ ORDER_MAX = 12
 """Longest model tried unless said otherwise: two poles each for sensor, amplifier and mains, and as many to spare."""
 SAMPLES_PER_ORDER = 20
 """At least this many samples stand behind each coefficient: its standard error is then below 0.25."""
+FOLLOWED = 0.5
+"""At least this share of the samples have as many predecessors in their stretch as the model is long: the others say
+nothing of it."""
 FLOOR = 1e-12
 """Innovation variance is never below this share of the variance: rounding is no noise model."""
 
@@ -100,8 +103,11 @@ def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autor
     -------
     the model; white noise of variance 0 where the stretches are zero
     """
-    count = sum(stretch.size for stretch in series)
-    order_max = min(order_max, count // SAMPLES_PER_ORDER, min(stretch.size for stretch in series) - 1)
+    sizes = np.array([stretch.size for stretch in series])
+    count = int(sizes.sum())
+    order_max = min(order_max, count // SAMPLES_PER_ORDER)
+    while order_max > 0 and np.maximum(sizes - order_max, 0).sum() < FOLLOWED * count:
+        order_max -= 1
     variance = whole = sum(float(stretch @ stretch) for stretch in series) / max(count, 1)
     a = np.zeros(0)
     best = Autoregression(a, variance)

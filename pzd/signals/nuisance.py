@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from pzd.record import Array
+from pzd.record import Array, Mask
 from pzd.schema.model import Frozen
+from pzd.signals.left_out import slope_within
 
 TIMED = 2
 """Columns from this one on say when a force comes; those before it, how large it is."""
@@ -35,6 +36,7 @@ def nuisance(
     config: NuisanceConfig,
     timing: Array,
     calm: NDArray[np.bool_],
+    counted: Mask,
 ) -> tuple[Array, Array]:
     """The part of a residual that offset, gain and delay of the test explain within their priors.
 
@@ -43,35 +45,45 @@ def nuisance(
 
     Parameters
     ----------
-    residual : (n,) measured less predicted force [N]
-    predicted : (n,) force [N]
+    residual : (m,) measured less predicted force [N]
+    predicted : (m,) force [N]
     rate : sampling rate [Hz]
     variance : of the noise [N^2]
     config : standard deviations of the priors
-    timing : (n, 1) what one standard deviation of the voltage's instant makes of the force [N]; (n, 0) without
-    calm : (n,) the samples that count, those beside no jump
+    timing : (m, 1) what one standard deviation of the voltage's instant makes of the force [N]; (m, 0) without
+    calm : (m,) the samples that count, those beside no jump
+    counted : (n,) which samples of the record these m are
 
     Returns
     -------
-    (n,) force by offset and gain, and (n,) by when it comes [N]; beside a jump, where the slope of the force is that of
+    (m,) force by offset and gain, and (m,) by when it comes [N]; beside a jump, where the slope of the force is that of
     one sample, the second may be far from anything that a delay does
     """
-    columns = np.hstack([columns_of(predicted, rate, config), timing])
+    columns = np.hstack([columns_of(predicted, rate, config, counted), timing])
     weight = max(variance, 1e-12 * float(np.max(np.abs(predicted))) ** 2)
-    counted = columns[calm]
-    normal = counted.T @ counted / weight + np.eye(columns.shape[1])
-    estimate = np.linalg.solve(normal, counted.T @ residual[calm] / weight)
+    beside_none = columns[calm]
+    normal = beside_none.T @ beside_none / weight + np.eye(columns.shape[1])
+    estimate = np.linalg.solve(normal, beside_none.T @ residual[calm] / weight)
     within = np.clip(estimate, -AT_MOST, AT_MOST)
     return columns[:, :TIMED] @ within[:TIMED], columns[:, TIMED:] @ within[TIMED:]
 
 
-def columns_of(predicted: Array, rate: float, config: NuisanceConfig) -> Array:
-    """(n, 3) force [N] that one standard deviation of offset, gain and delay makes of a predicted force (n,)."""
+def columns_of(predicted: Array, rate: float, config: NuisanceConfig, counted: Mask | None = None) -> Array:
+    """(m, 3) force [N] that one standard deviation of offset, gain and delay makes of a predicted force.
+
+    Parameters
+    ----------
+    predicted : (m,) force [N]
+    rate : sampling rate [Hz]
+    config : standard deviations of the priors
+    counted : (n,) which samples of the record these m are; None for all
+    """
+    slope = np.gradient(predicted) if counted is None else slope_within(predicted, counted)
     peak = float(np.max(np.abs(predicted)))
     return np.column_stack(
         [
             np.full(predicted.size, config.offset * peak),
             config.gain * predicted,
-            -config.delay_s * np.gradient(predicted) * rate,
+            -config.delay_s * slope * rate,
         ]
     )

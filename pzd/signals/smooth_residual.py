@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.record import Array, Record
+from pzd.record import Array, Mask, Record, sliced
 from pzd.signals.autoregression import Autoregression, autoregression
+from pzd.signals.left_out import slope_within, stretches, unbroken
 from pzd.signals.root_mean_square import rms
 
 HATS = 8
@@ -38,37 +39,39 @@ class SmoothResidual:
     """A residual parted into what a smooth model of many terms explains, and noise."""
 
     explained: Array
-    """(n,) [N]."""
+    """(m,) [N]."""
     spread: Array
-    """(n,) variance that noise alone gives to what is explained [N^2]."""
+    """(m,) variance that noise alone gives to what is explained [N^2]."""
     noise: Autoregression
     """What is left."""
     probability: float
     """That noise alone lets the model explain so much."""
 
 
-def fit_smooth_residual(residual: Array, record: Record, predicted: Array) -> SmoothResidual:
+def fit_smooth_residual(residual: Array, record: Record, predicted: Array, counted: Mask) -> SmoothResidual:
     """The residual of a record that does not repeat, parted into misfit and noise.
 
     Equation: F = ((RSS_0 - RSS) / p) / (RSS / (n - p)) on the whitened residual     Source: Aitken 1935, Fisher
 
     Parameters
     ----------
-    residual : (n,) measured less predicted force, the test's nuisances taken off [N]
+    residual : (m,) measured less predicted force, the test's nuisances taken off [N]
     record : the motion, (n,)
-    predicted : (n,) force [N]
+    predicted : (m,) force [N]
+    counted : (n,) which samples of the record these m are; what follows on one left out is not whitened by it
     """
     from scipy.special import fdtrc
 
-    terms = _terms(record, predicted)
+    terms = _terms(record, predicted, counted)
     if residual.size < SAMPLES_PER_TERM * terms.shape[1]:
         nothing = np.zeros(residual.size)
         return SmoothResidual(nothing, nothing, autoregression([residual - residual.mean()]), 1.0)
     explained = terms @ np.linalg.lstsq(terms, residual, rcond=None)[0]
     for _ in range(ROUNDS):
-        noise = autoregression([residual - explained]).with_white(QUIETEST)
-        flat = noise.whitened(residual)
-        whitened = noise.whitened(terms)
+        noise = autoregression(stretches(residual - explained, counted)).with_white(QUIETEST)
+        whole = unbroken(counted, noise.coefficients.size)
+        flat = noise.whitened(residual)[whole]
+        whitened = noise.whitened(terms)[whole]
         _, sizes, right = np.linalg.svd(np.linalg.qr(whitened, mode="r"))
         rank = int(np.count_nonzero(sizes > SINGULAR * sizes[0]))
         orthonormal = right[:rank].T / sizes[:rank]
@@ -82,21 +85,22 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array) -> Sm
     return SmoothResidual(explained, spread, noise, float(fdtrc(rank, free, ratio)))
 
 
-def _terms(record: Record, predicted: Array) -> Array:
-    """(n, p) smooth functions of motion, force, voltage and time, scaled to about one, without repeated columns."""
-    v, a = _scaled(record.velocity), _scaled(record.acceleration)
-    rate = _scaled(np.gradient(predicted))
+def _terms(record: Record, predicted: Array, counted: Mask) -> Array:
+    """(m, p) smooth functions of motion, force, voltage and time, scaled to about one, without repeated columns."""
+    part = sliced(record, counted)
+    v, a = _scaled(part.velocity), _scaled(part.acceleration)
+    rate = _scaled(slope_within(predicted, counted))
     columns = [
-        _hats(record.velocity),
-        _hats(record.displacement),
+        _hats(part.velocity),
+        _hats(part.displacement),
         _hats(predicted),
-        np.column_stack([a, v * np.abs(v), a * np.sign(v), rate, np.abs(rate), _scaled(record.displacement) * v]),
-        _hats(record.time)[:, ::3],
+        np.column_stack([a, v * np.abs(v), a * np.sign(v), rate, np.abs(rate), _scaled(part.displacement) * v]),
+        _hats(part.time)[:, ::3],
     ]
     along = np.column_stack([np.sign(v), v])
-    if record.voltage is not None and np.ptp(record.voltage) > 0.0:
-        columns.append(_hats(record.voltage)[:, ::2] * np.sign(v)[:, None])
-        columns += [_behind(record.voltage, tau * record.rate)[:, None] * along for tau in LAGS]
+    if record.voltage is not None and part.voltage is not None and np.ptp(part.voltage) > 0.0:
+        columns.append(_hats(part.voltage)[:, ::2] * np.sign(v)[:, None])
+        columns += [_behind(record.voltage, tau * record.rate)[counted][:, None] * along for tau in LAGS]
     return np.column_stack(columns)
 
 

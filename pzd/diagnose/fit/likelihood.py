@@ -21,6 +21,7 @@ from pzd.damper.motion import Motion
 from pzd.record import Array
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError
+from pzd.signals.left_out import unbroken as unbroken_in
 
 SIMULATION_TOLERANCE = 1e-7
 """Of the damper's path, as a share of the force, in every step by itself.
@@ -132,10 +133,7 @@ class RecordLikelihood:
 
 def unbroken(compared: NDArray[np.bool_], noise: PureError | Autoregression) -> NDArray[np.bool_]:
     """Which whitened samples have all their predecessors in the same stretch of the samples (s,) that are compared."""
-    memory = noise.coefficients.size if isinstance(noise, Autoregression) else 0
-    before = np.convolve(compared, np.ones(memory + 1, dtype=np.int64))[: compared.size][compared][memory:]
-    whole: NDArray[np.bool_] = before == memory + 1
-    return whole
+    return unbroken_in(compared, noise.coefficients.size if isinstance(noise, Autoregression) else 0)
 
 
 def response(observation: RecordLikelihood, damper: Damper) -> Array:

@@ -28,6 +28,11 @@ WARMS = 0.5
 Reason: about the resolution of a thermocouple; not tuned."""
 STEP = 0.1
 """A voltage that moves by more from one sample to the next [share of its range in the record] has stepped."""
+BESIDE_STEP = 0.001
+"""Nothing is judged so shortly before and after a step of the voltage [s].
+
+Reason: two standard deviations of a test's own delay (`NuisanceConfig.delay_s`); a sample at least, over which a filter
+against aliasing spreads the step of the force."""
 ENDS = 0.02
 """Share of a record at either end where its smoothed displacement rests on one side alone: not judged."""
 
@@ -94,13 +99,17 @@ def counted(prepared: Prepared) -> NDArray[np.bool_]:
     ends = int(ENDS * size)
     order = np.arange(size)
     inside = (order >= ends) & (order < size - ends)
-    return inside & in_motion(prepared.record) & ~_stepping(prepared.record.voltage, size)
+    return inside & in_motion(prepared.record) & ~_stepping(prepared.record)
 
 
-def _stepping(voltage: Array | None, size: int) -> NDArray[np.bool_]:
-    """(n,) whether the voltage steps right before or after a sample."""
-    beside = np.zeros(size, dtype=np.bool_)
-    if voltage is not None and np.ptp(voltage) > 0.0:
-        steps = np.flatnonzero(np.abs(np.diff(voltage)) > STEP * np.ptp(voltage))
-        beside[steps] = beside[steps + 1] = True
+def _stepping(record: Record) -> NDArray[np.bool_]:
+    """(n,) whether the voltage steps shortly before or after a sample."""
+    size, voltage = record.time.size, record.voltage
+    if voltage is None or np.ptp(voltage) == 0.0:
+        return np.zeros(size, dtype=np.bool_)
+    steps = np.zeros(size, dtype=np.bool_)
+    steps[:-1] = np.abs(np.diff(voltage)) > STEP * np.ptp(voltage)
+    reach = int(np.ceil(BESIDE_STEP * record.rate))
+    near = np.convolve(steps, np.ones(2 * reach + 2))[reach : reach + size]
+    beside: NDArray[np.bool_] = near > 0.5
     return beside

@@ -15,9 +15,10 @@ from pzd.diagnose.fit.input_uncertainty import Predicted
 from pzd.diagnose.fit.likelihood import RecordLikelihood, responses, unbroken
 from pzd.diagnose.fit.prediction import motion_of, warms
 from pzd.identify.trial import in_motion
-from pzd.record import Array, Record, sliced
+from pzd.record import Array, Record
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError, pure_error
+from pzd.signals.left_out import slope_within
 from pzd.signals.jumps import jumps, jumps_in_samples
 from pzd.signals.nuisance import NuisanceConfig
 from pzd.signals.reversals import reversals
@@ -118,7 +119,7 @@ def _of_cycles(
     cycle = _resampled(whole[counted].mean(axis=0), points)
     peak = float(np.max(np.abs(cycle)))
     average = _resampled(simulated.mean(axis=0), points)
-    left = DISCREPANCY * _left_by(cycle, average, error.sample_variance / len(counted))
+    left = DISCREPANCY * _left_by(cycle, average, np.gradient(average), error.sample_variance / len(counted))
     floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.displacement_variance
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
@@ -137,9 +138,9 @@ def _of_cycles(
     return with_nuisances(bare, given.damper, nuisance)
 
 
-def _left_by(measured: Array, force: Array, variance: float) -> float:
+def _left_by(measured: Array, force: Array, slope: Array, variance: float) -> float:
     """R.m.s. of what a model leaves above the noise [N], offset, gain and delay of the test taken off."""
-    columns = np.column_stack([np.ones(force.size), force, np.gradient(force)])
+    columns = np.column_stack([np.ones(force.size), force, slope])
     residual = measured - force
     residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
     return float(np.sqrt(max(np.mean(residual**2) - variance, 0.0)))
@@ -182,13 +183,11 @@ def _of_samples(
     first, *_, last = np.flatnonzero(mask)
     start, stop = int(first), int(last) + 1
     compared = mask[start:stop]
-    noise = fit_smooth_residual(
-        record.force[start:stop] - force[start:stop], _part(record, start, stop), force[start:stop]
-    ).noise
     measured = record.force[mask]
+    noise = fit_smooth_residual(measured - force[mask], record, force[mask], mask).noise
     peak = float(np.max(np.abs(measured)))
     alike = _samples_alike(record)
-    left = alike * (DISCREPANCY * _left_by(measured, force[mask], noise.variance)) ** 2
+    left = alike * (DISCREPANCY * _left_by(measured, force[mask], slope_within(force[mask], mask), noise.variance)) ** 2
     if left > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left)
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
@@ -218,12 +217,6 @@ def _samples_alike(record: Record) -> float:
     """
     cycles = max(len(reversals(record.displacement)) / 2.0, 1.0)
     return max(record.time.size / (2.0 * MOST_HARMONICS * cycles), 1.0)
-
-
-def _part(record: Record, start: int, stop: int) -> Record:
-    kept = np.zeros(record.time.size, dtype=np.bool_)
-    kept[start:stop] = True
-    return sliced(record, kept)
 
 
 def with_nuisances(
