@@ -18,8 +18,8 @@ from pzd.identify.trial import in_motion
 from pzd.record import Array, Record
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError, pure_error
-from pzd.signals.left_out import slope_within
 from pzd.signals.jumps import jumps, jumps_in_samples
+from pzd.signals.left_out import slope_within
 from pzd.signals.nuisance import NuisanceConfig
 from pzd.signals.reversals import reversals
 from pzd.signals.smooth_residual import fit_smooth_residual
