@@ -57,13 +57,20 @@ class Missed:
 def worse(one: Missed, other: Missed) -> bool:
     """Whether one damper predicts worse than another: visibly, and beyond chance.
 
-    Equation: mean d > 2 s_d / sqrt(n), d_i = W_s,i - W_s,i of the other one     Source: paired differences
+    Equation: mean d > t s_d / sqrt(n), d_i = W_s,i - W_s,i of the other one, P(t_(n-1) < t) = P(z < 2)
+                                                                Source: Student 1908, the t-test of paired differences
     """
+    from scipy.special import ndtr, stdtrit
+
     if not one.record:
         return False
     difference = (one.error - other.error) / one.energy
-    error = float(np.std(difference, ddof=1) / np.sqrt(difference.size)) if difference.size > 1 else 0.0
-    return other.less_than(one) and float(difference.mean()) > PREDICTS_WORSE * error
+    if difference.size > 1:
+        error = float(np.std(difference, ddof=1) / np.sqrt(difference.size))
+        chance = float(stdtrit(difference.size - 1, ndtr(PREDICTS_WORSE))) * error
+    else:
+        chance = 0.0
+    return other.less_than(one) and float(difference.mean()) > chance
 
 
 def much_worse(one: Missed, other: Missed) -> bool:

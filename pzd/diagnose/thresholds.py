@@ -113,7 +113,8 @@ MOST_REWEIGHTINGS = 5
 
 Reason: time; what swings between two optima would never end."""
 PREDICTS_WORSE = 2.0
-"""Standard errors of the paired difference over tests from which one damper predicts worse than another.
+"""Standard errors of the paired difference over tests from which one damper predicts worse than another; of few tests
+as many more as Student's t takes for the same confidence.
 
 Reason: the customary 95 %."""
 

@@ -18,7 +18,7 @@ from pzd.diagnose.data.split import split
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.handed_on import handed_on
 from pzd.diagnose.kept_back import Trials, trials_of
-from pzd.diagnose.missed import Missed
+from pzd.diagnose.missed import Missed, worse
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.diagnose.search.selection import Selection
 from pzd.diagnose.verdict import unpredicted
@@ -112,6 +112,16 @@ def test_worse_is_beyond_two_standard_errors_at_any_voltage(rng: np.random.Gener
     assert asked.worse(alike, plain) == ()
     assert asked.worse(at_one, plain) == (150.0,)
     assert asked.worse(plain, at_one) == (0.0,)
+
+
+@pytest.mark.parametrize("tests", [2, 3, 12])
+def test_chance_predicts_worse_as_seldom_whatever_the_number_of_tests(tests: int, rng: np.random.Generator) -> None:
+    """With two tests to a voltage, two standard errors of these two are chance in one of seven."""
+    ones = np.ones(tests)
+    plain = Missed(tuple(range(tests)), ones, 100.0 * ones, ones, 0.0 * ones)
+    found = sum(worse(replace(plain, error=1.0 + 0.1 * rng.standard_normal(tests)), plain) for _ in range(8000))
+    expected = 8000 * 0.02275
+    assert abs(found - expected) < 4.0 * np.sqrt(expected)
 
 
 def test_worse_by_less_than_can_be_seen_is_not_worse(rng: np.random.Generator) -> None:

@@ -36,7 +36,7 @@ EFFECT = Effect(
             0.0,
             1.0e7,
             "force at which the valve opens",
-            Search(lambda s: s.force, (0.05, 0.12, 0.3, 0.5, 0.8), logarithmic=True),
+            Search(lambda s: s.force, (0.05, 0.12, 0.3, 0.5, 0.7, 0.8, 0.9), logarithmic=True),
         ),
         Parameter(
             "C_r", "N s/m", 0.0, 1.0e-3, 1.0e8, "slope beyond it", Search(lambda s: s.damping, (0.4,), logarithmic=True)
