@@ -20,6 +20,10 @@ nothing of it."""
 FLOOR = 1e-12
 """Innovation variance is never below this share of the variance: rounding is no noise model."""
 
+MORE_WITH_WHITE = 4
+"""Coefficients more that coloured noise takes together with white noise. Their sum is no autoregression of any length:
+one of the same length would be too quiet at low frequencies, where a gap is sought, by a third where samples follow one
+another by 0.9; with four more it is within 1 %."""
 GRID = 4096
 """Frequencies over which a density is summed: enough for poles within 1e-3 of the unit circle."""
 
@@ -72,19 +76,19 @@ class Autoregression:
         return np.asarray(self.innovation / np.abs(response) ** 2)
 
     def with_white(self, share: float) -> Autoregression:
-        """The noise together with white noise of a share of its variance, by a model of the same order.
+        """The noise together with white noise of a share of its variance, by a model of a few coefficients more.
 
         Equation: R a = r, sigma_w^2 = r_0 - a r, r_0 (1 + share) in place of r_0      Source: Yule 1927, Walker 1931
         """
         from scipy.linalg import solve_toeplitz
 
-        p = self.coefficients.size
-        if p == 0 or self.innovation <= 0.0:
+        if self.coefficients.size == 0 or self.innovation <= 0.0:
             return self
         shares = (np.arange(GRID) + 0.5) / GRID
-        r = np.array([np.mean(self._density_on_grid * np.cos(2.0 * np.pi * shares * lag)) for lag in range(p + 1)])
+        lags = np.arange(self.coefficients.size + MORE_WITH_WHITE + 1)
+        r = np.cos(2.0 * np.pi * np.outer(lags, shares)) @ self._density_on_grid / GRID
         r[0] *= 1.0 + share
-        a = solve_toeplitz(r[:p], r[1:])
+        a = solve_toeplitz(r[:-1], r[1:])
         return Autoregression(a, float(r[0] - a @ r[1:]))
 
 

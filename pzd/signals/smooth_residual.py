@@ -81,7 +81,9 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array, count
     spread = np.sum(to_samples**2, axis=1) if noise.innovation > 0.0 else np.zeros(residual.size)
     free = flat.size - rank - noise.coefficients.size
     over = float(flat @ flat - taken @ taken)
-    ratio = float(taken @ taken) / rank / (over / free) if over > 0.0 else np.inf
+    # Of the white noise that QUIETEST puts beside coloured noise there may be none: then less is left than expected.
+    scale = max(over / free, 1.0 if noise.coefficients.size else 0.0)
+    ratio = float(taken @ taken) / rank / scale if over > 0.0 else np.inf
     return SmoothResidual(explained, spread, noise, float(fdtrc(rank, free, ratio)))
 
 

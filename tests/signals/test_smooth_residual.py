@@ -1,0 +1,50 @@
+"""Noise alone is told from a gap in a record that does not repeat, whatever the colour of the noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.random import Generator
+from scipy.signal import lfilter
+
+from pzd.record import Array, Record
+from pzd.signals.smooth_residual import fit_smooth_residual
+
+RATE, DURATION, DRAWS = 500.0, 12.0, 80
+SIZE = 20.0
+"""Standard deviation of the noise [N]."""
+
+
+def sweep() -> tuple[Record, Array]:
+    """A sweep from 0.5 to 4 Hz, and a force with friction for it."""
+    t = np.arange(round(DURATION * RATE)) / RATE
+    phase = 2.0 * np.pi * (0.5 * t + 0.5 * 3.5 / DURATION * t**2)
+    x = 0.012 * np.sin(phase)
+    v = np.gradient(x, t)
+    force = 500.0 * np.tanh(v / 0.01) + 2500.0 * v
+    return Record("sweep", None, t, x, v, np.gradient(v, t), force, None), force
+
+
+@pytest.mark.parametrize("follows", [0.0, 0.5, 0.9, 0.97])
+def test_noise_of_any_colour_passes_for_a_gap_as_seldom_as_it_should(follows: float, rng: Generator) -> None:
+    """Of slow noise, two in three were once said to be beyond one chance in ten."""
+    record, force = sweep()
+    drawn = rng.standard_normal((DRAWS, force.size + 500))
+    noise = lfilter([1.0], [1.0, -follows], drawn, axis=1)[:, 500:] * SIZE * np.sqrt(1.0 - follows**2)
+    everything = np.ones(force.size, dtype=np.bool_)
+    found = np.array([fit_smooth_residual(each, record, force, everything).probability for each in noise])
+    assert np.mean(found < 0.1) < 0.1 + 4.0 * np.sqrt(0.1 * 0.9 / DRAWS)
+    assert np.min(found) > 1e-4
+
+
+@pytest.mark.parametrize("follows", [0.0, 0.9])
+def test_a_force_that_a_damper_may_miss_does_not_pass_for_noise(follows: float, rng: Generator) -> None:
+    """A damping that grows with the square of the speed, of half the size of the noise."""
+    record, force = sweep()
+    drawn = lfilter([1.0], [1.0, -follows], rng.standard_normal(force.size)) * SIZE * np.sqrt(1.0 - follows**2)
+    missed = record.velocity * np.abs(record.velocity)
+    missed *= 0.5 * SIZE / np.std(missed)
+    everything = np.ones(force.size, dtype=np.bool_)
+    found = fit_smooth_residual(drawn + missed, record, force, everything)
+    assert found.probability < 1e-6
+    assert np.mean(found.explained**2 - found.spread) == pytest.approx(np.mean(missed**2), rel=0.5)
