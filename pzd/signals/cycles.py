@@ -24,10 +24,7 @@ from pzd.signals.step import usual_step
 FITTED_POINTS = 1000
 """Points of a cycle that the period is fitted to, at least, as far as there are samples."""
 REFINEMENTS = 6
-"""Rounds of the refinement of the period, at most; each squares the error."""
-SETTLED = 1e-9
-"""Share of the period by which a round of the refinement moves it where more rounds would add nothing: after the next
-it would be beyond rounding."""
+"""Rounds of the refinement of the period; each squares the error."""
 CORNER = 3
 """Points at either end of the cycle that the period is not fitted to."""
 MAINS_BAND = 0.5
@@ -193,10 +190,7 @@ def _fitted(time: Array, coarse: Array, displacement: Array, found: Repeats) -> 
     course = _cubic(coarse, displacement)
     for round_number in range(REFINEMENTS):
         used = Cycles(run.period, run.start, min(run.count, 3 * 4**round_number))
-        shift = _shift_per_cycle(used, course(used.instants(coarse)))
-        run = _whole(time, found, run.period + shift)
-        if used.count == run.count and abs(shift) < SETTLED * run.period:
-            break
+        run = _whole(time, found, run.period + _shift_per_cycle(used, course(used.instants(coarse))))
     return run
 
 

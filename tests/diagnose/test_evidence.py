@@ -17,7 +17,7 @@ from pzd.diagnose.data.split import TRAINING, UNTOUCHED, VALIDATION, split
 from pzd.diagnose.fit.input_uncertainty import expected
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.fit.likelihood import RecordLikelihood
-from pzd.diagnose.fit.prediction import counted
+from pzd.diagnose.fit.prediction import BESIDE_STEP, counted
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.record import Record
 from pzd.signals.nuisance import NuisanceConfig
@@ -98,8 +98,11 @@ def test_samples_beside_a_step_of_the_voltage_are_not_judged(rng: np.random.Gene
     (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, rng),))
     voltage = np.where(np.arange(prepared.record.time.size) < 3000, 0.0, 150.0)
     stepped = replace(prepared, record=replace(prepared.record, voltage=voltage), lead=None, cycles=None)
-    assert not counted(stepped)[2999:3001].any()
-    assert counted(stepped)[[2998, 3001]].all()
+    before, after = 2999, 3000
+    reach = round(BESIDE_STEP * stepped.record.rate)
+    assert reach >= 1
+    assert not counted(stepped)[before - reach : after + reach + 1].any()
+    assert counted(stepped)[[before - reach - 1, after + reach + 1]].all()
 
 
 def test_the_hardest_tests_of_the_rig_are_fitted(rng: np.random.Generator) -> None:

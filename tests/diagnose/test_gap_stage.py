@@ -183,7 +183,10 @@ def test_a_nuisance_explains_a_pure_delay() -> None:
     t = np.arange(2000) / 1000.0
     force = 1000.0 * np.sin(4 * np.pi * t)
     late = 1000.0 * np.sin(4 * np.pi * (t - 4e-4)) - force
-    explained = sum(nuisance(late, force, 1000.0, 1e-2, NuisanceConfig(), np.zeros((t.size, 0)), np.ones(t.size, bool)))
+    everything = np.ones(t.size, dtype=np.bool_)
+    explained = sum(
+        nuisance(late, force, 1000.0, 1e-2, NuisanceConfig(), np.zeros((t.size, 0)), everything, everything)
+    )
     assert np.max(np.abs(explained - late)) < 0.03 * np.max(np.abs(late))
 
 
