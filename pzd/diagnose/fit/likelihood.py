@@ -21,7 +21,7 @@ from pzd.damper.motion import Motion
 from pzd.record import Array
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError
-from pzd.signals.left_out import unbroken as unbroken_in
+from pzd.signals.left_out import unbroken
 
 SIMULATION_TOLERANCE = 1e-7
 """Of the damper's path, as a share of the force, in every step by itself.
@@ -121,7 +121,7 @@ class RecordLikelihood:
     @cached_property
     def _unbroken(self) -> NDArray[np.bool_]:
         """Which whitened samples count: those whose predecessors, as many as the noise remembers, are compared too."""
-        return unbroken(self.compared, self.noise)
+        return unbroken(self.compared, self.noise.coefficients.size if isinstance(self.noise, Autoregression) else 0)
 
     def _scaled(self, values: Array) -> Array:
         if isinstance(self.noise, Autoregression):
@@ -129,11 +129,6 @@ class RecordLikelihood:
         weights = self.weights.reshape(-1, *([1] * (values.ndim - 1)))
         harmonics = np.fft.rfft(values, axis=0)[: self.weights.size] / len(values) * weights
         return np.concatenate([harmonics.real, harmonics.imag[1:]])
-
-
-def unbroken(compared: NDArray[np.bool_], noise: PureError | Autoregression) -> NDArray[np.bool_]:
-    """Which whitened samples have all their predecessors in the same stretch of the samples (s,) that are compared."""
-    return unbroken_in(compared, noise.coefficients.size if isinstance(noise, Autoregression) else 0)
 
 
 def response(observation: RecordLikelihood, damper: Damper) -> Array:

@@ -12,14 +12,14 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.input_uncertainty import Predicted
-from pzd.diagnose.fit.likelihood import RecordLikelihood, responses, unbroken
+from pzd.diagnose.fit.likelihood import RecordLikelihood, responses
 from pzd.diagnose.fit.prediction import motion_of, warms
 from pzd.identify.trial import in_motion
 from pzd.record import Array, Record
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError, pure_error
 from pzd.signals.jumps import jumps, jumps_in_samples
-from pzd.signals.left_out import slope_within
+from pzd.signals.left_out import slope_within, unbroken
 from pzd.signals.nuisance import NuisanceConfig
 from pzd.signals.reversals import reversals
 from pzd.signals.smooth_residual import fit_smooth_residual
@@ -192,7 +192,7 @@ def _of_samples(
         noise = Autoregression(np.zeros(0), noise.variance + left)
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
     motion, factor = motion_of(record)
-    rows = int(np.count_nonzero(unbroken(compared, noise)))
+    rows = int(np.count_nonzero(unbroken(compared, noise.coefficients.size)))
     bare = RecordLikelihood(
         record.name,
         place,
