@@ -137,4 +137,4 @@ def _predicts_better(one: Missed, other: Missed, trials: Trials) -> bool:
     if one.criterion is None or other.criterion is None:
         return False
     less = one.criterion <= (1.0 - LEAST_CUT_IN_PREDICTION) * other.criterion
-    return less and bool(trials.worse(other, one)) and not trials.worse(one, other)
+    return less and bool(trials.better(one, other)) and not trials.worse(one, other)

@@ -24,7 +24,7 @@ from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.prediction import counted, predicted_force
 from pzd.diagnose.fit.weights import record_likelihood, unweighted
 from pzd.diagnose.folds import deal
-from pzd.diagnose.missed import Missed, much_worse, worse
+from pzd.diagnose.missed import Missed, better, much_worse, worse
 from pzd.diagnose.search.evidence import evidence_of
 from pzd.record import Mask
 from pzd.signals.nuisance import NuisanceConfig, columns_of
@@ -97,10 +97,16 @@ class Trials:
 
     def worse(self, one: Missed, other: Missed) -> tuple[float | None, ...]:
         """The voltages [V] at which one damper predicts worse than another; all where only the whole shows it."""
-        found = tuple(
-            v for v, group in zip(self.voltages, self.groups, strict=True) if worse(one.of(group), other.of(group))
-        )
-        return found or (self.voltages if worse(one, other) else ())
+        return self._where(worse, one, other)
+
+    def better(self, one: Missed, other: Missed) -> tuple[float | None, ...]:
+        """The voltages [V] at which one damper predicts better than another; all where only the whole shows it."""
+        return self._where(better, one, other)
+
+    def _where(self, holds: Callable[[Missed, Missed], bool], one: Missed, other: Missed) -> tuple[float | None, ...]:
+        groups = zip(self.voltages, self.groups, strict=True)
+        found = tuple(v for v, group in groups if holds(one.of(group), other.of(group)))
+        return found or (self.voltages if holds(one, other) else ())
 
     def worse_between(self, between: Missed) -> tuple[float | None, ...]:
         """The voltages [V] between others at which a damper misses visibly and much more than the plain one does."""
