@@ -768,6 +768,17 @@ def test_nothing_heavy_is_imported_to_find_that_all_is_fresh() -> None:
     assert printed.stdout == "[]\n", printed.stderr
 
 
+def test_no_law_is_compiled_to_read_a_config_that_names_effects() -> None:
+    text = (
+        "import sys\nfrom pzd.damper.effects import library\nfrom pzd.damper.model import Damper\n"
+        "assert {'bouc_wen', 'cavitation', 'frame_compliance'} <= set(library())\n"
+        "Damper(base=({'T0_N': 300, 'C_Ns_per_m': 2500, 'k_N_per_m': 2e5},), effects={'gas_spring': {'k_g': 1000}})\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules])"
+    )
+    printed = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, env=ENVIRONMENT)
+    assert printed.stdout == "[]\n", printed.stderr
+
+
 def test_a_closed_pipe_is_quiet() -> None:
     read, write = os.pipe()
     os.close(read)

@@ -14,16 +14,17 @@ ORDER_MAX = 12
 """Longest model tried unless said otherwise: two poles each for sensor, amplifier and mains, and as many to spare."""
 SAMPLES_PER_ORDER = 20
 """At least this many samples stand behind each coefficient: its standard error is then below 0.25."""
-FOLLOWED = 0.5
-"""At least this share of the samples have as many predecessors in their stretch as the model is long: the others say
-nothing of it."""
+WITH_PREDECESSORS = 0.5
+"""At least this share of the samples has as many predecessors in its stretch as the model has coefficients.
+
+Reason: the others say nothing of the last coefficients; not tuned."""
 FLOOR = 1e-12
 """Innovation variance is never below this share of the variance: rounding is no noise model."""
 
 MORE_WITH_WHITE = 4
 """Coefficients more that coloured noise takes together with white noise. Their sum is no autoregression of any length:
-one of the same length would be too quiet at low frequencies, where a gap is sought, by a third where samples follow one
-another by 0.9; with four more it is within 1 %."""
+one of the same length would be too quiet at low frequencies, where a gap is sought, by 28 % where each
+sample correlates with the one before by 0.9; with four more it is within 1 %."""
 GRID = 4096
 """Frequencies over which a density is summed: enough for poles within 1e-3 of the unit circle."""
 
@@ -110,7 +111,7 @@ def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autor
     sizes = np.array([stretch.size for stretch in series])
     count = int(sizes.sum())
     order_max = min(order_max, count // SAMPLES_PER_ORDER)
-    while order_max > 0 and np.maximum(sizes - order_max, 0).sum() < FOLLOWED * count:
+    while order_max > 0 and np.maximum(sizes - order_max, 0).sum() < WITH_PREDECESSORS * count:
         order_max -= 1
     variance = whole = sum(float(stretch @ stretch) for stretch in series) / max(count, 1)
     a = np.zeros(0)

@@ -1,4 +1,4 @@
-"""A record of which samples are left out: nothing is differenced across what is missing."""
+"""Where a record parts, of which samples are left out: nothing is differenced across what is missing."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from pzd.record import Array, Mask
 
 
-def stretches(values: Array, counted: Mask) -> list[Array]:
+def parted(values: Array, counted: Mask) -> list[Array]:
     """Values (m,) or (m, p) at the counted samples of a record, parted where samples between them are left out.
 
     Parameters
@@ -27,7 +27,7 @@ def slope_within(values: Array, counted: Mask) -> Array:
     values : (m,) at the samples that count
     counted : (n,) which samples of the record these are
     """
-    parts = stretches(values, counted)
+    parts = parted(values, counted)
     return np.concatenate([np.gradient(part) if part.size > 1 else np.zeros(part.size) for part in parts])
 
 

@@ -61,9 +61,9 @@ def nuisance(
     """
     columns = np.hstack([columns_of(predicted, rate, config, counted), timing])
     weight = max(variance, 1e-12 * float(np.max(np.abs(predicted))) ** 2)
-    beside_none = columns[calm]
-    normal = beside_none.T @ beside_none / weight + np.eye(columns.shape[1])
-    estimate = np.linalg.solve(normal, beside_none.T @ residual[calm] / weight)
+    kept = columns[calm]
+    normal = kept.T @ kept / weight + np.eye(columns.shape[1])
+    estimate = np.linalg.solve(normal, kept.T @ residual[calm] / weight)
     within = np.clip(estimate, -AT_MOST, AT_MOST)
     return columns[:, :TIMED] @ within[:TIMED], columns[:, TIMED:] @ within[TIMED:]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from pzd.record import Array, Mask, Record, sliced
 from pzd.signals.autoregression import Autoregression, autoregression
-from pzd.signals.left_out import slope_within, stretches, unbroken
+from pzd.signals.left_out import parted, slope_within, unbroken
 from pzd.signals.root_mean_square import rms
 
 HATS = 8
@@ -68,7 +68,7 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array, count
         return SmoothResidual(nothing, nothing, autoregression([residual - residual.mean()]), 1.0)
     explained = terms @ np.linalg.lstsq(terms, residual, rcond=None)[0]
     for _ in range(ROUNDS):
-        noise = autoregression(stretches(residual - explained, counted)).with_white(QUIETEST)
+        noise = autoregression(parted(residual - explained, counted)).with_white(QUIETEST)
         whole = unbroken(counted, noise.coefficients.size)
         flat = noise.whitened(residual)[whole]
         whitened = noise.whitened(terms)[whole]

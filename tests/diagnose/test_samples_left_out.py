@@ -16,7 +16,7 @@ from pzd.diagnose.residual_check import check_residual
 from pzd.record import Array, Record
 from pzd.signals.autoregression import autoregression
 from pzd.signals.kinematics import kinematics
-from pzd.signals.left_out import slope_within, stretches, unbroken
+from pzd.signals.left_out import parted, slope_within, unbroken
 from pzd.signals.nuisance import NuisanceConfig, columns_of
 
 RATE, FINER, DURATION, LEAD = 500, 16, 12.0, 2.0
@@ -90,7 +90,7 @@ def test_the_force_of_a_delay_is_its_slope_on_either_side_of_what_is_left_out() 
 def test_stretches_are_parted_at_every_sample_left_out() -> None:
     counted = np.array([0, 1, 1, 1, 0, 0, 1, 0, 1, 1], dtype=np.bool_)
     values = np.array([1.0, 2.0, 4.0, 9.0, 5.0, 8.0])
-    assert [part.tolist() for part in stretches(values, counted)] == [[1.0, 2.0, 4.0], [9.0], [5.0, 8.0]]
+    assert [part.tolist() for part in parted(values, counted)] == [[1.0, 2.0, 4.0], [9.0], [5.0, 8.0]]
     assert slope_within(values, counted).tolist() == [1.0, 1.5, 2.0, 0.0, 3.0, 3.0]
     assert unbroken(counted, 1).tolist() == [True, True, False, False, True]
     assert unbroken(counted, 0).all()

@@ -36,6 +36,7 @@ EFFECT = Effect(
             0.0,
             1.0e7,
             "force at which the valve opens",
+            # Close to 1 as well: where T0 is most of the force, no step leads on from a start below T0.
             Search(lambda s: s.force, (0.05, 0.12, 0.3, 0.5, 0.7, 0.8, 0.9), logarithmic=True),
         ),
         Parameter(
