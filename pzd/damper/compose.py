@@ -6,19 +6,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.damper.branch import any_slips, branch_forces
 from pzd.damper.columns import DRIVE, NEUTRAL, PARALLEL, STROKE_AND_FLOW, acting
 from pzd.damper.competing_forms import module_of
 from pzd.damper.drive import effective_voltage
-from pzd.damper.element import element_force
+from pzd.damper.element import element_force, element_force_sensitivities
 from pzd.damper.flow import flow_force
 from pzd.damper.kernels import T0, C, K, branch_steady, parallel_forces, plain, row_of
 from pzd.damper.laws import arguments, functions
 from pzd.damper.material import base_voltages, material
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.damper.path import march
+from pzd.damper.path import march, march_sensitivities
 from pzd.damper.values import columns_of, value_of
 from pzd.record import Array
 
@@ -79,6 +80,35 @@ def integrated_force(rows: Array, motion: Motion, steps: Array, initial_force: f
         friction, damping, stiffness = rows[0, [T0, C, K]]
         return element_force(x, steps, friction, damping, stiffness, initial_force, v)
     return march(x, v, steps, rows, initial_force, tolerance)
+
+
+def integrated_sensitivities(
+    rows: Array,
+    columns: NDArray[np.int64],
+    along: Array,
+    motion: Motion,
+    steps: Array,
+    initial_force: float,
+    tolerance: float,
+) -> tuple[Array, Array]:
+    """The same force, and its derivatives by v variables that move c columns of the rows; the initial force is held.
+
+    Parameters
+    ----------
+    rows, motion, steps, initial_force, tolerance : as `integrated_force`
+    columns : (c,) places in the row
+    along : (v, n, c) or (v, 1, c) derivatives of these columns by each variable
+
+    Returns
+    -------
+    (n,) force [N] and (n, v) its derivatives [N]
+    """
+    x, v = motion.displacement, motion.velocity
+    if len(rows) == 1 and along.shape[1] == 1 and plain(row_of(rows[0])) and np.all(columns <= K):
+        friction, damping, stiffness = rows[0, [T0, C, K]]
+        force, slopes = element_force_sensitivities(x, steps, friction, damping, stiffness, initial_force, v)
+        return force, slopes[:, columns] @ along[:, 0].T
+    return march_sensitivities(x, v, steps, rows, initial_force, tolerance, columns, along)
 
 
 def with_parallel(force: Array, parallel: Array | None, motion: Motion) -> Array:

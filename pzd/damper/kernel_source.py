@@ -62,6 +62,7 @@ def _rows() -> Iterator[str]:
     yield from _function("mix(a, b, share)", "return a if a == b else a + (b - a) * share")  # equal infinities stand
     yield from _function("interpolate(p, q, t)", f"return {_tuple('mix(p[#], q[#], t)')}")
     yield from _function("row_of(a)", f"return {_tuple('a[#]')}")
+    yield from _function("nudged(p, i, by)", f"return {_tuple('p[#] + (by if i == # else 0.0)')}")
     same = " and ".join(f"p[{i}] == q[{i}]" for i in moved) or "True"
     yield from _function("stroke_moves(p, q)", f"return not ({same})")
     alike = " and ".join(f"p[{i}] == q[{i}]" for i in range(len(ELEMENT), _WIDTH)) or "True"

@@ -17,6 +17,7 @@ from types import ModuleType
 import numpy as np
 
 from pzd.compiled import cache_folder
+from pzd.damper.columns import acting
 from pzd.damper.kernel_source import source
 from pzd.damper.laws import ELEMENT
 from pzd.record import Array
@@ -26,6 +27,8 @@ Row = tuple[float, ...]
 
 T0, C, K = range(len(ELEMENT))
 """The first places in a parameter row."""
+FLOW = len(ELEMENT) + sum(len(effect.parameters) for effect in acting("stroke"))
+"""The first place of a flow effect, behind those of the stroke."""
 
 
 def _load() -> ModuleType:
@@ -50,6 +53,8 @@ interpolate: Callable[[Row, Row, float], Row] = _MODULE.interpolate
 """The parameter row at a share of the way from one to the other."""
 row_of: Callable[[Array], Row] = _MODULE.row_of
 """An array as a parameter row."""
+nudged: Callable[[Row, int, float], Row] = _MODULE.nudged
+"""The parameter row with one of its columns changed by so much."""
 stroke_moves: Callable[[Row, Row], bool] = _MODULE.stroke_moves
 """Whether two rows differ in a parameter of a stroke effect."""
 effects_alike: Callable[[Row, Row], bool] = _MODULE.effects_alike

@@ -13,11 +13,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pzd.compiled import compiled
 from pzd.damper.flow import breakaway, relief, smooth_force
 from pzd.damper.kernels import T0, C, K, Row, interpolate, row_of, stroke_slope
 from pzd.damper.moving_element import UNSOLVED, goes_straight, whole_step
+from pzd.damper.path_sensitivities import Varied, begin, carry, fill_slopes, not_varied, varied
 from pzd.damper.pieces import TimeStep, extension_speed, piece, row_in
 from pzd.damper.regimes import (
     SMOOTH,
@@ -47,7 +49,7 @@ _SAME_FORCE = 1e-11  # of the force; a saved flow speed that gives it within thi
 
 
 @compiled
-def advance(state: Array, step: TimeStep, tolerance: float, booked: bool) -> None:
+def advance(state: Array, step: TimeStep, tolerance: float, booked: bool, v: Varied, sample: int) -> None:
     """Carry the state through one step.
 
     Parameters
@@ -56,6 +58,8 @@ def advance(state: Array, step: TimeStep, tolerance: float, booked: bool) -> Non
     step : what happens in it
     tolerance : admissible error of a piece, as a share of the force
     booked : whether the energies are booked, which doubles the work
+    v : what varies, its derivatives carried along; changed in place
+    sample : before the step
     """
     e, w, at = state[DEFLECTION], state[SPEED], 0.0
     turn = step.u0 / (step.u0 - step.u1) * step.h if step.u0 * step.u1 < 0.0 else step.h
@@ -84,6 +88,8 @@ def advance(state: Array, step: TimeStep, tolerance: float, booked: bool) -> Non
             speed = speed_at(abs(spring_force(end, p)), p, following, onto, speed)
         if booked:
             _book(state, e, end, w, speed, at, dt, regime, side, step)
+        if v.carried.size > 0:
+            carry(v, e, end, w, speed, at, dt, regime, side, step, sample)
         e, w = end, speed
         at += dt
         if at >= step.h * (1.0 - 1e-14):
@@ -205,8 +211,37 @@ def march(
     (n,) force [N]
     """
     force = np.empty(displacement.size)
-    _march(displacement, velocity, steps, rows, initial_force, tolerance, np.zeros(STATES), force)
+    none = np.empty((force.size, 0))
+    _march(displacement, velocity, steps, rows, initial_force, tolerance, np.zeros(STATES), force, not_varied(), none)
     return force
+
+
+def march_sensitivities(
+    displacement: Array,
+    velocity: Array,
+    steps: Array,
+    rows: Array,
+    initial_force: float,
+    tolerance: float,
+    columns: NDArray[np.int64],
+    along: Array,
+) -> tuple[Array, Array]:
+    """The same force, and its derivatives by v variables that move c columns of the rows, the initial force held.
+
+    Parameters
+    ----------
+    displacement, velocity, steps, rows, initial_force, tolerance : as `march`
+    columns : (c,) places in the row
+    along : (v, n, c) or (v, 1, c) derivatives of these columns by each variable
+
+    Returns
+    -------
+    (n,) force [N] and (n, v) its derivatives [N]
+    """
+    force, slopes = np.empty(displacement.size), np.empty((displacement.size, len(along)))
+    v = varied(rows, columns, along)
+    _march(displacement, velocity, steps, rows, initial_force, tolerance, np.zeros(STATES), force, v, slopes)
+    return force, slopes
 
 
 def deflections(force: Array, rows: Array) -> Array:
@@ -232,11 +267,17 @@ def _march(
     tolerance: float,
     state: Array,
     force: Array,
+    v: Varied,
+    slopes: Array,
 ) -> None:
+    """Fill the force and, where something varies, the slopes."""
     p0 = row_of(rows[0])
     p1 = p0
     state[DEFLECTION] = deflection_at(initial_force, p0)
     force[0] = spring_force(state[DEFLECTION], p0)
+    begin(v, state[DEFLECTION], p0)
+    if v.carried.size > 0:
+        fill_slopes(v, state[DEFLECTION], p0, 0, slopes[0])
     moving = False
     for i in range(1, displacement.size):
         if rows.shape[0] > 1:
@@ -248,7 +289,19 @@ def _march(
         step = TimeStep(h, mean - half, mean + half, p0, p1, moving)
         end, speed = whole_step(state[DEFLECTION], step, tolerance) if goes_straight(p0, p1) else UNSOLVED
         if math.isnan(end):
-            advance(state, step, tolerance, False)
+            advance(state, step, tolerance, False, v, i - 1)
         else:
+            if v.carried.size > 0:
+                _carry_whole(v, state[DEFLECTION], end, speed, step, i - 1)
             state[DEFLECTION], state[SPEED] = end, speed
         force[i] = spring_force(state[DEFLECTION], p1)
+        if v.carried.size > 0:
+            fill_slopes(v, state[DEFLECTION], p1, i, slopes[i])
+
+
+@compiled
+def _carry_whole(v: Varied, e: float, end: float, speed: float, step: TimeStep, sample: int) -> None:
+    """Bring the derivatives through a step that lies in one regime."""
+    regime, side = regime_of(spring_force(e, step.p0), step.p0)
+    w = speed_at(abs(spring_force(e, step.p0)), step.p0, regime, side, speed)
+    carry(v, e, end, w, speed, 0.0, step.h, regime, side, step, sample)

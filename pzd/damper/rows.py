@@ -1,4 +1,4 @@
-"""The parameter row at a voltage: linear between the nodes of a damper."""
+"""The parameter row at a voltage, or along a voltage that moves: linear between the nodes of a damper."""
 
 from __future__ import annotations
 
@@ -20,3 +20,38 @@ def row_at(voltages: Array, rows: Array, voltage: float) -> Row:
     i = np.searchsorted(voltages, voltage, side="right") - 1
     share = (voltage - voltages[i]) / (voltages[i + 1] - voltages[i])
     return interpolate(row_of(rows[i]), row_of(rows[i + 1]), share)
+
+
+def rows_along(voltages: Array, rows: Array, effective: Array) -> Array:
+    """Parameter rows along an effective voltage, linear between the nodes, held beyond them.
+
+    Parameters
+    ----------
+    voltages : (k,) rising nodes [V]
+    rows : (k, r) rows at the nodes
+    effective : (n,) effective voltage [V]
+
+    Returns
+    -------
+    (n, r), or (1, r) where they are the same at every node
+    """
+    if np.all(rows == rows[0]):
+        return rows[:1].copy()
+    found = np.empty((effective.size, rows.shape[1]))
+    _fill(voltages, np.ascontiguousarray(rows), effective, found)
+    return found
+
+
+@compiled
+def _fill(voltages: Array, rows: Array, effective: Array, found: Array) -> None:
+    last, i = voltages.size - 1, 0
+    for n in range(effective.size):
+        voltage = min(max(effective[n], voltages[0]), voltages[last])
+        while i > 0 and voltage < voltages[i]:
+            i -= 1
+        while i < last - 1 and voltage >= voltages[i + 1]:
+            i += 1
+        share = (voltage - voltages[i]) / (voltages[i + 1] - voltages[i])
+        for c in range(rows.shape[1]):
+            a, b = rows[i, c], rows[i + 1, c]
+            found[n, c] = a if a == b else a + (b - a) * share

@@ -22,6 +22,7 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.damper.moving_element import whole_step
 from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance, march
+from pzd.damper.path_sensitivities import not_varied
 from pzd.damper.pieces import TimeStep
 from pzd.damper.regimes import spring_force
 from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
@@ -57,6 +58,7 @@ FLOWS = [
 ]
 
 
+NOTHING = not_varied()
 NEUTRAL_ROW = tuple(constant_rows(1.0, 1.0, 1.0, {})[0][0, 3:])
 """Columns of a parameter row behind T0, C and k, without any effect."""
 
@@ -244,7 +246,7 @@ def test_a_scheme_of_fixed_steps_is_of_order_five(effects: dict, moving: bool) -
         rows = [tuple(a + s * (b - a) if a != b else a for a, b in zip(first, last, strict=True)) for s in share]
         for i in range(steps):
             ends = (rows[i], rows[i + 1]) if moving else (first, first)
-            advance(state, TimeStep(long / steps, u[i], u[i + 1], *ends, moving), unlimited, False)
+            advance(state, TimeStep(long / steps, u[i], u[i + 1], *ends, moving), unlimited, False, NOTHING, 0)
         return float(state[DEFLECTION])
 
     truth = after(512)
@@ -262,7 +264,7 @@ def test_behind_an_open_relief_valve_moving_parameters_cost_no_order() -> None:
         rows = [tuple(a + s * (b - a) if a != b else a for a, b in zip(first, last, strict=True)) for s in share]
         u = 0.2 + 0.1 * share
         for i in range(steps):
-            advance(state, TimeStep(4e-3 / steps, u[i], u[i + 1], rows[i], rows[i + 1], True), 1e9, False)
+            advance(state, TimeStep(4e-3 / steps, u[i], u[i + 1], rows[i], rows[i + 1], True), 1e9, False, NOTHING, 0)
         return float(state[DEFLECTION])
 
     truth = after(256)
@@ -312,10 +314,10 @@ def test_energy_goes_into_the_spring_the_oil_and_the_valve_and_nowhere_else(effe
             share = 0.5 * (1 + x)
             middle = tuple(a + share * (b - a) if a != b else a for a, b in zip(p0, p1, strict=True))
             probe, u = state.copy(), mean + half * (2 * share - 1)
-            advance(probe, TimeStep(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, False)
+            advance(probe, TimeStep(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, False, NOTHING, i)
             e = probe[DEFLECTION]
             work += 0.5 * w * STEP * spring_force(e, middle) * u
-        advance(state, TimeStep(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, True)
+        advance(state, TimeStep(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, True, NOTHING, i)
     wound = np.linspace(0.0, state[DEFLECTION], 2001)
     stored = np.trapezoid([spring_force(e, row_of(rows[-1])) for e in wound], wound)
     assert state[DISSIPATED] > 0.0
@@ -409,5 +411,5 @@ def in_parts(first: tuple, last: tuple, parts: int) -> float:
 def marched_step(first: tuple, last: tuple) -> float:
     """The same by pieces whose length follows from their error."""
     state = np.array([900.0 / first[2], 0.0, 0.0, 0.0])
-    advance(state, TimeStep(STEP, 0.3, 0.5, first, last, True), 1e-11, False)
+    advance(state, TimeStep(STEP, 0.3, 0.5, first, last, True), 1e-11, False, NOTHING, 0)
     return state[DEFLECTION]

@@ -8,14 +8,9 @@ import numpy as np
 import pytest
 from campaign import damper_of, sines
 
-from pzd.damper.compose import constant_rows, respond
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.data.split import UNTOUCHED, split
-from pzd.diagnose.fit.least_squares import fit
-from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE, RecordLikelihood
-from pzd.diagnose.fit.parameters import simulated
-from pzd.diagnose.search.evidence import evidence_of
 from pzd.signals.nuisance import NuisanceConfig
 
 TWO = (0.0, 150.0)
@@ -53,30 +48,3 @@ def test_naming_sees_all_but_the_untouched_samples(asked: Callable[[int], Campai
 def test_records_judged_at_the_same_time_are_judged_the_same(asked: Callable[[int], Campaign]) -> None:
     for one, other in zip(asked(1).checks(PLAIN), asked(2).checks(PLAIN), strict=True):
         np.testing.assert_array_equal(one.residual, other.residual)
-
-
-def test_effects_beside_the_element_leave_what_is_remembered_of_it(asked: Callable[[int], Campaign]) -> None:
-    problem = evidence_of(asked(1), PLAIN).whole
-    start = np.append(fit(problem, (), problem.start(), evaluations=1).searched, 0.1)
-    unknowns = problem.unknowns(("gas_spring",))
-    for observation in problem.observations:
-        point = problem.point(start, unknowns)
-        row, _ = constant_rows(*point.base[observation.place], {})
-        before = observation.element(row.tobytes()).copy()
-        force = simulated(point, observation)
-        np.testing.assert_array_equal(observation.element(row.tobytes()), before)
-        damper = point.damper()
-        alone = damper.model_copy(update={"base": damper.base[observation.place : observation.place + 1]})
-        whole = respond(alone, observation.motion, observation.begins_with, SIMULATION_TOLERANCE)
-        np.testing.assert_allclose(force, observation.at_compared(whole), rtol=1e-12)
-
-
-def test_a_remembered_element_takes_the_kernel_that_is_compiled_already(
-    asked: Callable[[int], Campaign], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A row that may only be read is another type to the compiler, and the march takes ten seconds to compile."""
-    (record, *_) = evidence_of(asked(1), PLAIN).whole.observations
-    writeable = []
-    monkeypatch.setattr(RecordLikelihood, "marched", lambda _, rows: writeable.append(rows.flags.writeable))
-    record.element(constant_rows(401.0, 2500.0, 4e5, {})[0].tobytes())
-    assert writeable == [True]

@@ -41,7 +41,7 @@ def linear(rng: np.random.Generator, pulled: float) -> tuple[Fitted, float]:
     parameter = library()["fluid_inertia"].parameters[0]
     unknowns = (Unknown("fluid_inertia", parameter, 1.0),)
     split_left = tuple(left.reshape(TESTS, 40))
-    fitted = Fitted(damper_of(), (), step, split_left, (), unknowns, np.zeros((0, 4)), lambda: jacobian)
+    fitted = Fitted(damper_of(), (), step, split_left, (), unknowns, np.zeros((0, 4)), jacobian)
     return fitted, float(step[3])
 
 

@@ -6,27 +6,21 @@ squares is minus the logarithm of the likelihood, and fits of different effects 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from pzd.damper.model import Damper
-from pzd.diagnose.fit.carried_slopes import CarriedSlopes
-from pzd.diagnose.fit.differences import blocks, differences
-from pzd.diagnose.fit.parameters import Problem, Unknown, simulated
+from pzd.diagnose.fit.parameters import Problem, Unknown
+from pzd.diagnose.fit.slopes import Left, left_at
 from pzd.record import Array
-
-Left = tuple[list[Array], list[Array]]
-"""Residuals in units of noise and simulated forces, an observation each."""
 
 MOST_EVALUATIONS = 20
 """Evaluations of the model in a search, at most, unless said otherwise.
 
 Reason: time; what is adopted is searched on, see `thresholds.MOST_EVALUATIONS_OF_BEST`."""
-MOST_PASSES = 3
-"""Times that the end of a search is looked at with slopes of its own, and the search goes on from there."""
 PRECISION = 1e-5
 """Relative change of the sum of squares at which a search ends.
 
@@ -63,13 +57,8 @@ class Fitted:
     unknowns: tuple[Unknown, ...]
     prior: Array
     """(2 b, 3 b + e) slopes of the prior on C and k."""
-    differentiated: Callable[[], Array]
-    """Gives the `slopes`."""
-
-    @cached_property
-    def slopes(self) -> Array:
-        """(w, 3 b + e) derivatives of all residuals by the searched variables."""
-        return self.differentiated()
+    slopes: Array
+    """(w, 3 b + e) derivatives of all residuals by the searched variables."""
 
     @cached_property
     def frame(self) -> Array:
@@ -92,15 +81,7 @@ class Fitted:
         return sum(r.size for r in self.residuals)
 
 
-def fit(
-    problem: Problem,
-    effects: Sequence[str],
-    start: Array,
-    evaluations: int = MOST_EVALUATIONS,
-    *,
-    beside: Fitted | None = None,
-    rough: bool = False,
-) -> Fitted:
+def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int = MOST_EVALUATIONS) -> Fitted:
     """The optimum reached from a starting point, by trust-region least squares within the limits.
 
     Parameters
@@ -108,26 +89,19 @@ def fit(
     problem : what is fitted to what
     effects : names of the effects fitted together with the base rows
     start : (3 b + e,) in the units of the search
-    evaluations : of the model, at most, from one set of slopes of its own on
-    beside : an optimum of the same problem with the first of these effects, from whose slopes the search starts
-    rough : end where slopes that were carried end; otherwise the end is looked at with slopes of its own
+    evaluations : of the model, at most
     """
     unknowns = problem.unknowns(effects)
-    known = None if beside is None else _known(problem, unknowns, start, beside)
-    found, slopes, (residuals, forces) = _search(problem, unknowns, start, start.size, evaluations, known, rough=rough)
-
-    def differentiated() -> Array:
-        return differences(problem, unknowns, found, _bounds(problem, unknowns)) if slopes is None else slopes
-
+    found, left = _search(problem, unknowns, start, start.size, evaluations)
     return Fitted(
-        problem.point(found, unknowns).damper(),
+        problem.point(found, unknowns).damper,
         tuple(effects),
         found,
-        tuple(residuals),
-        tuple(forces),
+        left.residuals,
+        left.simulated,
         unknowns,
         _prior(problem, len(unknowns)),
-        differentiated,
+        left.slopes,
     )
 
 
@@ -135,89 +109,45 @@ def misfit_of(problem: Problem, damper: Damper) -> float:
     """Smallest misfit that T0, C and k alone reach while the effects stay as a damper has them."""
     unknowns = problem.unknowns(tuple(damper.effects))
     start = problem.start_with(damper)
-    _, _, (residuals, _) = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS)
-    return float(sum(r @ r for r in residuals))
+    _, left = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS)
+    return float(left.whole @ left.whole)
 
 
 def _search(
-    problem: Problem,
-    unknowns: Sequence[Unknown],
-    start: Array,
-    free: int,
-    evaluations: int,
-    known: Array | None = None,
-    *,
-    rough: bool = False,
-) -> tuple[Array, Array | None, Left]:
-    """Where a search over the first `free` variables ends, (3 b + e,), with residuals and forces there.
-
-    And with the slopes there (w, free), where they are exact.
-    """
+    problem: Problem, unknowns: Sequence[Unknown], start: Array, free: int, evaluations: int
+) -> tuple[Array, Left]:
+    """Where a search over the first `free` variables ends, (3 b + e,), and what is left there."""
     from scipy.optimize import least_squares
 
     low, high = _bounds(problem, unknowns)
-    begin = np.clip(start, low + 1e-9, high - 1e-9)
+    begin, limits = np.clip(start, low + 1e-9, high - 1e-9), (low[:free], high[:free])
     centre, prior = problem.start(), _prior(problem, len(unknowns))
 
     def whole(x: Array) -> Array:
         return np.concatenate([x, begin[free:]])
 
-    evaluated: dict[bytes, Left] = {}
-
-    def left_at(x: Array) -> Left:
-        """Asked twice of each point, for its residuals and for its slopes."""
-        key = x.tobytes()
-        if key not in evaluated:
-            evaluated[key] = _residuals(problem, unknowns, whole(x))
-        return evaluated[key]
+    @lru_cache(maxsize=2)  # where the search is, and where it tries to go
+    def left_by(x: bytes) -> Left:
+        return left_at(problem, unknowns, whole(np.frombuffer(x)), limits)
 
     def residuals_at(x: Array) -> Array:
-        return np.concatenate([*left_at(x)[0], prior[:, : centre.size] @ (x[: centre.size] - centre)])
+        return np.concatenate([left_by(x.tobytes()).whole, prior[:, : centre.size] @ (x[: centre.size] - centre)])
 
-    slopes = CarriedSlopes(
-        lambda x: np.concatenate(left_at(x)[0]),
-        lambda x: differences(problem, unknowns, whole(x), (low[:free], high[:free])),
-        blocks(problem, unknowns, free),
-        None if known is None else (begin[:free], known),
+    def slopes_at(x: Array) -> Array:
+        return np.concatenate([left_by(x.tobytes()).slopes, prior[:, :free]])
+
+    found = least_squares(
+        residuals_at,
+        begin[:free],
+        jac=slopes_at,
+        bounds=limits,
+        x_scale="jac",
+        ftol=PRECISION,
+        xtol=PRECISION,
+        gtol=PRECISION,
+        max_nfev=evaluations,
     )
-
-    def jacobian(x: Array) -> Array:
-        return np.concatenate([slopes(x), prior[:, :free]])
-
-    at, misfit = begin[:free], np.inf
-    for _ in range(1 if rough else MOST_PASSES):
-        found = least_squares(
-            residuals_at,
-            at,
-            jac=jacobian,
-            bounds=(low[:free], high[:free]),
-            x_scale="jac",
-            ftol=PRECISION,
-            xtol=PRECISION,
-            gtol=PRECISION,
-            max_nfev=evaluations,
-        )
-        at, gained, misfit = found.x, misfit - found.cost, found.cost
-        if slopes.exact or gained <= PRECISION * misfit:
-            break
-        slopes.renew()
-    return whole(at), slopes(at) if slopes.exact else None, left_at(at)
-
-
-def _known(problem: Problem, unknowns: Sequence[Unknown], start: Array, beside: Fitted) -> Array | None:
-    """(w, 3 b + e) slopes at a start: those of an optimum for what it has, differences for the rest.
-
-    None where that optimum is one of other base rows or other residuals.
-    """
-    shared = beside.searched.size
-    same_rows = shared == 3 * len(problem.base) + len(beside.unknowns)
-    same_effects = unknowns[: len(beside.unknowns)] == beside.unknowns
-    same_residuals = beside.size == sum(o.residuals for o in problem.observations)
-    if not (same_rows and same_effects and same_residuals):
-        return None
-    columns = range(shared, start.size)
-    new = differences(problem, unknowns, start, _bounds(problem, unknowns), columns)
-    return np.hstack([beside.slopes, new[:, shared:]])
+    return whole(found.x), left_by(found.x.tobytes())
 
 
 def _prior(problem: Problem, effects: int) -> Array:
@@ -238,12 +168,6 @@ def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array
         np.array([*low.ravel(), *(lower for lower, _ in limits)]),
         np.array([*high.ravel(), *(upper for _, upper in limits)]),
     )
-
-
-def _residuals(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> Left:
-    point = problem.point(x, unknowns)
-    forces = [simulated(point, o) for o in problem.observations]
-    return [o.in_noise(o.measured - f) for o, f in zip(problem.observations, forces, strict=True)], forces
 
 
 def _covariance(jacobian: Array) -> Array:

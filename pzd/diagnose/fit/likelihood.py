@@ -15,7 +15,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compose import integrated_force, respond, sampling_steps, sensors_of, shown_moments
+from pzd.damper.compose import respond, sampling_steps, sensors_of, shown_moments
+from pzd.damper.drive import effective_voltage
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.record import Array
@@ -28,8 +29,8 @@ SIMULATION_TOLERANCE = 1e-7
 
 Reason: over a record the errors add up, and jump as the parameters move. The slopes of a rounded yield, by differences
 of 1e-3, are then right to 1e-4; from 1e-6 on they are wrong by up to 3 %, and searches stop beside the optimum."""
-REMEMBERED = 12
-"""Element forces kept, enough for one column of slopes each of two fits at the same time."""
+REMEMBERED = 4
+"""Effective voltages kept: slopes by a parameter of the drive need three."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +66,15 @@ class RecordLikelihood:
         return sampling_steps(self.motion.time)
 
     @cached_property
-    def element(self) -> Callable[[bytes], Array]:
-        """(m,) force [N] of the element by its parameter row, (1, r) as bytes; effects beside it leave it as it is."""
-        return lru_cache(REMEMBERED)(lambda row: self.marched(np.frombuffer(row)[np.newaxis].copy()))
+    def effective_voltage(self) -> Callable[[bytes], Array]:
+        """(m,) effective voltage [V] by the row of the drive, (d,) as bytes; the same array for the same row."""
+        return lru_cache(REMEMBERED)(self._followed)
 
-    def marched(self, rows: Array) -> Array:
-        """(m,) force [N] of the element by its parameter rows, (1, r) or (m, r)."""
-        return integrated_force(rows, self.motion, self.steps, self.begins_with, SIMULATION_TOLERANCE)
+    def _followed(self, row: bytes) -> Array:
+        voltage = self.motion.voltage
+        if voltage is None:
+            raise ValueError(f"{self.name}: the damper depends on the voltage, and none is given")
+        return effective_voltage(voltage, self.steps, np.frombuffer(row).copy())
 
     @property
     def residuals(self) -> int:
@@ -89,11 +92,11 @@ class RecordLikelihood:
         return simulated[self.first :: self.stride][: self.compared.size][self.compared]
 
     def shown(self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], late: float = 0.0) -> Array:
-        """(m,) what was simulated as a channel shows it, between the samples by a cubic.
+        """(m,) or (m, p) what was simulated as a channel shows it, between the samples by a cubic.
 
         Parameters
         ----------
-        simulated : (m,) force [N]
+        simulated : (m,) force [N], or (m, p) of them
         sensors : effects of the sensor, see `pzd.damper.compose.sensors_of`
         late : how much later yet the channel shows it [s]
         """
@@ -109,7 +112,7 @@ class RecordLikelihood:
         if begin == 0:
             return np.asarray(CubicSpline(time, simulated)(np.clip(shown, time[0], time[-1])))
         period = time[-1] - time[0] + self.steps[-1]
-        whole = np.append(simulated[begin:], simulated[begin])
+        whole = np.concatenate([simulated[begin:], simulated[begin : begin + 1]])
         cycle = CubicSpline(np.append(time, time[0] + period), whole, bc_type="periodic")
         return np.concatenate([simulated[:begin], cycle(shown)])
 

@@ -1,4 +1,4 @@
-"""What is fitted to what: T0, C, k of every base row and the parameters of effects, and the forces they give."""
+"""What is fitted to what: T0, C, k of every base row and the parameters of effects."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from typing import cast
 import numpy as np
 
 from pzd.damper.competing_forms import known
-from pzd.damper.compose import constant_rows, constant_value, with_parallel
+from pzd.damper.compose import Nodes, nodes_of
 from pzd.damper.effect import Effect, Parameter, Scales, Search
-from pzd.damper.laws import ELEMENT
-from pzd.damper.material import by_voltage, material_factors
+from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnose.fit.likelihood import RecordLikelihood, response
+from pzd.diagnose.fit.likelihood import RecordLikelihood
 from pzd.diagnose.work import Work
 from pzd.record import Array
 
@@ -192,7 +191,9 @@ class Point:
     problem: Problem
     zero: float = 0.0
     """Of the displacement [m]."""
+    _laid_out: dict[float | None, Nodes] = field(default_factory=dict, repr=False)
 
+    @cached_property
     def damper(self) -> Damper:
         """The same as a damper."""
         rows = tuple(
@@ -212,6 +213,12 @@ class Point:
             zero_m=self.zero,
         )
 
+    def nodes(self, temperature: float | None) -> Nodes:
+        """The damper at one temperature [degC], by its nodes of voltage."""
+        if temperature not in self._laid_out:
+            self._laid_out[temperature] = nodes_of(self.damper, temperature)
+        return self._laid_out[temperature]
+
     def _nodes(self, effect: str) -> dict[str, tuple[float, ...]]:
         return {"at_voltage_V": self.problem.voltages} if effect in self.problem.varying else {}
 
@@ -222,31 +229,3 @@ class Point:
             name: {key: value[node] if isinstance(value, tuple) else value for key, value in values.items()}
             for name, values in self.effects.items()
         }
-
-
-def simulated(point: Point, observation: RecordLikelihood) -> Array:
-    """(n,) force at the compared samples of an observation [N]."""
-    o = observation
-    point.problem.work.add(o.motion.time.size)
-    if o.place < 0:
-        return response(o, point.damper())
-    friction, damping, stiffness = point.base[o.place]
-    effects = point.at(o.place)
-    rows, parallel = constant_rows(friction, damping, stiffness, effects)
-    rows = _with_material(rows, point, o, effects)
-    force = o.element(rows.tobytes()) if len(rows) == 1 else o.marched(rows)
-    force = with_parallel(force, parallel, o.motion.about(point.zero))
-    sensors = {name: values for name, values in effects.items() if known()[name].place == "sensor"}
-    return o.at_compared(o.shown(force, sensors))
-
-
-def _with_material(rows: Array, point: Point, o: RecordLikelihood, effects: Mapping[str, Mapping[str, float]]) -> Array:
-    """The parameter row (1, r) of one observation as its temperature makes it: (1, r), or (m, r) where that moves."""
-    acting = {name: values for name, values in effects.items() if known()[name].place == "material"}
-    if not acting:
-        return rows
-    given = {name: {key: np.array([value]) for key, value in values.items()} for name, values in acting.items()}
-    factors = material_factors(given, constant_value(o.motion.temperature), point.problem.reference)
-    found = np.repeat(rows, len(factors), axis=0)
-    found[:, : len(ELEMENT)] *= factors
-    return found

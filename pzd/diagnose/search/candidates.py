@@ -183,9 +183,9 @@ def converged(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
     effect = known()[found.effect]
     problem = _for(problem, effect)
     others = [np.concatenate([_base(problem, before), s]) for s in promising_starts(problem, before, effect)[1:]]
-    fits = [fit(problem, found.fitted.effects, start, rough=True) for start in others]
+    fits = [fit(problem, found.fitted.effects, start) for start in others]
     best = min([found.fitted, *fits], key=lambda f: f.misfit)
-    return _from(problem, before, found.effect, best.searched, MOST_EVALUATIONS_OF_BEST, rough=False)
+    return _from(problem, before, found.effect, best.searched, MOST_EVALUATIONS_OF_BEST)
 
 
 def _for(problem: Problem, effect: Effect) -> Problem:
@@ -200,17 +200,10 @@ def _base(problem: Problem, before: Fitted) -> Array:
 
 
 def _from(
-    problem: Problem,
-    before: Fitted,
-    effect: str,
-    start: Array,
-    evaluations: int = MOST_EVALUATIONS,
-    *,
-    rough: bool = True,
+    problem: Problem, before: Fitted, effect: str, start: Array, evaluations: int = MOST_EVALUATIONS
 ) -> Candidate:
-    """An effect fitted from a start; `rough` where only how much it pays is asked."""
-    beside = before if rough else None
-    fitted = fit(problem, (*before.effects, effect), start, evaluations, beside=beside, rough=rough)
+    """An effect fitted from a start."""
+    fitted = fit(problem, (*before.effects, effect), start, evaluations)
     pays = delta_bic(before, fitted)
     if len(problem.base) < len(before.damper.base):
         # Fewer base rows alone may pay already; that is not the effect's merit, nor are the parameters that they save.

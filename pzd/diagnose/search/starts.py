@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from pzd.damper.effect import Effect
-from pzd.diagnose.fit.differences import DIFFERENCE
 from pzd.diagnose.fit.least_squares import Fitted
-from pzd.diagnose.fit.parameters import BOUND, Problem, Unknown, simulated
+from pzd.diagnose.fit.parameters import BOUND, Problem, Unknown
+from pzd.diagnose.fit.slopes import left_at
 from pzd.diagnose.thresholds import FAINT
 from pzd.record import Array
 
@@ -83,19 +83,12 @@ def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Ar
     effects = (*before.effects, effect.name)
     unknowns = problem.unknowns(effects)
     here = np.concatenate([before.searched, start])
-    points = [problem.point(here, unknowns)]
-    for j in range(before.searched.size, here.size):
-        shifted = here.copy()
-        shifted[j] += DIFFERENCE
-        points.append(problem.point(shifted, unknowns))
-    residuals, slopes = [], []
-    for o in problem.observations:
-        forces = [simulated(point, o) for point in points]
-        residuals.append(o.in_noise(o.measured - forces[0]))
-        slopes.append(o.in_noise(np.stack([forces[0] - f for f in forces[1:]], axis=-1) / DIFFERENCE))
-    r, columns, frame = np.concatenate(residuals), np.concatenate(slopes), before.frame
+    new = range(before.searched.size, here.size)
+    limits = np.full(here.size, -np.inf), np.full(here.size, np.inf)
+    left = left_at(problem, unknowns, here, limits, new)
+    r, columns, frame = left.whole, left.slopes[:, before.searched.size :], before.frame
     r, columns = r - frame @ (frame.T @ r), columns - frame @ (frame.T @ columns)
     size = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(size > 0.0, size, 1.0)
-    left = r - columns @ np.linalg.lstsq(columns, r, rcond=1e-6)[0]
-    return float(left @ left)
+    rest = r - columns @ np.linalg.lstsq(columns, r, rcond=1e-6)[0]
+    return float(rest @ rest)

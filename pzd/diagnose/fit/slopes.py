@@ -1,0 +1,99 @@
+"""Residuals of observations at a point of the search, and their slopes by the searched variables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.diagnose.fit.forces import Directions, alike_at_one_voltage, directions, sensitivities
+from pzd.diagnose.fit.likelihood import RecordLikelihood
+from pzd.diagnose.fit.parameters import Problem, Unknown
+from pzd.record import Array
+
+STEP = 1e-4
+"""Step of a searched variable to either side, over which its parameter, the effective voltage and what stands beside
+the element are differenced.
+
+Reason: far above rounding, and so short that a branch begins to slip at the same sample on either side; the path of the
+oil, whose own errors a longer step would have to drown, is not differenced."""
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """What a point of the search leaves, and how that goes with the searched variables."""
+
+    residuals: tuple[Array, ...]
+    """(w_o,) an observation, in units of noise."""
+    simulated: tuple[Array, ...]
+    """(n,) an observation, force at the compared samples [N]."""
+    slopes: Array
+    """(w, free) derivatives of all residuals by the searched variables."""
+
+    @property
+    def whole(self) -> Array:
+        """(w,) all residuals."""
+        return np.concatenate(self.residuals)
+
+
+def left_at(
+    problem: Problem,
+    unknowns: Sequence[Unknown],
+    x: Array,
+    limits: tuple[Array, Array],
+    wanted: Sequence[int] | None = None,
+) -> Left:
+    """Residuals and slopes at a point: together they cost little more than the residuals alone.
+
+    Parameters
+    ----------
+    problem : what is fitted to what
+    unknowns : of the effects
+    x : (3 b + e,) where they are taken, in the units of the search
+    limits : (free,) least and largest values of the variables that the search moves
+    wanted : the columns asked for, the others being zero; all where none are given
+    """
+    low, high = limits
+    free = low.size
+    point, below, above = (
+        problem.point(x, unknowns),
+        np.maximum(x[:free] - STEP, low),
+        np.minimum(x[:free] + STEP, high),
+    )
+    asked = range(free) if wanted is None else wanted
+    beside = {
+        j: (
+            problem.point(_with(x, j, below[j]), unknowns),
+            problem.point(_with(x, j, above[j]), unknowns),
+            float(above[j] - below[j]),
+        )
+        for j in asked
+    }
+    residuals, forces, blocks = [], [], []
+    alike, known = alike_at_one_voltage(point), dict[int, Directions]()
+    for o in problem.observations:
+        columns = [j for j in _moving(problem, unknowns, o, free) if j in beside]
+        if o.place not in known or o.place < 0 or not alike:
+            known[o.place] = directions(point, [beside[j] for j in columns], o)
+        force, slopes = sensitivities(known[o.place], o, problem.work)
+        block = np.zeros((o.residuals, free))
+        block[:, columns] = o.in_noise(-slopes)
+        residuals.append(o.in_noise(o.measured - force))
+        forces.append(force)
+        blocks.append(block)
+    return Left(tuple(residuals), tuple(forces), np.concatenate(blocks))
+
+
+def _moving(problem: Problem, unknowns: Sequence[Unknown], o: RecordLikelihood, free: int) -> list[int]:
+    """Which of the first `free` variables move the force of an observation: a test moves with its own voltage alone."""
+    rows = 3 * len(problem.base)
+    own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(rows)
+    effects = [j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]]
+    return [*own, *(rows + j for j in effects if rows + j < free)]
+
+
+def _with(x: Array, j: int, value: float) -> Array:
+    moved = x.copy()
+    moved[j] = value
+    return moved
