@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,10 @@ from pzd.damper.element import element_force, element_force_sensitivities
 from pzd.damper.flow import flow_force
 from pzd.damper.kernels import T0, C, K, branch_steady, parallel_forces, plain, row_of
 from pzd.damper.laws import arguments, functions
-from pzd.damper.material import base_voltages, material
+from pzd.damper.march import march, march_sensitivities
+from pzd.damper.material import material
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.damper.path import march, march_sensitivities
 from pzd.damper.values import columns_of, value_of
 from pzd.record import Array
 
@@ -95,19 +94,20 @@ def integrated_sensitivities(
 
     Parameters
     ----------
-    rows, motion, steps, initial_force, tolerance : as `integrated_force`
+    rows : as `integrated_force`
     columns : (c,) places in the row
-    along : (v, n, c) or (v, 1, c) derivatives of these columns by each variable
+    along : (n, v, c) or (1, v, c) derivatives of these columns by each variable
+    motion, steps, initial_force, tolerance : as `integrated_force`
 
     Returns
     -------
     (n,) force [N] and (n, v) its derivatives [N]
     """
     x, v = motion.displacement, motion.velocity
-    if len(rows) == 1 and along.shape[1] == 1 and plain(row_of(rows[0])) and np.all(columns <= K):
+    if len(rows) == len(along) == 1 and plain(row_of(rows[0])) and np.all(columns <= K):
         friction, damping, stiffness = rows[0, [T0, C, K]]
         force, slopes = element_force_sensitivities(x, steps, friction, damping, stiffness, initial_force, v)
-        return force, slopes[:, columns] @ along[:, 0].T
+        return force, slopes[:, columns] @ along[0].T
     return march_sensitivities(x, v, steps, rows, initial_force, tolerance, columns, along)
 
 
@@ -278,32 +278,3 @@ def static_force(damper: Damper, voltage: Array | float | None) -> Array:
     rest = np.zeros(u.size)
     rows = columns_of(damper, PARALLEL, None if voltage is None else u.ravel())
     return parallel_forces(rest, rest, rest, rows).reshape(u.shape)
-
-
-@dataclass(frozen=True, eq=False)
-class Nodes:
-    """A damper at one temperature, laid out for compiled loops: all of it piecewise linear in the effective voltage."""
-
-    voltages: Array
-    """(m,) rising nodes [V]; held beyond."""
-    rows: Array
-    """(m, r) parameter rows of the element."""
-    parallel: Array
-    """(m, b) rows of the parallel effects, columns as `columns.PARALLEL`."""
-    drive: Array
-    """(d,) row of the drive, columns as `columns.DRIVE`."""
-
-
-def nodes_of(damper: Damper, temperature: float | None) -> Nodes:
-    """The damper at one temperature [degC], laid out for compiled loops."""
-    listed = [values["at_voltage_V"] for values in damper.effects.values() if "at_voltage_V" in values]
-    voltages = np.unique(np.concatenate([base_voltages(damper), *(np.atleast_1d(v) for v in listed)]))
-    shape = (voltages.size, -1)
-    rows = element_rows(damper, voltages, temperature)
-    parallel = columns_of(damper, PARALLEL, voltages)
-    return Nodes(
-        voltages,
-        np.broadcast_to(rows, (voltages.size, rows.shape[1])).reshape(shape).copy(),
-        np.broadcast_to(parallel, (voltages.size, parallel.shape[1])).copy(),
-        drive_row_of(damper),
-    )

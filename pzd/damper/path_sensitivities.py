@@ -27,6 +27,7 @@ from pzd.record import Array
 _NUDGE = 1e-6
 """Change of a column for its derivatives, as a share of itself or of what a variable changes it by: about half the
 digits of a double."""
+_LOOKED_AT = 100  # samples that show how large these changes are
 _VANISHING = 1e-9  # of the larger slope at the ends of a piece: the oil hardly flows there, and has no steady state
 
 
@@ -38,7 +39,7 @@ class Varied(NamedTuple):
     nudges: Array
     """(c,) change of each for its derivative, in its own unit."""
     along: Array
-    """(v, n, c) or (v, 1, c) derivatives of these columns by each variable, linear between samples."""
+    """(n, v, c) or (1, v, c) derivatives of these columns by each variable, linear between samples."""
     partial: Array
     """(c,) derivatives by each column, of whatever is looked at."""
     carried: Array
@@ -58,11 +59,11 @@ def varied(rows: Array, columns: NDArray[np.int64], along: Array) -> Varied:
     ----------
     rows : (n, r) or (1, r) parameter rows
     columns : (c,) places in the row
-    along : (v, n, c) or (v, 1, c) derivatives of these columns by each variable
+    along : (n, v, c) or (1, v, c) derivatives of these columns by each variable
     """
-    variables, _, count = along.shape
-    own = np.abs(rows[0, columns])
-    largest = np.maximum(np.max(np.abs(along), axis=(0, 1), initial=0.0), np.where(np.isfinite(own), own, 0.0))
+    samples, variables, count = along.shape
+    own, some = np.abs(rows[0, columns]), along[:: max(samples // _LOOKED_AT, 1)]
+    largest = np.maximum(np.max(np.abs(some), axis=(0, 1), initial=0.0), np.where(np.isfinite(own), own, 0.0))
     nudges = _NUDGE * np.where(largest > 0.0, largest, 1.0)
     ends = np.zeros((2, 1 + variables))
     place = np.full(2, np.nan)
@@ -80,19 +81,20 @@ def varied(rows: Array, columns: NDArray[np.int64], along: Array) -> Varied:
 
 def not_varied() -> Varied:
     """No variables: nothing is carried along."""
-    return varied(np.zeros((1, 0)), np.zeros(0, dtype=np.int64), np.zeros((0, 1, 0)))
+    return varied(np.zeros((1, 0)), np.zeros(0, dtype=np.int64), np.zeros((1, 0, 0)))
 
 
 @inlined
 def _by_variable(v: Varied, variable: int, sample: int, share: float) -> float:
     """What the `partial` derivatives make of a variable, at a share of the way from one sample to the next."""
-    last, found = v.along.shape[1] - 1, 0.0
-    if last == 0 or share == 0.0:
+    found, last = 0.0, v.along.shape[0] - 1
+    if last == 0 or share == 0.0 or share >= 1.0:
+        at = min(sample if share < 1.0 else sample + 1, last)
         for c in range(v.columns.size):
-            found += v.partial[c] * v.along[variable, min(sample, last), c]
+            found += v.partial[c] * v.along[at, variable, c]
     else:
         for c in range(v.columns.size):
-            before, after = v.along[variable, sample, c], v.along[variable, sample + 1, c]
+            before, after = v.along[sample, variable, c], v.along[sample + 1, variable, c]
             found += v.partial[c] * (before + (after - before) * share)
     return found
 

@@ -10,10 +10,10 @@ from uuid import UUID
 import numpy as np
 
 from pzd.damper.columns import NEUTRAL, acting
-from pzd.damper.compose import nodes_of
 from pzd.damper.laws import ELEMENT
 from pzd.damper.material import material
 from pzd.damper.model import Damper
+from pzd.damper.nodes import nodes_of
 from pzd.damper.values import columns_of, value_of
 from pzd.export.c_text import array, double, head
 from pzd.export.content import Content

@@ -7,9 +7,10 @@ import numpy as np
 from pzd.artefacts import ForceRow, Table
 from pzd.damper.branch import BRANCHES, any_slips
 from pzd.damper.columns import DRIVE
-from pzd.damper.compose import nodes_of, steady_force
+from pzd.damper.compose import steady_force
 from pzd.damper.kernels import C, K, parallel_force
 from pzd.damper.model import Damper
+from pzd.damper.nodes import nodes_of
 from pzd.record import Array
 from pzd.schema.errors import DataError
 from pzd.simulate.car import HalfCar

@@ -13,11 +13,12 @@ import pytest
 
 import pzd
 from pzd.damper.columns import STROKE_AND_FLOW
-from pzd.damper.compose import nodes_of, respond
+from pzd.damper.compose import respond
 from pzd.damper.drive import drive_row, effective_voltage
 from pzd.damper.material import material
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.damper.nodes import nodes_of
 from pzd.damper.rows import row_at
 
 TIME = np.arange(0, 1, 1e-3)

@@ -18,10 +18,11 @@ from pzd.damper.compose import (
 )
 from pzd.damper.element import element_force
 from pzd.damper.kernels import row_of
+from pzd.damper.march import march
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.damper.moving_element import whole_step
-from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance, march
+from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance
 from pzd.damper.path_sensitivities import not_varied
 from pzd.damper.pieces import TimeStep
 from pzd.damper.regimes import spring_force

@@ -10,7 +10,7 @@ from pzd.damper.columns import STROKE_AND_FLOW
 from pzd.damper.compose import constant_rows
 from pzd.damper.element import element_force_sensitivities
 from pzd.damper.laws import ELEMENT
-from pzd.damper.path import march, march_sensitivities
+from pzd.damper.march import march, march_sensitivities
 from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
 from pzd.record import Array
 
@@ -58,7 +58,7 @@ def scaled(rows: Array, column: int, by: float) -> Array:
 @pytest.mark.parametrize("effects", [{}, *CONSTANT], ids=lambda e: "+".join(e) or "plain")
 def test_they_are_the_differences_of_an_exact_path(effects: dict, moving: bool) -> None:
     rows, columns, (x, v), steps = rows_of(effects, moving), columns_of(effects), motion(), np.array([STEP])
-    along = np.stack([rows[:, columns] * (np.arange(len(columns)) == j) for j in range(len(columns))])
+    along = np.stack([rows[:, columns] * (np.arange(len(columns)) == j) for j in range(len(columns))], axis=1)
     force, found = march_sensitivities(x, v, steps, rows, 50.0, SIMULATION_TOLERANCE, np.array(columns), along)
     np.testing.assert_array_equal(force, march(x, v, steps, rows, 50.0, SIMULATION_TOLERANCE))
     for j, column in enumerate(columns):
@@ -72,7 +72,7 @@ def test_a_damper_of_twice_all_forces_gives_twice_the_force(effects: dict) -> No
     """Euler's theorem: F is homogeneous of degree one in T0, C, k and q."""
     rows, (x, v) = rows_of(effects, False), motion()
     columns = [0, 1, 2, *(c for c in columns_of(effects)[3:] if "orifice_quadratic" in effects)]
-    along = rows[np.newaxis, :, columns]
+    along = rows[:, np.newaxis, columns]
     force, slopes = march_sensitivities(x, v, np.array([STEP]), rows, 0.0, 1e-9, np.array(columns), along)
     assert np.max(np.abs(slopes[:, 0] - force)) < 1e-3 * np.max(np.abs(force))
 
@@ -81,7 +81,7 @@ def test_of_the_plain_element_they_are_those_of_the_closed_form_to_order_two() -
     rows, missed = rows_of({}, False), []
     for parts in (1, 2, 4):
         step, (x, v) = STEP / parts, motion(STEP / parts)
-        _, found = march_sensitivities(x, v, np.array([step]), rows, 0.0, 1e-9, np.arange(3), np.eye(3)[:, np.newaxis])
+        _, found = march_sensitivities(x, v, np.array([step]), rows, 0.0, 1e-9, np.arange(3), np.eye(3)[np.newaxis])
         _, exact = element_force_sensitivities(x, step, *BASE, 0.0, v)
         missed.append(np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0))
     assert np.all(missed[0] < 2e-4)
@@ -92,7 +92,7 @@ def test_of_the_plain_element_they_are_those_of_the_closed_form_to_order_two() -
 def test_a_moment_without_flow_moves_the_force_by_the_spring_alone() -> None:
     """While the oil sticks dF/dk is the way that the rod has gone, and T0 and C change nothing."""
     x = 1e-4 * np.sin(2 * np.pi * TIME)  # 20 N of 300
-    v, each = 2e-4 * np.pi * np.cos(2 * np.pi * TIME), np.eye(3)[:, np.newaxis]
+    v, each = 2e-4 * np.pi * np.cos(2 * np.pi * TIME), np.eye(3)[np.newaxis]
     _, slopes = march_sensitivities(x, v, np.array([STEP]), rows_of({}, False), 0.0, 1e-9, np.arange(3), each)
     np.testing.assert_array_equal(slopes[:, :2], 0.0)
     np.testing.assert_allclose(slopes[:, 2], x - x[0], atol=1e-12)

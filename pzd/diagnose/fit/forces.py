@@ -111,7 +111,7 @@ class Directions:
     moved: NDArray[np.int64]
     """(c,) columns of the rows that a direction changes."""
     along: Array
-    """(d, 1, c) or (d, m, c) derivatives of these columns by each direction."""
+    """(1, d, c) or (m, d, c) derivatives of these columns by each direction."""
 
 
 def directions(point: Point, beside: Sequence[tuple[Point, Point, float]], o: RecordLikelihood) -> Directions:
@@ -127,7 +127,7 @@ def directions(point: Point, beside: Sequence[tuple[Point, Point, float]], o: Re
     changes = [before.change_to(after) / width for before, after, width in pairs]
     moved = np.flatnonzero(np.any([np.any(change != 0.0, axis=0) for change in changes], axis=0))
     along = [here.in_time(change[:, moved]) for change in changes]
-    return Directions(here, pairs, moved, np.stack(np.broadcast_arrays(*along)))
+    return Directions(here, pairs, moved, np.stack(np.broadcast_arrays(*along), axis=1))
 
 
 def alike_at_one_voltage(point: Point) -> bool:

@@ -10,10 +10,10 @@ from typing import cast
 import numpy as np
 
 from pzd.damper.competing_forms import known
-from pzd.damper.compose import Nodes, nodes_of
 from pzd.damper.effect import Effect, Parameter, Scales, Search
 from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
+from pzd.damper.nodes import Nodes, nodes_of
 from pzd.diagnose.fit.likelihood import RecordLikelihood
 from pzd.diagnose.work import Work
 from pzd.record import Array
@@ -214,7 +214,10 @@ class Point:
         )
 
     def nodes(self, temperature: float | None) -> Nodes:
-        """The damper at one temperature [degC], by its nodes of voltage."""
+        """The damper at one temperature [degC], by its nodes of voltage; at any the same where nothing goes by it."""
+        problem = self.problem
+        if len(problem.base) == len(problem.voltages) and all(known()[n].place != "material" for n in self.effects):
+            temperature = None
         if temperature not in self._laid_out:
             self._laid_out[temperature] = nodes_of(self.damper, temperature)
         return self._laid_out[temperature]

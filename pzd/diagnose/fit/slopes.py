@@ -78,8 +78,9 @@ def left_at(
             known[o.place] = directions(point, [beside[j] for j in columns], o)
         force, slopes = sensitivities(known[o.place], o, problem.work)
         block = np.zeros((o.residuals, free))
-        block[:, columns] = o.in_noise(-slopes)
-        residuals.append(o.in_noise(o.measured - force))
+        counted = o.in_noise(np.column_stack([o.measured - force, -slopes]))
+        block[:, columns] = counted[:, 1:]
+        residuals.append(counted[:, 0].copy())
         forces.append(force)
         blocks.append(block)
     return Left(tuple(residuals), tuple(forces), np.concatenate(blocks))

@@ -18,9 +18,9 @@ from pzd.damper.compose import (
     voltage_at_valve,
 )
 from pzd.damper.kernels import K, row_of, stroke_straight
+from pzd.damper.march import deflections
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.damper.path import deflections
 from pzd.record import Array
 
 TOLERANCE = 1e-7
