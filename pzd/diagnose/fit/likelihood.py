@@ -27,8 +27,8 @@ from pzd.signals.left_out import unbroken
 SIMULATION_TOLERANCE = 1e-7
 """Of the damper's path, as a share of the force, in every step by itself.
 
-Reason: over a record the errors add up, and jump as the parameters move. The slopes of a rounded yield, by differences
-of 1e-3, are then right to 1e-4; from 1e-6 on they are wrong by up to 3 %, and searches stop beside the optimum."""
+Reason: over a record the errors add up, and jump as the parameters move; a search must not take that for a way down.
+Looser, it would hardly be faster: most steps of a record lie in one piece."""
 REMEMBERED = 4
 """Effective voltages kept: slopes by a parameter of the drive need three."""
 
