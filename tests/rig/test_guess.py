@@ -81,6 +81,7 @@ FILES: dict[str, tuple[list[str], str, str, str]] = {
     "french": (["temps (s)\tcourse (mm)\teffort (kN)"], "\t", ",", "utf-8"),
     "spanish": (["tiempo [s],carrera [mm],fuerza [kN]"], ",", ".", "utf-8"),
     "underscores": (["time_s,pos_mm,load_kN"], ",", ".", "utf-8"),
+    "letters": (["t_s,x_mm,F_kN"], ",", ".", "utf-8"),
     "slashes": (["Zeit / s;Weg / mm;Kraft / kN"], ";", ".", "utf-8"),
     "utf-16": (["Time [s],Stroke [mm],Load [kN]"], ",", ".", "utf-16"),
 }
@@ -112,6 +113,18 @@ def test_one_header_is_one_quantity_and_engineering_units_go_before_volts(tmp_pa
     assert "temperature: degC" in text
     (entry,) = read_back(tmp_path, [path]).entries
     assert (entry.temperature_degC, entry.voltage_V) == (22.5, 0.5)
+
+
+@pytest.mark.parametrize(
+    "control", [("U_V", "voltage"), ("ctrl (V)", "voltage"), ("I_A", "current"), ("Coil/A", "current")]
+)
+def test_a_letter_or_a_word_of_any_signal_is_what_its_unit_says(tmp_path: Path, control: tuple[str, str]) -> None:
+    header, name = control
+    rows = [numbers(values) for values in (TIME, MM, FORCE, 0 * X + 31.5, 0 * X + 0.5)]
+    path = stored(tmp_path / "a.csv", [f"t [s],x [mm],F [N],T [°C],{header}"], rows, ",")
+    assert f"        {name}: {header}" in guessed([path])
+    (entry,) = read_back(tmp_path, [path]).entries
+    assert (entry.temperature_degC, entry.voltage_V) == (31.5, 0.5)
 
 
 def test_what_stays_open_is_an_empty_value_that_the_check_asks_for(tmp_path: Path) -> None:

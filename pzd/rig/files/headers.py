@@ -38,6 +38,20 @@ CONTROLS = {
     Control("current", "A"): r"^i$|current|strom|courant|corriente",
 }
 """What the header of the control signal looks like."""
+_WITH_UNIT = {
+    TIME: "^t$",
+    DISPLACEMENT: "^[xs]$",
+    VELOCITY: "^v$",
+    ACCELERATION: "^a$",
+    FORCE: "^f$",
+    TEMPERATURE: "^t$",
+    PRESSURE: "^p$",
+}
+"""What names a quantity where a unit of it stands behind: `x_m`, `F_kN`, `T [degC]`."""
+_CONTROLS_WITH_UNIT = {
+    Control(): "^u$|ctrl|control|valve|piezo|coil",
+    Control("current", "A"): "^i$|ctrl|control|valve|coil",
+}
 _LAST_WORD = re.compile(r"[ _/,]\s*([A-Za-zµ°%][A-Za-zµ°/²^0-9]*)$")
 _CELSIUS = {"C", "°C", "deg C", "grad C", "Grad C"}
 """What headers call degrees Celsius, and pint does not or takes for coulombs."""
@@ -49,7 +63,8 @@ def control_of(headers: Sequence[str]) -> Control:
         control
         for control, pattern in CONTROLS.items()
         for header in headers
-        if re.search(pattern, _bare(header)) and _word(header, Control()) not in (FORCE, DISPLACEMENT)
+        if (re.search(pattern, _bare(header)) and _word(header, None, Control()) not in (FORCE, DISPLACEMENT))
+        or _by_unit(header, None, control) is VOLTAGE
     ]
     return next(iter(shown), Control())
 
@@ -61,11 +76,12 @@ def assigned(headers: Sequence[str], units: Sequence[str] | None, control: Contr
     """
     found: dict[Quantity, tuple[int, str]] = {}
     for index, header in enumerate(headers):
-        quantity = _word(header, control)
+        below = units[index] if units else None
+        quantity = _word(header, below, control)
         if quantity is None:
             continue
         canonical = is_canonical(header, quantity, control)
-        unit = unit_of(header, units[index] if units else None, own_quantity(quantity, control))
+        unit = unit_of(header, below, own_quantity(quantity, control))
         rank = 3 if canonical else 2 if unit is not None else 0 if _in_brackets(header, units, index) else 1
         if quantity not in found or rank > found[quantity][0]:
             found[quantity] = (rank, header)
@@ -91,16 +107,27 @@ def unit_of(header: str, below: str | None, quantity: Quantity) -> str | None:
     return unit
 
 
-def _word(header: str, control: Control) -> Quantity | None:
+def _word(header: str, below: str | None, control: Control) -> Quantity | None:
     """The quantity that a header names; where it names two (Druckkraft, load cell voltage) the mechanical one."""
     for quantity in CHANNELS:
         if is_canonical(header, quantity, control):
             return quantity
+    if (quantity := _by_unit(header, below, control)) is not None:
+        return quantity
     bare = _bare(header)
     for quantity in (FORCE, DISPLACEMENT, VELOCITY, ACCELERATION, TIME, TEMPERATURE, PRESSURE):
         if re.search(_LOOKS_LIKE[quantity], bare):
             return quantity
     return VOLTAGE if re.search(CONTROLS[control], bare) else None
+
+
+def _by_unit(header: str, below: str | None, control: Control) -> Quantity | None:
+    """The quantity that a header means by the unit behind it; None where there is none."""
+    word = _LAST_WORD.sub("", _bare(header))
+    for quantity, pattern in {**_WITH_UNIT, VOLTAGE: _CONTROLS_WITH_UNIT[control]}.items():
+        if re.search(pattern, word) and unit_of(header, below, own_quantity(quantity, control)) is not None:
+            return quantity
+    return None
 
 
 def _in_brackets(header: str, units: Sequence[str] | None, index: int) -> bool:

@@ -15,6 +15,8 @@ ALIKE = 0.3
 """Offsets that differ by less than this share of the usual one are alike: friction at rest moves them so far."""
 LEAST_RECORDS = 3
 """Records from which there is a usual offset."""
+LEAST_SPEEDS = 5
+"""Records whose offsets rise or fall with the speed throughout: that five do so by chance has odds of 1 in 60."""
 SLIPS = 0.02
 """Least share of the samples at which the element must slip, either way.
 
@@ -56,26 +58,33 @@ def check(test: Measured) -> list[Finding]:
 def compared(entries: tuple[RecordEntry, ...]) -> tuple[RecordEntry, ...]:
     """The same entries, in which the offset of a record is compared with those of the other records of its setting.
 
-    A preload or a gas force is the damper's: the same in every record. A tare may change from file to file, and a
-    force and a displacement that are both turned over show the offset with the other sign.
+    A preload or a gas force is the damper's: the same in every record. Where rebound is unlike compression the offset
+    goes with the speed. A tare may change from file to file, and a force and a displacement that are both turned over
+    show the offset with the other sign.
     """
-    offsets = {entry.name: _offset(entry) for entry in entries}
-    return tuple(
-        _compared(entry, [offsets[o.name] for o in entries if o.setting == entry.setting]) for entry in entries
-    )
+    return tuple(_compared(entry, [o for o in entries if o.setting == entry.setting]) for entry in entries)
 
 
 def _offset(entry: RecordEntry) -> float:
     return next((finding.size for finding in entry.findings if finding.check == "offset"), 0.0)
 
 
-def _compared(entry: RecordEntry, offsets: list[float]) -> RecordEntry:
-    mine = _offset(entry)
+def _by_speed(entries: list[RecordEntry]) -> bool:
+    """Whether the offsets of records rise, or fall, with the speed throughout."""
+    said = sorted((e.velocity_rms_m_per_s or 0.0, _offset(e)) for e in entries if _offset(e) != 0.0)
+    steps = np.diff([offset for _, offset in said])
+    return len(said) >= LEAST_SPEEDS and bool(np.all(steps > 0.0) or np.all(steps < 0.0))
+
+
+def _compared(entry: RecordEntry, entries: list[RecordEntry]) -> RecordEntry:
+    mine, offsets = _offset(entry), [_offset(other) for other in entries]
     usual = float(np.median(offsets))
     if mine == 0.0 or len(offsets) < LEAST_RECORDS:
         return entry
     if np.ptp(offsets) <= ALIKE * abs(usual):
         follows = f"{FOLLOWS}; alike in all {len(offsets)} records of this setting, as a preload or a gas force is"
+    elif _by_speed(entries):
+        follows = "it goes with the speed of the test, as where rebound is unlike compression; no tare does that"
     elif usual and abs(mine + usual) <= ALIKE * abs(usual):
         follows = f"{usual:+.4g} N is usual in this setting: force and displacement are both turned over here (sign)"
     elif abs(mine - usual) > ALIKE * abs(usual):
