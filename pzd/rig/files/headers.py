@@ -112,8 +112,8 @@ def _word(header: str, below: str | None, control: Control) -> Quantity | None:
     for quantity in CHANNELS:
         if is_canonical(header, quantity, control):
             return quantity
-    if (quantity := _by_unit(header, below, control)) is not None:
-        return quantity
+    if (meant := _by_unit(header, below, control)) is not None:
+        return meant
     bare = _bare(header)
     for quantity in (FORCE, DISPLACEMENT, VELOCITY, ACCELERATION, TIME, TEMPERATURE, PRESSURE):
         if re.search(_LOOKS_LIKE[quantity], bare):
