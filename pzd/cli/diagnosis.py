@@ -113,8 +113,10 @@ def _by_hand(value: Value) -> str:
 def _rejected(diagnosis: Diagnosis) -> Iterator[str]:
     listed = {*diagnosis.effects, *diagnosis.rivals}
     others = [one for one in diagnosis.ranking if one.effect not in listed]
-    adopted = [one.gap_after for one in diagnosis.ranking if one.effect in diagnosis.effects]
-    against = f" against {number(min(adopted))}" if adopted else ""
+    adopted = {one.effect: one.gap_after for one in diagnosis.ranking if one.effect in diagnosis.effects}
+    # What was added for its prediction alone was in no round of the search: then no figure there is the damper's.
+    whole = adopted.keys() == {*diagnosis.effects}
+    against = f" against {number(min(adopted.values()))}" if adopted and whole else ""
     for one in others[:_MOST]:
         yield f"not taken: {one.effect}, W_s {number(one.gap_after)}{against} on the tests seen, {one.reason}"
 

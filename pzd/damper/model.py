@@ -94,6 +94,10 @@ class Damper(Frozen):
             zero_m=self.zero_m,
         )
 
+    def without_effects(self, *names: str) -> Damper:
+        """The same damper without some of its effects."""
+        return self.model_copy(update={"effects": {n: values for n, values in self.effects.items() if n not in names}})
+
     def moved(self, by: float) -> Damper:
         """The same damper on a stand whose displacement reads more by so much [m]."""
         return self.model_copy(update={"zero_m": self.zero_m + by})

@@ -5,6 +5,9 @@ missing, and takes other values on other tests. What counts there is what the da
 is added if whole tests that no fit has seen are predicted better with it, beyond chance, and at no voltage worse; and
 if voltages left out are predicted no worse from those around them, beyond chance or not, since a law that takes other
 values there is none. That makes no name of it: the verdict stays `unexplained`.
+
+What is added may say better what an effect before it stood in for, as a gas that hardens does for a spring beside the
+element: then the data no longer know that one's parameters, and it goes if kept-back tests are predicted as well.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ from dataclasses import dataclass, replace
 from pzd.damper.effects import library
 from pzd.damper.nature import against_nature
 from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.fit.intervals import LEVEL, standard_errors
 from pzd.diagnose.fit.least_squares import Fitted
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.kept_back import Trials
@@ -28,6 +32,7 @@ from pzd.diagnose.thresholds import LEAST_CUT_IN_PREDICTION, PREDICTED_AT_ONCE, 
 log = logging.getLogger(__name__)
 
 ADDED = "added: kept-back tests are predicted better with it; what it stands for is open"
+REPLACED = "stand-in: kept-back tests are predicted as well without it, beside what was added"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +46,16 @@ class Extended:
     """What it misses of the voltages between others."""
     added: tuple[str, ...]
     """What was added, best first, in words."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Predicting:
+    """A damper fitted by criterion (4), and what it misses."""
+
+    problem: Problem
+    fitted: Fitted
+    missed: Missed
+    between: Missed
 
 
 def with_predictive_effects(
@@ -73,15 +88,57 @@ def with_predictive_effects(
         at = trials.fitted_by_criterion(chosen.fitted.damper, trials.nothing)
     if at is None or not added:
         return None
-    problem, fitted = at
-    reasons = {**selection.reasons, **{each.effect: ADDED for each in added if each.effect not in selection.adopted}}
-    last = replace(selection.last, whole=problem)
+    lean = _without_replaced(_Predicting(*at, missed, between), trials, config.force)
+    words = tuple(_in_words(each) for each in added if each.effect in lean.fitted.effects)
+    if not words:
+        return None
+    new = {each.effect: ADDED for each in added if each.effect not in selection.adopted}
+    gone = dict.fromkeys({*selection.adopted, *new} - {*lean.fitted.effects}, REPLACED)
     return Extended(
-        replace(selection, fitted=fitted, last=last, reasons=reasons),
-        missed,
-        between,
-        tuple(_in_words(each) for each in added),
+        replace(
+            selection,
+            fitted=lean.fitted,
+            last=replace(selection.last, whole=lean.problem),
+            reasons={**selection.reasons, **new, **gone},
+        ),
+        lean.missed,
+        lean.between,
+        words,
     )
+
+
+def _without_replaced(found: _Predicting, trials: Trials, forced: Sequence[str]) -> _Predicting:
+    """The same without effects that the data do not know beside the others, and that prediction does not need."""
+    while True:
+        fewer = []
+        for name in _unknown(found.fitted):
+            if name in forced:
+                continue
+            damper = found.fitted.damper.without_effects(name)
+            missed, at = trials.missed_by_criterion(damper), trials.fitted_by_criterion(damper, trials.nothing)
+            if at is not None and not _predicts_better(found.missed, missed, trials):
+                fewer.append((*at, missed))
+        if not fewer:
+            return found
+        problem, fitted, missed = min(fewer, key=lambda each: each[2].criterion or 0.0)
+        between = trials.missed_between(fitted.damper, by_criterion=True)
+        found = _Predicting(problem, fitted, missed, between)
+
+
+def _unknown(fitted: Fitted) -> list[str]:
+    """The effects that may as well be off, or have values that nature does not have.
+
+    May be off: the 95 % interval of the strength, the first parameter, holds its neutral value.
+    """
+    strengths = {name: library()[name].parameters[0] for name in fitted.effects}
+    unknowns = zip(fitted.unknowns, LEVEL * standard_errors(fitted), strict=True)
+    known = {
+        u.effect
+        for u, error in unknowns
+        if u.parameter == strengths.get(u.effect) and not abs(u.of(fitted.damper) - u.parameter.neutral) <= error
+    }
+    odd = against_nature(fitted.damper)
+    return [name for name in fitted.effects if (name not in known or name in odd) and len(fitted.effects) > 1]
 
 
 def _in_words(added: Candidate) -> str:

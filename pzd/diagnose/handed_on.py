@@ -162,10 +162,9 @@ def _harmful(
 
 def _without(selection: Selection, effect: str, reason: str = HARMFUL) -> Selection:
     """The selection with one effect taken back for a reason, the rest fitted anew."""
-    damper = selection.fitted.damper
-    effects = {name: values for name, values in damper.effects.items() if name != effect}
+    fewer = selection.fitted.damper.without_effects(effect)
     reasons = {**selection.reasons, effect: reason}
-    if not effects:
+    if not fewer.effects:
         return replace(
             selection,
             fitted=selection.plain,
@@ -173,11 +172,10 @@ def _without(selection: Selection, effect: str, reason: str = HARMFUL) -> Select
             competitions=(),
             reasons=reasons,
         )
-    fewer = damper.model_copy(update={"effects": effects})
     last = evidence_of(selection.last.campaign, fewer)
     return replace(
         selection,
-        fitted=fit(last.whole, tuple(effects), last.whole.start_with(fewer)),
+        fitted=fit(last.whole, tuple(fewer.effects), last.whole.start_with(fewer)),
         last=last,
         competitions=tuple(c for c in selection.competitions if c.effect != effect),
         reasons=reasons,

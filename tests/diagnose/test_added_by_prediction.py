@@ -14,7 +14,7 @@ from whole_diagnosis import all_but
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import Damper
 from pzd.damper.nature import against_nature
-from pzd.diagnose.added_by_prediction import ADDED, Extended, with_predictive_effects
+from pzd.diagnose.added_by_prediction import ADDED, REPLACED, Extended, with_predictive_effects
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.handed_on import handed_on
@@ -107,6 +107,36 @@ def test_no_more_is_added_than_the_config_allows_nor_what_it_forbids(rng: np.ran
     found, _ = extended(records, DiagnoseConfig(forbid=all_but("gas_spring")))
     assert found is not None
     assert {name.partition(" ")[0] for name in found.added} == {"gas_spring"}
+
+
+def test_what_was_added_takes_the_place_of_what_stood_in_for_it(rng: np.random.Generator) -> None:
+    """A spring and an offset are the polytropic gas to first order; beside it they may have any value."""
+    truth = damper_of(TWO, accumulator={"F_g": 300.0, "L": 0.08})
+    records = records_of(truth, rng)
+    forbid = all_but("preload_offset", "gas_spring", "accumulator")
+    config = DiagnoseConfig(forbid=forbid)
+    selection, trials = plain_selection(records, config)
+    whole = selection.first.whole
+    stood_in = damper_of(TWO, preload_offset={"F_0": -250.0}, gas_spring={"k_g": 6000.0})
+    fitted = fit(whole, ("preload_offset", "gas_spring"), whole.start_with(stood_in))
+    adopted = replace(selection, fitted=fitted, reasons=dict.fromkeys(fitted.effects, "adopted"))
+    missed = trials.missed_by_criterion(fitted.damper)
+    between = trials.missed_between(fitted.damper, by_criterion=True)
+    found = with_predictive_effects(adopted, missed, between, trials, config)
+    assert found is not None
+    assert found.added == ("accumulator",)
+    values = found.selection.fitted.damper.effects
+    assert set(values) == {"accumulator"}
+    assert values["accumulator"]["F_g"] == pytest.approx(300.0, rel=0.05)
+    assert values["accumulator"]["L"] == pytest.approx(0.08, rel=0.05)
+    assert found.selection.reasons["gas_spring"] == found.selection.reasons["preload_offset"] == REPLACED
+    assert found.missed.criterion is not None
+    assert found.missed.criterion < 0.5 * (missed.criterion or 0.0)
+    asked = with_predictive_effects(
+        adopted, missed, between, trials, config.model_copy(update={"force": ("preload_offset", "gas_spring")})
+    )
+    assert asked is not None
+    assert {"preload_offset", "gas_spring"} <= set(asked.selection.fitted.damper.effects)
 
 
 @pytest.mark.ci

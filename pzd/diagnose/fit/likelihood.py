@@ -142,6 +142,6 @@ def response(observation: RecordLikelihood, damper: Damper) -> Array:
 def responses(observation: RecordLikelihood, damper: Damper) -> Callable[[float], Array]:
     """(n,) force that a damper gives at the compared samples [N], by how much later yet a channel shows it [s]."""
     o, sensors = observation, sensors_of(damper)
-    prompt = damper.model_copy(update={"effects": {n: e for n, e in damper.effects.items() if n not in sensors}})
+    prompt = damper.without_effects(*sensors)
     force = respond(prompt, o.motion, o.begins_with, SIMULATION_TOLERANCE)
     return lambda late: o.at_compared(o.shown(force, sensors, late))
