@@ -8,19 +8,22 @@ edit a law, and the kernels are new.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 import platform
 import sys
 import tempfile
 from collections.abc import Callable
-from functools import partial
+from contextlib import ExitStack, suppress
+from functools import cached_property
 from pathlib import Path
 from types import FunctionType
 from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core.registry import CPUDispatcher
 
 from pzd.own_effects import own_files
 
@@ -60,14 +63,58 @@ def cache_folder() -> Path:
 numba.config.CACHE_DIR = str(cache_folder())  # type: ignore[attr-defined]  # numba sets its options up at run time
 
 
-_MACHINE_CODE: Any = partial(
-    numba.njit,
-    cache=True,
-    error_model="numpy",
-    nogil=True,
-    _nrt=False,  # no array is made inside, so none is counted, which took three quarters of a ride's time
-    no_cfunc_wrapper=True,  # nothing here is called from C, and the wrapper costs a tenth of the compiling
-)
+_OPTIONS: dict[str, Any] = {
+    "nopython": True,
+    "error_model": "numpy",
+    "nogil": True,
+    "_nrt": False,  # no array is made inside, so none is counted, which took three quarters of a ride's time
+    "no_cfunc_wrapper": True,  # nothing here is called from C, and the wrapper costs a tenth of the compiling
+}
+
+
+class _Kernel(CPUDispatcher):
+    """A compiled function that Python calls; compiled callers take its `inner` twin.
+
+    What reads the arguments of a call from Python costs a quarter of the compiling, and most functions are called by
+    compiled ones alone: it is made for those that Python does call.
+    """
+
+    def __init__(self, function: Callable[..., Any], inline: str = "never") -> None:
+        super().__init__(py_func=function, targetoptions={**_OPTIONS, "inline": inline})
+        self.enable_caching()
+
+    @cached_property
+    def _inner(self) -> Any:
+        function = self.py_func
+        twin = FunctionType(
+            function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
+        )
+        twin.__qualname__ = f"{function.__qualname__}.inner"  # by which numba keeps it
+        inner = CPUDispatcher(py_func=twin, targetoptions={**_OPTIONS, "no_cpython_wrapper": True})
+        inner.enable_caching()
+        return inner
+
+    def compile(self, sig: Any) -> Any:
+        """Compile as numba does, once: another process that needs the same meanwhile waits, and reads it.
+
+        No garbage is looked for in what is made, which would take an eighth of the time.
+        """
+        from filelock import FileLock
+
+        lock = FileLock(Path(numba.config.CACHE_DIR) / f"{self.__module__}.{self.__qualname__}.lock")  # type: ignore[attr-defined]  # numba sets its options up at run time
+        enabled = gc.isenabled()
+        with ExitStack() as held:
+            with suppress(OSError):  # without locks it is merely compiled twice
+                held.enter_context(lock)
+            gc.disable()
+            if enabled:
+                held.callback(gc.enable)
+            return super().compile(sig)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What a compiled caller finds where it names this function."""
+        return self._inner._numba_type_
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
@@ -81,9 +128,9 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
         called = function.__globals__.get(name)
         if isinstance(called, FunctionType) and called.__module__.startswith("pzd."):
             function.__globals__[name] = compiled(called)
-    return cast("Callable[P, R]", _MACHINE_CODE()(function))
+    return cast("Callable[P, R]", _Kernel(function))
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """The same, inlined into each compiled caller: for short functions that are called once or twice."""
-    return cast("Callable[P, R]", _MACHINE_CODE(inline="always")(function))
+    return cast("Callable[P, R]", _Kernel(function, inline="always"))

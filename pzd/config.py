@@ -25,7 +25,7 @@ from pzd.report.config import ReportConfig
 from pzd.rig.config import ControlConfig, RigConfig
 from pzd.schema.errors import ConfigError
 from pzd.schema.extends import read_extended
-from pzd.schema.model import Frozen
+from pzd.schema.model import Frozen, for_editors
 from pzd.schema.nearest import nearest
 from pzd.schema.yamlfile import Document
 from pzd.simulate.config import SimulateConfig
@@ -37,8 +37,9 @@ WITHOUT_CAR: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "r
 """What `stages` of a config may say."""
 
 
-def _rig_may_stand_elsewhere(schema: dict[str, Any]) -> None:
+def _rig_may_stand_elsewhere(schema: dict[str, Any], model: type[RunConfig]) -> None:
     """Ask for `rig` only where the config extends no other one, in which it may stand."""
+    for_editors(schema, model)
     del schema["required"]
     schema["anyOf"] = [{"required": ["rig"]}, {"required": ["extends"]}]
 

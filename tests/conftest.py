@@ -100,20 +100,17 @@ def _shared() -> Path | None:
 
 @pytest.fixture(scope="session", autouse=True)
 def kernels_compiled_once(request: pytest.FixtureRequest) -> Generator[None, None, None]:
-    """Where tests run in several processes one compiles for all: at once, each would take half a minute.
+    """Where tests run in several processes, what most begin with is compiled first, by one of them for all.
 
     The ride's kernels, which take most of it, are compiled beside the tests before: a ride waits for them.
     """
     if not hasattr(request.config, "workerinput"):
         yield
         return
-    from filelock import FileLock
-
     from pzd.compiled import cache_folder
     from pzd.simulate.compiled_ahead import mark
 
-    with FileLock(cache_folder() / "tests.lock"):
-        respond_once()
+    respond_once()
     ahead = None
     if not mark(cache_folder()).exists():
         ahead = subprocess.Popen([sys.executable, "-m", "pzd.simulate.precompile"], cwd=ROOT)

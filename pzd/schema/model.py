@@ -13,14 +13,18 @@ from pydantic import BaseModel, ConfigDict, Field
 from pzd.quantities import VOLTAGE
 
 
-def under_any_control(schema: dict[str, Any]) -> None:
-    """Let keys of the control signal be called after any one: an editor does not know what `control` says of them.
+def for_editors(schema: dict[str, Any], model: type[BaseModel]) -> None:
+    """Describe each key, and let keys of the control signal be called after any one, which no editor knows.
 
     Parameters
     ----------
     schema : JSON schema of a block; beside `voltage_V` stands a pattern that `current_A` and `rebound_clicks` meet, and
         no other key of the block
+    model : the block
     """
+    from pzd.schema.docstrings import describe_keys
+
+    describe_keys(schema, model)
     properties: dict[str, Any] = schema.get("properties", {})
     others = "|".join(map(re.escape, properties))
     for name, body in properties.items():
@@ -40,8 +44,7 @@ class Frozen(BaseModel):
         extra="forbid",
         strict=True,
         allow_inf_nan=False,
-        use_attribute_docstrings=True,
-        json_schema_extra=under_any_control,
+        json_schema_extra=for_editors,
     )
 
     former_keys: ClassVar[Mapping[str, str]] = {}

@@ -44,9 +44,6 @@ def _once(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    import gc
-
     from pzd.compiled import cache_folder
 
-    gc.disable()  # a short process: to look for garbage in what a compiler makes takes an eighth of its time
     _once(cache_folder())
