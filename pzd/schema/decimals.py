@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-_ROWS = TypeAdapter(list[tuple[float | None, ...]])
 _NUMBERS = TypeAdapter(list[float])
+_EMPTY = b"nul"
+"""Letters of `null`, which JSON has for a NaN and a number has none of."""
 
 
 def lines(columns: Sequence[NDArray[np.float64] | None], rows: int) -> bytes:
@@ -25,9 +26,17 @@ def lines(columns: Sequence[NDArray[np.float64] | None], rows: int) -> bytes:
     -------
     the bytes, each number as JSON has it, which takes a quarter of the time of `repr`
     """
-    cells = [[None] * rows if column is None else column.tolist() for column in columns]
-    arrays = _ROWS.dump_json(list(zip(*cells, strict=True)))
-    return arrays[2:-2].replace(b"],[", b"\n").replace(b"null", b"") + b"\n" if rows else b""
+    if not rows:
+        return b""
+    cells = np.full((rows, len(columns)), np.nan)
+    for place, column in enumerate(columns):
+        if column is not None:
+            cells[:, place] = column
+    text = np.frombuffer(_NUMBERS.dump_json(cells.ravel().tolist()), dtype=np.uint8)[1:].copy()
+    ends = np.flatnonzero(text == ord(","))[len(columns) - 1 :: len(columns)]
+    text[ends] = text[-1] = ord("\n")
+    whole = text.tobytes()
+    return whole if all(column is not None for column in columns) else whole.translate(None, _EMPTY)
 
 
 def numbers(body: str, columns: Sequence[int], width: int) -> NDArray[np.float64]:

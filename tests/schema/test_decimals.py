@@ -65,3 +65,12 @@ def test_some_of_the_columns() -> None:
 def test_what_is_no_table_of_numbers(body: str) -> None:
     with pytest.raises(ValueError):
         numbers(body, [0, 1], 2)
+
+
+@pytest.mark.parametrize("empty", [{0}, {1}, {2}, {0, 2}, {1, 2}, {0, 1}])
+def test_an_empty_column_leaves_its_cells_empty_wherever_it_stands(empty: set[int]) -> None:
+    cells = [[1.5, -2e-30], [0.25, 1e22], [-0.0, 3.0]]
+    columns = [None if place in empty else np.array(column) for place, column in enumerate(cells)]
+    written = lines(columns, 2).decode().split("\n")[:-1]
+    expected = [["" if place in empty else repr(cells[place][row]) for place in range(3)] for row in range(2)]
+    assert [[cell and repr(float(cell)) for cell in line.split(",")] for line in written] == expected
