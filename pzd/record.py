@@ -132,8 +132,11 @@ def from_neighbours(values: Array) -> Array:
 
 def without_glitches(values: Array) -> Array:
     """The samples of a channel that are no glitches of more than 2 % of its usual magnitude."""
+    spread = float(np.ptp(values))
+    if spread == 0.0:
+        return values  # most control signals, and no median is needed for them
     usual = float(np.median(np.abs(values)))
-    if float(np.ptp(values)) <= CONSTANT_SHARE * usual:
+    if spread <= CONSTANT_SHARE * usual:
         return values
     away = from_neighbours(values)
     rows = glitches(values, away)

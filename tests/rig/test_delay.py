@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pzd.damper.element import element_force
 from pzd.record import Array, Record
 from pzd.rig.config import Limits
-from pzd.rig.preflight import Measured, checks
+from pzd.rig.preflight import Measured, checks, delay
+from pzd.rig.reference_fit import Piece, ReferenceFit
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
@@ -37,3 +39,22 @@ def test_a_rigid_damper_with_sigmoid_friction_is_not_late(
     for noise in (0.0, 5.0):
         force = 900.0 * v + 200.0 * np.tanh(v / rounded_at) + noise * rng.standard_normal(TIME.size)
         assert checks()["delay"].check(measured(x, force)) == []
+
+
+def test_delays_are_looked_for_only_where_the_element_leaves_something(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x = 0.01 * np.sin(2.0 * np.pi * 2.0 * TIME)
+    other = 500.0 * rng.standard_normal(TIME.size)
+    asked: list[int] = []
+    search = delay.fitted
+
+    def counted(part: Piece, forces: Array) -> ReferenceFit:
+        asked.append(len(forces))
+        return search(part, forces)
+
+    monkeypatch.setattr(delay, "fitted", counted)
+    assert delay.check(measured(x, element_force(x, 1e-3, 300.0, 2500.0, 2e5))) == []
+    assert asked == []
+    delay.check(measured(x, other))
+    assert asked == [delay.TRIES]

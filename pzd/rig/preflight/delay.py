@@ -41,12 +41,14 @@ def check(test: Measured) -> list[Finding]:
     if not is_constant(test.record, voltage_scale([test.record])):
         return []
     part, undelayed = fit_reference(test)
+    if undelayed.left < VISIBLE:
+        return []
     longest = min(LONGEST, test.run.period / 20.0) if test.run else LONGEST
     delays = np.linspace(-longest, longest, TRIES)
     best = fitted(part, part.force_later(delays))
     delay = float(delays[best.force])
     found = abs(delay) >= max(LEAST_DELAY, 0.5 * part.step) and best.force not in (0, TRIES - 1)
-    if not found or undelayed.left < VISIBLE or best.left > EXPLAINS * undelayed.left:
+    if not found or best.left > EXPLAINS * undelayed.left:
         return []
     if _left_by_rigid(part) < AS_WELL * best.left:
         return []

@@ -32,18 +32,21 @@ def check(test: Measured) -> list[Finding]:
     """Displacement and force that are held, and steps of the displacement in a single sample."""
     record, v = test.record, test.clean.velocity
     found: list[Finding] = []
+    steps_of_clock = np.diff(record.time)
+    lost = LOST * float(np.median(steps_of_clock))
     for name, unit, values in (("force", "N", record.force), ("displacement", "m", record.displacement)):
+        least = _least(values)
         if name == "force":
-            ends = np.union1d(_jumping_on(values), _oddly_long(values))
+            ends = np.union1d(_jumping_on(values, least), _oddly_long(values))
             moving = np.abs(v) > IN_MOTION * float(np.percentile(np.abs(v), 99.0))
             middle = float(np.median(values))
             spread = 1.4826 * float(np.median(np.abs(values - middle)))
             ends = ends[moving[ends] | (np.abs(values[ends] - middle) > FAR_OFF * spread)]
         else:
             # A motion may dwell, before the test or in it: only a jump tells that it went on unseen.
-            ends = np.union1d(_jumping_on(values), _alone(values))
+            ends = np.union1d(_jumping_on(values, least), _alone(values, least))
         # Across a gap of the clock a jump is what the lost samples did, which another check says.
-        ends = ends[np.diff(record.time)[ends] < LOST * float(np.median(np.diff(record.time)))]
+        ends = ends[steps_of_clock[ends] < lost]
         if ends.size:
             steps = np.diff(values)[ends]
             worst = int(ends[np.argmax(np.abs(steps))])
@@ -60,6 +63,7 @@ def check(test: Measured) -> list[Finding]:
 
 
 def _least(values: Array) -> float:
+    """The smallest step from one sample to the next that is a jump."""
     low, high = np.percentile(values, (2.0, 98.0))
     return max(JUMP * float(np.percentile(np.abs(np.diff(values)), 99.0)), SHARE * float(high - low), 1e-300)
 
@@ -70,10 +74,10 @@ def _runs(values: Array) -> tuple[Rows, Rows]:
     return change, np.diff(change, prepend=-1)
 
 
-def _jumping_on(values: Array) -> Rows:
+def _jumping_on(values: Array, least: float) -> Rows:
     """Last rows of runs of equal samples from which the channel jumps on."""
     ends, lengths = _runs(values)
-    jumps: Rows = ends[(lengths >= LEAST_HELD) & (np.abs(values[ends + 1] - values[ends]) > _least(values))]
+    jumps: Rows = ends[(lengths >= LEAST_HELD) & (np.abs(values[ends + 1] - values[ends]) > least)]
     return jumps
 
 
@@ -88,9 +92,9 @@ def _oddly_long(values: Array) -> Rows:
     return none if quiet else ends[odd]
 
 
-def _alone(values: Array) -> Rows:
+def _alone(values: Array, least: float) -> Rows:
     """Rows from which the channel jumps in one sample, and goes on as it went before."""
     steps = np.abs(np.diff(values))
-    rows = np.flatnonzero(steps[1:-1] > np.maximum(_least(values), ALONE * np.maximum(steps[:-2], steps[2:]))) + 1
+    rows = np.flatnonzero(steps[1:-1] > np.maximum(least, ALONE * np.maximum(steps[:-2], steps[2:]))) + 1
     alone: Rows = rows
     return alone
