@@ -40,8 +40,9 @@ def write_rows(path: Path, model: type[Row], rows: Iterable[Row], control: Contr
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([control.renamed(name) for name in model.model_fields])
-        for row in rows:
-            writer.writerow([_cell(getattr(row, name)) for name in model.model_fields])
+        # The writer leaves None empty and writes a float as `repr` has it, which reads back exactly.
+        names = tuple(model.model_fields)
+        writer.writerows([getattr(row, name) for name in names] for row in rows)
 
 
 def read_rows(path: Path, model: type[Row], control: Control) -> tuple[Row, ...]:
@@ -271,12 +272,6 @@ def _refuse(path: Path, faults: Sequence[str]) -> None:
     if faults:
         more = len(faults) - _MOST_FAULTS
         raise DataError([*faults[:_MOST_FAULTS], *([f"{at(path)}: and {more} more such faults"] if more > 0 else [])])
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    return repr(value) if isinstance(value, float) else str(value)
 
 
 def _typed(cell: str, annotation: Any) -> str | float | None:
