@@ -81,6 +81,21 @@ def test_voltages_between_others_are_left_out_one_at_a_time(rng: np.random.Gener
         assert 0.2 * share**2 < each.W_s < 5.0 * share**2
 
 
+def test_a_voltage_without_tests_stays_where_it_is_and_stops_no_other(rng: np.random.Generator) -> None:
+    """At large, its T0 goes to a limit, where the step of all ends: a search of 20 steps was then far from its end."""
+    three = (0.0, 50.0, 150.0)
+    truth = damper_of(three, rounded_yield={"w_s": 0.02}, preload_offset={"F_0": 60.0})
+    records = sines(truth, rng, three, tests=((1.0, 0.02), (2.5, 0.01)), cycles=3, noise=2e-3)
+    problem = evidence_of(campaign_of(records), damper_of(three)).whole
+    effects, start = ("rounded_yield", "preload_offset"), problem.start_with(truth)
+    start[[1, 2, 7, 8]] += 0.5
+    kept = replace(problem, observations=tuple(o for o in problem.observations if o.place != 1))
+    found = fit(kept, effects, start)
+    np.testing.assert_array_equal(found.searched[3:6], start[3:6])
+    exact = fit(kept, effects, problem.start_with(truth), 100)
+    assert found.misfit < exact.misfit + 0.1
+
+
 @pytest.mark.parametrize("tests", [OTHER_TESTS[:1], OTHER_TESTS])
 def test_a_test_alone_at_its_voltage_keeps_back_its_cycles(
     rng: np.random.Generator, tests: tuple[tuple[float, float], ...]

@@ -14,7 +14,7 @@ import numpy as np
 
 from pzd.damper.model import Damper
 from pzd.diagnose.fit.parameters import Problem, Unknown
-from pzd.diagnose.fit.slopes import Left, left_at
+from pzd.diagnose.fit.slopes import Left, left_at, moving
 from pzd.record import Array
 
 MOST_EVALUATIONS = 20
@@ -116,31 +116,39 @@ def misfit_of(problem: Problem, damper: Damper) -> float:
 def _search(
     problem: Problem, unknowns: Sequence[Unknown], start: Array, free: int, evaluations: int
 ) -> tuple[Array, Left]:
-    """Where a search over the first `free` variables ends, (3 b + e,), and what is left there."""
+    """Where a search over the first `free` variables ends, (3 b + e,), and what is left there.
+
+    Those that no observation moves with, such as T0 of a voltage that is left out, stay where they are: at large, one
+    wanders between its limits, and where it meets one the step of all ends.
+    """
     from scipy.optimize import least_squares
 
     low, high = _bounds(problem, unknowns)
     begin, limits = np.clip(start, low + 1e-9, high - 1e-9), (low[:free], high[:free])
     centre, prior = problem.start(), _prior(problem, len(unknowns))
+    moved = sorted({j for o in problem.observations for j in moving(problem, unknowns, o, free)})
 
     def whole(x: Array) -> Array:
-        return np.concatenate([x, begin[free:]])
+        at = begin.copy()
+        at[moved] = x
+        return at
 
     @lru_cache(maxsize=2)  # where the search is, and where it tries to go
     def left_by(x: bytes) -> Left:
         return left_at(problem, unknowns, whole(np.frombuffer(x)), limits)
 
     def residuals_at(x: Array) -> Array:
-        return np.concatenate([left_by(x.tobytes()).whole, prior[:, : centre.size] @ (x[: centre.size] - centre)])
+        away = whole(x)[: centre.size] - centre
+        return np.concatenate([left_by(x.tobytes()).whole, prior[:, : centre.size] @ away])
 
     def slopes_at(x: Array) -> Array:
-        return np.concatenate([left_by(x.tobytes()).slopes, prior[:, :free]])
+        return np.concatenate([left_by(x.tobytes()).slopes[:, moved], prior[:, moved]])
 
     found = least_squares(
         residuals_at,
-        begin[:free],
+        begin[moved],
         jac=slopes_at,
-        bounds=limits,
+        bounds=(low[moved], high[moved]),
         x_scale="jac",
         ftol=PRECISION,
         xtol=PRECISION,

@@ -73,7 +73,7 @@ def left_at(
     residuals, forces, blocks = [], [], []
     alike, known = alike_at_one_voltage(point), dict[int, Directions]()
     for o in problem.observations:
-        columns = [j for j in _moving(problem, unknowns, o, free) if j in beside]
+        columns = [j for j in moving(problem, unknowns, o, free) if j in beside]
         if o.place not in known or o.place < 0 or not alike:
             known[o.place] = directions(point, [beside[j] for j in columns], o)
         force, slopes = sensitivities(known[o.place], o, problem.work)
@@ -86,8 +86,16 @@ def left_at(
     return Left(tuple(residuals), tuple(forces), np.concatenate(blocks))
 
 
-def _moving(problem: Problem, unknowns: Sequence[Unknown], o: RecordLikelihood, free: int) -> list[int]:
-    """Which of the first `free` variables move the force of an observation: a test moves with its own voltage alone."""
+def moving(problem: Problem, unknowns: Sequence[Unknown], o: RecordLikelihood, free: int) -> list[int]:
+    """Which of the first `free` variables move the force of an observation: a test moves with its own voltage alone.
+
+    Parameters
+    ----------
+    problem : what is fitted to what
+    unknowns : of the effects
+    o : the observation
+    free : how many variables the search moves
+    """
     rows = 3 * len(problem.base)
     own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(rows)
     effects = [j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]]
