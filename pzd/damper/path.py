@@ -70,8 +70,8 @@ def advance(state: Array, step: TimeStep, tolerance: float, booked: bool, v: Var
             dt = min(dt, turn - at)
         end, speed, error = piece(e, w, at, dt, regime, side, step)
         allowed = tolerance * (abs(spring_force(e, step.p1)) + size)
-        if error > allowed and dt > 1e-7 * step.h:
-            dt *= max(0.2, _growth(error, allowed))
+        if not error <= allowed and dt > 1e-7 * step.h:  # where what grows has overflowed there is no error to compare
+            dt *= max(0.2, _growth(error, allowed)) if error > allowed else 0.2
             continue
         over, way = beyond(end, row_in(step, at + dt), regime, side)
         following, onto = regime, side

@@ -193,7 +193,9 @@ class Trials:
 
     def _known(self, damper: Damper, kept_back: Sequence[Mask]) -> list[Mask]:
         """What is kept back of the voltages for which some test was left to fit."""
-        fitted = {voltage for voltage, _ in by_voltage(damper.base)}
+        constant = [voltage for voltage in self.voltages if voltage is not None]
+        # By the nearest: a voltage is that of one of its rows, and rows of other temperatures have it not quite.
+        fitted = {min(constant, key=lambda v: abs(v - u), default=None) for u, _ in by_voltage(damper.base)}
         lost = {
             i for v, group in zip(self.voltages, self.groups, strict=True) if v not in {*fitted, None} for i in group
         }
