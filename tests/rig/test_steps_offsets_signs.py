@@ -96,6 +96,15 @@ def test_a_file_with_force_and_displacement_both_turned_over_is_said(tmp_path: P
     assert "both turned over here" in said[3]
 
 
+def test_a_damper_that_hardly_slips_has_no_wrong_sign(tmp_path: Path, rng: np.random.Generator) -> None:
+    """Its line over the displacement has no area but that of the noise, which is as often negative as positive."""
+    for number in range(6):
+        x = sine(0.003, 1.5)
+        stored(tmp_path, f"{number}", x, 2e5 * x + 20.0 * rng.standard_normal(x.size))
+    works = [entry.work_J or 0.0 for entry in run(tmp_path).entries]
+    assert min(works) < 0.0 < max(works)
+
+
 def test_which_channel_is_turned_over_is_told_by_the_gas_force_the_other_files_and_the_header(tmp_path: Path) -> None:
     x = sine(0.01, 1.5)
     force = damper(x, gas=-200.0)

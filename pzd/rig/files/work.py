@@ -11,16 +11,21 @@ from pzd.rig.files.channels import COMPRESSION
 from pzd.rig.files.fixture import Freed
 from pzd.rig.files.layout import Layout
 from pzd.rig.files.splitting import Test
-from pzd.signals.work import work
+from pzd.signals.work import work, work_of_chance
 
 CLEAR_OFFSET = 0.1
 """Mean force, as a share of half the force's range, from which its sign says which way the force is counted."""
 
 
 def works_on_the_rig(freed: Freed) -> bool:
-    """Whether the damper does work on the rig over a test; not where a steady force over a net displacement does it."""
+    """Whether the damper does work on the rig over a test.
+
+    Not where a steady force over a net displacement does it, nor where it is so little that a damper which hardly slips
+    may do it by its noise.
+    """
     x, force = freed.displacement, freed.force
-    return work(x, force) < 0.0 and work(x, force - force.mean()) < 0.0
+    chance = work_of_chance(x, force)
+    return work(x, force) < -chance and work(x, force - force.mean()) < -chance
 
 
 def sign_fault(test: Test, freed: Freed, layout: Layout, others: Sequence[tuple[Test, Freed]]) -> str:

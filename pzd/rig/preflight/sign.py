@@ -6,22 +6,13 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import Measured
-from pzd.signals.reversals import reversals
-from pzd.signals.work import work
-
-LEAST = 0.05
-"""Work that is said, as a share of stroke times range of the force.
-
-A damper that sticks draws a line without area, and what little its noise encloses is fed in as
-often as taken out; over many cycles that adds up with the root of their number.
-"""
+from pzd.signals.work import work, work_of_chance
 
 
 def check(test: Measured) -> list[Finding]:
     """Cycles with negative work, and a record whose steady force outweighs its loops."""
     record = test.record
-    least = LEAST * float(np.ptp(record.displacement) * np.subtract(*np.percentile(record.force, (99, 1))))
-    if work(record.displacement, record.force) < -least * np.sqrt(1.0 + 0.5 * len(reversals(record.displacement))):
+    if work(record.displacement, record.force) < -work_of_chance(record.displacement, record.force):
         return [
             Finding(
                 check="sign",
@@ -37,7 +28,7 @@ def check(test: Measured) -> list[Finding]:
     # Each cycle is closed: left open, a small stroke's noise keeps its ends apart, and the force would do work there.
     cycles = [number == k for k in range(test.run.count)]
     works = np.array([work(record.displacement[rows], record.force[rows], closed=True) for rows in cycles])
-    negative = np.flatnonzero(works < -least)
+    negative = np.flatnonzero(works < -work_of_chance(record.displacement, record.force, cycles=1.0))
     if negative.size == 0:
         return []
     first = test.run.start + float(negative[0]) * test.run.period
