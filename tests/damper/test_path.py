@@ -281,6 +281,22 @@ def test_at_the_tolerance_of_the_diagnosis_the_force_is_right_to_1e_6_of_peak(ef
     assert np.max(np.abs(ours - truth)) <= 1e-6 * np.max(np.abs(truth))
 
 
+def test_a_piece_that_overflows_is_cut() -> None:
+    """On the flank of a yield that is hardly rounded, while T0 falls; taken as it came, no force was left.
+
+    Of a sharp yield it differs by what the oil creeps below T0, in proportion to w_s.
+    """
+    w_s, speed = 1.3247e-5, np.array([-0.0122971, -0.0143870])
+    elements = ((67.26775, 5521.146, 1975385.0), (66.96300, 5520.318, 1975370.0))
+    rounded, sharp = (
+        np.vstack([constant_rows(*element, effects)[0] for element in elements])
+        for effects in ({"rounded_yield": {"w_s": w_s}}, {})
+    )
+    x, step = np.array([0.0, 2e-3 * speed.mean()]), np.array([2e-3])
+    one, other = (march(x, speed, step, rows, -67.51003131, 1e-7) for rows in (rounded, sharp))
+    assert one[1] == pytest.approx(other[1], rel=1e-3)
+
+
 @pytest.mark.parametrize("effects", FLOWS[:3], ids="+".join)
 def test_the_error_falls_with_the_tolerance(effects: dict) -> None:
     damper, motion = with_effects(effects), sine(40.0)

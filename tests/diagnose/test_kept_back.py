@@ -96,6 +96,21 @@ def test_a_voltage_without_tests_stays_where_it_is_and_stops_no_other(rng: np.ra
     assert found.misfit < exact.misfit + 0.1
 
 
+def test_a_voltage_is_known_by_its_rows_at_any_temperature(rng: np.random.Generator) -> None:
+    """They have it not quite: 150 V at one, 150.002 V at the other, and either row may be without a test."""
+    plain = damper_of(TWO)
+    asked = trials(sines(plain, rng, TWO, tests=TESTS, cycles=3), plain)
+    warm = tuple(row.model_copy(update={"voltage_V": (row.voltage_V or 0.0) + 2e-3}) for row in plain.base)
+    known = asked._known(plain.model_copy(update={"base": warm}), asked.folds[0])
+    assert [mask.any() for mask in known] == [mask.any() for mask in asked.folds[0]]
+    cold = plain.model_copy(update={"base": plain.base[:1]})
+    lost = [p.record.voltage is not None and p.record.voltage[0] > 75.0 for p in asked.campaign.prepared]
+    known = asked._known(cold, asked.folds[0])
+    assert [mask.any() for mask in known] == [
+        m.any() and not gone for m, gone in zip(asked.folds[0], lost, strict=True)
+    ]
+
+
 @pytest.mark.parametrize("tests", [OTHER_TESTS[:1], OTHER_TESTS])
 def test_a_test_alone_at_its_voltage_keeps_back_its_cycles(
     rng: np.random.Generator, tests: tuple[tuple[float, float], ...]
