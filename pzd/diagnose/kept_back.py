@@ -24,7 +24,7 @@ from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.prediction import counted, predicted_force
 from pzd.diagnose.fit.weights import record_likelihood, unweighted
 from pzd.diagnose.folds import deal
-from pzd.diagnose.missed import Missed, better, much_worse, worse
+from pzd.diagnose.missed import NOTHING_MISSED, Missed, better, joined, much_worse, worse
 from pzd.diagnose.search.evidence import evidence_of
 from pzd.record import Mask
 from pzd.signals.nuisance import NuisanceConfig, columns_of
@@ -32,7 +32,6 @@ from pzd.signals.nuisance import NuisanceConfig, columns_of
 EVALUATIONS = 6
 """Of a refit without one fold: it begins at the optimum of all tests, and a fifth of them moves that little."""
 HoldOut = Literal["tests", "cycles", "segments", "mixed"]
-_NOTHING = Missed((), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
 _Refit = Callable[[Sequence[Mask]], "Damper | None"]
 """The damper fitted to all but what is kept back; None where nothing is left."""
 
@@ -85,7 +84,7 @@ class Trials:
         by_criterion : whether it is fitted by criterion (4), else by the likelihood
         """
         refit = self._by_criterion(damper) if by_criterion else self._by_likelihood(damper)
-        return self._joined([self._without_voltage(i, refit) for i in self.between()])
+        return joined([self._without_voltage(i, refit) for i in self.between()])
 
     def fitted_by_criterion(self, damper: Damper, kept_back: Sequence[Mask]) -> tuple[Problem, Fitted] | None:
         """A damper, its effects too, fitted by criterion (4) to all but what is kept back, and to what it is fitted.
@@ -170,26 +169,14 @@ class Trials:
         sizes = [p.record.time.size for p in self.campaign.prepared]
         found = fitted(tuple(np.full(n, i in mine or i in moving) for i, n in enumerate(sizes)))
         asked = tuple(np.full(n, i in mine) for i, n in enumerate(sizes))
-        return _NOTHING if found is None else self._of_fold(found, asked)
+        return NOTHING_MISSED if found is None else self._of_fold(found, asked)
 
     def _missed(self, fitted: _Refit) -> Missed:
         def of_fold(kept_back: Sequence[Mask]) -> Missed:
             found = fitted(kept_back)
-            return _NOTHING if found is None else self._of_fold(found, self._known(found, kept_back))
+            return NOTHING_MISSED if found is None else self._of_fold(found, self._known(found, kept_back))
 
-        return self._joined(self.campaign.each(of_fold, self.folds))
-
-    @staticmethod
-    def _joined(parts: Sequence[Missed]) -> Missed:
-        if not parts:
-            return _NOTHING
-        return Missed(
-            tuple(i for part in parts for i in part.record),
-            *(
-                np.concatenate([getattr(part, name) for part in parts])
-                for name in ("error", "energy", "spread", "limit")
-            ),
-        )
+        return joined(self.campaign.each(of_fold, self.folds))
 
     def _known(self, damper: Damper, kept_back: Sequence[Mask]) -> list[Mask]:
         """What is kept back of the voltages for which some test was left to fit."""

@@ -54,6 +54,18 @@ class Missed:
         return Missed(records, self.error[kept], self.energy[kept], self.spread[kept], self.limit[kept])
 
 
+NOTHING_MISSED = Missed((), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
+"""Where no test was kept back."""
+
+
+def joined(parts: Sequence[Missed]) -> Missed:
+    """What is missed of several folds, one behind the other."""
+    if not parts:
+        return NOTHING_MISSED
+    sums = (np.concatenate([getattr(p, name) for p in parts]) for name in ("error", "energy", "spread", "limit"))
+    return Missed(tuple(i for part in parts for i in part.record), *sums)
+
+
 def worse(one: Missed, other: Missed) -> bool:
     """Whether one damper predicts worse than another: visibly, and beyond chance however few the tests.
 
