@@ -34,6 +34,10 @@ FINER = 16
 """Points per sample on which the cleaned cycle is laid."""
 DRAWN = 4
 """Points per sample on which a drawn cycle is laid: what it differs by is noise."""
+LINE = 16
+"""The first and last of so many parts of a record say what the temperature is at its ends.
+
+Reason: of a test of seconds half a second, in which no oil warms unevenly, and hundreds of samples of noise."""
 COVERS = 0.5
 """The repeating run must hold this share of the way that the piston travels, else the record counts as not
 repeating; rest before and after does not count."""
@@ -133,7 +137,15 @@ def _even_temperature(record: Record) -> Record:
     """The record with the temperature of the oil in place of what a noisy sensor of some resolution makes of it."""
     if record.temperature is None or np.ptp(record.temperature) == 0.0:
         return record
-    return replace(record, temperature=low_pass(record.temperature, HIGHEST))
+    values = record.temperature.copy()  # the smoothing goes through the ends, and would keep the noise of these two
+    values[0], values[-1] = _end(values), _end(values[::-1])
+    return replace(record, temperature=low_pass(values, HIGHEST))
+
+
+def _end(values: Array) -> float:
+    """Where a straight line through the first samples of a channel begins."""
+    first = values[: max(values.size // LINE, 2)]
+    return float(np.polynomial.Polynomial.fit(np.arange(first.size), first, 1)(0.0))
 
 
 def _moved(record: Record, motion: Motion) -> Record:

@@ -23,9 +23,13 @@ PREDICTION_TOLERANCE = 1e-7
 Reason: far below `weights.RESOLUTION`; see `likelihood.SIMULATION_TOLERANCE`."""
 
 WARMS = 0.5
-"""A temperature that moves by less [K] counts as standing still.
+"""A test over which the temperature moves by less [K] counts as its average cycle, at one temperature.
 
 Reason: about the resolution of a thermocouple; not tuned."""
+HELD = 0.05
+"""A temperature that moves by less [K] over a test stands still there.
+
+Reason: of 5 % a kelvin, which is much for an oil, the force changes by 0.25 % of itself, which counts as nothing."""
 STEP = 0.1
 """A voltage that moves by more from one sample to the next [share of its range in the record] has stepped."""
 BESIDE_STEP = 0.001
@@ -59,15 +63,15 @@ def motion_of(record: Record) -> tuple[Motion, int]:
     half_cycle = min(np.diff(reversals(record.displacement)), default=record.displacement.size)
     stride = max(int(np.ceil(FEWEST_IN_HALF_CYCLE / max(half_cycle, 1))), 1)
     motion = Motion.of(record) if stride == 1 else _refined(record, stride)
-    if motion.temperature is not None and not warms(motion.temperature):
+    if motion.temperature is not None and not warms(motion.temperature, HELD):
         held = np.full(motion.temperature.size, np.median(motion.temperature))
         motion = replace(motion, temperature=held)
     return motion, stride
 
 
-def warms(temperature: Array | None) -> bool:
-    """Whether a temperature (n,) moves from beginning to end; False where none was recorded."""
-    return temperature is not None and float(np.ptp(ends(temperature))) > WARMS
+def warms(temperature: Array | None, by: float = WARMS) -> bool:
+    """Whether a temperature (n,) moves by so much [K] from beginning to end; False where none was recorded."""
+    return temperature is not None and float(np.ptp(ends(temperature))) > by
 
 
 def ends(temperature: Array) -> tuple[float, float]:
