@@ -14,6 +14,9 @@ from pzd.damper.kernels import T0, C, Row, bleed_factor, direction_factor
 
 _NEWTON_STEPS = 60
 _NEWTON_TOLERANCE = 1e-13
+_NO_FRICTION = 1e-6
+"""Breakaway force [N] that counts as none: in the rounding of a force, its two edges would be one to a path that looks
+for where it sticks; a search that ends at T0 = 0 comes as near as 1e-12."""
 
 
 _friction, _friction_slope, _friction_is_sharp = kernels.yield_force, kernels.yield_slope, kernels.yield_sharp
@@ -37,7 +40,8 @@ def damping(p: Row, side: float) -> float:
 @compiled
 def breakaway(p: Row, side: float) -> float:
     """Force [N] below which nothing flows in the direction `side` (+1 rebound, -1 compression)."""
-    return _friction(0.0, p[T0] * direction_factor(side, p), p)
+    force = _friction(0.0, p[T0] * direction_factor(side, p), p)
+    return force if force > _NO_FRICTION else 0.0
 
 
 @compiled

@@ -281,6 +281,18 @@ def test_at_the_tolerance_of_the_diagnosis_the_force_is_right_to_1e_6_of_peak(ef
     assert np.max(np.abs(ours - truth)) <= 1e-6 * np.max(np.abs(truth))
 
 
+@pytest.mark.parametrize("friction", [0.0, *(10.0 ** np.arange(-14.0, 1.0, 0.25))])
+def test_the_friction_may_vanish(friction: float) -> None:
+    """An orifice too small to be seen sends the element through the march, which has to find where 1e-12 N sticks."""
+    motion = sine(0.0, frequency=5.0, amplitude=0.015)
+    row = BaseRow(voltage_V=None, T0_N=friction, C_Ns_per_m=4550.0, k_N_per_m=184041.0)
+    alone, marched = (
+        respond(Damper(base=(row,), effects=effects), motion, 100.0, SIMULATION_TOLERANCE)
+        for effects in ({}, {"orifice_quadratic": {"q": 1e-6}})
+    )
+    np.testing.assert_allclose(marched, alone, atol=2e-6)
+
+
 def test_a_piece_that_overflows_is_cut() -> None:
     """On the flank of a yield that is hardly rounded, while T0 falls; taken as it came, no force was left.
 
