@@ -111,7 +111,7 @@ def _without_replaced(found: _Predicting, trials: Trials, forced: Sequence[str])
     """The same without effects that the data do not know beside the others, and that prediction does not need."""
     while True:
         fewer = []
-        for name in _unknown(found.fitted):
+        for name in _undetermined(found.fitted):
             if name in forced:
                 continue
             damper = found.fitted.damper.without_effects(name)
@@ -125,7 +125,7 @@ def _without_replaced(found: _Predicting, trials: Trials, forced: Sequence[str])
         found = _Predicting(problem, fitted, missed, between)
 
 
-def _unknown(fitted: Fitted) -> list[str]:
+def _undetermined(fitted: Fitted) -> list[str]:
     """The effects that may as well be off, or have values that nature does not have.
 
     May be off: the 95 % interval of the strength, the first parameter, holds its neutral value.

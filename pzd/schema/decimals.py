@@ -35,8 +35,7 @@ def lines(columns: Sequence[NDArray[np.float64] | None], rows: int) -> bytes:
     text = np.frombuffer(_NUMBERS.dump_json(cells.ravel().tolist()), dtype=np.uint8)[1:].copy()
     ends = np.flatnonzero(text == ord(","))[len(columns) - 1 :: len(columns)]
     text[ends] = text[-1] = ord("\n")
-    whole = text.tobytes()
-    return whole if all(column is not None for column in columns) else whole.translate(None, _EMPTY)
+    return text.tobytes().translate(None, _EMPTY)
 
 
 def numbers(body: str, columns: Sequence[int], width: int) -> NDArray[np.float64]:

@@ -74,3 +74,7 @@ def test_an_empty_column_leaves_its_cells_empty_wherever_it_stands(empty: set[in
     written = lines(columns, 2).decode().split("\n")[:-1]
     expected = [["" if place in empty else repr(cells[place][row]) for place in range(3)] for row in range(2)]
     assert [[cell and repr(float(cell)) for cell in line.split(",")] for line in written] == expected
+
+
+def test_a_number_that_is_none_leaves_its_cell_empty() -> None:
+    assert lines([np.array([1.5, np.nan]), np.array([np.nan, 2.0])], 2) == b"1.5,\n,2.0\n"

@@ -52,6 +52,7 @@ _CONTROLS_WITH_UNIT = {
     Control(): "^u$|ctrl|control|valve|piezo|coil",
     Control("current", "A"): "^i$|ctrl|control|valve|coil",
 }
+"""The same of the control signal: `U_V`, `ctrl [V]`, `Coil/A`."""
 _LAST_WORD = re.compile(r"[ _/,]\s*([A-Za-zµ°%][A-Za-zµ°/²^0-9]*)$")
 _CELSIUS = {"C", "°C", "deg C", "grad C", "Grad C"}
 """What headers call degrees Celsius, and pint does not or takes for coulombs."""
