@@ -31,9 +31,10 @@ _IN_ROW = {column: K + 1 + i for i, column in enumerate(STROKE_AND_FLOW)}
 _IN_PARALLEL = {column: i for i, column in enumerate(PARALLEL)}
 
 _EVEN = 1e-6  # of the median sampling interval
+_NUDGE = 1e-6  # of the largest force, for the derivative by the initial one
 
 
-def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, tolerance: float = TOLERANCE) -> Array:
+def respond(damper: Damper, motion: Motion, first_force: float | None = None, tolerance: float = TOLERANCE) -> Array:
     """Force that the force channel records while the damper goes through a motion.
 
     Parameters
@@ -41,7 +42,8 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
     damper : the damper with its effects
     motion : (n,) sampled motion, its displacement as recorded; the extension is a parabola inside each step,
         voltage and temperature go linearly
-    initial_force : force of the oil spring at the first sample [N]
+    first_force : force of the whole damper at the first sample [N], of which the oil spring carries what the forces
+        beside it do not; None for an oil spring that is relaxed there
     tolerance : admissible error of a piece, as a share of the force
 
     Returns
@@ -57,8 +59,9 @@ def respond(damper: Damper, motion: Motion, initial_force: float = 0.0, toleranc
     effective = voltage_at_valve(damper, constant_value(motion.voltage), steps)
     rows = element_rows(damper, effective, constant_value(motion.temperature))
     parallel = parallel_rows(damper, effective)
-    force = with_parallel(integrated_force(rows, motion, steps, initial_force, tolerance), parallel, motion)
-    return recorded(sensors_of(damper), motion.time, force)
+    beside = np.zeros(1) if parallel is None else forces_beside(motion, parallel)
+    initial = 0.0 if first_force is None else first_force - float(beside[0])
+    return recorded(sensors_of(damper), motion.time, integrated_force(rows, motion, steps, initial, tolerance) + beside)
 
 
 def integrated_force(rows: Array, motion: Motion, steps: Array, initial_force: float, tolerance: float) -> Array:
@@ -88,9 +91,10 @@ def integrated_sensitivities(
     motion: Motion,
     steps: Array,
     initial_force: float,
+    initial_slopes: Array,
     tolerance: float,
 ) -> tuple[Array, Array]:
-    """The same force, and its derivatives by v variables that move c columns of the rows; the initial force is held.
+    """The same force, and its derivatives by v variables that move c columns of the rows and the initial force.
 
     Parameters
     ----------
@@ -98,6 +102,7 @@ def integrated_sensitivities(
     columns : (c,) places in the row
     along : (n, v, c) or (1, v, c) derivatives of these columns by each variable
     motion, steps, initial_force, tolerance : as `integrated_force`
+    initial_slopes : (v,) derivatives of the initial force by each variable [N]
 
     Returns
     -------
@@ -107,24 +112,23 @@ def integrated_sensitivities(
     if len(rows) == len(along) == 1 and plain(row_of(rows[0])) and np.all(columns <= K):
         friction, damping, stiffness = rows[0, [T0, C, K]]
         force, slopes = element_force_sensitivities(x, steps, friction, damping, stiffness, initial_force, v)
-        return force, slopes[:, columns] @ along[0].T
-    return march_sensitivities(x, v, steps, rows, initial_force, tolerance, columns, along)
-
-
-def with_parallel(force: Array, parallel: Array | None, motion: Motion) -> Array:
-    """(n,) force [N] of the element together with what stands beside it.
-
-    Parameters
-    ----------
-    force : (n,) of the element [N]
-    parallel : (n, m) or (1, m) rows of the forces beside it; None without any
-    motion : (n,) sampled motion
-    """
-    return force if parallel is None else force + forces_beside(motion, parallel)
+        found = slopes[:, columns] @ along[0].T
+        if np.any(initial_slopes != 0.0):
+            nudge = _NUDGE * max(float(np.max(np.abs(force))), np.finfo(float).tiny)
+            begun = element_force(x, steps, friction, damping, stiffness, initial_force + nudge, v)
+            found += np.outer((begun - force) / nudge, initial_slopes)
+        return force, found
+    return march_sensitivities(x, v, steps, rows, initial_force, initial_slopes, tolerance, columns, along)
 
 
 def forces_beside(motion: Motion, parallel: Array) -> Array:
-    """(n,) force [N] of what stands beside the element, with memory and without; see `with_parallel`."""
+    """(n,) force [N] of what stands beside the element, with memory and without.
+
+    Parameters
+    ----------
+    motion : (n,) sampled motion
+    parallel : (n, m) or (1, m) rows of these forces
+    """
     force = parallel_forces(motion.displacement, motion.velocity, motion.acceleration, parallel)
     return force + branch_forces(motion, parallel) if any_slips(parallel) else force
 
@@ -132,7 +136,7 @@ def forces_beside(motion: Motion, parallel: Array) -> Array:
 def constant_rows(
     friction: float, damping: float, stiffness: float, effects: Mapping[str, Mapping[str, float]]
 ) -> tuple[Array, Array | None]:
-    """The (1, r) and (1, m) rows for `integrated_force` and `with_parallel` at constant voltage and temperature."""
+    """The (1, r) and (1, m) rows for `integrated_force` and `forces_beside` at constant voltage and temperature."""
     row, parallel = _NEUTRAL_ROW.copy(), _NEUTRAL_PARALLEL.copy()
     row[0, [T0, C, K]] = friction, damping, stiffness
     beside = False

@@ -16,6 +16,8 @@ from pzd.damper.pieces import TimeStep
 from pzd.damper.regimes import deflection_at, regime_of, speed_at, spring_force
 from pzd.record import Array
 
+_HELD = np.zeros(0)
+
 
 def march(
     displacement: Array, velocity: Array, steps: Array, rows: Array, initial_force: float, tolerance: float
@@ -37,7 +39,8 @@ def march(
     """
     force = np.empty(displacement.size)
     none = np.empty((force.size, 0))
-    _march(displacement, velocity, steps, rows, initial_force, tolerance, np.zeros(STATES), force, not_varied(), none)
+    state, still = np.zeros(STATES), not_varied()
+    _march(displacement, velocity, steps, rows, initial_force, _HELD, tolerance, state, force, still, none)
     return force
 
 
@@ -47,15 +50,17 @@ def march_sensitivities(
     steps: Array,
     rows: Array,
     initial_force: float,
+    initial_slopes: Array,
     tolerance: float,
     columns: NDArray[np.int64],
     along: Array,
 ) -> tuple[Array, Array]:
-    """The same force, and its derivatives by v variables that move c columns of the rows, the initial force held.
+    """The same force, and its derivatives by v variables that move c columns of the rows and the initial force.
 
     Parameters
     ----------
     displacement, velocity, steps, rows, initial_force, tolerance : as `march`
+    initial_slopes : (v,) derivatives of the initial force by each variable [N]
     columns : (c,) places in the row
     along : (n, v, c) or (1, v, c) derivatives of these columns by each variable
 
@@ -65,7 +70,8 @@ def march_sensitivities(
     """
     force, slopes = np.empty(displacement.size), np.empty((displacement.size, along.shape[1]))
     v = varied(rows, columns, along)
-    _march(displacement, velocity, steps, rows, initial_force, tolerance, np.zeros(STATES), force, v, slopes)
+    state = np.zeros(STATES)
+    _march(displacement, velocity, steps, rows, initial_force, initial_slopes, tolerance, state, force, v, slopes)
     return force, slopes
 
 
@@ -89,6 +95,7 @@ def _march(
     steps: Array,
     rows: Array,
     initial_force: float,
+    initial_slopes: Array,
     tolerance: float,
     state: Array,
     force: Array,
@@ -100,7 +107,7 @@ def _march(
     p1 = p0
     state[DEFLECTION] = deflection_at(initial_force, p0)
     force[0] = spring_force(state[DEFLECTION], p0)
-    begin(v, state[DEFLECTION], p0)
+    begin(v, state[DEFLECTION], p0, initial_slopes)
     if v.carried.size > 0:
         fill_slopes(v, state[DEFLECTION], p0, 0, slopes[0])
     moving = False

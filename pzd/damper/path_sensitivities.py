@@ -100,12 +100,13 @@ def _by_variable(v: Varied, variable: int, sample: int, share: float) -> float:
 
 
 @compiled
-def begin(v: Varied, e: float, p: Row) -> None:
-    """Begin at an elastic deflection [m] whose force is given, whatever the parameters are."""
+def begin(v: Varied, e: float, p: Row, initial_slopes: Array) -> None:
+    """Begin at an elastic deflection [m] whose force goes with each variable by (v,) initial slopes [N]."""
     if v.carried.size > 0:
         by_deflection = _of_force(v, e, p)
         for j in range(v.carried.size):
-            v.carried[j] = -_by_variable(v, j, 0, 0.0) / by_deflection if by_deflection > 0.0 else 0.0
+            rest = initial_slopes[j] - _by_variable(v, j, 0, 0.0)
+            v.carried[j] = rest / by_deflection if by_deflection > 0.0 else 0.0
 
 
 @compiled

@@ -75,7 +75,7 @@ def pure_error(folded: Array) -> PureError:
     shape = noise.density(np.arange(last + 1) / points) / points
     shape = np.where(shape > 0.0, shape, 1.0)
     own = np.mean(np.abs(steps) ** 2, axis=0) / 2.0 / shape
-    low, high = _window(last)
+    low, high = neighbours(last)
     total = np.concatenate([[0.0], np.cumsum(own)])
     local = (total[high + 1] - total[low]) / (high + 1 - low)
     freedom = _with_shape(
@@ -92,8 +92,8 @@ def pure_error(folded: Array) -> PureError:
     )
 
 
-def _window(last: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First and last harmonic, from 1 on, whose scatter describes the noise at each harmonic.
+def neighbours(last: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and last harmonic, from 1 on, whose scatter describes the noise at each harmonic from 0 to the last.
 
     Those within a third of its number, and at least `LOCAL` of them where there are so many.
     """

@@ -100,11 +100,13 @@ def test_heat_is_the_work_that_has_not_gone_off_yet(rng: np.random.Generator) ->
     assert np.all(np.diff(temperature) > -1e-4)
 
 
-def forces_of(motion: Driven, factor: float = 1.0) -> Array:
+def forces_of(motion: Driven, factor: float = 1.0, **laws: float) -> Array:
     from pzd.blind.independent.kernel import Parameters, integrated
 
     base = tuple(factor * np.full_like(motion.time, row[0]) for row in (BASE.T0, BASE.C, BASE.k))
-    return integrated(motion.time, (motion.displacement, motion.velocity, motion.acceleration), base, Parameters())
+    return integrated(
+        motion.time, (motion.displacement, motion.velocity, motion.acceleration), base, Parameters(**laws)
+    )
 
 
 def test_a_damper_with_other_parameters_leaves_no_gap(rng: np.random.Generator) -> None:
@@ -113,3 +115,20 @@ def test_a_damper_with_other_parameters_leaves_no_gap(rng: np.random.Generator) 
     assert gap_after_refit([motion], [force], BASE) < 1e-4
     ripple = force + 0.02 * np.max(force) * np.sin(600.0 * motion.time[::2])
     assert gap_after_refit([motion], [ripple], BASE) == pytest.approx(0.02 / np.sqrt(2.0), rel=0.1)
+
+
+def test_what_parameters_of_every_temperature_follow_is_no_gap(rng: np.random.Generator) -> None:
+    """As identify gives T0, C and k by voltage and temperature, a drift between tests is no missing effect."""
+    motion = one(LaboratoryTest("sine", 0.02, 2.0, 3), EXACT, rng)
+    motions, forces = [motion, motion], [forces_of(motion), forces_of(motion, 0.8)]
+    assert gap_after_refit(motions, forces, BASE) > 0.03
+    assert gap_after_refit(motions, forces, BASE, temperatures=[21.0, 22.5]) > 0.03
+    assert gap_after_refit(motions, forces, BASE, temperatures=[21.0, 25.0]) < 1e-4
+
+
+def test_a_relief_valve_that_is_always_open_is_no_gap(rng: np.random.Generator) -> None:
+    """From T0 on the oil flows through it alone: a Bingham element with C_r, a twentieth of C."""
+    motion = one(LaboratoryTest("sine", 0.02, 2.0, 3), EXACT, rng)
+    force = forces_of(motion, F_r=float(BASE.T0[0]), C_r=0.05 * float(BASE.C[0]))
+    assert np.max(np.abs(force - forces_of(motion))) > 0.2 * np.max(force)
+    assert gap_after_refit([motion], [force], BASE) < 1e-4

@@ -124,7 +124,7 @@ def test_time_need_not_be_even(rng: np.random.Generator) -> None:
 
     def force(time: np.ndarray) -> np.ndarray:
         x = 0.02 * np.sin(omega * time)
-        return respond(single, Motion(time, x, 0.02 * omega * np.cos(omega * time), -(omega**2) * x), 0.0)
+        return respond(single, Motion(time, x, 0.02 * omega * np.cos(omega * time), -(omega**2) * x))
 
     even = np.arange(uneven[0], 1, 1e-4)
     late = uneven > 0.5

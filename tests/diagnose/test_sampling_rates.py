@@ -50,7 +50,7 @@ def recorded(damper: Damper, tests: list[list[tuple[float, float, float]]], rng:
             v = np.sum([a * u * np.cos(u * t + p) for u, (a, _, p) in zip(w, tones, strict=True)], axis=0)
             a = -np.sum([a * u**2 * np.sin(u * t + p) for u, (a, _, p) in zip(w, tones, strict=True)], axis=0)
             U = np.full(t.size, row.voltage_V)
-            force = respond(damper, Motion(t, x, v, a, U), 0.0, 1e-9)
+            force = respond(damper, Motion(t, x, v, a, U), tolerance=1e-9)
             channels = np.stack([t, x, force, U])[:, t >= 0.0]
             channels[1] += SENSOR * np.sqrt(RATE / 2.0) * rng.standard_normal(channels.shape[1])
             channels[2] += NOISE * np.sqrt(RATE / 2.0) * rng.standard_normal(channels.shape[1])

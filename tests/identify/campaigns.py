@@ -184,7 +184,7 @@ def _record(
     sensors: NuisanceConfig,
 ) -> Record:
     """What the sensors show of one test."""
-    fine = respond(damper, motion, 0.0)
+    fine = respond(damper, motion)
     time = np.arange(round(test.seconds * RATE)) / RATE
     peak = float(np.max(np.abs(fine)))
     at = partial(np.interp, time, motion.time)

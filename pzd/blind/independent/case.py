@@ -121,7 +121,7 @@ def drawn_case(seed: int, index: int, campaign_name: str, hidden: Sequence[str])
         _logged(m, f, t, chain, peak, len(run.values) > 1, damper, draw)
         for m, f, t in zip(fine, forces, temperatures, strict=True)
     )
-    seen = _coarse_forces(damper, coarse, start, rise, drifts)
+    seen, warm = _coarse(damper, coarse, start, rise, drifts)
     return IndependentCase(
         campaign=run,
         base=base,
@@ -129,10 +129,10 @@ def drawn_case(seed: int, index: int, campaign_name: str, hidden: Sequence[str])
         tests=logged,
         chain=chain,
         reference_temperature=start if drifts else None,
-        visible_gap=gap_after_refit(coarse, seen, base),
+        visible_gap=gap_after_refit(coarse, seen, base, temperatures=warm),
         gap_given_other={
             name: gap_after_refit(
-                coarse, seen, base, parameters_of({n: v for n, v in damper.laws.items() if n != name})
+                coarse, seen, base, parameters_of({n: v for n, v in damper.laws.items() if n != name}), warm
             )
             for name in (hidden if len(hidden) > 1 else ())
         },
@@ -192,12 +192,16 @@ def _capacity(motions: Sequence[Driven], forces: Sequence[Array], rise: float) -
     return work / rise
 
 
-def _coarse_forces(damper: Hidden, coarse: Sequence[Driven], start: float, rise: float, drifts: bool) -> list[Array]:
+def _coarse(
+    damper: Hidden, coarse: Sequence[Driven], start: float, rise: float, drifts: bool
+) -> tuple[list[Array], list[float] | None]:
+    """The force in every test [N], and its median temperature [degC] where that matters."""
     forces = [damper.force(m, None) for m in coarse]
     if not drifts:
-        return forces
+        return forces, None
     temperatures = warmed(coarse, forces, start, _capacity(coarse, forces, max(rise, 4.0)))
-    return [damper.force(m, t) for m, t in zip(coarse, temperatures, strict=True)]
+    warm = [float(np.median(t[m.time >= 0.0])) for m, t in zip(coarse, temperatures, strict=True)]
+    return [damper.force(m, t) for m, t in zip(coarse, temperatures, strict=True)], warm
 
 
 def _sized(
@@ -219,9 +223,8 @@ def _sized(
         for _ in range(TRIALS):
             values = law.drawn(default_rng(chance), scale, strength)
             damper = Hidden(plain.base, {name: values}, start)
-            gap = gap_after_refit(
-                some, _coarse_forces(damper, some, start, rise, name == "temperature_drift"), plain.base
-            )
+            seen, warm = _coarse(damper, some, start, rise, name == "temperature_drift")
+            gap = gap_after_refit(some, seen, plain.base, temperatures=warm)
             if 0.7 * wanted <= gap <= 1.4 * wanted:
                 break
             strength = min(2.0, strength * min(4.0, max(0.2, wanted / max(gap, 1e-9))))

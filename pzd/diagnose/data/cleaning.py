@@ -2,7 +2,8 @@
 
 Noise of the displacement goes through a stiff oil spring into the force, and a second derivative
 makes it look like inertia. Where the motion repeats, cycles are averaged and only harmonics well
-above their own scatter are kept; where it does not, the spectrum is cut where it sinks into noise.
+above their own scatter are kept, over the whole cycle or in short parts of it, such as the corners
+of a triangle; where it does not, the spectrum is cut where it sinks into noise.
 
 Noise and steps of a temperature would go through a drift of the oil into the force, which follows the oil and not its
 sensor. Noise of a voltage that stands still would look like steps of the voltage.
@@ -18,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array, Record, is_constant, sliced, voltage_scale
-from pzd.signals.between_cycles import pure_error
+from pzd.signals.between_cycles import neighbours, pure_error
 from pzd.signals.cycles import Cycles, cycles, drift, settled
+from pzd.signals.short_time import Clear
 from pzd.signals.smoothing import HIGHEST, low_pass, motion_below
 from pzd.signals.stretches import separate_tests
 
@@ -27,7 +29,7 @@ Motion = tuple[Array, Array, Array]
 """Displacement, velocity and acceleration, each (n,)."""
 
 CLEAR = 4.0
-"""A harmonic of the displacement is kept from this many standard errors on."""
+"""A harmonic of the displacement is kept from this many standard errors on, over a cycle or in parts of it."""
 DRAWS = 6
 """Displacements sent through the damper to see what their noise makes of the force."""
 FINER = 16
@@ -191,25 +193,60 @@ class Average:
         hidden = finest**2 / 12.0 if error.sample_variance < (0.5 * finest) ** 2 else 0.0
         return cls(run, error.points, error.mean, error.of_mean + hidden / error.points)
 
-    @property
+    @cached_property
     def clear(self) -> NDArray[np.bool_]:
         """(H + 1,) whether a harmonic stands clear of its own uncertainty."""
         clear: NDArray[np.bool_] = np.abs(self.harmonics) > CLEAR * np.sqrt(self.variance)
         clear[0] = True
         return clear
 
-    @property
+    @cached_property
+    def _in_parts(self) -> tuple[Clear, Array]:
+        left = self._cycle(np.where(self.clear, 0.0, self.harmonics))
+        return Clear.of(left, self.variance, CLEAR)
+
+    @cached_property
     def clear_harmonics(self) -> NDArray[np.complex128]:
-        """(H + 1,) the coefficients that stand clear, the others zero [m]."""
-        return np.where(self.clear, self.harmonics, 0.0)
+        """(H + 1,) the coefficients of what stands clear, over the whole cycle or in parts of it [m]."""
+        return np.where(self.clear, self.harmonics, self._spectrum(self._in_parts[1]))
+
+    def _noise(self, draw: np.random.Generator) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """(H + 1,) noise as likely as any, and what is kept of it."""
+        size = self.harmonics.size
+        unit = draw.standard_normal(size) + 1j * draw.standard_normal(size)
+        noise: NDArray[np.complex128] = np.sqrt(0.5 * self.variance) * unit
+        in_parts = self._spectrum(self._in_parts[0].kept(self._cycle(noise * ~self.clear)))
+        return noise, np.where(self.clear, noise, in_parts)
+
+    @cached_property
+    def left_out(self) -> Array:
+        """(H + 1,) power of the motion itself in what is not kept: what neighbouring harmonics have above noise."""
+        drawn = [self._noise(draw) for draw in np.random.default_rng(DRAWS).spawn(DRAWS)]
+        noise = np.mean([np.abs(whole - kept) ** 2 for whole, kept in drawn], axis=0)
+        above = np.where(self.clear, 0.0, np.abs(self.harmonics - self.clear_harmonics) ** 2 - noise)
+        low, high = neighbours(above.size - 1)
+        sums, counts = (np.concatenate([[0.0], np.cumsum(each)]) for each in (above, ~self.clear))
+        mean = (sums[high + 1] - sums[low]) / np.maximum(counts[high + 1] - counts[low], 1.0)
+        power: Array = np.where(self.clear, 0.0, np.maximum(mean, 0.0))
+        return power
 
     def error(self, draw: np.random.Generator) -> NDArray[np.complex128]:
-        """(H + 1,) one error of `clear_harmonics` as likely as any: noise in those kept, what is left out of others."""
-        left_out = np.maximum(np.abs(self.harmonics) ** 2 - 2.0 * self.variance, 0.0)
-        size = np.sqrt(0.5 * np.where(self.clear, self.variance, left_out))
-        found: NDArray[np.complex128] = size * (draw.standard_normal(size.size) + 1j * draw.standard_normal(size.size))
+        """(H + 1,) one error of `clear_harmonics` as likely as any: noise in what is kept, and what is left out."""
+        _, found = self._noise(draw)
+        size = found.size
+        found += np.sqrt(0.5 * self.left_out) * (draw.standard_normal(size) + 1j * draw.standard_normal(size))
         found[0] = 0.0
         return found
+
+    def _cycle(self, harmonics: NDArray[np.complex128]) -> Array:
+        """(points,) the cycle of some harmonics (H + 1,)."""
+        cycle: Array = np.fft.irfft(harmonics, self.points) * self.points
+        return cycle
+
+    def _spectrum(self, cycle: Array) -> NDArray[np.complex128]:
+        """(H + 1,) the harmonics of a cycle (points,)."""
+        spectrum: NDArray[np.complex128] = np.fft.rfft(cycle)[: self.harmonics.size] / self.points
+        return spectrum
 
     def motion(self, harmonics: NDArray[np.complex128], finer: int = FINER) -> Callable[[Array], Motion]:
         """Displacement, velocity and acceleration of some harmonics (H + 1,) at any time."""

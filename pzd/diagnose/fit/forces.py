@@ -66,9 +66,9 @@ class LaidOut:
         """(1, c) or (m, c) of what is given at the nodes, or as it stands, along the motion."""
         return self._in_time(change) if self.nodes is not None and len(change) == self.nodes.size else change
 
-    def force_beside(self, o: RecordLikelihood) -> Array | float:
-        """(m,) force of what stands beside the element [N]; 0 without any."""
-        return 0.0 if self.beside is None else forces_beside(o.motion.about(self.zero), self.beside)
+    def force_beside(self, o: RecordLikelihood) -> Array:
+        """(m,) force of what stands beside the element [N]; (1,) a zero without any."""
+        return np.zeros(1) if self.beside is None else forces_beside(o.motion.about(self.zero), self.beside)
 
 
 def laid_out(point: Point, o: RecordLikelihood) -> LaidOut:
@@ -151,13 +151,22 @@ def sensitivities(given: Directions, o: RecordLikelihood, work: Work) -> tuple[A
     (n,) force [N], (n, d) slopes [N]
     """
     work.add(o.motion.time.size * (1 + len(given.pairs)))
+    beside = given.here.force_beside(o)
+    changes = [_change_beside(pair, o) for pair in given.pairs]
+    initial_slopes = np.array([-change[0] for change in changes])
     force, slopes = integrated_sensitivities(
-        given.here.rows, given.moved, given.along, o.motion, o.steps, o.begins_with, SIMULATION_TOLERANCE
+        given.here.rows,
+        given.moved,
+        given.along,
+        o.motion,
+        o.steps,
+        o.begins_with - float(beside[0]),
+        initial_slopes,
+        SIMULATION_TOLERANCE,
     )
-    force = force + given.here.force_beside(o)
-    for j, (before, after, width) in enumerate(given.pairs):
-        if before.zero != after.zero or not _same(before.beside, after.beside):
-            slopes[:, j] += (after.force_beside(o) - before.force_beside(o)) / width
+    force = force + beside
+    for j, change in enumerate(changes):
+        slopes[:, j] += change
     if not given.here.sensors:
         return o.at_compared(force), o.at_compared(slopes)
     shown = o.shown(np.column_stack([force, slopes]), given.here.sensors)
@@ -166,6 +175,14 @@ def sensitivities(given: Directions, o: RecordLikelihood, work: Work) -> tuple[A
             shown[:, 1 + j] += (o.shown(force, after.sensors) - o.shown(force, before.sensors)) / width
     compared = o.at_compared(shown)
     return compared[:, 0], compared[:, 1:]
+
+
+def _change_beside(pair: tuple[LaidOut, LaidOut, float], o: RecordLikelihood) -> Array:
+    """(m,) or (1,) derivative of the force of what stands beside the element along a direction [N]."""
+    before, after, width = pair
+    if before.zero == after.zero and _same(before.beside, after.beside):
+        return np.zeros(1)
+    return (after.force_beside(o) - before.force_beside(o)) / width
 
 
 def _same(one: Array | None, other: Array | None) -> bool:

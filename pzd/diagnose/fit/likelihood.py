@@ -42,6 +42,8 @@ class RecordLikelihood:
     """Which base row it belongs to; -1 where the voltage moves."""
     motion: Motion
     """(m,) what is simulated."""
+    begins_with: float
+    """Recorded force at the first sample of the motion [N]: that of the same phase where the motion repeats."""
     first: int
     """Samples of the motion that come before the first one compared."""
     stride: int
@@ -80,12 +82,6 @@ class RecordLikelihood:
     def residuals(self) -> int:
         """How many residuals it gives: w."""
         return len(self.frame)
-
-    @property
-    def begins_with(self) -> float:
-        """Force with which the simulation begins [N]: that of the same phase where the motion repeats."""
-        lead = self.first // self.stride
-        return float(self.measured[-lead % self.measured.size if isinstance(self.noise, PureError) else 0])
 
     def at_compared(self, simulated: Array) -> Array:
         """(n,) or (n, p) of what was simulated at the samples that are compared."""

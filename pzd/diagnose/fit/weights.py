@@ -123,10 +123,14 @@ def _of_cycles(
     floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.displacement_variance
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
+    motion, lead, factor = _cycle_motion(record, run.period, [_resampled(channel, points) for channel in p.mean_motion])
     bare = RecordLikelihood(
         record.name,
         place,
-        *_cycle_motion(record, run.period, [_resampled(channel, points) for channel in p.mean_motion]),
+        motion,
+        float(cycle[-(lead // factor) % cycle.size]),
+        lead,
+        factor,
         np.ones(cycle.size, dtype=np.bool_),
         cycle,
         peak,
@@ -197,6 +201,7 @@ def _of_samples(
         record.name,
         place,
         motion,
+        float(record.force[0]),
         start * factor,
         factor,
         compared,

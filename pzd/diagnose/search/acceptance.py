@@ -16,6 +16,7 @@ from pzd.diagnose.search.candidates import Candidate
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.thresholds import (
     HALVES_ALIKE,
+    HALVES_LOSE,
     HALVES_SIGNIFICANCE,
     LEAST_CLOSED,
     STOP_BEGINS,
@@ -97,15 +98,24 @@ def spurious(
     if with_it > left + config.rival_bic:
         return "stand-in: widens the gap on tests it was not fitted to"
     fresh = tuple(e for e in candidate.fitted.effects if e not in before.effects) or (candidate.effect,)
-    if not _agree(halves, (fits[0], fits[1]), fresh):
+    if not _agree(halves, (fits[0], fits[1]), fresh, HALVES_LOSE * -candidate.delta_bic):
         return "stand-in: takes other values on either half of the tests"
     return None
 
 
-def _agree(halves: tuple[Problem, Problem], fits: tuple[Fitted, Fitted], effects: Sequence[str]) -> bool:
+def _agree(
+    halves: tuple[Problem, Problem], fits: tuple[Fitted, Fitted], effects: Sequence[str], negligible: float
+) -> bool:
     """Whether one half of the tests does nearly as well with the values that the other half gives to some effects.
 
-    Equation: min_ij (|r_j(p_i)|^2 - |r_j(p_j)|^2) < 2 chi2_e        Source: likelihood ratio, either half for granted
+    Equation: min_ij (|r_j(p_i)|^2 - |r_j(p_j)|^2) < max(2 chi2_e, L)   Source: likelihood ratio, a half for granted
+
+    Parameters
+    ----------
+    halves : of the tests
+    fits : of each
+    effects : whose values are compared
+    negligible : misfit L that is little beside what the effects explain
     """
     from scipy.special import chdtri
 
@@ -115,6 +125,6 @@ def _agree(halves: tuple[Problem, Problem], fits: tuple[Fitted, Fitted], effects
     limit = 2.0 * float(chdtri(len(fits[0].unknowns), HALVES_SIGNIFICANCE))
     for half, own, other in ((halves[0], fits[0], fits[1]), (halves[1], fits[1], fits[0])):
         spread = max(1.0, own.misfit / max(own.size - own.searched.size, 1))
-        if misfit_of(half, other.damper) - own.misfit <= limit * spread:
+        if misfit_of(half, other.damper) - own.misfit <= max(limit * spread, negligible):
             return True
     return False
