@@ -98,7 +98,7 @@ def diagnose(
         prediction=prediction,
         zero_m=found.zero_m,
         ranking=ranking_of(selection, selection.first),
-        rivals=selection.rivals,
+        rivals=(*selection.rivals, *selection.undecided),
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),
         next_test=_next_test(handed, found, zero, trials, recorded, reach),
     )

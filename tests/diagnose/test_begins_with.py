@@ -13,7 +13,7 @@ from pzd.record import Record
 
 
 def within_the_stick(offset: float) -> Record:
-    """A motion without a period, of 1 mm at most, which 301 N of friction at 0 V never let slip; a spring preloads it."""
+    """A motion of 1 mm without a period, which 301 N of friction at 0 V never let slip, beside a preload."""
     time = np.arange(8000) / 500.0
     tones = ((1.13, 0.5e-3), (2.71, 0.3e-3), (6.97, 0.1e-3))
     x, v, a = (

@@ -24,6 +24,9 @@ from pzd.diagnose.thresholds import (
     TRIVIAL_SIZE,
 )
 
+OF_THE_TESTS = "so small that it counts as an offset or a delay of the tests"
+UNDECIDED = "may be no more than an offset or a delay that each test has of its own"
+
 
 def unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate) -> str | None:
     """Why a candidate is too little to be adopted, None where it is not."""
@@ -31,8 +34,8 @@ def unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate
         return "does not pay"
     if candidate.explained < config.visible:
         return f"moves the force by less than {100 * config.visible:g} % of peak"
-    if trivial(candidate.fitted, candidate.effect, evidence.whole.scales.low_force):
-        return "so small that it counts as an offset or a delay of the tests"
+    if small := trivial(candidate.fitted, candidate.effect, evidence.whole.scales.low_force):
+        return small
     return no_stop(candidate.fitted.damper, evidence.whole.scales.stroke) if candidate.effect == "end_stop" else None
 
 
@@ -64,16 +67,24 @@ def closes(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate
     return evidence.gap(candidate.fitted) <= max(config.unexplained_share * evidence.gap(before), config.negligible)
 
 
-def trivial(fitted: Fitted, effect: str, force: float) -> bool:
-    """Whether the 95 % interval of a common offset or delay reaches below what counts as an effect."""
-    errors = standard_errors(fitted)
+def trivial(fitted: Fitted, effect: str, force: float) -> str | None:
+    """Why a common offset or delay is no effect: below what counts as one, or its 95 % interval reaches below that.
+
+    Parameters
+    ----------
+    fitted : with the effect
+    effect : name, of one in `TRIVIAL_SIZE`, else no reason is found
+    force : the lowest peak of the tests [N]
+    """
     sizes = []
-    for unknown, error in zip(fitted.unknowns, errors, strict=True):
+    for unknown, error in zip(fitted.unknowns, standard_errors(fitted), strict=True):
         limit = TRIVIAL_SIZE.get((unknown.effect, unknown.parameter.name))
         if unknown.effect == effect and limit is not None:
             unit = limit * (force if unknown.parameter.unit == "N" else 1.0)
-            sizes.append((abs(unknown.of(fitted.damper)) - LEVEL * error) / unit)
-    return bool(sizes) and max(sizes) < 1.0
+            sizes.append((abs(unknown.of(fitted.damper)) / unit, LEVEL * error / unit))
+    if not sizes or max(size - reach for size, reach in sizes) >= 1.0:
+        return None
+    return UNDECIDED if max(size for size, _ in sizes) >= 1.0 else OF_THE_TESTS
 
 
 def spurious(

@@ -43,7 +43,8 @@ def verdict(context: ReportContext) -> str:
     if diagnosis.verdict == "named":
         text = f"Missing from the {context.model}: {adopted}"
     elif diagnosis.verdict == "ambiguous" and not diagnosis.effects:
-        text = "These tests do not settle whether anything is missing"
+        rivals = listed(effects_in_words(diagnosis.rivals), "or")
+        text = f"These tests do not settle whether anything is missing{f'; possible: {rivals}' if rivals else ''}"
     elif diagnosis.verdict == "ambiguous":
         rivals = listed(effects_in_words(diagnosis.rivals), "or")
         text = f"These tests do not settle what is missing. Best: {adopted or DASH}; also possible: {rivals or DASH}"
