@@ -101,8 +101,9 @@ def integrated_sensitivities(
     rows : as `integrated_force`
     columns : (c,) places in the row
     along : (n, v, c) or (1, v, c) derivatives of these columns by each variable
-    motion, steps, initial_force, tolerance : as `integrated_force`
+    motion, steps, initial_force : as `integrated_force`
     initial_slopes : (v,) derivatives of the initial force by each variable [N]
+    tolerance : as `integrated_force`
 
     Returns
     -------

@@ -59,8 +59,9 @@ def march_sensitivities(
 
     Parameters
     ----------
-    displacement, velocity, steps, rows, initial_force, tolerance : as `march`
+    displacement, velocity, steps, rows, initial_force : as `march`
     initial_slopes : (v,) derivatives of the initial force by each variable [N]
+    tolerance : as `march`
     columns : (c,) places in the row
     along : (n, v, c) or (1, v, c) derivatives of these columns by each variable
 

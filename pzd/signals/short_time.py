@@ -24,14 +24,14 @@ TOGETHER = 8
 """Neighbouring frequencies of a part that are kept or left together.
 
 Reason: a corner fills a band; together they stand clear at a third of the power that each would need alone."""
-BESIDE = 0.05
+NEIGHBOUR_CHANCE = 0.05
 """Beside what stands clear, powers are kept that noise alone would show less often.
 
 Reason: a corner reaches over a part's whole spectrum and sinks into the noise slowly; not tuned."""
 
 
 @dataclass(frozen=True, eq=False)
-class Clear:
+class ShortTimeMask:
     """Which short-time coefficients stand clear of the noise, at each length of the parts."""
 
     points: int
@@ -40,7 +40,7 @@ class Clear:
     """(parts, frequencies) each, for as many lengths as the cycle has samples for."""
 
     @classmethod
-    def of(cls, cycle: Array, variance: Array, errors: float) -> tuple[Clear, Array]:
+    def of(cls, cycle: Array, variance: Array, errors: float) -> tuple[ShortTimeMask, Array]:
         """What stands clear in a cycle, and the cycle of that alone.
 
         Parameters
@@ -79,7 +79,7 @@ def _stand_clear(ratio: Array, errors: float) -> NDArray[np.bool_]:
     """(parts, frequencies) which powers, in units of noise, stand clear of it, with those beside that probably do."""
     parts, count = ratio.shape
     blocks = np.pad(ratio, ((0, 0), (0, -count % TOGETHER))).reshape(parts, -1, TOGETHER).sum(axis=2)
-    clear, probable = blocks > _seldom(errors**2), blocks > _seldom(-np.log(BESIDE))
+    clear, probable = blocks > _seldom(errors**2), blocks > _seldom(-np.log(NEIGHBOUR_CHANCE))
     for _ in range(blocks.shape[1]):
         beside = np.pad(clear, ((0, 0), (1, 1)))
         grown = clear | (probable & (beside[:, :-2] | beside[:, 2:]))

@@ -12,7 +12,7 @@ from pzd.diagnose.fit.likelihood import response
 from pzd.record import Record
 
 
-def within_the_stick(offset: float) -> Record:
+def within_the_stick(offset: float, rng: np.random.Generator) -> Record:
     """A motion of 1 mm without a period, which 301 N of friction at 0 V never let slip, beside a preload."""
     time = np.arange(8000) / 500.0
     tones = ((1.13, 0.5e-3), (2.71, 0.3e-3), (6.97, 0.1e-3))
@@ -22,12 +22,14 @@ def within_the_stick(offset: float) -> Record:
     )
     damper = damper_of((0.0,), preload_offset={"F_0": offset})
     force = respond(damper, Motion(time, x, v, a, np.zeros(time.size)), offset + 30.0)
-    noise = np.random.default_rng(3).standard_normal(time.size)
+    noise = rng.standard_normal(time.size)
     return Record("stuck", None, time, x, v, a, force + 0.1 * noise, np.zeros(time.size))
 
 
-def test_a_part_that_begins_later_is_simulated_from_the_force_at_its_motions_first_sample() -> None:
-    found = evidence((within_the_stick(150.0),), damper_of((0.0,)))
+def test_a_part_that_begins_later_is_simulated_from_the_force_at_its_motions_first_sample(
+    rng: np.random.Generator,
+) -> None:
+    found = evidence((within_the_stick(150.0, rng),), damper_of((0.0,)))
     truth = damper_of((0.0,), preload_offset={"F_0": 150.0})
     parts = [o for half in found.halves for o in half.observations]
     assert any(o.first > 0 for o in parts)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pzd.record import Array
-from pzd.signals.short_time import Clear
+from pzd.signals.short_time import ShortTimeMask
 
 POINTS = 2000
 NOISE = 1e-3
@@ -31,14 +31,14 @@ def without_high_harmonics(cycle: Array, last: int) -> Array:
 def test_without_noise_all_that_it_looks_at_is_kept(points: int, rng: np.random.Generator) -> None:
     """The parts overlap so that their squares add up to one: nothing below the band limit gets lost."""
     cycle = without_high_harmonics(rng.standard_normal(points), int(0.3 * points))
-    _, found = Clear.of(cycle, variance_of(1e-9, points), 4.0)
+    _, found = ShortTimeMask.of(cycle, variance_of(1e-9, points), 4.0)
     np.testing.assert_allclose(found, cycle, atol=0.02 * np.max(np.abs(cycle)))
 
 
 def test_noise_alone_is_left_out(rng: np.random.Generator) -> None:
     """Of fifteen hundred blocks beyond 4 standard errors, exp(-16) each, one is kept in several thousand cycles."""
     cycles = NOISE * rng.standard_normal((100, POINTS))
-    kept = [np.any(Clear.of(cycle, variance_of(NOISE), 4.0)[1] != 0.0) for cycle in cycles]
+    kept = [np.any(ShortTimeMask.of(cycle, variance_of(NOISE), 4.0)[1] != 0.0) for cycle in cycles]
     assert not np.any(kept)
 
 
@@ -48,14 +48,14 @@ def test_a_corner_of_a_triangle_is_found_below_the_noise_of_every_harmonic(rng: 
     left = whole - without_high_harmonics(whole, 90)
     noisy = left + NOISE * rng.standard_normal(POINTS)
     assert np.max(np.abs(np.fft.rfft(left)) ** 2) / POINTS**2 < 6.0 * variance_of(NOISE)[0]
-    clear, found = Clear.of(noisy, variance_of(NOISE), 4.0)
+    clear, found = ShortTimeMask.of(noisy, variance_of(NOISE), 4.0)
     corner = np.abs(whole) > 0.99
     assert np.linalg.norm((found - left)[corner]) < 0.75 * np.linalg.norm(left[corner])
     np.testing.assert_array_equal(clear.kept(noisy), found)
 
 
 def test_what_is_kept_of_another_cycle_is_linear_in_it(rng: np.random.Generator) -> None:
-    clear, _ = Clear.of(triangle() - without_high_harmonics(triangle(), 90), variance_of(NOISE), 4.0)
+    clear, _ = ShortTimeMask.of(triangle() - without_high_harmonics(triangle(), 90), variance_of(NOISE), 4.0)
     one, other = rng.standard_normal((2, POINTS))
     np.testing.assert_allclose(clear.kept(one + 2.0 * other), clear.kept(one) + 2.0 * clear.kept(other), atol=1e-12)
     assert np.linalg.norm(clear.kept(one)) < 0.5 * np.linalg.norm(one)

@@ -121,7 +121,7 @@ def drawn_case(seed: int, index: int, campaign_name: str, hidden: Sequence[str])
         _logged(m, f, t, chain, peak, len(run.values) > 1, damper, draw)
         for m, f, t in zip(fine, forces, temperatures, strict=True)
     )
-    seen, warm = _coarse(damper, coarse, start, rise, drifts)
+    seen, warm = _forces_and_temperatures(damper, coarse, start, rise, drifts)
     return IndependentCase(
         campaign=run,
         base=base,
@@ -192,7 +192,7 @@ def _capacity(motions: Sequence[Driven], forces: Sequence[Array], rise: float) -
     return work / rise
 
 
-def _coarse(
+def _forces_and_temperatures(
     damper: Hidden, coarse: Sequence[Driven], start: float, rise: float, drifts: bool
 ) -> tuple[list[Array], list[float] | None]:
     """The force in every test [N], and its median temperature [degC] where that matters."""
@@ -223,7 +223,7 @@ def _sized(
         for _ in range(TRIALS):
             values = law.drawn(default_rng(chance), scale, strength)
             damper = Hidden(plain.base, {name: values}, start)
-            seen, warm = _coarse(damper, some, start, rise, name == "temperature_drift")
+            seen, warm = _forces_and_temperatures(damper, some, start, rise, name == "temperature_drift")
             gap = gap_after_refit(some, seen, plain.base, temperatures=warm)
             if 0.7 * wanted <= gap <= 1.4 * wanted:
                 break

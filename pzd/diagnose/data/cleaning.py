@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pzd.record import Array, Record, is_constant, sliced, voltage_scale
 from pzd.signals.between_cycles import neighbours, pure_error
 from pzd.signals.cycles import Cycles, cycles, drift, settled
-from pzd.signals.short_time import Clear
+from pzd.signals.short_time import ShortTimeMask
 from pzd.signals.smoothing import HIGHEST, low_pass, motion_below
 from pzd.signals.stretches import separate_tests
 
@@ -201,9 +201,9 @@ class Average:
         return clear
 
     @cached_property
-    def _in_parts(self) -> tuple[Clear, Array]:
+    def _in_parts(self) -> tuple[ShortTimeMask, Array]:
         left = self._cycle(np.where(self.clear, 0.0, self.harmonics))
-        return Clear.of(left, self.variance, CLEAR)
+        return ShortTimeMask.of(left, self.variance, CLEAR)
 
     @cached_property
     def clear_harmonics(self) -> NDArray[np.complex128]:
