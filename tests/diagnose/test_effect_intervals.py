@@ -16,6 +16,7 @@ from pzd.diagnose.data.split import split
 from pzd.diagnose.fit.intervals import LEVEL, base_half_widths, disagreement, standard_errors
 from pzd.diagnose.fit.least_squares import Fitted, fit
 from pzd.diagnose.fit.parameters import Unknown
+from pzd.diagnose.fit.slopes import BlockSlopes
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.record import Array, Record, sliced
 from pzd.signals.nuisance import NuisanceConfig
@@ -41,7 +42,8 @@ def linear(rng: np.random.Generator, pulled: float) -> tuple[Fitted, float]:
     parameter = library()["fluid_inertia"].parameters[0]
     unknowns = (Unknown("fluid_inertia", parameter, 1.0),)
     split_left = tuple(left.reshape(TESTS, 40))
-    fitted = Fitted(damper_of(), (), step, split_left, (), unknowns, np.zeros((0, 4)), jacobian)
+    by_all = BlockSlopes(4, ((tuple(range(4)), jacobian),))
+    fitted = Fitted(damper_of(), (), step, split_left, (), unknowns, np.zeros((0, 4)), by_all)
     return fitted, float(step[3])
 
 

@@ -96,7 +96,7 @@ def test_they_are_those_of_the_whole_damper(effect: str, moving: bool, rng: Gene
     np.testing.assert_allclose(left.residuals[0], counted, rtol=1e-9, atol=1e-9)
     for j in range(x.size):
         exact = o.in_noise(force(j, -2e-4, 1e-11) - force(j, 2e-4, 1e-11)) / 4e-4
-        missed = np.linalg.norm(left.slopes[:, j] - exact)
+        missed = np.linalg.norm(left.slopes.dense()[:, j] - exact)
         assert missed <= 0.02 * np.linalg.norm(exact) + 1e-9, (j, missed / np.linalg.norm(exact))
 
 
@@ -106,6 +106,6 @@ def test_a_factor_common_to_all_forces_moves_them_in_proportion(rng: Generator) 
     start = asked.start_with(CHARGED)
     found = fit(asked, ("gas_spring",), start, evaluations=1)
     friction, _, _, charge = start
-    along = found.slopes @ np.array([friction, 1.0, 1.0, charge])
+    along = found.slopes.dense() @ np.array([friction, 1.0, 1.0, charge])
     exact = [-o.in_noise(force) for o, force in zip(asked.observations, found.simulated, strict=True)]
     assert np.linalg.norm(along - np.concatenate(exact)) < 0.02 * np.linalg.norm(along)

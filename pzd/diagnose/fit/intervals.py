@@ -58,7 +58,7 @@ def disagreement(fitted: Fitted, of: slice) -> Array:
     covariance = np.where(np.isfinite(fitted.covariance), fitted.covariance, 0.0)
     ends = np.cumsum([r.size for r in fitted.residuals])[:-1]
     pulled, allowed = np.zeros(of.stop - of.start), np.zeros(of.stop - of.start)
-    for slopes, residual in zip(np.split(fitted.slopes, ends), fitted.residuals, strict=True):
+    for slopes, residual in zip(np.split(fitted.slopes.dense(), ends), fitted.residuals, strict=True):
         pull = slopes @ covariance[:, of]
         own, shared = np.sum(pull**2, axis=0), slopes.T @ pull
         chance = own - np.sum(shared * (covariance @ shared), axis=0)

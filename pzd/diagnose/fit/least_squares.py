@@ -14,7 +14,7 @@ import numpy as np
 
 from pzd.damper.model import Damper
 from pzd.diagnose.fit.parameters import Problem, Unknown
-from pzd.diagnose.fit.slopes import Left, left_at, moving
+from pzd.diagnose.fit.slopes import BlockSlopes, Left, left_at, moving
 from pzd.record import Array
 
 MOST_EVALUATIONS = 20
@@ -57,18 +57,18 @@ class Fitted:
     unknowns: tuple[Unknown, ...]
     prior: Array
     """(2 b, 3 b + e) slopes of the prior on C and k."""
-    slopes: Array
-    """(w, 3 b + e) derivatives of all residuals by the searched variables."""
+    slopes: BlockSlopes
+    """Of all residuals by the searched variables."""
 
     @cached_property
     def frame(self) -> Array:
         """(w, 3 b + e) orthonormal columns: what of a residual the searched variables can take up."""
-        return np.asarray(np.linalg.qr(self.slopes).Q)
+        return np.asarray(np.linalg.qr(self.slopes.dense()).Q)
 
     @cached_property
     def covariance(self) -> Array:
         """(3 b + e, 3 b + e) of what was searched, noise alone; infinite for what no test shows."""
-        return _covariance(np.concatenate([self.slopes, self.prior]))
+        return _covariance(np.concatenate([self.slopes.dense(), self.prior]))
 
     @property
     def misfit(self) -> float:
@@ -142,7 +142,7 @@ def _search(
         return np.concatenate([left_by(x.tobytes()).whole, prior[:, : centre.size] @ away])
 
     def slopes_at(x: Array) -> Array:
-        return np.concatenate([left_by(x.tobytes()).slopes[:, moved], prior[:, moved]])
+        return np.concatenate([left_by(x.tobytes()).slopes.dense(moved), prior[:, moved]])
 
     found = least_squares(
         residuals_at,

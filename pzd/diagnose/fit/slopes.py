@@ -21,6 +21,28 @@ oil, whose own errors a longer step would have to drown, is not differenced."""
 
 
 @dataclass(frozen=True, eq=False)
+class BlockSlopes:
+    """Slopes of the residuals of observations, each by the variables that move it: a test has one voltage of many."""
+
+    free: int
+    """How many variables the search moves."""
+    blocks: tuple[tuple[tuple[int, ...], Array], ...]
+    """Of every observation the columns of the variables, and (w_o, columns) the slopes."""
+
+    def dense(self, columns: Sequence[int] | None = None) -> Array:
+        """(w, columns) slopes by some variables, or by all, zero where an observation does not move with one."""
+        wanted = range(self.free) if columns is None else columns
+        place = {j: i for i, j in enumerate(wanted)}
+        found = np.zeros((sum(len(block) for _, block in self.blocks), len(place)))
+        begin = 0
+        for own, block in self.blocks:
+            here = [i for i, j in enumerate(own) if j in place]
+            found[begin : begin + len(block), [place[own[i]] for i in here]] = block[:, here]
+            begin += len(block)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
 class Left:
     """What a point of the search leaves, and how that goes with the searched variables."""
 
@@ -28,8 +50,8 @@ class Left:
     """(w_o,) an observation, in units of noise."""
     simulated: tuple[Array, ...]
     """(n,) an observation, force at the compared samples [N]."""
-    slopes: Array
-    """(w, free) derivatives of all residuals by the searched variables."""
+    slopes: BlockSlopes
+    """Of all residuals by the searched variables."""
 
     @property
     def whole(self) -> Array:
@@ -77,13 +99,11 @@ def left_at(
         if o.place not in known or o.place < 0 or not alike:
             known[o.place] = directions(point, [beside[j] for j in columns], o)
         force, slopes = sensitivities(known[o.place], o, problem.work)
-        block = np.zeros((o.residuals, free))
         counted = o.in_noise(np.column_stack([o.measured - force, -slopes]))
-        block[:, columns] = counted[:, 1:]
         residuals.append(counted[:, 0].copy())
         forces.append(force)
-        blocks.append(block)
-    return Left(tuple(residuals), tuple(forces), np.concatenate(blocks))
+        blocks.append((tuple(columns), counted[:, 1:].copy()))
+    return Left(tuple(residuals), tuple(forces), BlockSlopes(free, tuple(blocks)))
 
 
 def moving(problem: Problem, unknowns: Sequence[Unknown], o: RecordLikelihood, free: int) -> list[int]:

@@ -86,7 +86,7 @@ def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Ar
     new = range(before.searched.size, here.size)
     limits = np.full(here.size, -np.inf), np.full(here.size, np.inf)
     left = left_at(problem, unknowns, here, limits, new)
-    r, columns, frame = left.whole, left.slopes[:, before.searched.size :], before.frame
+    r, columns, frame = left.whole, left.slopes.dense(new), before.frame
     r, columns = r - frame @ (frame.T @ r), columns - frame @ (frame.T @ columns)
     size = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(size > 0.0, size, 1.0)
