@@ -43,7 +43,7 @@ def linear(rng: np.random.Generator, pulled: float) -> tuple[Fitted, float]:
     unknowns = (Unknown("fluid_inertia", parameter, 1.0),)
     split_left = tuple(left.reshape(TESTS, 40))
     by_all = BlockSlopes(4, ((tuple(range(4)), jacobian),))
-    fitted = Fitted(damper_of(), (), step, split_left, (), unknowns, np.zeros((0, 4)), by_all)
+    fitted = Fitted(damper_of(), (), step, split_left, (), unknowns, np.zeros((0, 4)), lambda: by_all)
     return fitted, float(step[3])
 
 

@@ -6,7 +6,7 @@ squares is minus the logarithm of the likelihood, and fits of different effects 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -57,8 +57,13 @@ class Fitted:
     unknowns: tuple[Unknown, ...]
     prior: Array
     """(2 b, 3 b + e) slopes of the prior on C and k."""
-    slopes: BlockSlopes
-    """Of all residuals by the searched variables."""
+    derive: Callable[[], BlockSlopes]
+    """Gives `slopes`, which of all candidates together would fill the memory."""
+
+    @cached_property
+    def slopes(self) -> BlockSlopes:
+        """Of all residuals by the searched variables."""
+        return self.derive()
 
     @cached_property
     def frame(self) -> Array:
@@ -93,6 +98,7 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
     """
     unknowns = problem.unknowns(effects)
     found, left = _search(problem, unknowns, start, start.size, evaluations)
+    limits = _bounds(problem, unknowns)
     return Fitted(
         problem.point(found, unknowns).damper,
         tuple(effects),
@@ -101,7 +107,7 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
         left.simulated,
         unknowns,
         _prior(problem, len(unknowns)),
-        left.slopes,
+        lambda: left_at(problem, unknowns, found, limits).slopes,
     )
 
 

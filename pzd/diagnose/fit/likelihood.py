@@ -19,6 +19,7 @@ from pzd.damper.compose import respond, sampling_steps, sensors_of, shown_moment
 from pzd.damper.drive import effective_voltage
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
+from pzd.diagnose.fit.integrated_out import IntegratedOut
 from pzd.record import Array
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError
@@ -57,10 +58,8 @@ class RecordLikelihood:
     noise: PureError | Autoregression
     weights: Array
     """(H + 1,) of the harmonics of an average cycle; empty where samples are compared."""
-    frame: Array
-    """(w, q) orthonormal columns, in units of noise, along which nuisances move the force."""
-    shrink: Array
-    """(q,) factor on the residual along each of them."""
+    nuisances: IntegratedOut
+    """Offset, gain and delay of the test, and its jumps."""
 
     @cached_property
     def steps(self) -> Array:
@@ -81,7 +80,7 @@ class RecordLikelihood:
     @property
     def residuals(self) -> int:
         """How many residuals it gives: w."""
-        return len(self.frame)
+        return self.nuisances.residuals
 
     def at_compared(self, simulated: Array) -> Array:
         """(n,) or (n, p) of what was simulated at the samples that are compared."""
@@ -114,8 +113,7 @@ class RecordLikelihood:
 
     def in_noise(self, values: Array) -> Array:
         """(w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
-        flat = self._scaled(values)
-        return flat - self.frame @ ((1.0 - self.shrink).reshape(-1, *([1] * (flat.ndim - 1))) * (self.frame.T @ flat))
+        return self.nuisances.taken_out(self._scaled(values))
 
     @cached_property
     def _unbroken(self) -> NDArray[np.bool_]:

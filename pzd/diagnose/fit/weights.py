@@ -12,6 +12,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.fit.input_uncertainty import Predicted
+from pzd.diagnose.fit.integrated_out import IntegratedOut
 from pzd.diagnose.fit.likelihood import RecordLikelihood, responses
 from pzd.diagnose.fit.prediction import motion_of, warms
 from pzd.identify.trial import in_motion
@@ -37,10 +38,6 @@ LATEST = 3.0
 """At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope.
 
 Reason: the customary bound for what a normal prior still allows."""
-HIDDEN = 1e-3
-"""A nuisance that moves all residuals together by less [standard deviations of one] is left out.
-
-Reason: it would change the misfit by a millionth."""
 DISCREPANCY = 0.3
 """Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
 fitted: a model that still lacks something must not be bent to where the noise happens to be smallest.
@@ -136,8 +133,7 @@ def _of_cycles(
         peak,
         error,
         weights,
-        np.zeros((2 * weights.size - 1, 0)),
-        np.zeros(0),
+        IntegratedOut.nothing(2 * weights.size - 1),
     )
     return with_nuisances(bare, given.damper, nuisance)
 
@@ -209,8 +205,7 @@ def _of_samples(
         peak,
         noise,
         np.zeros(0),
-        np.zeros((rows, 0)),
-        np.zeros(0),
+        IntegratedOut.nothing(rows),
     )
     return with_nuisances(bare, given.damper, nuisance, given.timing[mask])
 
@@ -229,8 +224,7 @@ def with_nuisances(
 ) -> RecordLikelihood:
     """The observation with the test's own offset, gain and delay, jumps and instants of the voltage integrated out.
 
-    Equation: r' = (I + V V')^(-1/2) r, V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise
-                                                    Source: Gaussian prior, marginal likelihood
+    Equation: V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `IntegratedOut`
 
     A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
     that, F(t - d) - F + d dF/dt, is taken off the measured force.
@@ -247,22 +241,11 @@ def with_nuisances(
             *([] if timing is None else [timing]),
         ]
     )
-    left, size, right = _principal(bare.in_noise(columns))
-    likeliest = right[:, 0] @ (size / (1.0 + size**2) * (left.T @ bare.in_noise(bare.measured - force)))
+    nuisances = IntegratedOut.of(bare.in_noise(columns))
+    likeliest = float(nuisances.likeliest(bare.in_noise(bare.measured - force))[0])
     delay = nuisance.delay_s * float(np.clip(likeliest, -LATEST, LATEST))
     measured = bare.measured - (shown(delay) - force - delay * late)
-    return replace(bare, measured=measured, frame=left, shrink=1.0 / np.sqrt(1.0 + size**2))
-
-
-def _principal(columns: Array) -> tuple[Array, Array, Array]:
-    """Singular value decomposition (w, q), (q,), (q, p) of what (w, p) nuisances do, without what noise hides.
-
-    By the eigenvalues of the (p, p) products: what they lose of small singular values lies below `HIDDEN`.
-    """
-    squares, right = np.linalg.eigh(columns.T @ columns)
-    shown = squares > HIDDEN**2
-    size = np.sqrt(squares[shown])
-    return columns @ (right[:, shown] / size), size, right[:, shown].T
+    return replace(bare, measured=measured, nuisances=nuisances)
 
 
 def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLikelihood:
@@ -280,12 +263,10 @@ def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLi
     scale = UNWEIGHTED * peak
     if isinstance(weighed.noise, Autoregression):
         white = Autoregression(np.zeros(0), scale**2)
-        none = np.zeros((weighed.measured.size, 0))
-        return replace(weighed, noise=white, frame=none, shrink=np.zeros(0))
+        return replace(weighed, noise=white, nuisances=IntegratedOut.nothing(weighed.measured.size))
     weights = np.full(weighed.weights.size, np.sqrt(2.0 * samples) / scale)
     weights[0] /= np.sqrt(2.0)
-    none = np.zeros((2 * weights.size - 1, 0))
-    return replace(weighed, weights=weights, frame=none, shrink=np.zeros(0))
+    return replace(weighed, weights=weights, nuisances=IntegratedOut.nothing(2 * weights.size - 1))
 
 
 def _neighbours_of(bends: Array) -> Array:
