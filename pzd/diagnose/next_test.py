@@ -26,6 +26,8 @@ POINTS = 400
 """Samples of a cycle."""
 CYCLES = 2
 """Simulated, the last compared."""
+MANY_CYCLES = "ten"
+"""Of a test: noise is told from what repeats, and a quarter of the cycles chooses, another is held out."""
 STEPS_HZ = 4.0
 """Changes of the voltage in the test that steps it, for each cycle."""
 LEAST = 0.02
@@ -145,6 +147,28 @@ def next_test(
         return None
     names = tuple(name for name, _ in rivals)
     return best[1].model_copy(update={"separates": names, "distance_percent": round(100.0 * best[0], 3)})
+
+
+def one_more(recorded: Sequence[Prepared], reach: Reach) -> NextTest:
+    """A sine of many cycles as fast as the stand can, with the stroke of the longest record: one more test to average.
+
+    Parameters
+    ----------
+    recorded : the records, their displacement as recorded
+    reach : what a test may reach
+    """
+    record = max(recorded, key=lambda p: float(np.ptp(p.record.time))).record
+    amplitude = min(0.5 * float(np.ptp(record.displacement)), reach.amplitude)
+    frequency = rounded_down(min(reach.frequency, reach.speed / (2.0 * np.pi * amplitude)))
+    return NextTest(
+        waveform=f"sine, {MANY_CYCLES} cycles",
+        frequency_Hz=frequency,
+        amplitude_m=rounded_down(amplitude),
+        middle_m=reach.middle,
+        voltage_V=record.median_voltage(),
+        separates=(),
+        peak_speed_m_per_s=float(2.0 * np.pi * frequency * rounded_down(amplitude)),
+    )
 
 
 def _plans(reach: Reach, temperature: float | None) -> Iterator[tuple[NextTest, Motion]]:

@@ -124,8 +124,11 @@ def _hum(checks: Sequence[ResidualCheck]) -> str:
 def _next_test(
     handed: HandedOn, found: Damper, zero: float, trials: Trials, recorded: Sequence[Prepared], reach: Reach
 ) -> NextTest | None:
-    """The test that tells rivals apart; without rivals one at a voltage at which the force is known least."""
-    from pzd.diagnose.next_test import next_test
+    """The test that tells rivals apart; without rivals one at a voltage at which the force is known least.
+
+    What may be chance of few tests is settled by one more.
+    """
+    from pzd.diagnose.next_test import next_test, one_more
     from pzd.diagnose.voltage_between import PredictingDamper, next_voltage
 
     selection = handed.selection
@@ -133,6 +136,8 @@ def _next_test(
     if selection.rivalling:
         rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
         return next_test(rivals, reach, warmth, [campaign.offset(damper) for _, damper in selection.rivalling])
+    if selection.undecided:
+        return one_more(recorded, reach)
     offset = campaign.offset(found.moved(-zero) if selection.adopted else found)
     predicting = PredictingDamper(found, offset, handed.missed, handed.between)
     return next_voltage(predicting, trials, recorded, reach, warmth)

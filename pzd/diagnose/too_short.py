@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from pzd.artefacts import Diagnosis, NextTest
+from pzd.artefacts import Diagnosis
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.diagnose.data.split import TRAINING
 from pzd.diagnose.fit.weights import FEWEST_SAMPLES, enough
-from pzd.diagnose.next_test import Reach, rounded_down
+from pzd.diagnose.next_test import MANY_CYCLES, Reach, one_more
 from pzd.record import Mask
-
-CYCLES = "ten"
-"""Of a test: noise is told from what repeats, and a quarter of the cycles chooses, another is held out."""
 
 
 def too_short(campaign: Campaign) -> bool:
@@ -35,25 +30,14 @@ def undecided(recorded: Sequence[Prepared], reach: Reach) -> Diagnosis:
     recorded : the records of the setting, their displacement as recorded
     reach : what a test may reach
     """
-    record = max(recorded, key=lambda p: float(np.ptp(p.record.time))).record
-    amplitude = min(0.5 * float(np.ptp(record.displacement)), reach.amplitude)
-    frequency = rounded_down(min(reach.frequency, reach.speed / (2.0 * np.pi * amplitude)))
     longest = max(p.record.time.size for p in recorded)
     return Diagnosis.without_effects(
         verdict="ambiguous",
         reason=(
             "the records are too short to tell noise from what is missing: too little of them repeats a cycle, and "
             f"a motion that does not repeat takes {FEWEST_SAMPLES} samples to fit, the same to choose and to hold out "
-            f"(the longest record has {longest}); record {CYCLES} cycles of a test, of at least 40 samples each"
+            f"(the longest record has {longest}); record {MANY_CYCLES} cycles of a test, of at least 40 samples each"
         ),
         gap=None,
-        next_test=NextTest(
-            waveform=f"sine, {CYCLES} cycles",
-            frequency_Hz=frequency,
-            amplitude_m=rounded_down(amplitude),
-            middle_m=reach.middle,
-            voltage_V=record.median_voltage(),
-            separates=(),
-            peak_speed_m_per_s=float(2.0 * np.pi * frequency * rounded_down(amplitude)),
-        ),
+        next_test=one_more(recorded, reach),
     )

@@ -34,3 +34,4 @@ def test_what_may_be_of_the_tests_is_neither_named_nor_passed_over(
     """Of three delays with a standard deviation of 0.5 ms the mean is known to 0.57 ms (95 %): 1.5 may be 0.9."""
     told = diagnosed(late(delay, rng), forbid=all_but("sensor_delay", "lash"), most_added=0).diagnosis
     assert (told.verdict, told.effects, told.rivals) == (verdict, effects, rivals), told.reason
+    assert (told.next_test is not None) is (verdict == "ambiguous")  # one more test, over which to average
