@@ -16,7 +16,7 @@ from pzd.damper.pieces import TimeStep
 from pzd.damper.regimes import deflection_at, regime_of, speed_at, spring_force
 from pzd.record import Array
 
-_HELD = np.zeros(0)
+_HELD = np.zeros(0)  # nothing varies, the initial force neither
 
 
 def march(

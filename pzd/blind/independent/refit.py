@@ -93,9 +93,8 @@ def _refitted(
 
     low, high = np.array([-6.0, -3.0, -3.0]), np.array([3.0, 3.0, 3.0])
     friction, damping = _line_through(own)
-    stiffness = min(
-        start[2][i], damping / (own[0][0].time[2] - own[0][0].time[0])
-    )  # else the grid is too coarse for it
+    step = float(own[0][0].time[2] - own[0][0].time[0])
+    stiffness = min(start[2][i], damping / step)  # the integration follows C/k of a step and more
     line = np.clip(np.log([friction / start[0][i], damping / start[1][i], stiffness / start[2][i]]), low, high)
     starts = [np.zeros(3)] if abs(line[1]) < OTHER_DAMPING else [np.zeros(3), line]
     fits = [

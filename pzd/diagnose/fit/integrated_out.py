@@ -34,8 +34,8 @@ class IntegratedOut:
     """(w, p) what each does to the residuals at one standard deviation, in units of noise."""
     inner: Array
     """(p, p) M."""
-    prior: Array
-    """(p, p) covariance of the nuisances given residuals, over that without: R diag(1/(1 + s^2)) R'."""
+    covariance: Array
+    """(p, p) of the nuisances once the residuals are known: R diag(1/(1 + s^2)) R'."""
 
     @classmethod
     def of(cls, columns: Array) -> IntegratedOut:
@@ -70,7 +70,7 @@ class IntegratedOut:
 
     def likeliest(self, values: Array) -> Array:
         """(p,) the likeliest nuisances [standard deviations], given residuals (w,) that they are not taken out of."""
-        return np.asarray(self.prior @ (self.columns.T @ values))
+        return np.asarray(self.covariance @ (self.columns.T @ values))
 
 
 def _packed(columns: Array) -> Array | csr_array:

@@ -73,9 +73,11 @@ def trivial(fitted: Fitted, effect: str, force: float) -> str | None:
     Parameters
     ----------
     fitted : with the effect
-    effect : name, of one in `TRIVIAL_SIZE`, else no reason is found
+    effect : its name; there is no reason where it is none of `TRIVIAL_SIZE`
     force : the lowest peak of the tests [N]
     """
+    if not any(name == effect for name, _ in TRIVIAL_SIZE):
+        return None
     sizes = []
     for unknown, error in zip(fitted.unknowns, standard_errors(fitted), strict=True):
         limit = TRIVIAL_SIZE.get((unknown.effect, unknown.parameter.name))
