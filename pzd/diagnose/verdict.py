@@ -17,7 +17,6 @@ from pzd.damper.nature import against_nature
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.intervals import LEVEL, standard_errors
 from pzd.diagnose.gap import probability_of_noise, visible_gap
-from pzd.diagnose.search.acceptance import UNDECIDED
 from pzd.diagnose.search.candidates import moved_by
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection
@@ -86,7 +85,7 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
     sizes = visible_gap(before), visible_gap(after)
     chances = probability_of_noise(before), probability_of_noise(after)
     if not selection.adopted:
-        return _nothing_adopted(sizes[0], chances[0], selection.undecided, config)
+        return _nothing_adopted(sizes[0], chances[0], selection, config)
     change = f"{' and '.join(selection.adopted)}: {_change(selection, sizes, config)}"
     if chances[1] < config.significance and _remains(sizes, config):
         words = f"{change}, and what is left repeats (probability by noise alone {max(chances[1], 1e-300):.1g})"
@@ -125,10 +124,10 @@ def _remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
     return share or sizes[1] >= CONTRADICTS * config.visible
 
 
-def _nothing_adopted(size: float, chance: float, undecided: Sequence[str], config: DiagnoseConfig) -> Decision:
-    if undecided and (chance >= config.significance or size < config.visible):
-        names = " and ".join(undecided)
-        return Decision("ambiguous", f"{names} would fit better, and {UNDECIDED}: more tests would settle it", None)
+def _nothing_adopted(size: float, chance: float, selection: Selection, config: DiagnoseConfig) -> Decision:
+    if selection.undecided and (chance >= config.significance or size < config.visible):
+        told = "; ".join(f"{name} {selection.reasons[name]}" for name in selection.undecided)
+        return Decision("ambiguous", f"{told}; more tests would settle it", None)
     gap = f"a gap of {_percent(size)} of peak force (r.m.s. above the noise)"
     if chance >= config.significance:
         return Decision("none", f"{gap} that noise alone shows with probability {chance:.2g}: within the noise", None)

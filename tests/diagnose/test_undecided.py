@@ -35,3 +35,20 @@ def test_what_may_be_of_the_tests_is_neither_named_nor_passed_over(
     told = diagnosed(late(delay, rng), forbid=all_but("sensor_delay", "lash"), most_added=0).diagnosis
     assert (told.verdict, told.effects, told.rivals) == (verdict, effects, rivals), told.reason
     assert (told.next_test is not None) is (verdict == "ambiguous")  # one more test, over which to average
+
+
+def test_what_chance_could_hardly_but_might_yet_be_is_told_as_open(rng: np.random.Generator) -> None:
+    """A spring that stiffens by a fifth from case to case, in the same noise: unseen, then open, then adopted.
+
+    A criterion lower by 10 to 20 is more than rivals differ by, and less than adoption takes: a quarter of stiffness.
+    """
+    plain = tuple(sine(damper_of((0.0,)), 0.0, f, x, rng, noise=0.05, cycles=4) for f, x in TESTS)
+    said = []
+    for stiffness in 600.0 * 1.2 ** np.arange(12):
+        records = tuple(replace(r, force=r.force + stiffness * r.displacement) for r in plain)
+        told = diagnosed(records, forbid=all_but("gas_spring"), most_added=0).diagnosis
+        assert (told.verdict == "none") is (not told.effects and not told.rivals), told.reason
+        said.append("adopted" if told.effects else "open" if told.rivals else "unseen")
+    order = ["unseen", "open", "adopted"]
+    assert set(said) == set(order)
+    assert said == sorted(said, key=order.index)

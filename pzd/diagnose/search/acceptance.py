@@ -25,7 +25,8 @@ from pzd.diagnose.thresholds import (
 )
 
 OF_THE_TESTS = "so small that it counts as an offset or a delay of the tests"
-UNDECIDED = "may be no more than an offset or a delay that each test has of its own"
+MAY_BE_OF_THE_TESTS = "would fit better, and may be no more than an offset or a delay that each test has of its own"
+MAY_BE_CHANCE = "would fit better, though not by so much that chance is out of the question"
 
 
 def unsupported(evidence: Evidence, config: DiagnoseConfig, candidate: Candidate) -> str | None:
@@ -86,7 +87,7 @@ def trivial(fitted: Fitted, effect: str, force: float) -> str | None:
             sizes.append((abs(unknown.of(fitted.damper)) / unit, LEVEL * error / unit))
     if not sizes or max(size - reach for size, reach in sizes) >= 1.0:
         return None
-    return UNDECIDED if max(size for size, _ in sizes) >= 1.0 else OF_THE_TESTS
+    return MAY_BE_OF_THE_TESTS if max(size for size, _ in sizes) >= 1.0 else OF_THE_TESTS
 
 
 def spurious(

@@ -15,7 +15,14 @@ from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import Fitted, fit
 from pzd.diagnose.fit.parameters import Problem
-from pzd.diagnose.search.acceptance import closes, leaves_gap, spurious, unsupported
+from pzd.diagnose.search.acceptance import (
+    MAY_BE_CHANCE,
+    MAY_BE_OF_THE_TESTS,
+    closes,
+    leaves_gap,
+    spurious,
+    unsupported,
+)
 from pzd.diagnose.search.candidates import (
     Candidate,
     best_competing_form,
@@ -54,9 +61,9 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
     while len(search.rounds) < 2 * config.most_effects and campaign.work.may_go_on() and search.step():
         pass
     search.rest()
-    return Selection(
-        plain, search.current, tuple(search.rounds), search.reasons, first, search.evidence, search.competitions()
-    )
+    undecided, competitions = search.undecided(), search.competitions()
+    rounds, reasons = tuple(search.rounds), search.reasons
+    return Selection(plain, search.current, rounds, reasons, first, search.evidence, competitions, undecided)
 
 
 @dataclass(eq=False)
@@ -131,9 +138,7 @@ class _Search:
     def _first_supported(self, tried: Sequence[Candidate]) -> Candidate | None:
         """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""
         for each in tried:
-            reason = self._too_little(self.evidence, self.current, each) or spurious(
-                self.evidence, self.weighed(each.fitted.damper), self.config, self.current, each
-            )
+            reason = self._refused(self.config, each)
             if reason is None:
                 return each
             if not each.varies:
@@ -219,6 +224,28 @@ class _Search:
             if behind < self.config.rival_bic:
                 found.append(Competition(name, self.current.damper, form.effect, form.fitted.damper, behind))
         return tuple(found)
+
+    def undecided(self) -> tuple[str, ...]:
+        """Where nothing was adopted, the effects that are rivals of none, each with its reason."""
+        if self.current.effects or not self.rounds:
+            return ()
+        short = [c for c in self.rounds[-1].tried if c.delta_bic > self.config.adopt_bic]
+        best = min((c.delta_bic for c in short), default=0.0)
+        if best <= -self.config.rival_bic:
+            lenient = self.config.model_copy(update={"adopt_bic": min(best + self.config.rival_bic, 0.0)})
+            for each in short:
+                if each.delta_bic <= lenient.adopt_bic:
+                    self.reasons[each.effect] = self._refused(lenient, each) or MAY_BE_CHANCE
+        return tuple(name for name, why in self.reasons.items() if why in (MAY_BE_OF_THE_TESTS, MAY_BE_CHANCE))
+
+    def _refused(self, config: DiagnoseConfig, each: Candidate) -> str | None:
+        """Why a candidate is too little, or a stand-in; None where the data support it by itself."""
+        evidence, before = self.evidence, self.current
+        return (
+            unsupported(evidence, config, each)
+            or leaves_gap(evidence, config, before, each)
+            or spurious(evidence, self.weighed(each.fitted.damper), config, before, each)
+        )
 
     def _drop_needless(self, effect: str, newest: str) -> None:
         """Take back an effect adopted earlier that no longer pays or no longer moves the force."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from pzd.damper.model import Damper
 from pzd.diagnose.fit.least_squares import Fitted
-from pzd.diagnose.search.acceptance import UNDECIDED
 from pzd.diagnose.search.candidates import Candidate
 from pzd.diagnose.search.evidence import Evidence
 
@@ -62,6 +61,8 @@ class Selection:
     """Weighed by what the adopted damper leaves."""
     competitions: tuple[Competition, ...] = ()
     """What is not in the library and would do as well in the place of an effect adopted, or better."""
+    undecided: tuple[str, ...] = ()
+    """Effects that would fit better where nothing was adopted, and of which the tests do not say enough."""
 
     @property
     def rivalling(self) -> tuple[tuple[str, Damper], ...]:
@@ -77,11 +78,6 @@ class Selection:
         """Effects that explain some step as well as the one adopted there, and were not adopted later."""
         found = dict.fromkeys(name for step in self._contested for name in step.rivals)
         return tuple(name for name in found if name not in self.adopted)
-
-    @property
-    def undecided(self) -> tuple[str, ...]:
-        """Effects that pay where nothing was adopted, and may yet be what each test has of its own."""
-        return () if self.adopted else tuple(name for name, why in self.reasons.items() if why == UNDECIDED)
 
     @property
     def _contested(self) -> list[Round]:
