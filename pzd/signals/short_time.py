@@ -60,8 +60,9 @@ class ShortTimeMask:
             coefficients = cut.coefficients(cycle - found)
             at = np.linspace(0.0, 0.5 * cycle.size, coefficients.shape[1])
             noise = np.interp(at, np.arange(variance.size), variance) * cut.power[:, None]
-            ratio = np.where(at < variance.size, np.abs(coefficients) ** 2 / noise, 0.0)
-            masks.append((at < variance.size) & _stand_clear(ratio, errors))
+            power = np.abs(coefficients) ** 2
+            ratio = np.divide(power, noise, out=np.full_like(power, np.inf), where=noise > 0.0)
+            masks.append((at < variance.size) & _stand_clear(np.where(at < variance.size, ratio, 0.0), errors))
             found += cut.cycle(np.where(masks[-1], coefficients, 0.0))
         return cls(cycle.size, tuple(masks)), found
 

@@ -35,6 +35,12 @@ def test_without_noise_all_that_it_looks_at_is_kept(points: int, rng: np.random.
     np.testing.assert_allclose(found, cycle, atol=0.02 * np.max(np.abs(cycle)))
 
 
+def test_where_cycles_are_equal_to_the_last_digit_nothing_is_noise(rng: np.random.Generator) -> None:
+    cycle = without_high_harmonics(rng.standard_normal(512), 150)
+    _, found = ShortTimeMask.of(cycle, np.zeros(int(0.4 * 512) + 1), 4.0)
+    np.testing.assert_allclose(found, cycle, atol=0.02 * np.max(np.abs(cycle)))
+
+
 def test_noise_alone_is_left_out(rng: np.random.Generator) -> None:
     """Of fifteen hundred blocks beyond 4 standard errors, exp(-16) each, one is kept in several thousand cycles."""
     cycles = NOISE * rng.standard_normal((100, POINTS))
