@@ -57,11 +57,6 @@ class IntegratedOut:
         """No nuisances of so many residuals."""
         return cls(np.zeros((residuals, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
 
-    @property
-    def residuals(self) -> int:
-        """How many there are: w."""
-        return int(self.columns.shape[0])
-
     def taken_out(self, values: Array) -> Array:
         """(w,) or (w, k) values in units of noise, without what the nuisances may explain of them."""
         if not self.inner.size:

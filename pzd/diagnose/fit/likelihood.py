@@ -77,11 +77,6 @@ class RecordLikelihood:
             raise ValueError(f"{self.name}: the damper depends on the voltage, and none is given")
         return effective_voltage(voltage, self.steps, np.frombuffer(row).copy())
 
-    @property
-    def residuals(self) -> int:
-        """How many residuals it gives: w."""
-        return self.nuisances.residuals
-
     def at_compared(self, simulated: Array) -> Array:
         """(n,) or (n, p) of what was simulated at the samples that are compared."""
         return simulated[self.first :: self.stride][: self.compared.size][self.compared]
