@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 
@@ -19,6 +19,8 @@ GAPS = (0.0, 0.0025, 0.005, 0.01, 0.02, math.inf)
 """Edges of the bins of the visible gap, as shares of the peak force."""
 VISIBLE = 0.005
 """A truth is visible from this gap on."""
+COUNTS = 0.0025
+"""A smaller gap counts as nothing missing, see `visible` of `DiagnoseConfig`."""
 LOW_NOISE = 0.01
 """Noise up to this share of the peak is low."""
 
@@ -217,17 +219,52 @@ class CalibrationRow(Frozen):
     hit_high95: float
 
 
+def held(case: Scored) -> bool:
+    """Whether what a confidence is stated for holds: that what is named is there, or a rival, and nothing else counts.
+
+    Where nothing counts, an effect that was hidden is rightly named and rightly not.
+    """
+    if case.kind == "outside":
+        return rightly_outside(case) or (case.visible_gap < COUNTS and not case.effects)
+    said = {*case.effects, *(case.rivals if case.verdict == "ambiguous" else ())}
+    there = {name for name in case.truth if case.gap_given_other.get(name, case.visible_gap) >= COUNTS}
+    if not there <= said:
+        return False
+    return {*case.effects} <= {*case.truth} or (case.verdict == "ambiguous" and bool(there))
+
+
+def brier_gain(cases: Iterable[Scored]) -> float | None:
+    """By which share the mean square error of stated confidences is below that of the best constant.
+
+    Equation: 1 - sum (c - h)^2 / sum (h - mean h)^2                Source: Brier 1950, Mon. Weather Rev. 78, eq. (2)
+
+    None where nothing, or always the same, came of them.
+    """
+    stated = [(case.confidence, held(case)) for case in cases if case.confidence is not None]
+    if not stated:
+        return None
+    said, came = np.array(stated, dtype=np.float64).T
+    spread = float(np.sum((came - came.mean()) ** 2))
+    return 1.0 - float(np.sum((said - came) ** 2)) / spread if spread > 0.0 else None
+
+
 CONFIDENCES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
 
 
-def calibration_rows(cases: Iterable[Scored]) -> list[CalibrationRow]:
-    """Bins of the confidence; a hit is that exactly what was adopted was there."""
+def calibration_rows(cases: Iterable[Scored], limits: Sequence[float] = CONFIDENCES) -> list[CalibrationRow]:
+    """Bins of the confidence, and how often what it was stated for held.
+
+    Parameters
+    ----------
+    cases : those that state none are left out
+    limits : between the bins, rising
+    """
     stated = [(case.confidence, case) for case in cases if case.confidence is not None]
     rows = []
-    for low, high in pairwise(CONFIDENCES):
-        inside = [(c, case) for c, case in stated if low < c <= high or (low == 0.0 and c == 0.0)]
+    for low, high in pairwise(limits):
+        inside = [(c, case) for c, case in stated if low < c <= high or low == c == limits[0]]
         if inside:
-            rate = Rate.of((case for _, case in inside), lambda case: set(case.effects) == set(case.truth))
+            rate = Rate.of((case for _, case in inside), held)
             rows.append(
                 CalibrationRow(
                     confidence_low=low,

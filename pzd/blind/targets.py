@@ -9,10 +9,12 @@ import numpy as np
 
 from pzd.blind.case import Scored
 from pzd.blind.rates import (
+    CalibrationRow,
     Predicate,
     Rate,
     ambiguous_with_truth,
     among,
+    brier_gain,
     calibration_rows,
     false_name,
     low_noise,
@@ -29,6 +31,9 @@ FULL_BIN = 50
 """A bin of the calibration counts from so many cases on."""
 ENOUGH_PARAMETERS = 400
 """So do intervals from so many parameters on."""
+FIFTHS = (0.2, 0.4, 0.6, 0.8, 1.0)
+"""Bins of as many cases, where there are `FULL_FIFTH` to each."""
+FULL_FIFTH = 200
 CALIBRATED = 0.05
 """Largest distance of stated confidence and hit rate."""
 TWINS = {"gas_spring", "fluid_inertia"}
@@ -230,16 +235,40 @@ def _calibration(cases: Sequence[Scored]) -> Iterator[Line]:
     for row in calibration_rows(cases):
         far = abs(row.stated - row.hit_rate)
         full = row.cases >= FULL_BIN
-        yield Line(
-            about=f"confidence {row.confidence_low:g}-{row.confidence_high:g}, mean {100 * row.stated:.1f} %",
-            figure="hit rate",
-            value=row.hit_rate,
-            low95=row.hit_low95,
-            high95=row.hit_high95,
-            count=row.cases,
-            target="within 5 %" if full else "",
-            met="shown" if not full else "met" if far <= CALIBRATED else "missed",
+        yield _bin_line(
+            row, "within 5 %" if full else "", "shown" if not full else "met" if far <= CALIBRATED else "missed"
         )
+    stated = sorted(c.confidence for c in cases if c.confidence is not None)
+    if len(stated) >= len(FIFTHS) * FULL_FIFTH:
+        limits = np.unique(np.quantile(stated, [0.0, *FIFTHS]))
+        for row in calibration_rows(cases, [float(limit) for limit in limits]):
+            yield _bin_line(
+                row, "in its interval", "met" if row.hit_low95 <= row.stated <= row.hit_high95 else "missed"
+            )
+        gain = brier_gain(cases)
+        yield Line(
+            about="confidence",
+            figure="mean square error below that of the best constant",
+            value=gain,
+            low95=None,
+            high95=None,
+            count=len(stated),
+            target=">= 20 %",
+            met=_verdict(gain, ">= 20 %"),
+        )
+
+
+def _bin_line(row: CalibrationRow, target: str, met: Met) -> Line:
+    return Line(
+        about=f"confidence {row.confidence_low:.3g}-{row.confidence_high:.3g}, mean {100 * row.stated:.1f} %",
+        figure="hit rate",
+        value=row.hit_rate,
+        low95=row.hit_low95,
+        high95=row.hit_high95,
+        count=row.cases,
+        target=target,
+        met=met,
+    )
 
 
 def _counts(cases: Sequence[Scored]) -> Iterator[Line]:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pzd.diagnose.kept_back import Trials
     from pzd.diagnose.next_test import Reach
     from pzd.diagnose.residual_check import ResidualCheck
+    from pzd.diagnose.verdict import Decision
 
 log = logging.getLogger(__name__)
 
@@ -100,7 +101,7 @@ def diagnose(
         ranking=ranking_of(selection, selection.first),
         rivals=(*selection.rivals, *(selection.undecided if decision.verdict == "ambiguous" else ())),
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),
-        next_test=_next_test(handed, found, zero, trials, recorded, reach),
+        next_test=_next_test(handed, decision, found, zero, trials, recorded, reach),
     )
     if selection.adopted:
         rows = base_parameters(selection, decision.verdict, setting)
@@ -122,11 +123,17 @@ def _hum(checks: Sequence[ResidualCheck]) -> str:
 
 
 def _next_test(
-    handed: HandedOn, found: Damper, zero: float, trials: Trials, recorded: Sequence[Prepared], reach: Reach
+    handed: HandedOn,
+    decision: Decision,
+    found: Damper,
+    zero: float,
+    trials: Trials,
+    recorded: Sequence[Prepared],
+    reach: Reach,
 ) -> NextTest | None:
     """The test that tells rivals apart; without rivals one at a voltage at which the force is known least.
 
-    What may be chance of few tests is settled by one more.
+    What may be chance of few tests, or is not excluded by them, is settled by one more.
     """
     from pzd.diagnose.next_test import next_test, one_more
     from pzd.diagnose.voltage_between import PredictingDamper, next_voltage
@@ -136,7 +143,7 @@ def _next_test(
     if selection.rivalling:
         rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
         return next_test(rivals, reach, warmth, [campaign.offset(damper) for _, damper in selection.rivalling])
-    if selection.undecided and not selection.adopted:
+    if decision.unsure or (selection.undecided and not selection.adopted):
         return one_more(recorded, reach)
     offset = campaign.offset(found.moved(-zero) if selection.adopted else found)
     predicting = PredictingDamper(found, offset, handed.missed, handed.between)

@@ -51,6 +51,10 @@ FAINT = 0.1
 """Share of the way to its starting values at which an effect that noise nearly hides is linearised.
 
 Reason: there a law is still nearly linear in its parameter; the starting values themselves are tried beside it."""
+FAINTEST = 0.01
+"""Where an effect is looked for from none on, it is linearised over so much of its scale.
+
+Reason: a hundredth of the largest force, or of its like, where such effects are linear in their parameter."""
 LEAST_PROMISE = 15.0
 """An effect that promises to lower the misfit by less is not searched for where noise explains what is left.
 
@@ -170,3 +174,26 @@ OUTSIDE_LIBRARY = 0.03
 """Share of cases in which what is missing is not in the library and yet one of its effects fits within the noise.
 
 Reason: benchmark: with it 97.0 % were stated and 97.6 % hit in 710 cases of the highest confidence."""
+
+# How sure a verdict is (confidence.py, search/detection.py)
+
+LARGEST_GAP = 0.25
+"""Largest gap [share of peak, r.m.s.] that a missing effect is expected to leave; the smallest is `visible`.
+
+Reason: a quarter of the peak would be no extension of T0, C and k but another damper; it enters by its logarithm."""
+SMALLEST_GAP = 0.01
+"""Share of `visible` down to which an effect too small to count is expected.
+
+Reason: as many decades below `visible` as lie above it; it enters by its logarithm."""
+SIZES_AVERAGED = 400
+"""Sizes of a gap over which a likelihood is averaged.
+
+Reason: 1 % from one to the next, so that a gap known to 2 % is resolved."""
+NOT_EXCLUDED = 0.05
+"""From this probability on an effect is told as one that the tests do not exclude.
+
+Reason: as much as a 95 % interval leaves outside; not tuned."""
+UNSURE = 0.9
+"""Below this confidence a verdict without an effect tells what is not excluded, and one more test is proposed.
+
+Reason: one such verdict in ten is wrong then, if the confidence is right; not tuned."""

@@ -6,21 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-import numpy as np
-
 from pzd.artefacts import Prediction, Ranked, Value
 from pzd.damper.competing_forms import known
 from pzd.damper.effect import Parameter
 from pzd.damper.effects import library
 from pzd.damper.model import Damper
 from pzd.damper.nature import against_nature
+from pzd.diagnose.confidence import confidence_of, not_excluded
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.intervals import LEVEL, standard_errors
 from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.search.candidates import moved_by
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection
-from pzd.diagnose.thresholds import CONTRADICTS, OUTSIDE_LIBRARY
+from pzd.diagnose.thresholds import CONTRADICTS, UNSURE
 from pzd.diagnose.trends_of_tests import Trend
 from pzd.quantities import Control
 
@@ -37,6 +36,11 @@ class Decision:
     verdict: Verdict
     reason: str
     confidence: float | None
+
+    @property
+    def unsure(self) -> bool:
+        """Whether nothing is named, and much is not excluded."""
+        return self.verdict == "none" and self.confidence is not None and self.confidence < UNSURE
 
 
 def weak(hold_out: str) -> str:
@@ -103,8 +107,9 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
     if selection.rivals or selection.competitions:
         others = [*selection.rivals, *(f"{known()[f.form].law} (not in the library)" for f in selection.competitions)]
         words = f"{change}; {', '.join(others)} would do as well on these tests"
-        return Decision("ambiguous", words, confidence_of(selection))
-    return Decision("named", f"{change}; what is left is within the noise or negligible", confidence_of(selection))
+        return Decision("ambiguous", words, confidence_of(selection, config))
+    sure = confidence_of(selection, config)
+    return Decision("named", f"{change}; what is left is within the noise or negligible", sure)
 
 
 def _change(selection: Selection, sizes: tuple[float, float], config: DiagnoseConfig) -> str:
@@ -125,38 +130,32 @@ def _remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
 
 
 def _nothing_adopted(size: float, chance: float, selection: Selection, config: DiagnoseConfig) -> Decision:
+    sure = confidence_of(selection, config)
     if selection.undecided and (chance >= config.significance or size < config.visible):
         told = "; ".join(f"{name} {selection.reasons[name]}" for name in selection.undecided)
-        return Decision("ambiguous", f"{told}; more tests would settle it", None)
+        return Decision("ambiguous", f"{told}; more tests would settle it", sure)
     gap = f"a gap of {_percent(size)} of peak force (r.m.s. above the noise)"
+    doubt = _doubt(selection, config) if sure < UNSURE else ""
     if chance >= config.significance:
-        return Decision("none", f"{gap} that noise alone shows with probability {chance:.2g}: within the noise", None)
+        words = f"{gap} that noise alone shows with probability {chance:.2g}: within the noise{doubt}"
+        return Decision("none", words, sure)
     if size < config.visible:
-        limit = _percent(config.visible)
-        return Decision("none", f"{gap}, repeatable but smaller than {limit} of peak: counts as nothing missing", None)
+        words = (
+            f"{gap}, repeatable but smaller than {_percent(config.visible)} of peak: counts as nothing missing{doubt}"
+        )
+        return Decision("none", words, sure)
     words = f"{gap} that repeats (probability by noise alone {max(chance, 1e-300):.1g}); no effect of the library fits"
     return Decision("unexplained", words, None)
 
 
+def _doubt(selection: Selection, config: DiagnoseConfig) -> str:
+    """What to add of effects that the tests do not exclude."""
+    likely = [f"{name} ({told.interval})" for name, told in not_excluded(selection, config).items()]
+    return f"; these tests do not exclude {' or '.join(likely)}" if likely else ""
+
+
 def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %"
-
-
-def confidence_of(selection: Selection) -> float:
-    """Posterior weight of the effects adopted among all that were tried, by their Bayesian criteria.
-
-    Equation: w_i = exp(-BIC_i / 2) / sum_j exp(-BIC_j / 2), times what the library leaves out
-                                                    Source: Kass and Raftery 1995, J. Am. Stat. Assoc. 90, eq. (9)
-    """
-    weight = 1.0 - OUTSIDE_LIBRARY
-    for step in selection.rounds:
-        if step.chosen in selection.adopted:
-            best = next(c.delta_bic for c in step.tried if c.effect == step.chosen)
-            others = [c.delta_bic - best for c in step.contenders]
-            weight /= sum(float(np.exp(-0.5 * other)) for other in others)
-    for competitions in selection.competitions:
-        weight /= 1.0 + float(np.exp(-0.5 * competitions.behind))
-    return round(weight, 3)
 
 
 def ranking_of(selection: Selection, evidence: Evidence) -> tuple[Ranked, ...]:

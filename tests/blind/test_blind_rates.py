@@ -10,7 +10,7 @@ import pytest
 
 from pzd.blind.case import Scored
 from pzd.blind.confusion import confusion
-from pzd.blind.rates import Z95, Rate, calibration_rows, rate_rows
+from pzd.blind.rates import Z95, Rate, brier_gain, calibration_rows, held, rate_rows
 from pzd.blind.summary import write
 from pzd.blind.targets import Line, campaign_lines, lines
 from pzd.quantities import Control
@@ -146,6 +146,51 @@ def test_calibration_compares_stated_confidence_with_hits(case: Make) -> None:
     (row,) = calibration_rows(said)
     assert (row.stated, row.hit_rate, row.cases) == (0.97, 0.8, 60)
     assert [one.met for one in lines(said) if one.figure == "hit rate"] == ["missed"]
+
+
+@pytest.mark.parametrize(
+    ("said", "holds"),
+    [
+        ({}, True),
+        ({"effects": ("lash",)}, False),
+        ({"effects": ("asymmetry", "lash")}, False),
+        ({"verdict": "none", "effects": ()}, False),
+        ({"verdict": "none", "effects": (), "visible_gap": 0.002}, True),
+        ({"visible_gap": 0.002}, True),
+        ({"verdict": "ambiguous", "effects": ("lash",), "rivals": ("asymmetry",)}, True),
+        ({"verdict": "ambiguous", "effects": (), "rivals": ("asymmetry",)}, True),
+        ({"verdict": "ambiguous", "effects": (), "rivals": ("lash",)}, False),
+        ({"verdict": "ambiguous", "effects": (), "rivals": ("lash",), "truth": (), "visible_gap": 0.0}, True),
+        ({"verdict": "ambiguous", "effects": ("lash",), "truth": (), "visible_gap": 0.0}, False),
+        ({"truth": ("asymmetry", "lash"), "gap_given_other": {"asymmetry": 0.01, "lash": 0.001}}, True),
+        ({"truth": ("asymmetry", "lash"), "gap_given_other": {"asymmetry": 0.01, "lash": 0.003}}, False),
+        ({"kind": "outside", "truth": (), "hidden": "ripple", "verdict": "none", "effects": ()}, False),
+        ({"kind": "outside", "truth": (), "hidden": "ripple", "effects": ("asymmetry",)}, False),
+    ],
+)  # fmt: skip
+def test_a_confidence_holds_where_nothing_that_counts_is_left_out_and_nothing_false_is_named(
+    case: Make, said: dict[str, object], holds: bool
+) -> None:
+    assert held(case(**said)) is holds
+
+
+def test_the_best_constant_gains_nothing_and_the_truth_everything(case: Make) -> None:
+    came = [{}] * 3 + [{"effects": ("lash",)}]
+    assert brier_gain([case(confidence=0.75, **each) for each in came]) == pytest.approx(0.0)
+    assert brier_gain([case(confidence=float(not each), **each) for each in came]) == 1.0
+    assert brier_gain([case(), case(confidence=None, effects=("lash",))]) is None
+
+
+def test_bins_of_200_are_asked_whether_their_hit_rate_agrees(case: Make) -> None:
+    """Five bins, of which the fourth states 80 % and holds in 60."""
+    said = [
+        case(confidence=stated, effects=("asymmetry",) if i < 200 * rate else ("lash",))
+        for stated, rate in ((0.2, 0.2), (0.4, 0.4), (0.6, 0.6), (0.8, 0.6), (0.95, 0.95))
+        for i in range(200)
+    ]
+    found = [one.met for one in lines(said) if one.target == "in its interval"]
+    assert found == ["met", "met", "met", "missed", "met"]
+    assert [one.met for one in lines(said[1:]) if one.target == "in its interval"] == []
 
 
 def test_intervals_count_from_400_parameters_on(case: Make) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,6 +76,26 @@ def left_at(
     limits : (free,) least and largest values of the variables that the search moves
     wanted : the columns asked for, the others being zero; all where none are given
     """
+    residuals, forces, blocks = [], [], []
+    for o, columns, force, slopes in _sensitivities_at(problem, unknowns, x, limits, wanted):
+        counted = o.in_noise(np.column_stack([o.measured - force, -slopes]))
+        residuals.append(counted[:, 0].copy())
+        forces.append(force)
+        blocks.append((columns, counted[:, 1:].copy()))
+    return Left(tuple(residuals), tuple(forces), BlockSlopes(limits[0].size, tuple(blocks)))
+
+
+def force_slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> BlockSlopes:
+    """Slopes of the force at the compared samples [N] by all searched variables; parameters as in `left_at`."""
+    limits = np.full(x.size, -np.inf), np.full(x.size, np.inf)
+    found = _sensitivities_at(problem, unknowns, x, limits, None)
+    return BlockSlopes(x.size, tuple((columns, slopes) for _, columns, _, slopes in found))
+
+
+def _sensitivities_at(
+    problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array], wanted: Sequence[int] | None
+) -> Iterator[tuple[RecordLikelihood, tuple[int, ...], Array, Array]]:
+    """Each observation with the variables that move it, the force (n,) and its slopes (n, columns); see `left_at`."""
     low, high = limits
     free = low.size
     point, below, above = (
@@ -92,18 +112,12 @@ def left_at(
         )
         for j in asked
     }
-    residuals, forces, blocks = [], [], []
     alike, known = alike_at_one_voltage(point), dict[int, Directions]()
     for o in problem.observations:
-        columns = [j for j in moving(problem, unknowns, o, free) if j in beside]
+        columns = tuple(j for j in moving(problem, unknowns, o, free) if j in beside)
         if o.place not in known or o.place < 0 or not alike:
             known[o.place] = directions(point, [beside[j] for j in columns], o)
-        force, slopes = sensitivities(known[o.place], o, problem.work)
-        counted = o.in_noise(np.column_stack([o.measured - force, -slopes]))
-        residuals.append(counted[:, 0].copy())
-        forces.append(force)
-        blocks.append((tuple(columns), counted[:, 1:].copy()))
-    return Left(tuple(residuals), tuple(forces), BlockSlopes(free, tuple(blocks)))
+        yield o, columns, *sensitivities(known[o.place], o, problem.work)
 
 
 def moving(problem: Problem, unknowns: Sequence[Unknown], o: RecordLikelihood, free: int) -> list[int]:

@@ -44,6 +44,10 @@ class Candidate:
     """Change of the Bayesian criterion against the model without it; negative where it pays."""
     explained: float
     """R.m.s. by which it moves the simulated force, as a share of each record's peak."""
+    apart: float
+    """Sum of squares of what it changes in the residuals, in units of noise."""
+    less: float
+    """How much lower the misfit is with it."""
     varies: bool = False
     """Whether its parameters are by voltage: an effect adopted before, or one that is only looked for so."""
     searched: bool = True
@@ -173,7 +177,7 @@ def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:
 def _varied(problem: Problem, before: Fitted, effect: str, evaluations: int = MOST_EVALUATIONS) -> Candidate:
     wider = replace(problem, varying=problem.varying | {effect})
     fitted = fit(wider, before.effects, wider.start_with(before.damper), evaluations)
-    return Candidate(effect, fitted, delta_bic(before, fitted), moved_by(problem, before, fitted), varies=True)
+    return Candidate(effect, fitted, delta_bic(before, fitted), *_changed(problem, before, fitted), varies=True)
 
 
 def converged(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
@@ -211,7 +215,13 @@ def _from(
         own = len(fitted.unknowns) - len(before.unknowns)
         alone = fitted.misfit - before.misfit + own * float(np.log(fitted.size))
         pays = max(pays, alone, delta_bic(pooled, fitted))
-    return Candidate(effect, fitted, pays, moved_by(problem, before, fitted))
+    return Candidate(effect, fitted, pays, *_changed(problem, before, fitted))
+
+
+def _changed(problem: Problem, before: Fitted, after: Fitted) -> tuple[float, float, float]:
+    """What a candidate changes: the force, the residuals, the misfit."""
+    apart = sum(float((b - a) @ (b - a)) for b, a in zip(before.residuals, after.residuals, strict=True))
+    return moved_by(problem, before, after), apart, before.misfit - after.misfit
 
 
 def delta_bic(before: Fitted, after: Fitted) -> float:

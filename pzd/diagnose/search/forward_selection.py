@@ -33,6 +33,7 @@ from pzd.diagnose.search.candidates import (
     delta_bic,
     moved_by,
 )
+from pzd.diagnose.search.detection import Detection, detections
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.diagnose.search.reweighting import reweighted
 from pzd.diagnose.search.selection import Competition, Round, Selection
@@ -63,7 +64,9 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
     search.rest()
     undecided, competitions = search.undecided(), search.competitions()
     rounds, reasons = tuple(search.rounds), search.reasons
-    return Selection(plain, search.current, rounds, reasons, first, search.evidence, competitions, undecided)
+    return Selection(
+        plain, search.current, rounds, reasons, first, search.evidence, competitions, undecided, search.left_open
+    )
 
 
 @dataclass(eq=False)
@@ -80,6 +83,7 @@ class _Search:
     current: Fitted
     rounds: list[Round] = field(default_factory=list)
     reasons: dict[str, str] = field(default_factory=dict)
+    left_open: dict[str, tuple[Detection, ...]] = field(default_factory=dict)
 
     def force(self) -> None:
         """Adopt what the config asks for."""
@@ -156,6 +160,7 @@ class _Search:
         lead = next((c for c in tried if missing and self._too_little(self.evidence, self.current, c) is None), None)
         found = None if lead is None else self._with_second(lead)
         if lead is None or found is None:
+            self.left_open = detections(self.evidence.whole, self.current, tried)
             # Once noise explains what is left, the round that adopted something tells more of the others.
             self.rounds += [Round(tried, None)] if tried and (missing or not self.rounds) else []
             return False

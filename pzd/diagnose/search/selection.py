@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from pzd.damper.model import Damper
 from pzd.diagnose.fit.least_squares import Fitted
 from pzd.diagnose.search.candidates import Candidate
+from pzd.diagnose.search.detection import Detection
 from pzd.diagnose.search.evidence import Evidence
 
 
@@ -63,6 +65,8 @@ class Selection:
     """What is not in the library and would do as well in the place of an effect adopted, or better."""
     undecided: tuple[str, ...] = ()
     """Effects that would fit better where nothing was adopted, and of which the tests do not say enough."""
+    left_open: Mapping[str, tuple[Detection, ...]] = field(default_factory=dict)
+    """What the tests say of the gap of every effect that was tried beside all that was adopted."""
 
     @property
     def rivalling(self) -> tuple[tuple[str, Damper], ...]:
