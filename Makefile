@@ -59,6 +59,10 @@ blind: $(RUNTIME)  ## Hide effects in virtual rigs, and print how far the verdic
 blind-motions: $(RUNTIME)  ## As `make blind`, on two tones, sweeps, roads, moving voltages, warming alone; three hours
 	$(BIN)/pzd blind configs/blind-motions.yaml
 
+.PHONY: blind-edge
+blind-edge: $(RUNTIME)  ## As `make blind`, at the edge of what can be seen: how far a confidence can be trusted; half an hour
+	$(BIN)/pzd blind configs/blind-edge.yaml
+
 .PHONY: bench
 bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that does the same work; half an hour
 	$(BIN)/python tests/studies/bench.py

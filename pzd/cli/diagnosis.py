@@ -45,13 +45,21 @@ def diagnosis_lines(
     lines += [f"where: {where.region}, {where.share_of_gap:.0%} of the gap" for where in diagnosis.where[:_MOST]]
     lines += [f"adopted: {name}, {_parameters(diagnosis, name, unit)}" for name in diagnosis.effects]
     if diagnosis.confidence is not None:
-        lines.append(f"confidence: {diagnosis.confidence:.0%}")
+        lines.append(f"confidence: {diagnosis.confidence:.0%}{_of(diagnosis)}")
     if diagnosis.rivals:
         lines.append(f"rivals: {', '.join(diagnosis.rivals)}")
     lines += [*_rejected(diagnosis), *_hypotheses(hypotheses)]
     if diagnosis.next_test:
         lines.append(_next(diagnosis.next_test, unit))
     return lines
+
+
+def _of(diagnosis: Diagnosis) -> str:
+    """What the confidence of an open verdict is in."""
+    if diagnosis.verdict != "ambiguous":
+        return ""
+    named = [*diagnosis.effects, *diagnosis.rivals] + ["nothing"] * (not diagnosis.effects)
+    return f" that it is {' or '.join(named)}" if len(named) > 1 else ""
 
 
 def _gap(diagnosis: Diagnosis) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pzd.artefacts import ForceRow, Table
+from pzd.artefacts import Table
 from pzd.damper.branch import BRANCHES, any_slips
 from pzd.damper.columns import DRIVE
 from pzd.damper.compose import steady_force
@@ -45,17 +45,26 @@ def table_of(damper: Damper, table: Table) -> Table:
         key = (row.temperature_degC, row.voltage_V)
         if row.inside == 1 or table.notes.outside != "clamp":
             held[key] = max(held[key], abs(row.velocity_m_per_s))
+    forces = {key: iter(_forces_of(damper, table, key, fastest)) for key, fastest in held.items()}
+    rows = (
+        (row, next(forces[row.temperature_degC, row.voltage_V]))  # one after another as they stand in the table
+        for row in table.force
+    )
     return Table(
-        tuple(_of(damper, row, held[row.temperature_degC, row.voltage_V]) for row in table.force), (), table.notes
+        tuple(row if row.force_N is None else row.model_copy(update={"force_N": force}) for row, force in rows),
+        (),
+        table.notes,
     )
 
 
-def _of(damper: Damper, row: ForceRow, fastest: float) -> ForceRow:
-    if row.force_N is None:
-        return row
-    velocity = np.copysign(min(abs(row.velocity_m_per_s), fastest), row.velocity_m_per_s)
-    force = float(steady_force(damper, row.voltage_V, row.temperature_degC, velocity))
-    return row.model_copy(update={"force_N": force})
+def _forces_of(
+    damper: Damper, table: Table, conditions: tuple[float | None, float | None], fastest: float
+) -> list[float]:
+    """Force of a damper [N] at the nodes of one temperature and voltage, no faster than its table reaches."""
+    temperature, voltage = conditions
+    asked = [row.velocity_m_per_s for row in table.force if (row.temperature_degC, row.voltage_V) == conditions]
+    velocity = np.copysign(np.minimum(np.abs(asked), fastest), asked)
+    return [float(force) for force in steady_force(damper, voltage, temperature, velocity)]
 
 
 def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -> DynamicDamper:

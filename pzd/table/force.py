@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -66,21 +65,19 @@ def grid(config: TableConfig, damper: Damper, temperatures: Sequence[float | Non
     both = np.concatenate([-speeds[::-1], speeds])
     warm = temperatures[0]
 
-    def over_voltage(voltage: float) -> Array:
-        return forces(damper, warm, voltage, both)
-
     allowed = config.tolerance * max(float(np.max(np.abs(forces(damper, warm, u, both)))) for u in voltages)
-    known = [u for u in voltages if u is not None]
-    if config.voltages_V is None and known:
+    known = np.array([u for u in voltages if u is not None])
+
+    def over_voltage(at: Array) -> Array:
+        return steady_force(damper, at[:, np.newaxis], warm, both)
+
+    def over_speed(at: Array) -> Array:
+        pairs = at[:, np.newaxis, np.newaxis] * np.array([-1.0, 1.0])
+        return steady_force(damper, known[:, np.newaxis] if known.size else None, warm, pairs).reshape(at.size, -1)
+
+    if config.voltages_V is None and known.size:
         known = refined(known, over_voltage, allowed)
-
-    def over_speed(speed: float) -> Array:
-        pair = np.array([-speed, speed])
-        return np.concatenate([forces(damper, warm, u, pair) for u in known or (None,)])
-
-    return TableNodes(
-        tuple(temperatures), tuple(known) or (None,), np.array(refined(list(speeds), over_speed, allowed))
-    )
+    return TableNodes(tuple(temperatures), tuple(map(float, known)) or (None,), refined(speeds, over_speed, allowed))
 
 
 def _speeds(config: TableConfig, reach: ReachedSpeed) -> Array:
@@ -92,35 +89,32 @@ def _speeds(config: TableConfig, reach: ReachedSpeed) -> Array:
     return np.unique(np.concatenate([[0.0], apart, fastest[fastest > 0.0]]))
 
 
-def refined(nodes: Sequence[float], law: Callable[[float], Array], allowed: float) -> list[float]:
+def refined(nodes: Array, law: Callable[[Array], Array], allowed: float) -> Array:
     """The nodes, with intervals halved until the straight line between two is off by no more than `allowed`.
 
     Parameters
     ----------
-    nodes : rising
-    law : values (n,) of the law at a node
+    nodes : (m,) rising
+    law : values (k, n) of the law at k nodes
     allowed : largest error at the middle of an interval, in units of the law
 
     Returns
     -------
     the nodes and those added between them, rising
     """
-    found = [nodes[0]]
-    for low, high in pairwise(nodes):
-        found += [*_halved(low, high, law, allowed, HALVINGS), high]
+    found, values = nodes, law(nodes)
+    wide = np.arange(nodes.size - 1)
+    for _ in range(HALVINGS):
+        middles = 0.5 * (found[wide] + found[wide + 1])
+        there = law(middles)
+        off = np.max(np.abs(there - 0.5 * (values[wide] + values[wide + 1])), axis=1) > allowed
+        if not np.any(off):
+            break
+        behind = wide[off] + 1
+        found, values = np.insert(found, behind, middles[off]), np.insert(values, behind, there[off], axis=0)
+        first = behind - 1 + np.arange(behind.size)
+        wide = np.sort(np.concatenate([first, first + 1]))
     return found
-
-
-def _halved(low: float, high: float, law: Callable[[float], Array], allowed: float, left: int) -> list[float]:
-    middle = (low + high) / 2.0
-    off = np.max(np.abs(law(middle) - (law(low) + law(high)) / 2.0))
-    if left == 0 or off <= allowed:
-        return []
-    return [
-        *_halved(low, middle, law, allowed, left - 1),
-        middle,
-        *_halved(middle, high, law, allowed, left - 1),
-    ]
 
 
 def force_rows(config: TableConfig, damper: Damper, nodes: TableNodes, reach: ReachedSpeed) -> tuple[ForceRow, ...]:

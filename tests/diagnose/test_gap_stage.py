@@ -46,7 +46,8 @@ def test_a_damper_that_misses_nothing_is_handed_on_with_the_verdict_none(rng: np
     records = sines(damper_of(TWO), rng, TWO, jitter=0.02, cycles=5)
     found = diagnosed(records)
     assert found.diagnosis.verdict == "none"
-    assert found.diagnosis.confidence is None
+    assert found.diagnosis.confidence is not None
+    assert found.diagnosis.confidence > 0.95  # noise of these tests would hide next to nothing that counts
     assert found.diagnosis.where == ()
     gap = found.diagnosis.gap
     assert gap.before == gap.after

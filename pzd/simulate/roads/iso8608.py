@@ -6,6 +6,7 @@ The height is a function of place and seed alone: a longer ride meets the same r
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Literal
 from zlib import crc32
 
@@ -14,8 +15,7 @@ from pydantic import Field, field_validator
 from typing_extensions import override
 
 from pzd.record import Array
-from pzd.signals.iso8608 import classes
-from pzd.signals.iso8608 import profile as drawn
+from pzd.signals.iso8608 import classes, profile
 from pzd.simulate.profile import Profile, through
 from pzd.simulate.road import Road, Way
 
@@ -28,6 +28,8 @@ _MARGIN = 100
 """Knots behind the ride: the end of a spline is felt through fewer than these."""
 _RUN_IN = 5.0
 """Length over which the road rises out of the level [m]."""
+_REMEMBERED = 4
+"""Roads kept: thousands of rides of a sweep go over the same few."""
 
 
 class Iso8608(Road):
@@ -56,31 +58,38 @@ class Iso8608(Road):
 
     @override
     def profile(self, way: Way) -> Profile:
-        """The road as far as the ride goes.
+        """The road as far as the ride goes."""
+        return _drawn(self, way)
 
-        Equation: xi = cos(r) xi_k + sin(r) xi_(k+1), r from 0 to pi/2 over half a piece; cos2 + sin2 = 1 keeps the
-        spectrum
-        """
-        seed = [way.seed, crc32(self.name.encode())] if self.seed is None else [self.seed]
-        half = math.ceil(0.5 * _KNOTS_A_WAVE * _PIECE / self.shortest_wave_m)
-        spacing = 0.5 * _PIECE / half
-        knots = math.ceil(way.distance / spacing) + _MARGIN
-        fade = 0.5 * np.pi * np.arange(half) / half
-        piece, parts = self._piece([*seed, 0], 2 * half), []
-        for number in range(1, knots // half + 2):
-            following = self._piece([*seed, number], 2 * half)
-            parts.append(np.cos(fade) * piece[half:] + np.sin(fade) * following[:half])
-            piece = following
-        heights = np.concatenate(parts)[: knots + 1]
-        rising = spacing * np.arange(min(math.ceil(_RUN_IN / spacing), knots + 1)) / _RUN_IN
-        heights[: rising.size] *= rising * rising * (3.0 - 2.0 * rising)
-        return through(heights, spacing)
 
-    def _piece(self, seed: list[int], knots: int) -> Array:
-        """(knots,) heights of one piece [m], of a draw of its own."""
-        band = (_BAND_FROM, 1.0 / self.shortest_wave_m)
-        road = drawn(classes()[self.road_class], _PIECE, np.random.default_rng(seed), band)
-        return road(_PIECE / knots * np.arange(knots, dtype=np.float64))[0]
+@lru_cache(maxsize=_REMEMBERED)
+def _drawn(road: Iso8608, way: Way) -> Profile:
+    """The road as far as a ride goes.
+
+    Equation: xi = cos(r) xi_k + sin(r) xi_(k+1), r from 0 to pi/2 over half a piece; cos2 + sin2 = 1 keeps the
+    spectrum
+    """
+    seed = [way.seed, crc32(road.name.encode())] if road.seed is None else [road.seed]
+    half = math.ceil(0.5 * _KNOTS_A_WAVE * _PIECE / road.shortest_wave_m)
+    spacing = 0.5 * _PIECE / half
+    knots = math.ceil(way.distance / spacing) + _MARGIN
+    fade = 0.5 * np.pi * np.arange(half) / half
+    piece, parts = _piece(road, [*seed, 0], 2 * half), []
+    for number in range(1, knots // half + 2):
+        following = _piece(road, [*seed, number], 2 * half)
+        parts.append(np.cos(fade) * piece[half:] + np.sin(fade) * following[:half])
+        piece = following
+    heights = np.concatenate(parts)[: knots + 1]
+    rising = spacing * np.arange(min(math.ceil(_RUN_IN / spacing), knots + 1)) / _RUN_IN
+    heights[: rising.size] *= rising * rising * (3.0 - 2.0 * rising)
+    return through(heights, spacing)
+
+
+def _piece(road: Iso8608, seed: list[int], knots: int) -> Array:
+    """(knots,) heights of one piece [m], of a draw of its own."""
+    band = (_BAND_FROM, 1.0 / road.shortest_wave_m)
+    heights = profile(classes()[road.road_class], _PIECE, np.random.default_rng(seed), band)
+    return heights(_PIECE / knots * np.arange(knots, dtype=np.float64))[0]
 
 
 ROAD = Iso8608
