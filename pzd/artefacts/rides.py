@@ -9,6 +9,7 @@ from typing import ClassVar, Literal, Self
 
 from pzd.quantities import Control
 from pzd.record import Array
+from pzd.schema import parquetfile
 from pzd.schema.csvfile import read_columns, read_rows, write_columns, write_rows
 from pzd.schema.model import Frozen
 from pzd.schema.processes import parallel_map
@@ -30,6 +31,10 @@ _RIDE_OPTIONAL = tuple(name.format(axle) for axle in AXLES for name in AXLE_COLU
 Ending = Literal[
     "end of the ride", "motion died away", "motion falls no further", "ride over before the motion died away"
 ]
+
+
+History = Literal["csv", "parquet", "none"]
+"""How the history of a ride is written, if it is."""
 
 
 class SummaryRow(Frozen):
@@ -69,6 +74,8 @@ class RideRow(Frozen):
     """Of a policy that holds one voltage."""
     damping_Ns_per_m: float | None
     """Of a policy that asks for one damping coefficient, per axle."""
+    history: History
+    """The file of its history, beside this one."""
 
 
 class WheelRow(Frozen):
@@ -153,6 +160,7 @@ class Rides:
     folder: ClassVar[str] = "5-simulate"
 
     rides: tuple[Ride, ...] = ()
+    """Those whose history is written."""
     summary: tuple[SummaryRow, ...] = ()
     ridden: tuple[RideRow, ...] = ()
     wheels: tuple[WheelRow, ...] = ()
@@ -162,10 +170,14 @@ class Rides:
     found: tuple[FoundRow, ...] = ()
 
     def write(self, folder: Path, control: Control, jobs: int = 1) -> None:
-        """Write one CSV a case, so many at the same time, and one table of each kind over all cases."""
+        """Write the history of each case, so many at the same time, and one table of each kind over all cases."""
+        kinds = {row.case: row.history for row in self.ridden}
 
         def written(ride: Ride) -> None:
-            write_columns(folder / f"{ride.case}.csv", ride.columns, control, _RIDE_HEADER)
+            if kinds[ride.case] == "csv":
+                write_columns(folder / f"{ride.case}.csv", ride.columns, control, _RIDE_HEADER)
+            elif kinds[ride.case] == "parquet":
+                parquetfile.write_columns(folder / f"{ride.case}.parquet", ride.columns, control)
 
         parallel_map(written, self.rides, jobs)
         write_rows(folder / "summary.csv", SummaryRow, self.summary, control)
@@ -181,15 +193,16 @@ class Rides:
     def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
         """Read and check them again, so many at the same time."""
 
-        def ride(row: SummaryRow) -> Ride:
-            return Ride(row.case, read_columns(folder / f"{row.case}.csv", _RIDE_HEADER, control, _RIDE_OPTIONAL))
+        def ride(row: RideRow) -> Ride:
+            read = read_columns if row.history == "csv" else parquetfile.read_columns
+            return Ride(row.case, read(folder / f"{row.case}.{row.history}", _RIDE_HEADER, control, _RIDE_OPTIONAL))
 
-        summary = read_rows(folder / "summary.csv", SummaryRow, control)
-        rides = tuple(parallel_map(ride, summary, jobs))
+        ridden = read_rows(folder / "rides.csv", RideRow, control)
+        rides = tuple(parallel_map(ride, [row for row in ridden if row.history != "none"], jobs))
         return cls(
             rides,
-            summary,
-            read_rows(folder / "rides.csv", RideRow, control),
+            read_rows(folder / "summary.csv", SummaryRow, control),
+            ridden,
             read_rows(folder / "wheels.csv", WheelRow, control),
             read_rows(folder / "weighted.csv", WeightedRow, control),
             read_rows(folder / "spectrum.csv", SpectrumRow, control),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from pzd.artefacts import History
 from pzd.schema.errors import InsideError
 from pzd.schema.model import Frozen
 from pzd.simulate.car_block import CarBlock
@@ -107,6 +108,9 @@ class SimulateConfig(Frozen):
     are taken from the moment when axle 1 meets it until the motion has died away."""
     output_rate_Hz: float = Field(default=500.0, gt=0.0)
     """Rate of the written histories; every other number is taken from every step."""
+    histories: History = "csv"
+    """How the history of each ride is written: `csv`, `parquet` (half the size, with `pip install pzd[formats]`)
+    or `none`, where the numbers are enough; the report then draws no acceleration over time."""
 
     @field_validator("policies")
     @classmethod

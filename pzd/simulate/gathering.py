@@ -57,7 +57,7 @@ def rows_of_ride(
     voltage : whether the rig has a control signal
     """
     rows = _in_window(config, case, outcome, window)
-    return _of_rows(case, held, outcome, window, ending, voltage, rows)
+    return _of_rows(config, case, held, outcome, window, ending, voltage, rows)
 
 
 def _in_window(config: SimulateConfig, case: Case, outcome: Outcome, window: Window, lead: int | None = None) -> Rows:
@@ -78,13 +78,20 @@ def _in_window(config: SimulateConfig, case: Case, outcome: Outcome, window: Win
 
 
 def _of_rows(
-    case: Case, held: Held, outcome: Outcome, window: Window, ending: Ending, voltage: bool, rows: Rows
+    config: SimulateConfig,
+    case: Case,
+    held: Held,
+    outcome: Outcome,
+    window: Window,
+    ending: Ending,
+    voltage: bool,
+    rows: Rows,
 ) -> RideRows:
     summary, wheels, felt, spectrum, _ = rows
     return RideRows(
         ride_of(case.name, outcome, _left_out(case, voltage)),
         summary,
-        _ride_row(case, held, outcome.step, window, ending, voltage),
+        _ride_row(config, case, held, outcome.step, window, ending, voltage),
         tuple(wheels),
         felt,
         tuple(spectrum),
@@ -123,7 +130,7 @@ class Gathering:
         pieces = Pieces(window.first, clock.step, partial(_in_window, self._config, case))
         held, outcome = ridden(case, pieces.take)
         rows = pieces.joined(outcome)
-        return _of_rows(case, held, outcome, window, "end of the ride", self._with_voltage, rows)
+        return _of_rows(self._config, case, held, outcome, window, "end of the ride", self._with_voltage, rows)
 
     def all(
         self,
@@ -151,7 +158,7 @@ class Gathering:
                 every |= self._over_event(event, [(c, *ride) for c, ride in over if not isinstance(ride, RideRows)])
         found = [every[case.name] for case in planned]
         return Rides(
-            tuple(one.ride for one in found),
+            tuple(one.ride for one in found if one.ridden.history != "none"),
             tuple(one.summary for one in found),
             tuple(one.ridden for one in found),
             tuple(row for one in found for row in one.wheels),
@@ -197,7 +204,9 @@ def _left_out(case: Case, with_voltage: bool) -> tuple[str, ...]:
     return without + ((_DEMANDED,) if case.policy.aim in ("voltage", "schedule") else ())
 
 
-def _ride_row(case: Case, held: Held, step: float, window: Window, ending: Ending, with_voltage: bool) -> RideRow:
+def _ride_row(
+    config: SimulateConfig, case: Case, held: Held, step: float, window: Window, ending: Ending, with_voltage: bool
+) -> RideRow:
     aim = case.policy.aim
     return RideRow(
         case=case.name,
@@ -206,4 +215,5 @@ def _ride_row(case: Case, held: Held, step: float, window: Window, ending: Endin
         ending=ending,
         voltage_V=held.voltage if aim == "voltage" and with_voltage else None,
         damping_Ns_per_m=held.damping if aim == "damping" else None,
+        history=config.histories,
     )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from pzd.artefacts import Diagnosed, Rides, Table
 from pzd.schema.errors import ConfigError
+from pzd.schema.parquetfile import check_installed
 from pzd.simulate.config import SimulateConfig
 
 if TYPE_CHECKING:
@@ -37,8 +38,8 @@ def simulate(
 
     Raises
     ------
-    ConfigError : when a policy needs the voltage of a rig without one, a road is too short for the ride, or a
-        temperature or a voltage lies outside of the table
+    ConfigError : when histories cannot be written as asked, a policy needs the voltage of a rig without one, a road is
+        too short for the ride, or a temperature or a voltage lies outside of the table
     DataError : when a ride needs the table where it ends
     """
     from pzd.simulate.dampers import check_inertance, dynamic_damper_of, grid_of, table_of
@@ -48,6 +49,8 @@ def simulate(
     from pzd.simulate.response import responses
     from pzd.simulate.setup import Setup
 
+    if simulate.histories == "parquet":
+        check_installed("simulate.histories")
     with_voltage = all(row.voltage_V is not None for row in diagnosed.damper.base)
     planned = cases(simulate, with_voltage, diagnosed.damper != diagnosed.plain)
     temperature = checked_temperature(simulate, table)

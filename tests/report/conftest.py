@@ -300,6 +300,7 @@ def made(
         ending="end of the ride",
         voltage_V=None,
         damping_Ns_per_m=None,
+        history="csv",
     ).model_copy(update=held or {})
     wheels = tuple(
         WheelRow(

@@ -132,6 +132,65 @@ def test_written_histories_are_thinned_and_peaks_are_not(damper) -> None:
     assert (thin.weighted, thin.spectrum, thin.wheels) == (full.weighted, full.spectrum, full.wheels)
 
 
+def test_histories_in_parquet_read_back_as_those_in_csv_do(damper, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    read = {}
+    for kind in ("csv", "parquet"):
+        (tmp_path / kind).mkdir()
+        ride(damper, policies=["comfort"], histories=kind).write(tmp_path / kind, Control("current", "A"))
+        assert len(list((tmp_path / kind).glob(f"sine-*.{kind}"))) == 3
+        read[kind] = Rides.read(tmp_path / kind, Control("current", "A"))
+    assert not list((tmp_path / "parquet").glob("sine-*.csv"))
+    for one, other in zip(read["csv"].rides, read["parquet"].rides, strict=True):
+        assert one.case == other.case
+        assert one.columns.keys() == other.columns.keys()
+        assert all(np.array_equal(one.columns[name], other.columns[name]) for name in one.columns)
+
+
+def test_histories_that_are_not_wanted_are_not_written_and_all_numbers_stay(damper, tmp_path: Path) -> None:
+    without, usual = (ride(damper, policies=["comfort"], histories=kind) for kind in ("none", "csv"))
+    assert without.rides == ()
+    assert (without.summary, without.weighted, without.spectrum) == (usual.summary, usual.weighted, usual.spectrum)
+    without.write(tmp_path, Control())
+    assert not list(tmp_path.glob("sine-*"))
+    assert Rides.read(tmp_path, Control()).ridden == without.ridden
+
+
+def test_parquet_without_its_library_is_refused_before_anything_is_ridden(
+    damper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pzd.schema.parquetfile.find_spec", lambda _: None)
+    with pytest.raises(ConfigError, match=r"^simulate\.histories: parquet is written with pyarrow, which is not"):
+        ride(damper, histories="parquet")
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "told"),
+    [
+        ("gone", "the file is missing"),
+        ("words", "is no Parquet file"),
+        ("column", "column a_K_m_per_s2 is missing"),
+        ("number", "column z_m must hold finite numbers"),
+    ],
+)
+def test_a_spoilt_history_is_refused_with_its_place(damper, tmp_path: Path, spoilt: str, told: str) -> None:
+    pyarrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    ride(damper, policies=["comfort"], fidelities=["ideal"], histories="parquet").write(tmp_path, Control())
+    (path,) = tmp_path.glob("*.parquet")
+    columns = parquet.read_table(path).to_pydict()
+    if spoilt == "gone":
+        path.unlink()
+    elif spoilt == "words":
+        path.write_text("time_s,z_m", encoding="utf-8")
+    elif spoilt == "column":
+        parquet.write_table(pyarrow.table({n: v for n, v in columns.items() if n != "a_K_m_per_s2"}), path)
+    else:
+        parquet.write_table(pyarrow.table({**columns, "z_m": [None, *columns["z_m"][1:]]}), path)
+    with pytest.raises(DataError, match=f"{path.name}: {told}"):
+        Rides.read(tmp_path, Control())
+
+
 def test_force_answers_a_step_of_voltage_later_than_the_valve(damper) -> None:
     times = {(r.signal, r.to_voltage_V): r for r in ride(damper).responses}
     voltage, force = times["voltage", 150.0], times["force", 150.0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -19,16 +19,18 @@ _TIME, _ACCELERATION = RIDE_COLUMNS[0], RIDE_COLUMNS[-1]
 
 
 def draw(context: ReportContext) -> Iterator[Panel]:
-    """The last three periods of a harmonic road; of any other the four seconds with the largest peak."""
-    for road in context.roads:
-        shown = context.nearest(road)
-        if shown:
-            yield _panel(context, road, shown)
-
-
-def _panel(context: ReportContext, road: str, shown: tuple[SummaryRow, ...]) -> Panel:
-    figure, ax = axes(key=2)
+    """The last three periods of a harmonic road, of any other the four seconds with the largest peak; where written."""
     histories = {ride.case: ride.columns for ride in context.rides.rides}
+    for road in context.roads:
+        shown = tuple(row for row in context.nearest(road) if row.case in histories)
+        if shown:
+            yield _panel(context, road, shown, histories)
+
+
+def _panel(
+    context: ReportContext, road: str, shown: tuple[SummaryRow, ...], histories: Mapping[str, Mapping[str, Array]]
+) -> Panel:
+    figure, ax = axes(key=2)
     periods = {r.name: _PERIODS / r.frequency_Hz for r in context.simulate.roads if isinstance(r, Sine)}
     first = histories[shown[0].case]
     start, end = _window(first[_TIME], np.abs(first[_ACCELERATION]), periods.get(road))

@@ -13,6 +13,7 @@ from pzd.paper.figures.cars import survey
 from pzd.paper.figures.fidelities import fidelities
 from pzd.paper.figures.figure import Drawing, PaperFigure
 from pzd.paper.figures.sources import FigureData
+from pzd.schema.errors import ConfigError
 
 _SHOWN = 2.0
 """Length of what is shown of the settled ride [s]."""
@@ -28,7 +29,12 @@ def draw(data: FigureData) -> Iterator[Drawing]:
 
 
 def accelerations(data: FigureData) -> Drawing:
-    """|a_K| over the last two seconds of the ideal rides at 2.25 and 4.5 Hz."""
+    """|a_K| over the last two seconds of the ideal rides at 2.25 and 4.5 Hz.
+
+    Raises
+    ------
+    ConfigError : when no history was written
+    """
     rides = {ride.case: ride.columns for ride in data.rides_of_setting.rides.rides}
     figure, axes = panels()
     captions = []
@@ -37,6 +43,8 @@ def accelerations(data: FigureData) -> Drawing:
     ):
         for (policy, (label, colour)), peak in zip(_CURVES.items(), printed, strict=True):
             row = data.ride(frequency, policy, "ideal")
+            if row.case not in rides:
+                raise ConfigError("simulate.histories: Fig. 19 is drawn from them; say csv or parquet (got none)")
             time = rides[row.case][_TIME]
             part = time >= time[-1] - _SHOWN
             ax.plot(time[part] - time[part][0], np.abs(rides[row.case][_ACCELERATION][part]), color=colour, label=label)
