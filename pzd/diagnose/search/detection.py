@@ -103,19 +103,17 @@ class _Tangent:
 
     problem: Problem
     before: Fitted
-    slopes: Array
-    """(w, p) of the residuals."""
     forces: Array
-    """(n, p) of the force, each record in units of its peak and of the root of its samples."""
+    """(n, p) orthonormal: what of a change of the force its variables can take up, in `units`."""
     units: Array
-    """(n,) these units [N]."""
+    """(n,) of the force [N]: the peak of each record, and the root of the samples."""
 
     @classmethod
     def at(cls, problem: Problem, before: Fitted) -> _Tangent:
         counts = [o.peak * np.sqrt(o.measured.size * len(problem.observations)) for o in problem.observations]
         units = np.repeat(counts, [o.measured.size for o in problem.observations])
         forces = force_slopes(problem, before.unknowns, before.searched).dense() / units[:, np.newaxis]
-        return cls(problem, before, before.slopes.dense(), forces, units)
+        return cls(problem, before, np.asarray(np.linalg.qr(forces).Q), units)
 
     def gap(self, simulated: Sequence[Array]) -> float:
         """R.m.s. of a change of the force that no other values of what stands before would bring about."""
@@ -145,7 +143,7 @@ class _Tangent:
         simulated = [response(o, damper) for o in problem.observations]
         left = [o.in_noise(o.measured - f) for o, f in zip(problem.observations, simulated, strict=True)]
         residual = np.concatenate(before.residuals)
-        rest = _beside(self.slopes, np.concatenate(left) - residual)
+        rest = _beside(self.before.frame, np.concatenate(left) - residual)
         gap, power = self.gap(simulated), float(rest @ rest)
         if gap <= 0.0 or power <= 0.0:
             return None
@@ -153,12 +151,9 @@ class _Tangent:
         return Detection(part * gap, gap * float(np.sqrt(spread / power)), part**2 * power / spread, 0)
 
 
-def _beside(columns: Array, values: Array) -> Array:
-    """(n,) what of some values no combination of (n, p) columns gives."""
-    size = np.linalg.norm(columns, axis=0)
-    scaled = columns / np.where(size > 0.0, size, 1.0)
-    rest: Array = values - scaled @ np.linalg.lstsq(scaled, values, rcond=1e-6)[0]
-    return rest
+def _beside(frame: Array, values: Array) -> Array:
+    """(n,) what of some values no combination of (n, p) orthonormal columns gives."""
+    return values - frame @ (frame.T @ values)
 
 
 def _traces(problem: Problem, before: Fitted, effect: Effect) -> Iterator[Array]:
