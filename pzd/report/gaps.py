@@ -18,6 +18,9 @@ _FEWEST = 5
 _ROWS = 12
 """The map shows no more rows than this."""
 
+_MOST_VOLTAGES = 3
+"""Voltages that are shown, from the lowest to the highest."""
+
 
 @dataclass(frozen=True, eq=False)
 class GapMap:
@@ -43,6 +46,19 @@ def of_record(context: ReportContext, record: Record) -> tuple[float, float]:
 def begun(record: Record) -> slice:
     """The samples of a record that do not depend on how it began."""
     return slice(warm_up(record.displacement), None)
+
+
+def at_some_voltages(context: ReportContext) -> dict[str, list[Record]]:
+    """Records by voltage, those of the lowest, the highest and one between; all together where there is none."""
+    scale = voltage_scale(context.sampled)
+    still = [r for r in context.sampled if is_constant(r, scale)] or list(context.sampled)
+    levels = sorted({context.level(r) or 0.0 for r in still})
+    places = np.linspace(0, len(levels) - 1, min(_MOST_VOLTAGES, len(levels)))
+    chosen = [levels[round(place)] for place in places]
+    return {
+        context.voltage(level) if context.controlled else "": [r for r in still if (context.level(r) or 0.0) == level]
+        for level in chosen
+    }
 
 
 def gap_map(context: ReportContext) -> GapMap:

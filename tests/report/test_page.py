@@ -380,6 +380,25 @@ def test_what_is_left_is_drawn_over_three_planes_where_it_has_no_name(run: Any) 
     assert planes(run) == []
 
 
+@pytest.mark.ci
+def test_what_is_left_is_drawn_by_frequency_and_by_its_spread_and_tests_alone_over_what_they_differ_in(
+    run: Any,
+) -> None:
+    def told(of: Any) -> list[str]:
+        alts = [str(attributes["alt"]) for tag, attributes in Reader(of.told().page).tags if tag == "img"]
+        begins = ("R.m.s. of measured minus", "Quantiles of what is left", "T0, C and k of")
+        return [alt.replace("\u00a0", " ") for alt in alts if alt.startswith(begins)]
+
+    found = told(with_hypotheses(run, Hypotheses(sought=True)))
+    assert [alt.partition(";")[0] for alt in found if alt.startswith("R.m.s.")] == [
+        "R.m.s. of measured minus simulated force by third octaves at 0 V",
+        "R.m.s. of measured minus simulated force by third octaves at 150 V",
+    ]
+    assert sum(alt.startswith("Quantiles") for alt in found) == 1
+    assert any(alt.endswith("each fitted alone, over the place among the tests.") for alt in found)
+    assert told(run) == []
+
+
 def test_without_a_hypothesis_the_page_says_that_none_predicts_or_says_nothing(words_only: None, run: Any) -> None:
     none = Reader(with_hypotheses(run, Hypotheses(sought=True)).told().page).text
     assert "No shape of what is left predicts tests kept back better" in none

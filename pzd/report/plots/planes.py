@@ -7,17 +7,15 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, VELOCITY
-from pzd.record import Array, Record, is_constant, voltage_scale
+from pzd.record import Array, Record
 from pzd.report.context import ReportContext
 from pzd.report.drawing import Panel, Plot
-from pzd.report.gaps import begun
+from pzd.report.gaps import at_some_voltages, begun
 
 _CLASSES = 28
 """Classes of either quantity of a plane."""
 _FEWEST = 3
 """A cell with fewer samples stays empty."""
-_MOST_VOLTAGES = 3
-"""Voltages that are shown, from the lowest to the highest."""
 _CENTRED = "RdBu_r"
 """White where nothing is left; red where more force was measured."""
 
@@ -33,23 +31,10 @@ def draw(context: ReportContext) -> Iterator[Panel]:
     """A picture a plane, a column a voltage, before above and after below; under the verdict `unexplained` alone."""
     if context.diagnosed.diagnosis.verdict != "unexplained" or not context.records:
         return
-    groups = _groups(context)
+    groups = at_some_voltages(context)
     which = (0, 1) if context.extended else (0,)
     for first, second, words in _PLANES:
         yield _panel(context, groups, which, (first, second), words)
-
-
-def _groups(context: ReportContext) -> dict[str, list[Record]]:
-    """Records by voltage, at most `_MOST_VOLTAGES` of them; all together where there is none."""
-    scale = voltage_scale(context.sampled)
-    still = [r for r in context.sampled if is_constant(r, scale)] or list(context.sampled)
-    levels = sorted({context.level(r) or 0.0 for r in still})
-    places = np.linspace(0, len(levels) - 1, min(_MOST_VOLTAGES, len(levels)))
-    chosen = [levels[round(place)] for place in places]
-    return {
-        context.voltage(level) if context.controlled else "": [r for r in still if (context.level(r) or 0.0) == level]
-        for level in chosen
-    }
 
 
 def _panel(
