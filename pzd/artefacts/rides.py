@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal, Self
@@ -171,12 +171,12 @@ class Rides:
 
     def write(self, folder: Path, control: Control, jobs: int = 1) -> None:
         """Write the history of each case, so many at the same time, and one table of each kind over all cases."""
-        kinds = {row.case: row.history for row in self.ridden}
+        history = _histories(self.ridden)
 
         def written(ride: Ride) -> None:
-            if kinds[ride.case] == "csv":
+            if history(ride.case) == "csv":
                 write_columns(folder / f"{ride.case}.csv", ride.columns, control, _RIDE_HEADER)
-            elif kinds[ride.case] == "parquet":
+            elif history(ride.case) == "parquet":
                 parquetfile.write_columns(folder / f"{ride.case}.parquet", ride.columns, control)
 
         parallel_map(written, self.rides, jobs)
@@ -193,15 +193,17 @@ class Rides:
     def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
         """Read and check them again, so many at the same time."""
 
-        def ride(row: RideRow) -> Ride:
-            read = read_columns if row.history == "csv" else parquetfile.read_columns
-            return Ride(row.case, read(folder / f"{row.case}.{row.history}", _RIDE_HEADER, control, _RIDE_OPTIONAL))
+        def ride(case: str) -> Ride:
+            read = read_columns if history(case) == "csv" else parquetfile.read_columns
+            return Ride(case, read(folder / f"{case}.{history(case)}", _RIDE_HEADER, control, _RIDE_OPTIONAL))
 
+        summary = read_rows(folder / "summary.csv", SummaryRow, control)
         ridden = read_rows(folder / "rides.csv", RideRow, control)
-        rides = tuple(parallel_map(ride, [row for row in ridden if row.history != "none"], jobs))
+        history = _histories(ridden)
+        written = [row.case for row in summary if history(row.case) != "none"]
         return cls(
-            rides,
-            read_rows(folder / "summary.csv", SummaryRow, control),
+            tuple(parallel_map(ride, written, jobs)),
+            summary,
             ridden,
             read_rows(folder / "wheels.csv", WheelRow, control),
             read_rows(folder / "weighted.csv", WeightedRow, control),
@@ -217,6 +219,12 @@ class Rides:
             for row in self.summary
             if not abs(row.energy_error) <= ENERGY_LIMIT
         )
+
+
+def _histories(ridden: Sequence[RideRow]) -> Callable[[str], History]:
+    """How the history of a case is written."""
+    kinds = {row.case: row.history for row in ridden}
+    return lambda case: kinds.get(case, "csv")
 
 
 ENERGY_LIMIT = 1e-6

@@ -17,11 +17,11 @@ def confidence_of(selection: Selection, config: DiagnoseConfig) -> float:
 
     Before the tests, something more is missing as likely as not, each effect of the library is as likely as any other,
     and each size of its gap as likely as any other by its logarithm. What is not in the library is expected to be seen
-    as well as what is.
+    as well as what is, but for a share that looks like one of its effects or like nothing.
 
     Equation: P = (1 - q) prod_r sum_(i named) B_i / (n B_0 + sum_i B_i), B_i as in `Detection.log_odds` over the sizes
     that count, B_0 = (1 + mean_i B_i below them) / 2; r every step that adopted something, and what was tried after the
-    last, where nothing more is named as well; q `OUTSIDE_LIBRARY`, where something was adopted
+    last, where nothing more is named as well; q `OUTSIDE_LIBRARY`
                                                         Source: Kass and Raftery 1995, J. Am. Stat. Assoc. 90, eq. (1)
 
     Parameters
@@ -30,7 +30,7 @@ def confidence_of(selection: Selection, config: DiagnoseConfig) -> float:
     config : which gaps count
     """
     said = {*selection.adopted, *selection.rivals}
-    sure = 1.0 - OUTSIDE_LIBRARY if selection.adopted else 1.0
+    sure = 1.0 - OUTSIDE_LIBRARY
     for step in selection.rounds:
         if step.chosen in selection.adopted:
             sure *= _together(_probabilities({c.effect: of_fit(c) for c in step.contenders}, config.visible), said)

@@ -143,7 +143,7 @@ def _next_test(
     if selection.rivalling:
         rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
         return next_test(rivals, reach, warmth, [campaign.offset(damper) for _, damper in selection.rivalling])
-    if decision.unsure or (selection.undecided and not selection.adopted):
+    if decision.doubtful or (selection.undecided and not selection.adopted):
         return one_more(recorded, reach)
     offset = campaign.offset(found.moved(-zero) if selection.adopted else found)
     predicting = PredictingDamper(found, offset, handed.missed, handed.between)

@@ -170,13 +170,14 @@ CONTRADICTS = 2.0
 """A remainder of so many times `visible` contradicts that these effects are all, whatever they closed.
 
 Reason: a large effect may close all but a tenth of the gap, and the tenth be as large as a second one; not tuned."""
-OUTSIDE_LIBRARY = 0.03
-"""Share of cases in which what is missing is not in the library and yet one of its effects fits within the noise.
-
-Reason: benchmark: with it 97.0 % were stated and 97.6 % hit in 710 cases of the highest confidence."""
 
 # How sure a verdict is (confidence.py, search/detection.py)
 
+OUTSIDE_LIBRARY = 0.03
+"""Share of cases in which something is missing that is not in the library, and that looks like one of its effects or
+like nothing.
+
+Reason: benchmark: with it 97.0 % were stated and 97.6 % hit in 710 cases of the highest confidence."""
 LARGEST_GAP = 0.25
 """Largest gap [share of peak, r.m.s.] that a missing effect is expected to leave; the smallest is `visible`.
 
@@ -193,7 +194,7 @@ NOT_EXCLUDED = 0.05
 """From this probability on an effect is told as one that the tests do not exclude.
 
 Reason: as much as a 95 % interval leaves outside; not tuned."""
-UNSURE = 0.9
+DOUBTFUL_BELOW = 0.9
 """Below this confidence a verdict without an effect tells what is not excluded, and one more test is proposed.
 
 Reason: one such verdict in ten is wrong then, if the confidence is right; not tuned."""

@@ -19,7 +19,7 @@ from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.search.candidates import moved_by
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection
-from pzd.diagnose.thresholds import CONTRADICTS, UNSURE
+from pzd.diagnose.thresholds import CONTRADICTS, DOUBTFUL_BELOW
 from pzd.diagnose.trends_of_tests import Trend
 from pzd.quantities import Control
 
@@ -38,9 +38,9 @@ class Decision:
     confidence: float | None
 
     @property
-    def unsure(self) -> bool:
+    def doubtful(self) -> bool:
         """Whether nothing is named, and much is not excluded."""
-        return self.verdict == "none" and self.confidence is not None and self.confidence < UNSURE
+        return self.verdict == "none" and self.confidence is not None and self.confidence < DOUBTFUL_BELOW
 
 
 def weak(hold_out: str) -> str:
@@ -135,7 +135,7 @@ def _nothing_adopted(size: float, chance: float, selection: Selection, config: D
         told = "; ".join(f"{name} {selection.reasons[name]}" for name in selection.undecided)
         return Decision("ambiguous", f"{told}; more tests would settle it", sure)
     gap = f"a gap of {_percent(size)} of peak force (r.m.s. above the noise)"
-    doubt = _doubt(selection, config) if sure < UNSURE else ""
+    doubt = _doubt(selection, config) if sure < DOUBTFUL_BELOW else ""
     if chance >= config.significance:
         words = f"{gap} that noise alone shows with probability {chance:.2g}: within the noise{doubt}"
         return Decision("none", words, sure)

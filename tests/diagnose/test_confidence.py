@@ -102,7 +102,7 @@ def test_confidence_in_nothing_falls_to_even_odds_as_noise_hides_everything(rng:
     sure = [diagnosed(with_spring(0.0, noise, rng), most_added=0).diagnosis for noise in (0.003, 0.03, 0.3)]
     assert [told.verdict for told in sure] == ["none"] * 3
     stated = [told.confidence or 0.0 for told in sure]
-    assert stated[0] > 0.97
+    assert stated[0] > 0.95
     assert stated == sorted(stated, reverse=True)
     assert 0.4 < stated[-1] < 0.9
 

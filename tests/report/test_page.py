@@ -386,7 +386,7 @@ def test_what_is_left_is_drawn_by_frequency_and_by_its_spread_and_tests_alone_ov
 ) -> None:
     def told(of: Any) -> list[str]:
         alts = [str(attributes["alt"]) for tag, attributes in Reader(of.told().page).tags if tag == "img"]
-        begins = ("R.m.s. of measured minus", "Quantiles of what is left", "T0, C and k of")
+        begins = ("R.m.s. of measured minus", "Quantiles of measured minus", "T0, C and k of")
         return [alt.replace("\u00a0", " ") for alt in alts if alt.startswith(begins)]
 
     found = told(with_hypotheses(run, Hypotheses(sought=True)))

@@ -118,7 +118,7 @@ class _Tangent:
     def gap(self, simulated: Sequence[Array]) -> float:
         """R.m.s. of a change of the force that no other values of what stands before would bring about."""
         changed = (np.concatenate(simulated) - np.concatenate(self.before.simulated)) / self.units
-        return float(np.linalg.norm(_beside(self.forces, changed)))
+        return float(np.linalg.norm(_left_by(self.forces, changed)))
 
     def of_trace(self, effect: Effect, trace: Array) -> Detection | None:
         """What the tests say of the gap of an effect that was not searched for; None where it can be none.
@@ -143,7 +143,7 @@ class _Tangent:
         simulated = [response(o, damper) for o in problem.observations]
         left = [o.in_noise(o.measured - f) for o, f in zip(problem.observations, simulated, strict=True)]
         residual = np.concatenate(before.residuals)
-        rest = _beside(self.before.frame, np.concatenate(left) - residual)
+        rest = _left_by(self.before.frame, np.concatenate(left) - residual)
         gap, power = self.gap(simulated), float(rest @ rest)
         if gap <= 0.0 or power <= 0.0:
             return None
@@ -151,7 +151,7 @@ class _Tangent:
         return Detection(part * gap, gap * float(np.sqrt(spread / power)), part**2 * power / spread, 0)
 
 
-def _beside(frame: Array, values: Array) -> Array:
+def _left_by(frame: Array, values: Array) -> Array:
     """(n,) what of some values no combination of (n, p) orthonormal columns gives."""
     return values - frame @ (frame.T @ values)
 

@@ -26,12 +26,13 @@ def draw(context: ReportContext) -> Iterator[Panel]:
     for label, which, colour in curves:
         normal, found = quantiles(context, which)
         ax.plot(normal, found, color=colour, label=label)
-    ends = [float(normal[0]), float(normal[-1])]
-    ax.plot(ends, ends, "--", color=MEASURED, label="normal")
+    line = [float(normal[0]), float(normal[-1])]
+    ax.plot(line, line, "--", color=MEASURED, label="normal")
     ax.set_xlabel("quantile of a normal distribution")
     ax.set_ylabel("of what is left, over its r.m.s.")
     legend(figure)
-    alt = f"Quantiles of what is left against a normal distribution: from {number(found[0])} to {number(found[-1])}."
+    ends = f"from {number(found[0])} to {number(found[-1])}"
+    alt = f"Quantiles of measured minus simulated force against a normal distribution: {ends}."
     told = "On the dashed line it is spread as chance spreads it; long ends are rare large misses, as jumps leave them."
     yield Panel(figure, "How what is left is spread", alt, told)
 
