@@ -11,6 +11,7 @@ import numpy as np
 
 from pzd.blind.case import Scored
 from pzd.blind.outside import FORMS
+from pzd.diagnose.config import DiagnoseConfig
 from pzd.schema.model import Frozen
 
 Z95 = 1.959963984540054
@@ -19,8 +20,8 @@ GAPS = (0.0, 0.0025, 0.005, 0.01, 0.02, math.inf)
 """Edges of the bins of the visible gap, as shares of the peak force."""
 VISIBLE = 0.005
 """A truth is visible from this gap on."""
-COUNTS = 0.0025
-"""A smaller gap counts as nothing missing, see `visible` of `DiagnoseConfig`."""
+COUNTS = DiagnoseConfig().visible
+"""A smaller gap counts as nothing missing."""
 LOW_NOISE = 0.01
 """Noise up to this share of the peak is low."""
 
