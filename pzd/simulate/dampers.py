@@ -45,26 +45,17 @@ def table_of(damper: Damper, table: Table) -> Table:
         key = (row.temperature_degC, row.voltage_V)
         if row.inside == 1 or table.notes.outside != "clamp":
             held[key] = max(held[key], abs(row.velocity_m_per_s))
-    forces = {key: iter(_forces_of(damper, table, key, fastest)) for key, fastest in held.items()}
+    forces = np.zeros(len(table.force))
+    for conditions, fastest in held.items():
+        places = [i for i, row in enumerate(table.force) if (row.temperature_degC, row.voltage_V) == conditions]
+        asked = [table.force[i].velocity_m_per_s for i in places]
+        velocity = np.copysign(np.minimum(np.abs(asked), fastest), asked)
+        forces[places] = steady_force(damper, conditions[1], conditions[0], velocity)
     rows = (
-        (row, next(forces[row.temperature_degC, row.voltage_V]))  # one after another as they stand in the table
-        for row in table.force
+        row if row.force_N is None else row.model_copy(update={"force_N": float(force)})
+        for row, force in zip(table.force, forces, strict=True)
     )
-    return Table(
-        tuple(row if row.force_N is None else row.model_copy(update={"force_N": force}) for row, force in rows),
-        (),
-        table.notes,
-    )
-
-
-def _forces_of(
-    damper: Damper, table: Table, conditions: tuple[float | None, float | None], fastest: float
-) -> list[float]:
-    """Force of a damper [N] at the nodes of one temperature and voltage, no faster than its table reaches."""
-    temperature, voltage = conditions
-    asked = [row.velocity_m_per_s for row in table.force if (row.temperature_degC, row.voltage_V) == conditions]
-    velocity = np.copysign(np.minimum(np.abs(asked), fastest), asked)
-    return [float(force) for force in steady_force(damper, voltage, temperature, velocity)]
+    return Table(tuple(rows), (), table.notes)
 
 
 def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -> DynamicDamper:
