@@ -26,6 +26,7 @@ from pzd.artefacts import (
     Region,
     Report,
     Ride,
+    RideRow,
     Rides,
     Rig,
     SummaryRow,
@@ -156,7 +157,16 @@ def simulate(simulate: SimulateConfig, diagnosed: Diagnosed, table: Table, seed:
         energy_error=1e-9,
         outside_table=0.0,
     )
-    return Rides((ride,), (summary,), (), (), (), ())
+    ridden = RideRow(
+        case=ride.case,
+        from_s=0.0,
+        to_s=1.0,
+        ending="end of the ride",
+        voltage_V=None,
+        damping_Ns_per_m=None,
+        history="csv",
+    )
+    return Rides((ride,), (summary,), (ridden,))
 
 
 def report(report: ReportConfig, rides: Rides, control: Control, setting: str | None, folder: Path) -> Report:

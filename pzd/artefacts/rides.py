@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal, Self
@@ -171,13 +171,14 @@ class Rides:
 
     def write(self, folder: Path, control: Control, jobs: int = 1) -> None:
         """Write the history of each case, so many at the same time, and one table of each kind over all cases."""
-        history = _histories(self.ridden)
+        history = {row.case: row.history for row in self.ridden}
 
         def written(ride: Ride) -> None:
-            if history(ride.case) == "csv":
-                write_columns(folder / f"{ride.case}.csv", ride.columns, control, _RIDE_HEADER)
-            elif history(ride.case) == "parquet":
-                parquetfile.write_columns(folder / f"{ride.case}.parquet", ride.columns, control)
+            path = folder / f"{ride.case}.{history[ride.case]}"
+            if history[ride.case] == "csv":
+                write_columns(path, ride.columns, control, _RIDE_HEADER)
+            else:
+                parquetfile.write_columns(path, ride.columns, control)
 
         parallel_map(written, self.rides, jobs)
         write_rows(folder / "summary.csv", SummaryRow, self.summary, control)
@@ -193,16 +194,14 @@ class Rides:
     def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
         """Read and check them again, so many at the same time."""
 
-        def ride(case: str) -> Ride:
-            read = read_columns if history(case) == "csv" else parquetfile.read_columns
-            return Ride(case, read(folder / f"{case}.{history(case)}", _RIDE_HEADER, control, _RIDE_OPTIONAL))
+        def ride(row: RideRow) -> Ride:
+            read = read_columns if row.history == "csv" else parquetfile.read_columns
+            return Ride(row.case, read(folder / f"{row.case}.{row.history}", _RIDE_HEADER, control, _RIDE_OPTIONAL))
 
         summary = read_rows(folder / "summary.csv", SummaryRow, control)
         ridden = read_rows(folder / "rides.csv", RideRow, control)
-        history = _histories(ridden)
-        written = [row.case for row in summary if history(row.case) != "none"]
         return cls(
-            tuple(parallel_map(ride, written, jobs)),
+            tuple(parallel_map(ride, [row for row in ridden if row.history != "none"], jobs)),
             summary,
             ridden,
             read_rows(folder / "wheels.csv", WheelRow, control),
@@ -219,12 +218,6 @@ class Rides:
             for row in self.summary
             if not abs(row.energy_error) <= ENERGY_LIMIT
         )
-
-
-def _histories(ridden: Sequence[RideRow]) -> Callable[[str], History]:
-    """How the history of a case is written."""
-    kinds = {row.case: row.history for row in ridden}
-    return lambda case: kinds.get(case, "csv")
 
 
 ENERGY_LIMIT = 1e-6
