@@ -45,7 +45,7 @@ def diagnosis_lines(
     lines += [f"where: {where.region}, {where.share_of_gap:.0%} of the gap" for where in diagnosis.where[:_MOST]]
     lines += [f"adopted: {name}, {_parameters(diagnosis, name, unit)}" for name in diagnosis.effects]
     if diagnosis.confidence is not None:
-        lines.append(f"confidence: {diagnosis.confidence:.0%}{_of(diagnosis)}")
+        lines.append(f"confidence: {diagnosis.confidence:.0%}{_confident_of(diagnosis)}")
     if diagnosis.rivals:
         lines.append(f"rivals: {', '.join(diagnosis.rivals)}")
     lines += [*_rejected(diagnosis), *_hypotheses(hypotheses)]
@@ -54,7 +54,7 @@ def diagnosis_lines(
     return lines
 
 
-def _of(diagnosis: Diagnosis) -> str:
+def _confident_of(diagnosis: Diagnosis) -> str:
     """What the confidence of an open verdict is in."""
     if diagnosis.verdict != "ambiguous":
         return ""

@@ -111,6 +111,11 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
     )
 
 
+def not_taken_up(frame: Array, values: Array) -> Array:
+    """(w,) or (w, c) what of some values orthonormal columns (w, p), such as `Fitted.frame`, do not give."""
+    return values - frame @ (frame.T @ values)
+
+
 def misfit_of(problem: Problem, damper: Damper) -> float:
     """Smallest misfit that T0, C and k alone reach while the effects stay as a damper has them."""
     unknowns = problem.unknowns(tuple(damper.effects))

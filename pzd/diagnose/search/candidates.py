@@ -44,9 +44,9 @@ class Candidate:
     """Change of the Bayesian criterion against the model without it; negative where it pays."""
     explained: float
     """R.m.s. by which it moves the simulated force, as a share of each record's peak."""
-    apart: float
+    residual_change: float
     """Sum of squares of what it changes in the residuals, in units of noise."""
-    less: float
+    misfit_drop: float
     """How much lower the misfit is with it."""
     varies: bool = False
     """Whether its parameters are by voltage: an effect adopted before, or one that is only looked for so."""
@@ -220,8 +220,8 @@ def _from(
 
 def _changed(problem: Problem, before: Fitted, after: Fitted) -> tuple[float, float, float]:
     """What a candidate changes: the force, the residuals, the misfit."""
-    apart = sum(float((b - a) @ (b - a)) for b, a in zip(before.residuals, after.residuals, strict=True))
-    return moved_by(problem, before, after), apart, before.misfit - after.misfit
+    changed = sum(float((b - a) @ (b - a)) for b, a in zip(before.residuals, after.residuals, strict=True))
+    return moved_by(problem, before, after), changed, before.misfit - after.misfit
 
 
 def delta_bic(before: Fitted, after: Fitted) -> float:

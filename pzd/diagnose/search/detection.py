@@ -15,7 +15,7 @@ from pzd.damper.effect import Effect
 from pzd.damper.effects import library
 from pzd.damper.nature import against_nature
 from pzd.diagnose.fit.intervals import LEVEL
-from pzd.diagnose.fit.least_squares import Fitted
+from pzd.diagnose.fit.least_squares import Fitted, not_taken_up
 from pzd.diagnose.fit.likelihood import response
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.slopes import force_slopes
@@ -35,7 +35,7 @@ class Detection:
     """Its standard error."""
     gain: float
     """Misfit less at that size than without the effect."""
-    shape: int
+    shape_parameters: int
     """Parameters of the effect beside its size."""
 
     @property
@@ -57,7 +57,7 @@ class Detection:
         away = (low * (high / low) ** share - self.size) / self.error
         known = max(self.size, low) / self.error
         mean = logsumexp(-0.5 * away**2) - np.log(SIZES_AVERAGED)
-        return float(0.5 * self.gain - 0.5 * self.shape * np.log1p(known**2) + mean)
+        return float(0.5 * self.gain - 0.5 * self.shape_parameters * np.log1p(known**2) + mean)
 
 
 def detections(problem: Problem, before: Fitted, tried: Sequence[Candidate]) -> dict[str, tuple[Detection, ...]]:
@@ -89,12 +89,16 @@ def of_fit(candidate: Candidate, gap: float | None = None) -> tuple[Detection, .
     gap : m that it closes; how far it moves the force where none is given
     """
     size = candidate.explained if gap is None else gap
-    if not candidate.searched or min(candidate.less, candidate.apart, size) <= 0.0:
+    if not candidate.searched or min(candidate.misfit_drop, candidate.residual_change, size) <= 0.0:
         return ()
     fitted = candidate.fitted
     spread = max(1.0, fitted.misfit / max(fitted.size - fitted.searched.size, 1))
     shape = sum(u.effect == candidate.effect for u in fitted.unknowns) - 1
-    return (Detection(size, size / float(np.sqrt(candidate.apart / spread)), candidate.less / spread, shape),)
+    return (
+        Detection(
+            size, size / float(np.sqrt(candidate.residual_change / spread)), candidate.misfit_drop / spread, shape
+        ),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +122,7 @@ class _Tangent:
     def gap(self, simulated: Sequence[Array]) -> float:
         """R.m.s. of a change of the force that no other values of what stands before would bring about."""
         changed = (np.concatenate(simulated) - np.concatenate(self.before.simulated)) / self.units
-        return float(np.linalg.norm(_left_by(self.forces, changed)))
+        return float(np.linalg.norm(not_taken_up(self.forces, changed)))
 
     def of_trace(self, effect: Effect, trace: Array) -> Detection | None:
         """What the tests say of the gap of an effect that was not searched for; None where it can be none.
@@ -143,17 +147,12 @@ class _Tangent:
         simulated = [response(o, damper) for o in problem.observations]
         left = [o.in_noise(o.measured - f) for o, f in zip(problem.observations, simulated, strict=True)]
         residual = np.concatenate(before.residuals)
-        rest = _left_by(self.before.frame, np.concatenate(left) - residual)
+        rest = not_taken_up(self.before.frame, np.concatenate(left) - residual)
         gap, power = self.gap(simulated), float(rest @ rest)
         if gap <= 0.0 or power <= 0.0:
             return None
         part = -float(residual @ rest) / power
         return Detection(part * gap, gap * float(np.sqrt(spread / power)), part**2 * power / spread, 0)
-
-
-def _left_by(frame: Array, values: Array) -> Array:
-    """(n,) what of some values no combination of (n, p) orthonormal columns gives."""
-    return values - frame @ (frame.T @ values)
 
 
 def _traces(problem: Problem, before: Fitted, effect: Effect) -> Iterator[Array]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pzd.damper.effect import Effect
-from pzd.diagnose.fit.least_squares import Fitted
+from pzd.diagnose.fit.least_squares import Fitted, not_taken_up
 from pzd.diagnose.fit.parameters import BOUND, Problem, Unknown
 from pzd.diagnose.fit.slopes import left_at
 from pzd.diagnose.thresholds import FAINT
@@ -86,8 +86,7 @@ def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Ar
     new = range(before.searched.size, here.size)
     limits = np.full(here.size, -np.inf), np.full(here.size, np.inf)
     left = left_at(problem, unknowns, here, limits, new)
-    r, columns, frame = left.whole, left.slopes.dense(new), before.frame
-    r, columns = r - frame @ (frame.T @ r), columns - frame @ (frame.T @ columns)
+    r, columns = (not_taken_up(before.frame, values) for values in (left.whole, left.slopes.dense(new)))
     size = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(size > 0.0, size, 1.0)
     rest = r - columns @ np.linalg.lstsq(columns, r, rcond=1e-6)[0]
