@@ -49,10 +49,9 @@ def not_excluded(selection: Selection, config: DiagnoseConfig) -> dict[str, Dete
     config : which gaps count
     """
     chances = _left_open(selection, config)
-    likely = sorted(
-        (name for name, chance in chances.items() if name and chance >= NOT_EXCLUDED), key=chances.__getitem__
-    )
-    return {name: max(selection.left_open[name], key=lambda each: each.size) for name in reversed(likely) if name}
+    likely = [name for name, chance in chances.items() if name is not None and chance >= NOT_EXCLUDED]
+    likely.sort(key=chances.__getitem__, reverse=True)
+    return {name: max(selection.left_open[name], key=lambda each: each.size) for name in likely}
 
 
 def _left_open(selection: Selection, config: DiagnoseConfig) -> dict[str | None, float]:
