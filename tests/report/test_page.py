@@ -395,7 +395,7 @@ def test_what_is_left_is_drawn_by_frequency_and_by_its_spread_and_tests_alone_ov
         "R.m.s. of measured minus simulated force by third octaves at 150 V",
     ]
     assert sum(alt.startswith("Quantiles") for alt in found) == 1
-    assert any(alt.endswith("each fitted alone, over the place among the tests.") for alt in found)
+    assert any(alt.endswith("each fitted alone, over the order of the files.") for alt in found)
     assert told(run) == []
 
 

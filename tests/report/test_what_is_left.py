@@ -76,5 +76,5 @@ def test_each_test_alone_tells_its_own_friction() -> None:
     context = seen(*records)
     context.identified = SimpleNamespace(measures=())
     found = fitted_alone(context)
-    assert [test.over["place among the tests"] for test in found] == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert [test.over["order of the files"] for test in found] == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert [test.row.T0_N for test in found] == pytest.approx(list(300.0 * 1.1 ** np.arange(5)), rel=0.01)

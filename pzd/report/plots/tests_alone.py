@@ -61,7 +61,7 @@ def fitted_alone(context: ReportContext) -> list[LoneTest]:
             "frequency [Hz]": measured.frequency_Hz if measured else None,
             "amplitude [mm]": 1000.0 * measured.amplitude_m if measured and measured.frequency_Hz else None,
             "temperature [°C]": record.median_temperature(),
-            "place among the tests": number + 1.0,
+            "order of the files": number + 1.0,
         }
         found.append(LoneTest(context.level(record), _alone(record), over))
     return found
