@@ -60,7 +60,7 @@ blind-motions: $(RUNTIME)  ## As `make blind`, on two tones, sweeps, roads, movi
 	$(BIN)/pzd blind configs/blind-motions.yaml
 
 .PHONY: blind-edge
-blind-edge: $(RUNTIME)  ## As `make blind`, at the edge of what can be seen: how far a confidence can be trusted; half an hour
+blind-edge: $(RUNTIME)  ## As `make blind`, at the edge of what can be seen: how far a confidence can be trusted; 15 minutes
 	$(BIN)/pzd blind configs/blind-edge.yaml
 
 .PHONY: bench
