@@ -177,10 +177,10 @@ def read_columns(path: Path, header: Sequence[str], control: Control, optional: 
     _check_header(path, given, [control.renamed(name) for name in names])
     if not body.strip():
         raise DataError(f"{at(path, 1)}: no data rows stand below the header")
-    _check_counts(path, body, len(names))
-    empty = [i for i, cell in enumerate(body.partition("\n")[0].split(",")) if names[i] in optional and not cell]
+    widths = _widths(path, body, len(names))
+    empty = [i for i, width in enumerate(widths[0]) if names[i] in optional and width == 0]
     filled = [i for i in range(len(names)) if i not in empty]
-    _check_empty(path, body, {i: control.renamed(names[i]) for i in empty})
+    _check_empty(path, body, widths, {i: control.renamed(names[i]) for i in empty})
     try:
         table = numbers(body, filled, len(names))
     except ValueError:
@@ -190,19 +190,19 @@ def read_columns(path: Path, header: Sequence[str], control: Control, optional: 
     return {names[i]: np.ascontiguousarray(table[:, n]) for n, i in enumerate(filled)} if table is not None else {}
 
 
-def _check_counts(path: Path, body: str, wanted: int) -> None:
-    """Refuse lines with more or fewer fields than the header; quotes are no part of such a file."""
-    codes = np.frombuffer(body.removesuffix("\n").encode(), dtype=np.uint8)
-    ends = np.append(np.flatnonzero(codes == ord("\n")), codes.size)
-    before = np.searchsorted(np.flatnonzero(codes == ord(",")), ends)
-    fields = np.diff(before, prepend=0) + 1
+def _widths(path: Path, body: str, wanted: int) -> NDArray[np.int64]:
+    """(lines, wanted) bytes of each field; lines with more or fewer are refused. Quotes are no part of such a file."""
+    codes = np.frombuffer(body.removesuffix("\n").encode() + b"\n", dtype=np.uint8)
+    ends = np.flatnonzero((codes == ord(",")) | (codes == ord("\n")))
+    fields = np.diff(np.flatnonzero(codes[ends] == ord("\n")), prepend=-1)
     uneven = np.flatnonzero(fields != wanted)
     _refuse(path, [f"{at(path, int(i) + 2)}: {fields[i]} fields where the header has {wanted}" for i in uneven])
+    return (np.diff(ends, prepend=-1) - 1).reshape(-1, wanted)
 
 
-def _check_empty(path: Path, body: str, columns: Mapping[int, str]) -> None:
+def _check_empty(path: Path, body: str, widths: NDArray[np.int64], columns: Mapping[int, str]) -> None:
     """Refuse cells in columns that begin as wholly empty ones."""
-    if columns:
+    if widths[:, list(columns)].any():
         _refuse(
             path,
             [
