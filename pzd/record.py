@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -214,13 +215,30 @@ def merged_voltages(records: Sequence[Record], voltage_within: float) -> tuple[f
     return (min(known), max(known)) if DIFFERENT_SHARE * scale < spread <= voltage_within else None
 
 
+def level(values: Array) -> float:
+    """The median of a channel that stands still, without the digits that its noise made.
+
+    Parameters
+    ----------
+    values : (n,) of one condition or record
+
+    Returns
+    -------
+    rounded to the largest power of ten within the robust standard deviation, so by half of it at most; as it is where
+    most samples are alike
+    """
+    middle = float(np.median(values))
+    scatter = 1.4826 * float(np.median(np.abs(values - middle)))
+    return round(middle, -math.floor(math.log10(scatter))) + 0.0 if scatter > 0.0 else middle
+
+
 def _condition(setting: str | None, members: Sequence[Record]) -> Condition:
     voltages = [r.voltage for r in members if r.voltage is not None]
     temperatures = [r.temperature for r in members if r.temperature is not None]
     return Condition(
         setting,
-        float(np.median(np.concatenate(voltages))) if voltages else None,
-        float(np.median(np.concatenate(temperatures))) if temperatures else None,
+        level(np.concatenate(voltages)) if voltages else None,
+        level(np.concatenate(temperatures)) if temperatures else None,
         tuple(members),
     )
 

@@ -4,7 +4,8 @@ Where a law is missing that no name accounts for, evidence weighed by noise misl
 missing, and takes other values on other tests. What counts there is what the damper is for, to predict tests. An effect
 is added if whole tests that no fit has seen are predicted better with it, beyond chance, and at no voltage worse; and
 if voltages left out are predicted no worse from those around them, beyond chance or not, since a law that takes other
-values there is none. That makes no name of it: the verdict stays `unexplained`.
+values there is none; and if half-way between two voltages the force lies between those at either. That makes no name of
+it: the verdict stays `unexplained`.
 
 What is added may say better what an effect before it stood in for, as a gas that hardens does for a spring beside the
 element: then the data no longer know that one's parameters, and it goes if kept-back tests are predicted as well.
@@ -22,6 +23,7 @@ from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.intervals import LEVEL, standard_errors
 from pzd.diagnose.fit.least_squares import Fitted
 from pzd.diagnose.fit.parameters import Problem
+from pzd.diagnose.half_way import between_neighbours
 from pzd.diagnose.kept_back import Trials
 from pzd.diagnose.missed import Missed
 from pzd.diagnose.search.candidates import Candidate, by_voltage, candidate, seen_in
@@ -76,19 +78,21 @@ def with_predictive_effects(
     -------
     None where nothing improves the prediction
     """
-    added: list[Candidate] = []
-    at = trials.fitted_by_criterion(selection.fitted.damper, trials.nothing)
-    while at is not None and trials.campaign.work.may_go_on():
-        found = _best(*at, (missed, between), trials, config, selection.adopted)
-        if found is None:
-            break
-        chosen, missed, between = found
-        added.append(chosen)
-        log.info("diagnose: %s added, W_s of kept-back tests %.4g", _in_words(chosen), missed.criterion)
-        at = trials.fitted_by_criterion(chosen.fitted.damper, trials.nothing)
-    if at is None or not added:
+    fitted = trials.fitted_by_criterion(selection.fitted.damper, trials.nothing)
+    if fitted is None:
         return None
-    lean = _without_replaced(_Predicting(*at, missed, between), trials, config.force)
+    added: list[Candidate] = []
+    found = _Predicting(*fitted, missed, between)
+    while trials.campaign.work.may_go_on():
+        better = _best(found, trials, config, selection.adopted)
+        if better is None:
+            break
+        chosen, found = better
+        added.append(chosen)
+        log.info("diagnose: %s added, W_s of kept-back tests %.4g", _in_words(chosen), found.missed.criterion)
+    if not added:
+        return None
+    lean = _without_replaced(found, trials, config.force)
     words = tuple(_in_words(each) for each in added if each.effect in lean.fitted.effects)
     if not words:
         return None
@@ -116,7 +120,9 @@ def _without_replaced(found: _Predicting, trials: Trials, forced: Sequence[str])
                 continue
             damper = found.fitted.damper.without_effects(name)
             missed, at = trials.missed_by_criterion(damper), trials.fitted_by_criterion(damper, trials.nothing)
-            if at is not None and not _predicts_better(found.missed, missed, trials):
+            if at is None or _predicts_better(found.missed, missed, trials):
+                continue
+            if between_neighbours(at[1].damper, trials):
                 fewer.append((*at, missed))
         if not fewer:
             return found
@@ -146,24 +152,22 @@ def _in_words(added: Candidate) -> str:
 
 
 def _best(
-    problem: Problem,
-    fitted: Fitted,
-    before: tuple[Missed, Missed],
-    trials: Trials,
-    config: DiagnoseConfig,
-    adopted: Sequence[str],
-) -> tuple[Candidate, Missed, Missed] | None:
+    found: _Predicting, trials: Trials, config: DiagnoseConfig, adopted: Sequence[str]
+) -> tuple[Candidate, _Predicting] | None:
     """Of the candidates that fit best, the one that predicts best; None where none predicts better than without it."""
-    promising = sorted(_tried(problem, fitted, config, adopted), key=lambda c: c.delta_bic)[:PREDICTED_AT_ONCE]
+    tried = _tried(found.problem, found.fitted, config, adopted)
     better = []
-    for each in promising:
+    for each in sorted(tried, key=lambda c: c.delta_bic)[:PREDICTED_AT_ONCE]:
         predicted = trials.missed_by_criterion(each.fitted.damper)
-        if _predicts_better(predicted, before[0], trials):
+        if _predicts_better(predicted, found.missed, trials):
             better.append((each, predicted))
     for each, predicted in sorted(better, key=lambda pair: pair[1].criterion or 0.0):
         between = trials.missed_between(each.fitted.damper, by_criterion=True)
-        if not before[1].less_than(between):
-            return each, predicted, between
+        if found.between.less_than(between):
+            continue
+        fitted = trials.fitted_by_criterion(each.fitted.damper, trials.nothing)
+        if fitted is not None and between_neighbours(fitted[1].damper, trials):
+            return each, _Predicting(*fitted, predicted, between)
     return None
 
 

@@ -148,6 +148,11 @@ PREDICTED_AT_ONCE = 3
 """Candidates of which kept-back tests are predicted, those that fit best.
 
 Reason: time; each takes as many refits as there are folds."""
+FARTHEST_HALF_WAY = 0.25
+"""Of the difference between the forces at two neighbouring voltages, what the force half-way may lie off their mean.
+
+Reason: a force that goes with the square of the voltage lies off by just that; with parameters on lines, and an effect
+that the tests know at each voltage, it is a few hundredths. Not tuned."""
 
 # What the tests' own gains, offsets and delays have in common (trends_of_tests.py)
 
