@@ -91,6 +91,10 @@ def _misses_more(one: Missed, other: Missed, errors: float) -> bool:
     if not one.record:
         return False
     difference = (one.error - other.error) / one.energy
+    largest = float(np.max(np.abs(difference)))
+    if not np.isfinite(largest):  # a path that was lost misses more than any other
+        return not np.isfinite(one.error).all() and bool(np.isfinite(other.error).all())
+    difference /= max(largest, 1e-300)  # the square of what a path almost lost misses would overflow
     error = float(np.std(difference, ddof=1) / np.sqrt(difference.size)) if difference.size > 1 else 0.0
     return other.less_than(one) and float(difference.mean()) > errors * error
 

@@ -161,6 +161,14 @@ def test_worse_by_less_than_can_be_seen_is_not_worse(rng: np.random.Generator) -
     assert asked.worse(replace(plain, error=plain.error + 2e-2), plain) == TWO
 
 
+@pytest.mark.parametrize("lost", [1e180, np.inf])
+def test_a_path_that_was_lost_predicts_worse_and_warns_of_nothing(lost: float) -> None:
+    """The square of what it misses would overflow, and leave a scatter beside which nothing is worse."""
+    plain = Missed(tuple(range(6)), *(np.full(6, value) for value in (1.0, 100.0, 100.0, 1e-3)))
+    assert worse(replace(plain, error=plain.error * lost), plain)
+    assert not worse(plain, replace(plain, error=plain.error * lost))
+
+
 def test_much_worse_between_is_visible_and_half_as_much_again(rng: np.random.Generator) -> None:
     """The tests of one voltage all miss what the line misses: that they agree is no evidence."""
     damper = damper_of((0.0, 50.0, 100.0))
