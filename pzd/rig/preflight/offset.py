@@ -15,8 +15,8 @@ ALIKE = 0.3
 """Offsets that differ by less than this share of the usual one are alike: friction at rest moves them so far."""
 LEAST_RECORDS = 3
 """Records from which there is a usual offset."""
-LEAST_SPEEDS = 5
-"""Records whose offsets rise or fall with the speed throughout: that five do so by chance has odds of 1 in 60."""
+BY_CHANCE = 0.02
+"""Probability below which offsets rise or fall with the speed by no chance: five in order throughout have 1/60."""
 SLIPS = 0.02
 """Least share of the samples at which the element must slip, either way.
 
@@ -70,10 +70,14 @@ def _offset(entry: RecordEntry) -> float:
 
 
 def _by_speed(entries: list[RecordEntry]) -> bool:
-    """Whether the offsets of records rise, or fall, with the speed throughout."""
-    said = sorted((e.velocity_rms_m_per_s or 0.0, _offset(e)) for e in entries if _offset(e) != 0.0)
-    steps = np.diff([offset for _, offset in said])
-    return len(said) >= LEAST_SPEEDS and bool(np.all(steps > 0.0) or np.all(steps < 0.0))
+    """Whether the offsets of records rise, or fall, with the speed.
+
+    Equation: the exact probability of Kendall's tau        Source: Kendall 1938, Biometrika 30
+    """
+    from scipy.stats import kendalltau
+
+    said = [(e.velocity_rms_m_per_s or 0.0, _offset(e)) for e in entries if _offset(e) != 0.0]
+    return len(said) > LEAST_RECORDS and bool(kendalltau(*zip(*said, strict=True)).pvalue <= BY_CHANCE)
 
 
 def _compared(entry: RecordEntry, entries: list[RecordEntry]) -> RecordEntry:
