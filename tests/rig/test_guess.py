@@ -127,6 +127,13 @@ def test_a_letter_or_a_word_of_any_signal_is_what_its_unit_says(tmp_path: Path, 
     assert (entry.temperature_degC, entry.voltage_V) == (31.5, 0.5)
 
 
+def test_a_farad_of_a_temperature_is_a_degree_fahrenheit(tmp_path: Path) -> None:
+    columns = [numbers(values) for values in (TIME, MM, FORCE, 0 * X + 77.0)]
+    path = stored(tmp_path / "a.csv", ["t [s],x [mm],F [N],Temp (F)"], columns, ",")
+    (entry,) = read_back(tmp_path, [path]).entries
+    assert entry.temperature_degC == pytest.approx(25.0)
+
+
 def test_what_stays_open_is_an_empty_value_that_the_check_asks_for(tmp_path: Path) -> None:
     path = stored(tmp_path / "a.csv", ["t,pos,Channel 3"], [numbers(values) for values in (TIME, MM, FORCE)], ",")
     (tmp_path / "guess.yaml").write_text("\n".join(guessed([path])), encoding="utf-8")

@@ -54,8 +54,8 @@ _CONTROLS_WITH_UNIT = {
 }
 """The same of the control signal: `U_V`, `ctrl [V]`, `Coil/A`."""
 _LAST_WORD = re.compile(r"[ _/,]\s*([A-Za-zµ°%][A-Za-zµ°/²^0-9]*)$")
-_CELSIUS = {"C", "°C", "deg C", "grad C", "Grad C"}
-"""What headers call degrees Celsius, and pint does not or takes for coulombs."""
+_DEGREES = dict.fromkeys(("C", "°C", "deg C", "grad C", "Grad C"), "degC") | dict.fromkeys(("F", "°F", "deg F"), "degF")
+"""What headers call degrees, and pint does not or takes for coulombs and farads."""
 
 
 def control_of(headers: Sequence[str]) -> Control:
@@ -100,7 +100,7 @@ def unit_of(header: str, below: str | None, quantity: Quantity) -> str | None:
     told = below.strip("[]() ") if below and below.strip("[]() ") else in_header(header, quantity) or (last and last[1])
     if not told:
         return None
-    unit = "degC" if quantity is TEMPERATURE and told in _CELSIUS else told
+    unit = _DEGREES.get(told, told) if quantity is TEMPERATURE else told
     try:
         to_canonical(np.zeros(1), unit, quantity)
     except UnitError:
