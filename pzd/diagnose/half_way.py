@@ -43,13 +43,13 @@ def between_neighbours(damper: Damper, trials: Trials) -> bool:
     """
     groups = {v: group for v, group in zip(trials.voltages, trials.groups, strict=True) if v is not None}
     return all(
-        _near(damper, trials, record, low, high)
+        _lies_between(damper, trials, record, low, high)
         for low, high in pairwise(sorted(groups))
         for record in (*groups[low], *groups[high])
     )
 
 
-def _near(damper: Damper, trials: Trials, record: int, low: float, high: float) -> bool:
+def _lies_between(damper: Damper, trials: Trials, record: int, low: float, high: float) -> bool:
     below, half_way, above = _forces(damper, trials, record, (low, 0.5 * (low + high), high))
     off = rms(half_way - 0.5 * (below + above))
     seen = trials.visible * float(max(np.max(np.abs(below)), np.max(np.abs(above))))
@@ -59,7 +59,7 @@ def _near(damper: Damper, trials: Trials, record: int, low: float, high: float) 
 def _forces(damper: Damper, trials: Trials, record: int, voltages: tuple[float, ...]) -> Iterator[Array]:
     """The force under the motion of a test at other voltages, as far as it does not depend on how the test began."""
     prepared = trials.campaign.prepared[record]
-    motion, stride = motion_of(prepared.record)
+    motion, places = motion_of(prepared.record)
     for voltage in voltages:
         held: Motion = replace(motion, voltage=np.full(motion.time.size, voltage))
-        yield respond(damper, held, float(prepared.record.force[0]), TOLERANCE)[::stride][counted(prepared)]
+        yield respond(damper, held, float(prepared.record.force[0]), TOLERANCE)[places][counted(prepared)]

@@ -12,10 +12,11 @@ from pzd.diagnose.fit.prediction import counted
 from pzd.diagnose.thresholds import CYCLE_CHANGE_SIGNIFICANCE, LEAST_HUM
 from pzd.record import Array, Mask
 from pzd.signals.between_cycles import PureError, harmonics_of, pure_error, repeatable_power
-from pzd.signals.jumps import jumps, jumps_in_cycles, within_a_sample
+from pzd.signals.jumps import jumps_in_cycles, jumps_in_samples, within_a_sample
 from pzd.signals.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend
 from pzd.signals.mains import hum
 from pzd.signals.nuisance import NuisanceConfig, nuisance
+from pzd.signals.reversals import reversals
 from pzd.signals.smooth_residual import fit_smooth_residual
 
 
@@ -51,6 +52,11 @@ class ResidualCheck:
         return self.residual - self.nuisances
 
     @property
+    def predicted(self) -> Array:
+        """(n,) force that the damper gives [N]."""
+        return self.prepared.record.force - self.residual
+
+    @property
     def peak(self) -> float:
         """Peak force of the record [N]."""
         return float(np.max(np.abs(self.prepared.record.force)))
@@ -64,7 +70,7 @@ def check_residual(given: Predicted, prepared: Prepared, wanted: Mask, config: N
     mains = _mains(prepared, residual, mask)
     without = residual - mains
     rough = _rough_variance(prepared, without, mask)
-    calm = bend_beside_jumps(prepared) == 0.0
+    calm = bend_beside_jumps(prepared, predicted) == 0.0
     slack = np.zeros(residual.size)
     late = np.zeros(residual.size)
     slack[mask], late[mask] = nuisance(
@@ -86,10 +92,12 @@ def _mains(prepared: Prepared, residual: Array, mask: Mask) -> Array:
     return hum(record.time, residual, mask, run.frequency if run else 0.0, LEAST_HUM * peak)
 
 
-def bend_beside_jumps(prepared: Prepared) -> Array:
+def bend_beside_jumps(prepared: Prepared, predicted: Array) -> Array:
     """(n,) how far the force bends beside a jump [N]; 0 elsewhere."""
-    record = prepared.record
-    return jumps_in_cycles(prepared.cycles, record.time, record.force) if prepared.cycles else jumps(record.force)
+    record, run = prepared.record, prepared.cycles
+    if run is None:
+        return jumps_in_samples(record.force, predicted, len(reversals(record.displacement)))
+    return jumps_in_cycles(run, record.time, record.force)
 
 
 def _beside_jumps(force: Array, predicted: Array, sized: Array, late: Array) -> Array:

@@ -85,7 +85,7 @@ def _own(checks: Sequence[ResidualCheck]) -> tuple[Array, Array]:
     """(n, 3) offset, gain and delay of every test in `UNIT`, and (3,) what one of each makes of the force [peak]."""
     found, size = [], []
     for check in checks:
-        force = (check.prepared.record.force - check.residual)[check.wanted]
+        force = check.predicted[check.wanted]
         columns = columns_of(force, check.prepared.record.rate, UNIT, check.wanted)
         found.append(np.linalg.lstsq(columns, check.residual[check.wanted], rcond=None)[0])
         size.append(np.sqrt(np.mean(columns**2, axis=0)) / check.peak)

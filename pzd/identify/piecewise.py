@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.motion import Motion
+from pzd.damper.motion import Motion, parts_of_steps
 from pzd.identify.nodes import weights
 from pzd.identify.objective import Bingham, Objective
-from pzd.record import Array, Record
+from pzd.record import Array, Record, Rows
 
 DIFFERENCE = 1e-5
 """Step of the difference quotients, as a share of the parameter; for T0 of a hundredth of peak force at least."""
@@ -36,13 +37,17 @@ class MovingObjective:
         """Indices of the nodes to be fitted."""
         return [i for i in range(self.nodes.size) if i not in self.held]
 
+    @cached_property
+    def _motions(self) -> tuple[tuple[Motion, Rows], ...]:
+        return tuple(motion_of(record) for record in self.records)
+
     def residuals(self, free: Sequence[Bingham]) -> Array:
         """(N,) measured less simulated force at the counted samples [N]."""
         values = dict(self.held) | dict(zip(self.free, free, strict=True))
         damper = damper_of(self.nodes, [values[i] for i in range(self.nodes.size)])
         parts = [
-            respond(damper, motion_of(r), float(r.force[0]), INTEGRATION)[t.counted]
-            for r, t in zip(self.records, self.plain.trials, strict=True)
+            respond(damper, motion, float(r.force[0]), INTEGRATION)[places][t.counted]
+            for r, t, (motion, places) in zip(self.records, self.plain.trials, self._motions, strict=True)
         ]
         residuals: Array = self.plain.measured - np.concatenate(parts)
         return residuals
@@ -79,12 +84,18 @@ def damper_of(nodes: Array, values: Sequence[Bingham]) -> Damper:
     )
 
 
-def motion_of(record: Record) -> Motion:
-    """The record's motion, its speed from the cubic through the displacement."""
+def motion_of(record: Record) -> tuple[Motion, Rows]:
+    """The record's motion, its speed from the cubic through the displacement, on a finer grid where the voltage steps.
+
+    Returns
+    -------
+    the motion, and (n,) which of its samples are those of the record
+    """
     from scipy.interpolate import CubicSpline
 
-    speed = CubicSpline(record.time, record.displacement)(record.time, 1)
-    return Motion(record.time, record.displacement, speed, record.acceleration, voltage_of(record), None)
+    speed, voltage = CubicSpline(record.time, record.displacement)(record.time, 1), voltage_of(record)
+    motion = Motion(record.time, record.displacement, speed, record.acceleration, voltage, None)
+    return motion.finer(parts_of_steps(voltage, voltage.size))
 
 
 def voltage_of(record: Record) -> Array:

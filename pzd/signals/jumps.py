@@ -13,6 +13,8 @@ MOST_SUDDEN = 40
 """Samples beside jumps that are allowed for in one record or average cycle, the largest."""
 MOST_IN_SAMPLES = 150
 """The same in a record that is compared sample by sample: no cycle stands for the others there."""
+BESIDE_REVERSAL = 4
+"""Samples beside the jump of a dry friction: two, and at either end one that it reaches through a filter."""
 USUAL = 1.4826
 """Standard deviation of Gaussian scatter over its median magnitude."""
 
@@ -37,9 +39,16 @@ def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
     return found
 
 
-def jumps_in_samples(measured: Array, predicted: Array) -> Array:
-    """(n,) the same for a record compared sample by sample: noise hides jumps of it that its prediction shows [N]."""
-    return np.maximum(jumps(measured, MOST_IN_SAMPLES), jumps(predicted, MOST_IN_SAMPLES))
+def jumps_in_samples(measured: Array, predicted: Array, reversals: int = 0) -> Array:
+    """(n,) the same for a record compared sample by sample: noise hides jumps of it that its prediction shows [N].
+
+    Parameters
+    ----------
+    measured, predicted : (n,) force [N]
+    reversals : of the motion; of many, more samples are allowed for
+    """
+    most = max(MOST_IN_SAMPLES, BESIDE_REVERSAL * reversals)
+    return np.maximum(jumps(measured, most), jumps(predicted, most))
 
 
 def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:

@@ -133,8 +133,8 @@ def road_record(rng: np.random.Generator, count: int, name: str) -> Record:
 
 def samples_of(observation: RecordLikelihood) -> set[tuple[str, int]]:
     """The samples of the record that an observation is compared at."""
-    begins = observation.first // observation.stride
-    return {(observation.name, int(i)) for i in begins + np.flatnonzero(observation.compared)}
+    assert np.all(np.diff(observation.places) == 1)
+    return {(observation.name, int(i)) for i in observation.places[observation.compared]}
 
 
 @pytest.mark.parametrize("count", [1, 2])

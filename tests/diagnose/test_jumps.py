@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 from campaign import TABLE_2, damper_of, sine
 
+from pzd.damper.compose import respond
+from pzd.damper.motion import Motion
 from pzd.diagnose.data.cleaning import prepare
 from pzd.diagnose.fit.input_uncertainty import expected
 from pzd.diagnose.gap import visible_gap
 from pzd.diagnose.residual_check import check_residual
+from pzd.record import Record, sliced
 from pzd.signals.jumps import jumps
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -36,3 +39,28 @@ def test_the_true_damper_with_a_large_jump_at_every_reversal_leaves_no_gap(rng: 
     with_jump, without = (expected(d, prepared, NuisanceConfig().delay_s) for d in (damper, damper_of((0.0,))))
     assert visible_gap([check_residual(with_jump, prepared, wanted, NuisanceConfig())]) < 0.001
     assert visible_gap([check_residual(without, prepared, wanted, NuisanceConfig())]) > 0.01
+
+
+def test_so_does_one_whose_test_does_not_repeat_and_has_more_jumps_than_a_cycle(rng: np.random.Generator) -> None:
+    """Two tones without a common period, a hundred reversals, each between samples of 500 Hz."""
+    damper = damper_of((0.0,), stribeck_friction={"F_s": 0.4 * TABLE_2[0.0][0], "v_s": 0.015})
+    time = np.arange(0.0, 40.0, 1.0 / 4000.0)
+    tones = tuple(zip((0.02, 0.012), 2.0 * np.pi * np.array([0.83, 1.57]), strict=True))
+    x, v, a = (
+        np.asarray(sum(size * rate**n * wave(rate * time + 0.3) for size, rate in tones))
+        for n, wave in ((0, np.sin), (1, np.cos), (2, lambda at: -np.sin(at)))
+    )
+    force = respond(damper, Motion(time, x, v, a, np.zeros(time.size)))
+    force += 0.002 * np.max(force) * rng.standard_normal(time.size)
+    fine = Record("two-tone", None, time, x, v, a, force, np.zeros(time.size))
+    (prepared,) = prepare((sliced(fine, np.arange(time.size) % 8 == 3),))
+    assert prepared.cycles is None
+    assert np.count_nonzero(np.diff(np.sign(v))) > 80
+    check = check_residual(
+        expected(damper, prepared, NuisanceConfig().delay_s),
+        prepared,
+        np.ones(prepared.record.time.size, dtype=np.bool_),
+        NuisanceConfig(),
+    )
+    assert check.probability["smooth"][0] > 1e-3
+    assert visible_gap([check]) < 0.001

@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.diagnose.data.cleaning import Prepared
-from pzd.diagnose.fit.prediction import PREDICTION_TOLERANCE, motion_of, predicted_force
-from pzd.record import Array, Record
+from pzd.diagnose.fit.prediction import force_in, predicted_force
+from pzd.record import Array
 from pzd.signals.between_cycles import harmonics_of
 
 BETWEEN_SAMPLES = 0.5
@@ -77,7 +76,7 @@ def force_error(damper: Damper, prepared: Prepared) -> Array | float:
     if not prepared.draws:
         return 0.0
     points = prepared.draws[0].time.size // 2
-    known, *others = (_simulated(damper, draw)[points:] for draw in prepared.draws)
+    known, *others = (force_in(damper, draw)[points:] for draw in prepared.draws)
     changes = np.fft.rfft(np.stack(others) - known, points, axis=1) / points
     power = np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
     power[0] = 0.0  # a stuck damper keeps whatever offset it began with
@@ -85,8 +84,3 @@ def force_error(damper: Damper, prepared: Prepared) -> Array | float:
     smooth: Array = np.convolve(power, width, "same") / np.convolve(np.ones(power.size), width, "same")
     smooth[0] = 0.0
     return smooth
-
-
-def _simulated(damper: Damper, record: Record) -> Array:
-    motion, stride = motion_of(record)
-    return respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)[::stride]

@@ -20,7 +20,7 @@ from pzd.damper.drive import effective_voltage
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnose.fit.integrated_out import IntegratedOut
-from pzd.record import Array
+from pzd.record import Array, Rows
 from pzd.signals.autoregression import Autoregression
 from pzd.signals.between_cycles import PureError
 from pzd.signals.left_out import unbroken
@@ -45,12 +45,10 @@ class RecordLikelihood:
     """(m,) what is simulated."""
     begins_with: float
     """Recorded force at the first sample of the motion [N]: that of the same phase where the motion repeats."""
-    first: int
-    """Samples of the motion that come before the first one compared."""
-    stride: int
-    """Motion samples from one compared sample to the next."""
+    places: Rows
+    """(s,) samples of the motion at which it was recorded, from the first one compared to the last."""
     compared: NDArray[np.bool_]
-    """(s,) which of the samples from the first on are compared: n of them, in one stretch or several."""
+    """(s,) which of them are compared: n of them, in one stretch or several."""
     measured: Array
     """(n,) force [N]."""
     peak: float
@@ -79,7 +77,11 @@ class RecordLikelihood:
 
     def at_compared(self, simulated: Array) -> Array:
         """(n,) or (n, p) of what was simulated at the samples that are compared."""
-        return simulated[self.first :: self.stride][: self.compared.size][self.compared]
+        return simulated[self._compared_places]
+
+    @cached_property
+    def _compared_places(self) -> Rows:
+        return self.places[self.compared]
 
     def shown(self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], late: float = 0.0) -> Array:
         """(m,) or (m, p) what was simulated as a channel shows it, between the samples by a cubic.
@@ -94,7 +96,7 @@ class RecordLikelihood:
 
         if not sensors and late == 0.0:
             return simulated
-        begin = self.first if isinstance(self.noise, PureError) else 0
+        begin = int(self.places[0]) if isinstance(self.noise, PureError) else 0
         time = self.motion.time[begin:]
         shown = shown_moments(sensors, time - late)
         if np.array_equal(shown, time):

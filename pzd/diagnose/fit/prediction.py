@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
-from pzd.damper.motion import Motion
+from pzd.damper.motion import Motion, parts_of_steps, steps_of_voltage
 from pzd.diagnose.data.cleaning import Prepared
 from pzd.identify.trial import in_motion
-from pzd.record import Array, Record
+from pzd.record import Array, Record, Rows
 from pzd.signals.reversals import reversals
 
 FEWEST_IN_HALF_CYCLE = 25
@@ -30,8 +30,6 @@ HELD = 0.05
 """A temperature that moves by less [K] over a test stands still there.
 
 Reason: of 5 % a kelvin, which is much for an oil, the force changes by 0.25 % of itself, which counts as nothing."""
-STEP = 0.1
-"""A voltage that moves by more from one sample to the next [share of its range in the record] has stepped."""
 BESIDE_STEP = 0.001
 """Nothing is judged so shortly before and after a step of the voltage [s].
 
@@ -44,13 +42,19 @@ ENDS = 0.02
 def predicted_force(damper: Damper, prepared: Prepared) -> Array:
     """(n,) force that the damper gives under the record's cleaned motion [N]."""
     record = prepared.lead or prepared.record
-    motion, stride = motion_of(record)
-    force = respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)
-    return force[::stride][prepared.lead_samples :]
+    return force_in(damper, record)[prepared.lead_samples :]
 
 
-def motion_of(record: Record) -> tuple[Motion, int]:
-    """The record's motion, on a finer grid where its samples are too far apart for a parabola between them.
+def force_in(damper: Damper, record: Record) -> Array:
+    """(n,) force that the damper gives in the motion of a record, from the recorded force on [N]."""
+    motion, places = motion_of(record)
+    return respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)[places]
+
+
+def motion_of(record: Record) -> tuple[Motion, Rows]:
+    """The record's motion, on a finer grid where its samples are too far apart.
+
+    That is where no parabola goes from one to the next, and where the voltage steps between two.
 
     Parameters
     ----------
@@ -58,15 +62,16 @@ def motion_of(record: Record) -> tuple[Motion, int]:
 
     Returns
     -------
-    the motion, and how many of its samples make one of the record
+    the motion, and (n,) which of its samples are those of the record
     """
-    half_cycle = min(np.diff(reversals(record.displacement)), default=record.displacement.size)
-    stride = max(int(np.ceil(FEWEST_IN_HALF_CYCLE / max(half_cycle, 1))), 1)
-    motion = Motion.of(record) if stride == 1 else _refined(record, stride)
+    size = record.time.size
+    half_cycle = min(np.diff(reversals(record.displacement)), default=size)
+    fewest = int(np.ceil(FEWEST_IN_HALF_CYCLE / max(half_cycle, 1)))
+    motion, places = Motion.of(record).finer(np.maximum(parts_of_steps(record.voltage, size), fewest))
     if motion.temperature is not None and not warms(motion.temperature, HELD):
         held = np.full(motion.temperature.size, np.median(motion.temperature))
         motion = replace(motion, temperature=held)
-    return motion, stride
+    return motion, places
 
 
 def warms(temperature: Array | None, by: float = WARMS) -> bool:
@@ -78,18 +83,6 @@ def ends(temperature: Array) -> tuple[float, float]:
     """Temperature [degC] at the beginning and at the end of a test, the noise of (n,) samples averaged out."""
     tenth = max(temperature.size // 10, 1)
     return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
-
-
-def _refined(record: Record, stride: int) -> Motion:
-    """The record's motion on `stride` times as many samples, by cubic splines."""
-    from scipy.interpolate import CubicSpline
-
-    samples = np.arange(record.time.size)
-    fine = np.arange((record.time.size - 1) * stride + 1) / stride
-    smooth = (record.displacement, record.velocity, record.acceleration)
-    displacement, velocity, acceleration = (CubicSpline(samples, channel)(fine) for channel in smooth)
-    held = (None if c is None else np.interp(fine, samples, c) for c in (record.voltage, record.temperature))
-    return Motion(np.interp(fine, samples, record.time), displacement, velocity, acceleration, *held)
 
 
 def counted(prepared: Prepared) -> NDArray[np.bool_]:
@@ -108,11 +101,10 @@ def counted(prepared: Prepared) -> NDArray[np.bool_]:
 
 def _stepping(record: Record) -> NDArray[np.bool_]:
     """(n,) whether the voltage steps shortly before or after a sample."""
-    size, voltage = record.time.size, record.voltage
-    if voltage is None or np.ptp(voltage) == 0.0:
-        return np.zeros(size, dtype=np.bool_)
-    steps = np.zeros(size, dtype=np.bool_)
-    steps[:-1] = np.abs(np.diff(voltage)) > STEP * np.ptp(voltage)
+    size = record.time.size
+    steps = np.append(steps_of_voltage(record.voltage, size), False)
+    if not steps.any():
+        return steps
     reach = int(np.ceil(BESIDE_STEP * record.rate))
     near = np.convolve(steps, np.ones(2 * reach + 2))[reach : reach + size]
     beside: NDArray[np.bool_] = near > 0.5

@@ -126,8 +126,7 @@ def _of_cycles(
         place,
         motion,
         float(cycle[-(lead // factor) % cycle.size]),
-        lead,
-        factor,
+        lead + factor * np.arange(cycle.size),
         np.ones(cycle.size, dtype=np.bool_),
         cycle,
         peak,
@@ -191,15 +190,14 @@ def _of_samples(
     if left > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left)
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
-    motion, factor = motion_of(record)
+    motion, places = motion_of(record)
     rows = int(np.count_nonzero(unbroken(compared, noise.coefficients.size)))
     bare = RecordLikelihood(
         record.name,
         place,
         motion,
         float(record.force[0]),
-        start * factor,
-        factor,
+        places[start:stop],
         compared,
         measured,
         peak,

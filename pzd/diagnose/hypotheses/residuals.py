@@ -139,11 +139,10 @@ def residuals_of(trials: Trials, damper: Damper) -> Residuals:
     reach = max(float(np.max(np.abs(check.prepared.record.displacement))) for check in checks)
 
     def made(check: ResidualCheck) -> ResidualOfTest:
-        force = check.prepared.record.force - check.residual
         return ResidualOfTest(
             check,
-            signals_of(check.prepared, force, warmth, reach),
-            tangents(damper, check.prepared, force),
+            signals_of(check.prepared, check.predicted, warmth, reach),
+            tangents(damper, check.prepared, check.predicted),
             _counted(check),
             campaign.nuisance,
             check.variance + gap,
@@ -154,7 +153,7 @@ def residuals_of(trials: Trials, damper: Damper) -> Residuals:
 
 def _counted(check: ResidualCheck) -> Mask:
     """(n,) the checked samples beside no jump, evenly thinned."""
-    counts = check.wanted & (bend_beside_jumps(check.prepared) == 0.0)
+    counts = check.wanted & (bend_beside_jumps(check.prepared, check.predicted) == 0.0)
     rows = np.flatnonzero(counts)
     thinned: Mask = np.zeros(counts.size, dtype=np.bool_)
     thinned[rows[:: -(-rows.size // MOST_SAMPLES) or 1]] = True
