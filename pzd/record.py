@@ -24,6 +24,8 @@ SAME_TEMPERATURE = 2.0
 """Records within this many degC are one condition."""
 
 
+_EQUAL_GAPS = 1e-9
+"""Gaps that differ by less than this share are equal but for rounding."""
 _EVEN = 1e-3
 """Steps that scatter by less than this share are even: a clock in microseconds at 1 kHz."""
 
@@ -182,17 +184,20 @@ def conditions(
 
     Returns
     -------
-    conditions sorted by setting, temperature and voltage; and the records whose voltage moves
+    conditions sorted by setting, voltage and temperature; and the records whose voltage moves
     """
     scale = voltage_scale(records)
     within = CONSTANT_SHARE * scale if voltage_within is None else voltage_within
     still = [r for r in records if is_constant(r, scale)]
-    found: list[Condition] = []
+    alike: list[tuple[str | None, list[Record]]] = []
     for setting in sorted({r.setting for r in still}, key=lambda s: s or ""):
         mine = [r for r in still if r.setting == setting]
-        for by_temperature in _bands(mine, [r.median_temperature() for r in mine], temperature_within):
-            bands = _bands(by_temperature, [r.median_voltage() for r in by_temperature], within)
-            found.extend(_condition(setting, members) for members in bands)
+        for at_voltage in _bands(mine, [r.median_voltage() for r in mine], within):
+            bands = _bands(at_voltage, [r.median_temperature() for r in at_voltage], temperature_within)
+            alike.extend((setting, members) for members in bands)
+    found = [_condition(*each, (within, temperature_within)) for each in alike]
+    if len({_labels(each) for each in found}) < len(found):
+        found = [_condition(*each, (0.0, 0.0)) for each in alike]
     return tuple(found), tuple(r for r in records if not is_constant(r, scale))
 
 
@@ -215,44 +220,55 @@ def merged_voltages(records: Sequence[Record], voltage_within: float) -> tuple[f
     return (min(known), max(known)) if DIFFERENT_SHARE * scale < spread <= voltage_within else None
 
 
-def level(values: Array) -> float:
+def level(values: Array, finest: float) -> float:
     """The median of a channel that stands still, without the digits that its noise made.
 
     Parameters
     ----------
-    values : (n,) of one condition or record
+    values : (n,) of one condition
+    finest : a difference that counts [unit of the values]
 
     Returns
     -------
-    rounded to the largest power of ten within the robust standard deviation, so by half of it at most; as it is where
-    most samples are alike
+    rounded to the largest power of ten within both the robust standard deviation and a tenth of what counts; as it is
+    where most samples are alike
     """
     middle = float(np.median(values))
-    scatter = 1.4826 * float(np.median(np.abs(values - middle)))
-    return round(middle, -math.floor(math.log10(scatter))) + 0.0 if scatter > 0.0 else middle
+    step = min(1.4826 * float(np.median(np.abs(values - middle))), 0.1 * finest)
+    return round(middle, -math.floor(math.log10(step))) + 0.0 if step > 0.0 else middle
 
 
-def _condition(setting: str | None, members: Sequence[Record]) -> Condition:
+def _condition(setting: str | None, members: Sequence[Record], finest: tuple[float, float]) -> Condition:
+    """Of records alike, voltage and temperature told no finer than what differs by so much."""
     voltages = [r.voltage for r in members if r.voltage is not None]
     temperatures = [r.temperature for r in members if r.temperature is not None]
     return Condition(
         setting,
-        level(np.concatenate(voltages)) if voltages else None,
-        level(np.concatenate(temperatures)) if temperatures else None,
+        level(np.concatenate(voltages), finest[0]) if voltages else None,
+        level(np.concatenate(temperatures), finest[1]) if temperatures else None,
         tuple(members),
     )
 
 
+def _labels(condition: Condition) -> tuple[str | None, float | None, float | None]:
+    return condition.setting, condition.voltage, condition.temperature
+
+
 def _bands(records: Sequence[Record], labels: Sequence[float | None], within: float) -> list[list[Record]]:
     """Split records into bands of labels no wider than `within`, lowest first; no label is a band of its own."""
-    bands: list[list[Record]] = []
-    start: float | None = None
-    order = sorted(range(len(records)), key=lambda i: (labels[i] is not None, labels[i] or 0.0))
-    for i in order:
-        label = labels[i]
-        if bands and (label is None) == (start is None) and (label is None or label - (start or 0.0) <= within):
-            bands[-1].append(records[i])
-        else:
-            bands.append([records[i]])
-            start = label
-    return bands
+    unknown = [record for record, label in zip(records, labels, strict=True) if label is None]
+    known = sorted(((label, i) for i, label in enumerate(labels) if label is not None), key=lambda one: one[0])
+    parts = _parted(np.array([label for label, _ in known]), within) if known else []
+    bands = [[records[i] for _, i in known[part]] for part in parts]
+    return [unknown, *bands] if unknown else bands
+
+
+def _parted(rising: Array, within: float) -> list[slice]:
+    """Ranges of (n,) rising numbers no wider than `within`: cut at the widest gap, of equal ones at the middlemost."""
+    if rising[-1] - rising[0] <= within:
+        return [slice(0, rising.size)]
+    gaps = np.diff(rising)
+    widest = np.flatnonzero(gaps >= gaps.max() * (1.0 - _EQUAL_GAPS)) + 1
+    cut = int(widest[np.argmin(np.abs(widest - 0.5 * rising.size))])
+    above = (slice(cut + part.start, cut + part.stop) for part in _parted(rising[cut:], within))
+    return [*_parted(rising[:cut], within), *above]

@@ -54,6 +54,8 @@ class Missed:
         return Missed(records, self.error[kept], self.energy[kept], self.spread[kept], self.limit[kept])
 
 
+FEWEST = 2
+"""Differences that scatter."""
 NOTHING_MISSED = Missed((), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
 """Where no test was kept back."""
 
@@ -91,12 +93,17 @@ def _misses_more(one: Missed, other: Missed, errors: float) -> bool:
     if not one.record:
         return False
     difference = (one.error - other.error) / one.energy
-    largest = float(np.max(np.abs(difference)))
-    if not np.isfinite(largest):  # a path that was lost misses more than any other
+    if not np.isfinite(difference).all():  # a path that was lost misses more than any other
         return not np.isfinite(one.error).all() and bool(np.isfinite(other.error).all())
-    difference /= max(largest, 1e-300)  # the square of what a path almost lost misses would overflow
-    error = float(np.std(difference, ddof=1) / np.sqrt(difference.size)) if difference.size > 1 else 0.0
-    return other.less_than(one) and float(difference.mean()) > errors * error
+    return other.less_than(one) and float(difference.mean()) > errors * standard_error(difference)
+
+
+def standard_error(differences: Array) -> float:
+    """Of the mean of (n,) differences, however large: their squares may overflow; 0 of a single one."""
+    largest = float(np.max(np.abs(differences)))
+    if differences.size < FEWEST or largest == 0.0:
+        return 0.0
+    return largest * float(np.std(differences / largest, ddof=1) / np.sqrt(differences.size))
 
 
 def much_worse(one: Missed, other: Missed) -> bool:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from pzd.diagnose.hypotheses.shapes import Shape
-from pzd.diagnose.missed import Missed
+from pzd.diagnose.missed import Missed, standard_error
 from pzd.diagnose.thresholds import PREDICTS_WORSE
 from pzd.record import Array
 
@@ -149,7 +149,7 @@ class Regression:
         plain = self.missed(())
         weight, noise = (np.array([getattr(p, name) for p in self.parts]) for name in ("weight", "noise"))
         better = weight * (before.error - after.error)
-        scatter = float(np.std(better, ddof=1) / np.sqrt(better.size))
+        scatter = standard_error(better)
         surer = float(better.mean()) / scatter if scatter > 0.0 else np.inf
         gap = float(weight @ np.maximum(plain.error - noise, 0.0))
         if surer <= PREDICTS_WORSE or gap <= 0.0:
