@@ -111,6 +111,8 @@ class FilesEntry(Frozen):
     columns: dict[str, Header] = Field(default={})
     """Quantity -> header in the file, e.g. `{time: t, force: Load}`; what is not named has its canonical header.
     An empty header (`{voltage: ''}`) leaves a column out."""
+    rate_Hz: float | None = Field(default=None, gt=0.0)
+    """Samples a second of files in which no column holds the time; each recording begins at 0."""
     units: dict[str, Unit] = Field(default={})
     """Quantity -> unit in the file (`mm`, `kN`, `degF`), or what one recorded unit stands for (`980.665 N`).
     For time also a format of date and time (`%m/%d/%Y %H:%M:%S.%f`)."""

@@ -134,6 +134,19 @@ def test_a_farad_of_a_temperature_is_a_degree_fahrenheit(tmp_path: Path) -> None
     assert entry.temperature_degC == pytest.approx(25.0)
 
 
+@pytest.mark.parametrize("said", ["# Sample rate: 500 Hz", "Abtastfrequenz 0,5 kHz", "SAMPLING 500.0 hz"])
+def test_a_rate_above_the_header_stands_for_a_column_of_time(tmp_path: Path, said: str) -> None:
+    path = stored(tmp_path / "a.csv", [said, "Stroke (mm);Load (N)"], [numbers(MM), numbers(FORCE)], ";")
+    assert "      rate_Hz: 500    # from the lines above the header: no column holds the time" in guessed([path])
+    (record,) = read_back(tmp_path, [path]).records
+    assert record.time == pytest.approx(np.arange(TIME.size) / 500.0)
+
+
+def test_where_nothing_tells_the_rate_it_is_asked_for(tmp_path: Path) -> None:
+    path = stored(tmp_path / "a.csv", ["Stroke (mm);Load (N)"], [numbers(MM), numbers(FORCE)], ";")
+    assert any("or say rate_Hz: N instead" in line for line in guessed([path]))
+
+
 def test_what_stays_open_is_an_empty_value_that_the_check_asks_for(tmp_path: Path) -> None:
     path = stored(tmp_path / "a.csv", ["t,pos,Channel 3"], [numbers(values) for values in (TIME, MM, FORCE)], ",")
     (tmp_path / "guess.yaml").write_text("\n".join(guessed([path])), encoding="utf-8")

@@ -165,6 +165,33 @@ def test_a_header_among_the_data_is_named_as_such(tmp_path: Path) -> None:
     assert "a file of its own" in said
 
 
+def test_so_is_one_below_a_blank_line_and_a_title(tmp_path: Path) -> None:
+    text = lines(CANONICAL)
+    write(tmp_path / "a.csv", [*text, "", "Test 2", *text, "", "Test 3", *text])
+    (said,) = refused(tmp_path)
+    assert "a.csv:504: the header stands here again and once more below" in said
+
+
+@pytest.mark.parametrize(
+    ("cell", "decimal"), [("1.129,9", ","), ("1,129.9", "."), ("1'129.9", "."), ("-12 129,9", ",")]
+)
+def test_grouped_thousands_are_told_as_such(tmp_path: Path, cell: str, decimal: str) -> None:
+    text = [line.replace(".", decimal) for line in lines(CANONICAL, separator=";")]
+    text[7] = ";".join([*text[7].split(";")[:2], cell, *text[7].split(";")[3:]])
+    write(tmp_path / "a.csv", text)
+    said = refused(tmp_path, {"path": "*.csv", "separator": ";", "decimal": decimal})
+    assert f"force_N: a number is needed (got {cell!r}); write the file without grouping thousands" in said[0]
+
+
+def test_a_clock_is_a_column_or_counted_and_not_both(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", lines({name: values for name, values in CANONICAL.items() if name != "time_s"}))
+    assert "missing column time_s" in refused(tmp_path)[0]
+    (record,) = run(tmp_path, {"path": "*.csv", "rate_Hz": 200.0}).records
+    assert record.time == pytest.approx(np.arange(TIME.size) / 200.0)
+    (said,) = wrong(tmp_path, {"path": "*.csv", "rate_Hz": 200.0, "columns": {"time": "t"}})
+    assert "time: said twice, under rate_Hz and columns" in said
+
+
 def test_milliseconds_called_seconds_are_asked_about_unless_the_config_says_them(tmp_path: Path) -> None:
     write(tmp_path / "a.csv", lines(CANONICAL | {"time_s": TIME * 1e3}))
     (said,) = refused(tmp_path)

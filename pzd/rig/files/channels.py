@@ -75,8 +75,9 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
     found = _sources(sheet, layout)
     bad = [fault for source in found for fault in sheet.faults.get(source.column, [])]
     if bad:
-        return Channels(_clock(sheet, found), tuple(bad))
+        return Channels(_clock(sheet, layout, found), tuple(bad))
     values = {source.spec.quantity: _instants(sheet, source) for source in found if source.dated}
+    values |= _counted(sheet, layout)
     faults: list[str] = []
     for source in found:
         if source.dated:
@@ -95,8 +96,9 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
             raise ConfigError(f"{layout.place}.units: {fault} (in {sheet.path})") from None
         values[source.spec.quantity] = _steady(channel) if source.spec.quantity in LABELS else channel
     if faults:
-        return Channels(_clock(sheet, found), tuple(faults))
-    return Channels(values, remarks=_remarks(sheet, found), steps=tuple(_steps(sheet, found, values)))
+        return Channels(_clock(sheet, layout, found), tuple(faults))
+    steps = (*_steps(sheet, found, values), *_counting(layout))
+    return Channels(values, remarks=_remarks(sheet, found), steps=steps)
 
 
 def _steps(sheet: Sheet, found: list[_Source], values: dict[Quantity, Array]) -> Iterator[ReadingStep]:
@@ -225,8 +227,25 @@ def _missing(sheet: Sheet, spec: ChannelSpec, place: str) -> str:
     return f"{sheet.top}: missing column {wanted}{hint} (got {', '.join(sheet.header)})"
 
 
-def _clock(sheet: Sheet, found: list[_Source]) -> dict[Quantity, Array]:
+def _counted(sheet: Sheet, layout: Layout) -> dict[Quantity, Array]:
+    """The clock of files without a column of it, from 0 in every recording; nothing where a column holds it."""
+    if layout.entry.rate_Hz is None:
+        return {}
+    rows = np.arange(sheet.rows, dtype=np.float64)
+    begins = np.array(sheet.starts)[np.searchsorted(sheet.starts, rows, side="right") - 1]
+    return {TIME: (rows - begins) / layout.entry.rate_Hz}
+
+
+def _counting(layout: Layout) -> Iterator[ReadingStep]:
+    """That samples were counted for the time."""
+    if layout.entry.rate_Hz is not None:
+        yield ReadingStep("clock", TIME.name, "no column", f"samples counted at {layout.entry.rate_Hz:.10g} Hz")
+
+
+def _clock(sheet: Sheet, layout: Layout, found: list[_Source]) -> dict[Quantity, Array]:
     """The clock as it stands in the file; nothing where it holds dates or bad cells."""
+    if layout.entry.rate_Hz is not None:
+        return _counted(sheet, layout)
     (clock,) = (source for source in found if source.spec.quantity is TIME)
     return {} if clock.dated or clock.column in sheet.faults else {TIME: sheet.numbers[clock.column]}
 

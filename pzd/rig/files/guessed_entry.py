@@ -14,6 +14,7 @@ import numpy as np
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
 from pzd.record import Array
 from pzd.rig.config import FilesEntry, FileSplit, NamedLayout
+from pzd.rig.files.dialect import after_lines
 from pzd.rig.files.file_names import one_pattern, setting_in_names, setting_of, value_in_names
 from pzd.rig.files.formats import TEXT, read_sheet
 from pzd.rig.files.headers import assigned, is_canonical, unit_of
@@ -32,6 +33,8 @@ FORMATS = (
 )
 """Formats of date and time that are tried on the first row."""
 
+_RATE = re.compile(r"(?:sampl|rate|freq|abtast)[^\n\d]*(\d+(?:[.,]\d+)?)\s*(k)?Hz", re.IGNORECASE)
+"""A sampling rate in the lines above the header."""
 _EVENTS = re.compile(r"event|marker|marke|ereignis", re.IGNORECASE)
 _GOES_ON = re.compile(r"resume|restart|start|begin|weiter", re.IGNORECASE)
 """Words of an event with which another recording begins."""
@@ -123,10 +126,16 @@ def _keys(
     yield from _dialect_keys(dialect)
     named = {own_quantity(q, control): c for q, c in columns.items() if not is_canonical(c, q, control)}
     lost = [q for q in NEEDED if q not in columns]
+    if TIME in lost and (rate := _rate(files[0])):
+        lost.remove(TIME)
+        yield f"rate_Hz: {rate:.10g}    # from the lines above the header: no column holds the time"
     if named or lost:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
-        yield from (f"  {q.name}:   # fill in: one of {', '.join(dialect.header)}" for q in lost)
+        counted = "; or say rate_Hz: N instead, where no column holds it"
+        yield from (
+            f"  {q.name}:   # fill in: one of {', '.join(dialect.header)}{counted if q is TIME else ''}" for q in lost
+        )
     units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, unit in in_names.items())]
     if units:
         yield "units:"
@@ -136,6 +145,15 @@ def _keys(
     yield from _events(files[0])
     if not lost and any(_turned(file, columns) for file in files):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
+
+
+def _rate(file: Sniffed) -> float | None:
+    """The sampling rate [Hz] that the lines above the header of a text file tell, None where they tell none."""
+    if file.form != TEXT:
+        return None
+    text = file.path.read_bytes().decode(file.dialect.encoding, errors="replace")
+    found = _RATE.search(text[: after_lines(text, file.dialect.skip)])
+    return float(found[1].replace(",", ".")) * (1e3 if found[2] else 1.0) if found else None
 
 
 def _patterns(paths: Sequence[Path]) -> list[tuple[str, Sequence[Path]]]:

@@ -24,7 +24,7 @@ from pzd.rig.files.layout import ALSO_READ, own_quantity
 from pzd.rig.files.units import UnitError, in_header, to_canonical
 
 _LOOKS_LIKE = {
-    TIME: r"^t$|^tout$|time|zeit|\btemps\b|tiempo|^second|^sek",
+    TIME: r"^t$|^tout$|time|clock|zeit|\btemps\b|tiempo|^second|^sek",
     DISPLACEMENT: r"^[xs]$|disp|^dist|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera",
     VELOCITY: r"^v$|vel|speed|geschw|vitesse",
     ACCELERATION: r"^a$|acc|beschl|acel",

@@ -177,7 +177,8 @@ def _layout(entry: FilesEntry, place: str, control: Control, folder: Path) -> La
                 f"control: {{name: {theirs.name}, unit: {theirs.unit}}} (got {entry.layout!r})"
             )
         entry = with_layout(entry, named)
-    layout = Layout(entry, place, control, tuple(_spec(quantity, entry, control) for quantity in CHANNELS))
+    held = (quantity for quantity in CHANNELS if quantity is not TIME or entry.rate_Hz is None)
+    layout = Layout(entry, place, control, tuple(_spec(quantity, entry, control) for quantity in held))
     faults = _faults(layout)
     if faults:
         raise ConfigError(faults)
@@ -216,6 +217,9 @@ def _faults(layout: Layout) -> list[str]:
         ways = [field for field in ways if field != "columns" or spec.headers]
         if spec.quantity in LABELS and len(ways) > 1:
             faults.append(f"{place}: {spec.own.name}: said twice, under {' and '.join(ways)}")
+    if entry.rate_Hz is not None:
+        twice = [field for field in ("columns", "units", "sign") if TIME.name in getattr(entry, field)]
+        faults += [f"{place}: time: said twice, under rate_Hz and {field}" for field in twice]
     if "setting" in groups and entry.setting is not None:
         faults.append(f"{place}: setting: said twice, under setting and pattern")
     return faults

@@ -36,6 +36,8 @@ MOST_FAULTS = 5
 """Faults of one kind that are listed for one file."""
 
 
+_GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d*|(?:,\d{3})+\.\d*|(?:[' ]\d{3})+(?:[.,]\d*)?)")
+"""A number whose thousands are grouped: 1.129,9 or 1,129.9 or 1'129.9."""
 _INSIDE = "\x1e"
 """Stands for a separator inside an event, which no logger quotes."""
 
@@ -96,11 +98,7 @@ class _Table:
         again = [row for row, cell in enumerate(self.texts(columns[0])) if cell == self.header[columns[0]]]
         again = again if all(self.texts(c)[row] == self.header[c] for row in again[:1] for c in columns) else []
         if again:
-            more = f" and {len(again) - 1} more times below" if len(again) > 1 else ""
-            raise DataError(
-                f"{at(self.path, int(self.lines[again[0]]))}: the header stands here again{more}: another recording "
-                "begins; write each into a file of its own"
-            )
+            raise DataError(_stands_again(self.path, int(self.lines[again[0]]), len(again)))
 
     def _cell_by_cell(self, column: int) -> Array | list[str]:
         """The slow way, which knows the place of every bad cell; the faults where there are such."""
@@ -113,7 +111,7 @@ class _Table:
             except ValueError:
                 bad.append(row)
         if bad:
-            hint = "; for decimal commas say decimal: ','" if any("," in cells[row] for row in bad) else ""
+            hint = _hint([cells[row] for row in bad])
             return self._listed(column, bad, [f"a number is needed (got {cells[row]!r}){hint}" for row in bad])
         return values
 
@@ -212,6 +210,7 @@ def _sheet(
     if entry.split is not None and entry.split.event == header[-1]:
         body, uneven = _with_loose_events(body, fields, len(header), separator)
     if uneven.any():
+        _refuse_another_header(path, entry, heads, body, lines, separator)
         raise DataError(_uneven(path, lines, fields, np.flatnonzero(uneven), len(header), separator))
     units = tuple(heads[-1]) if entry.units_row else None
     if units is not None and len(units) != len(header):
@@ -235,6 +234,43 @@ def _steps(entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[
     unread = [head for head in header if head not in wanted.numbers | wanted.texts]
     if unread:
         yield ReadingStep("left out", None, f"columns {', '.join(unread)}", "")
+
+
+def _refuse_another_header(
+    path: Path,
+    entry: FilesEntry,
+    heads: list[list[str]],
+    body: str,
+    lines: NDArray[np.int64],
+    separator: str,
+) -> None:
+    """Say so where the header stands among lines of other lengths: another test begins there.
+
+    Raises
+    ------
+    DataError : with the line of the first such header
+    """
+    if entry.header is not None or not heads:
+        return
+    rows = body.split("\n")
+    again = [i for i, row in enumerate(rows) if fields_of(row, separator) == heads[0]]
+    if again:
+        raise DataError(_stands_again(path, int(lines[again[0]]), len(again)))
+
+
+def _stands_again(path: Path, line: int, times: int) -> str:
+    more = {1: "", 2: " and once more below"}.get(times, f" and {times - 1} more times below")
+    return (
+        f"{at(path, line)}: the header stands here again{more}: another recording begins; write each into a file of "
+        "its own"
+    )
+
+
+def _hint(cells: list[str]) -> str:
+    """What to do about cells that are no numbers, where they tell it by themselves."""
+    if any(_GROUPED.fullmatch(cell) for cell in cells):
+        return "; write the file without grouping thousands"
+    return "; for decimal commas say decimal: ','" if any("," in cell for cell in cells) else ""
 
 
 def _uneven(
