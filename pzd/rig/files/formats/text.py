@@ -21,6 +21,7 @@ from pzd.record import Array
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import BLANKS, after_lines, field_counts, fields_of, separator_of, text_of, without_blank_end
 from pzd.rig.files.sheet import ReadingStep, Sheet, Wanted
+from pzd.rig.files.text_faults import MOST_FAULTS, hint, refuse_another_header, stands_again, uneven_lines
 from pzd.schema.errors import DataError, at
 from pzd.schema.wording import counted
 
@@ -32,12 +33,6 @@ SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
 NEEDS = None
 OPTIONS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding")
 
-MOST_FAULTS = 5
-"""Faults of one kind that are listed for one file."""
-
-
-_GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d*|(?:,\d{3})+\.\d*|(?:[' ]\d{3})+(?:[.,]\d*)?)")
-"""A number whose thousands are grouped: 1.129,9 or 1,129.9 or 1'129.9."""
 _INSIDE = "\x1e"
 """Stands for a separator inside an event, which no logger quotes."""
 
@@ -98,7 +93,7 @@ class _Table:
         again = [row for row, cell in enumerate(self.texts(columns[0])) if cell == self.header[columns[0]]]
         again = again if all(self.texts(c)[row] == self.header[c] for row in again[:1] for c in columns) else []
         if again:
-            raise DataError(_stands_again(self.path, int(self.lines[again[0]]), len(again)))
+            raise DataError(stands_again(self.path, int(self.lines[again[0]]), len(again)))
 
     def _cell_by_cell(self, column: int) -> Array | list[str]:
         """The slow way, which knows the place of every bad cell; the faults where there are such."""
@@ -111,8 +106,8 @@ class _Table:
             except ValueError:
                 bad.append(row)
         if bad:
-            hint = _hint([cells[row] for row in bad])
-            return self._listed(column, bad, [f"a number is needed (got {cells[row]!r}){hint}" for row in bad])
+            advice = hint([cells[row] for row in bad])
+            return self._listed(column, bad, [f"a number is needed (got {cells[row]!r}){advice}" for row in bad])
         return values
 
     def _infinite(self, column: int, values: Array) -> list[str]:
@@ -210,8 +205,9 @@ def _sheet(
     if entry.split is not None and entry.split.event == header[-1]:
         body, uneven = _with_loose_events(body, fields, len(header), separator)
     if uneven.any():
-        _refuse_another_header(path, entry, heads, body, lines, separator)
-        raise DataError(_uneven(path, lines, fields, np.flatnonzero(uneven), len(header), separator))
+        if entry.header is None:
+            refuse_another_header(path, header, body, lines, separator)
+        raise DataError(uneven_lines(path, lines, fields, np.flatnonzero(uneven), len(header), separator))
     units = tuple(heads[-1]) if entry.units_row else None
     if units is not None and len(units) != len(header):
         raise DataError(f"{at(path, int(lines[0]) - 1)}: {len(units)} units for {len(header)} columns")
@@ -234,61 +230,6 @@ def _steps(entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[
     unread = [head for head in header if head not in wanted.numbers | wanted.texts]
     if unread:
         yield ReadingStep("left out", None, f"columns {', '.join(unread)}", "")
-
-
-def _refuse_another_header(
-    path: Path,
-    entry: FilesEntry,
-    heads: list[list[str]],
-    body: str,
-    lines: NDArray[np.int64],
-    separator: str,
-) -> None:
-    """Say so where the header stands among lines of other lengths: another test begins there.
-
-    Raises
-    ------
-    DataError : with the line of the first such header
-    """
-    if entry.header is not None or not heads:
-        return
-    rows = body.split("\n")
-    again = [i for i, row in enumerate(rows) if fields_of(row, separator) == heads[0]]
-    if again:
-        raise DataError(_stands_again(path, int(lines[again[0]]), len(again)))
-
-
-def _stands_again(path: Path, line: int, times: int) -> str:
-    more = {1: "", 2: " and once more below"}.get(times, f" and {times - 1} more times below")
-    return (
-        f"{at(path, line)}: the header stands here again{more}: another recording begins; write each into a file of "
-        "its own"
-    )
-
-
-def _hint(cells: list[str]) -> str:
-    """What to do about cells that are no numbers, where they tell it by themselves."""
-    if any(_GROUPED.fullmatch(cell) for cell in cells):
-        return "; write the file without grouping thousands"
-    return "; for decimal commas say decimal: ','" if any("," in cell for cell in cells) else ""
-
-
-def _uneven(
-    path: Path,
-    lines: NDArray[np.int64],
-    fields: NDArray[np.int64],
-    rows: NDArray[np.int64],
-    wanted: int,
-    separator: str,
-) -> list[str]:
-    said = "" if separator == "\x1f" else f" (separator {separator!r})"
-    shown = [
-        f"{at(path, int(lines[r]))}: {fields[r]} fields where the header has {wanted}{said}" for r in rows[:MOST_FAULTS]
-    ]
-    if rows.size <= MOST_FAULTS:
-        return shown
-    hint = "; if the header stands further down, say skip: lines above it" if rows.size > lines.size // 2 else ""
-    return [*shown, f"{at(path)}: and {rows.size - MOST_FAULTS} more such lines{hint}"]
 
 
 def _with_loose_events(
