@@ -14,6 +14,7 @@ from pzd.damper.motion import Motion, parts_of_steps
 from pzd.identify.nodes import weights
 from pzd.identify.objective import Bingham, Objective
 from pzd.record import Array, Record, Rows
+from pzd.signals.lines import without_noise
 
 DIFFERENCE = 1e-5
 """Step of the difference quotients, as a share of the parameter; for T0 of a hundredth of peak force at least."""
@@ -99,7 +100,7 @@ def motion_of(record: Record) -> tuple[Motion, Rows]:
 
 
 def voltage_of(record: Record) -> Array:
-    """The record's voltage.
+    """(n,) the record's voltage, its levels and ramps free of noise.
 
     Raises
     ------
@@ -107,4 +108,4 @@ def voltage_of(record: Record) -> Array:
     """
     if record.voltage is None:
         raise ValueError(f"record {record.name} has no voltage")
-    return record.voltage
+    return without_noise(record.voltage)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from pzd.record import Array, Record, is_constant, sliced, voltage_scale
 from pzd.signals.between_cycles import neighbours, pure_error
 from pzd.signals.cycles import Cycles, cycles, drift, settled
+from pzd.signals.lines import without_noise
 from pzd.signals.short_time import ShortTimeMask
 from pzd.signals.smoothing import HIGHEST, low_pass, motion_below
 from pzd.signals.stretches import separate_tests
@@ -107,7 +108,7 @@ def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
 
 
 def _prepared(raw: Record, constant: bool) -> Prepared:
-    record = _even_temperature(_held_voltage(raw) if constant else raw)
+    record = _even_temperature(_held_voltage(raw) if constant else _quiet_voltage(raw))
     run = cycles(record.time, record.displacement)
     if run is None:
         return Prepared(_smoothed(record), None, None, constant)
@@ -133,6 +134,11 @@ def _held_voltage(record: Record) -> Record:
     """The record with its median voltage in place of what a noisy sensor makes of one that stands still."""
     voltage = record.median_voltage()
     return record if voltage is None else replace(record, voltage=np.full(record.time.size, voltage))
+
+
+def _quiet_voltage(record: Record) -> Record:
+    """The record with the levels and ramps of its voltage in place of what a noisy sensor makes of them."""
+    return record if record.voltage is None else replace(record, voltage=without_noise(record.voltage))
 
 
 def _even_temperature(record: Record) -> Record:

@@ -152,7 +152,20 @@ class _Search:
         return None
 
     def _too_little(self, evidence: Evidence, before: Fitted, each: Candidate) -> str | None:
-        return unsupported(evidence, self.config, each) or leaves_gap(evidence, self.config, before, each)
+        return unsupported(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
+
+    def _leaves_gap(self, evidence: Evidence, before: Fitted, each: Candidate) -> str | None:
+        """Why a candidate is a stand-in by the gap that it leaves open, weighed by what is left without it or with it.
+
+        What is left without it is slow: beside that the fit goes by what is quick, where the displacement is known
+        worst, and T0, C and k are bent.
+        """
+        reason = leaves_gap(evidence, self.config, before, each)
+        if reason is None or each.varies:
+            return reason
+        whole = self.weighed(each.fitted.damper).whole
+        again = fit(whole, each.fitted.effects, whole.start_with(each.fitted.damper))
+        return leaves_gap(evidence, self.config, before, replace(each, fitted=again))
 
     def _pair(self, tried: tuple[Candidate, ...]) -> bool:
         """Adopt two effects at once: alone either takes on values that the other distorts."""
@@ -248,7 +261,7 @@ class _Search:
         evidence, before = self.evidence, self.current
         return (
             unsupported(evidence, config, each)
-            or leaves_gap(evidence, config, before, each)
+            or self._leaves_gap(evidence, before, each)
             or spurious(evidence, self.weighed(each.fitted.damper), config, before, each)
         )
 
