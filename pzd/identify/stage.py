@@ -11,18 +11,30 @@ from pzd.identify.config import IdentifyConfig
 from pzd.quantities import Control
 from pzd.record import Condition, Record, conditions, merged_voltages
 from pzd.schema.errors import ConfigError
+from pzd.schema.processes import parallel_map
 from pzd.schema.progress import Listener, Progress, no_listener
 from pzd.schema.wording import supported
+from pzd.signals.cycles import Cycles
+from pzd.signals.repeating import cycles_of, remember
 
 Labels = tuple[str | None, float | None, float | None]
 
 log = logging.getLogger(__name__)
 
+WORTH_A_PROCESS = 2_000_000
+"""Samples in all from which conditions are fitted in processes of their own, each of which imports a library first:
+fewer are fitted as soon here."""
+
 _VOLTAGE = Control()
 
 
 def identify(
-    identify: IdentifyConfig, rig: Rig, seed: int, progress: Listener = no_listener, control: Control = _VOLTAGE
+    identify: IdentifyConfig,
+    rig: Rig,
+    seed: int,
+    progress: Listener = no_listener,
+    control: Control = _VOLTAGE,
+    jobs: int = 1,
 ) -> Identified:
     """The Bingham parameters of every condition of every setting, with intervals and their trust.
 
@@ -33,6 +45,7 @@ def identify(
     seed : of the evolutionary search
     progress : hears of every condition that is done
     control : the control signal, which names the voltage in messages
+    jobs : conditions that are fitted at the same time
 
     Returns
     -------
@@ -48,7 +61,7 @@ def identify(
 
     refuse_one_condition(identify, rig, control)
     constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
-    found = _constant_rows(constant, identify, seed, progress)
+    found = _constant_rows(constant, identify, seed, progress, jobs)
     rows = {_labels(row): row for row, _ in found}
     auxiliary = {_labels(row): row for _, row in found if row is not None}
     known = list(zip(constant, rows.values(), strict=True))
@@ -102,15 +115,25 @@ def refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> 
 
 
 def _constant_rows(
-    found: Sequence[Condition], config: IdentifyConfig, seed: int, progress: Listener
+    found: Sequence[Condition], config: IdentifyConfig, seed: int, progress: Listener, jobs: int
 ) -> list[tuple[ParameterRow, AuxiliaryRow | None]]:
     from pzd.identify.fit import identify_condition
 
-    rows = []
-    for index, condition in enumerate(found):
-        row, auxiliary = identify_condition(condition, config, seed + index)
+    rows: list[tuple[ParameterRow, AuxiliaryRow | None]] = []
+
+    def fitted(number: int) -> tuple[ParameterRow, AuxiliaryRow | None, list[Cycles | None]]:
+        condition = found[number]
+        return *identify_condition(condition, config, seed + number), [cycles_of(r) for r in condition.records]
+
+    def told(made: tuple[ParameterRow, AuxiliaryRow | None, list[Cycles | None]]) -> None:
+        row, auxiliary, runs = made
+        for record, run in zip(found[len(rows)].records, runs, strict=True):
+            remember(record, run)
         rows.append((row, auxiliary))
-        progress(Progress(index + 1, len(found), f"conditions: {_line(row)}{_auxiliary_text(auxiliary)}"))
+        progress(Progress(len(rows), len(found), f"conditions: {_line(row)}{_auxiliary_text(auxiliary)}"))
+
+    samples = sum(record.time.size for condition in found for record in condition.records)
+    parallel_map(fitted, range(len(found)), jobs if samples > WORTH_A_PROCESS else 1, told)
     return rows
 
 

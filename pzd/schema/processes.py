@@ -19,7 +19,9 @@ _FORKS = sys.platform == "linux"
 """Elsewhere a process would have to import everything anew, which takes longer than what is saved."""
 
 
-def parallel_map(function: Callable[[Item], Made], items: Sequence[Item], jobs: int) -> list[Made]:
+def parallel_map(
+    function: Callable[[Item], Made], items: Sequence[Item], jobs: int, made_one: Callable[[Made], None] | None = None
+) -> list[Made]:
     """What a function makes of each item, in order, however many processes there are.
 
     Parameters
@@ -27,14 +29,24 @@ def parallel_map(function: Callable[[Item], Made], items: Sequence[Item], jobs: 
     function : is called once an item; what it changes in memory may be lost
     items : what to call it with
     jobs : processes at the same time
+    made_one : hears in this process of each that is made, in order
 
     Raises
     ------
     whatever the function does
     """
     jobs = min(jobs, len(items)) if _FORKS else 1
+    made: list[Made] = []
+
+    def heard(one: Made) -> None:
+        made.append(one)
+        if made_one is not None:
+            made_one(one)
+
     if jobs < 2:
-        return [function(item) for item in items]
+        for item in items:
+            heard(function(item))
+        return made
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
@@ -44,7 +56,8 @@ def parallel_map(function: Callable[[Item], Made], items: Sequence[Item], jobs: 
     finished = False
     try:
         futures = [pool.submit(_one, place) for place in range(len(items))]
-        made = [_result(future, function, item) for future, item in zip(futures, items, strict=True)]
+        for future, item in zip(futures, items, strict=True):
+            heard(_result(future, function, item))
         finished = True
     finally:
         pool.shutdown(wait=finished, cancel_futures=True)

@@ -40,6 +40,16 @@ def test_records_of_one_condition_share_a_row_and_settings_do_not() -> None:
     assert found.untrusted(Control()) == ()
 
 
+def test_conditions_fitted_in_processes_of_their_own_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[Progress] = []
+    alone = identify(IdentifyConfig(), rig(), seed=1, progress=told.append)
+    monkeypatch.setattr("pzd.identify.stage.WORTH_A_PROCESS", 0)
+    together = list[Progress]()
+    found = identify(IdentifyConfig(), rig(), seed=1, progress=together.append, jobs=3)
+    assert vars(found) == vars(alone)
+    assert together == told
+
+
 def test_a_narrower_group_splits_conditions() -> None:
     config = IdentifyConfig.model_validate_json('{"group": {"temperature_degC": 0.1}}')
     assert len(identify(config, rig(), seed=1).rows) == 8

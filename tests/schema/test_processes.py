@@ -25,6 +25,13 @@ def test_results_stand_in_order_for_any_number_of_processes(jobs: int, count: in
     assert parallel_map(lambda number: number**2, range(count), jobs) == [number**2 for number in range(count)]
 
 
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_each_that_is_made_is_told_in_order_where_it_was_asked_for(jobs: int) -> None:
+    told: list[tuple[int, int]] = []
+    parallel_map(lambda number: number**2, range(5), jobs, lambda square: told.append((square, os.getpid())))
+    assert told == [(number**2, os.getpid()) for number in range(5)]
+
+
 def test_two_processes_work_at_the_same_time() -> None:
     both = multiprocessing.get_context("fork").Barrier(2, timeout=60.0)  # opens when two have come
 

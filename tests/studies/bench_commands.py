@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 import re
-import resource
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from bench_table import Row
@@ -22,8 +23,21 @@ STUDIES = ROOT / "tests" / "studies"
 CONFIG = ROOT / "configs" / "quickstart.yaml"
 
 
-def run(*arguments: object, folder: Path, module: str = "pzd", afresh: bool = False) -> tuple[float, float, str]:
-    """Seconds by the clock and of processors that a command takes, and what it prints; it must exit 0.
+class Done(NamedTuple):
+    """A command that has ended."""
+
+    wall: float
+    """Seconds by the clock."""
+    cpu: float
+    """Seconds of processors, those of its own processes included."""
+    said: str
+    """What it printed."""
+    peak_MB: float
+    """Memory of the largest of its processes."""
+
+
+def run(*arguments: object, folder: Path, module: str = "pzd", afresh: bool = False) -> Done:
+    """Run a command to its end; it must exit 0.
 
     Parameters
     ----------
@@ -37,20 +51,24 @@ def run(*arguments: object, folder: Path, module: str = "pzd", afresh: bool = Fa
     path = f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
     own = {"XDG_CACHE_HOME": str(folder / "cache")} if afresh else {}
     environment = {**os.environ, **own, "PYTHONPATH": path}
-    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise RuntimeError(f"{' '.join(command)}: {done.stderr}")
-    wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
-    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, done.stdout + done.stderr
+    with tempfile.TemporaryFile("w+") as printed:
+        start = time.perf_counter()
+        process = subprocess.Popen(command, env=environment, cwd=folder, stdout=printed, stderr=subprocess.STDOUT)
+        _, status, used = os.wait4(process.pid, 0)
+        wall, process.returncode = time.perf_counter() - start, os.waitstatus_to_exitcode(status)
+        printed.seek(0)
+        said = printed.read()
+    if process.returncode != 0:
+        raise RuntimeError(f"{' '.join(command)}: {said}")
+    return Done(wall, used.ru_utime + used.ru_stime, said, used.ru_maxrss / 1024.0)
 
 
 def waits(folder: Path) -> Iterator[Row]:
     """What a user types first."""
 
     def row(work: str, least: float, *arguments: object) -> Row:
-        wall, cpu, _ = run(*arguments, folder=folder, afresh=True)
-        return Row(work, wall, "s", least, at_least=False, about=f"{cpu:.3g} CPU-s")
+        done = run(*arguments, folder=folder, afresh=True)
+        return Row(work, done.wall, "s", least, at_least=False, about=f"{done.cpu:.3g} CPU-s")
 
     yield min((row("pzd --help, best of 5", 0.2, "--help") for _ in range(5)), key=lambda row: row.figure)
     yield row("quickstart, nothing compiled", 25.0, "run", CONFIG)
@@ -89,13 +107,15 @@ def files(folder: Path) -> Iterator[Row]:
                           folder=place, module="pzd")
         for name, jobs in (("half", 1), ("many", 1), ("many", 2))
     }  # fmt: skip
-    wall, cpu, said = times["many", 2]
-    fitting = float(re.search(r"identify\s+done in ([\d.]+) s", said)[1])
-    exponent = float(np.log2(times["many", 1][1] / times["half", 1][1]))
-    about = f"{cpu:.3g} CPU-s; growth of time with files: exponent {exponent:.2f}"
-    yield Row("1,000 rig CSVs of 10^4 rows to parameters.csv", wall, "s", 10.0, at_least=False, about=about)
+    two = times["many", 2]
+    fitting = float(re.search(r"identify\s+done in ([\d.]+) s", two.said)[1])
+    exponent = float(np.log2(times["many", 1].cpu / times["half", 1].cpu))
+    about = f"{two.cpu:.3g} CPU-s; growth of time with files: exponent {exponent:.2f}"
+    yield Row("1,000 rig CSVs of 10^4 rows to parameters.csv", two.wall, "s", 10.0, at_least=False, about=about)
     yield Row("  of which the stage identify", fitting, "s", 2.0, at_least=False)
-    yield Row("  with two processes beside one", times["many", 1][0] / wall, "x", 1.7)
+    yield Row("  with two processes beside one", times["many", 1].wall / two.wall, "x", 1.7)
+    peaks = f"with one process {times['many', 1].peak_MB:.0f} MB, of half the files {times['half', 1].peak_MB:.0f} MB"
+    yield Row("  its largest process", two.peak_MB, "MB", about=peaks)
 
 
 CAMPAIGNS = {"clean": 4.0, "rich": 20.0, "switching": 30.0}
@@ -108,7 +128,7 @@ def diagnoses(folder: Path) -> Iterator[Row]:
     folder.mkdir(exist_ok=True)
 
     def measured(name: str, *more: object) -> dict[str, object]:
-        _, _, said = run(script, STUDIES / "speed" / f"{name}.yaml", *more, folder=folder, module="")
+        said = run(script, STUDIES / "speed" / f"{name}.yaml", *more, folder=folder, module="").said
         told: dict[str, object] = json.loads(next(line for line in said.splitlines() if line.startswith("{")))
         return told
 
@@ -143,13 +163,14 @@ def campaign(folder: Path) -> Iterator[Row]:
         for some in (draws // 2, draws):
             place = ("--runs", f"runs-{some}")
             run("sweep", config, *place, "--set", "sweep.draws=2", folder=folder)  # makes what all runs share
-            spent.append(run("sweep", config, *place, "--set", f"sweep.draws={some}", "--jobs", 2, folder=folder)[:2])
-        (half, half_cpu), (wall, cpu) = spent
-        each, each_cpu = (2.0 * (total - part) / draws for total, part in ((wall, half), (cpu, half_cpu)))
-        start = half_cpu - 0.5 * draws * each_cpu
-        whole += wall + each * (count - draws)
-        peak = max(peak, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024.0)
-        about = f"{each_cpu:.3g} CPU-s a run, {start:.2g} CPU-s once; {count} in {wall + each * (count - draws):.0f} s"
-        yield Row(f"campaign, {draws} {what}", wall, "s", about=about)
+            spent.append(run("sweep", config, *place, "--set", f"sweep.draws={some}", "--jobs", 2, folder=folder))
+        half, full = spent
+        each, each_cpu = (2.0 * (total - part) / draws for total, part in zip(full[:2], half[:2], strict=True))
+        start = half.cpu - 0.5 * draws * each_cpu
+        took = full.wall + each * (count - draws)
+        whole += took
+        peak = max(peak, full.peak_MB)
+        about = f"{each_cpu:.3g} CPU-s a run, {start:.2g} CPU-s once; {count} in {took:.0f} s"
+        yield Row(f"campaign, {draws} {what}", full.wall, "s", about=about)
     yield Row("campaign of 10,240 identifications and 2048 rides", whole, "s", WHOLE_S, at_least=False)
     yield Row("  parent and two workers, as if each were the largest", 3.0 * peak, "MB", MOST_MB, at_least=False)
