@@ -125,7 +125,7 @@ def _constant_rows(
         condition = found[number]
         return *identify_condition(condition, config, seed + number), [cycles_of(r) for r in condition.records]
 
-    def told(made: tuple[ParameterRow, AuxiliaryRow | None, list[Cycles | None]]) -> None:
+    def collected(made: tuple[ParameterRow, AuxiliaryRow | None, list[Cycles | None]]) -> None:
         row, auxiliary, runs = made
         for record, run in zip(found[len(rows)].records, runs, strict=True):
             remember(record, run)
@@ -133,7 +133,7 @@ def _constant_rows(
         progress(Progress(len(rows), len(found), f"conditions: {_line(row)}{_auxiliary_text(auxiliary)}"))
 
     samples = sum(record.time.size for condition in found for record in condition.records)
-    parallel_map(fitted, range(len(found)), jobs if samples > WORTH_A_PROCESS else 1, told)
+    parallel_map(fitted, range(len(found)), jobs if samples > WORTH_A_PROCESS else 1, collected)
     return rows
 
 
