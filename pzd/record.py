@@ -220,7 +220,7 @@ def merged_voltages(records: Sequence[Record], voltage_within: float) -> tuple[f
     return (min(known), max(known)) if DIFFERENT_SHARE * scale < spread <= voltage_within else None
 
 
-def level(values: Array, finest: float) -> float:
+def _level(values: Array, finest: float) -> float:
     """The median of a channel that stands still, without the digits that its noise made.
 
     Parameters
@@ -244,8 +244,8 @@ def _condition(setting: str | None, members: Sequence[Record], finest: tuple[flo
     temperatures = [r.temperature for r in members if r.temperature is not None]
     return Condition(
         setting,
-        level(np.concatenate(voltages), finest[0]) if voltages else None,
-        level(np.concatenate(temperatures), finest[1]) if temperatures else None,
+        _level(np.concatenate(voltages), finest[0]) if voltages else None,
+        _level(np.concatenate(temperatures), finest[1]) if temperatures else None,
         tuple(members),
     )
 

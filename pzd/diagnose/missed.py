@@ -55,7 +55,7 @@ class Missed:
 
 
 FEWEST = 2
-"""Differences that scatter."""
+"""Differences of which the scatter is known, at least."""
 NOTHING_MISSED = Missed((), np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
 """Where no test was kept back."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.record import Array
+from pzd.signals.jumps import USUAL
 
 SUDDEN = 6.0
 """A change from one sample to the next of so many times its usual scatter is a step, or part of one."""
@@ -16,7 +17,6 @@ FEWEST = 10
 """Samples from which a stretch is held against a line."""
 BY_NOISE = 1.5
 """A stretch whose r.m.s. about its line is at most so many times the noise of a sample is that line."""
-_USUAL = 1.4826  # standard deviation of Gaussian scatter over its median magnitude
 
 
 def without_noise(values: Array) -> Array:
@@ -32,7 +32,7 @@ def without_noise(values: Array) -> Array:
     """
     changes = np.diff(values)
     usual = np.median(changes) if changes.size else 0.0
-    scatter = _USUAL * float(np.median(np.abs(changes - usual))) if changes.size else 0.0
+    scatter = USUAL * float(np.median(np.abs(changes - usual))) if changes.size else 0.0
     if scatter == 0.0:
         return values
     ends = np.flatnonzero(np.abs(changes - usual) > SUDDEN * scatter) + 1

@@ -142,9 +142,21 @@ def test_a_rate_above_the_header_stands_for_a_column_of_time(tmp_path: Path, sai
     assert record.time == pytest.approx(np.arange(TIME.size) / 500.0)
 
 
-def test_where_nothing_tells_the_rate_it_is_asked_for(tmp_path: Path) -> None:
-    path = stored(tmp_path / "a.csv", ["Stroke (mm);Load (N)"], [numbers(MM), numbers(FORCE)], ";")
-    assert any("or say rate_Hz: N instead" in line for line in guessed([path]))
+@pytest.mark.parametrize("above", [[], ["Test frequency: 5 Hz"], ["Generated at 5 Hz"]])
+def test_where_nothing_tells_the_rate_it_is_asked_for(tmp_path: Path, above: list[str]) -> None:
+    path = stored(tmp_path / "a.csv", [*above, "Stroke (mm);Load (N)"], [numbers(MM), numbers(FORCE)], ";")
+    text = guessed([path])
+    assert any("or say rate_Hz: N instead" in line for line in text)
+    assert not any(line.strip().startswith("rate_Hz") for line in text)
+
+
+def test_files_that_tell_several_rates_are_no_files_of_one(tmp_path: Path) -> None:
+    columns = [numbers(MM), numbers(FORCE)]
+    paths = [
+        stored(tmp_path / f"{rate}.csv", [f"Sample rate: {rate} Hz", "Stroke (mm);Load (N)"], columns, ";")
+        for rate in (500, 1000)
+    ]
+    assert not any(line.strip().startswith("rate_Hz") for line in guessed(paths))
 
 
 def test_what_stays_open_is_an_empty_value_that_the_check_asks_for(tmp_path: Path) -> None:

@@ -33,8 +33,8 @@ FORMATS = (
 )
 """Formats of date and time that are tried on the first row."""
 
-_RATE = re.compile(r"(?:sampl|rate|freq|abtast)[^\n\d]*(\d+(?:[.,]\d+)?)\s*(k)?Hz", re.IGNORECASE)
-"""A sampling rate in the lines above the header."""
+_RATE = re.compile(r"(?:sampl|abtast|\brate\b)[^\n\d]*(\d+(?:[.,]\d+)?)\s*(k)?Hz", re.IGNORECASE)
+"""A sampling rate in the lines above the header; a frequency alone may be that of the test."""
 _EVENTS = re.compile(r"event|marker|marke|ereignis", re.IGNORECASE)
 _GOES_ON = re.compile(r"resume|restart|start|begin|weiter", re.IGNORECASE)
 """Words of an event with which another recording begins."""
@@ -126,7 +126,8 @@ def _keys(
     yield from _dialect_keys(dialect)
     named = {own_quantity(q, control): c for q, c in columns.items() if not is_canonical(c, q, control)}
     lost = [q for q in NEEDED if q not in columns]
-    if TIME in lost and (rate := _rate(files[0])):
+    rates = {_rate(file) for file in files} if TIME in lost else set()
+    if len(rates) == 1 and (rate := rates.pop()):
         lost.remove(TIME)
         yield f"rate_Hz: {rate:.10g}    # from the lines above the header: no column holds the time"
     if named or lost:
