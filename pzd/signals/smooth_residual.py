@@ -51,7 +51,12 @@ class SmoothResidual:
 def fit_smooth_residual(residual: Array, record: Record, predicted: Array, counted: Mask) -> SmoothResidual:
     """The residual of a record that does not repeat, parted into misfit and noise.
 
+    Noise that wanders hides a level or a slow term: of a term that the samples hardly tell no more is explained than
+    they tell, each of p being expected to explain as much as any other.
+
     Equation: F = ((RSS_0 - RSS) / p) / (RSS / (n - p)) on the whitened residual     Source: Aitken 1935, Fisher
+    Equation: a_i = t / (t + s_i^2) times its estimate, t = sum r^2 / p, s_i its standard error
+                                                                            Source: Hoerl and Kennard 1970
 
     Parameters
     ----------
@@ -66,17 +71,20 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array, count
     if residual.size < SAMPLES_PER_TERM * terms.shape[1]:
         nothing = np.zeros(residual.size)
         return SmoothResidual(nothing, nothing, autoregression([residual - residual.mean()]), 1.0)
-    explained = terms @ np.linalg.lstsq(terms, residual, rcond=None)[0]
+    basis = _orthonormal(terms)
+    explained = basis @ (basis.T @ residual)
+    expected = float(residual @ residual) / basis.shape[1]
     for _ in range(ROUNDS):
         noise = autoregression(parted(residual - explained, counted)).with_white(QUIETEST)
         whole = unbroken(counted, noise.coefficients.size)
         flat = noise.whitened(residual)[whole]
-        whitened = noise.whitened(terms)[whole]
+        whitened = noise.whitened(basis)[whole]
         _, sizes, right = np.linalg.svd(np.linalg.qr(whitened, mode="r"))
         rank = int(np.count_nonzero(sizes > SINGULAR * sizes[0]))
-        orthonormal = right[:rank].T / sizes[:rank]
-        to_samples = terms @ orthonormal
-        taken = orthonormal.T @ (whitened.T @ flat)
+        taken = right[:rank] @ (whitened.T @ flat) / sizes[:rank]
+        known = sizes[:rank] ** 2 * expected
+        share = known / (known + 1.0) if noise.innovation > 0.0 else np.ones(rank)
+        to_samples = basis @ right[:rank].T * (share / sizes[:rank])
         explained = to_samples @ taken
     spread = np.sum(to_samples**2, axis=1) if noise.innovation > 0.0 else np.zeros(residual.size)
     free = flat.size - rank - noise.coefficients.size
@@ -85,6 +93,13 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array, count
     scale = max(over / free, 1.0 if noise.coefficients.size else 0.0)
     ratio = float(taken @ taken) / rank / scale if over > 0.0 else np.inf
     return SmoothResidual(explained, spread, noise, float(fdtrc(rank, free, ratio)))
+
+
+def _orthonormal(terms: Array) -> Array:
+    """(m, r) orthonormal: all that sums of some (m, p) terms can be, each of them once."""
+    basis, triangle = np.linalg.qr(terms)
+    left, sizes, _ = np.linalg.svd(triangle)
+    return np.asarray(basis @ left[:, sizes > SINGULAR * sizes[0]])
 
 
 def _terms(record: Record, predicted: Array, counted: Mask) -> Array:
