@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -33,7 +33,8 @@ def confidence_of(selection: Selection, config: DiagnoseConfig) -> float:
     sure = 1.0 - OUTSIDE_LIBRARY
     for step in selection.rounds:
         if step.chosen in selection.adopted:
-            sure *= _together(_probabilities({c.effect: of_fit(c) for c in step.contenders}, config.visible), said)
+            tried = {c.effect: of_fit(c, selection.last.whole.scales.low_force) for c in step.contenders}
+            sure *= _together(_probabilities(tried, config.visible), said)
     sure *= _together(_left_open(selection, config), {None, *selection.undecided})
     for competition in selection.competitions:
         sure /= 1.0 + float(np.exp(-0.5 * competition.behind))
@@ -68,11 +69,11 @@ def _probabilities(tried: Mapping[str, Sequence[Detection]], visible: float) -> 
     known = {name: told for name, told in tried.items() if told}
     if not known:
         return {None: 1.0}
-    small = [_log_odds(told, SMALLEST_GAP * visible, visible) for told in known.values()]
+    small = [_log_odds(told, lambda each: (SMALLEST_GAP * visible, _least(each, visible))) for told in known.values()]
     nothing = float(np.logaddexp(0.0, logsumexp(small) - np.log(len(known)))) - np.log(2.0) + np.log(len(known))
     odds: dict[str | None, float] = {
         None: nothing,
-        **{name: _log_odds(told, visible, LARGEST_GAP) for name, told in known.items()},
+        **{name: _log_odds(told, lambda each: (_least(each, visible), LARGEST_GAP)) for name, told in known.items()},
     }
     return dict(zip(odds, map(float, softmax([*odds.values()])), strict=True))
 
@@ -81,8 +82,19 @@ def _together(chances: Mapping[str | None, float], named: Collection[str | None]
     return sum(chance for name, chance in chances.items() if name in named)
 
 
-def _log_odds(told: Sequence[Detection], low: float, high: float) -> float:
-    """Logarithm of the mean odds over the starting values of an effect, each as likely as any other."""
+def _least(told: Detection, visible: float) -> float:
+    """The smallest gap of an effect that counts, as a share of peak."""
+    return min(max(visible, told.counts_from), LARGEST_GAP / 2.0)
+
+
+def _log_odds(told: Sequence[Detection], sizes: Callable[[Detection], tuple[float, float]]) -> float:
+    """Logarithm of the mean odds over the starting values of an effect, each as likely as any other.
+
+    Parameters
+    ----------
+    told : of each starting value
+    sizes : the smallest and the largest gap that is looked at
+    """
     from scipy.special import logsumexp
 
-    return float(logsumexp([each.log_odds(low, high) for each in told]) - np.log(len(told)))
+    return float(logsumexp([each.log_odds(*sizes(each)) for each in told]) - np.log(len(told)))

@@ -54,7 +54,7 @@ def test_a_force_that_a_damper_may_miss_does_not_pass_for_noise(follows: float, 
 
 @pytest.mark.parametrize("follows", [0.88, 0.9, 0.92])
 def test_no_more_is_explained_than_is_there(follows: float, rng: Generator) -> None:
-    """Behind a ramp lags differ in the first samples alone, which say next to nothing: once 2300 N was told there of a noise of 20."""
+    """Behind a ramp lags differ in the first samples alone, which say next to nothing: 2300 N were told of 20 N."""
     record, force = sweep()
     voltage = 150.0 * record.time / DURATION
     noise = lfilter([1.0], [1.0, -follows], rng.standard_normal(force.size)) * SIZE * np.sqrt(1.0 - follows**2)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pzd.damper.effect import Parameter
 from pzd.damper.model import Damper
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.intervals import LEVEL, standard_errors
@@ -68,6 +69,19 @@ def closes(evidence: Evidence, config: DiagnoseConfig, before: Fitted, candidate
     return evidence.gap(candidate.fitted) <= max(config.unexplained_share * evidence.gap(before), config.negligible)
 
 
+def trivial_size(effect: str, parameter: Parameter, force: float) -> float | None:
+    """Below which value of a parameter an effect counts as nothing missing, None where every value counts.
+
+    Parameters
+    ----------
+    effect : its name
+    parameter : of the effect
+    force : the lowest peak of the tests [N]
+    """
+    limit = TRIVIAL_SIZE.get((effect, parameter.name))
+    return limit if limit is None or parameter.unit != "N" else limit * force
+
+
 def trivial(fitted: Fitted, effect: str, force: float) -> str | None:
     """Why a common offset or delay is no effect: below what counts as one, or its 95 % interval reaches below that.
 
@@ -81,9 +95,7 @@ def trivial(fitted: Fitted, effect: str, force: float) -> str | None:
         return None
     sizes = []
     for unknown, error in zip(fitted.unknowns, standard_errors(fitted), strict=True):
-        limit = TRIVIAL_SIZE.get((unknown.effect, unknown.parameter.name))
-        if unknown.effect == effect and limit is not None:
-            unit = limit * (force if unknown.parameter.unit == "N" else 1.0)
+        if unknown.effect == effect and (unit := trivial_size(effect, unknown.parameter, force)) is not None:
             sizes.append((abs(unknown.of(fitted.damper)) / unit, LEVEL * error / unit))
     if not sizes or max(size - reach for size, reach in sizes) >= 1.0:
         return None

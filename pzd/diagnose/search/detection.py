@@ -13,12 +13,14 @@ import numpy as np
 
 from pzd.damper.effect import Effect
 from pzd.damper.effects import library
+from pzd.damper.model import Damper
 from pzd.damper.nature import against_nature
 from pzd.diagnose.fit.intervals import LEVEL
 from pzd.diagnose.fit.least_squares import Fitted, not_taken_up
 from pzd.diagnose.fit.likelihood import response
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.fit.slopes import force_slopes
+from pzd.diagnose.search.acceptance import trivial_size
 from pzd.diagnose.search.candidates import Candidate
 from pzd.diagnose.search.starts import fainter, starts_of
 from pzd.diagnose.thresholds import FAINT, FAINTEST, SIZES_AVERAGED
@@ -37,6 +39,8 @@ class Detection:
     """Misfit less at that size than without the effect."""
     shape_parameters: int
     """Parameters of the effect beside its size."""
+    counts_from: float = 0.0
+    """Gap from which it counts; a smaller offset or delay may be one of the tests."""
 
     @property
     def interval(self) -> str:
@@ -70,14 +74,15 @@ def detections(problem: Problem, before: Fitted, tried: Sequence[Candidate]) -> 
     tried : each fitted beside `before`, or as faint as it is looked for
     """
     tangent = _Tangent.at(problem, before)
-    searched = {c.effect: told for c in tried if (told := of_fit(c, tangent.gap(c.fitted.simulated)))}
+    force = problem.scales.low_force
+    searched = {c.effect: told for c in tried if (told := of_fit(c, force, tangent.gap(c.fitted.simulated)))}
     others = [library()[c.effect] for c in tried if c.effect not in searched]
     linear = [e for e in others if e.place != "material" or problem.pooled() is problem]
     traced = {e.name: [tangent.of_trace(e, trace) for trace in _traces(problem, before, e)] for e in linear}
     return searched | {name: tuple(each for each in found if each) for name, found in traced.items()}
 
 
-def of_fit(candidate: Candidate, gap: float | None = None) -> tuple[Detection, ...]:
+def of_fit(candidate: Candidate, force: float, gap: float | None = None) -> tuple[Detection, ...]:
     """What the optimum of a candidate says of its gap; nothing where it fits no better than without.
 
     Equation: g = m, s = m / sqrt(A), G = D; A and D over max(1, |r|^2 / (n - p)); A and D: how far the candidate moves
@@ -86,6 +91,7 @@ def of_fit(candidate: Candidate, gap: float | None = None) -> tuple[Detection, .
     Parameters
     ----------
     candidate : fitted
+    force : the lowest peak of the tests [N]
     gap : m that it closes; how far it moves the force where none is given
     """
     size = candidate.explained if gap is None else gap
@@ -94,11 +100,16 @@ def of_fit(candidate: Candidate, gap: float | None = None) -> tuple[Detection, .
     fitted = candidate.fitted
     spread = max(1.0, fitted.misfit / max(fitted.size - fitted.searched.size, 1))
     shape = sum(u.effect == candidate.effect for u in fitted.unknowns) - 1
-    return (
-        Detection(
-            size, size / float(np.sqrt(candidate.residual_change / spread)), candidate.misfit_drop / spread, shape
-        ),
-    )
+    error = size / float(np.sqrt(candidate.residual_change / spread))
+    counts_from = _counts_from(fitted.damper, candidate.effect, force, size)
+    return (Detection(size, error, candidate.misfit_drop / spread, shape, counts_from),)
+
+
+def _counts_from(damper: Damper, effect: str, force: float, gap: float) -> float:
+    """The gap of an effect as small as still counts, in proportion to that of the values it has in a damper."""
+    trivial = [(p.name, trivial_size(effect, p, force)) for p in library()[effect].parameters]
+    sizes = [float(np.max(np.abs(damper.effects[effect][name]))) / size for name, size in trivial if size is not None]
+    return gap / max(sizes) if sizes and max(sizes) > 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +163,8 @@ class _Tangent:
         if gap <= 0.0 or power <= 0.0:
             return None
         part = -float(residual @ rest) / power
-        return Detection(part * gap, gap * float(np.sqrt(spread / power)), part**2 * power / spread, 0)
+        counts_from = _counts_from(damper, effect.name, problem.scales.low_force, gap)
+        return Detection(part * gap, gap * float(np.sqrt(spread / power)), part**2 * power / spread, 0, counts_from)
 
 
 def _traces(problem: Problem, before: Fitted, effect: Effect) -> Iterator[Array]:
