@@ -63,6 +63,10 @@ blind-motions: $(RUNTIME)  ## As `make blind`, on two tones, sweeps, roads, movi
 blind-edge: $(RUNTIME)  ## As `make blind`, at the edge of what can be seen: how far a confidence can be trusted; 15 minutes
 	$(BIN)/pzd blind configs/blind-edge.yaml
 
+.PHONY: true-dampers
+true-dampers: $(DEV)  ## Hold the dampers of blind cases against their own records: what is left must be noise; five minutes
+	OPENBLAS_NUM_THREADS=1 PYTHONPATH=. $(BIN)/python tests/studies/true_damper.py --cases 150
+
 .PHONY: bench
 bench: $(DEV)  ## Print each speed beside what is wanted and beside a peer that does the same work; half an hour
 	$(BIN)/python tests/studies/bench.py

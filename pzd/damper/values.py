@@ -28,7 +28,10 @@ def columns_of(damper: Damper, columns: Sequence[Column], effective: Array | Non
     """(n, m) or (1, m) values of effect parameters, by the effective voltage [V] where they are lists."""
     if not columns:
         return np.empty((1, 0))
-    return np.stack(np.broadcast_arrays(*(column(damper, *one, effective) for one in columns)), axis=-1)
+    found = [column(damper, *one, effective) for one in columns]
+    if all(values.size == 1 for values in found):
+        return np.concatenate(found)[np.newaxis]
+    return np.stack(np.broadcast_arrays(*found), axis=-1)
 
 
 def column(damper: Damper, effect: str, parameter: str, effective: Array | None) -> Array:
