@@ -625,9 +625,10 @@ def test_init_needs_nothing_more_for_canonical_columns(typed: Terminal, tmp_path
 
 
 def test_init_says_which_quantity_it_did_not_find(typed: Terminal) -> None:
-    Path("odd.csv").write_text("a1,b1,force_N\n1,2,3\n")
+    """Of the columns that hold nothing else, and have a name."""
+    Path("odd.csv").write_text("a1,b1,force_N,\n1,2,3,\n")
     assert typed("init", "odd.csv") == 0
-    assert any("displacement:" in line and "fill in: one of a1, b1, force_N" in line for line in typed.out)
+    assert any(line.endswith("displacement:   # fill in: one of a1, b1") for line in typed.out)
 
 
 # ---------------------------------------------------------------- the story

@@ -276,6 +276,15 @@ def test_what_cannot_be_a_damper_is_refused(tmp_path: Path, fault: str) -> None:
     assert any(message in line for line in refused(tmp_path)), refused(tmp_path)
 
 
+def test_a_clock_of_too_few_digits_is_told_with_what_to_do_about_it(tmp_path: Path) -> None:
+    """Five digits of a second, as a table is exported: from 10 s on three samples have one time, 0.166 s for 0.1663 s."""
+    later = 10.0 + np.arange(TIME.size) / 3000.0
+    write(tmp_path / "a.csv", lines(CANONICAL | {"time_s": np.array([float(f"{t:.5g}") for t in later])}))
+    (said,) = refused(tmp_path)
+    assert "a.csv:3: time does not increase: 10 s after 10 s, and " in said
+    assert said.endswith("; it has too few digits: leave its column out and say rate_Hz, about 3006 here")
+
+
 def test_every_offending_file_is_listed_at_once(tmp_path: Path) -> None:
     write(tmp_path / "a.csv", lines(CANONICAL | {"force_N": -FORCE}))
     write(tmp_path / "b.csv", lines(CANONICAL)[:1])

@@ -133,10 +133,9 @@ def _keys(
     if named or lost:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
+        left = ", ".join(header for header in dialect.header if header.strip() and header not in columns.values())
         counted = "; or say rate_Hz: N instead, where no column holds it"
-        yield from (
-            f"  {q.name}:   # fill in: one of {', '.join(dialect.header)}{counted if q is TIME else ''}" for q in lost
-        )
+        yield from (f"  {q.name}:   # fill in: one of {left}{counted if q is TIME else ''}" for q in lost)
     units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, unit in in_names.items())]
     if units:
         yield "units:"

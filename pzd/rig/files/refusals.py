@@ -28,6 +28,8 @@ SLOWEST_STEP = 0.05
 """Step of the clock [s] from which it may be in milliseconds: stands take 20 samples a second and more,"""
 CREEPING = 5e-3
 """where the motion is no quicker than this [m/s], so that a thousand times as quick it is a test still."""
+OFTEN = 0.01
+"""Share of its steps at which a clock that stands still has too few digits; a logger repeats a row now and then."""
 LEAST_REVERSALS = 2
 """Fewer turns of the motion are no test of a damper."""
 
@@ -70,8 +72,18 @@ def _faults(test: Test, layout: Layout) -> list[str]:
 
 def _standstills(test: Test) -> list[str]:
     """Where the clock stands still or goes back, in a line; empty where it goes on. NaN is another's fault."""
-    fault = clock_fault(test.channels[TIME])
-    return [f"{test.place(fault[0])}: {fault[1]}"] if fault else []
+    time = test.channels[TIME]
+    fault = clock_fault(time)
+    return [f"{test.place(fault[0])}: {fault[1]}{_rounded(time)}"] if fault else []
+
+
+def _rounded(time: Array) -> str:
+    """What to do where a clock (n,) stands still often and never goes back: it has too few digits."""
+    steps = np.diff(time)
+    if steps.min() < 0.0 or np.mean(steps == 0.0) < OFTEN:
+        return ""
+    rate = (time.size - 1) / (time[-1] - time[0])
+    return f"; it has too few digits: leave its column out and say rate_Hz, about {rate:.5g} here"
 
 
 def _two_rates(test: Test) -> list[str]:
