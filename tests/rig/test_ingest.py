@@ -277,7 +277,7 @@ def test_what_cannot_be_a_damper_is_refused(tmp_path: Path, fault: str) -> None:
 
 
 def test_a_clock_of_too_few_digits_is_told_with_what_to_do_about_it(tmp_path: Path) -> None:
-    """Five digits of a second, as a table is exported: from 10 s on three samples have one time, 0.166 s for 0.1663 s."""
+    """Five digits of a second, as a table is exported: from 10 s on three samples have one time."""
     later = 10.0 + np.arange(TIME.size) / 3000.0
     write(tmp_path / "a.csv", lines(CANONICAL | {"time_s": np.array([float(f"{t:.5g}") for t in later])}))
     (said,) = refused(tmp_path)
