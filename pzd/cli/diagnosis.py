@@ -11,7 +11,7 @@ from pzd.schema.wording import counted
 
 _VERDICTS = {
     "named": "one answer fits, and no other does",
-    "ambiguous": "several answers fit the data equally well",
+    "ambiguous": "several answers fit the data",
     "none": "nothing is missing that the data can show",
     "unexplained": "a gap that repeats remains, and no name accounts for it",
 }

@@ -12,7 +12,7 @@ from pzd.diagnose.search.selection import Selection
 from pzd.diagnose.thresholds import LARGEST_GAP, NOT_EXCLUDED, OUTSIDE_LIBRARY, SMALLEST_GAP
 
 
-def confidence_of(selection: Selection, config: DiagnoseConfig) -> float:
+def confidence_of(selection: Selection, config: DiagnoseConfig, beside: Collection[str] = ()) -> float:
     """Probability that what is missing is what was adopted or a rival of it, and that nothing else that counts is.
 
     Before the tests, something more is missing as likely as not, each effect of the library is as likely as any other,
@@ -28,6 +28,7 @@ def confidence_of(selection: Selection, config: DiagnoseConfig) -> float:
     ----------
     selection : what was adopted, and what was tried
     config : which gaps count
+    beside : effects that are told as possible beside what was adopted
     """
     said = {*selection.adopted, *selection.rivals}
     sure = 1.0 - OUTSIDE_LIBRARY
@@ -35,7 +36,7 @@ def confidence_of(selection: Selection, config: DiagnoseConfig) -> float:
         if step.chosen in selection.adopted:
             tried = {c.effect: of_fit(c, selection.last.whole.scales.low_force) for c in step.contenders}
             sure *= _together(_probabilities(tried, config.visible), said)
-    sure *= _together(_left_open(selection, config), {None, *selection.undecided})
+    sure *= _together(_left_open(selection, config), {None, *selection.undecided, *beside})
     for competition in selection.competitions:
         sure /= 1.0 + float(np.exp(-0.5 * competition.behind))
     return round(sure, 3)

@@ -99,7 +99,7 @@ def diagnose(
         prediction=prediction,
         zero_m=found.zero_m,
         ranking=ranking_of(selection, selection.first),
-        rivals=(*selection.rivals, *(selection.undecided if decision.verdict == "ambiguous" else ())),
+        rivals=(*selection.rivals, *decision.possible),
         where=() if decision.verdict == "none" else regions(before, control.unit, zero),
         next_test=_next_test(handed, decision, found, zero, trials, recorded, reach),
     )
@@ -143,7 +143,7 @@ def _next_test(
     if selection.rivalling:
         rivals = [(name, damper.moved(zero)) for name, damper in selection.rivalling]
         return next_test(rivals, reach, warmth, [campaign.offset(damper) for _, damper in selection.rivalling])
-    if decision.doubtful or (selection.undecided and not selection.adopted):
+    if decision.doubtful:
         return one_more(recorded, reach)
     offset = campaign.offset(found.moved(-zero) if selection.adopted else found)
     predicting = PredictingDamper(found, offset, handed.missed, handed.between)

@@ -199,6 +199,10 @@ NOT_EXCLUDED = 0.05
 """From this probability on an effect is told as one that the tests do not exclude.
 
 Reason: as much as a 95 % interval leaves outside; not tuned."""
+LIKELIER_THAN_NOT = 0.5
+"""Below this confidence what the tests do not exclude is told as possible, and the verdict is open.
+
+Reason: something else is then likelier than what would be said."""
 DOUBTFUL_BELOW = 0.9
 """Below this confidence a verdict without an effect tells what is not excluded, and one more test is proposed.
 

@@ -19,7 +19,7 @@ from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.search.candidates import moved_by
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection
-from pzd.diagnose.thresholds import CONTRADICTS, DOUBTFUL_BELOW
+from pzd.diagnose.thresholds import CONTRADICTS, DOUBTFUL_BELOW, LIKELIER_THAN_NOT
 from pzd.diagnose.trends_of_tests import Trend
 from pzd.quantities import Control
 
@@ -36,11 +36,15 @@ class Decision:
     verdict: Verdict
     reason: str
     confidence: float | None
+    possible: tuple[str, ...] = ()
+    """Effects that may be missing beside those adopted."""
 
     @property
     def doubtful(self) -> bool:
-        """Whether nothing is named, and much is not excluded."""
-        return self.verdict == "none" and self.confidence is not None and self.confidence < DOUBTFUL_BELOW
+        """Whether much is not excluded beside what was adopted."""
+        return bool(self.possible) or (
+            self.verdict == "none" and self.confidence is not None and self.confidence < DOUBTFUL_BELOW
+        )
 
 
 def weak(hold_out: str) -> str:
@@ -104,11 +108,18 @@ def decide(selection: Selection, config: DiagnoseConfig) -> Decision:
     if better:
         others = [f"{known()[f.form].law}, which is not in the library, does better than {f.effect}" for f in better]
         return Decision("unexplained", f"{change}; but {' and '.join(others)}", None)
+    return _explained(change, selection, config)
+
+
+def _explained(change: str, selection: Selection, config: DiagnoseConfig) -> Decision:
+    """The verdict where what was adopted explains the gap: whether something else does, or is likely beside it."""
+    sure = confidence_of(selection, config)
     if selection.rivals or selection.competitions:
         others = [*selection.rivals, *(f"{known()[f.form].law} (not in the library)" for f in selection.competitions)]
-        words = f"{change}; {', '.join(others)} would do as well on these tests"
-        return Decision("ambiguous", words, confidence_of(selection, config))
-    sure = confidence_of(selection, config)
+        return Decision("ambiguous", f"{change}; {', '.join(others)} would do as well on these tests", sure)
+    if possible := _possible(selection, config, sure):
+        words = f"{change}{_not_excluded(selection, config)} beside it"
+        return Decision("ambiguous", words, confidence_of(selection, config, possible), possible)
     return Decision("named", f"{change}; what is left is within the noise or negligible", sure)
 
 
@@ -131,24 +142,30 @@ def _remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
 
 def _nothing_adopted(size: float, chance: float, selection: Selection, config: DiagnoseConfig) -> Decision:
     sure = confidence_of(selection, config)
-    if selection.undecided and (chance >= config.significance or size < config.visible):
-        told = "; ".join(f"{name} {selection.reasons[name]}" for name in selection.undecided)
-        return Decision("ambiguous", f"{told}; more tests would settle it", sure)
     gap = f"a gap of {_percent(size)} of peak force (r.m.s. above the noise)"
-    doubt = _doubt(selection, config) if sure < DOUBTFUL_BELOW else ""
+    if chance < config.significance and size >= config.visible:
+        alone = f"probability by noise alone {max(chance, 1e-300):.1g}"
+        return Decision("unexplained", f"{gap} that repeats ({alone}); no effect of the library fits", None)
+    possible = tuple(dict.fromkeys((*selection.undecided, *_possible(selection, config, sure))))
+    if possible:
+        told = "; ".join(f"{name} {selection.reasons[name]}" for name in selection.undecided)
+        words = told or f"{gap}{_not_excluded(selection, config)}"
+        sure = confidence_of(selection, config, possible)
+        return Decision("ambiguous", f"{words}; more tests would settle it", sure, possible)
+    doubt = _not_excluded(selection, config) if sure < DOUBTFUL_BELOW else ""
     if chance >= config.significance:
         words = f"{gap} that noise alone shows with probability {chance:.2g}: within the noise{doubt}"
         return Decision("none", words, sure)
-    if size < config.visible:
-        words = (
-            f"{gap}, repeatable but smaller than {_percent(config.visible)} of peak: counts as nothing missing{doubt}"
-        )
-        return Decision("none", words, sure)
-    words = f"{gap} that repeats (probability by noise alone {max(chance, 1e-300):.1g}); no effect of the library fits"
-    return Decision("unexplained", words, None)
+    words = f"{gap}, repeatable but smaller than {_percent(config.visible)} of peak: counts as nothing missing{doubt}"
+    return Decision("none", words, sure)
 
 
-def _doubt(selection: Selection, config: DiagnoseConfig) -> str:
+def _possible(selection: Selection, config: DiagnoseConfig, sure: float) -> tuple[str, ...]:
+    """What the tests do not exclude beside what is said, where the opposite of that is likelier."""
+    return tuple(not_excluded(selection, config)) if sure < LIKELIER_THAN_NOT else ()
+
+
+def _not_excluded(selection: Selection, config: DiagnoseConfig) -> str:
     """What to add of effects that the tests do not exclude."""
     likely = [f"{name} ({told.interval})" for name, told in not_excluded(selection, config).items()]
     return f"; these tests do not exclude {' or '.join(likely)}" if likely else ""

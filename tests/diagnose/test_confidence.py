@@ -22,6 +22,7 @@ from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.search.candidates import candidates
 from pzd.diagnose.search.detection import Detection, detections
 from pzd.diagnose.search.evidence import evidence_of
+from pzd.diagnose.thresholds import LIKELIER_THAN_NOT
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -107,15 +108,42 @@ def test_confidence_in_nothing_falls_to_even_odds_as_noise_hides_everything(rng:
     assert 0.4 < stated[-1] < 0.9
 
 
-def test_what_is_not_excluded_is_told_with_its_interval_and_a_test_to_settle_it(rng: np.random.Generator) -> None:
-    told = diagnosed(with_spring(400.0, 0.05, rng), forbid=all_but("gas_spring", "lash"), most_added=0).diagnosis
-    assert (told.verdict, told.effects) == ("none", ())
+def test_what_is_not_excluded_is_told_and_what_is_likelier_than_not_is_possible(rng: np.random.Generator) -> None:
+    """A spring that stiffens in the same noise: no doubt, then told, then possible, then adopted.
+
+    Nothing is said that is less likely than its opposite: `none` was, and then mostly something was missing.
+    """
+    plain, said = with_spring(0.0, 0.05, rng), []
+    for stiffness in np.linspace(0.0, 1500.0, 21):
+        records = [replace(r, force=r.force + stiffness * r.displacement) for r in plain]
+        told = diagnosed(records, forbid=all_but("gas_spring"), most_added=0).diagnosis
+        sure = told.confidence or 0.0
+        assert sure >= LIKELIER_THAN_NOT
+        said.append("adopted" if told.effects else "possible" if told.rivals else "told" if sure < 0.9 else "no doubt")
+        if said[-1] in ("told", "possible"):
+            assert told.verdict == ("none" if said[-1] == "told" else "ambiguous")
+            assert "gas_spring" in told.reason
+            assert told.next_test is not None
+            assert told.next_test.waveform.startswith("sine, ")
+        if said[-1] == "told":
+            assert "do not exclude gas_spring (a gap of " in told.reason
+    order = ["no doubt", "told", "possible", "adopted"]
+    assert set(said) == set(order)
+    assert said == sorted(said, key=order.index)
+
+
+def test_what_is_likely_beside_an_effect_that_explains_the_gap_is_told_beside_it(rng: np.random.Generator) -> None:
+    """Of an orifice and a fainter spring the orifice alone was named, with next to no confidence in it."""
+    hidden = damper_of((0.0,), orifice_quadratic={"q": 4000.0})
+    tests = [sine(hidden, 0.0, f, x, rng, noise=0.05, colour=0.0, cycles=4) for f, x in TESTS]
+    records = [replace(r, force=r.force + 1000.0 * r.displacement) for r in tests]
+    told = diagnosed(records, forbid=all_but("orifice_quadratic", "gas_spring"), most_added=0).diagnosis
+    assert (told.verdict, told.effects, told.rivals) == ("ambiguous", ("orifice_quadratic",), ("gas_spring",))
+    assert told.reason.startswith("orifice_quadratic: the gap falls from ")
+    assert "; these tests do not exclude gas_spring (a gap of " in told.reason
     assert told.confidence is not None
-    assert told.confidence < 0.9
-    assert "do not exclude gas_spring (a gap of " in told.reason
-    assert "lash" not in told.reason
+    assert told.confidence > 0.9  # that it is either, or both
     assert told.next_test is not None
-    assert told.next_test.waveform.startswith("sine, ")
 
 
 def test_a_delay_that_counts_as_nothing_is_no_doubt(rng: np.random.Generator) -> None:
