@@ -204,6 +204,6 @@ LIKELIER_THAN_NOT = 0.5
 
 Reason: something else is then likelier than what would be said."""
 DOUBTFUL_BELOW = 0.9
-"""Below this confidence a verdict without an effect tells what is not excluded, and one more test is proposed.
+"""Below this confidence a verdict tells what is not excluded, and one more test is proposed.
 
 Reason: one such verdict in ten is wrong then, if the confidence is right; not tuned."""

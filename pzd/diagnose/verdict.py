@@ -38,13 +38,8 @@ class Decision:
     confidence: float | None
     possible: tuple[str, ...] = ()
     """Effects that may be missing beside those adopted."""
-
-    @property
-    def doubtful(self) -> bool:
-        """Whether much is not excluded beside what was adopted."""
-        return bool(self.possible) or (
-            self.verdict == "none" and self.confidence is not None and self.confidence < DOUBTFUL_BELOW
-        )
+    doubtful: bool = False
+    """Whether so much is not excluded that one more test is worth its time."""
 
 
 def weak(hold_out: str) -> str:
@@ -119,8 +114,10 @@ def _explained(change: str, selection: Selection, config: DiagnoseConfig) -> Dec
         return Decision("ambiguous", f"{change}; {', '.join(others)} would do as well on these tests", sure)
     if possible := _possible(selection, config, sure):
         words = f"{change}{_not_excluded(selection, config)} beside it"
-        return Decision("ambiguous", words, confidence_of(selection, config, possible), possible)
-    return Decision("named", f"{change}; what is left is within the noise or negligible", sure)
+        return Decision("ambiguous", words, confidence_of(selection, config, possible), possible, doubtful=True)
+    doubt = _not_excluded(selection, config) if sure < DOUBTFUL_BELOW else ""
+    words = f"{change}; what is left is within the noise or negligible{doubt}"
+    return Decision("named", words, sure, doubtful=bool(doubt))
 
 
 def _change(selection: Selection, sizes: tuple[float, float], config: DiagnoseConfig) -> str:
@@ -151,13 +148,13 @@ def _nothing_adopted(size: float, chance: float, selection: Selection, config: D
         told = "; ".join(f"{name} {selection.reasons[name]}" for name in selection.undecided)
         words = told or f"{gap}{_not_excluded(selection, config)}"
         sure = confidence_of(selection, config, possible)
-        return Decision("ambiguous", f"{words}; more tests would settle it", sure, possible)
-    doubt = _not_excluded(selection, config) if sure < DOUBTFUL_BELOW else ""
+        return Decision("ambiguous", f"{words}; more tests would settle it", sure, possible, doubtful=True)
     if chance >= config.significance:
-        words = f"{gap} that noise alone shows with probability {chance:.2g}: within the noise{doubt}"
-        return Decision("none", words, sure)
-    words = f"{gap}, repeatable but smaller than {_percent(config.visible)} of peak: counts as nothing missing{doubt}"
-    return Decision("none", words, sure)
+        words = f"{gap} that noise alone shows with probability {chance:.2g}: within the noise"
+    else:
+        words = f"{gap}, repeatable but smaller than {_percent(config.visible)} of peak: counts as nothing missing"
+    doubtful = sure < DOUBTFUL_BELOW
+    return Decision("none", words + (_not_excluded(selection, config) if doubtful else ""), sure, doubtful=doubtful)
 
 
 def _possible(selection: Selection, config: DiagnoseConfig, sure: float) -> tuple[str, ...]:
