@@ -22,6 +22,7 @@ from pzd.diagnose.thresholds import (
     LEAST_PROMISE,
     MOST_EVALUATIONS_OF_BEST,
     MOVING_VOLTAGE,
+    NEARLY_AS_GOOD,
     SLIGHT_PROMISE,
     STARTS_TRIED,
     WORSE_THAN_CONTAINED,
@@ -180,6 +181,11 @@ def _varied(problem: Problem, before: Fitted, effect: str, evaluations: int = MO
     return Candidate(effect, fitted, delta_bic(before, fitted), *_changed(problem, before, fitted), varies=True)
 
 
+def as_candidate(problem: Problem, before: Fitted, effect: str, fitted: Fitted) -> Candidate:
+    """An optimum with an effect more than `before` has, as what was tried in that step."""
+    return Candidate(effect, fitted, delta_bic(before, fitted), *_changed(problem, before, fitted))
+
+
 def converged(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
     """A candidate with its optimum searched to the end, from all its starting values."""
     if found.varies:
@@ -190,6 +196,16 @@ def converged(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
     fits = [fit(problem, found.fitted.effects, start) for start in others]
     best = min([found.fitted, *fits], key=lambda f: f.misfit)
     return _from(problem, before, found.effect, best.searched, MOST_EVALUATIONS_OF_BEST)
+
+
+def nearly_as_good(
+    problem: Problem, before: Fitted, chosen: Candidate, tried: Sequence[Candidate]
+) -> tuple[Candidate, ...]:
+    """The candidates of a step, those nearly as good as the one chosen searched to the end as it was."""
+    near = NEARLY_AS_GOOD * chosen.delta_bic
+    return tuple(
+        converged(problem, before, c) if c.effect != chosen.effect and c.delta_bic < near else c for c in tried
+    )
 
 
 def _for(problem: Problem, effect: Effect) -> Problem:

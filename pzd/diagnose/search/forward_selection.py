@@ -14,7 +14,6 @@ from pzd.damper.nature import against_nature
 from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import Fitted, fit
-from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.search.acceptance import (
     MAY_BE_CHANCE,
     MAY_BE_OF_THE_TESTS,
@@ -32,12 +31,14 @@ from pzd.diagnose.search.candidates import (
     converged,
     delta_bic,
     moved_by,
+    nearly_as_good,
 )
+from pzd.diagnose.search.contest import contest
 from pzd.diagnose.search.detection import Detection, detections
 from pzd.diagnose.search.evidence import Evidence, evidence_of
 from pzd.diagnose.search.reweighting import reweighted
-from pzd.diagnose.search.selection import Competition, Round, Selection
-from pzd.diagnose.thresholds import NEARLY_AS_GOOD, WIDER
+from pzd.diagnose.search.selection import Competition, Round, Selection, rivals_of
+from pzd.diagnose.thresholds import WIDER
 
 log = logging.getLogger(__name__)
 
@@ -61,6 +62,7 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
     search.force()
     while len(search.rounds) < 2 * config.most_effects and campaign.work.may_go_on() and search.step():
         pass
+    search.contest()
     search.rest()
     undecided, competitions = search.undecided(), search.competitions()
     rounds, reasons = tuple(search.rounds), search.reasons
@@ -123,7 +125,7 @@ class _Search:
         if first is None:
             return self._pair(tried)
         ended = converged(self.evidence.whole, self.current, self._natural(first, steps))
-        self._adopt(ended, _ended(self.evidence.whole, self.current, ended, tried), _before(first, steps))
+        self._adopt(ended, nearly_as_good(self.evidence.whole, self.current, ended, tried), _before(first, steps))
         return True
 
     def _natural(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
@@ -194,14 +196,14 @@ class _Search:
         if not closes(self.evidence, self.config, self.current, both):
             return None
         failed = spurious(self.evidence, self.weighed(both.fitted.damper), self.config, self.current, both)
-        return None if failed else (both, _ended(evidence.whole, at, both, seconds), _before(best, seconds))
+        return None if failed else (both, nearly_as_good(evidence.whole, at, both, seconds), _before(best, seconds))
 
     def _adopt(self, chosen: Candidate, tried: tuple[Candidate, ...], refused: frozenset[str]) -> None:
         self.reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
         if not chosen.varies:
             finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
             step = Round(finished, chosen.effect, refused=refused)
-            self.rounds.append(replace(step, rivals=_rivals(chosen, step.contenders, self.config)))
+            self.rounds.append(replace(step, rivals=rivals_of(chosen, step.contenders, self.config)))
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
         self._reweight(chosen.fitted)
         self.choose_temperature_axis()
@@ -216,6 +218,22 @@ class _Search:
         self.current = fit(whole, found.effects, start)
         if self._gap(self.current) > max(WIDER * self._gap(found), self.config.negligible):
             self.current = fit(whole, found.effects, start, evaluations=1)
+
+    def contest(self) -> None:
+        """Try the others again in the place of each effect adopted before the last, and keep what does better."""
+        for name in self.current.effects[len(self.config.force) : -1]:
+            step = next((i for i, each in enumerate(self.rounds) if each.chosen == name), None)
+            fixed = name in self.evidence.whole.varying or library()[name].place == "material"
+            if step is None or fixed or not self.evidence.campaign.work.may_go_on():
+                continue
+            without = self._without(name)
+            refused = partial(self._refused, self.config, before=without)
+            whole = self.evidence.whole
+            self.rounds[step], best = contest(whole, without, name, self.current, refused, self.config, self.jobs)
+            if best.effect != name:
+                self.reasons[name] = f"stand-in: {best.effect} does better beside what was adopted later"
+                self.reasons[best.effect] = "adopted"
+                self._reweight(best.fitted)
 
     def rest(self) -> None:
         """Weigh and fit in turn until no parameter moves, unless that widens the gap."""
@@ -256,9 +274,9 @@ class _Search:
                     self.reasons[each.effect] = self._refused(lenient, each) or MAY_BE_CHANCE
         return tuple(name for name, why in self.reasons.items() if why in (MAY_BE_OF_THE_TESTS, MAY_BE_CHANCE))
 
-    def _refused(self, config: DiagnoseConfig, each: Candidate) -> str | None:
+    def _refused(self, config: DiagnoseConfig, each: Candidate, before: Fitted | None = None) -> str | None:
         """Why a candidate is too little, or a stand-in; None where the data support it by itself."""
-        evidence, before = self.evidence, self.current
+        evidence, before = self.evidence, before or self.current
         return (
             unsupported(evidence, config, each)
             or self._leaves_gap(evidence, before, each)
@@ -276,20 +294,6 @@ class _Search:
             self.current, self.reasons[effect] = without, f"stand-in: not needed beside {newest}"
 
 
-def _ended(problem: Problem, before: Fitted, chosen: Candidate, tried: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """The candidates of a step, those nearly as good as the one chosen searched to the end as it was."""
-    near = NEARLY_AS_GOOD * chosen.delta_bic
-    return tuple(
-        converged(problem, before, c) if c.effect != chosen.effect and c.delta_bic < near else c for c in tried
-    )
-
-
 def _before(chosen: Candidate, tried: Sequence[Candidate]) -> frozenset[str]:
     """The effects that promised more than the one chosen: they were refused."""
     return frozenset(c.effect for c in itertools.takewhile(lambda c: c is not chosen, tried) if not c.varies)
-
-
-def _rivals(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseConfig) -> tuple[str, ...]:
-    """The other effects that explain a step as well as the one chosen, best first."""
-    others = [c for c in tried if c.effect != chosen.effect]
-    return tuple(c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from pzd.damper.model import Damper
+from pzd.diagnose.config import DiagnoseConfig
 from pzd.diagnose.fit.least_squares import Fitted
 from pzd.diagnose.search.candidates import Candidate
 from pzd.diagnose.search.detection import Detection
@@ -26,6 +27,12 @@ class Round:
     def contenders(self) -> tuple[Candidate, ...]:
         """What was tried and not refused."""
         return tuple(c for c in self.tried if c.effect not in self.refused)
+
+
+def rivals_of(chosen: Candidate, tried: Sequence[Candidate], config: DiagnoseConfig) -> tuple[str, ...]:
+    """The other effects that explain a step as well as the one chosen, best first."""
+    others = [c for c in tried if c.effect != chosen.effect]
+    return tuple(c.effect for c in others if c.delta_bic - chosen.delta_bic < config.rival_bic)
 
 
 @dataclass(frozen=True, eq=False)
