@@ -19,7 +19,7 @@ from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.search.candidates import moved_by
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection
-from pzd.diagnose.thresholds import CONTRADICTS, DOUBTFUL_BELOW, LIKELIER_THAN_NOT
+from pzd.diagnose.thresholds import CONTRADICTS, DOUBTFUL_BELOW, LIKELIER_THAN_NOT, TRIVIAL_SIZE
 from pzd.diagnose.trends_of_tests import Trend
 from pzd.quantities import Control
 
@@ -158,8 +158,12 @@ def _nothing_adopted(size: float, chance: float, selection: Selection, config: D
 
 
 def _possible(selection: Selection, config: DiagnoseConfig, sure: float) -> tuple[str, ...]:
-    """What the tests do not exclude beside what is said, where the opposite of that is likelier."""
-    return tuple(not_excluded(selection, config)) if sure < LIKELIER_THAN_NOT else ()
+    """What the tests do not exclude beside what is said, where the opposite of that is likelier.
+
+    An offset, a delay or a lag may be each test's own: whether these are open is told by their size, see `trivial`.
+    """
+    own = {effect for effect, _ in TRIVIAL_SIZE}
+    return tuple(n for n in not_excluded(selection, config) if n not in own) if sure < LIKELIER_THAN_NOT else ()
 
 
 def _not_excluded(selection: Selection, config: DiagnoseConfig) -> str:
