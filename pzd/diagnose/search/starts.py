@@ -79,7 +79,7 @@ def _searched(unknown: Unknown, start: float) -> float:
 
 
 def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Array) -> float:
-    """Sum of squares after one linearised step from a start."""
+    """Sum of squares after one linearised step from a start; infinite where the slopes there are not."""
     effects = (*before.effects, effect.name)
     unknowns = problem.unknowns(effects)
     here = np.concatenate([before.searched, start])
@@ -87,6 +87,8 @@ def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Ar
     limits = np.full(here.size, -np.inf), np.full(here.size, np.inf)
     left = left_at(problem, unknowns, here, limits, new)
     r, columns = (not_taken_up(before.frame, values) for values in (left.whole, left.slopes.dense(new)))
+    if not np.all(np.isfinite(columns)):
+        return np.inf  # a power law whose flow stands still at a sample has no slope there
     size = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(size > 0.0, size, 1.0)
     rest = r - columns @ np.linalg.lstsq(columns, r, rcond=1e-6)[0]
