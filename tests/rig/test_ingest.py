@@ -285,6 +285,12 @@ def test_a_clock_of_too_few_digits_is_told_with_what_to_do_about_it(tmp_path: Pa
     assert said.endswith("; it has too few digits: leave its column out and say rate_Hz, about 3006 here")
 
 
+def test_a_clock_that_never_goes_on_is_told_no_rate(tmp_path: Path) -> None:
+    write(tmp_path / "a.csv", lines(CANONICAL | {"time_s": np.zeros(TIME.size)}))
+    assert any("time does not increase" in line for line in refused(tmp_path))
+    assert not any("rate_Hz" in line for line in refused(tmp_path))
+
+
 def test_every_offending_file_is_listed_at_once(tmp_path: Path) -> None:
     write(tmp_path / "a.csv", lines(CANONICAL | {"force_N": -FORCE}))
     write(tmp_path / "b.csv", lines(CANONICAL)[:1])

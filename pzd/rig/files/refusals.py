@@ -78,9 +78,9 @@ def _standstills(test: Test) -> list[str]:
 
 
 def _rounded(time: Array) -> str:
-    """What to do where a clock (n,) stands still often and never goes back: it has too few digits."""
+    """What to do where a clock (n,) stands still often, goes on, and never goes back: it has too few digits."""
     steps = np.diff(time)
-    if steps.min() < 0.0 or np.mean(steps == 0.0) < OFTEN:
+    if steps.min() < 0.0 or steps.max() == 0.0 or np.mean(steps == 0.0) < OFTEN:
         return ""
     rate = (time.size - 1) / (time[-1] - time[0])
     return f"; it has too few digits: leave its column out and say rate_Hz, about {rate:.5g} here"
