@@ -85,6 +85,8 @@ TRIVIAL_SIZE = {("preload_offset", "F_0"): 0.01, ("sensor_delay", "tau"): 1e-3, 
 """A common offset [share of the lowest peak], delay or lag [s] below which it counts as nothing missing.
 
 Reason: twice the prior of a test's own offset and delay (`NuisanceConfig`): what is smaller may be the rig's."""
+OF_EACH_TEST = frozenset(effect for effect, _ in TRIVIAL_SIZE)
+"""The effects that each test may have a little of for itself."""
 STOP_BEGINS = 0.4
 """No end stop begins within this share of the half stroke about its middle.
 

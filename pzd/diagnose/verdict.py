@@ -19,7 +19,7 @@ from pzd.diagnose.gap import probability_of_noise, visible_gap
 from pzd.diagnose.search.candidates import moved_by
 from pzd.diagnose.search.evidence import Evidence
 from pzd.diagnose.search.selection import Selection
-from pzd.diagnose.thresholds import CONTRADICTS, DOUBTFUL_BELOW, LIKELIER_THAN_NOT, TRIVIAL_SIZE
+from pzd.diagnose.thresholds import CONTRADICTS, DOUBTFUL_BELOW, LIKELIER_THAN_NOT, OF_EACH_TEST
 from pzd.diagnose.trends_of_tests import Trend
 from pzd.quantities import Control
 
@@ -112,7 +112,7 @@ def _explained(change: str, selection: Selection, config: DiagnoseConfig) -> Dec
     if selection.rivals or selection.competitions:
         others = [*selection.rivals, *(f"{known()[f.form].law} (not in the library)" for f in selection.competitions)]
         return Decision("ambiguous", f"{change}; {', '.join(others)} would do as well on these tests", sure)
-    if possible := _possible(selection, config, sure):
+    if possible := _possible(selection, config):
         words = f"{change}{_not_excluded(selection, config)} beside it"
         return Decision("ambiguous", words, confidence_of(selection, config, possible), possible, doubtful=True)
     doubt = _not_excluded(selection, config) if sure < DOUBTFUL_BELOW else ""
@@ -143,7 +143,7 @@ def _nothing_adopted(size: float, chance: float, selection: Selection, config: D
     if chance < config.significance and size >= config.visible:
         alone = f"probability by noise alone {max(chance, 1e-300):.1g}"
         return Decision("unexplained", f"{gap} that repeats ({alone}); no effect of the library fits", None)
-    possible = tuple(dict.fromkeys((*selection.undecided, *_possible(selection, config, sure))))
+    possible = tuple(dict.fromkeys((*selection.undecided, *_possible(selection, config))))
     if possible:
         told = "; ".join(f"{name} {selection.reasons[name]}" for name in selection.undecided)
         words = told or f"{gap}{_not_excluded(selection, config)}"
@@ -157,13 +157,14 @@ def _nothing_adopted(size: float, chance: float, selection: Selection, config: D
     return Decision("none", words + (_not_excluded(selection, config) if doubtful else ""), sure, doubtful=doubtful)
 
 
-def _possible(selection: Selection, config: DiagnoseConfig, sure: float) -> tuple[str, ...]:
-    """What the tests do not exclude beside what is said, where the opposite of that is likelier.
+def _possible(selection: Selection, config: DiagnoseConfig) -> tuple[str, ...]:
+    """What the tests do not exclude beside what is said, where it is likelier than that.
 
     An offset, a delay or a lag may be each test's own: whether these are open is told by their size, see `trivial`.
     """
-    own = {effect for effect, _ in TRIVIAL_SIZE}
-    return tuple(n for n in not_excluded(selection, config) if n not in own) if sure < LIKELIER_THAN_NOT else ()
+    if confidence_of(selection, config, OF_EACH_TEST) >= LIKELIER_THAN_NOT:
+        return ()
+    return tuple(name for name in not_excluded(selection, config) if name not in OF_EACH_TEST)
 
 
 def _not_excluded(selection: Selection, config: DiagnoseConfig) -> str:

@@ -10,21 +10,16 @@ import pytest
 from campaign import TABLE_2, damper_of, sine
 from scipy.integrate import quad
 from scipy.optimize import least_squares
-from whole_diagnosis import all_but, diagnosed
+from whole_diagnosis import all_but, diagnosed, problem_of
 
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnose.campaign import Campaign
-from pzd.diagnose.data.cleaning import prepare
-from pzd.diagnose.data.split import split
 from pzd.diagnose.fit.least_squares import fit
 from pzd.diagnose.fit.likelihood import response
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.search.candidates import candidates
 from pzd.diagnose.search.detection import Detection, detections
-from pzd.diagnose.search.evidence import evidence_of
 from pzd.diagnose.thresholds import LIKELIER_THAN_NOT
 from pzd.record import Array, Record
-from pzd.signals.nuisance import NuisanceConfig
 
 TESTS = ((0.5, 0.02), (2.0, 0.02), (2.0, 0.03))
 SIZES = (0.0025, 0.25)
@@ -64,11 +59,6 @@ def test_a_shape_that_the_tests_determine_is_paid_for() -> None:
     """Like the criterion: half the logarithm of the information, for each parameter beside the size."""
     plain, shaped = (Detection(0.05, 0.0005, 1e4, shape).log_odds(*SIZES) for shape in (0, 2))
     assert plain - shaped == pytest.approx(np.log(1.0 + 1e4))
-
-
-def problem_of(records: Sequence[Record]) -> Problem:
-    prepared = prepare(records)
-    return evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper_of((0.0,))).whole
 
 
 def left_by_refit(problem: Problem, hidden: Damper) -> float:

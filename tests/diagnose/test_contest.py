@@ -5,27 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from campaign import damper_of, sines
-from whole_diagnosis import all_but
+from whole_diagnosis import all_but, problem_of
 
 from pzd.damper.effects import library
-from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import DiagnoseConfig
-from pzd.diagnose.data.cleaning import prepare
-from pzd.diagnose.data.split import split
 from pzd.diagnose.fit.least_squares import Fitted, fit
 from pzd.diagnose.fit.parameters import Problem
 from pzd.diagnose.search.candidates import Candidate, converged
 from pzd.diagnose.search.candidates import candidate as fitted_beside
 from pzd.diagnose.search.contest import contest
-from pzd.diagnose.search.evidence import evidence_of
-from pzd.signals.nuisance import NuisanceConfig
 
 SMALL = DiagnoseConfig(forbid=all_but("gas_spring", "orifice_quadratic", "stribeck_friction", "relief_valve"))
 
 
-def problem_of(rng: np.random.Generator, **hidden: dict[str, float]) -> Problem:
-    prepared = prepare(sines(damper_of((0.0,), **hidden), rng, voltages=(0.0,)))
-    return evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper_of((0.0,))).whole
+def charged_orifice(rng: np.random.Generator) -> Problem:
+    """An orifice and the spring of a gas, at two frequencies and two amplitudes."""
+    hidden = damper_of((0.0,), orifice_quadratic={"q": 3000.0}, gas_spring={"k_g": 3000.0})
+    return problem_of(sines(hidden, rng, voltages=(0.0,)))
 
 
 def with_effects(problem: Problem, *names: str) -> Fitted:
@@ -42,7 +38,7 @@ def nothing_refused(_: Candidate) -> None:
 
 @pytest.mark.parametrize("first", ["stribeck_friction", "relief_valve"])
 def test_what_stood_in_for_another_effect_gives_way_to_it(first: str, rng: np.random.Generator) -> None:
-    problem = problem_of(rng, orifice_quadratic={"q": 3000.0}, gas_spring={"k_g": 3000.0})
+    problem = charged_orifice(rng)
     without, current = with_effects(problem, "gas_spring"), with_effects(problem, "gas_spring", first)
     step, kept = contest(problem, without, first, current, nothing_refused, SMALL, 1)
     assert kept.effect == step.chosen == "orifice_quadratic"
@@ -51,7 +47,7 @@ def test_what_stood_in_for_another_effect_gives_way_to_it(first: str, rng: np.ra
 
 
 def test_what_does_as_well_as_anything_stays(rng: np.random.Generator) -> None:
-    problem = problem_of(rng, orifice_quadratic={"q": 3000.0}, gas_spring={"k_g": 3000.0})
+    problem = charged_orifice(rng)
     without = with_effects(problem, "gas_spring")
     current = with_effects(problem, "gas_spring", "orifice_quadratic")
     step, kept = contest(problem, without, "orifice_quadratic", current, nothing_refused, SMALL, 1)
@@ -60,7 +56,7 @@ def test_what_does_as_well_as_anything_stays(rng: np.random.Generator) -> None:
 
 
 def test_what_the_data_do_not_support_takes_no_place(rng: np.random.Generator) -> None:
-    problem = problem_of(rng, orifice_quadratic={"q": 3000.0}, gas_spring={"k_g": 3000.0})
+    problem = charged_orifice(rng)
     without = with_effects(problem, "gas_spring")
     current = with_effects(problem, "gas_spring", "stribeck_friction")
 

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from campaign import damper_of
+
 from pzd.artefacts import Diagnosed, Rig
 from pzd.damper.effects import library
+from pzd.diagnose.campaign import Campaign
 from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnose.data.cleaning import prepare
+from pzd.diagnose.data.split import split
+from pzd.diagnose.fit.parameters import Problem
+from pzd.diagnose.search.evidence import evidence_of
 from pzd.diagnose.stage import diagnose
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.stage import identify
 from pzd.quantities import Control
 from pzd.record import Record
 from pzd.rig.config import FilesEntry, RigConfig
+from pzd.signals.nuisance import NuisanceConfig
 
 STAND = RigConfig(files=(FilesEntry(path="*.csv"),))
 """A rig whose files say nothing of the stand."""
@@ -21,6 +29,12 @@ STAND = RigConfig(files=(FilesEntry(path="*.csv"),))
 def all_but(*effects: str) -> tuple[str, ...]:
     """What to forbid where the claim needs few candidates: most of a diagnosis is their fits."""
     return tuple(sorted(set(library()) - set(effects)))
+
+
+def problem_of(records: Iterable[Record]) -> Problem:
+    """What a damper of one voltage is fitted to, weighed by what the plain one leaves."""
+    prepared = prepare(tuple(records))
+    return evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper_of((0.0,))).whole
 
 
 def diagnosed(records: Iterable[Record], jobs: int = 2, **config: object) -> Diagnosed:

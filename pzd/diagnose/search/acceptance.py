@@ -20,6 +20,7 @@ from pzd.diagnose.thresholds import (
     HALVES_LOSE,
     HALVES_SIGNIFICANCE,
     LEAST_CLOSED,
+    OF_EACH_TEST,
     STOP_BEGINS,
     STOP_OTHER_SIDE,
     TRIVIAL_SIZE,
@@ -88,10 +89,10 @@ def trivial(fitted: Fitted, effect: str, force: float) -> str | None:
     Parameters
     ----------
     fitted : with the effect
-    effect : its name; there is no reason where it is none of `TRIVIAL_SIZE`
+    effect : its name; there is no reason where it is none of `OF_EACH_TEST`
     force : the lowest peak of the tests [N]
     """
-    if not any(name == effect for name, _ in TRIVIAL_SIZE):
+    if effect not in OF_EACH_TEST:
         return None
     sizes = []
     for unknown, error in zip(fitted.unknowns, standard_errors(fitted), strict=True):

@@ -178,7 +178,7 @@ def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:
 def _varied(problem: Problem, before: Fitted, effect: str, evaluations: int = MOST_EVALUATIONS) -> Candidate:
     wider = replace(problem, varying=problem.varying | {effect})
     fitted = fit(wider, before.effects, wider.start_with(before.damper), evaluations)
-    return Candidate(effect, fitted, delta_bic(before, fitted), *_changed(problem, before, fitted), varies=True)
+    return replace(as_candidate(problem, before, effect, fitted), varies=True)
 
 
 def as_candidate(problem: Problem, before: Fitted, effect: str, fitted: Fitted) -> Candidate:
