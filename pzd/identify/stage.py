@@ -8,12 +8,12 @@ from dataclasses import replace
 
 from pzd.artefacts import AuxiliaryRow, Identified, Knees, ParameterRow, Rig
 from pzd.identify.config import IdentifyConfig
-from pzd.quantities import Control
+from pzd.quantities import TEMPERATURE, Control
 from pzd.record import Condition, Record, conditions, merged_voltages
-from pzd.schema.errors import ConfigError
+from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.processes import parallel_map
 from pzd.schema.progress import Listener, Progress, no_listener
-from pzd.schema.wording import supported
+from pzd.schema.wording import counted, supported
 from pzd.signals.cycles import Cycles
 from pzd.signals.repeating import cycles_of, remember
 
@@ -60,6 +60,7 @@ def identify(
     from pzd.identify.measures import measures
 
     refuse_one_condition(identify, rig, control)
+    refuse_partly_recorded(rig, control)
     constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
     found = _constant_rows(constant, identify, seed, progress, jobs)
     rows = {_labels(row): row for row, _ in found}
@@ -112,6 +113,32 @@ def refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> 
             "that T0, C and k could not depend on it; say less than lies between two of them, or leave it empty "
             f"(got {within:g})"
         )
+
+
+def refuse_partly_recorded(rig: Rig, control: Control) -> None:
+    """Refuse a setting of which some tests have a voltage or a temperature and others have none.
+
+    Parameters
+    ----------
+    rig : the records
+    control : the control signal, which names the voltage in messages
+
+    Raises
+    ------
+    DataError : with the first test that lacks one
+    """
+    for setting in dict.fromkeys(record.setting for record in rig.records):
+        mine = [record for record in rig.records if record.setting == setting]
+        for name, unit, without in (
+            (control.quantity.name, control.unit, [r.name for r in mine if r.voltage is None]),
+            (TEMPERATURE.name, TEMPERATURE.unit, [r.name for r in mine if r.temperature is None]),
+        ):
+            if 0 < len(without) < len(mine):
+                more = f" and {counted(len(without) - 1, 'more test')}" if len(without) > 1 else ""
+                raise DataError(
+                    f"{without[0]}{more}: no {name}, which other tests of the setting have: say what it was, "
+                    f"constants: {{{name}: ... {unit}}}, or leave it out of all, columns: {{{name}: ''}}"
+                )
 
 
 def _constant_rows(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pzd.artefacts import RecordEntry, Rig
 from pzd.config import RunConfig, check_settings, validated
-from pzd.identify.stage import refuse_one_condition
+from pzd.identify.stage import refuse_one_condition, refuse_partly_recorded
 from pzd.pipeline.execution import Pipeline, Say
 from pzd.pipeline.stages import LAST, Stage, stages
 from pzd.quantities import Control
@@ -161,6 +161,7 @@ def preflight(given: Opened) -> Rig:
         if not isinstance(made, Rig):
             return Rig((), ())
         refuse_one_condition(given.config.identify, made, given.run.control)
+        refuse_partly_recorded(made, given.run.control)
     return made
 
 

@@ -13,6 +13,7 @@ from pzd.artefacts import Identified, Rig
 from pzd.identify.config import IdentifyConfig
 from pzd.identify.stage import identify
 from pzd.quantities import Control
+from pzd.schema.errors import DataError
 from pzd.schema.progress import Progress
 
 
@@ -48,6 +49,23 @@ def test_conditions_fitted_in_processes_of_their_own_give_the_same(monkeypatch: 
     found = identify(IdentifyConfig(), rig(), seed=1, progress=together.append, jobs=3)
     assert vars(found) == vars(alone)
     assert together == told
+
+
+@pytest.mark.parametrize(
+    ("channel", "unit"), [("voltage", "V"), ("temperature", "degC")], ids=["voltage", "temperature"]
+)
+def test_a_setting_of_which_some_tests_lack_a_label_is_refused(channel: str, unit: str) -> None:
+    """Its damper would depend on what these tests do not tell: the diagnosis ended in a fault of pzd."""
+    whole = rig()
+    lacking = [
+        replace(r, **{channel: None}) if r.setting == "wide" and r.name.endswith("1") else r for r in whole.records
+    ]
+    with pytest.raises(DataError) as told:
+        identify(IdentifyConfig(), Rig(tuple(lacking), ()), seed=1)
+    said = f"wide-0-1 and 1 more test: no {channel}, which other tests of the setting have: say what it was, "
+    assert str(told.value).startswith(f"{said}constants: {{{channel}: ... {unit}}}, or leave it out of all")
+    none_has_it = [replace(r, **{channel: None}) if r.setting == "wide" else r for r in whole.records]
+    assert identify(IdentifyConfig(), Rig(tuple(none_has_it), ()), seed=1).rows
 
 
 def test_a_narrower_group_splits_conditions() -> None:
