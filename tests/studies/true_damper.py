@@ -60,8 +60,9 @@ def left_by_the_truth(config: RunConfig, setup: BenchmarkSetup, folder: Path, tr
     parts = split(prepared, config.identify.group.voltage_V, config.identify.group.temperature_degC)
     campaign = Campaign(prepared, parts, config.diagnose.nuisance, 1, Work(config.diagnose.most_evaluations))
     whole = evidence_of(campaign, base_of(identified.rows, None)).whole
-    start = whole.start_with(truth) if len(whole.base) == len(truth.base) else whole.start()
-    checks = campaign.checks(fit(whole, tuple(truth.effects), start, MOST_STEPS).damper)
+    of_voltages = whole if len(whole.base) == len(truth.base) else whole.pooled()  # the truth has no temperature axis
+    found = fit(of_voltages, tuple(truth.effects), of_voltages.start_with(truth), MOST_STEPS)
+    checks = campaign.checks(found.damper)
     return Left(visible_gap(checks), probability_of_noise(checks))
 
 
