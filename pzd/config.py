@@ -17,19 +17,17 @@ from pydantic import (
 )
 
 from pzd.blind.config import BlindConfig
-from pzd.diagnose.config import DiagnoseConfig
-from pzd.identify.config import IdentifyConfig
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.force_table.config import TableConfig
+from pzd.identification.config import IdentifyConfig
 from pzd.parallel.config import EngineConfig
 from pzd.quantities import Control
 from pzd.report.config import ReportConfig
 from pzd.rig.config import ControlConfig, RigConfig
 from pzd.schema.errors import ConfigError
-from pzd.schema.extends import read_extended
-from pzd.schema.model import Frozen, for_editors
-from pzd.schema.nearest import nearest
-from pzd.schema.yamlfile import Document
+from pzd.schema.model import Frozen, for_editors, nearest
+from pzd.schema.yamlfile import Document, read_extended
 from pzd.simulate.config import SimulateConfig
-from pzd.table.config import TableConfig
 
 StageName = Literal["rig", "identify", "diagnose", "table", "simulate", "report"]
 STAGES: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "simulate", "report")

@@ -35,17 +35,17 @@ from pzd.artefacts import (
     base_of,
 )
 from pzd.config import RunConfig
-from pzd.diagnose.config import DiagnoseConfig
-from pzd.identify.config import IdentifyConfig
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.force_table.config import TableConfig
+from pzd.identification.config import IdentifyConfig
 from pzd.pipeline.stages import Stage
 from pzd.quantities import Control
 from pzd.record import Record
 from pzd.report.config import ReportConfig
 from pzd.rig.config import RigConfig
-from pzd.rig.files.listing import listed
+from pzd.rig.files.reading import listed
 from pzd.schema.errors import DataError
 from pzd.simulate.config import SimulateConfig
-from pzd.table.config import TableConfig
 
 NAMES = ["ingest", "identify", "diagnose", "table", "simulate", "report"]
 UNDETERMINED = 99

@@ -21,13 +21,13 @@ from stub_stages import NAMES, NEXT_TEST, UNDETERMINED, project
 
 from pzd.artefacts import Diagnosis, Gap, KeptBack, LeftOut, Prediction, Ranked, Region, Value
 from pzd.cli.app import status
-from pzd.cli.diagnosis import diagnosis_lines
 from pzd.cli.output import Output
+from pzd.cli.text_tables import diagnosis_lines
 from pzd.config import load
 from pzd.damper.effects import library
+from pzd.parallel.processes import Progress
 from pzd.quantities import Control
 from pzd.runs import Run
-from pzd.schema.progress import Progress
 
 COMMANDS = [
     *("run", "synthesise", "ingest", "identify", "diagnose", "table", "simulate", "report", "watch", "peers"),
@@ -295,7 +295,7 @@ def test_a_second_config_of_the_same_stem_is_refused_and_both_are_named(typed: T
 
 
 def test_a_run_in_use_is_code_5_and_names_who_uses_it(typed: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pzd.runs.lock.LOCK_TIMEOUT_S", 0.1)
+    monkeypatch.setattr("pzd.runs.disk.LOCK_TIMEOUT_S", 0.1)
     with Run.of(typed.config, Path("runs"), load(typed.config).control.signal()).locked("pzd simulate"):
         assert typed("run", "first.yaml") == 5
     assert typed.err[0].startswith(f"runs/first: pzd simulate (process {os.getpid()} on ")
@@ -762,7 +762,7 @@ def test_help_imports_neither_numbers_nor_what_checks_them() -> None:
 def test_nothing_heavy_is_imported_to_find_that_all_is_fresh() -> None:
     text = (
         "import sys\nfrom pzd.pipeline.stages import stages\nfrom types import SimpleNamespace as S\n"
-        "import pzd.pipeline.command, pzd.rig.files.listing\nstages(S(rig=S(virtual=None), with_car=True))\n"
+        "import pzd.pipeline.command, pzd.rig.files.reading\nstages(S(rig=S(virtual=None), with_car=True))\n"
         f"print([name for name in {HEAVY!r} if name in sys.modules])"
     )
     printed = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, env=ENVIRONMENT)
@@ -867,7 +867,7 @@ from concurrent.futures import ThreadPoolExecutor
 sys.path[:0] = [{here!r}, {root!r}]
 import stub_stages
 from pzd.artefacts import Identified, Rig
-from pzd.identify.config import IdentifyConfig
+from pzd.identification.config import IdentifyConfig
 from pzd.pipeline import command
 from pzd.pipeline.stages import Stage
 
@@ -877,7 +877,7 @@ def identify(identify: IdentifyConfig, rig: Rig, seed: int) -> Identified:
         print("at work", flush=True)
         futures[0].result()
 
-identify.__module__ = "pzd.identify.stage"
+identify.__module__ = "pzd.identification.stage"
 command.stages = lambda config: tuple(
     Stage("identify", identify) if stage.name == "identify" else stage for stage in stub_stages.stages(config)
 )

@@ -229,7 +229,7 @@ def test_the_second_generator_shares_nothing_with_what_it_judges() -> None:
     assert borrowed(PACKAGE) == []
 
 
-@pytest.mark.parametrize("line", ["from pzd.damper.element import element_force", "import pzd.blind.sizes"])
+@pytest.mark.parametrize("line", ["from pzd.damper.element import element_force", "import pzd.blind.hide"])
 def test_a_loan_of_the_second_generator_is_found(line: str, tmp_path: Path) -> None:
     module = tmp_path / "pzd" / "blind" / "independent" / "laws" / "wrong.py"
     module.parent.mkdir(parents=True)

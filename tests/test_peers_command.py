@@ -10,11 +10,11 @@ import pytest
 from stub_stages import project
 
 from pzd.artefacts import Diagnosed, Identified, Knees, LawRow, Rig
-from pzd.artefacts.peers import PeerComparison, PeerParameterRow, PeerRow
+from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow, PeerRow
 from pzd.cli.app import status
 from pzd.cli.peers import comparison_lines
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnose.peer_comparison import compare_with_peers
+from pzd.diagnosis.peer_comparison import compare_with_peers
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
 

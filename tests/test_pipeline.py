@@ -17,16 +17,16 @@ from pzd.artefacts import Identified, Manifest, Rig
 from pzd.cli import start
 from pzd.config import load
 from pzd.damper.effects import library
+from pzd.parallel.processes import Listener, Progress, no_listener
 from pzd.pipeline.command import execute, opened, stale_stages
+from pzd.pipeline.dependencies import PACKAGE, _file, _imports_of, _modules, code_hash, modules_used
 from pzd.pipeline.execution import Pipeline
-from pzd.pipeline.sources import PACKAGE, _file, _imports_of, _modules, code_hash, modules_used
 from pzd.pipeline.stages import Stage, stages
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
 from pzd.runs import versions
 from pzd.schema.errors import ConfigError, DataError
-from pzd.schema.jsonfile import read_json
-from pzd.schema.progress import Listener, Progress, no_listener
+from pzd.schema.validate import read_json
 
 
 class Bench:
@@ -170,7 +170,7 @@ def test_edited_code_reruns_what_may_use_it(bench: Bench, monkeypatch: pytest.Mo
     bench()
     monkeypatch.setattr(
         "pzd.pipeline.dependencies.code_hash",
-        lambda module: "edited" if module == "pzd.table.stage" else code_hash(module),
+        lambda module: "edited" if module == "pzd.force_table.stage" else code_hash(module),
     )
     assert bench() == ["table"]
     assert bench.said("table").endswith("runs: the code has changed")
@@ -218,9 +218,9 @@ def test_a_comment_in_what_no_stage_imports_reruns_nothing(bench: Bench, copied:
 @pytest.mark.parametrize(
     ("module", "ran"),
     [
-        ("pzd.identify.stage", ["identify"]),
+        ("pzd.identification.stage", ["identify"]),
         ("pzd.report.stage", ["report"]),
-        ("pzd.table.stage", ["table"]),
+        ("pzd.force_table.stage", ["table"]),
         ("pzd.simulate.stage", ["simulate"]),
         ("pzd.quantities", NAMES),
     ],
@@ -250,19 +250,22 @@ def test_the_code_of_a_stage_is_all_that_it_may_import_and_the_data_beside(tmp_p
         ("__init__.py", ""),
         (
             "identify/stage.py",
-            "from pzd.identify import (\n    fit,\n)\nif TYPE_CHECKING:\n    import pzd.report.page\n",
+            "from pzd.identification import (\n    fit,\n)\nif TYPE_CHECKING:\n    import pzd.report.page\n",
         ),
         ("identify/fit.py", "from pzd.damper.element import f\n"),
         ("identify/alone.py", "import pzd.report.page\n"),
         ("identify/numbers.csv", "1\n"),
         ("identify/templates/page.html", "1\n"),
         ("identify/README.md", "1\n"),
-        ("damper/element.py", "def f():\n    from pzd.quantities import x\n    find(f'pzd.damper.laws.{name}')\n"),
+        (
+            "damper/element.py",
+            "def f():\n    from pzd.quantities import x\n    find(f'pzd.damper.compiled.laws.{name}')\n",
+        ),
         ("damper/laws/__init__.py", ""),
         ("damper/laws/lash.py", ""),
         ("quantities.py", "x = 1\n"),
         ("report/__init__.py", "found = pkgutil.iter_modules(__path__)\n"),
-        ("report/stage.py", "import pzd.identify.fit as fit\n"),
+        ("report/stage.py", "import pzd.identification.fit as fit\n"),
         ("report/page.py", ""),
     ):
         (package / name).parent.mkdir(parents=True, exist_ok=True)

@@ -10,8 +10,7 @@ from subprocess import CompletedProcess
 import pytest
 
 from pzd.config import load
-from pzd.pipeline.command import opened
-from pzd.pipeline.resolved import resolved
+from pzd.pipeline.command import opened, resolved
 from pzd.schema.yamlfile import read_yaml
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -24,7 +24,7 @@ from pzd.artefacts import Manifest
 from pzd.pipeline.command import execute, opened
 from pzd.quantities import Control
 from pzd.schema.errors import DataError
-from pzd.schema.jsonfile import read_json
+from pzd.schema.validate import read_json
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = {
@@ -61,7 +61,7 @@ class Sequences(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.patch = pytest.MonkeyPatch()
-        self.patch.setattr("pzd.runs.lock.LOCK_TIMEOUT_S", 60.0)  # a busy machine is no fault
+        self.patch.setattr("pzd.runs.disk.LOCK_TIMEOUT_S", 60.0)  # a busy machine is no fault
         self.home = Path(tempfile.mkdtemp(prefix="sequences-"))
         self.config = self.set_up()
         self.run = self.home / "runs" / self.config.stem

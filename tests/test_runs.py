@@ -211,7 +211,7 @@ def test_a_run_killed_between_the_renames_leaves_the_old_result_or_the_new(
 def test_a_held_run_is_refused_after_a_short_wait_and_names_who_holds_it(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pzd.runs.lock.LOCK_TIMEOUT_S", 0.2)
+    monkeypatch.setattr("pzd.runs.disk.LOCK_TIMEOUT_S", 0.2)
     process = other_process(run, hold=True)
     try:
         begun = time.monotonic()
@@ -419,7 +419,7 @@ def test_what_stands_where_we_write_is_named_and_left(run: Run, name: str) -> No
 def test_a_waiting_command_goes_on_where_a_refused_first_run_takes_the_folder_away(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pzd.runs.lock.LOCK_TIMEOUT_S", 30.0)
+    monkeypatch.setattr("pzd.runs.disk.LOCK_TIMEOUT_S", 30.0)
     failed: list[BaseException] = []
 
     def wait() -> None:

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from pzd.artefacts import Diagnosed, Identified, ParameterRow, RecordEntry, Rig, Value, extent
-from pzd.cli.diagnosis import diagnosis_lines
+from pzd.cli.text_tables import diagnosis_lines
 from pzd.config import load
 from pzd.damper.model import BaseRow, Damper
-from pzd.identify.config import GroupConfig, IdentifyConfig
-from pzd.identify.stage import identify
+from pzd.identification.config import GroupConfig, IdentifyConfig
+from pzd.identification.stage import identify
 from pzd.pipeline.command import opened, preflight
 from pzd.quantities import Control
 from pzd.record import Record, merged_voltages
 from pzd.rig.config import FilesEntry, FileSplit
-from pzd.rig.files.listing import listed
+from pzd.rig.files.reading import listed
 from pzd.schema.errors import ConfigError, DataError
 from pzd.signals.cycles import cycles
 

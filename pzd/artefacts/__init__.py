@@ -14,10 +14,13 @@ from pzd.artefacts.characteristics import (
     StepRow,
     WarmUpRow,
 )
-from pzd.artefacts.diagnosed import Diagnosed
 from pzd.artefacts.diagnosis import (
+    Diagnosed,
     Diagnosis,
     Gap,
+    Hypotheses,
+    HypothesisPoint,
+    HypothesisRow,
     KeptBack,
     LeftOut,
     NextTest,
@@ -26,7 +29,6 @@ from pzd.artefacts.diagnosis import (
     Region,
     Value,
 )
-from pzd.artefacts.hypotheses import Hypotheses, HypothesisPoint, HypothesisRow
 from pzd.artefacts.identified import (
     FALLBACK,
     AuxiliaryRow,
@@ -36,10 +38,8 @@ from pzd.artefacts.identified import (
     base_of,
     identified_damper,
 )
-from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, UnitRow
-from pzd.artefacts.knee_as_damper import knee_damper
-from pzd.artefacts.manifest import Manifest
-from pzd.artefacts.report import ComfortRow, ReferenceRow, Report
+from pzd.artefacts.knee import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, PredictedRow, UnitRow, knee_damper
+from pzd.artefacts.report import ComfortRow, Manifest, ReferenceRow, Report
 from pzd.artefacts.rides import (
     AXLE_COLUMNS,
     AXLES,

@@ -9,8 +9,7 @@ from typing import ClassVar, Self
 from pydantic import Field, model_validator
 
 from pzd.artefacts.characteristics import Characteristics
-from pzd.artefacts.knee import Knees
-from pzd.artefacts.knee_as_damper import knee_damper
+from pzd.artefacts.knee import Knees, knee_damper
 from pzd.damper.model import PHYSICAL, BaseRow, Damper, unphysical
 from pzd.quantities import Control
 from pzd.schema.csvfile import read_rows, write_rows

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
+from pzd.parallel.processes import parallel_map
 from pzd.quantities import Control
 from pzd.record import Array
-from pzd.schema import parquetfile
+from pzd.schema import csvfile
 from pzd.schema.csvfile import read_columns, read_rows, write_columns, write_rows
 from pzd.schema.model import Frozen
-from pzd.schema.processes import parallel_map
 
 RIDE_COLUMNS = ("time_s", "z_m", "phi_rad", "a_K_m_per_s2")
 AXLE_COLUMNS = (
@@ -178,7 +178,7 @@ class Rides:
             if history[ride.case] == "csv":
                 write_columns(path, ride.columns, control, _RIDE_HEADER)
             else:
-                parquetfile.write_columns(path, ride.columns, control)
+                csvfile.write_parquet(path, ride.columns, control)
 
         parallel_map(written, self.rides, jobs)
         write_rows(folder / "summary.csv", SummaryRow, self.summary, control)
@@ -195,7 +195,7 @@ class Rides:
         """Read and check them again, so many at the same time."""
 
         def ride(row: RideRow) -> Ride:
-            read = read_columns if row.history == "csv" else parquetfile.read_columns
+            read = read_columns if row.history == "csv" else csvfile.read_parquet
             return Ride(row.case, read(folder / f"{row.case}.{row.history}", _RIDE_HEADER, control, _RIDE_OPTIONAL))
 
         summary = read_rows(folder / "summary.csv", SummaryRow, control)

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pzd.blind.case import Places, Truth
-from pzd.blind.clean import Clean, write_clean
+from pzd.blind.case import Clean, Places, Truth, write_clean
 from pzd.blind.config import BlindConfig
 from pzd.blind.plan import Kind, PlannedCase, dealt
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE
 from pzd.schema.csvfile import write_columns
-from pzd.schema.jsonfile import write_json
+from pzd.schema.validate import write_json
 
 if TYPE_CHECKING:
     from pzd.blind.hide import BenchmarkSetup
@@ -29,7 +28,7 @@ def plan_independent(config: BlindConfig) -> tuple[PlannedCase, ...]:
     ----------
     config : the shares of what is hidden, and the number
     """
-    from pzd.blind.independent.campaigns import SHARES
+    from pzd.blind.independent.stand import SHARES
 
     return dealt(config, SHARES, hideable)
 
@@ -39,8 +38,8 @@ def hideable(campaign: str, kind: Kind) -> list[tuple[str, ...]]:
 
     Each campaign begins at another place of the list, so that few cases hold many laws.
     """
-    from pzd.blind.independent.campaigns import SHARES
     from pzd.blind.independent.case import DRIVE, LAWS, OUTSIDE, SEPARATE
+    from pzd.blind.independent.stand import SHARES
 
     turn = 4 * list(SHARES).index(campaign)
     laws = [name for name in LAWS if name not in DRIVE or campaign == "moving_signal"]

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.damper.drive import drive_row, effective_voltage
+from pzd.damper.material import drive_row, effective_voltage
 from pzd.damper.motion import Motion
 from pzd.record import Array
 
@@ -44,7 +44,7 @@ class Form:
     ranges: Mapping[str, tuple[float, float]]
     """Its parameters, each drawn evenly between two limits."""
     named_shapes: tuple[str, ...]
-    """Names of the shapes in `pzd/diagnose/hypotheses/shapes.py` that describe it rightly."""
+    """Names of the shapes in `pzd/diagnosis/hypotheses/shapes.py` that describe it rightly."""
 
 
 def position_damping(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Array:

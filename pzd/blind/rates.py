@@ -11,7 +11,7 @@ import numpy as np
 
 from pzd.blind.case import Scored
 from pzd.blind.outside import FORMS
-from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnosis.config import DiagnoseConfig
 from pzd.schema.model import Frozen
 
 Z95 = 1.959963984540054

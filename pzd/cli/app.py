@@ -11,15 +11,14 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from pzd.cli import blind, export, figures, look, peers, stages, start, sweep, watch
-from pzd.cli.exits import DONE, INTERRUPTED, OWN_FAULT
+from pzd.cli import campaigns, export, look, peers, stages, start
 from pzd.cli.interrupt import (
     end_at_once_when_interrupted,
     end_soon_after_interrupt,
     raise_when_interrupted,
     say_interrupted,
 )
-from pzd.cli.output import complain, own_fault, silence
+from pzd.cli.output import DONE, INTERRUPTED, OWN_FAULT, complain, own_fault, silence
 from pzd.schema.errors import ConfigError, FilesError, UserError
 
 _USAGE_ERROR: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
@@ -36,13 +35,13 @@ app = typer.Typer(
 )
 _COMMANDS: tuple[Callable[..., int], ...] = (
     *stages.COMMANDS,
-    *watch.COMMANDS,
+    *stages.WATCH_COMMANDS,
     *peers.COMMANDS,
     *look.COMMANDS,
     *export.COMMANDS,
-    *figures.COMMANDS,
-    *sweep.COMMANDS,
-    *blind.COMMANDS,
+    *export.FIGURE_COMMANDS,
+    *campaigns.SWEEP_COMMANDS,
+    *campaigns.COMMANDS,
     *start.COMMANDS,
 )
 for _command in _COMMANDS:

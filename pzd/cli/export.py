@@ -8,10 +8,24 @@ from typing import Annotated
 
 import typer
 
-from pzd.cli.exits import DONE, UNTRUSTED
-from pzd.cli.options import RUNS, Config, Json, Quiet, Runs, Set, Verbose, command_line
-from pzd.cli.output import Output, complain
+from pzd.cli.output import (
+    DONE,
+    RUNS,
+    UNTRUSTED,
+    Config,
+    Jobs,
+    Json,
+    Output,
+    Quiet,
+    Runs,
+    Set,
+    Verbose,
+    command_line,
+    complain,
+)
 from pzd.export.formats import formats
+
+# ----------------------------------------------------------------------------------------------------
 
 
 def _once(given: Sequence[str]) -> list[str]:
@@ -70,3 +84,34 @@ def export(
 
 
 COMMANDS = (export,)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The command that draws the figures of the paper from a run.
+
+
+def figures(
+    config: Config,
+    runs: Runs = RUNS,
+    overrides: Set = None,
+    jobs: Jobs = 1,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> int:
+    """Draw the figures of the paper, and their index."""
+    from pzd.paper.figures.draw import FOLDER, drawn
+    from pzd.paper.figures.sources import FigureData
+    from pzd.pipeline.command import execute, opened
+
+    output = Output(quiet=quiet, verbose=verbose)
+    given = opened(config, runs, overrides or ())
+    marks = execute(given, "identify", force=False, jobs=jobs, say=output.say, progress=output.progress)
+    figure_set = drawn(FigureData.of(given.run, given.config), output.say)
+    with given.run.locked("pzd figures"):
+        given.run.write_extra(FOLDER, figure_set.write)
+    output.say(f"figures: {given.run.folder / FOLDER / 'index.html'}")
+    complain(f"not to be trusted: {mark}" for mark in marks)
+    return UNTRUSTED if marks else DONE
+
+
+FIGURE_COMMANDS = (figures,)

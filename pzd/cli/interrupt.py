@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import signal
 
-from pzd.cli.exits import INTERRUPTED
+from pzd.cli.output import INTERRUPTED
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # before an interrupt is heeded, as little as possible is imported

@@ -2,19 +2,132 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pzd.cli.exits import DONE
-from pzd.cli.layout import aligned, filled, interval, number
-from pzd.cli.machine import run_as_data
-from pzd.cli.options import CORES, RUNS, Config, Json, Quiet, Runs, Set, Verbose
-from pzd.cli.output import Output
-from pzd.schema.errors import ConfigError
-from pzd.schema.wording import counted
+from pzd.cli.output import CORES, DONE, RUNS, Config, Json, Output, Quiet, Runs, Set, Verbose
+from pzd.cli.text_tables import aligned, filled, interval, number
+from pzd.schema.errors import ConfigError, counted
+
+# ----------------------------------------------------------------------------------------------------
+# The numbers of several runs as one table: a line a number, a column a run.
+
+
+if TYPE_CHECKING:
+    from pzd.pipeline.run_summary import RunSummary
+
+Column = dict[str, str]
+
+
+def comparison(runs: Sequence[RunSummary]) -> list[list[str]]:
+    """Rows of text; a dash where a run has no such number."""
+    columns = [_parameters(run) | _diagnosis(run) | _rides(run) | _comfort(run) for run in runs]
+    names = list(dict.fromkeys(name for column in columns for name in column))
+    head = ["", *(str(run.folder) for run in runs)]
+    return [head, *([name, *(column.get(name, "-") for column in columns)] for name in names)]
+
+
+def _parameters(run: RunSummary) -> Column:
+    column: Column = {}
+    for row in run.parameters:
+        place = [
+            row.setting or "",
+            *_with_unit(row.voltage_V, run.control.unit),
+            *_with_unit(row.temperature_degC, "degC"),
+        ]
+        where = ", ".join(part for part in place if part) or "all records"
+        column[f"T0 [N], {where}"] = interval(row.T0_N, row.T0_N_low95, row.T0_N_high95)
+        column[f"C [N s/m], {where}"] = interval(row.C_Ns_per_m, row.C_Ns_per_m_low95, row.C_Ns_per_m_high95)
+        column[f"k [N/m], {where}"] = interval(row.k_N_per_m, row.k_N_per_m_low95, row.k_N_per_m_high95)
+        column[f"W_s, {where}"] = number(row.W_s)
+    return column
+
+
+def _with_unit(value: float | None, unit: str) -> list[str]:
+    return [] if value is None else [f"{number(value)} {unit}"]
+
+
+def _diagnosis(run: RunSummary) -> Column:
+    found = run.diagnosis
+    if found is None:
+        return {}
+    return {
+        "verdict": found.verdict,
+        "effects": ", ".join(found.effects) or "-",
+        "confidence": number(found.confidence),
+        "gap before": number(found.gap.before if found.gap else None),
+        "gap after": number(found.gap.after if found.gap else None),
+    }
+
+
+def _rides(run: RunSummary) -> Column:
+    column: Column = {}
+    for row in run.summary:
+        column[f"{row.case}: peak |a_K| at {row.point} [m/s2]"] = number(row.peak_abs_aK_m_per_s2)
+        column[f"{row.case}: rms a_K at {row.point} [m/s2]"] = number(row.rms_aK_m_per_s2)
+    return column
+
+
+def _comfort(run: RunSummary) -> Column:
+    return {
+        f"{row.case}: {row.measure} at {row.point} [{row.unit}], {row.edition}": number(row.value)
+        for row in run.comfort
+    }
+
+
+# ----------------------------------------------------------------------------------------------------
+# What `--json` prints of a run: the numbers that people see, under the names that the files have.
+
+
+if TYPE_CHECKING:
+    from pzd.damper.effect import Effect, Parameter
+    from pzd.pipeline.run_summary import RunSummary
+
+
+def run_as_data(run: RunSummary) -> dict[str, Any]:
+    """The numbers of a run as plain data, the control under its own name."""
+    from pzd.schema.validate import plain_data
+
+    numbers = {
+        "run": run.folder.as_posix(),
+        "stale": run.stale,
+        "not_to_be_trusted": run.marks,
+        "characteristics": vars(run.characteristics),
+        "knee": vars(run.knees),
+        "parameters": run.parameters,
+        "diagnosis": run.diagnosis,
+        "settings": run.settings,
+        "settings_left_out": run.settings_left_out,
+        "hypotheses": run.hypotheses.rows,
+        "rides": run.summary,
+        "assumed": run.assumed,
+        "comfort": run.comfort,
+        "report": run.page.as_posix() if run.page else None,
+    }
+    data: dict[str, Any] = plain_data(numbers, run.control)
+    return data
+
+
+def effects_as_data(effects: Iterable[Effect]) -> list[dict[str, Any]]:
+    """The library as plain data; a limit that there is not is null."""
+    return [
+        {"name": e.name, "place": e.place, "law": e.law, "parameters": [_parameter(p) for p in e.parameters]}
+        for e in effects
+    ]
+
+
+def _parameter(parameter: Parameter) -> dict[str, Any]:
+    limits = {"low": parameter.low, "high": parameter.high, "neutral": parameter.neutral}
+    finite = {name: value if math.isfinite(value) else None for name, value in limits.items()}
+    return {"name": parameter.name, "unit": parameter.unit, "meaning": parameter.meaning} | finite
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 if TYPE_CHECKING:
     from pzd.artefacts import IngestRow, ParameterRow, RecordEntry
@@ -42,7 +155,7 @@ def check(
 ) -> int:
     """Check config, rig records and road files; write nothing but the page of --plot."""
     from pzd.pipeline.command import check_roads, check_setting, opened, preflight
-    from pzd.schema.jsonfile import plain_data
+    from pzd.schema.validate import plain_data
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
@@ -105,10 +218,7 @@ def show(
     """
     if resolved:
         return _show_resolved(config, runs, overrides or (), Output(quiet=quiet, verbose=verbose), as_json=as_json)
-    from pzd.cli.characteristics import characteristics_tables
-    from pzd.cli.diagnosis import diagnosis_lines
-    from pzd.cli.knee import knee_tables
-    from pzd.cli.settings import settings_tables
+    from pzd.cli.text_tables import characteristics_tables, diagnosis_lines, knee_tables, settings_tables
     from pzd.pipeline.command import opened
     from pzd.pipeline.run_summary import summary_with_stale
 
@@ -122,7 +232,7 @@ def show(
         _section(output, title, rows)
     for title, rows in knee_tables(found):
         _section(output, title, rows)
-    _section(output, "parameters", _parameters(found))
+    _section(output, "parameters", _look_parameters(found))
     _section(
         output,
         "diagnosis",
@@ -132,9 +242,9 @@ def show(
     )
     for title, rows in settings_tables(found):
         _section(output, title, rows)
-    _section(output, "rides", _rides(found))
+    _section(output, "rides", _look_rides(found))
     _section(output, "assumed, since the config does not say it", [[line] for line in found.assumed])
-    _section(output, "comfort", _comfort(found))
+    _section(output, "comfort", _look_comfort(found))
     output.say(*(f"not to be trusted: {mark}" for mark in found.marks))
     output.say(f"report: {found.page or 'not written yet'}")
     return DONE
@@ -142,9 +252,8 @@ def show(
 
 def _show_resolved(config: Path, runs: Path, overrides: Sequence[str], output: Output, *, as_json: bool) -> int:
     """Every value of the config with its origin; nothing needs to have run."""
-    from pzd.pipeline.command import opened
-    from pzd.pipeline.resolved import resolved
-    from pzd.schema.scalars import written
+    from pzd.pipeline.command import opened, resolved
+    from pzd.schema.yamltree import written
 
     found = resolved(opened(config, runs, overrides))
     if as_json:
@@ -165,7 +274,7 @@ def _section(output: Output, title: str, rows: list[list[str]]) -> None:
         output.say("", f"{title}:", *aligned(rows, "  "))
 
 
-def _parameters(found: RunSummary) -> list[list[str]]:
+def _look_parameters(found: RunSummary) -> list[list[str]]:
     control = found.control
     head = [
         "setting",
@@ -193,7 +302,7 @@ def _parameter_row(row: ParameterRow) -> list[str]:
     ]
 
 
-def _rides(found: RunSummary) -> list[list[str]]:
+def _look_rides(found: RunSummary) -> list[list[str]]:
     head = ["case", "point", "peak |a_K| [m/s2]", "rms a_K [m/s2]", "peak deflection [m]", "outside the table"]
     rows = [
         [
@@ -209,7 +318,7 @@ def _rides(found: RunSummary) -> list[list[str]]:
     return [head, *rows] if rows else []
 
 
-def _comfort(found: RunSummary) -> list[list[str]]:
+def _look_comfort(found: RunSummary) -> list[list[str]]:
     return [
         [row.case, row.point, row.edition, row.measure, f"{number(row.value)} {row.unit}", row.status]
         for row in found.comfort
@@ -221,7 +330,6 @@ def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbo
 
     A stage whose numbers are not those of the run's config as it is today is called stale, with the reason.
     """
-    from pzd.cli.comparison import comparison
     from pzd.pipeline.run_summary import summary_of
 
     output = Output(quiet=quiet, verbose=verbose)

@@ -4,16 +4,32 @@ from __future__ import annotations
 
 import logging
 import os
+import shlex
 import shutil
 import sys
 import tempfile
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
+
+import typer
+
+# ----------------------------------------------------------------------------------------------------
+# The exit codes that are not errors of the user; those stand with their errors.
+
+
+DONE = 0
+OWN_FAULT = 1
+UNTRUSTED = 4
+INTERRUPTED = 130
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 if TYPE_CHECKING:
-    from pzd.schema.progress import Progress
+    from pzd.parallel.processes import Progress
 
 _BAR = 24
 """Width of the progress bar in characters."""
@@ -40,7 +56,7 @@ class Output:
 
     def say_json(self, data: Any) -> None:
         """Print plain data as JSON to stdout."""
-        from pzd.schema.jsonfile import json_text
+        from pzd.schema.validate import json_text
 
         self.say(json_text(data))
 
@@ -120,3 +136,52 @@ def _filed(text: str) -> str:
     except OSError as error:
         return f"the traceback could not be written: {error.strerror}; -v shows it"
     return f"traceback in {Path(name)}; -v shows it"
+
+
+# ----------------------------------------------------------------------------------------------------
+# The options that commands share, each with its help.
+
+
+Config = Annotated[
+    Path, typer.Argument(metavar="CONFIG", help="The YAML file that describes the run.", show_default=False)
+]
+Runs = Annotated[Path, typer.Option("--runs", metavar="DIR", help="Folder of the results.")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="a.b=VALUE",
+        help="Set a value of the config, items of lists by index; can be given again.",
+        show_default=False,
+    ),
+]
+Force = Annotated[bool, typer.Option("--force", help="Run the stage even if it is fresh; with run, every stage.")]
+
+
+def _jobs(given: str) -> int:
+    """The value of --jobs.
+
+    Raises
+    ------
+    BadParameter : when it is no whole number above 0
+    """
+    if not str(given).isdecimal() or int(given) < 1:
+        raise typer.BadParameter(f"must be a whole number, 1 or more (got {given})")
+    return int(given)
+
+
+Jobs = Annotated[
+    int, typer.Option("--jobs", metavar="N", parser=_jobs, help="Threads or processes that a stage may use.")
+]
+CORES = os.cpu_count() or 1
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Print what the stages report, and tracebacks.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for other programs.")]
+
+RUNS = Path("runs")
+
+
+def command_line(name: str, config: Path, runs: Path, overrides: Sequence[str]) -> str:
+    """What to type for another command on the same config, with the same results folder and values."""
+    options = ["--runs", str(runs)] if runs != RUNS else []
+    return shlex.join(["pzd", name, str(config), *options, *(word for one in overrides for word in ("--set", one))])

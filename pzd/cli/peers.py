@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.cli.exits import DONE, UNTRUSTED
-from pzd.cli.layout import aligned, filled, number
-from pzd.cli.options import CORES, RUNS, Config, Jobs, Json, Quiet, Runs, Set, Verbose
-from pzd.cli.output import Output, complain
+from pzd.cli.output import CORES, DONE, RUNS, UNTRUSTED, Config, Jobs, Json, Output, Quiet, Runs, Set, Verbose, complain
+from pzd.cli.text_tables import aligned, filled, number
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from pzd.artefacts.peers import PeerComparison, PeerParameterRow, PeerRow
+    from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow, PeerRow
     from pzd.quantities import Control
 
 
@@ -27,11 +25,11 @@ def peers(
 ) -> int:
     """Set the damper handed on beside published models, on tests and voltages that no fit has seen."""
     from pzd.artefacts import Diagnosed, Identified, Rig
-    from pzd.artefacts.peers import PeerComparison
-    from pzd.diagnose.peer_comparison import compare_with_peers
+    from pzd.artefacts.diagnosis import PeerComparison
+    from pzd.diagnosis.peer_comparison import compare_with_peers
     from pzd.pipeline.command import execute, opened
     from pzd.pipeline.dependencies import setting_of
-    from pzd.schema.jsonfile import plain_data
+    from pzd.schema.validate import plain_data
 
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())

@@ -8,11 +8,9 @@ from typing import Annotated
 
 import typer
 
-from pzd.cli.exits import DONE
-from pzd.cli.layout import aligned
-from pzd.cli.machine import effects_as_data
-from pzd.cli.options import Json, Verbose
-from pzd.cli.output import Output
+from pzd.cli.look import effects_as_data
+from pzd.cli.output import DONE, Json, Output, Verbose
+from pzd.cli.text_tables import aligned
 
 RigFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Rig files to make a config for.")]
 
@@ -87,7 +85,7 @@ def effects(propose: Propose = None, out: Out = None, as_json: Json = False, ver
 
 def _propose(run: Path, out: Path | None, output: Output) -> int:
     """Write the best hypothesis of a run as an effect file, over none that is there."""
-    from pzd.diagnose.hypotheses.proposal import proposal_of
+    from pzd.diagnosis.hypotheses.summary import proposal_of
     from pzd.own_effects import VARIABLE, own_folder
     from pzd.pipeline.run_summary import summary_of
     from pzd.schema.errors import ConfigError

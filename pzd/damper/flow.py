@@ -9,8 +9,8 @@ below the breakaway force nothing flows.
 from __future__ import annotations
 
 from pzd.compiled import compiled
-from pzd.damper import kernels
-from pzd.damper.kernels import T0, C, Row, bleed_factor, direction_factor
+from pzd.damper.compiled import kernels
+from pzd.damper.compiled.kernels import T0, C, Row, bleed_factor, direction_factor
 
 _NEWTON_STEPS = 60
 _NEWTON_TOLERANCE = 1e-13

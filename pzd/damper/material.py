@@ -9,12 +9,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pzd.damper.columns import acting
-from pzd.damper.competing_forms import module_of
-from pzd.damper.laws import arguments, functions
+from pzd.compiled import compiled
+from pzd.damper.compiled.columns import DRIVE, NEUTRAL, acting, column
+from pzd.damper.compiled.kernels import follow_voltage
+from pzd.damper.compiled.laws import arguments, functions
+from pzd.damper.confounders import module_of
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.values import column
 from pzd.record import Array
+
+# ----------------------------------------------------------------------------------------------------
+
 
 _SAME_VOLTAGE = 0.02  # of the largest voltage; labels of one voltage at two temperatures differ a little
 
@@ -146,3 +150,37 @@ def material_factors(
             factors = np.repeat(factors, max(factor.size // len(factors), 1), axis=0)
             factors[:, _FACTORS[name]] *= factor
     return factors
+
+
+# ----------------------------------------------------------------------------------------------------
+# The voltage as the valve feels it: supply, valve and actuator, one behind the other.
+
+
+def drive_row(effects: Mapping[str, Mapping[str, float]]) -> Array:
+    """(d,) the row of the drive of some effects, the others switched off."""
+    return np.array([effects.get(name, {}).get(parameter, NEUTRAL[name, parameter]) for name, parameter in DRIVE])
+
+
+def effective_voltage(voltage: Array, steps: Array, row: Array) -> Array:
+    """Voltage as the valve feels it, at rest with the first sample.
+
+    Parameters
+    ----------
+    voltage : (n,) control signal, linear between samples [V]
+    steps : (n - 1,) or (1,) sampling intervals [s]
+    row : (d,) parameters of the drive effects, see `drive_row`
+
+    Returns
+    -------
+    (n,) effective voltage [V]
+    """
+    effective = np.empty_like(voltage)
+    _follow(voltage, steps, row, np.full(len(DRIVE), voltage[0]), effective)
+    return effective
+
+
+@compiled
+def _follow(voltage: Array, steps: Array, row: Array, state: Array, effective: Array) -> None:
+    effective[0] = voltage[0]
+    for i in range(1, voltage.size):
+        effective[i] = follow_voltage(voltage[i - 1], voltage[i], steps[min(i - 1, steps.size - 1)], state, row)

@@ -5,12 +5,17 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 
+import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from pzd.damper.competing_forms import known
+from pzd.damper.confounders import known
+from pzd.damper.effect import Effect
 from pzd.damper.effects import library
 from pzd.schema.errors import InsideError
 from pzd.schema.model import Frozen
+
+# ----------------------------------------------------------------------------------------------------
+
 
 EffectValues = Mapping[str, float | tuple[float, ...]]
 
@@ -126,3 +131,29 @@ def _check_effect(name: str, values: EffectValues) -> None:
             if not parameter.admits(number):
                 limits = f"[{parameter.low:g}, {parameter.high:g}] {parameter.unit}"
                 raise InsideError(f"{name}.{key} must lie in {limits} (got {number:g})", name, key)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which values an effect has in nature: a fit may go beyond them, and has then found something that looks alike.
+
+
+def against_nature(damper: Damper) -> tuple[str, ...]:
+    """The effects of a damper that have values which they have nowhere in nature, such as a negative mass."""
+    damping = max(row.C_Ns_per_m for row in damper.base)
+    return tuple(
+        name
+        for name, values in damper.effects.items()
+        if not all(_natural(known()[name], at, damping) for at in _by_voltage(values))
+    )
+
+
+def _natural(effect: Effect, values: Mapping[str, float], damping: float) -> bool:
+    within = all(p.natural_from <= values.get(p.name, p.neutral) <= p.natural_to for p in effect.parameters)
+    return within and effect.natural(values, damping)
+
+
+def _by_voltage(values: EffectValues) -> list[dict[str, float]]:
+    """The parameters of an effect, a set at each of its voltages."""
+    given = {name: np.atleast_1d(value).tolist() for name, value in values.items() if name != "at_voltage_V"}
+    count = max(len(each) for each in given.values())
+    return [{name: each[min(i, len(each) - 1)] for name, each in given.items()} for i in range(count)]

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from pzd.artefacts import Table
-from pzd.damper.model import Damper
-from pzd.quantities import Control
+from pzd.artefacts import ForceRow, InverseRow, Table
+from pzd.damper.confounders import known
+from pzd.damper.model import BaseRow, Damper
+from pzd.force_table.lookup import Lookup
+from pzd.quantities import CHANNELS, DAMPING, DISPLACEMENT, FRICTION, STIFFNESS, TEMPERATURE, VOLTAGE, Control
 from pzd.record import Array
 from pzd.schema.errors import ConfigError
-from pzd.simulate.car import HalfCar
-from pzd.simulate.policy import TieBreak
-from pzd.table.lookup import Lookup
+from pzd.schema.model import Frozen, safe_name
+from pzd.simulate.policies import TieBreak
+from pzd.simulate.vehicle.car import HalfCar
+
+# ----------------------------------------------------------------------------------------------------
+
 
 WRITTEN_BY_PZD = re.compile(rb"pzd \S+, config ")
 """How `Content.origin` begins, which every file holds: what has no such bytes is not from an export."""
@@ -135,3 +140,153 @@ class Content:
 def comment(lines: Sequence[str], mark: str) -> str:
     """Lines of a comment, each behind its mark."""
     return "".join(f"{mark} {line}".rstrip() + "\n" for line in lines)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The table as curves of force over velocity, one a control signal and temperature.
+
+
+@dataclass(frozen=True, eq=False)
+class ForceCurve:
+    """Force over velocity at one control signal and temperature."""
+
+    name: str
+    """Of its file, without the ending: that of the run with what tells the curve from the others."""
+    condition: str
+    """The control signal and the temperature in words; empty where there is neither."""
+    velocities: Array
+    """(n,) rising strictly [m/s]."""
+    forces: Array
+    """(n,) [N]."""
+
+
+def curves(content: Content, name: str) -> Iterator[ForceCurve]:
+    """Every curve of the table.
+
+    Parameters
+    ----------
+    content : the damper
+    name : of the format
+
+    Raises
+    ------
+    ConfigError : when the table has empty cells
+    """
+    grid, control = content.full_grid(name), content.control
+    for temperature, forces in zip(grid.temperatures, grid.forces, strict=True):
+        for signal, force in zip(grid.voltages, forces, strict=True):
+            labels = [safe_name(f"{signal:.12g}{control.unit}")] if content.controlled else []
+            words = [f"{control.name} {signal:.12g} {control.unit}"] if content.controlled else []
+            if temperature is not None:
+                words.append(f"{temperature:.12g} {TEMPERATURE.unit}")
+            if len(grid.temperatures) > 1:
+                labels.append(f"{temperature:.12g}{TEMPERATURE.unit}")
+            yield ForceCurve("-".join([content.name, *labels]), ", ".join(words), grid.velocities, force)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The control signal for a force, on a regular grid: over velocity and share of the range of forces there.
+
+
+@dataclass(frozen=True, eq=False)
+class Inverse:
+    """The inverse at one temperature; every point of it lies within reach."""
+
+    shares: Array
+    """(s,) from 0, the lowest force that the damper gives at a velocity, to 1, the highest."""
+    low: Array
+    """(n,) lowest force at each velocity of the grid [N]."""
+    high: Array
+    """(n,) highest force [N]."""
+    signals: Array
+    """(n, s) lowest control signal that gives the force [V]; NaN where the table is empty."""
+
+
+def inverses(content: Content) -> tuple[Inverse, ...]:
+    """The inverse at each temperature of the table."""
+    velocities = content.grid.velocities
+    shares = np.linspace(0.0, 1.0, content.force_levels)
+    found = []
+    for lookup in content.lookups:
+        least, most = lookup.range(velocities)
+        low, high = np.where(least <= most, least, np.nan), np.where(least <= most, most, np.nan)
+        wanted = low[:, np.newaxis] + shares * (high - low)[:, np.newaxis]
+        found.append(Inverse(shares, low, high, lookup.nearest_voltage_for(wanted, velocities[:, np.newaxis])))
+    return tuple(found)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The damper as plain tables: force, inverse, T0, C and k, the parameters of the effects, and what these count from.
+
+
+Cell = float | int | str | None
+
+
+class EffectRow(Frozen):
+    """One value of a parameter of an adopted effect."""
+
+    effect: str
+    parameter: str
+    voltage_V: float | None
+    """At which it holds; None at every one."""
+    value: float
+    unit: str
+
+
+class ReferencePointRow(Frozen):
+    """What the laws of the effects count temperature and displacement from."""
+
+    reference_temperature_degC: float | None
+    """T_ref; None where none was given."""
+    zero_m: float
+
+
+@dataclass(frozen=True)
+class Columns:
+    """One table, column by column."""
+
+    cells: Mapping[str, tuple[Cell, ...]]
+    """By the name of the column."""
+    units: Mapping[str, str]
+    """Of the columns that have one."""
+
+
+def tables(content: Content) -> dict[str, Columns]:
+    """The tables of a damper by name; one that would have no row is left out."""
+    damper = content.damper
+    reference = ReferencePointRow(reference_temperature_degC=damper.reference_temperature_degC, zero_m=damper.zero_m)
+    every = {
+        "force": _columns(content, ForceRow, content.table.force),
+        "inverse": _columns(content, InverseRow, content.table.inverse),
+        "base": _columns(content, BaseRow, damper.base),
+        "effects": _columns(content, EffectRow, effect_rows(content)),
+        "reference": _columns(content, ReferencePointRow, (reference,) if damper.effects else ()),
+    }
+    return {name: table for name, table in every.items() if any(table.cells.values())}
+
+
+def effect_rows(content: Content) -> tuple[EffectRow, ...]:
+    """A row a value of every parameter of the adopted effects."""
+    rows = []
+    for name, given in content.damper.effects.items():
+        nodes = given.get("at_voltage_V")
+        for parameter in known()[name].parameters:
+            value, unit = given[parameter.name], content.control.own_unit(parameter.unit)
+            values = value if isinstance(value, tuple) else (value,)
+            voltages = nodes if isinstance(value, tuple) and isinstance(nodes, tuple) else (None,)
+            rows += [
+                EffectRow(effect=name, parameter=parameter.name, voltage_V=U, value=v, unit=unit)
+                for U, v in zip(voltages, values, strict=True)
+            ]
+    return tuple(rows)
+
+
+def _columns(content: Content, model: type[Frozen], rows: Sequence[Frozen]) -> Columns:
+    control = content.control
+    quantities = (*CHANNELS, FRICTION, DAMPING, STIFFNESS)
+    units = {q.column: q.unit for q in quantities} | {control.renamed(VOLTAGE.column): control.unit}
+    units |= {"reference_temperature_degC": TEMPERATURE.unit, "zero_m": DISPLACEMENT.unit}
+    left_out = set() if content.controlled else {VOLTAGE.column}
+    fields = [name for name in model.model_fields if name not in left_out]
+    cells = {control.renamed(name): tuple(getattr(row, name) for row in rows) for name in fields}
+    return Columns(cells, {name: units[name] for name in cells if name in units})

@@ -8,8 +8,8 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from pzd.parallel.config import Pools, Where
 from pzd.parallel.engines import ENGINES
-from pzd.parallel.pools import Pools, Where
 from pzd.schema.errors import UserError
 
 TRIES = 3

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from pzd.artefacts import Diagnosed, Identified, Table
 from pzd.export.content import WRITTEN_BY_PZD, Content
-from pzd.export.format import Format
-from pzd.export.formats import format_of
+from pzd.export.formats import Format, format_of
 from pzd.pipeline.command import Opened, stale_stages
 from pzd.runs.disk import as_files_error, versions
 from pzd.schema.errors import ConfigError, FilesError

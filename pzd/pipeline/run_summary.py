@@ -28,9 +28,8 @@ from pzd.quantities import Control
 from pzd.runs import CONFIG, Run
 from pzd.schema.csvfile import read_rows
 from pzd.schema.errors import ConfigError, UserError
-from pzd.schema.extends import read_extended
-from pzd.schema.yamlfile import read_yaml
-from pzd.simulate.assumed import assumed
+from pzd.schema.yamlfile import read_extended, read_yaml
+from pzd.simulate.study.plan import assumed
 
 
 @dataclass(frozen=True)

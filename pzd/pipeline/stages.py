@@ -43,12 +43,12 @@ class Stage:
 
 def stages(config: RunConfig) -> tuple[Stage, ...]:
     """The stages of a config, first to last."""
-    from pzd.diagnose.stage import diagnose
-    from pzd.identify.stage import identify
+    from pzd.diagnosis.stage import diagnose
+    from pzd.force_table.stage import tabulate
+    from pzd.identification.stage import identify
     from pzd.report.stage import report, report_without_car
     from pzd.rig.stage import ingest, synthesise
     from pzd.simulate.stage import simulate
-    from pzd.table.stage import tabulate
 
     ridden = (Stage("simulate", simulate), Stage(LAST, report))
     return (

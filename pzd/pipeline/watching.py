@@ -9,7 +9,7 @@ from pathlib import Path
 from pzd.config import load
 from pzd.pipeline.dependencies import files_named
 from pzd.schema.errors import UserError
-from pzd.schema.extends import chain
+from pzd.schema.yamlfile import chain
 
 EVERY_S = 1.0
 """Time between two looks: far more than they take, far less than a test on a rig."""

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
 from pzd.artefacts import (
+    Characteristics,
     ComfortRow,
+    ContinuousVelocityRow,
     Diagnosed,
     Identified,
     ParameterRow,
+    PeakVelocityRow,
     RecordEntry,
     ReferenceRow,
     Rides,
@@ -21,18 +25,22 @@ from pzd.artefacts import (
     SummaryRow,
     Table,
 )
-from pzd.damper.competing_forms import known, module_of
+from pzd.damper.compose import static_force
+from pzd.damper.confounders import known, module_of
 from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.model import BaseRow
 from pzd.quantities import Control
 from pzd.record import Array, Record
+from pzd.report.blocks import amount
 from pzd.report.config import ReportConfig
 from pzd.report.ride_comfort import RatedRide
-from pzd.report.wording import amount
-from pzd.simulate.assumed import assumed
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.plan import PLAIN_SUFFIX
+from pzd.simulate.policies import policies
 from pzd.simulate.roads.sine import Sine
+from pzd.simulate.study.plan import PLAIN_SUFFIX, assumed
+
+# ----------------------------------------------------------------------------------------------------
+
 
 BASELINES = ("best_fixed_voltage", "best_constant_c", "passive", "constant")
 """What a controlled policy is set beside, the most telling first."""
@@ -298,3 +306,96 @@ def effect_in_words(name: str) -> str:
 def effects_in_words(names: Sequence[str]) -> list[str]:
     """Each effect in words, with its name."""
     return [f"{effect_in_words(name)} ({name})" for name in names]
+
+
+# ----------------------------------------------------------------------------------------------------
+# The force at rest, such as a gas force: a rig measures it, and the table leaves it to the static balance.
+
+
+def static_force_at(context: ReportContext, voltage: float | None) -> float:
+    """What the damper handed on pushes with at rest, at a value of the control signal [N]."""
+    return float(static_force(context.diagnosed.damper, voltage))
+
+
+def static_force_in_words(context: ReportContext, voltages: Sequence[float | None]) -> str:
+    """The same over several values, `90 N` or `80 N to 90 N`; empty where it is 0 at all."""
+    forces = [static_force_at(context, voltage) for voltage in voltages]
+    return " to ".join(dict.fromkeys(amount(end(forces), "N") for end in (min, max))) if any(forces) else ""
+
+
+# ----------------------------------------------------------------------------------------------------
+# What each policy makes of a road: comfort against the load of the wheels.
+
+
+_FEWEST = 2
+"""With fewer policies that control there is nothing to choose between; `Comparison` says what the one is worth."""
+
+
+def of_road(context: ReportContext, road: str) -> tuple[SummaryRow, ...]:
+    """The rides of all policies over a road, the most comfortable first.
+
+    At the fidelity nearest to a real car at which two policies or more control; nothing where there is none.
+    """
+    for fidelity in REALISTIC:
+        rows = [row for row in context.cases(road) if row.fidelity == fidelity]
+        if sum(policies()[row.policy].controlled for row in rows) >= _FEWEST:
+            return tuple(sorted(rows, key=context.a_w))
+    return ()
+
+
+def unbeaten(context: ReportContext, rows: Sequence[SummaryRow]) -> tuple[SummaryRow, ...]:
+    """The rides than which none is more comfortable with less wheel load, in the order given."""
+
+    def beats(one: SummaryRow, other: SummaryRow) -> bool:
+        return context.a_w(one) < context.a_w(other) and one.rms_wheel_load_N < other.rms_wheel_load_N
+
+    return tuple(row for row in rows if not any(beats(other, row) for other in rows))
+
+
+def name_of(policy: str) -> str:
+    """A policy as it is called on the page."""
+    return policy.replace("_", " ")
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which characteristics the page shows, and which share a colour: those of one control value, or of one setting.
+
+
+Row = TypeVar("Row", PeakVelocityRow, ContinuousVelocityRow)
+
+
+def characteristics_of(context: ReportContext) -> Characteristics:
+    """What the tests of the chosen setting show without any model; of every setting where nothing else is set."""
+    found = context.identified.characteristics
+    voltages = {row.voltage_V for row in found.peak_velocity} | {row.voltage_V for row in found.warm_up}
+    if voltages <= {None} and not found.steps:
+        return found
+    return Characteristics(
+        tuple(row for row in found.peak_velocity if row.setting == context.chosen),
+        tuple(row for row in found.continuous_velocity if row.setting == context.chosen),
+        tuple(row for row in found.gas_and_friction if row.setting == context.chosen),
+        tuple(row for row in found.steps if row.setting == context.chosen),
+        tuple(row for row in found.warm_up if row.setting == context.chosen),
+        tuple(row for row in found.as_it_stands if row.setting == context.chosen),
+    )
+
+
+def coloured(context: ReportContext, rows: Sequence[Row]) -> Mapping[str, list[Row]]:
+    """Rows by the label of their colour, lowest control value first; one label without text where nothing differs.
+
+    Parameters
+    ----------
+    context : the run, which says whether there is a control signal
+    rows : of the chosen setting, or of all where there is no control signal
+    """
+    controlled = any(row.voltage_V is not None for row in rows)
+    found: dict[str, list[Row]] = {}
+    for row in sorted(rows, key=lambda row: (row.voltage_V or 0.0, row.setting or "")):
+        label = context.voltage(context.nearest_level(row.voltage_V)) if controlled else row.setting or ""
+        found.setdefault(label, []).append(row)
+    return found
+
+
+def place_of(row: PeakVelocityRow | ContinuousVelocityRow) -> tuple[str | None, float | None, float | None]:
+    """The condition of a row."""
+    return row.setting, row.voltage_V, row.temperature_degC

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from pzd.artefacts import SummaryRow
+from pzd.parallel.processes import parallel_map
 from pzd.record import Array
 from pzd.report.blocks import Picture
 from pzd.report.context import ReportContext
-from pzd.schema.processes import parallel_map
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pzd.artefacts import Finding, RecordEntry, Rig
+from pzd.parallel.processes import parallel_map
 from pzd.quantities import Control
 from pzd.record import Array, Record
-from pzd.report.blocks import Block, Gallery, Notes, Paragraph, Section
+from pzd.report.blocks import Block, Gallery, Notes, Paragraph, Section, amount, number
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, STYLE, Panel, axes, encoded
 from pzd.report.page import render
-from pzd.report.wording import amount, number
-from pzd.schema.processes import parallel_map
-from pzd.schema.wording import counted
+from pzd.schema.errors import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,7 +11,7 @@
     tolerance   largest difference as a share of the value
     kind, figure_or_table, quantity, note     for the reader
 
-The first three are needed, the others may be left out. A selector is a name of `pzd.report.selectors.UNITS` or
+The first three are needed, the others may be left out. A selector is a name of `pzd.report.run_numbers.UNITS` or
 arithmetic between other rows, in their units:
 
     id,setting,voltage_V,frequency_Hz,amplitude_m,selector,value,unit,tolerance
@@ -19,15 +19,17 @@ arithmetic between other rows, in their units:
     peak-on,soft,150,2,0.03,measures.peak_force_N,2940,N,0.05
     rise,,,,,100 * ([peak-on] / [peak] - 1),94,percent,0.1
 
-Two tests are the same as `pzd.artefacts.matching` says. A number of its own as selector (`59.7`) stands for what the
+Two tests are the same as `pzd.artefacts.rig` says. A number of its own as selector (`59.7`) stands for what the
 run cannot compute; reference.csv says so.
 """
 
 from __future__ import annotations
 
+import ast
 import logging
+import operator
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -35,16 +37,85 @@ from pydantic import Field, ValidationInfo, field_validator
 
 import pzd
 from pzd.artefacts import ReferenceRow
-from pzd.artefacts.matching import Conditions, same_motion
+from pzd.artefacts.rig import Conditions, same_motion
 from pzd.quantities import Control, Quantity
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE
-from pzd.report.arithmetic import evaluated, parsed, terms
-from pzd.report.run_numbers import Found, RunNumbers, found_in
-from pzd.report.selectors import PURE, UNITS, Asked
+from pzd.report.run_numbers import PURE, UNITS, Asked, Found, RunNumbers, found_in
 from pzd.schema.csvfile import read_table
 from pzd.schema.errors import ConfigError, DataError, at
-from pzd.schema.model import Frozen
-from pzd.schema.nearest import nearest
+from pzd.schema.model import Frozen, nearest
+
+# ----------------------------------------------------------------------------------------------------
+# Sums, differences, products and quotients of numbers that stand elsewhere: `100 * ([b] / [a] - 1)`.
+
+
+_TERM = re.compile(r"\[([^\[\]]+)\]")
+_TWO: Mapping[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+
+
+def terms(text: str) -> tuple[str, ...]:
+    """The ids between brackets, each once, in the order of the text."""
+    return tuple(dict.fromkeys(_TERM.findall(text)))
+
+
+def parsed(text: str) -> ast.expr:
+    """The tree of an expression; each id is a name in it, by its place in `terms`.
+
+    Raises
+    ------
+    ValueError : when it is anything else than + - * / and parentheses between numbers and `[id]`
+    """
+    places = {name: number for number, name in enumerate(terms(text))}
+    try:
+        tree = ast.parse(_TERM.sub(lambda found: f" term{places[found[1]]} ", text).strip(), mode="eval").body
+    except SyntaxError:
+        tree = None
+    if tree is None or not _is_arithmetic(tree, set(range(len(places)))):
+        raise ValueError("is neither a name like measures.peak_force_N nor arithmetic like 100 * ([b] / [a] - 1)")
+    return tree
+
+
+def evaluated(text: str, numbers: Mapping[str, float]) -> float:
+    """The value of an expression.
+
+    Parameters
+    ----------
+    text : + - * / and parentheses between numbers and `[id]`
+    numbers : the value of each id
+
+    Raises
+    ------
+    ValueError : when it is no such expression
+    ZeroDivisionError : when a divisor is 0
+    """
+    return _value(parsed(text), {f"term{number}": numbers[name] for number, name in enumerate(terms(text))})
+
+
+def _is_arithmetic(node: ast.expr, places: set[int]) -> bool:
+    if isinstance(node, ast.BinOp):
+        return type(node.op) in _TWO and _is_arithmetic(node.left, places) and _is_arithmetic(node.right, places)
+    if isinstance(node, ast.UnaryOp):
+        return isinstance(node.op, ast.USub) and _is_arithmetic(node.operand, places)
+    if isinstance(node, ast.Name):
+        return node.id in {f"term{place}" for place in places}
+    return isinstance(node, ast.Constant) and type(node.value) in (int, float)
+
+
+def _value(node: ast.expr, numbers: Mapping[str, float]) -> float:
+    if isinstance(node, ast.BinOp):
+        return _TWO[type(node.op)](_value(node.left, numbers), _value(node.right, numbers))
+    if isinstance(node, ast.UnaryOp):
+        return -_value(node.operand, numbers)
+    return numbers[node.id] if isinstance(node, ast.Name) else float(ast.literal_eval(node))
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 SHIPPED = {"makowski2021": Path(pzd.__file__).parent / "paper" / "published.csv"}
 """Lists of expected numbers that come with the package, by name."""

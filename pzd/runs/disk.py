@@ -7,12 +7,17 @@ import os
 import platform
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pzd.schema.errors import FilesError
+
+# ----------------------------------------------------------------------------------------------------
+
 
 _SETTLED_NS = 100_000_000
 """Age from which a file's time of change tells one content from the next: file systems round it to about 10 ms."""
@@ -75,3 +80,95 @@ def sync(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+# ----------------------------------------------------------------------------------------------------
+# One command at a time on a run: the lock that a command holds on the run's folder.
+
+
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
+
+_LOCK = ".lock"
+_HOLDER = ".holder"
+"""Who holds the lock, for the message to whoever waits."""
+LOCK_TIMEOUT_S = 2.0
+"""How long a command waits for another one on the same run: longer than `pzd check` or a run that is fresh takes."""
+_RETRY_S = 0.01
+"""How long to wait before a lock is tried again whose file another command has just taken away."""
+
+
+@contextmanager
+def locked(folder: Path, command: str) -> Iterator[None]:
+    """Hold a run's folder, which is made where it is absent, and taken away again if it stays empty.
+
+    Parameters
+    ----------
+    folder : the folder of the run
+    command : what another command is told that has to wait
+
+    Raises
+    ------
+    FilesError : when another command holds it, or the folder cannot be written
+    """
+    with as_files_error(folder):
+        lock = _acquired(folder)
+    try:
+        with as_files_error(folder):
+            (folder / _HOLDER).write_text(_holder(command), encoding="utf-8")
+        yield
+    finally:
+        with suppress(OSError):  # somebody may have removed the folder meanwhile
+            (folder / _HOLDER).unlink(missing_ok=True)
+            _remove_if_empty(folder)
+        lock.release()
+
+
+def _holder(command: str) -> str:
+    started = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    return f"{command} (process {os.getpid()} on {platform.node()}, since {started})"
+
+
+def _acquired(folder: Path) -> BaseFileLock:
+    """The lock of a folder, held.
+
+    A command whose first run comes to no result takes folder and lock file away while others wait for them;
+    these try again on a new file, for a lock on a file that is no longer at its path excludes nobody.
+    """
+    from filelock import FileLock, Timeout
+
+    deadline = time.monotonic() + LOCK_TIMEOUT_S
+    while True:
+        lock = FileLock(folder / _LOCK)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            lock.acquire(timeout=max(0.0, deadline - time.monotonic()))
+            if _is_at_its_path(lock, folder / _LOCK):
+                return lock
+        except Timeout:
+            raise _held(folder) from None
+        except FileNotFoundError:
+            if time.monotonic() > deadline:
+                raise
+        lock.release()
+        time.sleep(_RETRY_S)
+
+
+def _is_at_its_path(lock: BaseFileLock, path: Path) -> bool:
+    handle = lock._context.lock_file_fd  # noqa: SLF001  # filelock has no public way to the file that it holds
+    return handle is not None and os.path.samestat(os.fstat(handle), path.stat())
+
+
+def _held(folder: Path) -> FilesError:
+    who = "another command"
+    with suppress(OSError):
+        who = (folder / _HOLDER).read_text(encoding="utf-8") or who
+    return FilesError(f"{folder}: {who} is writing here; wait for it, or give --runs another folder")
+
+
+def _remove_if_empty(folder: Path) -> None:
+    """Take a folder away again where a first run came to no result."""
+    if [path.name for path in folder.iterdir()] == [_LOCK]:
+        (folder / _LOCK).unlink()
+        folder.rmdir()
+        folder.parent.rmdir()

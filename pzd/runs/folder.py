@@ -8,9 +8,10 @@ the next time the run is opened.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -19,12 +20,130 @@ from typing import TypeVar
 
 from pzd.artefacts import Artefact, Diagnosed, Identified, Manifest, Report, Rides, Rig, Table
 from pzd.quantities import Control
-from pzd.runs.disk import as_files_error, file_hash, sync, sync_folder, versions
-from pzd.runs.hand_edits import carry_over, free_name
-from pzd.runs.leftovers import NEW, OLD, clean_up, hidden, in_the_way
-from pzd.runs.lock import locked
-from pzd.schema.errors import ConfigError, DataError
-from pzd.schema.jsonfile import read_json, write_json
+from pzd.runs.disk import as_files_error, file_hash, locked, sync, sync_folder, versions
+from pzd.schema.errors import ConfigError, DataError, FilesError
+from pzd.schema.validate import read_json, write_json
+
+# ----------------------------------------------------------------------------------------------------
+# What a person wrote into a folder of results is kept when the results are written anew.
+
+
+def carry_over(
+    target: Path, fresh: Path, files: Mapping[str, str], before: Mapping[str, str], now: Mapping[str, str]
+) -> None:
+    """Copy what a person left in a folder into the one that takes its place.
+
+    Files of their own keep their names. A file that they edited, or that stands where a result is
+    written now, is laid beside the result as ``NAME.edited``, ``NAME.edited-2`` and so on.
+
+    Parameters
+    ----------
+    target : the folder as it is
+    fresh : the folder that takes its place
+    files : hash of every file in `target`, by its path in the folder
+    before : hash of every file that was written into `target`
+    now : hash of every file that was written into `fresh`
+    """
+    for name, digest in files.items():
+        if digest in (before.get(name), now.get(name)):
+            continue
+        if name not in before and name not in now:
+            _copy(target / name, fresh / name)
+        elif (free := free_name(target, name, digest, {*files, *now})) is not None:
+            _copy(target / name, fresh / free)
+
+
+def free_name(folder: Path, name: str, digest: str, taken: Collection[str]) -> str | None:
+    """The name under which an edited file is kept; None where it is kept already.
+
+    Parameters
+    ----------
+    folder : where the edited copies so far stand
+    name : of the edited file
+    digest : its hash
+    taken : names that are in use
+    """
+    number = 1
+    while True:
+        free = f"{name}.edited" if number == 1 else f"{name}.edited-{number}"
+        if free not in taken:
+            return free
+        if (folder / free).is_file() and file_hash(folder / free) == digest:
+            return None
+        number += 1
+
+
+def _copy(source: Path, goal: Path) -> None:
+    goal.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copy2(source, goal)
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a command that was killed left half done in a run's folder: finished, undone, or removed.
+
+
+NEW = ".new"
+"""Ending of what is being written; it is renamed once it is whole."""
+OLD = ".old"
+"""Ending of the old folder until the new one is in its place."""
+
+log = logging.getLogger(__name__)
+
+
+def hidden(folder: Path, name: str, ending: str) -> Path:
+    """Where something is written, or waits, until it has its name."""
+    return folder / f".{name}{ending}"
+
+
+def clean_up(folder: Path, folders: Collection[str], files: Collection[str]) -> None:
+    """Settle what a killed command left; what only looks like it is named and left.
+
+    Parameters
+    ----------
+    folder : the folder of the run
+    folders : names of the folders that are written there
+    files : names of the files that are written there
+    """
+    for name in files:
+        path = hidden(folder, name, NEW)
+        if path.is_file() and not path.is_symlink():
+            path.unlink()
+    for name in folders:
+        _settle(folder, name)
+    for path in sorted(folder.glob(".*")):
+        if path.suffix in (NEW, OLD):
+            log.warning("%s: pzd did not write this, so it is left as it is; move it away if you do not need it", path)
+
+
+def in_the_way(folder: Path, name: str) -> None:
+    """Refuse to write a folder where something stands that is not ours.
+
+    Raises
+    ------
+    FilesError : naming it
+    """
+    for path in (hidden(folder, name, NEW), hidden(folder, name, OLD)):
+        if os.path.lexists(path):
+            raise FilesError(f"{path}: this stands where {folder / name} is written, and is not of pzd; move it away")
+
+
+def _settle(folder: Path, name: str) -> None:
+    new, old, target = hidden(folder, name, NEW), hidden(folder, name, OLD), folder / name
+    if _is_folder(new):
+        shutil.rmtree(new)
+    if _is_folder(old):
+        if target.exists():
+            shutil.rmtree(old)
+        else:
+            old.rename(target)
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 Made = TypeVar("Made", Rig, Identified, Diagnosed, Table, Rides, Report, Artefact)
 

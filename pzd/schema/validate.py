@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from pzd.quantities import Control
-from pzd.schema.errors import InsideError, UserError
-from pzd.schema.nearest import Path, former_keys, keys_at, nearest
-from pzd.schema.nodes import Node
-from pzd.schema.wording import worded
+from pzd.quantities import VOLTAGE, Control
+from pzd.schema.errors import DataError, InsideError, UserError, at, read_text, worded
+from pzd.schema.model import Frozen, KeyPath, former_keys, keys_at, nearest
+from pzd.schema.yamltree import Entry, Node, collection, compose
+
+# ----------------------------------------------------------------------------------------------------
+
 
 _LONGEST = 60
 """Characters of a wrong value that a message repeats."""
@@ -57,7 +60,7 @@ def _position(message: str) -> list[int]:
 class _Fault:
     """What pydantic found, at a path of the tree."""
 
-    path: Path
+    path: KeyPath
     node: Node
     """The deepest node of the path that is there."""
     detail: Mapping[str, Any]
@@ -104,7 +107,7 @@ def _below(node: Node, part: str | int) -> Node | None:
 def _merged(faults: list[_Fault]) -> list[list[_Fault]]:
     """The faults by path; of a union's members only those that got furthest are heard."""
     furthest = [fault.path for fault in faults if fault.in_union]
-    groups: dict[tuple[Path, str], list[_Fault]] = {}
+    groups: dict[tuple[KeyPath, str], list[_Fault]] = {}
     for fault in faults:
         deeper = any(len(path) > len(fault.path) and path[: len(fault.path)] == fault.path for path in furthest)
         if not (fault.in_union and deeper and fault.detail["type"].endswith("_type")) and not _follows(fault):
@@ -147,7 +150,7 @@ def _message(faults: list[_Fault], annotation: Any, root: Node, data: Any, contr
     return ": ".join(part for part in (place, shown, text) if part) + ("" if "(got" in text else f" (got {got})")
 
 
-def _key_place(root: Node, path: Path) -> str:
+def _key_place(root: Node, path: KeyPath) -> str:
     node = root
     for part in path[:-1]:
         node = _below(node, part) or node
@@ -185,3 +188,137 @@ def _alternatives(texts: list[str]) -> str:
 def _shown(value: Any) -> str:
     text = value if isinstance(value, str) and value.isprintable() and value else json.dumps(value, ensure_ascii=False)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+# ----------------------------------------------------------------------------------------------------
+# The names of the control signal in files: `voltage_V` to the code, `current_A` where the config says so.
+
+
+def canonical(name: str, control: Control) -> str:
+    """The canonical name of a column or key that a file calls by the control: current_1_A -> voltage_1_V."""
+    if control == Control():
+        return name
+    unit = control.quantity.column.removeprefix(control.name)
+    candidate = re.sub(rf"(?<![A-Za-z]){re.escape(control.name)}", VOLTAGE.name, name)
+    if unit and candidate.endswith(unit):
+        candidate = f"{candidate.removesuffix(unit)}_{VOLTAGE.unit}"
+    return candidate if control.renamed(candidate) == name else name
+
+
+def renamed_keys(data: Any, control: Control) -> Any:
+    """Plain data with every canonical key under the control's name."""
+    if isinstance(data, Mapping):
+        return {control.renamed(key): renamed_keys(value, control) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [renamed_keys(value, control) for value in data]
+    return data
+
+
+def canonical_nodes(root: Node, control: Control) -> Node:
+    """The tree with every key of the control under its canonical name."""
+    if control == Control() or not isinstance(root.value, Mapping | tuple):
+        return root
+    if isinstance(root.value, tuple):
+        return collection(tuple(canonical_nodes(item, control) for item in root.value), root.place)
+    entries: dict[str, Entry] = {}
+    for key, entry in root.value.items():
+        name = canonical(key, control)
+        name = key if name in root.value else name  # both names stand here: the model refuses one of them
+        entries[name] = Entry(entry.place, canonical_nodes(entry.node, control))
+    return collection(entries, root.place)
+
+
+def misnamed(root: Node, control: Control) -> list[str]:
+    """Every key that carries the canonical name although the control is called otherwise, with its place."""
+    faults: list[str] = []
+    if isinstance(root.value, tuple):
+        for item in root.value:
+            faults += misnamed(item, control)
+    elif isinstance(root.value, Mapping):
+        for key, entry in root.value.items():
+            if control.renamed(key) != key:
+                faults.append(f"{entry.place}: {key}: must be called {control.renamed(key)} here (got {key})")
+            faults += misnamed(entry.node, control)
+    return faults
+
+
+# ----------------------------------------------------------------------------------------------------
+# JSON artefacts: a validated model or a list of them, read back strictly with file and line.
+
+
+Model = TypeVar("Model", bound=Frozen)
+
+
+def write_json(path: Path, content: Frozen | Sequence[Frozen] | Mapping[str, Any], control: Control) -> None:
+    """Write a model, a list of models or plain data, keys of the control under its own name."""
+    path.write_text(json_text(plain_data(content, control)) + "\n", encoding="utf-8", newline="\n")
+
+
+def json_text(data: Any) -> str:
+    """Plain data as JSON, indented, without a line break at its end."""
+    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def plain_data(content: Any, control: Control) -> Any:
+    """Models, and lists and mappings of them, as plain data with keys of the control under its own name."""
+    return renamed_keys(_built_in_types(content), control)
+
+
+def read_json(path: Path, model: type[Model], control: Control) -> Model:
+    """Read what `write_json` wrote (or a person edited).
+
+    Raises
+    ------
+    DataError : when the file is not what the model asks for, with every place
+    """
+    found: Model = _read(path, model, control)
+    return found
+
+
+def read_json_list(path: Path, model: type[Model], control: Control) -> tuple[Model, ...]:
+    """Read a list of models.
+
+    Raises
+    ------
+    DataError : when the file is not a list of what the model asks for, with every place
+    """
+    found: tuple[Model, ...] = _read(path, tuple[model, ...], control)  # type: ignore[valid-type]  # made at run time
+    return found
+
+
+def _built_in_types(content: Any) -> Any:
+    if isinstance(content, Frozen):
+        return content.model_dump(mode="json")
+    if isinstance(content, Mapping):
+        return {key: _built_in_types(value) for key, value in content.items()}
+    return [_built_in_types(value) for value in content] if isinstance(content, list | tuple) else content
+
+
+def _read(path: Path, annotation: Any, control: Control) -> Any:
+    text = read_text(path, DataError, "run the stage again")
+    try:
+        data = json.loads(text, object_pairs_hook=lambda pairs: _canonical_object(pairs, control))
+        return TypeAdapter(annotation).validate_json(json.dumps(data))
+    except json.JSONDecodeError as fault:
+        raise DataError(f"{at(path, fault.lineno, fault.colno)}: not JSON: {fault.msg}") from None
+    except (ValidationError, _MisnamedError, ValueError, RecursionError):
+        return _read_with_places(path, text, annotation, control)
+
+
+class _MisnamedError(Exception):
+    """A key that stands twice or under the wrong name of the control."""
+
+
+def _canonical_object(pairs: list[tuple[str, Any]], control: Control) -> dict[str, Any]:
+    made = {canonical(key, control): value for key, value in pairs}
+    if len(made) < len(pairs) or any(control.renamed(key) != key for key, _ in pairs):
+        raise _MisnamedError
+    return made
+
+
+def _read_with_places(path: Path, text: str, annotation: Any, control: Control) -> Any:
+    """Read the text once more as YAML, of which JSON is a part, to know the places of the faults."""
+    root = compose(text.replace("\t", " "), path, DataError)
+    if faults := misnamed(root, control):
+        raise DataError(faults)
+    return validated(annotation, canonical_nodes(root, control), control, DataError)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.record import Array, Complex
+from pzd.record import Array, Complex, Mask
+
+# ----------------------------------------------------------------------------------------------------
+
 
 _WHOLE = 1e-7  # a period this close to a whole number of steps is one, in steps
 _BLOCK = 8192  # samples that stay in the cache
@@ -76,3 +80,115 @@ def _direct(sums: Complex, phase: Array) -> Array:
             total += sums[:, line, None]
         result[:, start : start + _BLOCK] = total.real
     return result
+
+
+# ----------------------------------------------------------------------------------------------------
+# The mains in a channel: whether a line at 50 or 60 Hz stands out, and the wave that it makes.
+
+
+MAINS = (50.0, 60.0)
+"""Of the grids of the world [Hz]."""
+LINES_OFF = 0.2
+"""The mains may be off by this much [Hz]."""
+STANDS_OUT = 3.0
+"""The line is this many times as large as anything in its neighbourhood."""
+LEAST_RATE = 2.5
+"""Sampling rate over the frequency of the mains from which it can be seen."""
+HARMONICS = (1, 3)
+"""Of the mains, as transformers and rectifiers give them."""
+LOW_ORDER = 12.0
+"""Harmonics of the motion below this order may stand out by themselves, so that one at the mains' frequency is none."""
+_STEP = 0.01
+"""Step of the frequencies at which the line is looked for, times the length of the record: half of it is 1 degree of
+phase at either end."""
+
+
+def lines(values: Array, rate: float, frequencies: Sequence[float], cycle: float) -> list[float]:
+    """Amplitudes of lines that stand out of their neighbourhood, which holds harmonics of the motion; else 0.
+
+    Parameters
+    ----------
+    values : (n,) of any channel
+    rate : sampling rate [Hz]
+    frequencies : of the lines [Hz]
+    cycle : frequency of the motion, 0 where it does not repeat [Hz]
+    """
+    if values.size == 0 or not frequencies:
+        return [0.0] * len(frequencies)
+    window = np.hanning(values.size)
+    ramp = np.linspace(values[0], values[-1], values.size)
+    spectrum = 2.0 * np.abs(np.fft.rfft((values - ramp) * window)) / window.sum()
+    resolution, places = rate / values.size, np.fft.rfftfreq(values.size, 1.0 / rate)
+    return [_standing_out(spectrum, np.abs(places - frequency), resolution, cycle) for frequency in frequencies]
+
+
+def _standing_out(spectrum: Array, off: Array, resolution: float, cycle: float) -> float:
+    """Amplitude of the line in a spectrum, by how far its places are off the line."""
+    wide = max(LINES_OFF, 1.5 * resolution)
+    inside, around = off <= wide, (off > wide + 3.0 * resolution) & (off <= max(5.0, 3.0 * cycle, 20.0 * resolution))
+    if not inside.any() or not around.any():
+        return 0.0
+    amplitude = float(spectrum[inside].max())
+    return amplitude if amplitude > STANDS_OUT * float(spectrum[around].max()) else 0.0
+
+
+def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) -> Array:
+    """The wave that the mains and their third harmonic make in a channel, its size from the samples that are wanted.
+
+    Equation: min |r - sum a_h cos(2 pi h f t) + b_h sin(2 pi h f t)|^2, f within 0.2 Hz of the mains
+                                                                                    Source: least squares
+
+    Parameters
+    ----------
+    time : (n,) evenly spaced [s]
+    values : (n,) of the channel, less what is not the mains' as far as that is known
+    wanted : (n,) the samples that count
+    cycle : frequency of the motion, 0 where it does not repeat [Hz]
+    least : amplitude below which a line is none
+
+    Returns
+    -------
+    (n,) in the unit of the channel; zero where no line stands out
+    """
+    wave, rate = np.zeros(values.size), (values.size - 1) / float(time[-1] - time[0])
+    if np.count_nonzero(wanted) <= 2 * len(HARMONICS):
+        return wave
+    level = values - values[wanted].mean()
+    asked = [m for m in MAINS if rate >= LEAST_RATE * m and not _of_motion(m, cycle, rate / values.size)]
+    for mains, amplitude in zip(asked, lines(values, rate, asked, cycle), strict=True):
+        if amplitude <= least:
+            continue
+        from scipy.signal import zoom_fft  # it takes 0.7 s to load, and few records hum
+
+        points = 1 + int(np.ceil(2.0 * LINES_OFF * values.size / rate / _STEP))
+        near = np.linspace(mains - LINES_OFF, mains + LINES_OFF, points)
+        spectrum = zoom_fft(level * np.hanning(level.size), [near[0], near[-1]], m=points, fs=rate, endpoint=True)
+        found = near[int(np.argmax(np.abs(spectrum)))]
+        found = float(np.clip(found + _off(found, time, level, wanted), near[0], near[-1]))
+        waves = _waves(found, time)
+        wave += waves @ np.linalg.lstsq(waves[wanted], level[wanted], rcond=None)[0]
+    return wave
+
+
+def _waves(frequency: float, time: Array) -> Array:
+    """Cosine and sine of each harmonic that the rate can show, (n, 2 times harmonics)."""
+    rate = (time.size - 1) / float(time[-1] - time[0])
+    phases = [2.0 * np.pi * h * frequency * time for h in HARMONICS if rate > 2.0 * h * frequency]
+    return np.column_stack([f(phase) for phase in phases for f in (np.cos, np.sin)])
+
+
+def _off(frequency: float, time: Array, level: Array, wanted: Mask) -> float:
+    """How far the least squares lie from a frequency of the grid [Hz]: a step of Gauss and Newton, by all harmonics."""
+    waves = _waves(frequency, time)
+    sizes = np.linalg.lstsq(waves[wanted], level[wanted], rcond=None)[0]
+    cosines, sines = waves[:, ::2], waves[:, 1::2]
+    rising = 2.0 * np.pi * time[:, np.newaxis] * np.array(HARMONICS[: cosines.shape[1]])
+    slope = np.sum(rising * (sizes[1::2] * cosines - sizes[::2] * sines), axis=1)
+    more = np.column_stack([waves, slope])
+    return float(np.linalg.lstsq(more[wanted], level[wanted], rcond=None)[0][-1])
+
+
+def _of_motion(mains: float, cycle: float, resolution: float) -> bool:
+    """Whether a low harmonic of the motion lies where the mains do."""
+    order = mains / cycle if cycle > 0.0 else LOW_ORDER
+    return order < LOW_ORDER and abs(order - round(order)) * cycle <= LINES_OFF + 2.0 * resolution

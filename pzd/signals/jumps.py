@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pzd.record import Array
+from pzd.record import Array, Mask
 from pzd.signals.cycles import Cycles
+
+# ----------------------------------------------------------------------------------------------------
+
 
 SUDDEN = 6.0
 """A sample at which the force bends by so many times its usual scatter lies beside a jump."""
@@ -82,3 +85,87 @@ def _neighbours(force: Array) -> Array:
     """(3, n) force one sample before, at, and after each."""
     padded = np.pad(force, 1, mode="edge")
     return np.stack([padded[:-2], force, padded[2:]])
+
+
+# ----------------------------------------------------------------------------------------------------
+# Where a record parts, of which samples are left out: nothing is differenced across what is missing.
+
+
+def parted(values: Array, counted: Mask) -> list[Array]:
+    """Values (m,) or (m, p) at the counted samples of a record, parted where samples between them are left out.
+
+    Parameters
+    ----------
+    values : at the m samples that count
+    counted : (n,) which samples of the record these are
+    """
+    ends = np.flatnonzero(np.diff(np.flatnonzero(counted)) > 1) + 1
+    return np.split(values, ends)
+
+
+def slope_within(values: Array, counted: Mask) -> Array:
+    """(m,) change from sample to sample, by central differences within each stretch; 0 for a sample that stands alone.
+
+    Parameters
+    ----------
+    values : (m,) at the samples that count
+    counted : (n,) which samples of the record these are
+    """
+    parts = parted(values, counted)
+    return np.concatenate([np.gradient(part) if part.size > 1 else np.zeros(part.size) for part in parts])
+
+
+def unbroken(counted: Mask, memory: int) -> Mask:
+    """Which of the counted samples (m,), but for the first few, have as many predecessors in the same stretch.
+
+    Parameters
+    ----------
+    counted : (n,) which samples of a record count
+    memory : how many predecessors; the first so many of the m samples are left out of what is returned
+
+    Returns
+    -------
+    (m - memory,)
+    """
+    run = np.convolve(counted, np.ones(memory + 1, dtype=np.int64))[: counted.size]
+    whole: Mask = run[counted][memory:] == memory + 1
+    return whole
+
+
+# ----------------------------------------------------------------------------------------------------
+# A control signal between its steps: where noise is all that it differs from a line by, it is that line.
+#
+# Noise of the recorded signal is none of the valve's, and a law that follows it steps in the force wherever the noise
+# turns. A level that is held and a ramp are lines; what is bent stays as it was recorded.
+
+
+FEWEST = 10
+"""Samples from which a stretch is held against a line."""
+BY_NOISE = 1.5
+"""A stretch whose r.m.s. about its line is at most so many times the noise of a sample is that line."""
+
+
+def without_noise(values: Array) -> Array:
+    """A signal whose levels and ramps are free of noise.
+
+    Parameters
+    ----------
+    values : (n,) of a signal that steps, is held, rises and falls
+
+    Returns
+    -------
+    (n,) by least squares on each stretch between two steps that is a line but for noise; the rest as it is
+    """
+    changes = np.diff(values)
+    usual = np.median(changes) if changes.size else 0.0
+    scatter = USUAL * float(np.median(np.abs(changes - usual))) if changes.size else 0.0
+    if scatter == 0.0:
+        return values
+    ends = np.flatnonzero(np.abs(changes - usual) > SUDDEN * scatter) + 1
+    found = values.copy()
+    for part in np.split(np.arange(values.size), ends):
+        if part.size >= FEWEST:
+            line = np.polyval(np.polyfit(part - part.mean(), values[part], 1), part - part.mean())
+            if np.sqrt(np.mean((values[part] - line) ** 2)) <= BY_NOISE * scatter / np.sqrt(2.0):
+                found[part] = line
+    return found

@@ -12,8 +12,7 @@ import numpy as np
 
 from pzd.record import Array
 from pzd.signals.cycles import Cycles
-from pzd.signals.smoothing import HIGHEST, low_pass
-from pzd.signals.step import usual_step
+from pzd.signals.smoothing import HIGHEST, low_pass, usual_step
 
 STANDARD_ERRORS = 4.0
 """A harmonic is kept where its mean exceeds this many standard errors of its scatter over cycles."""

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from pzd.record import Array, Mask
 from pzd.schema.model import Frozen
-from pzd.signals.left_out import slope_within
+from pzd.signals.jumps import slope_within
 
 TIMED = 2
 """Columns from this one on say when a force comes; those before it, how large it is."""

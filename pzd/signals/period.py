@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array
-from pzd.signals.smoothing import HIGHEST, low_pass
-from pzd.signals.step import usual_step
+from pzd.signals.smoothing import HIGHEST, low_pass, usual_step
 
 MOST_SAMPLES = 2**18
 """Longer records are thinned to this many samples for the search."""

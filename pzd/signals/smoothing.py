@@ -2,9 +2,67 @@
 
 from __future__ import annotations
 
+from weakref import ref
+
 import numpy as np
 
 from pzd.record import Array, Complex
+
+# ----------------------------------------------------------------------------------------------------
+# The usual step of a clock, which everything that reads a record over time asks for.
+
+
+_last: list[tuple[ref[Array], float]] = []
+"""The clock asked for last, which nobody changes, and its step: one record is worked on at a time."""
+
+
+def usual_step(time: Array) -> float:
+    """The median step of a clock (n,) [s]."""
+    if _last and _last[0][0]() is time:
+        return _last[0][1]
+    step = float(np.median(np.diff(time)))
+    _last[:] = [(ref(time), step)]
+    return step
+
+
+# ----------------------------------------------------------------------------------------------------
+# The samples at which a motion reverses.
+
+
+REVERSAL_SHARE = 0.1
+"""Share of the range by which a motion must go back: noise and the creep of a servo stay below it."""
+
+
+def reversals(displacement: Array, share: float = REVERSAL_SHARE) -> list[int]:
+    """Samples at which the motion turns, each between strokes larger than a share of the range.
+
+    Parameters
+    ----------
+    displacement : (n,) motion, in any unit
+    share : of its range
+    """
+    enough = share * float(np.ptp(displacement))
+    steps = np.sign(np.diff(displacement))
+    candidates = [0, *(np.flatnonzero(steps[1:] != steps[:-1]) + 1).tolist(), displacement.size - 1]
+    turns: list[int] = []
+    low = high = 0
+    direction = 0
+    for i in candidates:
+        low = i if displacement[i] < displacement[low] else low
+        high = i if displacement[i] > displacement[high] else high
+        if direction >= 0 and displacement[high] - displacement[i] > enough:
+            if direction or displacement[high] - displacement[0] > enough:
+                turns.append(high)
+            direction, low = -1, i
+        elif direction <= 0 and displacement[i] - displacement[low] > enough:
+            if direction or displacement[0] - displacement[low] > enough:
+                turns.append(low)
+            direction, high = 1, i
+    return turns
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 HIGHEST = 20.0
 """Corner of the smoothing [rad/sample] that leaves a record without noise as it is."""
@@ -94,3 +152,47 @@ def _corner(s: Array, power: Array, highest: float) -> float:
 def _least(taken: Array, binned: Array, counts: Array) -> int:
     """Which corner has the least score; `taken` (corners, bins) is what each takes away."""
     return int(np.argmin((taken**2 @ binned) / (taken @ counts) ** 2))
+
+
+# ----------------------------------------------------------------------------------------------------
+# Work along a path of force over displacement.
+
+
+CHANCE = 0.05
+"""Work of one cycle that may be chance, as a share of stroke times range of the force.
+
+Reason: a damper that sticks draws a line without area, and what little its noise encloses is fed in as often as taken
+out; a loop of dry friction alone has ten times this and more."""
+
+
+def work(displacement: Array, force: Array, closed: bool = False) -> float:
+    """Work done on the damper along the path.
+
+    Equation: W = integral of F dx, the area of the loop of force over displacement      Source: definition
+
+    Parameters
+    ----------
+    displacement : (n,) extension [m]
+    force : (n,) force [N]
+    closed : whether the last sample is followed by the first, as in an average cycle
+
+    Returns
+    -------
+    work [J]
+    """
+    if closed:
+        displacement, force = np.append(displacement, displacement[0]), np.append(force, force[0])
+    return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(displacement)))
+
+
+def work_of_chance(displacement: Array, force: Array, cycles: float | None = None) -> float:
+    """Work [J] that chance may do over a path; over many cycles it adds up with the root of their number.
+
+    Parameters
+    ----------
+    displacement : (n,) extension [m]
+    force : (n,) force [N]
+    cycles : how many there are; by the turns of the motion where it is not said
+    """
+    of_cycle = CHANCE * float(np.ptp(displacement) * np.subtract(*np.percentile(force, (99, 1))))
+    return of_cycle * float(np.sqrt(1.0 + 0.5 * len(reversals(displacement)) if cycles is None else cycles))

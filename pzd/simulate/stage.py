@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pzd.artefacts import Diagnosed, Rides, Table
+from pzd.schema.csvfile import check_installed
 from pzd.schema.errors import ConfigError
-from pzd.schema.parquetfile import check_installed
 from pzd.simulate.config import SimulateConfig
 
 if TYPE_CHECKING:
-    from pzd.simulate.gathering import RideRows
-    from pzd.simulate.outcome import Outcome
-    from pzd.simulate.plan import Case
-    from pzd.simulate.profile import Profile
-    from pzd.simulate.riding import Held
+    from pzd.simulate.ride.outcome import Outcome
+    from pzd.simulate.ride.riding import Held
+    from pzd.simulate.road.profile import Profile
+    from pzd.simulate.study.gathering import RideRows
+    from pzd.simulate.study.plan import Case
 
 log = logging.getLogger(__name__)
 
@@ -42,12 +42,11 @@ def simulate(
         too short for the ride, or a temperature or a voltage lies outside of the table
     DataError : when a ride needs the table where it ends
     """
-    from pzd.simulate.dampers import check_inertance, dynamic_damper_of, grid_of, table_of
-    from pzd.simulate.gathering import Gathering
-    from pzd.simulate.limits import checked_temperature, checked_voltage
-    from pzd.simulate.plan import cases
-    from pzd.simulate.response import responses
-    from pzd.simulate.setup import Setup
+    from pzd.simulate.ride.model import check_inertance, dynamic_damper_of, grid_of, table_of
+    from pzd.simulate.study.gathering import Gathering
+    from pzd.simulate.study.plan import cases, checked_temperature, checked_voltage
+    from pzd.simulate.study.response import responses
+    from pzd.simulate.study.tuning import Setup
 
     if simulate.histories == "parquet":
         check_installed("simulate.histories")
@@ -90,7 +89,7 @@ def profiles_of(simulate: SimulateConfig, seed: int, folder: Path) -> dict[str, 
     ConfigError : when a file cannot be used, is missing, or is too short for the ride, or the ride ends before an event
     """
     from pzd.simulate.config import KM_PER_H
-    from pzd.simulate.road import Way
+    from pzd.simulate.roads import Way
 
     speed = simulate.vehicle_speed_km_per_h * KM_PER_H
     profiles: dict[str, Profile] = {}

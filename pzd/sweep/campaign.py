@@ -14,19 +14,16 @@ from pathlib import Path
 from pzd.artefacts import Diagnosed
 from pzd.config import SweepConfig
 from pzd.parallel.chunks import ChunkedWork
-from pzd.parallel.config import HOW
-from pzd.parallel.pools import Where
-from pzd.pipeline.sources import code_hash
+from pzd.parallel.config import HOW, Where
+from pzd.parallel.processes import Listener, Progress, no_listener
+from pzd.pipeline.dependencies import code_hash
 from pzd.quantities import Control
 from pzd.runs import file_hash
 from pzd.schema.errors import ConfigError, DataError
-from pzd.schema.jsonfile import read_json_list, write_json
-from pzd.schema.progress import Listener, Progress, no_listener
-from pzd.sweep.gather import Results, write
-from pzd.sweep.page import decisive, page
+from pzd.schema.validate import read_json_list, write_json
+from pzd.sweep.gather import Results, decisive, page, write
 from pzd.sweep.plan import Task, tasks
-from pzd.sweep.scatter import check_scatter
-from pzd.sweep.task import BaseRun, RunResult, config_of, outcomes, shared_stages
+from pzd.sweep.task import BaseRun, RunResult, check_scatter, config_of, outcomes, shared_stages
 
 FOLDER = "sweep"
 """Where a sweep lies beside the stages of the run."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from pzd.config import Normal, SweepConfig
 from pzd.record import Array
-from pzd.schema.scalars import Scalar, written
+from pzd.schema.yamltree import Scalar, written
 
 LEAST_PROBABILITY = 1e-9
 """A quasi-random number may be 0, where a normal distribution has no value."""

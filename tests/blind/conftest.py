@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from pzd.blind.benchmark import Benchmark
+from pzd.blind.benchmark import Benchmark, Methods
 from pzd.blind.case import Places, Scored
-from pzd.blind.diagnosis import Methods
 from pzd.blind.hide import BenchmarkSetup
 from pzd.config import RunConfig, load
-from pzd.parallel.pools import Where
+from pzd.parallel.config import Where
 
 SMALL = """
 rig:

@@ -21,11 +21,8 @@ import pytest
 
 from pzd.artefacts import Diagnosed, Diagnosis
 from pzd.artefacts.diagnosis import Gap
-from pzd.blind.benchmark import Benchmark
-from pzd.blind.case import Places, Scored
-from pzd.blind.clean import Clean
-from pzd.blind.cuts import gap_cut, gap_cut_of_truth
-from pzd.blind.diagnosis import COST, diagnose_case
+from pzd.blind.benchmark import COST, Benchmark, diagnose_case, gap_cut, gap_cut_of_truth
+from pzd.blind.case import Clean, Places, Scored
 from pzd.blind.hide import BenchmarkSetup, drawn, hide
 from pzd.blind.plan import plan
 from pzd.cli.app import status
@@ -36,10 +33,10 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.parallel import chunks
 from pzd.parallel.chunks import ChunkedWork
+from pzd.parallel.config import Pools, Where
 from pzd.parallel.engines import local
-from pzd.parallel.pools import Pools, Where
+from pzd.parallel.processes import spawned_pool
 from pzd.schema.errors import ConfigError
-from pzd.schema.processes import spawned_pool
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -231,7 +228,7 @@ def test_a_config_that_cannot_be_used_is_refused(
 def test_no_process_outlives_a_benchmark_that_is_killed() -> None:
     text = """
 import os, time
-from pzd.schema.processes import spawned_pool
+from pzd.parallel.processes import spawned_pool
 if __name__ == "__main__":
     pool = spawned_pool(1)
     print(pool.submit(os.getpid).result(), flush=True)

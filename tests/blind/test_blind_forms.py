@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.blind.clean import Clean
+from pzd.blind.case import Clean
+from pzd.blind.hide import gap_after_refit
 from pzd.blind.outside import FORMS, Reached
-from pzd.blind.visible import gap_after_refit
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.hypotheses.shapes import SHAPES
+from pzd.diagnosis.hypotheses.shapes import SHAPES
 from pzd.record import Array
 
 STROKE, FREQUENCY = 0.02, 2.0

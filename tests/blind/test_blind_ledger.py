@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pzd.blind.ledger import ScoredSeed, enter, read
+from pzd.blind.benchmark import ScoredSeed, enter, read
 from pzd.cli.app import status
 from pzd.schema.errors import ConfigError, DataError
 

@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 
 from pzd.blind.case import Scored
-from pzd.blind.confusion import confusion
 from pzd.blind.rates import Z95, Rate, brier_gain, calibration_rows, held, rate_rows
-from pzd.blind.summary import write
+from pzd.blind.summary import confusion, write
 from pzd.blind.targets import Line, campaign_lines, lines
 from pzd.quantities import Control
 

@@ -17,7 +17,7 @@ import pytest
 from pzd.blind.case import Scored
 from pzd.blind.rates import Rate, false_name, right, visible, wrong_name
 from pzd.quantities import Control
-from pzd.schema.jsonfile import read_json
+from pzd.schema.validate import read_json
 
 CASES = 60
 NEVER_SCORED = 20261121

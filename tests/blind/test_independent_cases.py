@@ -10,18 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pzd.blind.case import Places, Scored, Truth
-from pzd.blind.clean import read_clean
+from pzd.blind.case import Places, Scored, Truth, read_clean
 from pzd.blind.hide import BenchmarkSetup
 from pzd.blind.hide_independent import hide_independent, hideable, plan_independent
-from pzd.blind.independent.campaigns import SHARES
 from pzd.blind.independent.case import LAWS, OUTSIDE, drawn_case
+from pzd.blind.independent.stand import SHARES
 from pzd.blind.plan import PlannedCase
 from pzd.blind.rates import false_name, rightly_outside, visible, wrong_name
 from pzd.blind.targets import independent_lines
 from pzd.config import RunConfig
 from pzd.quantities import Control
-from pzd.schema.jsonfile import read_json
+from pzd.schema.validate import read_json
 
 Command = Callable[..., "subprocess.CompletedProcess[str]"]
 CASES = 8

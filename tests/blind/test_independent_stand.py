@@ -6,17 +6,25 @@ import numpy as np
 import pytest
 
 from pzd.blind.independent.bingham import Base
-from pzd.blind.independent.campaigns import (
+from pzd.blind.independent.refit import gap_after_refit
+from pzd.blind.independent.stand import (
     CAMPAIGNS,
     MOST_SAMPLES,
     SHARES,
+    SPECTRUM,
+    Actuator,
+    Chain,
+    Driven,
+    ErrorsOfTest,
     LaboratoryCampaign,
     LaboratoryTest,
     campaign,
+    coloured,
+    driven,
+    sensed_force,
+    stamped,
+    warmed,
 )
-from pzd.blind.independent.refit import gap_after_refit
-from pzd.blind.independent.sensors import SPECTRUM, Chain, ErrorsOfTest, coloured, sensed_force, stamped
-from pzd.blind.independent.stand import Actuator, Driven, driven, warmed
 from pzd.record import Array
 
 EXACT = Actuator(natural_frequency=40.0, damping_ratio=0.7, even=0.0, odd=0.0, wander=0.0)

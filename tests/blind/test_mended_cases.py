@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from pzd.artefacts import Diagnosis
+from pzd.blind.benchmark import Methods, diagnose_case
 from pzd.blind.case import Places
-from pzd.blind.diagnosis import Methods, diagnose_case
 from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.plan import plan
 from pzd.config import RunConfig, load
 from pzd.quantities import Control
-from pzd.schema.jsonfile import read_json
+from pzd.schema.validate import read_json
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "blind-motions.yaml"
 FIRST_SCORED = 20261200

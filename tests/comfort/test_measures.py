@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.comfort.iso2631_1997 import evaluate, reactions
-from pzd.comfort.measures import maximum_transient, peak, vibration_dose
-from pzd.signals.root_mean_square import rms
+from pzd.comfort.iso2631_1997 import evaluate, maximum_transient, peak, reactions, vibration_dose
+from pzd.signals.criterion import rms
 
 RATE = 1000.0
 TIME = np.arange(16000) / RATE

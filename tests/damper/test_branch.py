@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.damper.branch import branch_forces
-from pzd.damper.competing_forms import module_of
-from pzd.damper.compose import constant_rows, parallel_rows, respond, static_force, steady_force
+from pzd.damper.compiled.laws import arguments
+from pzd.damper.compose import branch_forces, constant_rows, parallel_rows, respond, static_force, steady_force
+from pzd.damper.confounders import module_of
 from pzd.damper.effects import library, nameable
-from pzd.damper.laws import arguments
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.rig.stand.frame import force_in_frame

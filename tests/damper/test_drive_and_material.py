@@ -12,14 +12,12 @@ import numpy as np
 import pytest
 
 import pzd
-from pzd.damper.columns import STROKE_AND_FLOW
+from pzd.damper.compiled.columns import STROKE_AND_FLOW
+from pzd.damper.compiled.rows import nodes_of, row_at
 from pzd.damper.compose import respond
-from pzd.damper.drive import drive_row, effective_voltage
-from pzd.damper.material import material
+from pzd.damper.material import drive_row, effective_voltage, material
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.damper.nodes import nodes_of
-from pzd.damper.rows import row_at
 
 TIME = np.arange(0, 1, 1e-3)
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pzd.damper import effects
-from pzd.damper.competing_forms import module_of
+from pzd.damper.compiled.laws import LAWS, arguments, functions
 from pzd.damper.compose import respond
+from pzd.damper.confounders import module_of
 from pzd.damper.effects import library
-from pzd.damper.laws import LAWS, arguments, functions
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 

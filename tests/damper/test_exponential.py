@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from pzd.damper.exponential import STAGES, bend, end_corrected, phi
+from pzd.damper.regimes import STAGES, bend, end_corrected, phi
 
 
 @pytest.mark.parametrize("z", [-700.0, -37.0, -1.001, -0.999, -1e-3, 0.0, 0.3, 2.0])

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.damper.competing_forms import competing_forms, known, module_of
+from pzd.damper.compiled.laws import arguments, functions
 from pzd.damper.compose import respond, steady_force
+from pzd.damper.confounders import confounders, known, module_of
 from pzd.damper.effects import library
 from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.fitted_laws.knee import NO_KNEE
-from pzd.damper.laws import arguments, functions
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnose.config import DiagnoseConfig
+from pzd.diagnosis.config import DiagnoseConfig
 
 TIME = np.arange(1500) * 1e-3
 PLAIN = Damper(base=(BaseRow(T0_N=35.0, C_Ns_per_m=2000.0, k_N_per_m=3e6),))
@@ -32,8 +32,8 @@ def motion(sign: float = 1.0) -> Motion:
 
 
 def test_a_fitted_law_is_no_effect_of_the_library_and_nobody_can_ask_for_it_to_be_adopted() -> None:
-    assert set(known()) == {*library(), *competing_forms(), *fitted_laws()}
-    assert not set(fitted_laws()) & {*library(), *competing_forms()}
+    assert set(known()) == {*library(), *confounders(), *fitted_laws()}
+    assert not set(fitted_laws()) & {*library(), *confounders()}
     with pytest.raises(ValueError, match="no effect is called"):
         DiagnoseConfig(force=("knee",))
 

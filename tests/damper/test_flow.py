@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pzd.damper.compiled.kernels import row_of
+from pzd.damper.compiled.rows import nodes_of
 from pzd.damper.flow import flow_force, flow_speed
-from pzd.damper.kernels import row_of
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.nodes import nodes_of
 
 
 @pytest.mark.parametrize("friction", [1e-7, 200.0])

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pzd.damper.competing_forms import known, module_of
+from pzd.damper.compiled.laws import functions
+from pzd.damper.confounders import known, module_of
 from pzd.damper.effect import Scales
 from pzd.damper.effects import effects_in, library, nameable
-from pzd.damper.laws import functions
 
 GOOD = """
 from pzd.damper.effect import Effect, Parameter, Search, growing
@@ -106,10 +106,10 @@ def test_two_files_of_one_name_are_an_error_with_both(effects: Effects) -> None:
 
 
 def test_a_foil_called_like_an_effect_is_an_error_with_both(monkeypatch: pytest.MonkeyPatch) -> None:
-    from pzd.damper import competing_forms
+    from pzd.damper import confounders
 
     known.cache_clear()
-    monkeypatch.setattr(competing_forms, "competing_forms", lambda: {"lash": library()["lash"]})
+    monkeypatch.setattr(confounders, "competing_forms", lambda: {"lash": library()["lash"]})
     with pytest.raises(ImportError, match=r"effects/lash.py and .*competing_forms/lash.py both declare lash"):
         known()
     known.cache_clear()

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from pzd.damper.compiled.kernels import row_of
 from pzd.damper.compose import (
     TOLERANCE,
     constant_rows,
@@ -17,16 +18,12 @@ from pzd.damper.compose import (
     steady_force,
 )
 from pzd.damper.element import element_force
-from pzd.damper.kernels import row_of
-from pzd.damper.march import march
+from pzd.damper.march import march, whole_step
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.damper.moving_element import whole_step
-from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance
-from pzd.damper.path_sensitivities import not_varied
-from pzd.damper.pieces import TimeStep
-from pzd.damper.regimes import spring_force
-from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
+from pzd.damper.path import DEFLECTION, DISSIPATED, STATES, VALVE_WORK, advance, not_varied
+from pzd.damper.regimes import TimeStep, spring_force
+from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
 
 STEP = 1e-3
 TIME = np.arange(600) * STEP

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from test_path import FLOWS
 
-from pzd.damper.columns import STROKE_AND_FLOW
+from pzd.damper.compiled.columns import STROKE_AND_FLOW
+from pzd.damper.compiled.laws import ELEMENT
 from pzd.damper.compose import constant_rows, integrated_sensitivities
 from pzd.damper.element import element_force_sensitivities
-from pzd.damper.laws import ELEMENT
 from pzd.damper.march import march, march_sensitivities
 from pzd.damper.motion import Motion
-from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
+from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
 from pzd.record import Array
 
 STEP = 1e-3

@@ -9,12 +9,11 @@ import numpy as np
 from pzd.artefacts import Table, TableNotes
 from pzd.damper.model import BaseRow, Damper
 from pzd.export.content import Content
+from pzd.force_table.config import TableConfig
+from pzd.force_table.force import ReachedSpeed, force_rows, grid, temperatures_of, voltages_of
+from pzd.force_table.lookup import inverse_rows
 from pzd.quantities import Control
 from pzd.simulate.cars import cars
-from pzd.table.config import TableConfig
-from pzd.table.force import force_rows, grid, temperatures_of, voltages_of
-from pzd.table.inverse import inverse_rows
-from pzd.table.reach import ReachedSpeed
 
 POINTS = 2000
 """Points at which a second implementation is held to ours."""

@@ -14,9 +14,9 @@ from exported_dampers import DAMPERS, content_of, largest
 
 from pzd.export.content import Content
 from pzd.export.formats import formats
+from pzd.force_table.lookup import Lookup
 from pzd.schema.errors import ConfigError
-from pzd.simulate.minimise import TIE_BREAKS, farther_end, least_acceleration_forces
-from pzd.table.lookup import Lookup
+from pzd.simulate.control.demand import TIE_BREAKS, farther_end, least_acceleration_forces
 
 GCC = shutil.which("gcc")
 STRICT = ("-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wdouble-promotion")

@@ -25,8 +25,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.export.content import Content
 from pzd.export.dynamics import CARRIED, OF_THE_RIG, Dynamics, data_of
-from pzd.export.format import Files
-from pzd.export.formats import formats
+from pzd.export.formats import Files, formats
 from pzd.schema.errors import ConfigError, FilesError
 
 GCC = shutil.which("gcc")
@@ -363,7 +362,7 @@ def test_another_damper_has_another_token() -> None:
 def test_without_a_compiler_the_sources_are_all_there_is_and_that_is_said(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("pzd.export.library.shutil.which", lambda _: None)
+    monkeypatch.setattr("pzd.export.fmi.shutil.which", lambda _: None)
     for data in formats()["fmu"].files(content_of(DAMPERS["plain"])).values():
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             assert not any(name.startswith("binaries/") for name in archive.namelist())
@@ -378,8 +377,8 @@ def test_without_a_compiler_the_sources_are_all_there_is_and_that_is_said(
 def test_a_version_that_has_no_library_on_this_machine_is_said(
     system: str, machine: str, without: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("pzd.export.library.sys.platform", system)
-    monkeypatch.setattr("pzd.export.library.platform.machine", lambda: machine)
+    monkeypatch.setattr("pzd.export.fmi.sys.platform", system)
+    monkeypatch.setattr("pzd.export.fmi.platform.machine", lambda: machine)
     written = formats()["fmu"].files(content_of(DAMPERS["plain"]))
     told = [f"pzd builds no library for FMI {version} on {system} {machine}" for version in without]
     assert [record.getMessage().partition(":")[0] for record in caplog.records] == told
@@ -390,7 +389,7 @@ def test_a_version_that_has_no_library_on_this_machine_is_said(
 
 @needs_gcc
 def test_sources_that_the_compiler_refuses_are_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pzd.export.library._FLAGS", ("-std=none",))
+    monkeypatch.setattr("pzd.export.fmi._FLAGS", ("-std=none",))
     with pytest.raises(FilesError, match="does not compile the sources of the FMU; mend or remove it") as refused:
         formats()["fmu"].files(content_of(DAMPERS["plain"]))
     assert len(refused.value.messages) == 1

@@ -8,7 +8,8 @@ import pytest
 
 from pzd.artefacts import Diagnosed, Diagnosis, Identified, ReferenceRow, Rides, Rig, base_of
 from pzd.config import RunConfig, load
-from pzd.identify.stage import identify
+from pzd.force_table.stage import force_table
+from pzd.identification.stage import identify
 from pzd.paper.published import published
 from pzd.quantities import Control
 from pzd.report.reference import compared
@@ -16,7 +17,6 @@ from pzd.report.ride_comfort import assess, rated
 from pzd.report.run_numbers import RunNumbers
 from pzd.rig.stage import synthesise
 from pzd.simulate.stage import simulate
-from pzd.table.stage import force_table
 
 
 @pytest.fixture(scope="package")

@@ -26,7 +26,7 @@ from pzd.paper.car_search import (
     refined,
     stored,
 )
-from pzd.simulate.minimise import TIE_BREAKS
+from pzd.simulate.control.demand import TIE_BREAKS
 
 
 @pytest.fixture(scope="module")
@@ -118,12 +118,11 @@ def test_a_neighbour_differs_in_one_parameter_by_1_percent() -> None:
 @pytest.mark.parametrize("tie_break", TIE_BREAKS)
 def test_the_short_ride_gives_the_peaks_of_the_whole_simulation(config: RunConfig, tie_break) -> None:
     from pzd.damper.model import BaseRow, Damper
-    from pzd.simulate.dampers import dynamic_damper_of
-    from pzd.simulate.plan import Case
     from pzd.simulate.policies import policies
-    from pzd.simulate.ride_model import TableArrays
-    from pzd.simulate.riding import ride_case
-    from pzd.simulate.road import Way
+    from pzd.simulate.ride.model import TableArrays, dynamic_damper_of
+    from pzd.simulate.ride.riding import ride_case
+    from pzd.simulate.roads import Way
+    from pzd.simulate.study.plan import Case
 
     simulate = config.simulate.model_copy(update={"tie_break": tie_break})
     assert simulate.coefficients == BOUNDS

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from pzd.paper.claims import claims
-from pzd.paper.printing import claims_text
+from pzd.paper.__main__ import claims_text
+from pzd.paper.contradiction import claims
 
 GIVEN = {
     "227 N": "2270",

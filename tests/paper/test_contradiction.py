@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from pzd.damper.effects import library
+from pzd.paper.__main__ import verdict_on
 from pzd.paper.contradiction import Attempt, _attempt, attempts, excluded, misses
-from pzd.paper.printing import verdict_on
 
 FORCES = {
     "F4-0": 2085,

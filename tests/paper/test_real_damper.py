@@ -9,7 +9,7 @@ import pytest
 
 from pzd.artefacts import Identified, ReferenceRow, Rig, base_of
 from pzd.config import RunConfig
-from pzd.paper.fidelity import SettingRides, rides_on
+from pzd.paper.figures.sources import SettingRides, rides_on
 from pzd.paper.published import LARGE_GAP, SMALL_GAP
 from pzd.quantities import Control
 

@@ -10,11 +10,9 @@ import pytest
 
 from pzd.config import load
 from pzd.damper.model import Damper
-from pzd.paper.calibration import calibrate
-from pzd.paper.loop import loop_in, loop_of
-from pzd.paper.published import LARGE_GAP, PEAK, SMALL_GAP, published, rig_tests, span
-from pzd.paper.stand import written
-from pzd.paper.valve import STIFFNESS, VALVE, Valve, flow_force, least_stiffness, stand_damper
+from pzd.paper.__main__ import written
+from pzd.paper.published import LARGE_GAP, PEAK, SMALL_GAP, loop_in, loop_of, published, rig_tests, span
+from pzd.paper.valve import STIFFNESS, VALVE, Valve, calibrate, flow_force, least_stiffness, stand_damper
 from pzd.report.reference import Expected
 
 LAMINAR = replace(VALVE, turbulent=0.0, compliance=0.0, zero_error=0.0)

@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 from one_node import NoSlurmError, one_node
 
-from pzd.parallel.config import EngineConfig
+from pzd.parallel.config import EngineConfig, Where
 from pzd.parallel.engines import dask as of_dask
-from pzd.parallel.pools import Where
+from pzd.parallel.processes import Progress
 from pzd.schema.errors import ConfigError
-from pzd.schema.progress import Progress
 from pzd.sweep.campaign import SweepRuns
 from pzd.sweep.task import BaseRun
 

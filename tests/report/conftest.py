@@ -41,15 +41,15 @@ from pzd.artefacts import (
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.identify.characteristics.summary import characteristics
+from pzd.identification.tests_over_time import characteristics
 from pzd.quantities import Control
 from pzd.record import Record, conditions
 from pzd.report.config import ReportConfig
 from pzd.report.ride_comfort import RatedRide, rated
 from pzd.report.stage import report
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.vibration import Vibration, vibration
-from pzd.simulate.window import settled
+from pzd.simulate.ride.outcome import settled
+from pzd.simulate.study.gathering import Vibration, vibration
 
 PLAIN = Damper(
     base=(

@@ -9,18 +9,16 @@ import numpy as np
 import pytest
 
 from pzd.artefacts import Characteristics, Gap, GasAndFrictionRow, Identified, ParameterRow, PeakVelocityRow
-from pzd.cli.characteristics import characteristics_tables
-from pzd.cli.diagnosis import diagnosis_lines
-from pzd.cli.layout import interval
+from pzd.cli.text_tables import characteristics_tables, diagnosis_lines, interval
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnose.verdict import weak
+from pzd.diagnosis.verdict import weak
+from pzd.force_table.force import lost, not_monotone
 from pzd.quantities import Control
-from pzd.report import wording
+from pzd.report import blocks
 from pzd.report.context import effect_in_words
-from pzd.report.sections.characteristics import render as characteristics_section
 from pzd.report.sections.damper import parameter
-from pzd.schema.wording import supported
-from pzd.table.notes import lost, not_monotone
+from pzd.report.sections.tested import render_characteristics as characteristics_section
+from pzd.schema.errors import supported
 from tests.test_cli import diagnosis
 
 PRESSURE = Control("pressure", "bar")
@@ -61,8 +59,8 @@ def test_a_number_has_the_digits_that_its_interval_supports() -> None:
 
 
 def test_a_friction_of_nothing_is_zero_on_the_page() -> None:
-    assert wording.interval(6.3e-25, 0.0, 12.4) == "0 (0 to 12.4)"
-    assert wording.interval(6.3, 0.0, 12.4) == "6.3 (0 to 12.4)"
+    assert blocks.interval(6.3e-25, 0.0, 12.4) == "0 (0 to 12.4)"
+    assert blocks.interval(6.3, 0.0, 12.4) == "6.3 (0 to 12.4)"
     assert parameter(6.3e-25) == "0"
     assert parameter(0.25) == "0.25"
 

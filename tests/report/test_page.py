@@ -30,14 +30,12 @@ from pzd.artefacts import (
     WarmUpRow,
 )
 from pzd.damper.model import BaseRow, Damper
-from pzd.identify.characteristics.summary import characteristics
+from pzd.identification.tests_over_time import characteristics
 from pzd.quantities import Control
 from pzd.record import conditions
 from pzd.report.config import ReportConfig
 from pzd.report.plots import characteristic, library
-from pzd.simulate.car_block import CarBlock
-from pzd.simulate.config import SimulateConfig
-from pzd.simulate.electronics import SensorNoise, Sensors, Supply
+from pzd.simulate.config import CarBlock, SensorNoise, Sensors, SimulateConfig, Supply
 
 HERE = Path(__file__).parent
 ORDER = ["tested", "characteristics", "model", "missing", "damper", "passenger", "trust", "made"]

@@ -12,12 +12,10 @@ import pytest
 from pzd.artefacts import Identified, MeasureRow, ParameterRow, ReferenceRow, SummaryRow
 from pzd.comfort.iso2631_1978 import FACTORS
 from pzd.quantities import Control, Quantity
-from pzd.report.arithmetic import evaluated, terms
 from pzd.report.config import ReportConfig
-from pzd.report.reference import Expected, compared, file_of, read_reference, same_test
+from pzd.report.reference import Expected, compared, evaluated, file_of, read_reference, same_test, terms
 from pzd.report.ride_comfort import assess, rated
-from pzd.report.run_numbers import RunNumbers
-from pzd.report.selectors import UNITS
+from pzd.report.run_numbers import UNITS, RunNumbers
 from pzd.schema.errors import ConfigError, DataError
 from pzd.simulate.config import SimulateConfig
 

@@ -19,8 +19,7 @@ from pzd.artefacts import (
     PredictedRow,
     UnitRow,
 )
-from pzd.cli.characteristics import characteristics_tables
-from pzd.cli.knee import knee_tables
+from pzd.cli.text_tables import characteristics_tables, knee_tables
 from pzd.damper.model import Damper
 from pzd.pipeline.run_summary import RunSummary
 from pzd.quantities import Control

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pzd.report.wording import amount, interval, listed, minutes, number, sentence
+from pzd.report.blocks import amount, interval, listed, minutes, number, sentence
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pzd.rig.stand.config import ChannelNoise, DisplacementNoise, ForceNoise, TemperatureNoise, VoltageNoise
-from pzd.rig.stand.sensors import coloured, draw_for, sensed
-from pzd.signals.recursion import all_pole, recursion
+from pzd.rig.stand.recording import coloured, draw_for, sensed
+from pzd.signals.noise import all_pole, recursion
 
 COUNT = 40_000
 

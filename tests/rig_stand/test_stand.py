@@ -14,7 +14,7 @@ from pzd.damper.element import element_force
 from pzd.damper.motion import Motion
 from pzd.quantities import Control
 from pzd.rig.config import Fixture, RigConfig
-from pzd.rig.files.fixture import free
+from pzd.rig.files.channels import free
 from pzd.rig.stage import synthesise
 from pzd.rig.stand.config import VirtualEntry
 from pzd.rig.stand.recording import Taken, records, take

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pzd.rig.stand.sensors import draw_for
+from pzd.rig.stand.recording import draw_for
 from pzd.rig.stand.waveform import Course, Waveform, started
 from pzd.rig.stand.waveforms import waveforms
 from pzd.schema.errors import ConfigError, DataError

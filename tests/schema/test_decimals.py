@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.schema.decimals import lines, numbers
+from pzd.schema.csvfile import lines, numbers
 
 EDGES = [0.0, -0.0, 1.0, 0.1, 0.3, 2.0 / 3.0, 5e-324, 2.2250738585072014e-308, 1.7976931348623157e308, 1e15, 1e16, 1e22]
 EDGES += [1e23, 9999999999999998.0, 12345678901234567.0, 1e-4, 1e-5, 123456.0, -1e-7, 1e100, 9.5, 99999.0, 100000.0]

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from pzd.config import RunConfig, load
-from pzd.pipeline.command import opened
-from pzd.pipeline.resolved import resolved
+from pzd.pipeline.command import opened, resolved
 from pzd.schema.errors import ConfigError
 
 BASE = "seed: 3\nrig: {files: [{path: a.csv}, {path: b.csv}]}\ntable: {speed_points: 12, outside: clamp}\n"

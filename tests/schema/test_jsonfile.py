@@ -8,8 +8,8 @@ import pytest
 
 from pzd.quantities import Control
 from pzd.schema.errors import DataError
-from pzd.schema.jsonfile import read_json, read_json_list, write_json
 from pzd.schema.model import Frozen
+from pzd.schema.validate import read_json, read_json_list, write_json
 
 VOLTAGE = Control()
 CURRENT = Control("current", "A")

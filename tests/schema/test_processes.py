@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from pzd.parallel.processes import parallel_map
 from pzd.schema.errors import DataError
-from pzd.schema.processes import parallel_map
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -44,7 +44,7 @@ def test_two_processes_work_at_the_same_time() -> None:
 
 def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
     text = (
-        "import os, time\nfrom pathlib import Path\nfrom pzd.schema.processes import parallel_map\n"
+        "import os, time\nfrom pathlib import Path\nfrom pzd.parallel.processes import parallel_map\n"
         "def work(n):\n    Path(f'{n}').write_text(str(os.getpid()))\n    time.sleep(60)\n"
         "parallel_map(work, range(2), 2)"
     )

@@ -14,9 +14,8 @@ from pydantic import Field
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError, FilesError
 from pzd.schema.model import Frozen
-from pzd.schema.nodes import MOST_VALUES
-from pzd.schema.scalars import scalar_of, written
 from pzd.schema.yamlfile import read_yaml, read_yaml_model, write_yaml_model
+from pzd.schema.yamltree import MOST_VALUES, scalar_of, written
 
 VOLTAGE = Control()
 CURRENT = Control("current", "A")

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from pzd.damper.element import element_force
-from pzd.signals.cycles import cycles, settled
-from pzd.signals.edges import POINTS, averaged
+from pzd.signals.cycles import POINTS, averaged, cycles, settled
 
 SIGMAS = 4.0
 NOT_SEEN = 0.002

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from pzd.record import Array
-from pzd.signals.cycles import cycles
-from pzd.signals.departure import TOLERATED, departure
+from pzd.signals.cycles import TOLERATED, cycles, departure
 from pzd.signals.kinematics import kinematics
 
 RATE, DURATION = 1000.0, 20.0

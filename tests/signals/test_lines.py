@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pzd.record import Array
-from pzd.signals.lines import without_noise
+from pzd.signals.jumps import without_noise
 
 TIME = np.arange(4000) / 500.0
 STEPPED = np.array([0.0, 150.0, 75.0, 150.0])[(TIME / 0.7).astype(int) % 4]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pzd.record import Array
-from pzd.signals.mains import hum
+from pzd.signals.harmonics import hum
 
 RATE = 1000.0
 TIME = np.arange(8000) / RATE

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pzd.record import Array
-from pzd.signals.short_time import ShortTimeMask
+from pzd.signals.lack_of_fit import ShortTimeMask
 
 POINTS = 2000
 NOISE = 1e-3

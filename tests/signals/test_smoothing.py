@@ -7,7 +7,7 @@ import pytest
 from numpy.random import Generator
 
 from pzd.record import Array
-from pzd.signals.autoregression import autoregression
+from pzd.signals.noise import autoregression
 from pzd.signals.smoothing import HIGHEST, low_pass, motion_below
 
 RATE, NOISE = 1000, 1e-5

@@ -9,10 +9,9 @@ from stepped_motions import NO_STEPS, STEPS, TIME
 
 from pzd.artefacts import Rig
 from pzd.damper.element import element_force
-from pzd.diagnose.data.cleaning import prepare
-from pzd.diagnose.data.split import split
-from pzd.identify.config import IdentifyConfig
-from pzd.identify.stage import identify
+from pzd.diagnosis.data import prepare, split
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.stage import identify
 from pzd.record import Array, Record
 from pzd.signals.stretches import separate_tests, steps
 

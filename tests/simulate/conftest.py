@@ -16,12 +16,12 @@ from pzd.damper.model import Damper
 from pzd.paper.published import published
 from pzd.simulate.compiled_ahead import wait
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.dampers import dynamic_damper_of, grid_of
-from pzd.simulate.outcome import Outcome
-from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
-from pzd.simulate.riding import ride_case
-from pzd.simulate.road import Way
+from pzd.simulate.ride.model import dynamic_damper_of, grid_of
+from pzd.simulate.ride.outcome import Outcome
+from pzd.simulate.ride.riding import ride_case
+from pzd.simulate.roads import Way
+from pzd.simulate.study.plan import Case
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 
-from pzd.simulate.assumed import assumed
 from pzd.simulate.config import SimulateConfig
+from pzd.simulate.study.plan import assumed
 
 
 def lines(given: dict[str, object], effects: tuple[str, ...] = (), with_voltage: bool = True) -> str:

@@ -13,8 +13,8 @@ from pzd.artefacts import Diagnosed, Rides
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.schedule_search import ScheduleSearch, best_schedule, sampled, square_waves
 from pzd.simulate.stage import simulate
+from pzd.simulate.study.tuning import ScheduleSearch, best_schedule, sampled, square_waves
 
 SINE = {"kind": "sine", "frequency_Hz": 2.25, "label": "road"}
 OTHERS = ("passive", "comfort", "skyhook", "balance")

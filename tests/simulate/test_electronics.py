@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from pzd.simulate.car_block import CarBlock
-from pzd.simulate.config import SimulateConfig
-from pzd.simulate.electronics import SensorNoise, Sensors, Supply
-from pzd.simulate.ride_model import (
+from pzd.simulate.config import CarBlock, SensorNoise, Sensors, SimulateConfig, Supply
+from pzd.simulate.control.sensing import Electronics, electronics_of, sense, supplied, with_noise
+from pzd.simulate.ride.model import (
     BODY,
     COMFORT,
     DEFLECTION,
@@ -25,7 +24,6 @@ from pzd.simulate.ride_model import (
     vehicle,
     workspace,
 )
-from pzd.simulate.sensing import Electronics, electronics_of, sense, supplied, with_noise
 
 SHORT = {"duration_s": 2.0, "settle_s": 1.0, "output_rate_Hz": 1000.0}
 PERIOD = 1e-3

@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.damper.kernels import K
-from pzd.damper.rows import row_at
-from pzd.simulate import riding
-from pzd.simulate.controller import set_control
-from pzd.simulate.dormand_prince import STAGES
-from pzd.simulate.dynamic_damper import effective_voltage
-from pzd.simulate.energy import oil_energy
-from pzd.simulate.equations import motion
-from pzd.simulate.ride_model import (
+from pzd.damper.compiled.kernels import K
+from pzd.damper.compiled.rows import row_at
+from pzd.simulate.ride import riding
+from pzd.simulate.ride.energy import oil_energy
+from pzd.simulate.ride.equations import motion
+from pzd.simulate.ride.loop import set_control
+from pzd.simulate.ride.model import (
     BEHIND,
     OIL_DEFLECTION,
     OIL_WORK,
@@ -22,9 +20,10 @@ from pzd.simulate.ride_model import (
     RideModel,
     at_rest,
     control,
+    effective_voltage,
     workspace,
 )
-from pzd.simulate.stepper import advance
+from pzd.simulate.ride.stepper import STAGES, advance
 
 STEP = 2e-5
 BEFORE, AFTER = 20_000, 1_000

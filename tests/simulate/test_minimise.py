@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pzd.record import Array
-from pzd.simulate.minimise import LARGEST, TIE_BREAKS, TieBreak, farther_end, least_acceleration_forces
+from pzd.simulate.control.demand import LARGEST, TIE_BREAKS, TieBreak, farther_end, least_acceleration_forces
 
 
 def least_acceleration(a0: float, D: Array, low: Array, high: Array, tie_break: TieBreak) -> Array:

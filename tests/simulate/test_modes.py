@@ -7,10 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from pzd.simulate.car import HalfCar
 from pzd.simulate.cars import cars
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.modes import matrices, modes
+from pzd.simulate.vehicle.car import HalfCar, matrices, modes
 
 TWO_QUARTERS = {
     "mass_kg": 1200.0,

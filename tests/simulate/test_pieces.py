@@ -13,9 +13,10 @@ from simulate_dampers import table_of
 from pzd.artefacts import Diagnosed, Rides
 from pzd.damper.model import Damper
 from pzd.quantities import Control
-from pzd.simulate import pieces, profile
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.profile import through
+from pzd.simulate.ride import outcome
+from pzd.simulate.road import profile
+from pzd.simulate.road.profile import through
 from pzd.simulate.stage import simulate
 
 ROADS = [{"kind": "iso8608", "road_class": "C", "seed": 3}, {"kind": "sine", "frequency_Hz": 2.25}]
@@ -31,8 +32,8 @@ def test_the_numbers_of_a_ride_in_pieces_are_those_of_the_whole(damper, monkeypa
     """Pieces of 3 s, the settling time in the second one; two voltages of the search must be told apart alike."""
     given = {"duration_s": 9.0, "settle_s": 4.0, "output_rate_Hz": 100.0}
     whole = ridden(damper, **given)
-    monkeypatch.setattr(pieces, "PIECE_S", 3.0)
-    monkeypatch.setattr("pzd.simulate.setup.PIECE_S", 3.0)
+    monkeypatch.setattr(outcome, "PIECE_S", 3.0)
+    monkeypatch.setattr("pzd.simulate.study.tuning.PIECE_S", 3.0)
     parts = ridden(damper, **given)
     for table in ("summary", "wheels", "weighted", "ridden"):
         for one, other in zip(getattr(whole, table), getattr(parts, table), strict=True):
@@ -53,7 +54,7 @@ def test_a_transient_across_two_pieces_counts_as_one(damper, monkeypatch) -> Non
     given = {"duration_s": 15.0, "settle_s": 5.0, "policies": ["passive"], "roads": ROADS[:1]}
     found = []
     for length in (120.0, 0.75):
-        monkeypatch.setattr(pieces, "PIECE_S", length)
+        monkeypatch.setattr(outcome, "PIECE_S", length)
         found.append(ridden(damper, **given).weighted[0])
     assert found[1].MTVV_m_per_s2 == pytest.approx(found[0].MTVV_m_per_s2, rel=1e-6)
     assert found[1].a_w_m_per_s2 == pytest.approx(found[0].a_w_m_per_s2, rel=1e-6)
@@ -62,8 +63,8 @@ def test_a_transient_across_two_pieces_counts_as_one(damper, monkeypatch) -> Non
 @pytest.mark.ci
 def test_a_ride_five_times_as_long_takes_no_more_memory(damper, tmp_path, monkeypatch) -> None:
     """Its history neither: a row a step goes to a file piece by piece."""
-    monkeypatch.setattr(pieces, "PIECE_S", 10.0)
-    monkeypatch.setattr("pzd.simulate.setup.PIECE_S", 10.0)
+    monkeypatch.setattr(outcome, "PIECE_S", 10.0)
+    monkeypatch.setattr("pzd.simulate.study.tuning.PIECE_S", 10.0)
     peaks = []
     for seconds in (60.0, 60.0, 300.0):
         tracemalloc.start()

@@ -12,16 +12,23 @@ from pydantic import ValidationError
 from scipy.linalg import solve_continuous_lyapunov
 
 from pzd.schema.model import Frozen
-from pzd.simulate.car import GRAVITY, HalfCar
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.dampers import dynamic_damper_of, grid_of
-from pzd.simulate.minimise import SMALLEST, TIE_BREAKS, farther_end, least_acceleration_forces, least_load_forces
-from pzd.simulate.plan import Case
+from pzd.simulate.control.demand import (
+    SMALLEST,
+    TIE_BREAKS,
+    farther_end,
+    is_hard,
+    least_acceleration_forces,
+    least_load_forces,
+    switched_force,
+)
 from pzd.simulate.policies import clipped_lqr, policies, wheel_load
 from pzd.simulate.policies.clipped_lqr import ClippedLqr, regulator
-from pzd.simulate.riding import ride_case
-from pzd.simulate.road import Way
-from pzd.simulate.switching import is_hard, switched_force
+from pzd.simulate.ride.model import dynamic_damper_of, grid_of
+from pzd.simulate.ride.riding import ride_case
+from pzd.simulate.roads import Way
+from pzd.simulate.study.plan import Case
+from pzd.simulate.vehicle.car import GRAVITY, HalfCar
 
 SHORT = {"duration_s": 3.0, "settle_s": 1.0, "output_rate_Hz": 1000.0}
 SYMMETRIC = {"a1_m": 1.5, "a2_m": 1.5, "pitch_inertia_kgm2": 2700.0, "x_K_m": 0.0, "mass_kg": 1200.0}

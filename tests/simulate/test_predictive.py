@@ -19,19 +19,15 @@ from pzd.damper.element import element_force
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
-from pzd.signals.root_mean_square import rms
+from pzd.signals.criterion import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
-from pzd.simulate.controller import set_control
-from pzd.simulate.dampers import dynamic_damper_of, grid_of
-from pzd.simulate.dormand_prince import STAGES
-from pzd.simulate.equations import motion
-from pzd.simulate.plan import Case
+from pzd.simulate.control.prediction.choice import NOW, choose
+from pzd.simulate.control.prediction.planning import predictor_of
+from pzd.simulate.control.prediction.plant import HELD, LOAD_1, LOAD_2, WHEELS, Predictor, oil_after, predicted
 from pzd.simulate.policies import policies
-from pzd.simulate.prediction.choice import NOW, choose
-from pzd.simulate.prediction.planning import predictor_of
-from pzd.simulate.prediction.plant import oil_after, predicted
-from pzd.simulate.prediction.predictor import HELD, LOAD_1, LOAD_2, WHEELS, Predictor
-from pzd.simulate.ride_model import (
+from pzd.simulate.ride.equations import motion
+from pzd.simulate.ride.loop import set_control
+from pzd.simulate.ride.model import (
     COMFORT,
     CONTACT,
     OIL_1,
@@ -40,14 +36,17 @@ from pzd.simulate.ride_model import (
     RideModel,
     at_rest,
     control,
+    dynamic_damper_of,
+    grid_of,
     road_coefficients,
     vehicle,
     workspace,
 )
-from pzd.simulate.riding import Held, control_spec_of
-from pzd.simulate.road import Way
+from pzd.simulate.ride.riding import Held, control_spec_of
+from pzd.simulate.ride.stepper import STAGES, advance
+from pzd.simulate.roads import Way
 from pzd.simulate.stage import simulate
-from pzd.simulate.stepper import advance
+from pzd.simulate.study.plan import Case
 
 SHORT = {"duration_s": 4.0, "settle_s": 1.0, "output_rate_Hz": 1000.0}
 TIME, A_K, VOLTAGE_1, VOLTAGE_2 = 0, 3, 9, 15
@@ -112,7 +111,7 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
     In the steps of the policy, where the oil may stick or slip up to a step late, and in an eighth of them, where about
     a sixth of the error is left: it comes of the step, and of no equation.
     """
-    monkeypatch.setattr("pzd.simulate.prediction.planning.HOLD_STEP", step)
+    monkeypatch.setattr("pzd.simulate.control.prediction.planning.HOLD_STEP", step)
     for name, values in EFFECTS[effects].items():
         damper = damper.with_effect(name, values)
     road = [{"kind": "iso8608", "road_class": "C", "seed": 1}]
@@ -141,7 +140,7 @@ def test_an_oil_far_faster_than_the_step_is_quasi_static_with_an_error_in_propor
 ) -> None:
     """The rod speeds up at a = 10 m/s2: a resolved oil lags the force T0 + C v of the limit by C a (C / k), to first
     order; the plant, whose force in steps of 1 ms is that of the middle of its step, is off by twice that at most."""
-    monkeypatch.setattr("pzd.simulate.dampers.LEAST_RELAXATION", 1e-9)
+    monkeypatch.setattr("pzd.simulate.ride.model.LEAST_RELAXATION", 1e-9)
     T0, C, a, lags = damper.base[0].T0_N, damper.base[0].C_Ns_per_m, 10.0, []
     for relaxation in (1e-5, 1e-6, 1e-7):
         rows = tuple(r.model_copy(update={"k_N_per_m": r.C_Ns_per_m / relaxation}) for r in damper.base)

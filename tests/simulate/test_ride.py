@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
 
-from pzd.damper.columns import acting
+from pzd.damper.compiled.columns import acting
 from pzd.damper.compose import respond
 from pzd.damper.motion import Motion
-from pzd.simulate.dampers import dynamic_damper_of
-from pzd.simulate.dynamic_damper import slipping_forces
-from pzd.simulate.loop import LOST
-from pzd.simulate.outcome import low_passed_jerk
+from pzd.simulate.ride.loop import LOST
+from pzd.simulate.ride.model import dynamic_damper_of, slipping_forces
+from pzd.simulate.ride.outcome import low_passed_jerk
 
 DEFLECTION, RATE, SPRING, DAMPER, DEMANDED, VOLTAGE = range(4, 10)
 SHORT = {"duration_s": 4.0, "settle_s": 1.0, "output_rate_Hz": 1000.0}

@@ -10,15 +10,13 @@ import pytest
 from simulate_dampers import table_of
 
 from pzd.comfort.weighting import weighted
-from pzd.signals.root_mean_square import rms
-from pzd.simulate.config import KM_PER_H, SimulateConfig
-from pzd.simulate.dampers import dynamic_damper_of, grid_of
-from pzd.simulate.electronics import SensorNoise
-from pzd.simulate.prediction.planning import predictor_of
-from pzd.simulate.prediction.predictor import OBSERVATIONS, Predictor
-from pzd.simulate.prediction.road_ahead import learn
-from pzd.simulate.prediction.road_met import filtered_height
-from pzd.simulate.sensing import road_gain
+from pzd.signals.criterion import rms
+from pzd.simulate.config import KM_PER_H, SensorNoise, SimulateConfig
+from pzd.simulate.control.prediction.planning import predictor_of
+from pzd.simulate.control.prediction.plant import OBSERVATIONS, Predictor
+from pzd.simulate.control.prediction.road import filtered_height, learn
+from pzd.simulate.control.sensing import road_gain
+from pzd.simulate.ride.model import dynamic_damper_of, grid_of
 
 STEP, ARM = 2e-3, 1.2
 NOISE = SensorNoise(

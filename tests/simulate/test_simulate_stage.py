@@ -16,12 +16,12 @@ from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.dampers import dynamic_damper_of, grid_of
-from pzd.simulate.plan import cases
 from pzd.simulate.policies import policies
-from pzd.simulate.riding import ride_case
-from pzd.simulate.road import Way
+from pzd.simulate.ride.model import dynamic_damper_of, grid_of
+from pzd.simulate.ride.riding import ride_case
+from pzd.simulate.roads import Way
 from pzd.simulate.stage import simulate
+from pzd.simulate.study.plan import cases
 
 SHORT = {"duration_s": 1.0, "settle_s": 0.2, "roads": [{"kind": "sine", "frequency_Hz": 2.25}]}
 
@@ -159,7 +159,7 @@ def test_histories_that_are_not_wanted_are_not_written_and_all_numbers_stay(damp
 def test_parquet_without_its_library_is_refused_before_anything_is_ridden(
     damper, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pzd.schema.parquetfile.find_spec", lambda _: None)
+    monkeypatch.setattr("pzd.schema.csvfile.find_spec", lambda _: None)
     with pytest.raises(ConfigError, match=r"^simulate\.histories: parquet is written with pyarrow, which is not"):
         ride(damper, histories="parquet")
 

@@ -9,12 +9,9 @@ import pytest
 
 from pzd.simulate.cars import cars
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.dampers import dynamic_damper_of, grid_of
-from pzd.simulate.equations import motion
-from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
-from pzd.simulate.profile import Profile
-from pzd.simulate.ride_model import (
+from pzd.simulate.ride.equations import accelerate, motion
+from pzd.simulate.ride.model import (
     ACCELERATION,
     FORCE,
     HEAVE_RATE,
@@ -28,13 +25,16 @@ from pzd.simulate.ride_model import (
     RideModel,
     at_rest,
     control,
+    dynamic_damper_of,
+    grid_of,
     road_coefficients,
     vehicle,
     workspace,
 )
-from pzd.simulate.riding import Held, control_spec_of
-from pzd.simulate.stepper import choose_side
-from pzd.simulate.sticking import accelerate
+from pzd.simulate.ride.riding import Held, control_spec_of
+from pzd.simulate.ride.stepper import choose_side
+from pzd.simulate.road.profile import Profile
+from pzd.simulate.study.plan import Case
 
 
 @pytest.mark.parametrize("unsprung", [(0.0, 0.0), (90.0, 70.0)])

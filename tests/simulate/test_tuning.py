@@ -10,9 +10,9 @@ from simulate_dampers import damper_after_table_2, table_of
 
 from pzd.artefacts import Diagnosed, Rides
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.dampers import grid_of
+from pzd.simulate.ride.model import grid_of
 from pzd.simulate.stage import simulate
-from pzd.simulate.tuning import best_value, damping_range
+from pzd.simulate.study.tuning import best_value, damping_range
 
 SHORT = {"duration_s": 4.0, "settle_s": 2.0, "roads": [{"kind": "sine", "frequency_Hz": 1.3, "label": "road"}]}
 

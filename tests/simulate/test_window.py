@@ -12,9 +12,9 @@ from simulate_dampers import damper_after_table_2, table_of
 from pzd.artefacts import Diagnosed, Rides
 from pzd.comfort.weighting import WK, response
 from pzd.simulate.config import SimulateConfig
+from pzd.simulate.ride.outcome import Event, Window, of_event
 from pzd.simulate.stage import simulate
-from pzd.simulate.vibration import vibration
-from pzd.simulate.window import Event, Window, of_event
+from pzd.simulate.study.gathering import vibration
 
 BUMP = {"kind": "bump", "height_m": 0.05, "length_m": 2.0, "start_m": 10.0}
 ENTRY = 10.0 / 25.0

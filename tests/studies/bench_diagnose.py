@@ -22,15 +22,15 @@ from types import FrameType
 
 import pzd.cli  # noqa: F401  # before numpy: as in the command, the linear algebra has one thread
 from pzd.artefacts import Identified, Rig
-from pzd.diagnose.stage import diagnose
-from pzd.identify.stage import identify
+from pzd.diagnosis.stage import diagnose
+from pzd.identification.stage import identify
 from pzd.pipeline.command import opened
-from pzd.pipeline.in_memory import InMemory
+from pzd.pipeline.execution import InMemory
 from pzd.pipeline.stages import stages
 from pzd.record import sliced
 
 EVERY_S = 0.005
-CLEANING = ("pzd/signals/", "pzd/diagnose/data/")
+CLEANING = ("pzd/signals/", "pzd/diagnosis/data/")
 KERNELS = ("pzd/damper/",)
 WAITING = ("/threading.py", "/concurrent/futures/thread.py", "/concurrent/futures/_base.py")
 

@@ -16,11 +16,11 @@ import numpy as np
 from bench_table import LEAST_SECONDS, PAIRS, Row, once, pairs
 from scipy.integrate import solve_ivp
 
-from pzd.damper.columns import STROKE_AND_FLOW
+from pzd.damper.compiled.columns import STROKE_AND_FLOW
 from pzd.damper.compose import constant_rows, integrated_force, sampling_steps
 from pzd.damper.element import element_force, element_forces
 from pzd.damper.motion import Motion
-from pzd.diagnose.fit.likelihood import SIMULATION_TOLERANCE
+from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
 
 Array = np.ndarray
 STEP = 1e-3

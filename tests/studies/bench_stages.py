@@ -13,25 +13,22 @@ from scipy.integrate import solve_ivp
 from scipy.signal import bilinear_zpk, resample_poly, sosfilt, sosfreqz, zpk2sos
 
 from pzd.artefacts import Table
-from pzd.comfort.iso2631_1997 import evaluate
-from pzd.comfort.measures import maximum_transient, vibration_dose
+from pzd.comfort.iso2631_1997 import evaluate, maximum_transient, vibration_dose
 from pzd.comfort.weighting import WK, response, weighted
 from pzd.damper.element import element_force
 from pzd.damper.model import BaseRow, Damper
-from pzd.identify.config import EvolutionaryConfig
-from pzd.identify.evolutionary import fit_evolutionary
-from pzd.identify.objective import Bingham, Objective
-from pzd.identify.separable import descend, fit_separable
-from pzd.identify.trial import trial_of
+from pzd.identification.config import EvolutionaryConfig
+from pzd.identification.fit import descend, fit_evolutionary, fit_separable
+from pzd.identification.prepared_record import Bingham, Objective, trial_of
 from pzd.pipeline.command import opened
-from pzd.pipeline.in_memory import InMemory
+from pzd.pipeline.execution import InMemory
 from pzd.pipeline.stages import stages
 from pzd.record import Record
 from pzd.simulate.config import KM_PER_H, SimulateConfig
-from pzd.simulate.dampers import dynamic_damper_of, grid_of
-from pzd.simulate.plan import cases
-from pzd.simulate.road import Way
-from pzd.simulate.setup import Setup
+from pzd.simulate.ride.model import dynamic_damper_of, grid_of
+from pzd.simulate.roads import Way
+from pzd.simulate.study.plan import cases
+from pzd.simulate.study.tuning import Setup
 
 Array = np.ndarray
 

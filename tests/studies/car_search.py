@@ -17,7 +17,7 @@ from pathlib import Path
 from pzd.paper.car_search import CarRow, candidates, constant_peaks, controlled_peaks, miss, refined, row_of
 from pzd.quantities import Control
 from pzd.schema.csvfile import write_rows
-from pzd.simulate.minimise import TIE_BREAKS
+from pzd.simulate.control.demand import TIE_BREAKS
 
 STARTS = 6
 

@@ -23,9 +23,9 @@ import numpy as np
 from campaigns import KINDS, SENSORS, campaign
 
 from pzd.artefacts import ParameterRow
-from pzd.identify.config import IdentifyConfig
-from pzd.identify.fit import identify_condition
-from pzd.identify.objective import Bingham
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.fit import identify_condition
+from pzd.identification.prepared_record import Bingham
 from pzd.record import Condition
 from pzd.signals.nuisance import NuisanceConfig
 

@@ -24,16 +24,14 @@ from pathlib import Path
 from pzd.artefacts import Diagnosed, Table
 from pzd.comfort.weighting import weighted
 from pzd.pipeline.command import execute, opened
-from pzd.signals.root_mean_square import rms
+from pzd.signals.criterion import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
-from pzd.simulate.dampers import dynamic_damper_of, grid_of
-from pzd.simulate.limits import checked_temperature
-from pzd.simulate.outcome import Outcome
-from pzd.simulate.plan import Case
 from pzd.simulate.policies import policies
-from pzd.simulate.road import Road, Way
-from pzd.simulate.setup import Setup
-from pzd.simulate.window import Window, event_of, of_event, settled
+from pzd.simulate.ride.model import dynamic_damper_of, grid_of
+from pzd.simulate.ride.outcome import Outcome, Window, event_of, of_event, settled
+from pzd.simulate.roads import Road, Way
+from pzd.simulate.study.plan import Case, checked_temperature
+from pzd.simulate.study.tuning import Setup
 
 CONFIGS = ("configs/quickstart.yaml", "configs/utfsm.yaml")
 ROADS = (

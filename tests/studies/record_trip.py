@@ -117,10 +117,10 @@ def of_records(folder: Path) -> list[list[Call]]:
 def of_campaign(folder: Path) -> list[Call]:
     """The trip of eight tests through pzd/diagnose."""
     concurrent.futures.ThreadPoolExecutor = _InTurn  # type: ignore[assignment,misc]  # before diagnose imports it
-    from pzd.diagnose.config import DiagnoseConfig
-    from pzd.diagnose.stage import diagnose
-    from pzd.identify.config import IdentifyConfig
-    from pzd.identify.stage import identify
+    from pzd.diagnosis.config import DiagnoseConfig
+    from pzd.diagnosis.stage import diagnose
+    from pzd.identification.config import IdentifyConfig
+    from pzd.identification.stage import identify
     from pzd.rig.stage import synthesise
 
     base = [{"voltage_V": 0, "T0_N": 301, "C_Ns_per_m": 2720, "k_N_per_m": 199e3}]

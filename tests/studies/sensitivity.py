@@ -30,33 +30,31 @@ import numpy as np
 
 from pzd.artefacts import base_of
 from pzd.blind import rates
+from pzd.blind.benchmark import counted
 from pzd.blind.case import Places, Scored, Truth
 from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.plan import PlannedCase, plan
-from pzd.blind.scoring import counted
 from pzd.config import RunConfig, load
 from pzd.damper.effect import Effect
 from pzd.damper.model import Damper
-from pzd.diagnose import kept_back, residual_check, thresholds
-from pzd.diagnose.campaign import Campaign
-from pzd.diagnose.conclusion import concluded
-from pzd.diagnose.config import DiagnoseConfig
-from pzd.diagnose.data.cleaning import about, prepare
-from pzd.diagnose.data.exclusions import whole_records
-from pzd.diagnose.data.split import split
-from pzd.diagnose.fit.least_squares import Fitted, fit, misfit_of
-from pzd.diagnose.fit.likelihood import RecordLikelihood
-from pzd.diagnose.fit.parameters import Problem
-from pzd.diagnose.kept_back import Trials
-from pzd.diagnose.search.evidence import evidence_of
-from pzd.diagnose.search.forward_selection import select_effects
-from pzd.diagnose.search.selection import Selection
-from pzd.diagnose.search.starts import promise
-from pzd.identify.stage import identify
+from pzd.diagnosis import campaign, cross_validation, thresholds
+from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.cross_validation import Trials
+from pzd.diagnosis.data import about, prepare, split, whole_records
+from pzd.diagnosis.fit.least_squares import Fitted, fit, misfit_of
+from pzd.diagnosis.fit.likelihood import RecordLikelihood
+from pzd.diagnosis.fit.parameters import Problem
+from pzd.diagnosis.search.acceptance import Selection
+from pzd.diagnosis.search.candidates import promise
+from pzd.diagnosis.search.evidence import evidence_of
+from pzd.diagnosis.search.forward_selection import select_effects
+from pzd.diagnosis.verdict import concluded
+from pzd.identification.stage import identify
 from pzd.record import mid_stroke
 from pzd.rig.config import FilesEntry, RigConfig
 from pzd.rig.stage import ingest
-from pzd.schema.jsonfile import read_json
+from pzd.schema.validate import read_json
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "blind.yaml"
 TABLE = tuple(name for name in vars(thresholds) if name.isupper())
@@ -66,7 +64,7 @@ IN_CONFIG = (
 )
 CHANCES = ("significance", "HALVES_SIGNIFICANCE", "CYCLE_CHANGE_SIGNIFICANCE")
 AFTER = ("verdict", "missed", "handed_on", "added_by_prediction", "trends_of_tests", "hypotheses.regression")
-"""Modules of pzd.diagnose that act on a search that is over."""
+"""Modules of pzd.diagnosis that act on a search that is over."""
 AFTER_IN_CONFIG = ("unexplained_share", "most_added")
 
 Answer = tuple[str, frozenset[str], frozenset[str]]
@@ -135,10 +133,10 @@ class Kept:
 
 def keep_fits() -> None:
     """Let every module of the diagnosis ask for its fits where they are kept."""
-    for function in (fit, misfit_of, promise, evidence_of, kept_back.trials_of):
+    for function in (fit, misfit_of, promise, evidence_of, cross_validation.trials_of):
         kept = Kept(function)
         for key, module in list(sys.modules.items()):
-            for name, value in list(vars(module).items()) if key.startswith("pzd.diagnose.") else ():
+            for name, value in list(vars(module).items()) if key.startswith("pzd.diagnosis.") else ():
                 if value is function:
                     setattr(module, name, kept)
 
@@ -158,14 +156,14 @@ def names() -> tuple[str, ...]:
 
 def users(name: str) -> list[Any]:
     """The modules that have a threshold of the table."""
-    return [m for key, m in sys.modules.items() if key.startswith("pzd.diagnose.") and name in vars(m)]
+    return [m for key, m in sys.modules.items() if key.startswith("pzd.diagnosis.") and name in vars(m)]
 
 
 def acts_after(name: str) -> bool:
     """Whether a threshold acts on a search that is over and nowhere else."""
     if name in IN_CONFIG:
         return name in AFTER_IN_CONFIG
-    within = {module.__name__.removeprefix("pzd.diagnose.") for module in users(name)} - {"thresholds"}
+    within = {module.__name__.removeprefix("pzd.diagnosis.") for module in users(name)} - {"thresholds"}
     return within <= set(AFTER)
 
 
@@ -199,7 +197,7 @@ def instead(name: str, factor: float, config: DiagnoseConfig) -> Iterator[Diagno
 def searched(case: Case, config: DiagnoseConfig, *, checked: bool) -> Searched:
     """The search of a case, as the stage does it; with the residuals that were checked before, where these stand."""
     campaign = case.campaign if checked else replace(case.campaign, _expected={}, _checks={})
-    trials = kept_back.trials_of(campaign, case.plain, config.visible)
+    trials = cross_validation.trials_of(campaign, case.plain, config.visible)
     return Searched(select_effects(campaign, case.plain, config, 1), trials)
 
 
@@ -256,7 +254,7 @@ def replayed(seed: int, cases: int, number: int) -> tuple[str, dict[tuple[str, f
     for name in names():
         for factor in (0.5, 2.0):
             with instead(name, factor, config.diagnose) as other:
-                checked = residual_check not in users(name)
+                checked = campaign not in users(name)
                 found = stands if acts_after(name) else searched(prepared, other, checked=checked)
                 answer = answered(found, other)
             outcomes[name, factor] = judged(answer)

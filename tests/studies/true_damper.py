@@ -20,20 +20,17 @@ from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.plan import plan
 from pzd.config import RunConfig
 from pzd.damper.model import Damper
-from pzd.diagnose.campaign import Campaign
-from pzd.diagnose.data.cleaning import about, prepare
-from pzd.diagnose.data.exclusions import whole_records
-from pzd.diagnose.data.split import split
-from pzd.diagnose.fit.least_squares import fit
-from pzd.diagnose.gap import probability_of_noise, visible_gap
-from pzd.diagnose.search.evidence import evidence_of
-from pzd.diagnose.work import Work
-from pzd.identify.stage import identify
+from pzd.diagnosis.campaign import Campaign, probability_of_noise, visible_gap
+from pzd.diagnosis.data import about, prepare, split, whole_records
+from pzd.diagnosis.fit.least_squares import fit
+from pzd.diagnosis.fit.parameters import Work
+from pzd.diagnosis.search.evidence import evidence_of
+from pzd.identification.stage import identify
 from pzd.pipeline.command import opened
 from pzd.record import mid_stroke
 from pzd.rig.config import FilesEntry, RigConfig
 from pzd.rig.stage import ingest
-from pzd.schema.jsonfile import read_json
+from pzd.schema.validate import read_json
 
 MOST_STEPS = 60
 """Steps of the fit from the truth: it moves by what noise moves it."""

@@ -20,17 +20,15 @@ from pzd.artefacts import Diagnosed, ParameterRow
 from pzd.config import SweepConfig
 from pzd.damper.model import BaseRow, Damper
 from pzd.parallel import chunks
-from pzd.parallel.pools import Pools, Where
+from pzd.parallel.config import Pools, Where
+from pzd.parallel.processes import Progress
 from pzd.pipeline.command import execute
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError
-from pzd.schema.progress import Progress
 from pzd.sweep.campaign import SweepRuns
-from pzd.sweep.gather import Results, write
-from pzd.sweep.page import page
+from pzd.sweep.gather import Results, page, write
 from pzd.sweep.plan import design, tasks
-from pzd.sweep.scatter import check_scatter, scattered
-from pzd.sweep.task import BaseRun, RunResult
+from pzd.sweep.task import BaseRun, RunResult, check_scatter, scattered
 
 SMALL = """
 rig:

@@ -10,14 +10,23 @@ from types import ModuleType
 import numpy as np
 from numpy.random import Generator, SeedSequence, default_rng
 
-from pzd.blind.independent.bingham import Base
-from pzd.blind.independent.campaigns import LaboratoryCampaign, campaign
+from pzd.blind.independent.bingham import Base, Scale
 from pzd.blind.independent.kernel import Parameters, integrated
 from pzd.blind.independent.laws import piezo_hysteresis, sensor_delay, temperature_drift, valve_lag
 from pzd.blind.independent.refit import gap_after_refit
-from pzd.blind.independent.scale import Scale
-from pzd.blind.independent.sensors import Chain, ErrorsOfTest, sensed_displacement, sensed_force, stamped
-from pzd.blind.independent.stand import Actuator, Driven, driven, warmed
+from pzd.blind.independent.stand import (
+    Actuator,
+    Chain,
+    Driven,
+    ErrorsOfTest,
+    LaboratoryCampaign,
+    campaign,
+    driven,
+    sensed_displacement,
+    sensed_force,
+    stamped,
+    warmed,
+)
 from pzd.record import Array
 
 LAWS = (

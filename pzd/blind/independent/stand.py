@@ -2,14 +2,170 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.random import Generator
 
-from pzd.blind.independent.campaigns import LaboratoryCampaign, LaboratoryTest
 from pzd.record import Array, Rows
+
+# ----------------------------------------------------------------------------------------------------
+# Campaigns as laboratories run them: which motions, at which values of the control signal, sampled how fast.
+
+
+MotionKind = Literal["sine", "two_tone", "triangle", "sweep", "random"]
+SignalKind = Literal["constant", "steps", "ramp"]
+
+
+@dataclass(frozen=True)
+class LaboratoryTest:
+    """One test: what the actuator is asked for, and the control signal."""
+
+    kind: MotionKind
+    amplitude: float
+    """Largest displacement that is asked for [m]."""
+    frequency: float
+    """Of a sine, a triangle or the first tone; where a sweep ends and a random motion has lost its strength [Hz]."""
+    cycles: int
+    """Periods that are recorded; of a sweep or a random motion, seconds."""
+    signal: SignalKind = "constant"
+    value: float = 0.0
+    """Of the control signal where it is constant [V]."""
+
+    @property
+    def seconds(self) -> float:
+        """How long it is recorded."""
+        return float(self.cycles) if self.kind in ("sweep", "random") else self.cycles / self.frequency
+
+
+@dataclass(frozen=True)
+class LaboratoryCampaign:
+    """What the stand runs in one case."""
+
+    tests: tuple[LaboratoryTest, ...]
+    values: tuple[float, ...]
+    """Of the control signal at which parameters are given [V]; one where the damper has none."""
+    rate: float
+    """Sampling rate [Hz]."""
+
+    @property
+    def one_frequency(self) -> bool:
+        """Whether all tests are sines of one frequency, so that a spring and a mass are the same thing."""
+        return {t.kind for t in self.tests} == {"sine"} and len({t.frequency for t in self.tests}) == 1
+
+
+RATES = (500.0, 512.0, 1000.0, 1024.0, 2000.0, 4000.0)
+"""Usual rates of data loggers [Hz]."""
+MOST_SAMPLES = 40_000
+"""In all tests of a case; longer campaigns are sampled more slowly."""
+
+
+def one_frequency(draw: Generator, stroke: float) -> list[LaboratoryTest]:
+    """A crank drive: one frequency, one stroke."""
+    frequency = float(draw.choice([0.5, 1.0, 1.5, 2.0]))
+    return [LaboratoryTest("sine", stroke, frequency, 10)]
+
+
+def two_by_two(draw: Generator, stroke: float) -> list[LaboratoryTest]:
+    """Two frequencies at two strokes each."""
+    low, ratio = float(draw.choice([0.5, 1.0, 1.3])), float(draw.choice([2.0, 2.5, 3.0]))
+    return [
+        LaboratoryTest("sine", stroke * size * (1.0 if f == low else 0.7), f, 8)
+        for f in (low, low * ratio)
+        for size in (0.5, 1.0)
+    ]
+
+
+def constant_stroke(draw: Generator, stroke: float) -> list[LaboratoryTest]:
+    """The usual acceptance test of suspension dampers: one stroke, the speed set by the frequency."""
+    speeds = (0.052, 0.131, 0.262, 0.393, 0.524)  # the series 52 to 524 mm/s of the manufacturers
+    frequencies = [round(speed / (2.0 * np.pi * stroke), 2) for speed in speeds]
+    return [LaboratoryTest("sine", stroke, f, 5) for f in frequencies]
+
+
+def sines_and_triangles(draw: Generator, stroke: float) -> list[LaboratoryTest]:
+    """Constant speeds by triangles, between sines."""
+    low = float(draw.choice([0.5, 1.0]))
+    return [
+        LaboratoryTest("sine", stroke, low, 6),
+        LaboratoryTest("sine", 0.4 * stroke, 3.0 * low, 8),
+        LaboratoryTest("triangle", 0.8 * stroke, 0.5 * low, 4),
+        LaboratoryTest("triangle", 0.8 * stroke, 1.5 * low, 6),
+    ]
+
+
+def broadband(draw: Generator, stroke: float) -> list[LaboratoryTest]:
+    """Sines, two tones, a sweep and a random motion."""
+    low = float(draw.choice([0.7, 1.0, 1.2]))
+    return [
+        LaboratoryTest("sine", stroke, low, 6),
+        LaboratoryTest("sine", 0.4 * stroke, 2.5 * low, 8),
+        LaboratoryTest("two_tone", 0.8 * stroke, low, 8),
+        LaboratoryTest("sweep", 0.3 * stroke, 5.0, 12),
+        LaboratoryTest("random", 0.8 * stroke, 2.0, 15),
+    ]
+
+
+def moving_signal(draw: Generator, stroke: float) -> list[LaboratoryTest]:
+    """Two by two, and tests in which the control signal steps and ramps."""
+    low = float(draw.choice([1.0, 1.3]))
+    return [
+        *two_by_two(draw, stroke),
+        LaboratoryTest("sine", 0.8 * stroke, low, 8, "steps"),
+        LaboratoryTest("sine", 0.8 * stroke, low, 8, "ramp"),
+    ]
+
+
+CAMPAIGNS: Mapping[str, Callable[[Generator, float], list[LaboratoryTest]]] = {
+    "one_frequency": one_frequency,
+    "two_by_two": two_by_two,
+    "constant_stroke": constant_stroke,
+    "sines_and_triangles": sines_and_triangles,
+    "broadband": broadband,
+    "moving_signal": moving_signal,
+}
+"""Every campaign by name."""
+SHARES: Mapping[str, float] = {
+    "one_frequency": 0.1,
+    "two_by_two": 0.22,
+    "constant_stroke": 0.2,
+    "sines_and_triangles": 0.16,
+    "broadband": 0.16,
+    "moving_signal": 0.16,
+}
+"""How many of the cases run each."""
+
+
+def campaign(name: str, draw: Generator) -> LaboratoryCampaign:
+    """The tests of a case.
+
+    Parameters
+    ----------
+    name : of the campaign
+    draw : where stroke, speeds, control values and the sampling rate come from
+    """
+    stroke = float(draw.choice([0.01, 0.015, 0.02, 0.025, 0.03]))
+    tests = CAMPAIGNS[name](draw, stroke)
+    count = int(draw.integers(2, 4)) if name == "moving_signal" else int(draw.integers(1, 6))
+    count = min(count, 3) if len(tests) > 1 else count
+    if len(tests) > 4:
+        count = min(count, 2)
+    highest = float(draw.choice([2.0, 5.0, 12.0, 150.0]))
+    values = tuple(float(v) for v in np.round(np.linspace(0.0, highest, count), 3))
+    every = [
+        LaboratoryTest(t.kind, t.amplitude, t.frequency, t.cycles, t.signal, value)
+        for t in tests
+        for value in (values if t.signal == "constant" else values[:1])
+    ]
+    seconds = sum(test.seconds for test in every)
+    fast_enough = [r for r in RATES if r * seconds <= MOST_SAMPLES]
+    return LaboratoryCampaign(tuple(every), values, float(draw.choice(fast_enough or RATES[:1])))
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 FINEST = 1.25e-4
 """Longest step of the integration [s]: `tests/blind` shows what it costs."""
@@ -184,3 +340,138 @@ def warmed(motions: Sequence[Driven], forces: Sequence[Array], start: float, cap
         found.append(np.interp(motion.time, time, start + excess))
         above = float(excess[-1]) * float(np.exp(-PAUSE / COOLING))
     return found
+
+
+# ----------------------------------------------------------------------------------------------------
+# What the data logger has of a test: gains, offsets and their drift, noise, hum, a coarse clock and coarse numbers.
+
+
+SPECTRUM = (
+    (1.0, 2.6e-5),
+    (2.1, 1.0e-5),
+    (4.2, 4.6e-6),
+    (8.5, 1.1e-6),
+    (17.0, 6.0e-7),
+    (35.0, 1.2e-6),
+    (70.0, 1.8e-7),
+    (140.0, 5.3e-8),
+    (320.0, 2.9e-8),
+)
+"""Frequency [Hz], and spectral density of a measured force between the harmonics of its motion, over the square of its
+peak [1/Hz]: medians in octaves over 17 tests of a magneto-rheological damper on a press (Quiroz 2022, UTFSM). About
+1 % of the peak in all."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The measuring chain of a case."""
+
+    white: float
+    """White noise of the force, as a share of the largest force of the case."""
+    recorded: float
+    """Noise of the recorded spectrum, as a share of that of the press."""
+    hum: float
+    """Amplitude at the mains frequency, as a share of the largest force of the case."""
+    mains: float
+    """Mains frequency [Hz]."""
+    displacement_noise: float
+    """[m]"""
+    zero: float
+    """What the displacement shows in the middle of the stroke [m]."""
+    force_step: float
+    """[N]"""
+    displacement_step: float
+    """[m]"""
+    clock: float
+    """Time stamps are multiples of this [s]."""
+
+    @classmethod
+    def drawn(cls, draw: Generator, peak: float, stroke: float, rate: float) -> Chain:
+        """One as they stand in laboratories."""
+        return cls(
+            white=float(np.exp(draw.uniform(np.log(3e-4), np.log(3e-3)))),
+            recorded=float(draw.uniform(0.1, 0.8)),
+            hum=float(draw.choice([0.0, 0.5e-3, 2e-3])),
+            mains=float(draw.choice([50.0, 60.0]) + draw.normal(0.0, 0.02)),
+            displacement_noise=float(np.exp(draw.uniform(np.log(1e-6), np.log(2e-5)))),
+            zero=float(draw.choice([0.0, 1.0]) * draw.normal(0.0, 0.3)) * stroke,
+            force_step=2.5 * peak / 2 ** int(draw.choice([12, 14, 16])),
+            displacement_step=float(draw.choice([1e-6, 2e-6, 5e-6])),
+            clock=float(draw.choice([c for c in (1e-6, 1e-5, 1e-4) if c <= 0.25 / rate])),
+        )
+
+
+@dataclass(frozen=True)
+class ErrorsOfTest:
+    """What differs from test to test, within the standard deviations that `diagnose.nuisance` assumes."""
+
+    gain: float
+    offset: float
+    """[N]"""
+    drift: float
+    """Of the force from the beginning to the end [N]."""
+    delay: float
+    """[s]"""
+    position: float
+    """Displacement at rest [m]."""
+
+    @classmethod
+    def drawn(cls, draw: Generator, peak: float) -> ErrorsOfTest:
+        """Those of one test whose largest force is the peak [N]."""
+        return cls(
+            gain=float(np.clip(draw.normal(0.0, 0.01), -0.025, 0.025)),
+            offset=float(np.clip(draw.normal(0.0, 0.003), -0.008, 0.008)) * peak,
+            drift=float(np.clip(draw.normal(0.0, 0.002), -0.005, 0.005)) * peak,
+            delay=float(np.clip(draw.normal(0.0, 2e-4), -5e-4, 5e-4)),
+            position=float(draw.normal(0.0, 2e-5)),
+        )
+
+
+def sensed_force(time: Array, force: Array, peak: float, chain: Chain, errors: ErrorsOfTest, draw: Generator) -> Array:
+    """(n,) what the force channel shows [N].
+
+    Parameters
+    ----------
+    time : (n,) [s]
+    force : (n,) of the damper [N]
+    peak : largest force of the case [N]
+    chain : of the case
+    errors : of the test
+    draw : of the noise
+    """
+    own = float(np.max(np.abs(force)))
+    shown = (1.0 + errors.gain) * np.interp(time - errors.delay, time, force) + errors.offset
+    shown = shown + errors.drift * (time - time[0]) / (time[-1] - time[0])
+    phase = 2.0 * np.pi * chain.mains * time + draw.uniform(0.0, 2.0 * np.pi)
+    shown = shown + chain.hum * peak * (np.sin(phase) + 0.3 * np.sin(3.0 * phase))
+    shown = shown + chain.white * peak * draw.normal(size=time.size)
+    shown = shown + chain.recorded * own * coloured(time.size, float(time[1] - time[0]), draw)
+    return np.asarray(np.round(shown / chain.force_step) * chain.force_step)
+
+
+def coloured(count: int, step: float, draw: Generator) -> Array:
+    """(n,) noise of the recorded spectrum, of a force whose peak is 1; below 1 Hz as at 1 Hz.
+
+    Parameters
+    ----------
+    count : n
+    step : sampling interval [s]
+    draw : of the noise
+    """
+    length = 2 * count  # twice as long, so that its end does not run into its beginning
+    frequency = np.fft.rfftfreq(length, step)
+    known, density = np.array(SPECTRUM).T
+    wanted = np.exp(np.interp(np.log(np.maximum(frequency, known[0])), np.log(known), np.log(density)))
+    white = np.fft.rfft(draw.normal(size=length))
+    return np.asarray(np.fft.irfft(white * np.sqrt(wanted / (2.0 * step)), length)[:count])
+
+
+def sensed_displacement(time: Array, x: Array, chain: Chain, errors: ErrorsOfTest, draw: Generator) -> Array:
+    """(n,) what the displacement channel shows [m]; `x` (n,) counts from the middle of the stroke."""
+    shown = x + chain.zero + errors.position + chain.displacement_noise * draw.normal(size=time.size)
+    return np.asarray(np.round(shown / chain.displacement_step) * chain.displacement_step)
+
+
+def stamped(time: Array, chain: Chain) -> Array:
+    """(n,) time stamps as the clock gives them [s]."""
+    return np.asarray(np.round(time / chain.clock) * chain.clock)

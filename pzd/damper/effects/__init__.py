@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
+from pzd.damper.compiled.laws import declared
 from pzd.damper.effect import Effect
-from pzd.damper.laws import declared
 from pzd.own_effects import VARIABLE, own_files, own_folder
 from pzd.schema.errors import ConfigError
 

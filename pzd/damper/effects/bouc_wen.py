@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
-from pzd.damper.hysteresis import hysteresis_after, hysteresis_rate
+from pzd.damper.shared_laws import hysteresis_after, hysteresis_rate
 
 EXPONENT = 2
 """n of the source: 1 is the friction of Dahl, which comes up without a bend; larger ones near `second_branch`."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
-from pzd.damper.pocket import deflection_with, extension_behind, extension_slope
+from pzd.damper.shared_laws import deflection_with, extension_behind, extension_slope
 
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.export.format import Files, Format
+from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
@@ -19,7 +19,7 @@ def files(content: Content) -> Files:
     ------
     ConfigError : when the table has fewer than two control signals, or empty cells
     """
-    from pzd.export.c_text import source
+    from pzd.export.dynamics import source
     from pzd.schema.errors import ConfigError
 
     if not content.adjustable:
@@ -35,8 +35,8 @@ def _data(content: Content) -> str:
     """The table and the car as constants."""
     import numpy as np
 
-    from pzd.export.c_text import array, head, single
-    from pzd.simulate.minimise import TIE_BREAKS
+    from pzd.export.dynamics import array, head, single
+    from pzd.simulate.control.demand import TIE_BREAKS
 
     content.full_grid(NAME)
     car, first = content.car, content.lookups[0]

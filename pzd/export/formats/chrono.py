@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.export.format import Files, Format
+from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
@@ -23,8 +23,8 @@ def files(content: Content) -> Files:
     ------
     ConfigError : when the table has empty cells
     """
-    from pzd.export.curves import curves
-    from pzd.schema.jsonfile import json_text
+    from pzd.export.content import curves
+    from pzd.schema.validate import json_text
 
     found = {}
     for one in curves(content, NAME):

@@ -1,10 +1,10 @@
-"""CSV: a file for each table of `pzd.export.tabular`, behind a line that says where it is from."""
+"""CSV: a file for each table of `pzd.export.content`, behind a line that says where it is from."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.export.format import Files, Format
+from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
@@ -15,8 +15,7 @@ def files(content: Content) -> Files:
     import csv
     import io
 
-    from pzd.export.content import comment
-    from pzd.export.tabular import tables
+    from pzd.export.content import comment, tables
 
     found = {}
     for name, table in tables(content).items():

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.export.format import Files, Format
+from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,10 +28,8 @@ def files(content: Content) -> Files:
     ConfigError : when the damper has an effect that is not carried exactly
     FilesError : when the compiler refuses the sources
     """
-    from pzd.export.c_text import source
-    from pzd.export.dynamics import Dynamics, data_of
-    from pzd.export.fmi import IDENTIFIER, build_description, fmi2, fmi3
-    from pzd.export.library import compiled_library, folders, suffix
+    from pzd.export.dynamics import Dynamics, data_of, source
+    from pzd.export.fmi import IDENTIFIER, build_description, compiled_library, fmi2, fmi3, folders, suffix
 
     dynamics = Dynamics.of(content.damper, NAME)
     data, token = data_of(content, dynamics)

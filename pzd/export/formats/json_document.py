@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.export.format import Files, Format
+from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 def files(content: Content) -> Files:
     """One document."""
-    from pzd.export.tabular import tables
-    from pzd.schema.jsonfile import json_text
+    from pzd.export.content import tables
+    from pzd.schema.validate import json_text
 
     document = {"origin": content.origin} | {
         name: {"units": dict(table.units), "columns": {key: list(cells) for key, cells in table.cells.items()}}

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pzd.export.format import Files, Format
+from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
@@ -59,7 +59,7 @@ def _inverse(content: Content) -> dict[str, Any]:
     """The control signal over velocity and share of the range of forces, at each temperature."""
     import numpy as np
 
-    from pzd.export.inverse import inverses
+    from pzd.export.content import inverses
 
     found = inverses(content)
     several = len(found) > 1
@@ -76,7 +76,7 @@ def _parameters(content: Content) -> dict[str, Any]:
     """T0, C and k by column, the parameters of the effects, and what these count from, as structures."""
     import numpy as np
 
-    from pzd.export.tabular import tables
+    from pzd.export.content import tables
 
     numbers = {
         name: {

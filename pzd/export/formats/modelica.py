@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.export.format import Files, Format
+from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
@@ -28,8 +28,7 @@ def files(content: Content) -> Files:
     """
     import numpy as np
 
-    from pzd.export.content import comment
-    from pzd.export.inverse import inverses
+    from pzd.export.content import comment, inverses
     from pzd.quantities import FORCE, TEMPERATURE, VELOCITY
 
     grid, control = content.full_grid(NAME), content.control

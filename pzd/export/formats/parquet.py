@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.export.format import Files, Format
+from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
@@ -17,7 +17,7 @@ def files(content: Content) -> Files:
     import pyarrow as pa
     from pyarrow import parquet
 
-    from pzd.export.tabular import tables
+    from pzd.export.content import tables
 
     found = {}
     for name, table in tables(content).items():

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pzd.export.format import Files, Format
+from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
-    from pzd.export.content import Content
-    from pzd.export.curves import ForceCurve
+    from pzd.export.content import Content, ForceCurve
 
 NAME = "tir"
 _ENDING = ".dpr"
@@ -24,7 +23,7 @@ def files(content: Content) -> Files:
     ------
     ConfigError : when the table has empty cells
     """
-    from pzd.export.curves import curves
+    from pzd.export.content import curves
 
     return {f"{one.name}{_ENDING}": _text(one, content.origin).encode() for one in curves(content, NAME)}
 

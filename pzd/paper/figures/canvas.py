@@ -6,7 +6,12 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pzd.report.drawing import BASELINE, FINAL, INK, MEASURED, STYLE
+
+# ----------------------------------------------------------------------------------------------------
+
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,3 +84,103 @@ def encoded(figure: Figure) -> tuple[bytes, bytes]:
     figure.savefig(png, format="png", metadata={"Software": None})
     figure.savefig(svg, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     return png.getvalue(), svg.getvalue()
+
+
+# ----------------------------------------------------------------------------------------------------
+# A pen for schemes: springs, dashpots, walls, arrows.
+
+
+OIL_COLOUR = "#cfe3f1"
+_HALF = 0.16
+"""Half the width of springs and dashpots [in]."""
+_COILS = 6
+
+Point = tuple[float, float]
+
+
+class Pen:
+    """Draws on a sheet whose unit is the inch."""
+
+    def __init__(self, width: float, height: float) -> None:
+        self.figure, self._ax = sheet(width, height)
+
+    def line(self, start: Point, end: Point, width: float = 1.3) -> None:
+        """A straight line."""
+        self._ax.plot((start[0], end[0]), (start[1], end[1]), color=INK, linewidth=width, solid_capstyle="butt")
+
+    def text(self, x: float, y: float, words: str) -> None:
+        """Words centred at a place."""
+        self._ax.text(x, y, words, ha="center", va="center", fontsize=11)
+
+    def dot(self, x: float, y: float) -> None:
+        """A point."""
+        self._ax.plot(x, y, "o", color=INK, markersize=5.0)
+
+    def box(self, x: float, y: float, width: float, height: float, colour: str = "#e4e7eb") -> None:
+        """A filled rectangle from its lower left corner."""
+        from matplotlib.patches import Rectangle
+
+        self._ax.add_patch(Rectangle((x, y), width, height, facecolor=colour, edgecolor=INK, linewidth=1.1))
+
+    def arrow(self, start: Point, end: Point) -> None:
+        """An arrow."""
+        self._ax.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": INK, "shrinkA": 0, "shrinkB": 0})
+
+    def turn(self, x: float, y: float, radius: float) -> None:
+        """An arrow that turns counterclockwise about a place."""
+        angle = np.linspace(np.pi * 0.25, np.pi * 0.9, 30)
+        self._ax.plot(x + radius * np.cos(angle), y + radius * np.sin(angle), color=INK, linewidth=1.1)
+        self.arrow(
+            (x + radius * float(np.cos(angle[-2])), y + radius * float(np.sin(angle[-2]))),
+            (x + radius * float(np.cos(angle[-1])) - 0.01, y + radius * float(np.sin(angle[-1])) - 0.06),
+        )
+
+    def measure(self, start: float, end: float, height: float, name: str) -> None:
+        """A dimension between two places at one height."""
+        style = {"arrowstyle": "<|-|>", "color": SOFT, "shrinkA": 0, "shrinkB": 0}
+        self._ax.annotate("", (end, height), (start, height), arrowprops=style)
+        for x in (start, end):
+            self._ax.plot((x, x), (height - 0.12, height + 0.12), color=SOFT, linewidth=0.9)
+        self.text(0.5 * (start + end), height - 0.2, name)
+
+    def label(self, number: str, at: Point, to: Point) -> None:
+        """A number with a line to what it names."""
+        self._ax.plot((at[0], to[0]), (at[1], to[1]), color=SOFT, linewidth=0.9)
+        box = {"boxstyle": "circle,pad=0.2", "facecolor": "white", "edgecolor": SOFT}
+        self._ax.text(*at, number, ha="center", va="center", fontsize=9, bbox=box)
+
+    def wall(self, x: float, low: float, high: float) -> None:
+        """A wall with its hatching to the left."""
+        self.line((x, low), (x, high), 1.8)
+        for y in np.arange(low, high + 1e-9, 0.15):
+            self.line((x, float(y)), (x - 0.14, float(y) - 0.14), 0.8)
+
+    def spring(self, start: Point, end: Point) -> None:
+        """A coil spring between two places."""
+        along = np.concatenate(([0.0], np.linspace(0.25, 0.75, 2 * _COILS + 1), [1.0]))
+        across = np.concatenate(([0.0, 0.0], [_HALF * (-1.0) ** n for n in range(2 * _COILS - 1)], [0.0, 0.0]))
+        self._path(start, end, along, across)
+
+    def dashpot(self, start: Point, end: Point, *, controlled: bool = False) -> None:
+        """A dashpot between two places; an arrow across it where it is controlled."""
+        self._path(start, end, np.array([0.0, 0.4]), np.zeros(2))
+        self._path(start, end, np.array([0.68, 0.4, 0.4, 0.68]), _HALF * np.array([-1.0, -1.0, 1.0, 1.0]))
+        self._path(start, end, np.array([0.55, 0.55]), 0.8 * _HALF * np.array([-1.0, 1.0]))
+        self._path(start, end, np.array([0.55, 1.0]), np.zeros(2))
+        if controlled:
+            x, y = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
+            self.arrow((x - 0.3, y - 0.35), (x + 0.32, y + 0.4))
+
+    def friction(self, start: Point, end: Point) -> None:
+        """Dry friction between two places: two plates that rub."""
+        self._path(start, end, np.array([0.0, 0.35, 0.35, 0.65]), np.array([0.0, 0.0, 0.04, 0.04]))
+        self._path(start, end, np.array([0.38, 0.68, 0.68, 1.0]), np.array([-0.04, -0.04, 0.0, 0.0]))
+        for place in np.linspace(0.4, 0.62, 5):
+            self._path(start, end, np.array([place, place + 0.04]), np.array([-0.04, 0.04]))
+
+    def _path(self, start: Point, end: Point, along: np.ndarray, across: np.ndarray) -> None:
+        """A line given by its share along the way from start to end and its distance across it [in]."""
+        way = np.subtract(end, start)
+        normal = np.array([-way[1], way[0]]) / np.hypot(*way)
+        points = np.add(start, np.outer(along, way) + np.outer(across, normal))
+        self._ax.plot(points[:, 0], points[:, 1], color=INK, linewidth=1.3, solid_capstyle="butt")

@@ -3,18 +3,68 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pzd.paper.figures.canvas import PAPER_STYLE, encoded
-from pzd.paper.figures.entry import FigureEntry, FigureFiles
-from pzd.paper.figures.figure import PaperFigure
-from pzd.paper.figures.index import page
-from pzd.paper.figures.numbered import library
+from pzd.paper.figures.numbered import PaperFigure, library
 from pzd.paper.figures.sources import FigureData
 from pzd.quantities import Control
-from pzd.schema.jsonfile import write_json
+from pzd.schema.model import Frozen
+from pzd.schema.validate import write_json
+
+# ----------------------------------------------------------------------------------------------------
+# What the manifest of the figures says of each.
+
+
+class FigureFiles(Frozen):
+    """One picture of a figure."""
+
+    png: str
+    svg: str
+    """Names of its files."""
+    alt: str
+    caption: str
+    """What it shows, with its numbers beside the paper's."""
+    sha256: dict[str, str]
+    """Hash of each file."""
+
+
+class FigureEntry(Frozen):
+    """One figure of the paper as the manifest lists it."""
+
+    figure: int
+    title: str
+    source: str
+    """`stand`, `model`, `rides`, `scheme`, `computed` in its place, or `photograph`."""
+    made_from: str
+    pictures: tuple[FigureFiles, ...]
+    missing: str | None
+    """Why nothing is drawn; None where something is."""
+
+
+# ----------------------------------------------------------------------------------------------------
+# index.html: all twenty figures with what each is made from, relative links, no script.
+
+
+def page(entries: Sequence[FigureEntry]) -> str:
+    """Fill the template; every text is escaped there."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("pzd.paper.figures", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template("index.html").render(entries=entries)
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 FOLDER = "figures"
 """Beside the stages in the run's folder."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 
+from pzd.parallel.config import Pools, Where
 from pzd.parallel.engines import dask, local, slurm
-from pzd.parallel.pools import Pools, Where
 
 Engine = Callable[[Where, int, int], AbstractContextManager[Pools]]
 """Takes where it is to run, the number of processes and that of steps, and lends an executor for each step."""

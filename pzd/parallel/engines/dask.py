@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, cast
 
-from pzd.parallel.config import LOOPBACK
-from pzd.parallel.pools import Pools, Where
+from pzd.parallel.config import LOOPBACK, Pools, Where
 from pzd.schema.errors import ConfigError
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from pzd.parallel.pools import Pools, Where
-from pzd.schema.processes import spawned_pool
+from pzd.parallel.config import Pools, Where
+from pzd.parallel.processes import spawned_pool
 
 
 @contextmanager

@@ -7,9 +7,8 @@ import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-from pzd.parallel.config import LOOPBACK, SlurmConfig, is_loopback
+from pzd.parallel.config import LOOPBACK, Pools, SlurmConfig, Where, is_loopback
 from pzd.parallel.engines.dask import NO_DASHBOARD, lent, security
-from pzd.parallel.pools import Pools, Where
 from pzd.schema.errors import ConfigError
 
 

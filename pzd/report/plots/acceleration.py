@@ -8,9 +8,9 @@ import numpy as np
 
 from pzd.artefacts import RIDE_COLUMNS, SummaryRow
 from pzd.record import Array
+from pzd.report.blocks import number
 from pzd.report.context import ReportContext
 from pzd.report.drawing import Panel, Plot, axes, legend, line_of, thinned
-from pzd.report.wording import number
 from pzd.simulate.roads.sine import Sine
 
 _PERIODS = 3.0

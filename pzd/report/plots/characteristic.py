@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pzd.report.context import ReportContext
+from pzd.report.blocks import amount, number
+from pzd.report.context import ReportContext, static_force_at, static_force_in_words
 from pzd.report.drawing import Panel, Plot, axes, legend, shades
-from pzd.report.static_force import static_force_at, static_force_in_words
-from pzd.report.wording import amount, number
 
 
 def draw(context: ReportContext) -> Iterator[Panel]:

@@ -9,9 +9,9 @@ import numpy as np
 
 from pzd.artefacts import SummaryRow
 from pzd.comfort import iso2631_1997
+from pzd.report.blocks import number
 from pzd.report.context import ReportContext
 from pzd.report.drawing import Panel, Plot, axes, line_of
-from pzd.report.wording import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

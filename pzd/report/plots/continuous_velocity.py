@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from pzd.artefacts import ContinuousVelocityRow
-from pzd.report.context import ReportContext
-from pzd.report.curves import characteristics_of, coloured, place_of
+from pzd.report.blocks import amount, number
+from pzd.report.context import ReportContext, characteristics_of, coloured, place_of
 from pzd.report.drawing import Panel, Plot, axes, legend, shades
-from pzd.report.wording import amount, number
 
 
 def draw(context: ReportContext) -> Iterator[Panel]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pzd.quantities import FORCE, VELOCITY
 from pzd.report.context import ReportContext
 from pzd.report.drawing import Panel, Plot
-from pzd.report.loops import loops
+from pzd.report.gaps import loops
 
 
 def draw(context: ReportContext) -> Iterator[Panel]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pzd.report.blocks import number
 from pzd.report.context import ReportContext
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, Plot, axes
-from pzd.report.wording import number
 
 
 def draw(context: ReportContext) -> Iterator[Panel]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
+from pzd.report.blocks import number
 from pzd.report.context import ReportContext
 from pzd.report.drawing import FINAL, Panel, Plot, axes, legend, shades
-from pzd.report.wording import number
 
 
 def draw(context: ReportContext) -> Iterator[Panel]:

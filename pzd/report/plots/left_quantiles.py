@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.record import Array
+from pzd.report.blocks import number
 from pzd.report.context import ReportContext
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, Plot, axes, legend
 from pzd.report.gaps import begun
-from pzd.report.wording import number
-from pzd.signals.root_mean_square import rms
+from pzd.signals.criterion import rms
 
 _POINTS = 120
 """Quantiles that are drawn."""

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pzd.record import Array, Record
+from pzd.report.blocks import number
 from pzd.report.context import ReportContext
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, Plot, axes, legend
 from pzd.report.gaps import at_some_voltages, begun
-from pzd.report.wording import number
 from pzd.signals.cycles import cycles
 
 _BANDS_A_DECADE = 10

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from pzd.artefacts import ParameterRow
 from pzd.damper.model import BaseRow
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS
+from pzd.report.blocks import amount, unit_of
 from pzd.report.context import ReportContext
 from pzd.report.drawing import Panel, Plot, axes, legend, shades
-from pzd.report.wording import amount, unit_of
 
 
 def draw(context: ReportContext) -> Iterator[Panel]:

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from pzd.artefacts import PeakVelocityRow
-from pzd.report.context import ReportContext
-from pzd.report.curves import characteristics_of, coloured, place_of
+from pzd.report.context import ReportContext, characteristics_of, coloured, place_of
 from pzd.report.drawing import Panel, Plot, axes, legend, shades
 
 _MARKERS = {"sine": "o", "constant velocity": "s", "other swing": "D"}

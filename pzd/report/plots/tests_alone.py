@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.artefacts import ParameterRow
-from pzd.identify.config import IdentifyConfig
-from pzd.identify.fit import identify_condition
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.fit import identify_condition
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS
 from pzd.record import Condition, Record, is_constant, voltage_scale
+from pzd.report.blocks import unit_of
 from pzd.report.context import ReportContext
 from pzd.report.drawing import Panel, Plot, shades
-from pzd.report.wording import unit_of
 
 _FEWEST = 4
 """Fewer tests that differ show nothing at a glance."""

@@ -9,10 +9,9 @@ import numpy as np
 
 from pzd.artefacts import SummaryRow
 from pzd.record import Array
-from pzd.report.context import ReportContext
+from pzd.report.blocks import amount
+from pzd.report.context import ReportContext, name_of, of_road, unbeaten
 from pzd.report.drawing import BASELINE, FINAL, INK, MEASURED, Panel, Plot, axes
-from pzd.report.trade_off import name_of, of_road, unbeaten
-from pzd.report.wording import amount
 from pzd.simulate.policies import policies
 
 if TYPE_CHECKING:

@@ -2,14 +2,100 @@
 
 from __future__ import annotations
 
-from pzd.artefacts import Diagnosis, NextTest, Prediction, Ranked, Value
-from pzd.damper.competing_forms import known
+from pzd.artefacts import Diagnosis, Gap, Hypotheses, HypothesisRow, NextTest, Prediction, Ranked, Value
+from pzd.damper.confounders import known
 from pzd.quantities import Control
-from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
+from pzd.report.blocks import (
+    DASH,
+    Block,
+    Notes,
+    Paragraph,
+    Pictures,
+    Section,
+    TextTable,
+    amount,
+    galleries,
+    interval,
+    listed,
+    number,
+    percent,
+    sentence,
+    unit_of,
+)
 from pzd.report.context import ReportContext, effect_in_words, effects_in_words
-from pzd.report.sections import hypotheses
-from pzd.report.sections.pictures import Pictures, galleries
-from pzd.report.wording import DASH, amount, interval, listed, number, percent, sentence, unit_of
+
+# ----------------------------------------------------------------------------------------------------
+# Where the simple model fails: measured against simulated, and where the gap lies.
+
+
+def render_simple_model(context: ReportContext, pictures: Pictures) -> Section:
+    """The second section."""
+    element = (
+        "The knee law has dry friction T0, and bleed, knee and blow-off of each direction"
+        if context.fitted_law
+        else "The simple model is the Bingham element of the paper: dry friction T0 and viscous damping C"
+    )
+    text = f"{element} in series with the oil spring k. {_gap(context.diagnosed.diagnosis.gap)}"
+    blocks: list[Block] = [Paragraph(text), *galleries(pictures["model"])]
+    where = context.diagnosed.diagnosis.where
+    if where:
+        rows = tuple((region.region, percent(region.share_of_gap)) for region in where)
+        blocks.append(TextTable("Where the gap lies", ("region", "share of the gap"), rows))
+    return Section("model", f"Where the {context.model} fails", tuple(blocks))
+
+
+def _gap(gap: Gap | None) -> str:
+    if gap is None:
+        return "How far it misses the measured force could not be measured."
+    return (
+        f"On data that no fit has seen it leaves W_s = {number(gap.before)}, where noise alone would "
+        f"leave {number(gap.noise_floor)}. W_s is a share of the mean square of the force; in r.m.s. the model misses "
+        f"{percent(gap.before**0.5)} of the force, and noise alone would be {percent(gap.noise_floor**0.5)}."
+    )
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which shape what is left has, where the verdict is `unexplained`: hypotheses, beside the picture of the best.
+
+
+def hypothesis_blocks(found: Hypotheses) -> tuple[Block, ...]:
+    """A sentence and a table; nothing where none was looked for."""
+    if not found.sought:
+        return ()
+    if not found.rows:
+        return (Paragraph("No shape of what is left predicts tests kept back better beyond two standard errors."),)
+    best = found.alone[0]
+    return (
+        Paragraph(
+            f"A hypothesis on what is left: c {best.shape}, {best.physics}. It would close {percent(best.closes)} of "
+            "the gap on tests kept back. It is adopted nowhere: what has this shape may be something else."
+        ),
+        TextTable(
+            "Shapes of what is left, each by itself, and below beside the best",
+            ("shape", "coefficient (95 % interval)", "searched", "gap closed", "standard errors", "physics"),
+            tuple(_cells(row) for row in found.rows),
+        ),
+    )
+
+
+def _cells(row: HypothesisRow) -> tuple[str, ...]:
+    value = interval(row.coefficient, row.coefficient_low95, row.coefficient_high95)
+    second = f"; {number(row.second_coefficient)} with the cosine" if row.second_coefficient is not None else ""
+    searched = DASH
+    if row.parameter is not None:
+        searched = f"{row.parameter} = {amount(row.parameter_value, row.parameter_unit or '')}"
+    return (
+        f"c {row.shape}" if row.beside is None else f"c {row.shape}, beside {row.beside}",
+        f"{value}{second} {unit_of(row.unit)}".rstrip(),
+        searched,
+        percent(row.closes),
+        number(row.standard_errors, 2),
+        f"{row.physics} ({row.library})" if row.library else row.physics,
+    )
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 _FOLD = 6
 MIDDLE_DIGITS = 6
@@ -23,7 +109,7 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
         "" if diagnosis.confidence is None else f" The confidence in this verdict is {percent(diagnosis.confidence)}."
     )
     blocks: list[Block] = [Paragraph(f"{verdict(context)}{sure}")]
-    blocks += [Paragraph(text) for text in (sentence(diagnosis.reason), _gap(diagnosis)) if text]
+    blocks += [Paragraph(text) for text in (sentence(diagnosis.reason), _missing_gap(diagnosis)) if text]
     blocks += [*galleries(pictures["missing"])]
     if diagnosis.parameters:
         blocks.append(_parameters(context, diagnosis))
@@ -31,7 +117,7 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
         blocks.append(_prediction(context, diagnosis.prediction))
     if diagnosis.ranking:
         blocks.append(_ranking(diagnosis, context.control))
-    blocks += hypotheses.blocks(context.diagnosed.hypotheses)
+    blocks += hypothesis_blocks(context.diagnosed.hypotheses)
     blocks.append(Notes((next_test(context, diagnosis.next_test),)))
     return Section("missing", "What is missing, and how sure that is", tuple(blocks))
 
@@ -58,7 +144,7 @@ def verdict(context: ReportContext) -> str:
     return f"{text}."
 
 
-def _gap(diagnosis: Diagnosis) -> str:
+def _missing_gap(diagnosis: Diagnosis) -> str:
     gap = diagnosis.gap
     if gap is None:
         return ""

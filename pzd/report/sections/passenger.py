@@ -2,18 +2,171 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from pzd.artefacts import SummaryRow, WheelRow
 from pzd.comfort import directive, iso2631_1978, iso2631_1997
-from pzd.report.blocks import Block, Notes, Paragraph, Section, TextTable
-from pzd.report.context import Comparison, ReportContext
-from pzd.report.sections import trade_off
-from pzd.report.sections.meanings import meanings
-from pzd.report.sections.pictures import Pictures, by_turns
-from pzd.report.wording import DASH, amount, listed, minutes, number, percent
-from pzd.simulate.car import HalfCar
-from pzd.simulate.modes import modes
+from pzd.report.blocks import (
+    DASH,
+    Block,
+    Notes,
+    Paragraph,
+    Pictures,
+    Section,
+    TextTable,
+    amount,
+    by_turns,
+    galleries,
+    listed,
+    minutes,
+    number,
+    percent,
+)
+from pzd.report.context import REALISTIC, Comparison, ReportContext, name_of, of_road, unbeaten
+from pzd.simulate.config import Sensors, SimulateConfig
+from pzd.simulate.policies import policies
+from pzd.simulate.vehicle.car import HalfCar, modes
+
+# ----------------------------------------------------------------------------------------------------
+# What the names of policies and fidelities stand for, and what the controllers see and set.
+
+
+_FIDELITIES = {
+    "ideal": "the demanded force is there at once",
+    "table": "the voltage comes from the table of force, and the force from the voltage",
+    "dynamic": "as table, with the lag of the valve and the damper's own dynamics",
+}
+_UNCONTROLLED_FIDELITIES = {
+    "ideal": "the demanded force is there at once",
+    "table": "the force is that of the table at the speed of the damper",
+    "dynamic": "as table, with the damper's own dynamics",
+}
+"""The same of a damper without a control signal."""
+
+
+def meanings(context: ReportContext, rows: Sequence[SummaryRow]) -> tuple[Notes, ...]:
+    """What the names of the policies and fidelities of some rides stand for."""
+    used = {row.policy for row in rows}
+    as_it_is = {} if context.controlled else {"passive": "the damper as it is"}
+    names = [f"{name}: {as_it_is.get(name, policy.meaning)}" for name, policy in policies().items() if name in used]
+    exact = {row.fidelity for row in rows}
+    fidelities = _FIDELITIES if context.controlled else _UNCONTROLLED_FIDELITIES
+    names += [f"{name}: {text}" for name, text in fidelities.items() if name in exact]
+    if context.controlled and exact - {"ideal"}:
+        names += [*_sensors(context.simulate), *_supply(context)]
+    return (Notes(tuple(names)),) if names else ()
+
+
+def _sensors(config: SimulateConfig) -> Iterator[str]:
+    """What the controllers see, where that is not all."""
+    sensors, noise = config.sensors, config.sensors.noise
+    if sensors == Sensors():
+        return
+    period = sensors.period_s or config.control_period_s
+    told = [f"a sample every {amount(1000.0 * period, 'ms')}, {amount(1000.0 * sensors.delay_s, 'ms')} late"]
+    deviations = (
+        ("deflection", 1000.0 * noise.deflection_m, "mm"),
+        ("its rate", noise.deflection_rate_m_per_s, "m/s"),
+        ("height", 1000.0 * noise.heave_m, "mm"),
+        ("pitch", 1000.0 * noise.pitch_rad, "mrad"),
+        ("vertical speed", noise.heave_rate_m_per_s, "m/s"),
+        ("pitch rate", 1000.0 * noise.pitch_rate_rad_per_s, "mrad/s"),
+        ("acceleration", noise.acceleration_m_per_s2, "m/s2"),
+    )
+    noisy = [f"{name} {amount(size, unit)}" for name, size, unit in deviations if size > 0.0]
+    told += [f"with noise of {listed(noisy)} r.m.s."] if noisy else []
+    yield f"sensors, at table and dynamic: {' '.join(told)}"
+
+
+def _supply(context: ReportContext) -> Iterator[str]:
+    """What becomes of the voltage that the controllers ask for, where it is not set at once."""
+    supply, unit = context.simulate.supply, context.control.unit
+    told = []
+    if supply.step is not None:
+        told.append(f"sets values {amount(supply.step, unit)} apart")
+    if supply.slew_per_s is not None:
+        told.append(f"changes by {amount(supply.slew_per_s, f'{unit}/s')} at most")
+    if supply.power_W is not None and supply.capacitance_F is not None:
+        told.append(f"charges {amount(1e6 * supply.capacitance_F, 'uF')} with {amount(supply.power_W, 'W')}")
+    if told:
+        yield f"supply of an axle, at table and dynamic: {listed(told)}"
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which policy to choose: all of them beside each other, road by road.
+
+
+def trade_off_blocks(context: ReportContext, pictures: Pictures) -> Iterator[Block]:
+    """Words, pictures and a table; nothing where fewer than two policies control."""
+    shown = {road: rows for road in context.roads if (rows := of_road(context, road))}
+    if not shown:
+        return
+    yield Paragraph(
+        "All policies beside each other: to the left the road feels less of the car, below the passenger feels less of "
+        "the road. Square: the policy that the rest of this page is about; triangles: others that control; circles: "
+        "what is held. The dotted line joins those that none beats in both:"
+    )
+    yield Notes(tuple(f"{road}, {rows[0].fidelity}: {_names(context, rows)}" for road, rows in shown.items()))
+    found = tuple(text for road, rows in shown.items() if (text := _best_found(context, road, rows)))
+    if found:
+        own = context.simulate.best_found
+        yield Paragraph(
+            f"Star: the best that was found, with a wheel load at most {number(own.most_load)} times that at the best "
+            f"fixed voltage. A search tried up to {own.evaluations} schedules of voltage on each road; there may be "
+            "better ones."
+        )
+        yield Notes(found)
+    yield from galleries(pictures["policies"])
+    yield _table(context, tuple(shown))
+
+
+def _names(context: ReportContext, rows: tuple[SummaryRow, ...]) -> str:
+    return listed([name_of(row.policy) for row in unbeaten(context, rows)])
+
+
+def _best_found(context: ReportContext, road: str, rows: tuple[SummaryRow, ...]) -> str:
+    """Who found the best ride over a road, and how far the policy of this page goes towards it; empty without one."""
+    by_name = {row.policy: row for row in rows}
+    fixed, best = by_name.get("best_fixed_voltage"), by_name.get("best_found")
+    if best is None:
+        return ""
+    found = next(row for row in context.rides.found if row.case == best.case)
+    by = f"a schedule, after {found.evaluations} rides" if found.found_by == "search" else name_of(found.found_by)
+    told = f"{road}: a_w {amount(context.a_w(best), 'm/s2')}, by {by}"
+    mine = next((row for row in rows if context.simulate.is_controlled(row.policy)), None)
+    if fixed is None or mine is None or context.a_w(best) >= context.a_w(fixed):
+        return told
+    way = (context.a_w(fixed) - context.a_w(mine)) / (context.a_w(fixed) - context.a_w(best))
+    if way <= 0.0:
+        return f"{told}; {name_of(mine.policy)} is no better than the best fixed voltage"
+    return f"{told}; {name_of(mine.policy)} goes {percent(way)} of the way to it from the best fixed voltage"
+
+
+def _table(context: ReportContext, roads: tuple[str, ...]) -> TextTable:
+    ridden = {row.fidelity for road in roads for row in context.cases(road)}
+    fidelities = [name for name in reversed(REALISTIC) if name in ridden]
+    header = ("road", "policy", *(f"a_w, {name}" for name in fidelities), *(f"load, {name}" for name in fidelities))
+    rows = tuple(_row(context, road, policy, fidelities) for road in roads for policy in _policies(context, road))
+    return TextTable("Comfort and r.m.s. wheel load of every policy, by fidelity", header, rows, folded=True)
+
+
+def _policies(context: ReportContext, road: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(row.policy for row in context.cases(road)))
+
+
+def _row(context: ReportContext, road: str, policy: str, fidelities: list[str]) -> tuple[str, ...]:
+    found = {row.fidelity: row for row in context.cases(road) if row.policy == policy}
+    ridden = [found.get(name) for name in fidelities]
+    return (
+        road,
+        name_of(policy),
+        *(amount(None if row is None else context.a_w(row), "m/s2") for row in ridden),
+        *(amount(None if row is None else row.rms_wheel_load_N, "N") for row in ridden),
+    )
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 COMFORT_TIME = "exposure_time_reduced_comfort"
 
@@ -27,7 +180,7 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
     blocks: list[Block] = [Paragraph(_ride(context)), *meanings(context, _all(context))]
     blocks += _compared(context)
     blocks += by_turns(pictures["passenger"])
-    blocks += trade_off.blocks(context, pictures)
+    blocks += trade_off_blocks(context, pictures)
     blocks += [_accelerations(context), _suspension(context), _wheels(context), _modes(context)]
     blocks += [*_exposures(context), *_daily(context)]
     worth = _worth(context)

@@ -17,7 +17,7 @@ from pzd.rig.files.layouts import named_layout, with_layout
 from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.units import UnitError, constant
 from pzd.schema.errors import ConfigError
-from pzd.schema.nearest import nearest
+from pzd.schema.model import nearest
 
 Value = TypeVar("Value")
 Values = dict[Quantity, tuple[float, ...]]

@@ -5,24 +5,250 @@ listing -> layout -> format reader -> channels -> tests -> refusals -> fixture -
 
 from __future__ import annotations
 
+import glob
+from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from pzd.quantities import Control
+import numpy as np
+
+from pzd.artefacts import IngestRow
+from pzd.quantities import ACCELERATION, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
+from pzd.record import Array, Record
 from pzd.rig.config import FilesEntry, Limits
-from pzd.rig.files.channels import channels
-from pzd.rig.files.clock import on_regular_clock
-from pzd.rig.files.fixture import Freed, damper_alone
+from pzd.rig.files.channels import Freed, Test, channels, damper_alone, split_into_tests
 from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import Layout, layouts
-from pzd.rig.files.listing import listed
-from pzd.rig.files.records import measured, names
-from pzd.rig.files.refusals import refuse
-from pzd.rig.files.splitting import Test, split_into_tests
-from pzd.rig.files.work import sign_fault, works_on_the_rig
+from pzd.rig.files.refusals import refuse, sign_fault, works_on_the_rig
+from pzd.rig.files.sheet import ReadingStep
 from pzd.rig.preflight import Measured
 from pzd.schema.errors import ConfigError, DataError
+from pzd.schema.model import safe_name
+from pzd.signals.cycles import cycles
+from pzd.signals.kinematics import kinematics
+
+# ----------------------------------------------------------------------------------------------------
+# The rig files that the paths and patterns of a config name.
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One file, and the entry of the config that names it."""
+
+    path: Path
+    entry: FilesEntry
+    number: int
+    """Which entry of the config it is, from 0."""
+
+
+def listed(entries: Sequence[FilesEntry], folder: Path) -> tuple[Listed, ...]:
+    """Every file of every entry, sorted by path.
+
+    Parameters
+    ----------
+    entries : `rig.files` of the config
+    folder : the config's folder, which relative paths start from
+
+    Raises
+    ------
+    ConfigError : when a path matches no file, or two entries read the same of a file
+    """
+    found: list[Listed] = []
+    faults: list[str] = []
+    for number, entry in enumerate(entries):
+        place = f"rig.files.{number}"
+        paths = matching(folder, entry.path)
+        found += [Listed(path, entry, number) for path in paths]
+        if not paths:
+            hint = f"; {entry.source}" if entry.source else "; the path is relative to the config's folder"
+            faults.append(f"{place}.path: no such file under {folder}{hint} (got {entry.path!r})")
+    faults += _read_twice(found)
+    if faults:
+        raise ConfigError(faults)
+    return tuple(sorted(found, key=lambda one: (one.path.as_posix(), one.number)))
+
+
+def _read_twice(found: Sequence[Listed]) -> list[str]:
+    """Pairs of entries that read the same of a file; each may take other tables, columns or tests."""
+    first: dict[tuple[Path, str], Listed] = {}
+    pairs: dict[tuple[int, int], list[Path]] = {}
+    for one in found:
+        way = one.entry.model_dump_json(include={"layout", "columns", "table", "split"})
+        before = first.setdefault((one.path.resolve(), way), one)
+        if before is not one:
+            pairs.setdefault((before.number, one.number), []).append(one.path)
+    faults: list[str] = []
+    for (first_number, number), paths in pairs.items():
+        earlier, later = _entry(found, first_number), _entry(found, number)
+        more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
+        faults.append(
+            f"rig.files.{number}.path: reads {paths[0].name}{more}, which rig.files.{first_number} reads too"
+            f"{_settings(earlier, later)}; each test belongs to one entry: narrow one of the paths "
+            f"(got {earlier.path!r} and {later.path!r})"
+        )
+    return faults
+
+
+def _entry(found: Sequence[Listed], number: int) -> FilesEntry:
+    return next(one.entry for one in found if one.number == number)
+
+
+def _settings(one: FilesEntry, other: FilesEntry) -> str:
+    """Under which settings, where two entries name different ones."""
+    if one.setting == other.setting:
+        return ""
+    return f", as setting {one.setting or 'without a name'} and {other.setting or 'without a name'}"
+
+
+def matching(folder: Path, pattern: str) -> list[Path]:
+    """Files that a path or glob pattern of the config names, seen from the config's folder."""
+    literal = folder / pattern
+    if literal.is_file():
+        return [literal]
+    whole = str(Path(glob.escape(str(folder))) / pattern)
+    found = [Path(path) for path in glob.glob(whole, recursive=True)]  # noqa: PTH207  # Path.glob takes no absolute patterns
+    return [path for path in found if path.is_file()]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Accepted tests as records with all their channels, and the names of the records.
+
+
+def measured(name: str, test: Test, freed: Freed, limits: Limits, control: Control) -> Measured:
+    """The record of a test, with velocity and acceleration recorded or derived.
+
+    Parameters
+    ----------
+    name : what the record is called
+    test : the test as the rig measured it
+    freed : displacement and force of the damper alone
+    limits : what the stand can do
+    control : the control signal
+    """
+    time = test.channels[TIME]
+    run = cycles(time, freed.displacement)
+    clean = kinematics(time, freed.displacement, run)
+    # A velocity recorded on the frame's side is not the damper's: it is derived anew.
+    recorded = test.channels if freed.on_the_damper else {}
+    record = Record(
+        name,
+        test.setting,
+        time,
+        freed.displacement,
+        recorded.get(VELOCITY, clean.velocity),
+        recorded.get(ACCELERATION, clean.acceleration),
+        freed.force,
+        *(test.channels.get(quantity) for quantity in (VOLTAGE, TEMPERATURE, PRESSURE)),
+    )
+    return Measured(record, run, clean, limits, freed.said or None, control, test.remarks, _ingested(name, test, freed))
+
+
+def _ingested(name: str, test: Test, freed: Freed) -> tuple[IngestRow, ...]:
+    """What was done to the file of a record, as rows of the ingest report."""
+    steps = (*test.steps, *([ReadingStep("fixture", None, freed.said, "taken out")] if freed.said else []))
+    return tuple(
+        IngestRow(record=name, file=test.sheet.path.name, step=s.step, quantity=s.quantity, was=s.was, became=s.became)
+        for s in steps
+    )
+
+
+def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:
+    """The name of every record, by the file and the number of the test in it.
+
+    Parameters
+    ----------
+    tests : file, and number of the test in it (None where the file holds one)
+
+    Returns
+    -------
+    the file's stem; with the parent folder in front where stems are equal; then -1, -2
+
+    Raises
+    ------
+    ConfigError : when two records would have one name
+    """
+    files = list(dict.fromkeys(path for path, _ in tests))
+    stems = Counter(safe_name(path.stem) for path in files)
+    called = [_called(path, number, stems) for path, number in tests]
+    first: dict[str, Path] = {}
+    faults: list[str] = []
+    for name, (path, _) in zip(called, tests, strict=True):
+        if name in first:
+            faults.append(f"rig.files: two records would be called {name}: {first[name]} and {path}; rename one")
+        first.setdefault(name, path)
+    if faults:
+        raise ConfigError(faults)
+    return tuple(called)
+
+
+def _called(path: Path, number: int | None, stems: Counter[str]) -> str:
+    stem = safe_name(path.stem)
+    whole = stem if stems[stem] == 1 else safe_name(f"{path.resolve().parent.name}-{path.stem}")
+    return whole if number is None else f"{whole}-{number}"
+
+
+# ----------------------------------------------------------------------------------------------------
+# A regular clock whose stamps a file gives with few digits: the samples are where the clock was, not where it says.
+#
+# At 512 Hz and stamps of 1 ms the steps are 1 and 2 ms; a speed derived over them would be wrong by as much.
+
+
+FEWEST = 50
+"""Fewer samples do not tell a rounded clock from one that wavers."""
+FEWEST_OF_EACH = 10
+"""Rounding makes two steps of one, multiples of the resolution that are neighbours, each so often at least.
+
+Reason: a sample that was lost is a step of two as well, and evenly spaced only by chance from some of them on."""
+ROUNDED_BY = 0.75
+"""Of the resolution, how far a stamp may lie from the line through all.
+
+Reason: rounding moves it by half the resolution to either side, and the line itself is found from rounded stamps."""
+SAME_STEP = 1e-3
+"""Steps that differ by less than this share of the usual one are the same, written with many digits."""
+
+
+def on_regular_clock(test: Test) -> Test:
+    """The test with the stamps of its clock unrounded; as it is where its clock shows no rounding.
+
+    Parameters
+    ----------
+    test : its time rising
+    """
+    time = test.channels[TIME]
+    unrounded = _unrounded(time)
+    if unrounded is None:
+        return test
+    regular, resolution = unrounded
+    rate = (time.size - 1) / (regular[-1] - regular[0])
+    step = ReadingStep("clock", TIME.name, f"stamps rounded to {resolution:.3g} s", f"a regular clock of {rate:.6g} Hz")
+    return replace(test, channels={**test.channels, TIME: regular}, steps=(*test.steps, step))
+
+
+def _unrounded(time: Array) -> tuple[Array, float] | None:
+    """(n,) instants of a regular clock [s] and the resolution [s] to which it is rounded; None without any.
+
+    Equation: t_i = t_0 + i/f, least squares over all stamps
+    """
+    if time.size < FEWEST:
+        return None
+    steps = np.sort(np.diff(time))
+    usual = float(steps[steps.size // 2])
+    groups = np.split(steps, np.flatnonzero(np.diff(steps) > SAME_STEP * usual) + 1)
+    shorter, longer = groups[0], groups[-1]
+    if len(groups) != 2 or min(shorter.size, longer.size) < FEWEST_OF_EACH:
+        return None
+    resolution = float(longer.mean() - shorter.mean())
+    order = np.arange(time.size)
+    slope, begin = np.polyfit(order, time, 1)
+    regular: Array = begin + slope * order
+    if np.max(np.abs(time - regular)) > ROUNDED_BY * resolution:
+        return None
+    return regular, resolution
+
+
+# ----------------------------------------------------------------------------------------------------
 
 
 def read(

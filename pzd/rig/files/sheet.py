@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pzd.record import Array
-from pzd.schema.errors import at
+from pzd.schema.errors import DataError, at
+
+# ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -92,3 +96,280 @@ class Sheet:
 def table_place(path: Path, table: str) -> str:
     """A file, and the table in it where that has a name."""
     return f"{path}:{table}" if table else at(path)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The tables that a file of named columns holds, and the one sheet that is read from them.
+#
+# A workbook has several sheets, a TDMS or MDF file several groups, a MATLAB or JSON file several structures: every
+# table that holds a recording is one, the others are left out and said so.
+
+
+Cells = Array | list[str]
+"""One column: numbers (an empty cell is NaN), or texts."""
+
+MOST_FAULTS = 5
+"""Faults of one kind that are listed for one column."""
+_UNITS, _VALUES = ("unit", "units"), ("values", "value", "data")
+"""Keys under which a structure holds the unit and the samples of one column."""
+
+
+@dataclass(frozen=True, eq=False)
+class FileTable:
+    """Named columns of one length."""
+
+    name: str
+    """Name of the sheet, group or structure; empty where the file is one table."""
+    header: tuple[str, ...]
+    cells: tuple[Cells, ...]
+    """One a column, all of one length."""
+    units: tuple[str, ...] | None = None
+    """Unit of every column where the file says it apart from the header."""
+    lines: NDArray[np.int64] | None = None
+    """(rows,) line of every data row in the file, None where a format has no lines."""
+    header_line: int | None = None
+    """Line of the headers, None where a format has no lines."""
+
+    @property
+    def rows(self) -> int:
+        """Number of data rows."""
+        return len(self.cells[0]) if self.cells else 0
+
+
+def sheet_of(path: Path, tables: Sequence[FileTable], pattern: str | None, wanted: Wanted) -> Sheet:
+    """The wanted columns of every table that holds a recording, one below the other.
+
+    Parameters
+    ----------
+    path : the file
+    tables : what its format found in it
+    pattern : name or pattern of the tables to read; every one where nothing is said
+    wanted : the columns to read
+
+    Raises
+    ------
+    DataError : when there is no such table, none has rows, or two of them differ in columns or units that are wanted
+    """
+    filled = [table for table in tables if table.rows]
+    if not filled:
+        raise DataError(f"{at(path)}: no table with data rows")
+    named = [table for table in filled if pattern is None or fnmatchcase(table.name, pattern)]
+    if not named:
+        raise DataError(f"{at(path)}: no table {pattern!r} (got {', '.join(table.name for table in filled)})")
+    taken = [table for table in named if _matches(table, wanted) == len(wanted.needed)]
+    taken = taken or [max(named, key=lambda table: _matches(table, wanted))]
+    first = taken[0]
+    asked = wanted.numbers | wanted.texts
+    faults = [fault for other in taken[1:] for fault in _differences(path, first, other, asked)]
+    if faults:
+        raise DataError(faults)
+    starts = tuple(int(start) for start in np.cumsum([0, *(table.rows for table in taken[:-1])]))
+    bare = Sheet(
+        path,
+        first.header,
+        first.header_line,
+        first.units,
+        sum(table.rows for table in taken),
+        None if first.lines is None else np.concatenate([t.lines for t in taken if t.lines is not None]),
+        starts=starts,
+        tables=tuple(table.name for table in taken),
+        elsewhere={head: table.name for table in filled if table not in taken for head in table.header},
+        steps=tuple(_steps(filled, taken, asked)),
+    )
+    return _with_cells(bare, taken, wanted)
+
+
+def tables_of_tree(
+    tree: Mapping[str, Any], name: str = "", constants: Mapping[str, float] | None = None
+) -> list[FileTable]:
+    """The tables of a tree of structures: arrays of one length in one structure are the columns of one table.
+
+    Parameters
+    ----------
+    tree : name -> array (n,) or (n, k), list, number, text, or a structure below
+    name : what the structure is called, its parents in front; empty at the top
+    constants : numbers of the parents
+
+    Returns
+    -------
+    tables, each with the single numbers beside and above it as columns of one value behind its own
+    """
+    columns: dict[str, tuple[Cells, str]] = {}
+    numbers = dict(constants or {})
+    below: list[tuple[str, Mapping[str, Any]]] = []
+    for key, value in tree.items():
+        inner, unit = _leaf(value)
+        if isinstance(inner, Mapping):
+            below.append((key, inner))
+        elif isinstance(inner, list) and inner and all(isinstance(one, Mapping) for one in inner):
+            below += [(f"{key}.{n + 1}", one) for n, one in enumerate(inner)]
+        elif isinstance(inner, bool | int | float | np.number):
+            numbers[key] = float(inner)
+        else:
+            columns |= {head: (cells, unit) for head, cells in _columns(key, inner)}
+    found = _by_length(name, columns, numbers)
+    for key, inner in below:
+        found += tables_of_tree(inner, f"{name}.{key}" if name else key, numbers)
+    return found
+
+
+def table_of_rows(name: str, rows: Sequence[Mapping[str, Any]]) -> FileTable:
+    """The table of a list of rows, each a mapping of header to cell."""
+    header = list(dict.fromkeys(head for row in rows for head in row))
+    return FileTable(name, tuple(header), tuple(cells_of([row.get(head) for row in rows]) for head in header))
+
+
+def cells_of(values: Sequence[Any]) -> Cells:
+    """A column of loose cells: numbers where every filled cell is one, else texts."""
+    if all(value is None or (isinstance(value, int | float | np.number)) for value in values):
+        return np.array([np.nan if value is None else float(value) for value in values])
+    return ["" if value is None else spelled(value) for value in values]
+
+
+def spelled(value: Any) -> str:
+    """A cell as text: instants as ISO 8601 with microseconds, numbers as short as they are exact."""
+    if hasattr(value, "isoformat"):
+        try:
+            return str(value.isoformat(timespec="microseconds"))
+        except TypeError:  # a date without a time
+            return str(value.isoformat())
+    return f"{value:.15g}" if isinstance(value, float) else str(value).strip()
+
+
+def number(text: str) -> float:
+    """The number that a text is; infinities, NaN and what Python alone takes for one are none.
+
+    Raises
+    ------
+    ValueError : when it is no finite number
+    """
+    value = float(text)
+    if "_" in text or not np.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+def equal_lengths(name: str, columns: Mapping[str, tuple[Cells, str]]) -> list[FileTable]:
+    """Columns of one group as tables, one a length: channels of different rates are not one table."""
+    return _by_length(name, columns, {})
+
+
+def _by_length(name: str, columns: Mapping[str, tuple[Cells, str]], numbers: Mapping[str, float]) -> list[FileTable]:
+    lengths = list(dict.fromkeys(len(cells) for cells, _ in columns.values()))
+    found = []
+    for length in lengths:
+        mine = {head: both for head, both in columns.items() if len(both[0]) == length}
+        constant = {head: (np.full(length, value), "") for head, value in numbers.items() if head not in mine}
+        every: dict[str, tuple[Cells, str]] = {**mine, **constant}
+        units = tuple(unit for _, unit in every.values())
+        said = f"{name} of {length} rows".strip() if len(lengths) > 1 else name
+        found.append(
+            FileTable(said, tuple(every), tuple(cells for cells, _ in every.values()), units if any(units) else None)
+        )
+    return found
+
+
+def _leaf(value: Any) -> tuple[Any, str]:
+    """The samples of a column and its unit where a structure holds just these; else the value itself."""
+    if not isinstance(value, Mapping):
+        return value, ""
+    keys = {key.lower(): key for key in value}
+    unit = next((value[keys[key]] for key in _UNITS if key in keys), None)
+    samples = next((value[keys[key]] for key in _VALUES if key in keys), None)
+    return (samples, unit) if isinstance(unit, str) and samples is not None else (value, "")
+
+
+def _columns(key: str, value: Any) -> Iterator[tuple[str, Cells]]:
+    """One column, or one for each of the short side of a matrix; nothing where it is no list of samples."""
+    if isinstance(value, list):
+        if not all(value is None or isinstance(value, bool | int | float | str) for value in value):
+            try:
+                value = np.asarray(value, dtype=np.float64)
+            except (ValueError, TypeError):
+                return
+        else:
+            value = cells_of(value)
+    if isinstance(value, list):
+        yield key, value
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "biuf" and value.ndim in (1, 2):
+        numbers = np.asarray(value, dtype=np.float64)
+        if numbers.ndim == 1 or 1 in numbers.shape:
+            yield key, numbers.ravel()
+        else:
+            upright = numbers if numbers.shape[0] >= numbers.shape[1] else numbers.T
+            yield from ((f"{key}.{n + 1}", np.ascontiguousarray(column)) for n, column in enumerate(upright.T))
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "OU" and value.ndim == 1:
+        yield key, [str(cell).strip() for cell in value]
+
+
+def _matches(table: FileTable, wanted: Wanted) -> int:
+    """How many of the quantities that a recording must have stand in a table."""
+    return sum(bool(heads & set(table.header)) for heads in wanted.needed)
+
+
+def _differences(path: Path, first: FileTable, other: FileTable, asked: Iterable[str]) -> Iterator[str]:
+    """Where a second table cannot be read as the first is."""
+    for head in asked:
+        if (head in first.header) != (head in other.header):
+            holds, lacks = (first, other) if head in first.header else (other, first)
+            yield (
+                f"{table_place(path, lacks.name)}: no column {head!r}, which {holds.name!r} has; "
+                "read them by entries of their own, with table: NAME"
+            )
+        elif head in first.header and _unit(first, head) != _unit(other, head):
+            yield (
+                f"{table_place(path, other.name)}: {head!r} is in {_unit(other, head)!r} here and in "
+                f"{_unit(first, head)!r} in {first.name!r}; read them by entries of their own, with table: NAME"
+            )
+
+
+def _unit(table: FileTable, head: str) -> str:
+    return "" if table.units is None else table.units[table.header.index(head)]
+
+
+def _steps(tables: Sequence[FileTable], taken: Sequence[FileTable], asked: Iterable[str]) -> Iterator[ReadingStep]:
+    """Which tables and columns are read, and which are left out."""
+    names = ", ".join(repr(table.name) for table in taken if table.name)
+    yield ReadingStep("read", None, f"table {names}".strip(), f"{sum(table.rows for table in taken)} rows")
+    unread = list(dict.fromkeys(head for table in taken for head in table.header if head not in asked))
+    if unread:
+        yield ReadingStep("left out", None, f"columns {', '.join(unread)}", "")
+    for table in tables:
+        if table not in taken:
+            yield ReadingStep(
+                "left out", None, f"table {table.name!r}, {table.rows} rows", "no recording, or not asked for"
+            )
+
+
+def _with_cells(bare: Sheet, tables: Sequence[FileTable], wanted: Wanted) -> Sheet:
+    """The sheet with the wanted cells of every table, and what is wrong with them."""
+    for index, head in enumerate(bare.header):
+        unit = bare.units[index] if bare.units else ""
+        dated = "%S" in head or "%S" in unit
+        pieces = [table.cells[table.header.index(head)] for table in tables if head in table.header]
+        if head in wanted.texts or (dated and head in wanted.numbers):
+            bare.texts[index] = [cell if isinstance(cell, str) else spelled(float(cell)) for p in pieces for cell in p]
+        elif head in wanted.numbers:
+            values, faults = _numbers(bare, head, pieces)
+            bare.numbers[index] = values
+            if faults:
+                bare.faults[index] = faults
+    return bare
+
+
+def _numbers(sheet: Sheet, head: str, pieces: Sequence[Cells]) -> tuple[Array, list[str]]:
+    """A column as numbers, and the cells that are none."""
+    values, bad = np.full(sheet.rows, np.nan), []
+    for start, piece in zip(sheet.starts, pieces, strict=True):
+        if not isinstance(piece, list):
+            values[start : start + len(piece)] = piece
+            bad += [(start + int(row), "inf") for row in np.flatnonzero(np.isinf(piece))]
+            continue
+        for row, cell in enumerate(piece, start=start):
+            try:
+                values[row] = number(cell) if cell else np.nan
+            except ValueError:
+                bad.append((row, cell))
+    faults = [f"{sheet.place(row)}: {head}: a number is needed (got {cell!r})" for row, cell in bad[:MOST_FAULTS]]
+    more = len(bad) - len(faults)
+    return values, faults + ([f"{at(sheet.path)}: {head}: and {more} more"] if more > 0 else [])

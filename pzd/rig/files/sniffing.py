@@ -12,18 +12,211 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pzd.quantities import CHANNELS
+import numpy as np
+
+from pzd.quantities import (
+    ACCELERATION,
+    CHANNELS,
+    DISPLACEMENT,
+    FORCE,
+    PRESSURE,
+    TEMPERATURE,
+    TIME,
+    VELOCITY,
+    VOLTAGE,
+    Control,
+    Quantity,
+)
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, kind_of, unread
 from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in, tables_in
-from pzd.rig.files.headers import assigned, control_of
-from pzd.rig.files.sheet import Wanted
-from pzd.rig.files.tables import spelled
+from pzd.rig.files.layout import ALSO_READ, own_quantity
+from pzd.rig.files.sheet import Wanted, spelled
+from pzd.rig.files.units import UnitError, in_header, to_canonical
 from pzd.schema.errors import DataError, FilesError, at
+
+# ----------------------------------------------------------------------------------------------------
+# Which column of a rig file holds which quantity, guessed from its header in English, German, French or Spanish.
+
+
+_LOOKS_LIKE = {
+    TIME: r"^t$|^tout$|time|clock|zeit|\btemps\b|tiempo|^second|^sek",
+    DISPLACEMENT: r"^[xs]$|disp|^dist|pos|stroke|travel|lvdt|exten|weg|hub|federung|course|placement|desplaz|carrera",
+    VELOCITY: r"^v$|vel|speed|geschw|vitesse",
+    ACCELERATION: r"^a$|acc|beschl|acel",
+    FORCE: r"^f$|^for[cç]|force|load|kraft|effort|fuerza|carga",
+    TEMPERATURE: r"temp(?!s\b)|t[eé]mp[eé]r",
+    PRESSURE: r"^p$|press|druck|presi",
+}
+"""What headers of each quantity look like, a unit in brackets taken off."""
+CONTROLS = {
+    Control(): r"^u$|volt|spannung|tension|tensi[oó]n",
+    Control("current", "A"): r"^i$|current|strom|courant|corriente",
+}
+"""What the header of the control signal looks like."""
+_WITH_UNIT = {
+    TIME: "^t$",
+    DISPLACEMENT: "^[xs]$",
+    VELOCITY: "^v$",
+    ACCELERATION: "^a$",
+    FORCE: "^f$",
+    TEMPERATURE: "^t$",
+    PRESSURE: "^p$",
+}
+"""What names a quantity where a unit of it stands behind: `x_m`, `F_kN`, `T [degC]`."""
+_CONTROLS_WITH_UNIT = {
+    Control(): "^u$|ctrl|control|valve|piezo|coil",
+    Control("current", "A"): "^i$|ctrl|control|valve|coil",
+}
+"""The same of the control signal: `U_V`, `ctrl [V]`, `Coil/A`."""
+_LAST_WORD = re.compile(r"[ _/,]\s*([A-Za-zµ°%][A-Za-zµ°/²^0-9]*)$")
+_DEGREES = dict.fromkeys(("C", "°C", "deg C", "grad C", "Grad C"), "degC") | dict.fromkeys(("F", "°F", "deg F"), "degF")
+"""What headers call degrees, and pint does not or takes for coulombs and farads."""
+
+
+def control_of(headers: Sequence[str]) -> Control:
+    """The control signal that the headers show; a voltage where they show none."""
+    shown = [
+        control
+        for control, pattern in CONTROLS.items()
+        for header in headers
+        if (re.search(pattern, _bare(header)) and _word(header, None, Control()) not in (FORCE, DISPLACEMENT))
+        or _by_unit(header, None, control) is VOLTAGE
+    ]
+    return next(iter(shown), Control())
+
+
+def assigned(headers: Sequence[str], units: Sequence[str] | None, control: Control) -> dict[Quantity, str]:
+    """The header of every quantity that is found, each header for one quantity alone.
+
+    A column in a unit of the quantity is taken before one in volts or without a unit.
+    """
+    found: dict[Quantity, tuple[int, str]] = {}
+    for index, header in enumerate(headers):
+        below = units[index] if units else None
+        quantity = _word(header, below, control)
+        if quantity is None:
+            continue
+        canonical = is_canonical(header, quantity, control)
+        unit = unit_of(header, below, own_quantity(quantity, control))
+        rank = 3 if canonical else 2 if unit is not None else 0 if _in_brackets(header, units, index) else 1
+        if quantity not in found or rank > found[quantity][0]:
+            found[quantity] = (rank, header)
+    return {quantity: found[quantity][1] for quantity in CHANNELS if quantity in found}
+
+
+def is_canonical(header: str, quantity: Quantity, control: Control) -> bool:
+    """Whether a header is read without being named."""
+    return header in (own_quantity(quantity, control).column, ALSO_READ.get(quantity))
+
+
+def unit_of(header: str, below: str | None, quantity: Quantity) -> str | None:
+    """The unit that the row of units or the header names, as pint spells it; None where it is none of the quantity."""
+    last = _LAST_WORD.search(header)
+    told = below.strip("[]() ") if below and below.strip("[]() ") else in_header(header, quantity) or (last and last[1])
+    if not told:
+        return None
+    unit = _DEGREES.get(told, told) if quantity is TEMPERATURE else told
+    try:
+        to_canonical(np.zeros(1), unit, quantity)
+    except UnitError:
+        return None
+    return unit
+
+
+def _word(header: str, below: str | None, control: Control) -> Quantity | None:
+    """The quantity that a header names; where it names two (Druckkraft, load cell voltage) the mechanical one."""
+    for quantity in CHANNELS:
+        if is_canonical(header, quantity, control):
+            return quantity
+    if (meant := _by_unit(header, below, control)) is not None:
+        return meant
+    bare = _bare(header)
+    for quantity in (FORCE, DISPLACEMENT, VELOCITY, ACCELERATION, TIME, TEMPERATURE, PRESSURE):
+        if re.search(_LOOKS_LIKE[quantity], bare):
+            return quantity
+    return VOLTAGE if re.search(CONTROLS[control], bare) else None
+
+
+def _by_unit(header: str, below: str | None, control: Control) -> Quantity | None:
+    """The quantity that a header means by the unit behind it; None where there is none."""
+    word = _LAST_WORD.sub("", _bare(header))
+    for quantity, pattern in {**_WITH_UNIT, VOLTAGE: _CONTROLS_WITH_UNIT[control]}.items():
+        if re.search(pattern, word) and unit_of(header, below, own_quantity(quantity, control)) is not None:
+            return quantity
+    return None
+
+
+def _in_brackets(header: str, units: Sequence[str] | None, index: int) -> bool:
+    """Whether a header has a unit in brackets, whatever it is a unit of."""
+    return bool(units and units[index]) or bool(re.search(r"[\[(].*[\])]", header))
+
+
+def _bare(header: str) -> str:
+    return re.sub(r"[\[(].*", "", header).strip().lower()
+
+
+# ----------------------------------------------------------------------------------------------------
+# What the names of rig files tell that no column holds: control signal, temperature, and how the clickers stood.
+
+
+_NUMBER = r"(?<![A-Za-z0-9])([0-9]+(?:[.x,][0-9]+)?)"
+_VALUES = {
+    "voltage": re.compile(rf"{_NUMBER}(mV|kV|V)(?![A-Za-z])"),
+    "current": re.compile(rf"{_NUMBER}(mA|A)(?![A-Za-z])"),
+    "temperature": re.compile(rf"{_NUMBER}(degC|C)(?![A-Za-z])"),
+}
+"""150V, 0x5A, 22degC."""
+_CLICKERS = ("C[0-9]+_?R[0-9]+", "(?i:[ck]lick(?:er|s)?[ _-]?[0-9]+)", "(?i:[0-9]+[ _-]?[ck]lick(?:er|s)?)")
+"""C08_R12 (clicks from closed in compression and rebound), click5, 5 clicks, Klick-5."""
+
+
+def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
+    """The pattern that finds a quantity in every name, and its unit; None where a name lacks it or units differ.
+
+    Parameters
+    ----------
+    stems : names of files, without their ending
+    name : `voltage`, `current` or `temperature`
+    """
+    matches = [_VALUES[name].search(stem) if name in _VALUES else None for stem in stems]
+    units = {match[2] for match in matches if match}
+    if not all(matches) or len(units) != 1:
+        return None
+    (unit,) = units
+    return f"(?P<{name}>[0-9.x]+){unit}(?![A-Za-z])", {"C": "degC"}.get(unit, unit)
+
+
+def setting_in_names(stems: Sequence[str]) -> str | None:
+    """The pattern that finds in every name how the clickers stood; None where a name does not say it."""
+    patterns = (f"(?<![A-Za-z0-9])(?P<setting>{clickers})(?![A-Za-z0-9])" for clickers in _CLICKERS)
+    return next((one for one in patterns if all(re.search(one, stem) for stem in stems)), None)
+
+
+def one_pattern(patterns: Sequence[str], stems: Sequence[str]) -> str | None:
+    """One pattern for all that several find, in the order of the names; None where names have no common order."""
+    found = sorted(patterns, key=lambda one: _begin(one, stems[0]))
+    whole = ".*?".join(found)  # as little as can be between them: else a first digit is lost
+    return whole if found and all(re.search(whole, stem) for stem in stems) else None
+
+
+def setting_of(pattern: str | None, path: Path) -> str | None:
+    """The setting that a pattern finds in the name of a file; None where it finds none."""
+    found = (re.search(pattern, path.stem) or re.search(pattern, path.name)) if pattern else None
+    return found.groupdict().get("setting") if found else None
+
+
+def _begin(pattern: str, stem: str) -> int:
+    found = re.search(pattern, stem)
+    return found.start() if found else 0
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 MOST_LINES = 400
 """Lines from the top that are looked at."""
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_SNIFFING_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _CLOCK = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d{1,2}:\d{2}(:\d{2}.*)?|\d{4}-\d{2}-\d{2}T.*")
 _UNIT = re.compile(r"[\[(]?\s*[A-Za-zµ°%/²³^*.0-9-]{1,8}\s*[\])]?|-")
 
@@ -162,4 +355,4 @@ def _table(
 def _numbers(row: list[str], decimal: str) -> int:
     """Cells of a row that are numbers, or a date or time."""
     spelled = [cell.replace(",", ".") if decimal == "," and "." not in cell else cell for cell in row]
-    return sum(bool(_NUMBER.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in spelled)
+    return sum(bool(_SNIFFING_NUMBER.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in spelled)

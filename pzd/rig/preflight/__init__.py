@@ -16,13 +16,12 @@ from types import ModuleType
 import numpy as np
 
 from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig, extent
+from pzd.parallel.processes import parallel_map
 from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
-from pzd.schema.processes import parallel_map
-from pzd.signals.cycles import Cycles
+from pzd.signals.cycles import Cycles, remember
 from pzd.signals.kinematics import Kinematics
-from pzd.signals.repeating import remember
 
 
 @dataclass(frozen=True, eq=False)

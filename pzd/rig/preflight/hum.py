@@ -7,7 +7,7 @@ import numpy as np
 from pzd.artefacts import Finding
 from pzd.record import Array, is_constant, voltage_scale
 from pzd.rig.preflight import Measured
-from pzd.signals.mains import LEAST_RATE, MAINS, lines
+from pzd.signals.harmonics import LEAST_RATE, MAINS, lines
 
 SHARE = 0.002
 """Smallest amplitude that is said, as a share of half the range."""

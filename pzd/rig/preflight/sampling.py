@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import Measured
-from pzd.schema.wording import counted
+from pzd.schema.errors import counted
 
 LOST = 1.5
 """A step longer than this many median steps has lost samples."""

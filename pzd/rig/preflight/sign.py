@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import Measured
-from pzd.signals.work import work, work_of_chance
+from pzd.signals.smoothing import work, work_of_chance
 
 
 def check(test: Measured) -> list[Finding]:

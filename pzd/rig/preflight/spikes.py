@@ -7,7 +7,7 @@ import numpy as np
 from pzd.artefacts import Finding
 from pzd.record import from_neighbours, glitches
 from pzd.rig.preflight import Measured
-from pzd.schema.wording import counted
+from pzd.schema.errors import counted
 
 EDGE = 3
 """Samples at either end of force and displacement that have too few neighbours to tell a spike from a kink."""

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, model_validator
 
-from pzd.damper.competing_forms import known
+from pzd.damper.confounders import known
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.rig.stand.programmes import Temperature, Voltage
 from pzd.rig.stand.waveform import Waveform
 from pzd.rig.stand.waveforms import waveforms
-from pzd.schema.filename import safe_name
-from pzd.schema.model import Frozen
+from pzd.schema.model import Frozen, safe_name
 
 if TYPE_CHECKING:
     WaveformBlock = Waveform

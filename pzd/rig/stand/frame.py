@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pzd.damper.compiled.kernels import K, row_of, stroke_straight
 from pzd.damper.compose import (
     element_rows,
     forces_beside,
@@ -17,7 +18,6 @@ from pzd.damper.compose import (
     sensors_of,
     voltage_at_valve,
 )
-from pzd.damper.kernels import K, row_of, stroke_straight
 from pzd.damper.march import deflections
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion

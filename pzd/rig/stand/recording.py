@@ -7,6 +7,7 @@ a periodic motion gives a periodic force from the first sample on.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -19,13 +20,133 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.quantities import Control
 from pzd.record import Array, Record
-from pzd.rig.stand.config import PlannedRecord, StandTest, VirtualEntry
+from pzd.rig.stand.config import ChannelNoise, PlannedRecord, StandTest, VirtualEntry
 from pzd.rig.stand.frame import force_in_frame
 from pzd.rig.stand.programmes import Warming, voltage_over
-from pzd.rig.stand.sensors import draw_for, sensed
 from pzd.rig.stand.waveform import started
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import Kinematics, kinematics
+from pzd.signals.noise import recursion
+
+# ----------------------------------------------------------------------------------------------------
+# What the sensors make of the truth: gain, offset, noise and resolution, each drawn by the record's name.
+
+
+def draw_for(seed: int, *names: str) -> np.random.Generator:
+    """Random numbers that depend on the seed and these names alone, whatever else is drawn.
+
+    Parameters
+    ----------
+    seed : of the run
+    names : e.g. the record and the channel
+    """
+    digests = [hashlib.blake2b(name.encode(), digest_size=8).digest() for name in names]
+    key = tuple(int.from_bytes(digest, "little") for digest in digests)
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+
+
+def coloured(count: int, rho: float, draw: np.random.Generator) -> Array:
+    """Stationary Gaussian noise of unit variance.
+
+    Equation: e_i = rho e_(i-1) + sqrt(1 - rho^2) g_i, e_0 = g_0      Source: AR(1)
+
+    Parameters
+    ----------
+    count : number of samples
+    rho : correlation from one sample to the next
+    draw : where the numbers come from
+
+    Returns
+    -------
+    (count,)
+    """
+    innovations = draw.standard_normal(count)
+    innovations[1:] *= math.sqrt(1.0 - rho**2)
+    return recursion(rho, innovations)
+
+
+def sensed(truth: Array, noise: ChannelNoise, resolution: float, draw: np.random.Generator) -> Array:
+    """A channel with its noise, rounded to what it can show.
+
+    Parameters
+    ----------
+    truth : (n,) what is there
+    noise : size and colour of the noise
+    resolution : smallest step; 0 for none
+    draw : where the numbers come from
+
+    Returns
+    -------
+    (n,) what is recorded
+    """
+    size = noise.absolute + noise.share_of_peak * float(np.max(np.abs(truth)))
+    shown = truth + size * coloured(truth.size, noise.rho, draw) if size > 0.0 else truth
+    return np.round(shown / resolution) * resolution if resolution > 0.0 else shown
+
+
+# ----------------------------------------------------------------------------------------------------
+# How a damper warms with the work done on it, and what the warmth does to its force.
+
+
+_ROUNDS = 20
+_SETTLED = 1e-6
+"""Change of the temperature in a round that ends the search [K]."""
+
+
+def temperature_over(warming: Warming, time: Array, displacement: Array, force: Array) -> Array:
+    """Temperature of the damper; constant before time 0.
+
+    Equation: C_h dT/dt = F v - G (T - T_ambient)           Source: heat balance of one lump
+
+    Parameters
+    ----------
+    warming : start, surroundings, heat capacity C_h and loss G
+    time : (n,) at equal steps [s]
+    displacement : (n,) [m]
+    force : (n,) [N]
+
+    Returns
+    -------
+    (n,) temperature [degC]
+    """
+    ambient = warming.start_degC if warming.ambient_degC is None else warming.ambient_degC
+    step = float((time[-1] - time[0]) / (time.size - 1))
+    rate = warming.loss_W_per_K * step / warming.heat_capacity_J_per_K
+    decay = math.exp(-rate)
+    kept = -math.expm1(-rate) / rate if rate > 0.0 else 1.0
+    work = 0.5 * (force[1:] + force[:-1]) * np.diff(displacement)
+    first = max(int(np.searchsorted(time, -0.5 * step)), 0)
+    above = np.concatenate(([warming.start_degC - ambient], kept * work[first:] / warming.heat_capacity_J_per_K))
+    return ambient + np.concatenate((np.full(first, above[0]), recursion(decay, above)))
+
+
+def warmed(
+    warming: Warming, time: Array, displacement: Array, force_at: Callable[[Array], Array]
+) -> tuple[Array, Array]:
+    """Force and temperature of a damper that warms, each computed from the other until they agree.
+
+    Parameters
+    ----------
+    warming : the heat balance
+    time : (n,) at equal steps [s]
+    displacement : (n,) [m]
+    force_at : gives the force (n,) [N] at a temperature (n,) [degC]
+
+    Returns
+    -------
+    (n,) force [N] and (n,) temperature [degC]
+    """
+    temperature = np.full(time.size, warming.start_degC)
+    for _ in range(_ROUNDS):
+        force = force_at(temperature)
+        last, temperature = temperature, temperature_over(warming, time, displacement, force)
+        if np.max(np.abs(temperature - last)) <= _SETTLED:
+            break
+    return force, temperature
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 ForceLaw = Callable[[Damper, Motion, float | None], Array]
 """Gives the force (n,) [N] of a damper in a motion of the actuator, behind a frame of this stiffness [N/m]."""
@@ -191,7 +312,6 @@ def _truth(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, law: Forc
             motion = replace(motion, temperature=np.full(motion.time.size, planned.temperature))
         return motion, law(entry.damper, motion, stiffness)
     # Imported where a damper warms: most do not.
-    from pzd.rig.stand.warming import warmed
 
     force, temperature = warmed(
         planned.temperature,

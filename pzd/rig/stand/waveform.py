@@ -5,12 +5,16 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from pzd.record import Array
 from pzd.schema.model import OneOfAKind
+
+# ----------------------------------------------------------------------------------------------------
+
 
 Course = Callable[[Array], tuple[Array, Array, Array]]
 """Displacement [m], velocity [m/s] and acceleration [m/s2] at any times (n,) [s], exactly."""
@@ -72,3 +76,35 @@ def started(course: Course, lead: float) -> Course:
         return x, v, a
 
     return motion
+
+
+# ----------------------------------------------------------------------------------------------------
+# What motions made of spectral lines have in common: a band, and the period after which they repeat.
+
+
+class Lines(Waveform):
+    """A motion of lines at the multiples of 1 / period inside a band."""
+
+    usual_cycles: ClassVar[int] = 2
+
+    low_Hz: float = Field(default=0.5, gt=0.0)
+    """Lowest frequency."""
+    high_Hz: float = Field(default=10.0, gt=0.0)
+    """Highest frequency."""
+    period_s: float = Field(default=10.0, gt=0.0)
+    """After which the motion repeats."""
+
+    @model_validator(mode="after")
+    def _has_lines(self) -> Self:
+        if int(self.high_Hz * self.period_s) < np.ceil(self.low_Hz * self.period_s):
+            raise ValueError("no multiple of 1 / period_s lies between low_Hz and high_Hz")
+        return self
+
+    def cycle(self, folder: Path) -> float:
+        """The period."""
+        return self.period_s
+
+    @property
+    def settling_time(self) -> float:
+        """Two turns at the lowest frequency, or a second."""
+        return two_turns(self.low_Hz)

@@ -6,7 +6,7 @@ import importlib
 import pkgutil
 from functools import cache
 
-from pzd.simulate.car import HalfCar
+from pzd.simulate.vehicle.car import HalfCar
 
 
 @cache

@@ -4,7 +4,7 @@ Mass and springs are the paper's. It leaves a1, a2, J_y and x_K out: these were 
 peaks of Figure 19 come near (wheelbase 2.96 m, J_y / (m a1 a2) = 0.80, K beside the driver).
 """
 
-from pzd.simulate.car import HalfCar
+from pzd.simulate.vehicle.car import HalfCar
 
 CAR = HalfCar(
     name="makowski2021",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.schema.model import Frozen
-from pzd.simulate.car import HalfCar
-from pzd.simulate.policy import Policy, Switch
+from pzd.simulate.policies import Policy, Switch
+from pzd.simulate.vehicle.car import HalfCar
 
 
 def switch(car: HalfCar, own: Frozen) -> Switch:  # the signature of every switch

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 from pzd.schema.model import Frozen
-from pzd.simulate.car import HalfCar
-from pzd.simulate.policies import wheel_load
-from pzd.simulate.policy import Policy, Switch
+from pzd.simulate.policies import Policy, Switch, wheel_load
+from pzd.simulate.vehicle.car import HalfCar
 
 
 def switch(car: HalfCar, own: Frozen) -> Switch:

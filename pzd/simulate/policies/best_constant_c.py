@@ -1,7 +1,7 @@
 """One damping coefficient at both axles for the whole ride, the best: what a well-chosen viscous damper could do."""
 
+from pzd.simulate.policies import Policy
 from pzd.simulate.policies.constant import feedback
-from pzd.simulate.policy import Policy
 
 POLICY = Policy(
     "best_constant_c",

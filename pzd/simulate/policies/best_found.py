@@ -13,7 +13,7 @@ from typing import Literal
 from pydantic import Field
 
 from pzd.schema.model import Frozen
-from pzd.simulate.policy import Policy
+from pzd.simulate.policies import Policy
 
 
 class BestFound(Frozen):

@@ -21,8 +21,8 @@ from pydantic import Field
 
 from pzd.record import Array
 from pzd.schema.model import Frozen
-from pzd.simulate.car import GRAVITY, HalfCar
-from pzd.simulate.policy import Policy
+from pzd.simulate.policies import Policy
+from pzd.simulate.vehicle.car import GRAVITY, HalfCar
 
 
 class ClippedLqr(Frozen):

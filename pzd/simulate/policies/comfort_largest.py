@@ -1,6 +1,6 @@
 """The paper's control with the largest forces of those that make |a_K| smallest, whatever `tie_break` says."""
 
-from pzd.simulate.policy import Policy
+from pzd.simulate.policies import Policy
 
 POLICY = Policy(
     "comfort_largest",

@@ -1,6 +1,6 @@
 """The paper's control with the least wheel loads of those that make |a_K| smallest."""
 
-from pzd.simulate.policy import Policy
+from pzd.simulate.policies import Policy
 
 POLICY = Policy(
     "comfort_least_load",

@@ -12,10 +12,10 @@ that was met. So one weight serves roads of any height, and loads that leave tho
 than comfort brings.
 
 The plant has the state of the oil, the lag of the valve, the adopted effects and the wheels
-(`pzd.simulate.prediction.plant`). Body, wheels, oil, acceleration and the road under each axle are sensed exactly, or
+(`pzd.simulate.control.prediction.plant`). Body, wheels, oil, acceleration and the road under each axle are sensed exactly, or
 as `simulate.sensors` gives them: then the height of the road is that of body less suspension, joined to its rise by a
-steady Kalman filter (`pzd.simulate.prediction.road_met`). The road ahead is known, or forecast from what has passed
-under the front axle (`pzd.simulate.prediction.road_ahead`); the rear axle meets it (a1 + a2) / speed later. What the
+steady Kalman filter (`pzd.simulate.control.prediction.road`). The road ahead is known, or forecast from what has passed
+under the front axle (`pzd.simulate.control.prediction.road`); the rear axle meets it (a1 + a2) / speed later. What the
 forecasts missed of late may come again: the ride is tried with it added and subtracted, and a choice must beat the best
 voltage held on by `margin`, times the share of the road's motion that was not foreseen.
 
@@ -30,7 +30,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from pzd.schema.model import Frozen
-from pzd.simulate.policy import Policy
+from pzd.simulate.policies import Policy
 
 
 class ComfortPredictive(Frozen):

@@ -1,5 +1,5 @@
 """The dampers as they are at one voltage, without control."""
 
-from pzd.simulate.policy import Policy
+from pzd.simulate.policies import Policy
 
 POLICY = Policy("passive", "the voltage stays where it is", "voltage")

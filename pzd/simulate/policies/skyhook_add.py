@@ -7,9 +7,8 @@ import math
 from pydantic import Field
 
 from pzd.schema.model import Frozen
-from pzd.simulate.car import HalfCar
-from pzd.simulate.policies import skyhook
-from pzd.simulate.policy import Policy, Switch
+from pzd.simulate.policies import Policy, Switch, skyhook
+from pzd.simulate.vehicle.car import HalfCar
 
 
 class SkyhookAdd(Frozen):

@@ -6,8 +6,8 @@ import numpy as np
 
 from pzd.record import Array
 from pzd.schema.model import Frozen
-from pzd.simulate.car import HalfCar
-from pzd.simulate.policy import Policy
+from pzd.simulate.policies import Policy
+from pzd.simulate.vehicle.car import HalfCar
 
 
 def feedback(car: HalfCar, damping: float, own: Frozen) -> Array:  # the signature of every feedback

@@ -9,7 +9,7 @@ from pydantic import Field
 from typing_extensions import override
 
 from pzd.record import Array
-from pzd.simulate.unevenness import Unevenness
+from pzd.simulate.road.unevenness import Unevenness
 
 
 class Bump(Unevenness):

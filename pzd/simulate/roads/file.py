@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from pzd.record import Array
 from pzd.schema.errors import DataError, FilesError
-from pzd.simulate.measured import MeasuredRoad
+from pzd.simulate.road.measured import MeasuredRoad
 
 _HEADER = "distance_m,height_m"
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from typing_extensions import override
 
 from pzd.record import Array
-from pzd.simulate.unevenness import Unevenness, flanked
+from pzd.simulate.road.unevenness import Unevenness, flanked
 
 
 class Hump(Unevenness):

@@ -16,8 +16,8 @@ from typing_extensions import override
 
 from pzd.record import Array
 from pzd.signals.iso8608 import classes, profile
-from pzd.simulate.profile import Profile, through
-from pzd.simulate.road import Road, Way
+from pzd.simulate.road.profile import Profile, through
+from pzd.simulate.roads import Road, Way
 
 _PIECE = 1000.0
 """The road is made of pieces of this length [m], ten times its longest wave, drawn one by one."""

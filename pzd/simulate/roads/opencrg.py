@@ -10,8 +10,7 @@ from typing_extensions import override
 
 from pzd.record import Array
 from pzd.schema.errors import ConfigError
-from pzd.simulate.measured import MeasuredRoad
-from pzd.simulate.opencrg import read_grid
+from pzd.simulate.road.measured import MeasuredRoad, read_grid
 
 
 class OpenCrg(MeasuredRoad):

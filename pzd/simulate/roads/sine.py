@@ -8,8 +8,8 @@ from typing import Literal
 from pydantic import Field
 from typing_extensions import override
 
-from pzd.simulate.profile import Profile
-from pzd.simulate.road import Road, Way
+from pzd.simulate.road.profile import Profile
+from pzd.simulate.roads import Road, Way
 
 
 class Sine(Road):

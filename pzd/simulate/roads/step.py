@@ -8,7 +8,7 @@ import numpy as np
 from typing_extensions import override
 
 from pzd.record import Array
-from pzd.simulate.unevenness import Unevenness
+from pzd.simulate.road.unevenness import Unevenness
 
 
 class Step(Unevenness):

@@ -10,8 +10,8 @@ from pydantic import Field, model_validator
 from typing_extensions import override
 
 from pzd.record import Array
-from pzd.simulate.profile import Profile, through
-from pzd.simulate.road import Road, Way
+from pzd.simulate.road.profile import Profile, through
+from pzd.simulate.roads import Road, Way
 
 _KNOTS_A_WAVE = 40
 """Of the shortest wave: a spline of degree five is then 1e-9 of its amplitude off."""

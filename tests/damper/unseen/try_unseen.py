@@ -15,8 +15,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from pzd.artefacts import Diagnosed, ForceRow, Table, TableNotes
+from pzd.blind.benchmark import COST, Methods, diagnose_case
 from pzd.blind.case import Places
-from pzd.blind.diagnosis import COST, Methods, diagnose_case
 from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.plan import PlannedCase, hideable
 from pzd.config import load

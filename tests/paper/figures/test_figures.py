@@ -17,13 +17,11 @@ import pytest
 
 from pzd.artefacts import base_of
 from pzd.config import RunConfig
-from pzd.paper.fidelity import rides_on
 from pzd.paper.figures.draw import FigureSet, _entry, drawn
-from pzd.paper.figures.models import tabulated
 from pzd.paper.figures.numbered import library
 from pzd.paper.figures.numbered.fig_07 import heating
-from pzd.paper.figures.planes import element, loop
-from pzd.paper.figures.sources import Condition, FigureData, Sine
+from pzd.paper.figures.planes import element, loop, tabulated
+from pzd.paper.figures.sources import Condition, FigureData, Sine, rides_on
 from pzd.paper.published import published
 
 SMALL, LARGE = "gap 0.15 mm", "gap 0.25 mm"
@@ -56,7 +54,7 @@ def row(voltage: float, warm: float, friction: float, damping: float) -> dict[st
 @pytest.fixture(scope="module")
 def data() -> FigureData:
     """A stand like the paper's, identified; nothing is missing from its damper."""
-    from pzd.identify.stage import identify
+    from pzd.identification.stage import identify
     from pzd.rig.stage import synthesise
 
     small = [row(u, 22, t0, c) for u, t0, c in ((0, 800, 10000), (100, 2000, 16000), (150, 3400, 14000))]

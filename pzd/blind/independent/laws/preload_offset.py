@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from numpy.random import Generator
 
-from pzd.blind.independent.scale import Scale
+from pzd.blind.independent.bingham import Scale
 
 NAME = "preload_offset"
 

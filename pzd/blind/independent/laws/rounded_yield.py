@@ -9,7 +9,7 @@ import math
 
 from numpy.random import Generator
 
-from pzd.blind.independent.scale import Scale
+from pzd.blind.independent.bingham import Scale
 
 NAME = "rounded_yield"
 

@@ -10,7 +10,7 @@ import math
 
 from numpy.random import Generator
 
-from pzd.blind.independent.scale import Scale
+from pzd.blind.independent.bingham import Scale
 
 NAME = "frame_stick_slip"
 DESCRIBED_BY: tuple[str, ...] = ()

@@ -10,7 +10,7 @@ import math
 
 from numpy.random import Generator
 
-from pzd.blind.independent.scale import Scale
+from pzd.blind.independent.bingham import Scale
 
 NAME = "position_grooves"
 DESCRIBED_BY: tuple[str, ...] = ()

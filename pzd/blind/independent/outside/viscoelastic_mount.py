@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
-from pzd.blind.independent.scale import Scale
+from pzd.blind.independent.bingham import Scale
 
 NAME = "viscoelastic_mount"
 DESCRIBED_BY: tuple[str, ...] = ()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.paper.figures.figure import Drawing, PaperFigure
-from pzd.paper.figures.scheme import OIL_COLOUR, Pen
+from pzd.paper.figures.canvas import OIL_COLOUR, Pen
+from pzd.paper.figures.numbered import Drawing, PaperFigure
 from pzd.paper.figures.sources import FigureData
 
 

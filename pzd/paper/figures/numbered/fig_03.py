@@ -1,6 +1,6 @@
 """Figure 3: the test stand and the power supply, photographs."""
 
-from pzd.paper.figures.figure import PaperFigure
+from pzd.paper.figures.numbered import PaperFigure
 
 FIGURE = PaperFigure(
     3,

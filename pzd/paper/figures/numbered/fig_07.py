@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.paper.figures.canvas import BASELINE, FINAL, SOFT, panels
-from pzd.paper.figures.figure import Drawing, PaperFigure
+from pzd.paper.figures.numbered import Drawing, PaperFigure
 from pzd.paper.figures.sources import FigureData
 from pzd.paper.published import published
 

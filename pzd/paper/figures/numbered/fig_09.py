@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.paper.figures.figure import Drawing, PaperFigure
+from pzd.paper.figures.numbered import Drawing, PaperFigure
 from pzd.paper.figures.planes import measured
 from pzd.paper.figures.sources import FigureData
 

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.paper.figures.canvas import BASELINE, FORCE, MEASURED, key, panels
-from pzd.paper.figures.figure import Drawing, PaperFigure
-from pzd.paper.figures.models import parameters
-from pzd.paper.figures.planes import fitted
+from pzd.paper.figures.numbered import Drawing, PaperFigure
+from pzd.paper.figures.planes import fitted, parameters
 from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.published import SMALL_GAP
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pzd.paper.figures.canvas import BASELINE, MEASURED
-from pzd.paper.figures.figure import Drawing, PaperFigure
+from pzd.paper.figures.numbered import Drawing, PaperFigure
 from pzd.paper.figures.planes import Curve, both_planes, fitted, over_last_cycle
 from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.published import SMALL_GAP

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.paper.figures.figure import Drawing, PaperFigure
-from pzd.paper.figures.models import modelled
+from pzd.paper.figures.numbered import Drawing, PaperFigure
+from pzd.paper.figures.planes import modelled
 from pzd.paper.figures.sources import Condition, FigureData, Sine
 from pzd.paper.published import LARGE_GAP
 

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from pzd.paper.figures.models import at_two_temperatures
+from pzd.paper.figures.planes import at_two_temperatures
 
 FIGURE = at_two_temperatures(15, 0.0, "without voltage")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pzd.paper.figures.figure import Drawing, PaperFigure
-from pzd.paper.figures.scheme import Pen
+from pzd.paper.figures.canvas import Pen
+from pzd.paper.figures.numbered import Drawing, PaperFigure
 from pzd.paper.figures.sources import FigureData
 
 _LEFT, _RIGHT, _BODY, _ROAD = 1.2, 6.0, 2.7, 0.75

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.paper.figures.canvas import FORCE, INK, SOFT, VELOCITY, key, panels
-from pzd.paper.figures.figure import Drawing, PaperFigure
+from pzd.paper.figures.numbered import Drawing, PaperFigure
 from pzd.paper.figures.sources import FigureData
 from pzd.report.drawing import shades
 

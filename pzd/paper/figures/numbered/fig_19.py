@@ -3,17 +3,224 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pzd.artefacts import RIDE_COLUMNS, WheelRow
-from pzd.paper.car_search import CONSTANT_PEAKS, CONTROLLED_PEAKS, FREQUENCIES
-from pzd.paper.figures.canvas import BASELINE, FINAL, key, panels
-from pzd.paper.figures.cars import survey
-from pzd.paper.figures.fidelities import fidelities
-from pzd.paper.figures.figure import Drawing, PaperFigure
-from pzd.paper.figures.sources import FigureData
+from pzd.artefacts import RIDE_COLUMNS, Rides, SummaryRow, WheelRow, base_of
+from pzd.comfort.iso2631_1978 import TRUST, Boundary, Exposure, exposure, shortest
+from pzd.paper.car_search import (
+    AMPLITUDE,
+    BOUNDS,
+    CONSTANT_PEAKS,
+    CONTROLLED_PEAKS,
+    DAMPING,
+    FREQUENCIES,
+    SPEED,
+    CarRow,
+    closest,
+    constant_peaks,
+    stored,
+)
+from pzd.paper.figures.canvas import BASELINE, COLOURS, FINAL, INK, SOFT, key, panels
+from pzd.paper.figures.numbered import Drawing, PaperFigure
+from pzd.paper.figures.sources import FigureData, SettingRides, rides_on
+from pzd.paper.published import LARGE_GAP, SMALL_GAP, published
+from pzd.report.ride_comfort import rated
 from pzd.schema.errors import ConfigError
+from pzd.simulate.control.demand import TIE_BREAKS
+from pzd.simulate.ride.energy import harmonic_response
+
+# ----------------------------------------------------------------------------------------------------
+# The controlled peaks of every plausible car under every tie-break.
+
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def survey(data: FigureData) -> Drawing:
+    """Peak at 4.5 Hz over peak at 2.25 Hz, a panel a tie-break, with the spread for 1 % in each parameter."""
+    rows = stored()
+    figure, axes = panels(width=10.2, height=3.9, ratios=(1.0, 1.0, 1.0))
+    captions = []
+    for ax, tie_break, colour in zip(axes, TIE_BREAKS, COLOURS, strict=False):
+        cars = [row for row in rows if row.tie_break == tie_break]
+        best = closest(cars)
+        _spread(ax, cars, SOFT, 0.7, "plausible cars, spread for 1 %")
+        ax.plot([c.controlled[0] for c in cars], [c.controlled[1] for c in cars], ".", color=colour, markersize=3.5)
+        _spread(ax, [best], INK, 1.0, "closest", 1.6)
+        ax.plot(*CONTROLLED_PEAKS, "o", color=BASELINE, markersize=11, markerfacecolor="none", label="paper", zorder=4)
+        ax.set_title(f"{ax.get_title(loc='left')} {tie_break}", loc="left", fontsize=9.5)
+        ax.set_xlabel("controlled peak at 2.25 Hz [m/s²]")
+        ax.set_ylabel("controlled peak at 4.5 Hz [m/s²]")
+        ax.set_xlim(0.0, 2.2)
+        ax.set_ylim(0.0, 2.2)
+        captions.append(_described(best))
+    key(figure, axes[0])
+    count = len({(row.a1_m, row.a2_m, row.pitch_inertia_kgm2, row.x_K_m) for row in rows if row.found == "survey"})
+    said = f"{count} plausible cars of a grid that meet both peaks with constant c within 5 %."
+    caption = f"{said} Closest: {' '.join(captions)}"
+    return Drawing("cars", figure, "Controlled peaks of all plausible cars under three tie-breaks.", caption)
+
+
+def _spread(ax: Axes, cars: list[CarRow], colour: str, alpha: float, label: str, width: float = 0.6) -> None:
+    x, y = [c.controlled[0] for c in cars], [c.controlled[1] for c in cars]
+    across = [
+        [c.controlled[0] - c.controlled_a_low_m_per_s2 for c in cars],
+        [c.controlled_a_high_m_per_s2 - c.controlled[0] for c in cars],
+    ]
+    along = [
+        [c.controlled[1] - c.controlled_b_low_m_per_s2 for c in cars],
+        [c.controlled_b_high_m_per_s2 - c.controlled[1] for c in cars],
+    ]
+    ax.errorbar(
+        x,
+        y,
+        along,
+        across,
+        fmt="none",
+        ecolor=colour,
+        elinewidth=width,
+        alpha=alpha,
+        label=label,
+        zorder=3 if width > 1 else 1,
+    )
+
+
+def _described(row: CarRow) -> str:
+    return (
+        f"{row.tie_break} {row.miss:.1%} at worst (a1 {row.a1_m:g} m, a2 {row.a2_m:g} m, "
+        f"J_y {row.pitch_inertia_kgm2:g} kg m², x_K {row.x_K_m:g} m; constant {row.constant[0]:.3f} and "
+        f"{row.constant[1]:.3f}, controlled {row.controlled[0]:.3f} ({row.controlled_a_low_m_per_s2:.3f} to "
+        f"{row.controlled_a_high_m_per_s2:.3f} for 1 %) and {row.controlled[1]:.3f} "
+        f"({row.controlled_b_low_m_per_s2:.3f} to {row.controlled_b_high_m_per_s2:.3f}) m/s²)."
+    )
+
+
+# ----------------------------------------------------------------------------------------------------
+# What stands behind the peaks of Figure 19: how much the control does, and what a real damper leaves of it.
+
+
+_BOUNDARY: Boundary = "reduced_comfort"
+_NAMES = {"passive": "0 V", "comfort": "control"}
+
+
+@dataclass(frozen=True)
+class Bar:
+    """One ride: its peaks and its exposure times at both frequencies."""
+
+    name: str
+    colour: str
+    peaks: tuple[float, ...]
+    times: tuple[str, ...]
+
+
+def fidelities(data: FigureData) -> Iterator[Drawing]:
+    """Peaks of |a_K| by fidelity and gap."""
+    gaps = [_gap(data, setting) for setting in (LARGE_GAP, SMALL_GAP)]
+    bars = [*_of_the_paper(), *_ideal(data), *(bar for gap in gaps for bar in _real(data, gap))]
+    figure, axes = panels(width=10.2, height=0.55 + 0.3 * len(bars))
+    for n, (ax, frequency) in enumerate(zip(axes, FREQUENCIES, strict=True)):
+        for place, bar in enumerate(reversed(bars)):
+            ax.barh(place, bar.peaks[n], color=bar.colour, height=0.62)
+            ax.annotate(f"{bar.peaks[n]:.2f};  {bar.times[n]}", (bar.peaks[n], place), (4, 0), va="center",
+                        textcoords="offset points", fontsize=8.0)  # fmt: skip
+        ax.set_yticks(range(len(bars)), [bar.name for bar in reversed(bars)] if n == 0 else [])
+        ax.grid(visible=False, axis="y")
+        ax.set_xlim(0.0, 1.45 * max(bar.peaks[n] for bar in bars))
+        ax.set_xlabel(f"peak |a_K| at {frequency:g} Hz [m/s²];  exposure time in comfort")
+    floor = ", ".join(f"{gap.setting} at least {gap.least_damping:.0f} N s/m" for gap in gaps)
+    peaks = "; ".join(f"{bar.name} {' and '.join(f'{peak:.2f}' for peak in bar.peaks)}" for bar in bars)
+    caption = (
+        f"Peaks at 2.25 and 4.5 Hz [m/s²]: {peaks}. "
+        f"The damper's force over speed is nowhere below: {floor}; c_min = {BOUNDS[0]:g} N s/m is out of reach at any "
+        f"voltage. {_share(data)} Exposure times: reduced comfort of ISO 2631:1978, {TRUST}, "
+        "each harmonic by itself; beside the bars of the paper stand its own."
+    )
+    yield Drawing("fidelity", figure, "Peaks of |a_K| and exposure times, ideal, by table and dynamically.", caption)
+
+
+def _gap(data: FigureData, setting: str) -> SettingRides:
+    """Control by the table and dynamically, and the damper without voltage, on one setting of the valve."""
+    records = tuple(record for record in data.rig.records if record.setting == setting)
+    if not records:
+        raise LookupError(f"the rig has no tests at {setting}")
+    damper = base_of(data.identified.rows, setting)
+    rig = replace(data.rig, records=records)
+    real = data.simulate.model_copy(update={"policies": ("comfort", "passive"), "fidelities": ("table", "dynamic")})
+    return rides_on(damper, setting, rig, real, data.tabulate, data.control)
+
+
+def _of_the_paper() -> list[Bar]:
+    rows = published()
+
+    def times(policy: str) -> tuple[str, ...]:
+        return tuple(_minutes(rows[f"EXP{part}-{policy}"].number) for part in "ab")
+
+    return [
+        Bar("paper, constant c", SOFT, CONSTANT_PEAKS, times("c")),
+        Bar("paper, control", SOFT, CONTROLLED_PEAKS, times("ctrl")),
+    ]
+
+
+def _ideal(data: FigureData) -> list[Bar]:
+    car = data.simulate.car.car()
+    bars = []
+    for damping in (DAMPING, BOUNDS[0]):
+        peaks = constant_peaks(car, damping)
+        times = tuple(
+            _time(exposure(peak / 2.0**0.5, frequency, _BOUNDARY))
+            for peak, frequency in zip(peaks, FREQUENCIES, strict=True)
+        )
+        bars.append(Bar(f"constant c = {damping:g} N s/m", BASELINE, peaks, times))
+    rows = [data.ride(frequency, "comfort", "ideal") for frequency in FREQUENCIES]
+    return [*bars, _bar("control, ideal", COLOURS[0], data.rides_of_setting.rides, rows)]
+
+
+def _real(data: FigureData, gap: SettingRides) -> Iterator[Bar]:
+    colour = COLOURS[1] if gap.setting == LARGE_GAP else COLOURS[2]
+    for policy, fidelity in (("passive", "dynamic"), ("comfort", "table"), ("comfort", "dynamic")):
+        rows = [row for row in gap.rides.summary if (row.policy, row.fidelity) == (policy, fidelity)]
+        yield _bar(f"{gap.setting}, {_NAMES[policy]}, {fidelity}", colour, gap.rides, rows)
+
+
+def _bar(name: str, colour: str, rides: Rides, rows: list[SummaryRow]) -> Bar:
+    by_case = {ride.row.case: ride for ride in rated(rides)}
+    times = tuple(_time(shortest(by_case[row.case].components, _BOUNDARY)) for row in rows)
+    return Bar(name, colour, tuple(row.peak_abs_aK_m_per_s2 for row in rows), times)
+
+
+def _time(found: Exposure) -> str:
+    if found.minutes is None:
+        return found.remark
+    return found.remark if found.remark and found.minutes > 0.0 else _minutes(found.minutes)
+
+
+def _minutes(minutes: float) -> str:
+    return f"{minutes:.0f} min" if minutes < 120.0 else f"{minutes / 60.0:.1f} h"
+
+
+def _share(data: FigureData) -> str:
+    """How much of the gain c_min alone gives."""
+    car = data.simulate.car.car()
+    captions = []
+    soft = constant_peaks(car, BOUNDS[0])
+    for n, frequency in enumerate(FREQUENCIES):
+        constant = abs(harmonic_response(car, DAMPING, frequency, AMPLITUDE, SPEED)[1])
+        controlled = data.ride(frequency, "comfort", "ideal").peak_abs_aK_m_per_s2
+        share = (constant - soft[n]) / (constant - controlled)
+        gain = f"{share:.0%} of the gain" if share > 0.0 else "worse than the larger c"
+        captions.append(
+            f"{constant:.2f} to {controlled:.2f} m/s² at {frequency:g} Hz, where c_min alone gives {soft[n]:.2f}"
+            f" ({gain})"
+        )
+    return f"Control takes the peak from {' and from '.join(captions)}."
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 _SHOWN = 2.0
 """Length of what is shown of the settled ride [s]."""
@@ -66,7 +273,7 @@ def contact(data: FigureData) -> str:
     """The force between wheels and road in the controlled rides, in words.
 
     The paper's half-car has no unsprung masses: wheels without mass hand on the force of spring and damper, so that
-    the road feels it and the static load, see `pzd.simulate.outcome.wheel_rows`.
+    the road feels it and the static load, see `pzd.simulate.ride.outcome.wheel_rows`.
     """
     told = []
     for frequency in FREQUENCIES:

@@ -20,8 +20,7 @@ from types import ModuleType
 from typing import Any
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.sheet import Sheet, Wanted
-from pzd.rig.files.tables import FileTable, sheet_of
+from pzd.rig.files.sheet import FileTable, Sheet, Wanted, sheet_of
 from pzd.schema.errors import ConfigError, DataError, FilesError, UserError, at
 
 TEXT = "text"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import FileTable, cells_of, spelled
+from pzd.rig.files.sheet import FileTable, cells_of, spelled
 
 KIND = "an Excel file"
 SUFFIXES = (".xlsx", ".xlsm")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import FileTable, tables_of_tree
+from pzd.rig.files.sheet import FileTable, tables_of_tree
 
 KIND = "an HDF5 file"
 SUFFIXES = (".h5", ".hdf5", ".hdf")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import FileTable, table_of_rows, tables_of_tree
+from pzd.rig.files.sheet import FileTable, table_of_rows, tables_of_tree
 from pzd.schema.errors import DataError, at
 
 KIND = "a JSON file"

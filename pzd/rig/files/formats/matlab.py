@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import FileTable, tables_of_tree
+from pzd.rig.files.sheet import FileTable, tables_of_tree
 from pzd.schema.errors import DataError, at
 
 KIND = "a MATLAB file"

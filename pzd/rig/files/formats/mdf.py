@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import Cells, FileTable, equal_lengths
+from pzd.rig.files.sheet import Cells, FileTable, equal_lengths
 
 KIND = "an MDF file"
 SUFFIXES = (".mf4", ".mdf")

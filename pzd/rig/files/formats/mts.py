@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pzd.record import Array
 from pzd.rig.config import FilesEntry
 from pzd.rig.files.dialect import text_of
-from pzd.rig.files.tables import Cells, FileTable, number
+from pzd.rig.files.sheet import Cells, FileTable, number
 from pzd.schema.errors import DataError, at
 
 KIND = "a file of MTS's acquisition blocks"

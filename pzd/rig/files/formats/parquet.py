@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import FileTable, cells_of
+from pzd.rig.files.sheet import FileTable, cells_of
 
 KIND = "a Parquet file"
 SUFFIXES = (".parquet", ".pq")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.tables import Cells, FileTable, cells_of, equal_lengths
+from pzd.rig.files.sheet import Cells, FileTable, cells_of, equal_lengths
 from pzd.schema.errors import DataError, at
 
 KIND = "a TDMS file"

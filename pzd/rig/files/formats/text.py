@@ -19,11 +19,22 @@ from numpy.typing import NDArray
 
 from pzd.record import Array
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.dialect import BLANKS, after_lines, field_counts, fields_of, separator_of, text_of, without_blank_end
+from pzd.rig.files.dialect import (
+    BLANKS,
+    MOST_FAULTS,
+    after_lines,
+    field_counts,
+    fields_of,
+    hint,
+    refuse_another_header,
+    separator_of,
+    stands_again,
+    text_of,
+    uneven_lines,
+    without_blank_end,
+)
 from pzd.rig.files.sheet import ReadingStep, Sheet, Wanted
-from pzd.rig.files.text_faults import MOST_FAULTS, hint, refuse_another_header, stands_again, uneven_lines
-from pzd.schema.errors import DataError, at
-from pzd.schema.wording import counted
+from pzd.schema.errors import DataError, at, counted
 
 if TYPE_CHECKING:
     import pandas as pd

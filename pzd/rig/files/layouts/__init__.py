@@ -8,7 +8,7 @@ from pathlib import Path
 from pzd.quantities import Control
 from pzd.rig.config import FilesEntry, NamedLayout
 from pzd.schema.errors import ConfigError
-from pzd.schema.nearest import nearest
+from pzd.schema.model import nearest
 from pzd.schema.yamlfile import read_yaml
 
 _OWN = ("path", "layout", "source")

@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from pzd.rig.stand.spectral_lines import Lines
-from pzd.rig.stand.waveform import Course
+from pzd.rig.stand.waveform import Course, Lines
 from pzd.signals.harmonics import FourierSum
 
 

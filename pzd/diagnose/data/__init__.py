@@ -1,1 +1,0 @@
-"""Records made ready for the diagnosis: cleaned, some excluded, and split into what is fitted and what is not."""

@@ -1,0 +1,324 @@
+"""The force of a point of the search in one observation, and its slopes by the searched variables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.compiled.laws import ELEMENT
+from pzd.damper.compiled.rows import rows_along
+from pzd.damper.compose import (
+    constant_rows,
+    constant_value,
+    drive_row_of,
+    element_rows,
+    forces_beside,
+    integrated_sensitivities,
+    parallel_rows,
+    sensors_of,
+)
+from pzd.damper.confounders import known
+from pzd.damper.material import material_factors
+from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, RecordLikelihood
+from pzd.diagnosis.fit.parameters import Point, Problem, Unknown, Work
+from pzd.record import Array
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class LaidOut:
+    """The numbers of a damper as the kernels take them, along the motion of one observation."""
+
+    at_nodes: Array
+    """(k, r) parameter rows of the element at the nodes; without nodes (1, r), or (m, r) along the motion."""
+    beside: Array | None
+    """(1, b) or (m, b) rows of the forces beside it; None without any."""
+    sensors: Mapping[str, Mapping[str, float]]
+    """Parameters of the effects of the sensor, by effect and name."""
+    zero: float
+    """Of the displacement [m]."""
+    nodes: Array | None = None
+    """(k,) voltages [V]; None without nodes."""
+    effective: Array | None = None
+    """(m,) effective voltage [V], with which the rows go between the nodes."""
+
+    @cached_property
+    def rows(self) -> Array:
+        """(1, r) or (m, r) parameter rows of the element."""
+        return self._in_time(self.at_nodes)
+
+    def _in_time(self, at_nodes: Array) -> Array:
+        if self.nodes is None or self.effective is None:
+            return at_nodes
+        return rows_along(self.nodes, at_nodes, self.effective)
+
+    def change_to(self, other: LaidOut) -> Array:
+        """(1, r), (k, r) or (m, r) by how much the rows of another one are more, 0 where both are without limit."""
+        mine, others = (self.at_nodes, other.at_nodes) if self.effective is other.effective else (self.rows, other.rows)
+        shape = np.broadcast_shapes(mine.shape, others.shape)
+        return np.subtract(others, mine, out=np.zeros(shape), where=others != mine)
+
+    def in_time(self, change: Array) -> Array:
+        """(1, c) or (m, c) of what is given at the nodes, or as it stands, along the motion."""
+        return self._in_time(change) if self.nodes is not None and len(change) == self.nodes.size else change
+
+    def force_beside(self, o: RecordLikelihood) -> Array:
+        """(m,) force of what stands beside the element [N]; (1,) a zero without any."""
+        return np.zeros(1) if self.beside is None else forces_beside(o.motion.about(self.zero), self.beside)
+
+
+def laid_out(point: Point, o: RecordLikelihood) -> LaidOut:
+    """The numbers of a point along the motion of an observation."""
+    return _at_constant_voltage(point, o) if o.place >= 0 else _at_moving_voltage(point, o)
+
+
+def _at_constant_voltage(point: Point, o: RecordLikelihood) -> LaidOut:
+    friction, damping, stiffness = point.base[o.place]
+    effects = point.at(o.place)
+    rows, beside = constant_rows(friction, damping, stiffness, effects)
+    places = {name: known()[name].place for name in effects}
+    acting = {name: values for name, values in effects.items() if places[name] == "material"}
+    if acting:
+        given = {name: {key: np.array([value]) for key, value in values.items()} for name, values in acting.items()}
+        factors = material_factors(given, constant_value(o.motion.temperature), point.problem.reference)
+        rows = np.repeat(rows, len(factors), axis=0)
+        rows[:, : len(ELEMENT)] *= factors
+    sensors = {name: values for name, values in effects.items() if places[name] == "sensor"}
+    return LaidOut(rows, beside, sensors, point.zero)
+
+
+def _at_moving_voltage(point: Point, o: RecordLikelihood) -> LaidOut:
+    damper, temperature = point.damper, constant_value(o.motion.temperature)
+    effective = o.effective_voltage(drive_row_of(damper).tobytes())
+    beside, sensors = parallel_rows(damper, effective), sensors_of(damper)
+    if temperature is not None and temperature.size > 1:
+        return LaidOut(element_rows(damper, effective, temperature), beside, sensors, point.zero)
+    nodes = point.nodes(None if temperature is None else float(temperature[0]))
+    return LaidOut(nodes.rows, beside, sensors, point.zero, nodes.voltages, effective)
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Directions of the search from a point, as the kernels take them along the motion of one observation."""
+
+    here: LaidOut
+    pairs: Sequence[tuple[LaidOut, LaidOut, float]]
+    """On each direction a point before and one behind, and how far apart they are."""
+    moved: NDArray[np.int64]
+    """(c,) columns of the rows that a direction changes."""
+    along: Array
+    """(1, d, c) or (m, d, c) derivatives of these columns by each direction."""
+
+
+def directions(point: Point, beside: Sequence[tuple[Point, Point, float]], o: RecordLikelihood) -> Directions:
+    """Some directions of the search along the motion of an observation.
+
+    Parameters
+    ----------
+    point : from which they lead
+    beside : on each direction a point before and one behind it, and how far apart they are
+    o : the observation
+    """
+    here, pairs = laid_out(point, o), [(laid_out(a, o), laid_out(b, o), width) for a, b, width in beside]
+    changes = [before.change_to(after) / width for before, after, width in pairs]
+    moved = np.flatnonzero(np.any([np.any(change != 0.0, axis=0) for change in changes], axis=0))
+    along = [here.in_time(change[:, moved]) for change in changes]
+    return Directions(here, pairs, moved, np.stack(np.broadcast_arrays(*along), axis=1))
+
+
+def alike_at_one_voltage(point: Point) -> bool:
+    """Whether a point is laid out alike in all observations of one base row: nothing goes by their temperature."""
+    return all(known()[name].place != "material" for name in point.effects)
+
+
+def sensitivities(given: Directions, o: RecordLikelihood, work: Work) -> tuple[Array, Array]:
+    """The force at the compared samples of an observation, and its slopes along some directions of the search.
+
+    What the parameters make of the rows was differenced; from there on the path carries the derivatives along.
+
+    Parameters
+    ----------
+    given : the directions, laid out along the motion of this observation
+    o : the observation
+    work : counts what is simulated
+
+    Returns
+    -------
+    (n,) force [N], (n, d) slopes [N]
+    """
+    work.add(o.motion.time.size * (1 + len(given.pairs)))
+    beside = given.here.force_beside(o)
+    changes = [_change_beside(pair, o) for pair in given.pairs]
+    initial_slopes = np.array([-change[0] for change in changes])
+    force, slopes = integrated_sensitivities(
+        given.here.rows,
+        given.moved,
+        given.along,
+        o.motion,
+        o.steps,
+        o.begins_with - float(beside[0]),
+        initial_slopes,
+        SIMULATION_TOLERANCE,
+    )
+    force = force + beside
+    for j, change in enumerate(changes):
+        slopes[:, j] += change
+    if not given.here.sensors:
+        return o.at_compared(force), o.at_compared(slopes)
+    shown = o.shown(np.column_stack([force, slopes]), given.here.sensors)
+    for j, (before, after, width) in enumerate(given.pairs):
+        if before.sensors != after.sensors:
+            shown[:, 1 + j] += (o.shown(force, after.sensors) - o.shown(force, before.sensors)) / width
+    compared = o.at_compared(shown)
+    return compared[:, 0], compared[:, 1:]
+
+
+def _change_beside(pair: tuple[LaidOut, LaidOut, float], o: RecordLikelihood) -> Array:
+    """(m,) or (1,) derivative of the force of what stands beside the element along a direction [N]."""
+    before, after, width = pair
+    if before.zero == after.zero and _same(before.beside, after.beside):
+        return np.zeros(1)
+    return (after.force_beside(o) - before.force_beside(o)) / width
+
+
+def _same(one: Array | None, other: Array | None) -> bool:
+    return one is other is None or (one is not None and other is not None and np.array_equal(one, other))
+
+
+# ----------------------------------------------------------------------------------------------------
+# Residuals of observations at a point of the search, and their slopes by the searched variables.
+
+
+STEP = 1e-4
+"""Step of a searched variable to either side, over which its parameter, the effective voltage and what stands beside
+the element are differenced.
+
+Reason: far above rounding, and so short that a branch begins to slip at the same sample on either side; the path of the
+oil, whose own errors a longer step would have to drown, is not differenced."""
+
+
+@dataclass(frozen=True, eq=False)
+class BlockSlopes:
+    """Slopes of the residuals of observations, each by the variables that move it: a test has one voltage of many."""
+
+    free: int
+    """How many variables the search moves."""
+    blocks: tuple[tuple[tuple[int, ...], Array], ...]
+    """Of every observation the columns of the variables, and (w_o, columns) the slopes."""
+
+    def dense(self, columns: Sequence[int] | None = None) -> Array:
+        """(w, columns) slopes by some variables, or by all, zero where an observation does not move with one."""
+        wanted = range(self.free) if columns is None else columns
+        place = {j: i for i, j in enumerate(wanted)}
+        found = np.zeros((sum(len(block) for _, block in self.blocks), len(place)))
+        begin = 0
+        for own, block in self.blocks:
+            here = [i for i, j in enumerate(own) if j in place]
+            found[begin : begin + len(block), [place[own[i]] for i in here]] = block[:, here]
+            begin += len(block)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """What a point of the search leaves, and how that goes with the searched variables."""
+
+    residuals: tuple[Array, ...]
+    """(w_o,) an observation, in units of noise."""
+    simulated: tuple[Array, ...]
+    """(n,) an observation, force at the compared samples [N]."""
+    slopes: BlockSlopes
+    """Of all residuals by the searched variables."""
+
+    @property
+    def whole(self) -> Array:
+        """(w,) all residuals."""
+        return np.concatenate(self.residuals)
+
+
+def left_at(
+    problem: Problem,
+    unknowns: Sequence[Unknown],
+    x: Array,
+    limits: tuple[Array, Array],
+    wanted: Sequence[int] | None = None,
+) -> Left:
+    """Residuals and slopes at a point: together they cost little more than the residuals alone.
+
+    Parameters
+    ----------
+    problem : what is fitted to what
+    unknowns : of the effects
+    x : (3 b + e,) where they are taken, in the units of the search
+    limits : (free,) least and largest values of the variables that the search moves
+    wanted : the columns asked for, the others being zero; all where none are given
+    """
+    residuals, forces, blocks = [], [], []
+    for o, columns, force, slopes in _sensitivities_at(problem, unknowns, x, limits, wanted):
+        counted = o.in_noise(np.column_stack([o.measured - force, -slopes]))
+        residuals.append(counted[:, 0].copy())
+        forces.append(force)
+        blocks.append((columns, counted[:, 1:].copy()))
+    return Left(tuple(residuals), tuple(forces), BlockSlopes(limits[0].size, tuple(blocks)))
+
+
+def force_slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> BlockSlopes:
+    """Slopes of the force at the compared samples [N] by all searched variables; parameters as in `left_at`."""
+    limits = np.full(x.size, -np.inf), np.full(x.size, np.inf)
+    found = _sensitivities_at(problem, unknowns, x, limits, None)
+    return BlockSlopes(x.size, tuple((columns, slopes) for _, columns, _, slopes in found))
+
+
+def _sensitivities_at(
+    problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array], wanted: Sequence[int] | None
+) -> Iterator[tuple[RecordLikelihood, tuple[int, ...], Array, Array]]:
+    """Each observation with the variables that move it, the force (n,) and its slopes (n, columns); see `left_at`."""
+    low, high = limits
+    free = low.size
+    point, below, above = (
+        problem.point(x, unknowns),
+        np.maximum(x[:free] - STEP, low),
+        np.minimum(x[:free] + STEP, high),
+    )
+    asked = range(free) if wanted is None else wanted
+    beside = {
+        j: (
+            problem.point(_with(x, j, below[j]), unknowns),
+            problem.point(_with(x, j, above[j]), unknowns),
+            float(above[j] - below[j]),
+        )
+        for j in asked
+    }
+    alike, known = alike_at_one_voltage(point), dict[int, Directions]()
+    for o in problem.observations:
+        columns = tuple(j for j in moving(problem, unknowns, o, free) if j in beside)
+        if o.place not in known or o.place < 0 or not alike:
+            known[o.place] = directions(point, [beside[j] for j in columns], o)
+        yield o, columns, *sensitivities(known[o.place], o, problem.work)
+
+
+def moving(problem: Problem, unknowns: Sequence[Unknown], o: RecordLikelihood, free: int) -> list[int]:
+    """Which of the first `free` variables move the force of an observation: a test moves with its own voltage alone.
+
+    Parameters
+    ----------
+    problem : what is fitted to what
+    unknowns : of the effects
+    o : the observation
+    free : how many variables the search moves
+    """
+    rows = 3 * len(problem.base)
+    own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(rows)
+    effects = [j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]]
+    return [*own, *(rows + j for j in effects if rows + j < free)]
+
+
+def _with(x: Array, j: int, value: float) -> Array:
+    moved = x.copy()
+    moved[j] = value
+    return moved

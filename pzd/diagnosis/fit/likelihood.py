@@ -1,0 +1,469 @@
+"""One record as the evidence weighs it: what is simulated, what it is held against, and in which units of noise.
+
+A periodic record under constant conditions is its average cycle, harmonic by harmonic, each in
+units of its own noise; any other is its samples, whitened. What offset, gain and delay of the test
+may explain within their priors is taken out of both sides once and for all, so that a residual
+that is left counts as it should: |r|^2 is minus twice the logarithm of the likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.compose import respond, sampling_steps, sensors_of, shown_moments
+from pzd.damper.material import effective_voltage
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion
+from pzd.diagnosis.data import Prepared
+from pzd.diagnosis.fit.prediction import Predicted, motion_of, warms
+from pzd.identification.prepared_record import in_motion
+from pzd.record import Array, Record, Rows
+from pzd.signals.jumps import jumps, jumps_in_samples, slope_within, unbroken
+from pzd.signals.noise import Autoregression, PureError, fit_smooth_residual, pure_error
+from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.smoothing import reversals
+
+# ----------------------------------------------------------------------------------------------------
+# What the nuisances of a test may explain within their priors, taken out of residuals once and for all.
+#
+# Equation: r' = (I + V V')^(-1/2) r = r - V M V' r,  M = R diag((1 - 1/sqrt(1 + s^2))/s^2) R',  V' V = R diag(s^2) R'
+# Source: Gaussian prior, marginal likelihood
+
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+HIDDEN = 1e-3
+"""A nuisance that moves all residuals together by less [standard deviations of one] is left out.
+
+Reason: it would change the misfit by a millionth."""
+SPARSE = 0.2
+"""Share of numbers other than zero up to which the columns are kept as these alone.
+
+Reason: a column for a sample beside a jump has as many as the noise remembers; not tuned."""
+
+
+@dataclass(frozen=True, eq=False)
+class IntegratedOut:
+    """Nuisances of a test, and how much of what they could explain is taken out."""
+
+    columns: Array | csr_array
+    """(w, p) what each does to the residuals at one standard deviation, in units of noise."""
+    inner: Array
+    """(p, p) M."""
+    covariance: Array
+    """(p, p) of the nuisances once the residuals are known: R diag(1/(1 + s^2)) R'."""
+
+    @classmethod
+    def of(cls, columns: Array) -> IntegratedOut:
+        """Of some nuisances (w, p); what lies below `HIDDEN` is left in.
+
+        By the eigenvalues of the (p, p) products, which lose nothing of what shows.
+        """
+        squares, right = np.linalg.eigh(columns.T @ columns)
+        shown = squares > HIDDEN**2
+        squares, right = squares[shown], right[:, shown]
+        return cls(
+            _packed(columns),
+            (right * ((1.0 - 1.0 / np.sqrt(1.0 + squares)) / squares)) @ right.T,
+            (right / (1.0 + squares)) @ right.T,
+        )
+
+    @classmethod
+    def nothing(cls, residuals: int) -> IntegratedOut:
+        """No nuisances of so many residuals."""
+        return cls(np.zeros((residuals, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
+
+    def taken_out(self, values: Array) -> Array:
+        """(w,) or (w, k) values in units of noise, without what the nuisances may explain of them."""
+        if not self.inner.size:
+            return values
+        return np.asarray(values - self.columns @ (self.inner @ (self.columns.T @ values)))
+
+    def likeliest(self, values: Array) -> Array:
+        """(p,) the likeliest nuisances [standard deviations], given residuals (w,) that they are not taken out of."""
+        return np.asarray(self.covariance @ (self.columns.T @ values))
+
+
+def _packed(columns: Array) -> Array | csr_array:
+    if not columns.size or np.count_nonzero(columns) > SPARSE * columns.size:
+        return columns
+    from scipy.sparse import csr_array
+
+    return csr_array(columns)
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+SIMULATION_TOLERANCE = 1e-7
+"""Of the damper's path, as a share of the force, in every step by itself.
+
+Reason: over a record the errors add up, and jump as the parameters move; a search must not take that for a way down.
+Looser, it would hardly be faster: most steps of a record lie in one piece."""
+REMEMBERED = 4
+"""Effective voltages kept: slopes by a parameter of the drive need three."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordLikelihood:
+    """What one record, or a part of it, says."""
+
+    name: str
+    place: int
+    """Which base row it belongs to; -1 where the voltage moves."""
+    motion: Motion
+    """(m,) what is simulated."""
+    begins_with: float
+    """Recorded force at the first sample of the motion [N]: that of the same phase where the motion repeats."""
+    places: Rows
+    """(s,) samples of the motion at which it was recorded, from the first one compared to the last."""
+    compared: NDArray[np.bool_]
+    """(s,) which of them are compared: n of them, in one stretch or several."""
+    measured: Array
+    """(n,) force [N]."""
+    peak: float
+    """Largest measured force [N]."""
+    noise: PureError | Autoregression
+    weights: Array
+    """(H + 1,) of the harmonics of an average cycle; empty where samples are compared."""
+    nuisances: IntegratedOut
+    """Offset, gain and delay of the test, and its jumps."""
+
+    @cached_property
+    def steps(self) -> Array:
+        """Sampling intervals of the motion [s], one where they are even."""
+        return sampling_steps(self.motion.time)
+
+    @cached_property
+    def effective_voltage(self) -> Callable[[bytes], Array]:
+        """(m,) effective voltage [V] by the row of the drive, (d,) as bytes; the same array for the same row."""
+        return lru_cache(REMEMBERED)(self._followed)
+
+    def _followed(self, row: bytes) -> Array:
+        voltage = self.motion.voltage
+        if voltage is None:
+            raise ValueError(f"{self.name}: the damper depends on the voltage, and none is given")
+        return effective_voltage(voltage, self.steps, np.frombuffer(row).copy())
+
+    def at_compared(self, simulated: Array) -> Array:
+        """(n,) or (n, p) of what was simulated at the samples that are compared."""
+        return simulated[self._compared_places]
+
+    @cached_property
+    def _compared_places(self) -> Rows:
+        return self.places[self.compared]
+
+    def shown(self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], late: float = 0.0) -> Array:
+        """(m,) or (m, p) what was simulated as a channel shows it, between the samples by a cubic.
+
+        Parameters
+        ----------
+        simulated : (m,) force [N], or (m, p) of them
+        sensors : effects of the sensor, see `pzd.damper.compose.sensors_of`
+        late : how much later yet the channel shows it [s]
+        """
+        from scipy.interpolate import CubicSpline
+
+        if not sensors and late == 0.0:
+            return simulated
+        begin = int(self.places[0]) if isinstance(self.noise, PureError) else 0
+        time = self.motion.time[begin:]
+        shown = shown_moments(sensors, time - late)
+        if np.array_equal(shown, time):
+            return simulated
+        if begin == 0:
+            return np.asarray(CubicSpline(time, simulated)(np.clip(shown, time[0], time[-1])))
+        period = time[-1] - time[0] + self.steps[-1]
+        whole = np.concatenate([simulated[begin:], simulated[begin : begin + 1]])
+        cycle = CubicSpline(np.append(time, time[0] + period), whole, bc_type="periodic")
+        return np.concatenate([simulated[:begin], cycle(shown)])
+
+    def in_noise(self, values: Array) -> Array:
+        """(w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
+        return self.nuisances.taken_out(self._scaled(values))
+
+    @cached_property
+    def _unbroken(self) -> NDArray[np.bool_]:
+        """Which whitened samples count: those whose predecessors, as many as the noise remembers, are compared too."""
+        return unbroken(self.compared, self.noise.coefficients.size if isinstance(self.noise, Autoregression) else 0)
+
+    def _scaled(self, values: Array) -> Array:
+        if isinstance(self.noise, Autoregression):
+            return self.noise.whitened(values)[self._unbroken]
+        weights = self.weights.reshape(-1, *([1] * (values.ndim - 1)))
+        harmonics = np.fft.rfft(values, axis=0)[: self.weights.size] / len(values) * weights
+        return np.concatenate([harmonics.real, harmonics.imag[1:]])
+
+
+def response(observation: RecordLikelihood, damper: Damper) -> Array:
+    """(n,) force that a damper gives at the compared samples [N]."""
+    return responses(observation, damper)(0.0)
+
+
+def responses(observation: RecordLikelihood, damper: Damper) -> Callable[[float], Array]:
+    """(n,) force that a damper gives at the compared samples [N], by how much later yet a channel shows it [s]."""
+    o, sensors = observation, sensors_of(damper)
+    prompt = damper.without_effects(*sensors)
+    force = respond(prompt, o.motion, o.begins_with, SIMULATION_TOLERANCE)
+    return lambda late: o.at_compared(o.shown(force, sensors, late))
+
+
+# ----------------------------------------------------------------------------------------------------
+# How the evidence weighs every record: average cycles or samples, the noise in each, and what is no evidence.
+
+
+RESOLUTION = 3e-4
+"""No force is believed to be known better than this share of the record's peak (r.m.s.).
+
+Reason: a good load cell is right to 0.03 % of its range; without a floor a quiet record would decide
+alone. Not tuned."""
+INSTANT = 1e-6
+"""Delay by which the slope of a force over time is taken [s].
+
+Reason: far below a sample, far above the rounding of a time stamp."""
+LATEST = 3.0
+"""At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope.
+
+Reason: the customary bound for what a normal prior still allows."""
+DISCREPANCY = 0.3
+"""Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
+fitted: a model that still lacks something must not be bent to where the noise happens to be smallest.
+
+Reason: 0 believes the quietest harmonics whatever the model lacks, 1 leaves no evidence; about a tenth of the squares.
+Not tuned."""
+MOST_HARMONICS = 80
+"""Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart.
+
+Reason: harmonics of a force whose slope jumps, as at yield, fall with their square: those beyond are below 2e-4 of
+the first, and `RESOLUTION` is no finer."""
+UNWEIGHTED = 0.05
+"""What a plain element leaves [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k.
+
+Reason: what identify leaves of a damper that lacks a law is of this size; the priors hold only what no test
+shows. Not tuned."""
+CYCLE_POINTS = 256
+"""A cycle is simulated on at least this many points.
+
+Reason: three points for each of the harmonics that are compared."""
+FEWEST_SAMPLES = 2 * CYCLE_POINTS
+"""Fewer samples of a motion that does not repeat do not show what colour their noise has."""
+MOST_POINTS = 2048
+"""And on no more: the harmonics that are compared need no finer grid, however slow the test.
+
+Reason: 25 points for each of the harmonics that are compared."""
+
+
+def record_likelihood(
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
+) -> RecordLikelihood | None:
+    """The observation of some samples of a record; None where they are too few.
+
+    Parameters
+    ----------
+    p : the record
+    mask : (n,) which of its samples count
+    place : its base row; -1 where the voltage moves
+    given : what the damper makes of it, along which gain and delay act
+    nuisance : priors of the test's own offset, gain and delay
+    """
+    if not enough(p, mask):
+        return None
+    return (_of_cycles if _averaged(p) else _of_samples)(p, mask, place, given, nuisance)
+
+
+def enough(p: Prepared, mask: NDArray[np.bool_]) -> bool:
+    """Whether some samples (n,) of a record can be weighed: a whole cycle where it repeats, else a long enough stretch.
+
+    Parameters
+    ----------
+    p : the record
+    mask : (n,) which of its samples count
+    """
+    if p.cycles is not None and _averaged(p):
+        return bool(p.cycles.whole(p.record.time, mask))
+    return int(np.count_nonzero(mask & in_motion(p.record))) >= FEWEST_SAMPLES
+
+
+def _averaged(p: Prepared) -> bool:
+    """Whether a record counts as its average cycle; cycles differ where the damper warms, and it would hide that."""
+    return p.cycles is not None and not warms(p.record.temperature)
+
+
+def _of_cycles(
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
+) -> RecordLikelihood | None:
+    run = p.cycles
+    if run is None:
+        return None
+    time, record, whole = p.record.time, p.record, p.folded
+    counted = run.whole(time, mask)
+    simulated = run.fold(time, given.force)
+    error = pure_error(whole - simulated)
+    points = min(error.points, MOST_POINTS)
+    cycle = _resampled(whole[counted].mean(axis=0), points)
+    peak = float(np.max(np.abs(cycle)))
+    average = _resampled(simulated.mean(axis=0), points)
+    left = DISCREPANCY * _left_by(cycle, average, np.gradient(average), error.sample_variance / len(counted))
+    floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.displacement_variance
+    weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
+    weights[0] /= np.sqrt(2.0)
+    motion, lead, factor = _cycle_motion(record, run.period, [_resampled(channel, points) for channel in p.mean_motion])
+    bare = RecordLikelihood(
+        record.name,
+        place,
+        motion,
+        float(cycle[-(lead // factor) % cycle.size]),
+        lead + factor * np.arange(cycle.size),
+        np.ones(cycle.size, dtype=np.bool_),
+        cycle,
+        peak,
+        error,
+        weights,
+        IntegratedOut.nothing(2 * weights.size - 1),
+    )
+    return with_nuisances(bare, given.damper, nuisance)
+
+
+def _left_by(measured: Array, force: Array, slope: Array, variance: float) -> float:
+    """R.m.s. of what a model leaves above the noise [N], offset, gain and delay of the test taken off."""
+    columns = np.column_stack([np.ones(force.size), force, slope])
+    residual = measured - force
+    residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
+    return float(np.sqrt(max(np.mean(residual**2) - variance, 0.0)))
+
+
+def _cycle_motion(record: Record, period: float, channels: Sequence[Array]) -> tuple[Motion, int, int]:
+    """A cycle of the mean motion, half a cycle before it to settle in, on a grid fine enough to simulate."""
+    points = channels[0].size
+    factor = int(np.ceil(CYCLE_POINTS / points))
+    fine: Array = np.stack([_resampled(channel, points * factor) for channel in channels])
+    lead = points // 2 * factor  # it holds a reversal, after which the element has forgotten how it began
+    led = np.concatenate([fine[:, -lead:], fine], axis=1)
+    count = led.shape[1]
+    time: Array = np.arange(count, dtype=np.float64) * (period / (points * factor))
+    temperature = record.median_temperature()
+    voltage = record.median_voltage()
+    motion = Motion(
+        time,
+        led[0],
+        led[1],
+        led[2],
+        None if voltage is None else np.full(count, voltage),
+        None if temperature is None else np.full(count, temperature),
+    )
+    return motion, lead, factor
+
+
+def _resampled(cycle: Array, points: int) -> Array:
+    """A periodic channel on more points or fewer, by its own harmonics."""
+    if points == cycle.size:
+        return cycle
+    return np.asarray(np.fft.irfft(np.fft.rfft(cycle), points) * (points / cycle.size), dtype=np.float64)
+
+
+def _of_samples(
+    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
+) -> RecordLikelihood:
+    record, force = p.record, given.force
+    mask = mask & in_motion(record)
+    first, *_, last = np.flatnonzero(mask)
+    start, stop = int(first), int(last) + 1
+    compared = mask[start:stop]
+    measured = record.force[mask]
+    noise = fit_smooth_residual(measured - force[mask], record, force[mask], mask).noise
+    peak = float(np.max(np.abs(measured)))
+    alike = _samples_alike(record)
+    left = alike * (DISCREPANCY * _left_by(measured, force[mask], slope_within(force[mask], mask), noise.variance)) ** 2
+    if left > noise.variance:
+        noise = Autoregression(np.zeros(0), noise.variance + left)
+    noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
+    motion, places = motion_of(record)
+    rows = int(np.count_nonzero(unbroken(compared, noise.coefficients.size)))
+    bare = RecordLikelihood(
+        record.name,
+        place,
+        motion,
+        float(record.force[0]),
+        places[start:stop],
+        compared,
+        measured,
+        peak,
+        noise,
+        np.zeros(0),
+        IntegratedOut.nothing(rows),
+    )
+    return with_nuisances(bare, given.damper, nuisance, given.timing[mask])
+
+
+def _samples_alike(record: Record) -> float:
+    """Samples that say the same of what a model leaves: it fills as many harmonics of the motion as a cycle shows.
+
+    So what counts as noise has the same density at every sampling rate.
+    """
+    cycles = max(len(reversals(record.displacement)) / 2.0, 1.0)
+    return max(record.time.size / (2.0 * MOST_HARMONICS * cycles), 1.0)
+
+
+def with_nuisances(
+    bare: RecordLikelihood, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
+) -> RecordLikelihood:
+    """The observation with the test's own offset, gain and delay, jumps and instants of the voltage integrated out.
+
+    Equation: V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `IntegratedOut`
+
+    A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
+    that, F(t - d) - F + d dF/dt, is taken off the measured force.
+    """
+    shown = responses(bare, damper)
+    force, averaged = shown(0.0), isinstance(bare.noise, PureError)
+    late = (shown(INSTANT) - force) / INSTANT
+    columns = np.column_stack(
+        [
+            nuisance.delay_s * late,
+            np.full(force.size, nuisance.offset * bare.peak),
+            nuisance.gain * force,
+            _neighbours_of(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
+            *([] if timing is None else [timing]),
+        ]
+    )
+    nuisances = IntegratedOut.of(bare.in_noise(columns))
+    likeliest = float(nuisances.likeliest(bare.in_noise(bare.measured - force))[0])
+    delay = nuisance.delay_s * float(np.clip(likeliest, -LATEST, LATEST))
+    measured = bare.measured - (shown(delay) - force - delay * late)
+    return replace(bare, measured=measured, nuisances=nuisances)
+
+
+def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLikelihood:
+    """The observation as criterion (4) takes it: every sample alike, and nothing left to the test's own nuisances.
+
+    Equation: |r|^2 = n mean (F - F_sim)^2 / s^2, s alike in all tests of one condition
+                                                    Source: Makowski and Knap 2021, eq. (4); Parseval
+
+    Parameters
+    ----------
+    weighed : the record as the likelihood takes it
+    samples : that it counts for
+    peak : largest force of its condition [N]
+    """
+    scale = UNWEIGHTED * peak
+    if isinstance(weighed.noise, Autoregression):
+        white = Autoregression(np.zeros(0), scale**2)
+        return replace(weighed, noise=white, nuisances=IntegratedOut.nothing(weighed.measured.size))
+    weights = np.full(weighed.weights.size, np.sqrt(2.0 * samples) / scale)
+    weights[0] /= np.sqrt(2.0)
+    return replace(weighed, weights=weights, nuisances=IntegratedOut.nothing(2 * weights.size - 1))
+
+
+def _neighbours_of(bends: Array) -> Array:
+    """(n, j) one column a sample beside a jump, as large as the force bends there [N]."""
+    beside = np.flatnonzero(bends)
+    columns = np.zeros((bends.size, beside.size))
+    columns[beside, np.arange(beside.size)] = bends[beside]
+    return columns

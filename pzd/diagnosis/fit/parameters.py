@@ -1,0 +1,278 @@
+"""What is fitted to what: T0, C, k of every base row and the parameters of effects."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+
+from pzd.damper.compiled.rows import Nodes, nodes_of
+from pzd.damper.confounders import known
+from pzd.damper.effect import Effect, Parameter, Scales, Search
+from pzd.damper.material import by_voltage
+from pzd.damper.model import BaseRow, Damper
+from pzd.diagnosis.fit.likelihood import RecordLikelihood
+from pzd.record import Array
+
+# ----------------------------------------------------------------------------------------------------
+# How much a diagnosis may simulate before it ends with what it knows: work, not time, so that a result repeats.
+
+
+@dataclass(eq=False)
+class Work:
+    """What has been simulated so far, and how much may be.
+
+    It is counted in forces at samples, whoever asks for them, and looked at only where every thread has come to rest:
+    so the same input ends at the same place.
+    """
+
+    most: float = float("inf")
+    """Forces that may be computed."""
+    spent: int = 0
+    """Forces computed."""
+    ended: bool = False
+    """Whether the search has been kept from a further step."""
+    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+
+    def add(self, samples: int) -> None:
+        """Count a simulation of so many samples."""
+        with self._lock:
+            self.spent += samples
+
+    def may_go_on(self) -> bool:
+        """Whether anything more is to be looked for; asked between one step of the search and the next."""
+        self.ended = self.ended or self.spent >= self.most
+        return not self.ended
+
+    @property
+    def words(self) -> str:
+        """What a verdict says of a search that has been ended; empty for one that came to its own end."""
+        if not self.ended:
+            return ""
+        return (
+            f"; the search was ended by diagnose.most_evaluations ({self.most:.3g} forces): a larger one, or shorter "
+            "records, may tell more"
+        )
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+SOFTEST = 0.1
+"""Least C that a search starts from [largest force over largest speed]: identify may leave it undetermined."""
+BOUND = 1e4
+"""No scaled parameter is looked for beyond this, nor one with ratio steps below its inverse."""
+ZERO = Parameter(
+    "zero_m",
+    "m",
+    0.0,
+    -1.0,
+    1.0,
+    "zero of the displacement, from the middle of the stroke",
+    Search(lambda s: s.stroke, (0.0,), within=(-0.3, 0.3)),
+)
+"""Looked for once, beside the first effect that depends on it. It lies near the middle of what was recorded."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One effect parameter in the units of the search."""
+
+    effect: str
+    parameter: Parameter
+    scale: float
+    node: int | None = None
+    """Index of the voltage it holds at; None for one value at every voltage."""
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Limits of the searched variable."""
+        low, high = (limit / self.scale for limit in (self.parameter.low, self.parameter.high))
+        if self.parameter.search.logarithmic:
+            return float(np.log(max(low, 1.0 / BOUND))), float(np.log(min(high, BOUND)))
+        least, most = self.parameter.search.within
+        return max(low, least, -BOUND), min(high, most, BOUND)
+
+    def value(self, searched: float) -> float:
+        """The parameter in its own unit."""
+        scaled = float(np.exp(searched)) if self.parameter.search.logarithmic else searched
+        return float(np.clip(scaled * self.scale, self.parameter.low, self.parameter.high))
+
+    def searched(self, value: float) -> float:
+        """The searched variable at a value of the parameter."""
+        scaled = value / self.scale
+        return float(np.log(max(scaled, 1.0 / BOUND))) if self.parameter.search.logarithmic else scaled
+
+    def fainter(self, searched: float, share: float) -> float:
+        """The parameter [own unit] so much nearer to the value that switches its effect off."""
+        value, neutral = self.value(searched), self.parameter.neutral
+        return neutral + share * (value - neutral) if np.isfinite(neutral) else value / share
+
+    def of(self, damper: Damper) -> float:
+        """The value [own unit] that a damper has."""
+        if self.parameter is ZERO:
+            return damper.zero_m
+        value = damper.effects[self.effect][self.parameter.name]
+        return value if isinstance(value, float) else value[self.node or 0]
+
+    def slope(self, searched: float) -> float:
+        """Derivative of the parameter by the searched variable."""
+        return self.scale * (float(np.exp(searched)) if self.parameter.search.logarithmic else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is fitted to what."""
+
+    observations: tuple[RecordLikelihood, ...]
+    base: tuple[BaseRow, ...]
+    """Labels and starting values of the base rows."""
+    scales: Scales
+    fastest: float
+    """Largest k / C that is looked for [1/s]: an element that answers within a sample shows no spring."""
+    reference: float | None = None
+    """T_ref for temperature drift [degC]."""
+    varying: frozenset[str] = frozenset()
+    """Effects whose parameters are numbers by voltage, one a voltage of the base rows."""
+    work: Work = field(default_factory=Work, repr=False)
+    """Counts what is simulated."""
+
+    @cached_property
+    def voltages(self) -> tuple[float, ...]:
+        """(v,) voltages of the base rows [V], rising."""
+        return tuple(voltage for voltage, _ in by_voltage(self.base))
+
+    @cached_property
+    def nodes(self) -> tuple[int, ...]:
+        """(b,) index of the voltage of every base row."""
+        place = {id(row): i for i, (_, rows) in enumerate(by_voltage(self.base)) for row in rows}
+        return tuple(place[id(row)] for row in self.base)
+
+    def pooled(self) -> Problem:
+        """The same with one base row a voltage, whatever the temperature: an effect stands for its axis then."""
+        groups = [rows for _, rows in by_voltage(self.base)]
+        if len(groups) == len(self.base):
+            return self
+        place = {id(row): i for i, rows in enumerate(groups) for row in rows}
+        moved = tuple(o if o.place < 0 else replace(o, place=place[id(self.base[o.place])]) for o in self.observations)
+        return replace(self, observations=moved, base=tuple(_mean_row(rows) for rows in groups))
+
+    def growing(self, effect: Effect) -> Problem:
+        """The same with an effect by voltage where its parameters go with T0."""
+        by_voltage = len(self.voltages) > 1 and any(parameter.with_friction for parameter in effect.parameters)
+        return replace(self, varying=self.varying | {effect.name}) if by_voltage else self
+
+    def friction_at(self, node: int) -> float:
+        """Where T0 of the base rows starts at one of the voltages, as a share of the largest."""
+        here = max(row.T0_N for row, at in zip(self.base, self.nodes, strict=True) if at == node)
+        return here / (max(row.T0_N for row in self.base) or 1.0)
+
+    def unknowns(self, effects: Sequence[str]) -> tuple[Unknown, ...]:
+        """The parameters of some effects, in the order of the search, and the zero behind the first that needs it."""
+        found: list[Unknown] = []
+        for name in effects:
+            nodes = range(len(self.voltages)) if name in self.varying else (None,)
+            found += [self._unknown(name, parameter, node) for node in nodes for parameter in known()[name].parameters]
+            if known()[name].about_zero and all(u.parameter is not ZERO for u in found):
+                found.append(self._unknown(name, ZERO, None))
+        return tuple(found)
+
+    def _unknown(self, effect: str, parameter: Parameter, node: int | None) -> Unknown:
+        return Unknown(effect, parameter, parameter.search.scale(self.scales) or 1.0, node)
+
+    def start(self) -> Array:
+        """(3 b,) the base rows in the units of the search."""
+        softest = SOFTEST * self.scales.force / self.scales.speed
+        damping = [max(r.C_Ns_per_m, softest) for r in self.base]
+        stiffness = [min(r.k_N_per_m, self.fastest * C) for r, C in zip(self.base, damping, strict=True)]
+        rows = zip(self.base, damping, stiffness, strict=True)
+        return np.concatenate([(r.T0_N / self.scales.force, np.log(C), np.log(k)) for r, C, k in rows])
+
+    def start_with(self, damper: Damper) -> Array:
+        """(3 b + e,) the base rows, and the effects that a damper has."""
+        unknowns = self.unknowns(tuple(damper.effects))
+        return np.concatenate([self.start(), [u.searched(u.of(damper)) for u in unknowns]])
+
+    def point(self, searched: Array, unknowns: Sequence[Unknown]) -> Point:
+        """What a point of the search stands for."""
+        split = 3 * len(self.base)
+        base = searched[:split].reshape(-1, 3)
+        values = np.column_stack([np.maximum(base[:, 0], 0.0) * self.scales.force, np.exp(base[:, 1:])])
+        effects: dict[str, dict[str, float | tuple[float, ...]]] = {}
+        zero = 0.0
+        for unknown, x in zip(unknowns, searched[split:], strict=True):
+            if unknown.parameter is ZERO:
+                zero = unknown.value(float(x))
+                continue
+            given, name, value = effects.setdefault(unknown.effect, {}), unknown.parameter.name, unknown.value(float(x))
+            given[name] = value if unknown.node is None else (*cast("tuple[float, ...]", given.get(name, ())), value)
+        return Point(values, effects, self, zero)
+
+
+def _mean_row(rows: Sequence[BaseRow]) -> BaseRow:
+    """One row for several temperatures or none: means of T0, C and k."""
+    friction, damping, stiffness = np.mean([(r.T0_N, r.C_Ns_per_m, r.k_N_per_m) for r in rows], axis=0)
+    return BaseRow(
+        voltage_V=rows[0].voltage_V,
+        T0_N=float(friction),
+        C_Ns_per_m=float(damping),
+        k_N_per_m=float(stiffness),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Numbers for T0, C and k of every base row, and for the effects."""
+
+    base: Array
+    """(b, 3)"""
+    effects: Mapping[str, Mapping[str, float | tuple[float, ...]]]
+    """Lists are by voltage."""
+    problem: Problem
+    zero: float = 0.0
+    """Of the displacement [m]."""
+    _laid_out: dict[float | None, Nodes] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def damper(self) -> Damper:
+        """The same as a damper."""
+        rows = tuple(
+            BaseRow(
+                voltage_V=label.voltage_V,
+                temperature_degC=label.temperature_degC,
+                T0_N=float(friction),
+                C_Ns_per_m=float(damping),
+                k_N_per_m=float(stiffness),
+            )
+            for label, (friction, damping, stiffness) in zip(self.problem.base, self.base, strict=True)
+        )
+        return Damper(
+            base=rows,
+            effects={name: {**values, **self._nodes(name)} for name, values in self.effects.items()},
+            reference_temperature_degC=self.problem.reference,
+            zero_m=self.zero,
+        )
+
+    def nodes(self, temperature: float | None) -> Nodes:
+        """The damper at one temperature [degC], by its nodes of voltage; at any the same where nothing goes by it."""
+        problem = self.problem
+        if len(problem.base) == len(problem.voltages) and all(known()[n].place != "material" for n in self.effects):
+            temperature = None
+        if temperature not in self._laid_out:
+            self._laid_out[temperature] = nodes_of(self.damper, temperature)
+        return self._laid_out[temperature]
+
+    def _nodes(self, effect: str) -> dict[str, tuple[float, ...]]:
+        return {"at_voltage_V": self.problem.voltages} if effect in self.problem.varying else {}
+
+    def at(self, place: int) -> Mapping[str, Mapping[str, float]]:
+        """The effects at the voltage of one base row."""
+        node = self.problem.nodes[place]
+        return {
+            name: {key: value[node] if isinstance(value, tuple) else value for key, value in values.items()}
+            for name, values in self.effects.items()
+        }

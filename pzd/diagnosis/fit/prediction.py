@@ -1,0 +1,192 @@
+"""What a damper predicts for a record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.compose import respond
+from pzd.damper.model import Damper
+from pzd.damper.motion import Motion, parts_of_steps, steps_of_voltage
+from pzd.diagnosis.data import Prepared
+from pzd.identification.prepared_record import in_motion
+from pzd.record import Array, Record, Rows
+from pzd.signals.noise import harmonics_of
+from pzd.signals.smoothing import reversals
+
+# ----------------------------------------------------------------------------------------------------
+
+
+FEWEST_IN_HALF_CYCLE = 25
+"""Samples of the fastest half cycle from which a parabola between them is exact enough: 1e-4 of the force."""
+PREDICTION_TOLERANCE = 1e-7
+"""Of the damper's path, as a share of the force.
+
+Reason: far below `weights.RESOLUTION`; see `likelihood.SIMULATION_TOLERANCE`."""
+
+WARMS = 0.5
+"""A test over which the temperature moves by less [K] counts as its average cycle, at one temperature.
+
+Reason: about the resolution of a thermocouple; not tuned."""
+HELD = 0.05
+"""A temperature that moves by less [K] over a test stands still there.
+
+Reason: of 5 % a kelvin, which is much for an oil, the force changes by 0.25 % of itself, which counts as nothing."""
+BESIDE_STEP = 0.001
+"""Nothing is judged so shortly before and after a step of the voltage [s].
+
+Reason: two standard deviations of a test's own delay (`NuisanceConfig.delay_s`); a sample at least, over which a filter
+against aliasing spreads the step of the force."""
+ENDS = 0.02
+"""Share of a record at either end where its smoothed displacement rests on one side alone: not judged."""
+
+
+def predicted_force(damper: Damper, prepared: Prepared) -> Array:
+    """(n,) force that the damper gives under the record's cleaned motion [N]."""
+    record = prepared.lead or prepared.record
+    return force_in(damper, record)[prepared.lead_samples :]
+
+
+def force_in(damper: Damper, record: Record) -> Array:
+    """(n,) force that the damper gives in the motion of a record, from the recorded force on [N]."""
+    motion, places = motion_of(record)
+    return respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)[places]
+
+
+def motion_of(record: Record) -> tuple[Motion, Rows]:
+    """The record's motion, on a finer grid where its samples are too far apart.
+
+    That is where no parabola goes from one to the next, and where the voltage steps between two.
+
+    Parameters
+    ----------
+    record : cleaned; a temperature that hardly moves counts as standing still, at its median
+
+    Returns
+    -------
+    the motion, and (n,) which of its samples are those of the record
+    """
+    size = record.time.size
+    half_cycle = min(np.diff(reversals(record.displacement)), default=size)
+    fewest = int(np.ceil(FEWEST_IN_HALF_CYCLE / max(half_cycle, 1)))
+    motion, places = Motion.of(record).finer(np.maximum(parts_of_steps(record.voltage, size), fewest))
+    if motion.temperature is not None and not warms(motion.temperature, HELD):
+        held = np.full(motion.temperature.size, np.median(motion.temperature))
+        motion = replace(motion, temperature=held)
+    return motion, places
+
+
+def warms(temperature: Array | None, by: float = WARMS) -> bool:
+    """Whether a temperature (n,) moves by so much [K] from beginning to end; False where none was recorded."""
+    return temperature is not None and float(np.ptp(ends(temperature))) > by
+
+
+def ends(temperature: Array) -> tuple[float, float]:
+    """Temperature [degC] at the beginning and at the end of a test, the noise of (n,) samples averaged out."""
+    tenth = max(temperature.size // 10, 1)
+    return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
+
+
+def counted(prepared: Prepared) -> NDArray[np.bool_]:
+    """(n,) whether the prediction depends neither on how the record began nor on when exactly a voltage stepped.
+
+    And whether something moves, or has just come to rest.
+    """
+    size = prepared.record.time.size
+    if prepared.lead is not None:
+        return np.ones(size, dtype=np.bool_)
+    ends = int(ENDS * size)
+    order = np.arange(size)
+    inside = (order >= ends) & (order < size - ends)
+    return inside & in_motion(prepared.record) & ~_stepping(prepared.record)
+
+
+def _stepping(record: Record) -> NDArray[np.bool_]:
+    """(n,) whether the voltage steps shortly before or after a sample."""
+    size = record.time.size
+    steps = np.append(steps_of_voltage(record.voltage, size), False)
+    if not steps.any():
+        return steps
+    reach = int(np.ceil(BESIDE_STEP * record.rate))
+    near = np.convolve(steps, np.ones(2 * reach + 2))[reach : reach + size]
+    beside: NDArray[np.bool_] = near > 0.5
+    return beside
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a damper makes of a record, and how uncertain that is because the channels are: errors in variables.
+#
+# What noise and resolution leave in the cleaned displacement of an average cycle repeats in every
+# cycle of the prediction, and the oil spring makes force of it; the scatter of the force between
+# cycles does not show it. So a few displacements that are as likely are sent through the damper.
+# A voltage that moves is known at its samples alone: a step falls anywhere between two of them.
+
+
+BETWEEN_SAMPLES = 0.5
+"""Standard deviation of the instant of the voltage [samples]."""
+NEIGHBOURS = 2
+"""Harmonics on either side over which the scatter of so few draws is averaged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """The force that a damper gives in a record, and how uncertain it is."""
+
+    damper: Damper
+    force: Array
+    """(n,) that it gives [N]."""
+    displacement_variance: Array | float
+    """(H + 1,) variance |.|^2 of the harmonics of its average cycle by the displacement [N^2]; 0 where none repeats."""
+    timing: Array
+    """(n, 1) change of the force by one standard deviation of the voltage's instant [N]; (n, 0) where it stands."""
+
+
+def expected(damper: Damper, prepared: Prepared, delay: float) -> Predicted:
+    """What a damper makes of a record.
+
+    Parameters
+    ----------
+    damper : that predicts
+    prepared : the record
+    delay : standard deviation of a test's own delay [s]
+    """
+    force = predicted_force(damper, prepared)
+    return Predicted(damper, force, force_error(damper, prepared), _timing(damper, prepared, force, delay))
+
+
+def _timing(damper: Damper, prepared: Prepared, force: Array, delay: float) -> Array:
+    record = prepared.record
+    if prepared.constant or record.voltage is None:
+        return np.zeros((force.size, 0))
+    late = replace(record, voltage=np.concatenate([record.voltage[:1], record.voltage[:-1]]))
+    change = predicted_force(damper, replace(prepared, record=late)) - force
+    return np.asarray(np.hypot(BETWEEN_SAMPLES, delay * record.rate) * change[:, None])
+
+
+def force_error(damper: Damper, prepared: Prepared) -> Array | float:
+    """Variance of the harmonics of a predicted average cycle, because its displacement is not known better.
+
+    Equation: s_h^2 = mean_j |c_h(x + e_j) - c_h(x)|^2              Source: Monte Carlo, JCGM 101:2008
+
+    Parameters
+    ----------
+    damper : that predicts
+    prepared : the record
+
+    Returns
+    -------
+    (H + 1,) variance |.|^2 [N^2]; 0 where nothing repeats
+    """
+    if not prepared.draws:
+        return 0.0
+    points = prepared.draws[0].time.size // 2
+    known, *others = (force_in(damper, draw)[points:] for draw in prepared.draws)
+    changes = np.fft.rfft(np.stack(others) - known, points, axis=1) / points
+    power = np.mean(np.abs(changes) ** 2, axis=0)[: harmonics_of(points) + 1]
+    power[0] = 0.0  # a stuck damper keeps whatever offset it began with
+    width = np.ones(2 * NEIGHBOURS + 1)
+    smooth: Array = np.convolve(power, width, "same") / np.convolve(np.ones(power.size), width, "same")
+    smooth[0] = 0.0
+    return smooth

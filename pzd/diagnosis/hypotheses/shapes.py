@@ -1,0 +1,325 @@
+"""The shapes that a residual is held against: what each is made of, the unit of its coefficient, and its physics.
+
+One entry a shape; adding one means adding an entry, and `law` where an effect file can hold it. Expressions are in the
+symbols of the paper: x counts from the middle of the stroke, v and a are the rod's, F the force that the damper handed
+on gives, U the control signal, T the temperature, t the time since the test began. The method is the force surface of
+Masri and Caughey 1979, J. Appl. Mech. 46, with the sparse choice of terms of Brunton, Proctor and Kutz 2016, PNAS 113.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from pzd.diagnosis.data import Prepared
+from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array
+
+# ----------------------------------------------------------------------------------------------------
+# What shapes are made of: the signals along a test, and those columns that take more than one expression.
+
+
+LENGTHS = tuple(float(x) for x in np.geomspace(0.2, 1.5, 42))
+"""Wave lengths that are tried [half strokes]: 5 % apart, so that the shortest stays within a quarter of a wave over the
+stroke; a longer one is a spring."""
+PLACES = tuple(float(x) for x in np.linspace(-0.9, 0.9, 37))
+"""Places of the stroke that are tried [half strokes from its middle]: a sixth of `SPOT` apart."""
+SPOT = 0.3
+"""Half-width of a place with friction of its own [half strokes]; a narrower one shows as well, and no ride would feel
+it."""
+WIDTHS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6)
+"""Half-widths of the play that are tried [half strokes]."""
+TIMES_S = (0.003, 0.01, 0.03, 0.1, 0.3)
+"""Time constants of the lag that are tried [s], in half decades."""
+SHORTEST_RISE = 0.5
+"""Time constants of what changes while a test runs [s], and the doubles of it up to `LONGEST_RISE`."""
+LONGEST_RISE = 8.0
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """What a shape may be made of, along one test."""
+
+    t: Array
+    """(n,) time since the test began [s]."""
+    x: Array
+    v: Array
+    a: Array
+    F: Array
+    U: Array
+    """(n,) 0 where there is none."""
+    T: Array
+    """(n,) temperature from that of the setting [K]; 0 where there is none."""
+    half_stroke: float
+    """Of all tests [m]."""
+
+    @property
+    def force_rate(self) -> Array:
+        """(n,) dF/dt [N/s]."""
+        return np.gradient(self.F, self.t)
+
+
+Columns = Callable[[Signals], Iterator[tuple[float | None, Array]]]
+"""Value of the parameter that is searched (None without one), and (n, k) columns: one a coefficient."""
+
+
+def one_column(function: Callable[[Signals], Array]) -> Columns:
+    """The one column that a function of the signals gives; nothing is searched."""
+
+    def columns(s: Signals) -> Iterator[tuple[float | None, Array]]:
+        yield None, np.asarray(function(s))[:, None]
+
+    return columns
+
+
+def waves(s: Signals) -> Iterator[tuple[float | None, Array]]:
+    """Sine and cosine of each wave length [m] over the position."""
+    for length in (share * s.half_stroke for share in LENGTHS):
+        phase = 2.0 * np.pi * s.x / length
+        yield length, np.column_stack([np.sin(phase), np.cos(phase)])
+
+
+def at_a_place(s: Signals) -> Iterator[tuple[float | None, Array]]:
+    """Friction of about one around each place [m], falling to nothing in a straight line to either side."""
+    for place in (share * s.half_stroke for share in PLACES):
+        yield place, (np.sign(s.v) * np.maximum(1.0 - np.abs(s.x - place) / (SPOT * s.half_stroke), 0.0))[:, None]
+
+
+def behind_play(s: Signals) -> Iterator[tuple[float | None, Array]]:
+    """Pull of what the rod drags behind a play of each half-width [m], one at most."""
+    for half_width in (share * s.half_stroke for share in WIDTHS):
+        yield half_width, (play(s.x, half_width) / half_width)[:, None]
+
+
+def play(x: Array, half_width: float) -> Array:
+    """(n,) by how far the rod is ahead of what it drags behind a play of that half-width [m].
+
+    Equation: e_i = clip(e_(i-1) + x_i - x_(i-1), -r, r)     Source: Visintin 1994, Differential Models of Hysteresis
+    """
+    ahead, found = 0.0, np.empty(x.size)
+    for i, step in enumerate(np.diff(x, prepend=x[0]).tolist()):
+        ahead = min(max(ahead + step, -half_width), half_width)
+        found[i] = ahead
+    return found
+
+
+def lagging(s: Signals) -> Iterator[tuple[float | None, Array]]:
+    """Velocity behind a lag of first order, less the velocity itself: what the lag takes off the damping."""
+    from scipy.signal import lfilter
+
+    step = float(np.median(np.diff(s.t)))
+    for tau in TIMES_S:
+        share = step / (tau + step)
+        behind = lfilter([share], [1.0, share - 1.0], s.v, zi=[(1.0 - share) * s.v[0]])[0]
+        yield tau, (behind - s.v)[:, None]
+
+
+def while_running(s: Signals) -> Iterator[tuple[float | None, Array]]:
+    """Velocity by a share that grows from 0 towards 1 while a test runs, with each time constant [s]."""
+    tau = SHORTEST_RISE
+    while tau <= LONGEST_RISE:
+        yield tau, (-np.expm1(-s.t / tau) * s.v)[:, None]
+        tau *= 2.0
+
+
+def signals_of(prepared: Prepared, force: Array, temperature: float | None, half_stroke: float) -> Signals:
+    """What a shape may be made of, along one test.
+
+    Parameters
+    ----------
+    prepared : the test, its displacement cleaned and counted from the middle of the stroke
+    force : (n,) that the damper gives [N]
+    temperature : median of all tests [degC]; None where none was recorded
+    half_stroke : of all tests [m]
+    """
+    record = prepared.record
+    warmth = record.median_temperature()
+    T = 0.0 if warmth is None or temperature is None else warmth - temperature
+    U = np.zeros(force.size) if record.voltage is None else record.voltage
+    if prepared.constant and record.voltage is not None:
+        U = np.full(force.size, record.median_voltage())
+    return Signals(
+        t=record.time - record.time[0],
+        x=record.displacement,
+        v=record.velocity,
+        a=record.acceleration,
+        F=force,
+        U=U,
+        T=np.full(force.size, T),
+        half_stroke=half_stroke,
+    )
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+Needs = Literal["control", "temperature"]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One shape."""
+
+    name: str
+    """The expression behind the coefficient."""
+    unit: str
+    """Of the coefficient."""
+    physics: str
+    """What has this shape."""
+    source: str
+    columns: Columns
+    parameter: str | None = None
+    """Symbol of what is searched beside the coefficient."""
+    parameter_unit: str = ""
+    needs: Needs | None = None
+    """What must differ in the tests."""
+    law: str | None = None
+    """The same as Python of x, v and a, with `math` alone, where a force beside the element can have it; of two
+    coefficients the second law stands behind a semicolon."""
+    per_control: bool = False
+    """Whether it is one that goes with the control signal, made of another."""
+    width: float | None = None
+    """Half-width of the place that it is about [half strokes]; the force falls to nothing there in a straight line."""
+    library: tuple[str, ...] = ()
+    """Effects of the library that have this shape."""
+
+
+def _shape(
+    name: str,
+    unit: str,
+    physics: str,
+    source: str,
+    function: Callable[[Signals], Array],
+    law: str | None = None,
+    needs: Needs | None = None,
+    library: tuple[str, ...] = (),
+) -> Shape:
+    return Shape(name, unit, physics, source, one_column(function), law=law, needs=needs, library=library)
+
+
+_DIXON = "Dixon 2007, The Shock Absorber Handbook"
+_FRICTION = "Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30(7)"
+_STRUT = "Yabuta, Hidaka and Fukushima 1981, Vehicle System Dynamics 10: friction by side force"
+_DUYM = "Duym 2000, Vehicle System Dynamics 33"
+_PIN = "Milwitzky and Cook 1953, NACA Report 1154: metering pin"
+_SIGN = "math.copysign(1.0, v)"
+
+_BY_POSITION = "damping that depends on position"
+SHAPES: tuple[Shape, ...] = (
+    # ---- damping and friction by position
+    _shape("|x| v", "N s/m2", f"{_BY_POSITION}, alike at both ends, as bypass grooves give", _DIXON,
+           lambda s: np.abs(s.x) * s.v, "abs(x) * v"),
+    _shape("x^2 v", "N s/m3", f"{_BY_POSITION}, alike at both ends, as bypass grooves that taper give", _DIXON,
+           lambda s: s.x**2 * s.v, "x * x * v"),
+    _shape("x v", "N s/m2", f"{_BY_POSITION}, from one end to the other, as a metering pin gives", _PIN,
+           lambda s: s.x * s.v, "x * v"),
+    _shape("|x| |v| v", "N s2/m3", "an orifice that narrows to both ends of the stroke", _PIN,
+           lambda s: np.abs(s.x * s.v) * s.v, "abs(x * v) * v"),
+    _shape("x |v| v", "N s2/m3", "an orifice that narrows from one end of the stroke to the other", _PIN,
+           lambda s: s.x * np.abs(s.v) * s.v, "x * abs(v) * v"),
+    _shape("|x| sign v", "N/m", "friction that rises to both ends, as a bent rod gives", _STRUT,
+           lambda s: np.abs(s.x) * np.sign(s.v), f"abs(x) * {_SIGN}"),
+    _shape("x^2 sign v", "N/m2", "friction that rises steeply to both ends, or is less at the middle", _STRUT,
+           lambda s: s.x**2 * np.sign(s.v), f"x * x * {_SIGN}"),
+    _shape("x sign v", "N/m", "friction that is larger at one end, as a side load or a covered port gives", _STRUT,
+           lambda s: s.x * np.sign(s.v), f"x * {_SIGN}"),
+    Shape("sign v about x_p", "N", "friction at one place of the stroke, as a dent or a tight guide gives", _STRUT,
+          at_a_place, "x_p", "m", width=SPOT, law=f"max(1.0 - abs(x - {{parameter}}) / {{width}}, 0.0) * {_SIGN}"),
+    # ---- forces by position alone
+    _shape("x", "N/m", "a spring beside the element, as a gas charge gives", _DIXON, lambda s: s.x, "x",
+           library=("gas_spring",)),
+    _shape("x^2", "N/m2", "a spring that pushes the same way on both sides, as compressed gas does", _DIXON,
+           lambda s: s.x**2, "x * x"),
+    _shape("|x|", "N/m", "a spring that pushes the same way on both sides, bent at the middle", _DIXON,
+           lambda s: np.abs(s.x), "abs(x)"),
+    _shape("x^3", "N/m3", "a spring that hardens to both ends, as rubber stops or mounts give", _DIXON,
+           lambda s: s.x**3, "x * x * x", library=("end_stop",)),
+    Shape("sin 2 pi x/lambda", "N", "a force that waves over the position: cogging of magnets, a thread, a wavy guide",
+          "Hendershot and Miller 1994, Design of Brushless Permanent-Magnet Motors: cogging", waves, "lambda", "m",
+          law="math.sin(2.0 * math.pi * x / {parameter});math.cos(2.0 * math.pi * x / {parameter})"),
+    # ---- forces by speed and acceleration
+    _shape("1", "N", "a constant force, as a gas charge gives", _DIXON,
+           lambda s: np.ones(s.x.size), "1.0", library=("preload_offset",)),
+    _shape("|v|", "N s/m", "damping that differs between rebound and compression", _DIXON,
+           lambda s: np.abs(s.v), "abs(v)", library=("asymmetry",)),
+    _shape("v^2", "N s2/m2", "an orifice that differs between rebound and compression", _DIXON,
+           lambda s: s.v**2, "v * v", library=("asymmetry",)),
+    _shape("|v| v", "N s2/m2", "an orifice", "Merritt 1967, Hydraulic Control Systems", lambda s: np.abs(s.v) * s.v,
+           "abs(v) * v", library=("orifice_quadratic",)),
+    _shape("sign v", "N", "dry friction of seal or guide, behind no spring", _FRICTION,
+           lambda s: np.sign(s.v), _SIGN, library=("stribeck_friction",)),
+    _shape("a", "kg", "a mass: the oil column, or the stand's own", _DIXON, lambda s: s.a, "a",
+           library=("fluid_inertia",)),
+    _shape("a |v|", "kg s/m", "a force that differs between speeding up and slowing down", _DUYM,
+           lambda s: s.a * np.abs(s.v), "a * abs(v)"),
+    _shape("|a| v", "N s3/m2", "damping that rises with the acceleration", _DUYM,
+           lambda s: np.abs(s.a) * s.v, "abs(a) * v"),
+    # ---- forces by the force, and by what came before
+    _shape("|F|", "-", "a force that differs between rebound and compression", _DIXON, lambda s: np.abs(s.F),
+           library=("asymmetry",)),
+    _shape("|F| F", "1/N", "a force that grows faster or slower than the model, as a crooked load cell shows",
+           "VDI/VDE 2638: characteristics of load cells", lambda s: np.abs(s.F) * s.F),
+    _shape("x F", "1/m", "the whole force changes from one end of the stroke to the other", _PIN, lambda s: s.x * s.F),
+    _shape("|x| F", "1/m", "the whole force changes to both ends of the stroke", _DIXON, lambda s: np.abs(s.x) * s.F),
+    _shape("|F| sign v", "-", "friction that goes with the load, as a side force gives", _STRUT,
+           lambda s: np.abs(s.F) * np.sign(s.v)),
+    _shape("dF/dt", "s", "a force that comes late or early", _DUYM, lambda s: s.force_rate, library=("sensor_delay",)),
+    _shape("|dF/dt|", "s", "a force that comes late one way alone", _DUYM, lambda s: np.abs(s.force_rate)),
+    Shape("(v behind a lag - v)", "N s/m", "damping that comes late, as a softer oil spring or mount gives",
+          _DUYM, lagging, "tau", "s"),
+    Shape("(x behind a play)/r", "N", "a spring that slips, whatever the speed, as a rubber seat does",
+          "Al-Bender, Lampaert and Swevers 2005, IEEE Trans. Automatic Control 50(11)", behind_play, "r", "m",
+          library=("second_branch",)),
+    Shape("(1 - exp(-t/tau)) v", "N s/m", "damping that changes while a test runs, as air in the oil gives",
+          _DUYM, while_running, "tau", "s"),
+    _shape("T v", "N s/(m K)", "damping that changes with the temperature", _DIXON, lambda s: s.T * s.v,
+           needs="temperature", library=("temperature_drift",)),
+    _shape("T sign v", "N/K", "friction that changes with the temperature", _DIXON, lambda s: s.T * np.sign(s.v),
+           needs="temperature", library=("temperature_drift",)),
+)  # fmt: skip
+"""Every shape; those of x, v and a with one coefficient come a second time, in proportion to the control signal."""
+
+IN_ONE_UNIT = {
+    "N": "-", "-": "N", "N/m": "m", "N/m2": "m2", "N/m3": "m3", "N s/m": "m/s", "N s/m2": "m2/s", "N s/m3": "m3/s",
+    "N s2/m2": "m2/s2", "N s2/m3": "m3/s2", "N s3/m2": "m2/s3", "kg": "m/s2", "kg s/m": "m2/s3", "1/N": "N2",
+    "1/m": "N m", "s": "N/s", "N s/(m K)": "K m/s", "N/K": "K",
+}  # fmt: skip
+"""Unit of a shape by that of its coefficient: both together are a force."""
+
+
+def shapes_of(signals: Sequence[Signals]) -> tuple[Shape, ...]:
+    """The shapes that the tests can show.
+
+    Parameters
+    ----------
+    signals : those of every test
+    """
+    U = np.array([float(np.median(s.U)) for s in signals])
+    T = np.array([float(np.median(s.T)) for s in signals])
+    moves = any(float(np.ptp(s.U)) > 0.0 for s in signals)
+    several = {
+        "control": moves or float(np.ptp(U)) > CONSTANT_SHARE * float(np.max(np.abs(U))),
+        "temperature": float(np.ptp(T)) > SAME_TEMPERATURE,
+    }
+    plain = [shape for shape in SHAPES if shape.needs is None or several[shape.needs]]
+    by_control = [_by_control(shape) for shape in plain if shape.law and shape.parameter is None]
+    return (*plain, *(by_control if several["control"] else ()))
+
+
+def _by_control(shape: Shape) -> Shape:
+    """The shape in proportion to the control signal."""
+
+    def columns(s: Signals) -> Iterator[tuple[float | None, Array]]:
+        yield from ((value, s.U[:, None] * found) for value, found in shape.columns(s))
+
+    return replace(
+        shape,
+        name=f"U {shape.name}",
+        unit=f"{shape.unit}/V",
+        physics=f"{shape.physics}, in proportion to the control signal",
+        columns=columns,
+        law=shape.law,
+        per_control=True,
+    )

@@ -1,0 +1,347 @@
+"""Every effect that can be named fitted to the data, one at a time, together with those already adopted."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pzd.damper.confounders import confounders, known
+from pzd.damper.effect import Effect
+from pzd.damper.effects import library, nameable
+from pzd.diagnosis.fit.forces import left_at
+from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, Fitted, fit, not_taken_up
+from pzd.diagnosis.fit.parameters import BOUND, Problem, Unknown
+from pzd.diagnosis.fit.prediction import WARMS, ends
+from pzd.diagnosis.thresholds import (
+    AT_EDGE,
+    FAINT,
+    FAINTER_STARTS,
+    FIRST_EVALUATIONS,
+    LEAST_PROMISE,
+    MOST_EVALUATIONS_OF_BEST,
+    MOVING_VOLTAGE,
+    NEARLY_AS_GOOD,
+    SLIGHT_PROMISE,
+    STARTS_TRIED,
+    WORSE_THAN_CONTAINED,
+    WORTH_FITTING,
+    WORTH_SEARCHING,
+)
+from pzd.record import Array
+
+# ----------------------------------------------------------------------------------------------------
+# Where the search for an effect starts: its starting values, and what a linearised step promises from each.
+
+
+def promising_starts(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
+    """All starting values of an effect, first those from which one linearised step promises the smallest misfit.
+
+    Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
+                                                                Source: Gauss-Newton step
+    """
+    starts = starts_of(problem, before, effect)
+    if len(starts) == 1:
+        return starts
+    promised = [_promised_misfit(problem, before, effect, start) for start in starts]
+    return [starts[i] for i in np.argsort(promised, kind="stable")]
+
+
+def most_promising(problem: Problem, before: Fitted, effects: Sequence[Effect], count: int) -> list[Effect]:
+    """The effects from whose starting values one linearised step promises the smallest misfits, best first."""
+    promised = []
+    for effect in effects:
+        own = problem.growing(effect)
+        starts = starts_of(own, before, effect)
+        promised.append(min(_promised_misfit(own, before, effect, start) for start in starts))
+    return [effects[i] for i in np.argsort(promised, kind="stable")[:count]]
+
+
+def promise(problem: Problem, before: Fitted, effect: Effect) -> float:
+    """By how much a linearised step lowers the misfit at most, from an effect's starting values or from near none."""
+    starts = starts_of(problem, before, effect)
+    faint = (*starts, *(fainter(problem, before, effect, start, FAINT) for start in starts))
+    return before.misfit - min(_promised_misfit(problem, before, effect, start) for start in faint)
+
+
+def starts_of(problem: Problem, before: Fitted, effect: Effect) -> list[Array]:
+    """All combinations of the starting values of an effect, each (unknowns,) in the units of the search.
+
+    What is looked for by voltage starts at every one of them alike, or in proportion to T0.
+    """
+    unknowns = _new(problem, before, effect)
+    own = {u.parameter.name: u.parameter for u in unknowns}
+    grid = itertools.product(*(parameter.search.starts for parameter in own.values()))
+    starts = [dict(zip(own, values, strict=True)) for values in grid]
+    return [np.array([_searched(u, s[u.parameter.name] * _share(problem, u)) for u in unknowns]) for s in starts]
+
+
+def _share(problem: Problem, unknown: Unknown) -> float:
+    """The share of its largest value at which an unknown starts at its voltage."""
+    scaled = unknown.node is not None and unknown.parameter.with_friction
+    return problem.friction_at(unknown.node or 0) if scaled else 1.0
+
+
+def fainter(problem: Problem, before: Fitted, effect: Effect, start: Array, share: float) -> Array:
+    """Starting values that lie so much nearer to those that switch the effect off."""
+    unknowns = _new(problem, before, effect)
+    return np.array([u.searched(u.fainter(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
+
+
+def _new(problem: Problem, before: Fitted, effect: Effect) -> tuple[Unknown, ...]:
+    """What is looked for with an effect beside those of `before`."""
+    return problem.unknowns((*before.effects, effect.name))[len(before.unknowns) :]
+
+
+def _searched(unknown: Unknown, start: float) -> float:
+    return float(np.log(max(start, 1.0 / BOUND))) if unknown.parameter.search.logarithmic else start
+
+
+def _promised_misfit(problem: Problem, before: Fitted, effect: Effect, start: Array) -> float:
+    """Sum of squares after one linearised step from a start; infinite where the slopes there are not."""
+    effects = (*before.effects, effect.name)
+    unknowns = problem.unknowns(effects)
+    here = np.concatenate([before.searched, start])
+    new = range(before.searched.size, here.size)
+    limits = np.full(here.size, -np.inf), np.full(here.size, np.inf)
+    left = left_at(problem, unknowns, here, limits, new)
+    r, columns = (not_taken_up(before.frame, values) for values in (left.whole, left.slopes.dense(new)))
+    if not np.all(np.isfinite(columns)):
+        return np.inf  # a power law whose flow stands still at a sample has no slope there
+    size = np.linalg.norm(columns, axis=0)
+    columns = columns / np.where(size > 0.0, size, 1.0)
+    rest = r - columns @ np.linalg.lstsq(columns, r, rcond=1e-6)[0]
+    return float(rest @ rest)
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+VARIES = ("stroke", "flow", "parallel", "branch")
+"""Places of effects whose parameters may differ by voltage."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One effect fitted together with the base rows and the effects adopted so far."""
+
+    effect: str
+    fitted: Fitted
+    delta_bic: float
+    """Change of the Bayesian criterion against the model without it; negative where it pays."""
+    explained: float
+    """R.m.s. by which it moves the simulated force, as a share of each record's peak."""
+    residual_change: float
+    """Sum of squares of what it changes in the residuals, in units of noise."""
+    misfit_drop: float
+    """How much lower the misfit is with it."""
+    varies: bool = False
+    """Whether its parameters are by voltage: an effect adopted before, or one that is only looked for so."""
+    searched: bool = True
+    """Whether its optimum was searched for; else it stands as faint as it is looked for."""
+
+
+def seen_in(problem: Problem, effect: Effect) -> bool:
+    """Whether the voltage or temperature moves in some test, for an effect that shows only where it does."""
+    if effect.needs == "voltage":
+        return any(
+            o.motion.voltage is not None
+            and float(np.ptp(o.motion.voltage)) > MOVING_VOLTAGE * (problem.scales.voltage or np.inf)
+            for o in problem.observations
+        )
+    if effect.needs == "temperature":
+        return any(np.ptp(warmth) > WARMS for warmth in _warmth(problem).values())
+    return True
+
+
+def _warmth(problem: Problem) -> dict[int, list[float]]:
+    """Temperatures at the beginning and end of every test [degC], by base row."""
+    found: dict[int, list[float]] = {}
+    for o in problem.observations:
+        if o.motion.temperature is not None:
+            found.setdefault(o.place, []).extend(ends(o.motion.temperature))
+    return found
+
+
+def candidates(
+    problem: Problem,
+    before: Fitted,
+    forbidden: Sequence[str] = (),
+    jobs: int = 1,
+    *,
+    silent: bool = False,
+) -> tuple[Candidate, ...]:
+    """Every effect with a name that the tests could show, fitted beside those of `before`, best first.
+
+    Parameters
+    ----------
+    problem : what is fitted to what
+    before : the optimum with the effects adopted so far
+    forbidden : effects that are not tried
+    jobs : how many are fitted at the same time
+    silent : noise explains what is left, so that only a faint effect can be missing
+    """
+    tried = [
+        effect
+        for effect in nameable().values()
+        if effect.name not in (*before.effects, *forbidden) and seen_in(problem, effect)
+    ]
+
+    _ = before.frame  # asked of by every candidate: computed once, before they go to threads of their own
+
+    def promised(effect: Effect) -> float:
+        return promise(problem, before, effect) if _for(problem, effect) is problem else np.inf
+
+    with ThreadPoolExecutor(max(jobs, 1)) as pool:
+        gains = list(pool.map(promised, tried))
+        best = max((gain for gain in gains if np.isfinite(gain)), default=0.0)
+        least = max(LEAST_PROMISE if silent else SLIGHT_PROMISE, WORTH_FITTING * best)
+
+        def one(effect: Effect, gain: float) -> Candidate:
+            return (candidate if gain >= least else _barely)(problem, before, effect)
+
+        found = list(pool.map(one, tried, gains))
+        worth = WORTH_SEARCHING * min((c.delta_bic for c in found), default=0.0)
+        found = list(pool.map(lambda c: finished(problem, before, c) if c.delta_bic < worth else c, found))
+    return tuple(sorted(found, key=lambda c: c.delta_bic))
+
+
+def finished(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
+    """A candidate whose search was broken off early, searched on from there."""
+    return _from(_for(problem, known()[found.effect]), before, found.effect, found.fitted.searched)
+
+
+def candidate(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
+    """One effect fitted beside those of `before`, from its most promising starting values.
+
+    Others, then ever fainter ones, are tried only while what is reached is worse than without the effect: a search
+    that got stuck, for without the effect is one of its own values.
+    """
+    problem, reached = _for(problem, effect), []
+    starts = promising_starts(problem, before, effect)
+    for start in (
+        *starts[:STARTS_TRIED],
+        *(fainter(problem, before, effect, starts[0], share) for share in FAINTER_STARTS),
+    ):
+        reached.append(
+            _from(problem, before, effect.name, np.concatenate([_base(problem, before), start]), FIRST_EVALUATIONS)
+        )
+        if reached[-1].fitted.misfit <= before.misfit + WORSE_THAN_CONTAINED or _switched_off(
+            effect, reached[-1].fitted
+        ):
+            break
+    return min(reached, key=lambda c: c.fitted.misfit)
+
+
+def _switched_off(effect: Effect, fitted: Fitted) -> bool:
+    """Whether the search of an effect's only parameter went to the limit below which lies zero, its absence."""
+    (only, *more), nearest = effect.parameters, fitted.unknowns[-1].bounds[0]
+    vanishes = only.search.logarithmic and only.neutral == 0.0 and not more
+    return vanishes and bool(fitted.searched[-1] - nearest < AT_EDGE)
+
+
+def _barely(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
+    """An effect as faint as it is looked for."""
+    start = fainter(problem, before, effect, starts_of(problem, before, effect)[0], FAINTER_STARTS[-1])
+    return replace(_from(problem, before, effect.name, np.concatenate([before.searched, start]), 1), searched=False)
+
+
+def best_competing_form(problem: Problem, before: Fitted) -> Candidate:
+    """The competing form (a law outside the library) that explains most, fitted as a candidate is."""
+    tried = (converged(problem, before, candidate(problem, before, form)) for form in confounders().values())
+    return min(tried, key=lambda c: c.delta_bic)
+
+
+def by_voltage(problem: Problem, before: Fitted) -> list[Candidate]:
+    """Every effect of `before` whose parameters may differ by voltage, fitted so."""
+    if len(problem.voltages) == 1:
+        return []
+    fixed = [library()[name] for name in before.effects if name not in problem.varying]
+    free = [e.name for e in fixed if e.place in VARIES and not e.same_at_every_voltage]
+    return [_varied(problem, before, name) for name in free]
+
+
+def _varied(problem: Problem, before: Fitted, effect: str, evaluations: int = MOST_EVALUATIONS) -> Candidate:
+    wider = replace(problem, varying=problem.varying | {effect})
+    fitted = fit(wider, before.effects, wider.start_with(before.damper), evaluations)
+    return replace(as_candidate(problem, before, effect, fitted), varies=True)
+
+
+def as_candidate(problem: Problem, before: Fitted, effect: str, fitted: Fitted) -> Candidate:
+    """An optimum with an effect more than `before` has, as what was tried in that step."""
+    return Candidate(effect, fitted, delta_bic(before, fitted), *_changed(problem, before, fitted))
+
+
+def converged(problem: Problem, before: Fitted, found: Candidate) -> Candidate:
+    """A candidate with its optimum searched to the end, from all its starting values."""
+    if found.varies:
+        return _varied(problem, before, found.effect, MOST_EVALUATIONS_OF_BEST)
+    effect = known()[found.effect]
+    problem = _for(problem, effect)
+    others = [np.concatenate([_base(problem, before), s]) for s in promising_starts(problem, before, effect)[1:]]
+    fits = [fit(problem, found.fitted.effects, start) for start in others]
+    best = min([found.fitted, *fits], key=lambda f: f.misfit)
+    return _from(problem, before, found.effect, best.searched, MOST_EVALUATIONS_OF_BEST)
+
+
+def nearly_as_good(
+    problem: Problem, before: Fitted, chosen: Candidate, tried: Sequence[Candidate]
+) -> tuple[Candidate, ...]:
+    """The candidates of a step, those nearly as good as the one chosen searched to the end as it was."""
+    near = NEARLY_AS_GOOD * chosen.delta_bic
+    return tuple(
+        converged(problem, before, c) if c.effect != chosen.effect and c.delta_bic < near else c for c in tried
+    )
+
+
+def _for(problem: Problem, effect: Effect) -> Problem:
+    """The problem that an effect is tried on: what changes the base with heat stands for its temperature axis."""
+    return problem.pooled() if effect.place == "material" else problem
+
+
+def _base(problem: Problem, before: Fitted) -> Array:
+    """(3 b + e,) where the search starts in the base rows and the effects of `before`."""
+    rows = before.searched.size - len(before.unknowns)
+    return before.searched if rows == 3 * len(problem.base) else problem.start_with(before.damper)
+
+
+def _from(
+    problem: Problem, before: Fitted, effect: str, start: Array, evaluations: int = MOST_EVALUATIONS
+) -> Candidate:
+    """An effect fitted from a start."""
+    fitted = fit(problem, (*before.effects, effect), start, evaluations)
+    pays = delta_bic(before, fitted)
+    if len(problem.base) < len(before.damper.base):
+        # Fewer base rows alone may pay already; that is not the effect's merit, nor are the parameters that they save.
+        pooled = fit(problem, before.effects, problem.start_with(before.damper))
+        own = len(fitted.unknowns) - len(before.unknowns)
+        alone = fitted.misfit - before.misfit + own * float(np.log(fitted.size))
+        pays = max(pays, alone, delta_bic(pooled, fitted))
+    return Candidate(effect, fitted, pays, *_changed(problem, before, fitted))
+
+
+def _changed(problem: Problem, before: Fitted, after: Fitted) -> tuple[float, float, float]:
+    """What a candidate changes: the force, the residuals, the misfit."""
+    changed = sum(float((b - a) @ (b - a)) for b, a in zip(before.residuals, after.residuals, strict=True))
+    return moved_by(problem, before, after), changed, before.misfit - after.misfit
+
+
+def delta_bic(before: Fitted, after: Fitted) -> float:
+    """Change of the Bayesian information criterion.
+
+    Equation: BIC = |r|^2 + p ln n                                  Source: Schwarz 1978
+    """
+    more = after.searched.size - before.searched.size
+    return after.misfit - before.misfit + more * float(np.log(after.size))
+
+
+def moved_by(problem: Problem, before: Fitted, after: Fitted) -> float:
+    """R.m.s. difference of two simulated forces, each record in units of its peak."""
+    squares = [
+        np.mean((a - b) ** 2) / o.peak**2
+        for o, a, b in zip(problem.observations, after.simulated, before.simulated, strict=True)
+    ]
+    return float(np.sqrt(np.mean(squares)))

@@ -1,0 +1,376 @@
+"""From candidates to adopted effects: one after another, as long as the data support the next by themselves."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from pzd.damper.effects import library
+from pzd.damper.model import Damper, against_nature
+from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.fit.least_squares import Fitted, fit, standard_errors
+from pzd.diagnosis.fit.parameters import Problem
+from pzd.diagnosis.search.acceptance import (
+    MAY_BE_CHANCE,
+    MAY_BE_OF_THE_TESTS,
+    Competition,
+    Detection,
+    Round,
+    Selection,
+    closes,
+    detections,
+    leaves_gap,
+    rivals_of,
+    spurious,
+    unsupported,
+)
+from pzd.diagnosis.search.candidates import (
+    Candidate,
+    as_candidate,
+    best_competing_form,
+    by_voltage,
+    candidate,
+    candidates,
+    converged,
+    delta_bic,
+    moved_by,
+    nearly_as_good,
+)
+from pzd.diagnosis.search.evidence import Evidence, evidence_of
+from pzd.diagnosis.thresholds import AT_REST, MOST_REWEIGHTINGS, WIDER
+
+# ----------------------------------------------------------------------------------------------------
+# Iteratively reweighted fits, until the parameters no longer depend on the damper that the weights came from.
+
+
+def reweighted(weighed: Callable[[Damper], Evidence], evidence: Evidence, current: Fitted) -> tuple[Evidence, Fitted]:
+    """The evidence weighed by what an optimum leaves and the optimum by that evidence, in turn until neither moves.
+
+    The delay of a test acts along the slope of the force that the damper gives, and shifts its corners.
+
+    Parameters
+    ----------
+    weighed : the evidence by what a damper leaves
+    evidence : by which the optimum was found
+    current : the optimum with the effects adopted
+    """
+    for _ in range(MOST_REWEIGHTINGS if current.effects else 0):
+        before, evidence = current, weighed(current.damper)
+        current = fit(evidence.whole, before.effects, evidence.whole.start_with(before.damper))
+        moved = [abs(u.of(current.damper) - u.of(before.damper)) for u in before.unknowns]
+        if np.all(moved <= AT_REST * standard_errors(current)):
+            break
+    return evidence, current
+
+
+# ----------------------------------------------------------------------------------------------------
+# Every other effect in the place of one adopted early, beside all that was adopted after it.
+
+
+def contest(
+    problem: Problem,
+    without: Fitted,
+    name: str,
+    current: Fitted,
+    refused: Callable[[Candidate], str | None],
+    config: DiagnoseConfig,
+    jobs: int,
+) -> tuple[Round, Candidate]:
+    """The step in which an effect was adopted, taken again; and what is adopted in it.
+
+    What came first was chosen beside less than is adopted now, and may have stood in for what came later. It stays
+    where nothing that the data support is better by more than rivals differ, and nature has its values.
+
+    Parameters
+    ----------
+    problem : what is fitted to what
+    without : the optimum with all that was adopted but this effect
+    name : of the effect
+    current : the optimum with it
+    refused : why the data do not support a candidate beside `without`, None where they do
+    config : how near a rival comes
+    jobs : candidates fitted at the same time
+    """
+    own = as_candidate(problem, without, name, current)
+    tried = [c for c in candidates(problem, without, config.forbid, jobs) if c.effect != name]
+    ended = sorted((own, *nearly_as_good(problem, without, own, tried)), key=lambda c: c.delta_bic)
+    close = [c for c in ended if c is not own and c.delta_bic - own.delta_bic < config.rival_bic]
+    stand_ins = frozenset(c.effect for c in close if refused(c))
+    alike = [c for c in close if c.effect not in stand_ins]
+    kept = next((c for c in alike if _better(c, own, config.rival_bic)), own)
+    return Round(tuple(ended), kept.effect, rivals_of(kept, (*alike, own), config), stand_ins), kept
+
+
+def _better(other: Candidate, own: Candidate, rival_bic: float) -> bool:
+    """Whether a candidate takes the place of the effect adopted."""
+    if against_nature(other.fitted.damper):
+        return False
+    return other.delta_bic < own.delta_bic - rival_bic or bool(against_nature(own.fitted.damper))
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+log = logging.getLogger(__name__)
+
+
+def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, jobs: int = 1) -> Selection:
+    """Adopt effects one after another while the next one pays, is supported by itself, and something is missing.
+
+    Parameters
+    ----------
+    campaign : the records of one setting
+    damper : plain, where the fits start
+    config : thresholds, forced and forbidden effects
+    jobs : candidates fitted at the same time
+    """
+    weighed = partial(evidence_of, campaign)
+    first = weighed(damper)
+    plain = fit(first.whole, (), first.whole.start())
+    search = _Search(config, weighed, jobs, damper, first, plain)
+    search.choose_temperature_axis()
+    first, plain = search.evidence, search.current
+    search.force()
+    while len(search.rounds) < 2 * config.most_effects and campaign.work.may_go_on() and search.step():
+        pass
+    search.contest()
+    search.rest()
+    undecided, competitions = search.undecided(), search.competitions()
+    rounds, reasons = tuple(search.rounds), search.reasons
+    return Selection(
+        plain, search.current, rounds, reasons, first, search.evidence, competitions, undecided, search.left_open
+    )
+
+
+@dataclass(eq=False)
+class _Search:
+    """State of the forward selection: the current fit, the rounds so far, and why each effect was adopted or not."""
+
+    config: DiagnoseConfig
+    weighed: Callable[[Damper], Evidence]
+    jobs: int
+    identified: Damper
+    """Plain, with the base rows of identify."""
+    evidence: Evidence
+    """Weighed by what the current damper leaves."""
+    current: Fitted
+    rounds: list[Round] = field(default_factory=list)
+    reasons: dict[str, str] = field(default_factory=dict)
+    left_open: dict[str, tuple[Detection, ...]] = field(default_factory=dict)
+
+    def force(self) -> None:
+        """Adopt what the config asks for."""
+        for name in self.config.force:
+            self.current = candidate(self.evidence.whole, self.current, library()[name]).fitted
+            self.reasons[name] = "adopted because the config asks for it"
+
+    def choose_temperature_axis(self) -> None:
+        """Keep T0, C, k by temperature where that pays, and more than an effect would; else one row a voltage.
+
+        Rows by temperature follow each test's own gain, and bend between the tests what is missing.
+        """
+        if len(self.identified.base) == len(self.evidence.whole.voltages) or self._drifts():
+            return
+        whole = self.weighed(
+            self.identified.model_copy(
+                update={"effects": self.current.damper.effects, "zero_m": self.current.damper.zero_m}
+            )
+        ).whole
+        few, effects, damper = whole.pooled(), self.current.effects, self.current.damper
+        rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, few))
+        pays = delta_bic(one, rows)
+        if pays <= self.config.adopt_bic and not effects:
+            drifts = tuple(name for name, effect in library().items() if effect.place == "material")
+            tried = candidates(few, one, (*self.config.forbid, *drifts), self.jobs)
+            pays -= min((c.delta_bic for c in tried), default=0.0)
+        self._reweight(rows if pays <= self.config.adopt_bic else one)
+
+    def _drifts(self) -> bool:
+        return any(library()[name].place == "material" for name in self.current.effects)
+
+    def step(self) -> bool:
+        """Adopt one effect more, an adopted one by voltage, or two that are supported together; whether any was."""
+        tried = self._tried(self.evidence, self.current)
+        steps = sorted((*tried, *by_voltage(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
+        first = self._first_supported(steps)
+        if first is None:
+            return self._pair(tried)
+        ended = converged(self.evidence.whole, self.current, self._natural(first, steps))
+        self._adopt(ended, nearly_as_good(self.evidence.whole, self.current, ended, tried), _before(first, steps))
+        return True
+
+    def _natural(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
+        """Of the candidates that pay as much as the first and are supported, one with values that nature has."""
+        if not against_nature(first.fitted.damper):
+            return first
+        alike = [c for c in steps if not c.varies and c.delta_bic - first.delta_bic < self.config.rival_bic]
+        return self._first_supported([c for c in alike if not against_nature(c.fitted.damper)]) or first
+
+    def _tried(self, evidence: Evidence, current: Fitted) -> tuple[Candidate, ...]:
+        if len(current.effects) == self.config.most_effects:
+            return ()
+        silent = not evidence.something_missing(current, self.config)
+        return candidates(evidence.whole, current, self.config.forbid, self.jobs, silent=silent)
+
+    def _first_supported(self, tried: Sequence[Candidate]) -> Candidate | None:
+        """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""
+        for each in tried:
+            reason = self._refused(self.config, each)
+            if reason is None:
+                return each
+            if not each.varies:
+                self.reasons[each.effect] = reason
+            if each.delta_bic > self.config.adopt_bic:
+                break
+        return None
+
+    def _too_little(self, evidence: Evidence, before: Fitted, each: Candidate) -> str | None:
+        return unsupported(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
+
+    def _leaves_gap(self, evidence: Evidence, before: Fitted, each: Candidate) -> str | None:
+        """Why a candidate is a stand-in by the gap that it leaves open, weighed by what is left without it or with it.
+
+        What is left without it is slow: beside that the fit goes by what is quick, where the displacement is known
+        worst, and T0, C and k are bent.
+        """
+        reason = leaves_gap(evidence, self.config, before, each)
+        if reason is None or each.varies:
+            return reason
+        whole = self.weighed(each.fitted.damper).whole
+        again = fit(whole, each.fitted.effects, whole.start_with(each.fitted.damper))
+        return leaves_gap(evidence, self.config, before, replace(each, fitted=again))
+
+    def _pair(self, tried: tuple[Candidate, ...]) -> bool:
+        """Adopt two effects at once: alone either takes on values that the other distorts."""
+        missing = self.evidence.something_missing(self.current, self.config)
+        lead = next((c for c in tried if missing and self._too_little(self.evidence, self.current, c) is None), None)
+        found = None if lead is None else self._with_second(lead)
+        if lead is None or found is None:
+            self.left_open = detections(self.evidence.whole, self.current, tried)
+            # Once noise explains what is left, the round that adopted something tells more of the others.
+            self.rounds += [Round(tried, None)] if tried and (missing or not self.rounds) else []
+            return False
+        self.rounds.append(Round(tried, lead.effect, refused=_before(lead, tried)))
+        self.reasons[lead.effect] = "adopted"
+        self._adopt(*found)
+        return True
+
+    def _with_second(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...], frozenset[str]] | None:
+        """The effect that is supported together with another one, what else was tried beside that, and was refused."""
+        evidence = self.weighed(lead.fitted.damper)
+        at = fit(evidence.whole, lead.fitted.effects, evidence.whole.start_with(lead.fitted.damper))
+        seconds = self._tried(evidence, at)
+        best = next((c for c in seconds if self._too_little(evidence, at, c) is None), None)
+        if best is None:
+            return None
+        both = converged(evidence.whole, at, best)
+        if not closes(self.evidence, self.config, self.current, both):
+            return None
+        failed = spurious(self.evidence, self.weighed(both.fitted.damper), self.config, self.current, both)
+        return None if failed else (both, nearly_as_good(evidence.whole, at, both, seconds), _before(best, seconds))
+
+    def _adopt(self, chosen: Candidate, tried: tuple[Candidate, ...], refused: frozenset[str]) -> None:
+        self.reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
+        if not chosen.varies:
+            finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
+            step = Round(finished, chosen.effect, refused=refused)
+            self.rounds.append(replace(step, rivals=rivals_of(chosen, step.contenders, self.config)))
+        log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
+        self._reweight(chosen.fitted)
+        self.choose_temperature_axis()
+        for name in self.current.effects[len(self.config.force) : -1]:
+            self._drop_needless(name, chosen.effect)
+
+    def _reweight(self, found: Fitted) -> None:
+        """Go on from an optimum, the evidence weighed by what it leaves, unless that bends it to a wider gap."""
+        self.evidence = self.weighed(found.damper)
+        whole = self.evidence.whole
+        start = whole.start_with(found.damper)
+        self.current = fit(whole, found.effects, start)
+        if self._gap(self.current) > max(WIDER * self._gap(found), self.config.negligible):
+            self.current = fit(whole, found.effects, start, evaluations=1)
+
+    def contest(self) -> None:
+        """Try the others again in the place of each effect adopted before the last, and keep what does better."""
+        for name in self.current.effects[len(self.config.force) : -1]:
+            step = next((i for i, each in enumerate(self.rounds) if each.chosen == name), None)
+            fixed = name in self.evidence.whole.varying or library()[name].place == "material"
+            if step is None or fixed or not self.evidence.campaign.work.may_go_on():
+                continue
+            without = self._without(name)
+            refused = partial(self._refused, self.config, before=without)
+            whole = self.evidence.whole
+            self.rounds[step], best = contest(whole, without, name, self.current, refused, self.config, self.jobs)
+            if best.effect != name:
+                self.reasons[name] = f"stand-in: {best.effect} does better beside what was adopted later"
+                self.reasons[best.effect] = "adopted"
+                self._reweight(best.fitted)
+
+    def rest(self) -> None:
+        """Weigh and fit in turn until no parameter moves, unless that widens the gap."""
+        evidence, current = reweighted(self.weighed, self.evidence, self.current)
+        if self._gap(current) <= max(WIDER * self._gap(self.current), self.config.negligible):
+            self.evidence, self.current = evidence, current
+
+    def _gap(self, fitted: Fitted) -> float:
+        return self.evidence.gap(fitted)
+
+    def _without(self, effect: str) -> Fitted:
+        """The optimum with one of the adopted effects left out."""
+        whole, damper = self.evidence.whole, self.current.damper
+        effects = {name: values for name, values in damper.effects.items() if name != effect}
+        return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
+
+    def competitions(self) -> tuple[Competition, ...]:
+        """The competing forms that would do as well as an effect adopted, in its place."""
+        found = []
+        for name in self.current.effects[len(self.config.force) :]:
+            without = self._without(name)
+            form = best_competing_form(self.evidence.whole, without)
+            behind = form.delta_bic - delta_bic(without, self.current)
+            if behind < self.config.rival_bic:
+                found.append(Competition(name, self.current.damper, form.effect, form.fitted.damper, behind))
+        return tuple(found)
+
+    def undecided(self) -> tuple[str, ...]:
+        """Where nothing was adopted, the effects that are rivals of none, each with its reason."""
+        if self.current.effects or not self.rounds:
+            return ()
+        short = [c for c in self.rounds[-1].tried if c.delta_bic > self.config.adopt_bic]
+        best = min((c.delta_bic for c in short), default=0.0)
+        if best <= -self.config.rival_bic:
+            lenient = self.config.model_copy(update={"adopt_bic": min(best + self.config.rival_bic, 0.0)})
+            for each in short:
+                if each.delta_bic <= lenient.adopt_bic:
+                    self.reasons[each.effect] = self._refused(lenient, each) or MAY_BE_CHANCE
+        return tuple(name for name, why in self.reasons.items() if why in (MAY_BE_OF_THE_TESTS, MAY_BE_CHANCE))
+
+    def _refused(self, config: DiagnoseConfig, each: Candidate, before: Fitted | None = None) -> str | None:
+        """Why a candidate is too little, or a stand-in; None where the data support it by itself."""
+        evidence, before = self.evidence, before or self.current
+        return (
+            unsupported(evidence, config, each)
+            or self._leaves_gap(evidence, before, each)
+            or spurious(evidence, self.weighed(each.fitted.damper), config, before, each)
+        )
+
+    def _drop_needless(self, effect: str, newest: str) -> None:
+        """Take back an effect adopted earlier that no longer pays or no longer moves the force."""
+        whole, current = self.evidence.whole, self.current
+        if library()[effect].place == "material":
+            return
+        without = self._without(effect)
+        pays = delta_bic(without, current) <= self.config.adopt_bic
+        if not pays or moved_by(whole, without, current) < self.config.visible:
+            self.current, self.reasons[effect] = without, f"stand-in: not needed beside {newest}"
+
+
+def _before(chosen: Candidate, tried: Sequence[Candidate]) -> frozenset[str]:
+    """The effects that promised more than the one chosen: they were refused."""
+    return frozenset(c.effect for c in itertools.takewhile(lambda c: c is not chosen, tried) if not c.varies)

@@ -1,0 +1,93 @@
+"""The table stage: the damper that diagnose hands on becomes a table of force and its inverse."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pzd.artefacts import Diagnosed, Identified, Rig, Table, TableNotes
+from pzd.damper.model import Damper
+from pzd.force_table.config import TableConfig
+from pzd.quantities import Control
+from pzd.record import Record
+
+log = logging.getLogger(__name__)
+
+WARM_STEPS = 5
+"""Temperatures of the table where an effect of the material, as `temperature_drift`, gives the temperature axis."""
+
+
+def tabulate(
+    table: TableConfig, rig: Rig, identified: Identified, diagnosed: Diagnosed, control: Control, setting: str | None
+) -> Table:
+    """Force over (temperature, voltage, velocity) at steady slip, its inverse, and settings between tested ones.
+
+    Parameters
+    ----------
+    table : the config's block
+    rig : the records, for the speeds that were reached
+    identified : the dampers of all settings, for those between
+    diagnosed : the damper to tabulate
+    control : the control signal, for the words of the notes
+    setting : of the rig's settings, the one in use
+
+    Raises
+    ------
+    ConfigError : when a setting that is asked for does not lie between tested ones
+    """
+    made = force_table(table, rig, diagnosed, control, setting)
+    if table.settings is None:
+        return made
+    from pzd.force_table.settings import between_settings
+
+    rows, left_out = between_settings(table, rig, identified, control)
+    return replace(made, settings=rows, settings_left_out=left_out)
+
+
+def force_table(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Control, setting: str | None) -> Table:
+    """Force over (temperature, voltage, velocity) at steady slip, its inverse, and what it cannot carry.
+
+    Parameters
+    ----------
+    table : the config's block
+    rig : the records, for the speeds that were reached
+    diagnosed : the damper to tabulate
+    control : the control signal, for the words of the notes
+    setting : of the rig's settings, the one in use
+    """
+    from pzd.force_table.force import force_rows, grid, lost, not_monotone, reached, temperatures_of, voltages_of
+    from pzd.force_table.lookup import inverse_rows
+
+    damper = diagnosed.damper
+    records = [record for record in rig.records if record.setting == setting]
+    reach = reached(records, temperatures_of(diagnosed.plain), voltages_of(diagnosed.plain))
+    nodes = grid(table, damper, _temperatures(table, damper, records), reach)
+    notes = TableNotes(
+        outside=table.outside,
+        reached_m_per_s=float(np.nanmax(reach.speeds)),
+        lost=lost(damper, nodes.temperatures, nodes.velocities),
+        not_monotone=not_monotone(damper, nodes.temperatures, nodes.velocities, control),
+    )
+    for line in notes.not_monotone:
+        log.info("table: %s", line)
+    forward = Table(force_rows(table, damper, nodes, reach), (), notes)
+    return Table(forward.force, inverse_rows(table, forward), notes)
+
+
+def _temperatures(table: TableConfig, damper: Damper, records: Sequence[Record]) -> tuple[float | None, ...]:
+    """The temperatures of the table: as configured, over the rig's range under drift, else the damper's."""
+    from pzd.damper.confounders import known
+    from pzd.force_table.force import temperatures_of
+
+    recorded = [r.temperature for r in records if r.temperature is not None]
+    if not recorded:
+        return (None,)
+    if table.temperatures_degC is not None:
+        return tuple(sorted(set(table.temperatures_degC)))
+    if not any(known()[name].place == "material" for name in damper.effects):
+        return temperatures_of(damper)
+    low, high = min(float(t.min()) for t in recorded), max(float(t.max()) for t in recorded)
+    return tuple(float(t) for t in np.unique(np.linspace(low, high, WARM_STEPS)))

@@ -1,0 +1,220 @@
+"""The identify stage: the Bingham parameters of every condition and node, and the measures of every test."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+
+from pzd.artefacts import AuxiliaryRow, Identified, Knees, ParameterRow, Rig
+from pzd.identification.config import IdentifyConfig
+from pzd.parallel.processes import Listener, Progress, no_listener, parallel_map
+from pzd.quantities import TEMPERATURE, Control
+from pzd.record import Condition, Record, conditions, merged_voltages
+from pzd.schema.errors import ConfigError, DataError, counted, supported
+from pzd.signals.cycles import Cycles, cycles_of, remember
+
+Labels = tuple[str | None, float | None, float | None]
+
+log = logging.getLogger(__name__)
+
+WORTH_A_PROCESS = 2_000_000
+"""Samples in all from which conditions are fitted in processes of their own, each of which imports a library first:
+fewer are fitted as soon here."""
+
+_VOLTAGE = Control()
+
+
+def identify(
+    identify: IdentifyConfig,
+    rig: Rig,
+    seed: int,
+    progress: Listener = no_listener,
+    control: Control = _VOLTAGE,
+    jobs: int = 1,
+) -> Identified:
+    """The Bingham parameters of every condition of every setting, with intervals and their trust.
+
+    Parameters
+    ----------
+    identify : how they are found
+    rig : the records
+    seed : of the evolutionary search
+    progress : hears of every condition that is done
+    control : the control signal, which names the voltage in messages
+    jobs : conditions that are fitted at the same time
+
+    Returns
+    -------
+    one row a condition or voltage node, one row of measures a record, one of auxiliaries a condition that shows any,
+    and the characteristics that the tests show without a model
+
+    Raises
+    ------
+    ConfigError : when `identify.group` makes one condition of all voltages
+    """
+    from pzd.identification.tests_over_time import characteristics, measures
+
+    refuse_one_condition(identify, rig, control)
+    refuse_partly_recorded(rig, control)
+    constant, moving = conditions(rig.records, identify.group.voltage_V, identify.group.temperature_degC)
+    found = _constant_rows(constant, identify, seed, progress, jobs)
+    rows = {_labels(row): row for row, _ in found}
+    auxiliary = {_labels(row): row for _, row in found if row is not None}
+    known = list(zip(constant, rows.values(), strict=True))
+    rows |= {_labels(row): row for row in _moving_rows(moving, known, list(auxiliary.values()), identify)}
+    return Identified(
+        tuple(rows[labels] for labels in sorted(rows, key=_order)),
+        measures(rig.records),
+        tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_order)),
+        characteristics(constant, moving),
+        _knees(identify, known, [r.setting for r in rig.records], control, progress),
+    )
+
+
+def _knees(
+    config: IdentifyConfig,
+    known: Sequence[tuple[Condition, ParameterRow]],
+    settings: Sequence[str | None],
+    control: Control,
+    progress: Listener,
+) -> Knees:
+    """The knee law of every condition, where the config asks for it."""
+    if config.law == "bingham":
+        return Knees()
+    from pzd.identification.knee import knees
+
+    return knees(known, tuple(dict.fromkeys(settings)), config, control, progress)
+
+
+def refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> None:
+    """Refuse a group of voltages as wide as all that the rig has.
+
+    Parameters
+    ----------
+    config : the config's `identify` block
+    rig : the records
+    control : the control signal, which names the voltage in messages
+
+    Raises
+    ------
+    ConfigError : when `identify.group` makes one condition of all voltages
+    """
+    within = config.group.voltage_V
+    merged = merged_voltages(rig.records, within) if within is not None else None
+    if merged is not None:
+        key, span = control.renamed("voltage_V"), f"{merged[0]:.4g} to {merged[1]:.4g} {control.unit}"
+        raise ConfigError(
+            f"identify.group.{key}: merges every {control.quantity.name} of the rig ({span}) into one condition, so "
+            "that T0, C and k could not depend on it; say less than lies between two of them, or leave it empty "
+            f"(got {within:g})"
+        )
+
+
+def refuse_partly_recorded(rig: Rig, control: Control) -> None:
+    """Refuse a setting of which some tests have a voltage or a temperature and others have none.
+
+    Parameters
+    ----------
+    rig : the records
+    control : the control signal, which names the voltage in messages
+
+    Raises
+    ------
+    DataError : with the first test that lacks one
+    """
+    for setting in dict.fromkeys(record.setting for record in rig.records):
+        mine = [record for record in rig.records if record.setting == setting]
+        for name, unit, without in (
+            (control.quantity.name, control.unit, [r.name for r in mine if r.voltage is None]),
+            (TEMPERATURE.name, TEMPERATURE.unit, [r.name for r in mine if r.temperature is None]),
+        ):
+            if 0 < len(without) < len(mine):
+                more = f" and {counted(len(without) - 1, 'more test')}" if len(without) > 1 else ""
+                raise DataError(
+                    f"{without[0]}{more}: no {name}, which other tests of the setting have: say what it was, "
+                    f"constants: {{{name}: ... {unit}}}, or leave it out of all, columns: {{{name}: ''}}"
+                )
+
+
+def _constant_rows(
+    found: Sequence[Condition], config: IdentifyConfig, seed: int, progress: Listener, jobs: int
+) -> list[tuple[ParameterRow, AuxiliaryRow | None]]:
+    from pzd.identification.fit import identify_condition
+
+    rows: list[tuple[ParameterRow, AuxiliaryRow | None]] = []
+
+    def fitted(number: int) -> tuple[ParameterRow, AuxiliaryRow | None, list[Cycles | None]]:
+        condition = found[number]
+        return *identify_condition(condition, config, seed + number), [cycles_of(r) for r in condition.records]
+
+    def collected(made: tuple[ParameterRow, AuxiliaryRow | None, list[Cycles | None]]) -> None:
+        row, auxiliary, runs = made
+        for record, run in zip(found[len(rows)].records, runs, strict=True):
+            remember(record, run)
+        rows.append((row, auxiliary))
+        progress(Progress(len(rows), len(found), f"conditions: {_line(row)}{_auxiliary_text(auxiliary)}"))
+
+    samples = sum(record.time.size for condition in found for record in condition.records)
+    parallel_map(fitted, range(len(found)), jobs if samples > WORTH_A_PROCESS else 1, collected)
+    return rows
+
+
+def _auxiliary_text(row: AuxiliaryRow | None) -> str:
+    if row is None:
+        return ""
+    force = supported(row.F_0_N, row.F_0_N_low95, row.F_0_N_high95)
+    stiffness = supported(row.k_g_N_per_m, row.k_g_N_per_m_low95, row.k_g_N_per_m_high95)
+    return f"; beside the element {force} N and {stiffness} N/m"
+
+
+def _moving_rows(
+    moving: Sequence[Record],
+    known: Sequence[tuple[Condition, ParameterRow]],
+    auxiliaries: Sequence[AuxiliaryRow],
+    config: IdentifyConfig,
+) -> list[ParameterRow]:
+    from pzd.identification.auxiliary import without
+    from pzd.identification.moving_voltage import fit_moving
+
+    rows = []
+    for setting in sorted({r.setting for r in moving}, key=lambda s: s or ""):
+        auxiliary = [row for row in auxiliaries if row.setting == setting]
+        mine = [(c, row) for c, row in known if c.setting == setting]
+        still = [replace(c, records=tuple(without(r, auxiliary) for r in c.records)) for c, _ in mine]
+        of_setting = [without(r, auxiliary) for r in moving if r.setting == setting]
+        for row in fit_moving(of_setting, still, [row for _, row in mine], config):
+            rows.append(row)
+            log.info("node from records with moving voltage: %s", _line(row))
+    return rows
+
+
+def _labels(row: ParameterRow | AuxiliaryRow) -> Labels:
+    return row.setting, row.voltage_V, row.temperature_degC
+
+
+def _order(labels: Labels) -> tuple[str, float, float]:
+    setting, voltage, temperature = labels
+    return setting or "", temperature or 0.0, voltage or 0.0
+
+
+def _line(row: ParameterRow) -> str:
+    def shown(value: float | None, low: float | None, high: float | None) -> str:
+        if value is None:
+            return "-"
+        return f"{value:.4g}" if low is None or high is None else supported(value, low, high)
+
+    place = ", ".join(
+        part
+        for part in (
+            row.setting,
+            None if row.voltage_V is None else f"{row.voltage_V:.4g}",
+            None if row.temperature_degC is None else f"{row.temperature_degC:.4g} degC",
+        )
+        if part
+    )
+    return (
+        f"{place or 'all records'}: T0 = {shown(row.T0_N, row.T0_N_low95, row.T0_N_high95)} N,"
+        f" C = {shown(row.C_Ns_per_m, row.C_Ns_per_m_low95, row.C_Ns_per_m_high95)} N s/m,"
+        f" k = {shown(row.k_N_per_m, row.k_N_per_m_low95, row.k_N_per_m_high95)} N/m, W_s = {row.W_s:.3g}, {row.status}"
+    )

@@ -1,1 +1,0 @@
-"""The knee law of a passive damper: fitted, judged, and held to Bingham's on tests kept back."""

@@ -1,0 +1,148 @@
+"""Work of Python itself on several cores at once: in processes that are forked and share what stands in memory."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+# ----------------------------------------------------------------------------------------------------
+
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
+
+Item = TypeVar("Item")
+Made = TypeVar("Made")
+
+_FORKS = sys.platform == "linux"
+"""Elsewhere a process would have to import everything anew, which takes longer than what is saved."""
+
+
+def parallel_map(
+    function: Callable[[Item], Made], items: Sequence[Item], jobs: int, made_one: Callable[[Made], None] | None = None
+) -> list[Made]:
+    """What a function makes of each item, in order, however many processes there are.
+
+    Parameters
+    ----------
+    function : is called once an item; what it changes in memory may be lost
+    items : what to call it with
+    jobs : processes at the same time
+    made_one : hears in this process of each that is made, in order
+
+    Raises
+    ------
+    whatever the function does
+    """
+    jobs = min(jobs, len(items)) if _FORKS else 1
+    made: list[Made] = []
+
+    def heard(one: Made) -> None:
+        made.append(one)
+        if made_one is not None:
+            made_one(one)
+
+    if jobs < 2:
+        for item in items:
+            heard(function(item))
+        return made
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    # What a forked process is started with is not pickled: the function may be any, and the items are not copied.
+    context = multiprocessing.get_context("fork")
+    pool = ProcessPoolExecutor(jobs, context, _start_worker, (function, items))
+    finished = False
+    try:
+        futures = [pool.submit(_one, place) for place in range(len(items))]
+        for future, item in zip(futures, items, strict=True):
+            heard(_result(future, function, item))
+        finished = True
+    finally:
+        pool.shutdown(wait=finished, cancel_futures=True)
+    return made
+
+
+def spawned_pool(jobs: int) -> Executor:
+    """A pool of processes that share nothing with this one, say nothing, and end with it however it ends."""
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    return ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _work_quietly)
+
+
+def _work_quietly() -> None:
+    logging.getLogger("pzd").addHandler(logging.NullHandler())
+    end_with_parent()
+
+
+def end_with_parent() -> None:
+    """Let this process, a worker of a pool, end without a word when it is interrupted or its parent has ended.
+
+    A parent that is killed tells nobody: its workers would wait for work for ever.
+    """
+    import multiprocessing
+    from threading import Thread
+
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    parent = multiprocessing.parent_process()
+
+    def wait_for_its_end() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    Thread(target=wait_for_its_end, daemon=True).start()
+
+
+def _result(future: Future[Made], function: Callable[[Item], Made], item: Item) -> Made:
+    """What a worker made; where it failed or was killed, the item is done here, where a failure can be told."""
+    try:
+        return future.result()
+    except Exception:  # noqa: BLE001  # whatever it is, the same call here raises it, with all that belongs to it
+        return function(item)
+
+
+_work: list[Any] = []
+"""In a worker: the function, and the items."""
+
+
+def _start_worker(function: Callable[[Any], Any], items: Sequence[Any]) -> None:
+    end_with_parent()
+    _work[:] = function, items
+
+
+def _one(place: int) -> Any:
+    function, items = _work
+    return function(items[place])
+
+
+# ----------------------------------------------------------------------------------------------------
+# How far a stage that takes long has come, as an event for whoever shows it.
+
+
+@dataclass(frozen=True)
+class Progress:
+    """So many parts of the work are done."""
+
+    done: int
+    whole: int
+    what: str
+    """What is counted, in the plural, and what there is to say about the part that was done last."""
+
+    def __str__(self) -> str:
+        """How far, in words."""
+        return f"{self.done} of {self.whole} {self.what}"
+
+
+Listener = Callable[[Progress], None]
+"""Is called with every event, in the thread that does the work."""
+
+
+def no_listener(_: Progress) -> None:
+    """Does nothing: for a stage whose progress nobody follows."""

@@ -1,0 +1,303 @@
+"""The force that the policy asks of each axle, within the box Omega(V)."""
+
+from __future__ import annotations
+
+import math
+
+from pzd.compiled import compiled, inlined
+from pzd.force_table.lookup import table_range
+from pzd.record import Array
+from pzd.simulate.policies import TieBreak
+from pzd.simulate.ride.model import (
+    BODY,
+    BY_COEFFICIENTS,
+    BY_TABLE,
+    DEFLECTION,
+    FORCE,
+    HARD,
+    HEAVE,
+    HEAVE_RATE,
+    HIGH,
+    LOW,
+    MINIMISE,
+    PITCH,
+    PITCH_RATE,
+    RATE,
+    SIDED_RATE,
+    SWITCH,
+    TIE_END,
+    ControlSpec,
+    TableArrays,
+    Vehicle,
+)
+
+# ----------------------------------------------------------------------------------------------------
+# The box Omega(V) of admissible forces, equation (11) of the paper, by either of its two bounds.
+
+
+@inlined
+def coefficient_bounds(velocity: float, c_min: float, c_max: float) -> tuple[float, float]:
+    """Lowest and highest force between two damping coefficients.
+
+    Equation: T_i in [c_min V_i, c_max V_i]      Source: Makowski and Knap 2021, eq. (11) and section 5
+
+    Parameters
+    ----------
+    velocity : suspension speed V_i [m/s]
+    c_min, c_max : smallest and largest damping coefficient of the axle [N s/m]
+
+    Returns
+    -------
+    lowest and highest force of the axle [N]
+    """
+    if velocity >= 0.0:
+        return c_min * velocity, c_max * velocity
+    return c_max * velocity, c_min * velocity
+
+
+@inlined
+def table_bounds(
+    velocity: float, motion_ratio: float, dampers: float, speeds: Array, rebound: Array, compression: Array
+) -> tuple[float, float]:
+    """Lowest and highest force that the table has between its lowest and highest voltage.
+
+    Equation: T_i in {n r F(U, r V_i): U_min <= U <= U_max}      Source: Makowski and Knap 2021, eq. (11)
+
+    Parameters
+    ----------
+    velocity : suspension speed V_i; the sign bit of 0 picks the side [m/s]
+    motion_ratio : r, damper extension over suspension deflection
+    dampers : n, number of dampers at the axle
+    speeds, rebound, compression : the table, see `pzd.force_table.lookup.table_force`
+
+    Returns
+    -------
+    lowest and highest force of the axle [N]
+    """
+    low, high = table_range(speeds, rebound, compression, motion_ratio * velocity)
+    return dampers * motion_ratio * low, dampers * motion_ratio * high
+
+
+# ----------------------------------------------------------------------------------------------------
+# Laws that switch each damper between its hardest and its softest state.
+
+
+@inlined
+def is_hard(rate: float, signal: float, acceleration: float, crossover: float) -> bool:
+    """Whether a switched damper is to be hard.
+
+    Equation: hard where p V > 0, else soft; p = s where |a| <= w_c |s|, else p = a
+    Source: Savaresi and Spelta 2007, J. Dyn. Sys. Meas. Control 129(4), with s = dz_i/dt: a damper that pulls the body
+    against its motion (p V > 0) is hard. w_c = 0 leaves the acceleration alone, w_c without bound the signal
+
+    Parameters
+    ----------
+    rate : V_i, speed of the suspension [m/s]
+    signal : s that a policy makes of what it senses; its unit goes with that of w_c
+    acceleration : a = d2z_i/dt2 of the body above the axle [m/s2]
+    crossover : w_c [rad/s]
+    """
+    decides = acceleration if abs(acceleration) > crossover * abs(signal) else signal
+    return decides * rate > 0.0
+
+
+@inlined
+def switched_force(hard: bool, rate: float, low: float, high: float) -> float:
+    """The end of the box Omega(V) that is a hard or a soft damper at a speed [N]; the sign bit of 0 picks the side."""
+    return high if hard == (math.copysign(1.0, rate) > 0.0) else low
+
+
+# ----------------------------------------------------------------------------------------------------
+# The forces within reach that make |a_K| smallest, equations (10) and (12) of the paper.
+#
+# a_K = a_0 + D^T T is a plane over the box of the admissible forces, so the smallest |a_K| is where
+# a_K = 0 cuts the box - a whole segment of minimisers - or a corner where it does not. Equation (12)
+# says nothing about the segment: the tie-break picks its point.
+
+
+Pair = tuple[float, float]
+
+SMALLEST, EQUAL_SHARE, LARGEST, LEAST_LOAD = range(4)
+TIE_BREAKS: dict[TieBreak, int] = {"smallest": SMALLEST, "equal_share": EQUAL_SHARE, "largest": LARGEST}
+
+
+@compiled
+def least_acceleration_forces(
+    a0: float, D: Pair, low: Array, high: Array, tie: int, branch: int, forces: Array
+) -> None:
+    """Fill `forces` (2,) with damper forces within the box that make |a_0 + D^T T| smallest.
+
+    Equation: T_K in Arg min |a_0 + D^T T| over Omega(V)      Source: Makowski and Knap 2021, eq. (10)-(12)
+
+    Parameters
+    ----------
+    a0 : acceleration at K by the springs alone [m/s2]
+    D : acceleration at K by each damper force [1/kg]
+    low, high : (2,) the box Omega(V) [N]
+    tie : `SMALLEST` Euclidean norm; `EQUAL_SHARE`: each damper goes the same share of its range
+        from where it pushes K down most to where it pushes K up most; `LARGEST` Euclidean norm
+    branch : the end of the segment that `LARGEST` takes, see `farther_end`
+    forces : (2,) filled [N]
+    """
+    share = _share(a0, D, low, high)
+    if tie == EQUAL_SHARE or share <= 0.0 or share >= 1.0:
+        for i in range(2):
+            start, end = (low[i], high[i]) if D[i] >= 0.0 else (high[i], low[i])
+            forces[i] = start + share * (end - start)
+        return
+    i, first, last = _segment(a0, D, low, high)
+    j = 1 - i
+    if tie == LARGEST:
+        forces[i] = first if branch == 0 else last
+    else:
+        nearest = -a0 * D[i] / (D[0] * D[0] + D[1] * D[1])
+        forces[i] = min(max(nearest, first), last)
+    forces[j] = min(max((-a0 - D[i] * forces[i]) / D[j], low[j]), high[j])
+
+
+@compiled
+def least_load_forces(springs: Pair, D: Pair, low: Array, high: Array, forces: Array) -> None:
+    """Fill `forces` (2,) with those of the least wheel loads that make |a_K| smallest within the box.
+
+    Equation: a_K = D^T L, L = S + T: the smallest Euclidean norm of L in the box Omega(V) + S
+    Source: Makowski and Knap 2021, eq. (9)-(12); section 6 has the wheel load as another criterion
+
+    Parameters
+    ----------
+    springs : S_i of both axles [N]
+    D : acceleration at K by each force [1/kg]
+    low, high : (2,) the box Omega(V), shifted meanwhile [N]
+    forces : (2,) filled [N]
+    """
+    for i in range(2):
+        low[i] += springs[i]
+        high[i] += springs[i]
+    least_acceleration_forces(0.0, D, low, high, SMALLEST, 0, forces)
+    for i in range(2):
+        low[i] -= springs[i]
+        high[i] -= springs[i]
+        forces[i] = min(max(forces[i] - springs[i], low[i]), high[i])
+
+
+@compiled
+def farther_end(a0: float, D: Pair, low: Array, high: Array) -> int:
+    """End of the segment of minimisers (0 or 1) with the larger Euclidean norm."""
+    if D[0] == 0.0 and D[1] == 0.0:
+        return 0
+    i, first, last = _segment(a0, D, low, high)
+    j = 1 - i
+    at_first = math.hypot(first, (-a0 - D[i] * first) / D[j])
+    at_last = math.hypot(last, (-a0 - D[i] * last) / D[j])
+    return 0 if at_first >= at_last else 1
+
+
+@compiled
+def _share(a0: float, D: Pair, low: Array, high: Array) -> float:
+    """Share of the range of D^T T over the box at which a_K = 0: 0 or 1 where it is out of reach."""
+    least, most = 0.0, 0.0
+    for i in range(2):
+        least += min(D[i] * low[i], D[i] * high[i])
+        most += max(D[i] * low[i], D[i] * high[i])
+    if -a0 <= least:
+        return 0.0
+    if -a0 >= most:
+        return 1.0
+    return (-a0 - least) / (most - least)
+
+
+@compiled
+def _segment(a0: float, D: Pair, low: Array, high: Array) -> tuple[int, float, float]:
+    """The damper i with the smaller |D|, and its forces at both ends of the segment a_K = 0."""
+    i = 0 if abs(D[0]) <= abs(D[1]) else 1
+    j = 1 - i
+    first, last = low[i], high[i]
+    if D[i] != 0.0:
+        one, other = (-a0 - D[j] * low[j]) / D[i], (-a0 - D[j] * high[j]) / D[i]
+        first, last = max(first, min(one, other)), min(last, max(one, other))
+    if first > last:
+        first = last = 0.5 * (first + last)
+    return i, first, last
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@inlined
+def one_sided(velocity: float, side: float) -> float:
+    """The velocity held on the side of zero that an axle is on (+1, -1); the sign bit of 0 carries the side."""
+    return math.copysign(max(side * velocity, 0.0), side)
+
+
+@compiled
+def bounds_of(
+    control_spec: ControlSpec, car: Vehicle, grid: TableArrays, axle: int, velocity: float
+) -> tuple[float, float]:
+    """Lowest and highest force of an axle [N] at a suspension speed [m/s]."""
+    if control_spec.bounds == BY_COEFFICIENTS:
+        return coefficient_bounds(velocity, control_spec.c_min, control_spec.c_max)
+    if control_spec.bounds == BY_TABLE:
+        return table_bounds(velocity, car.ratio[axle], car.dampers[axle], grid.speeds, grid.rebound, grid.compression)
+    return -math.inf, math.inf
+
+
+@inlined
+def feedback_force(gains: Array, y: Array, workspace: Array) -> float:
+    """What a policy makes of what it senses at one axle: gains (8,) on `SENSED`; a force [N], or what switches."""
+    force = gains[4] * y[HEAVE] + gains[5] * y[PITCH] + gains[6] * y[HEAVE_RATE] + gains[7] * y[PITCH_RATE]
+    for i in range(2):
+        force += gains[i] * workspace[DEFLECTION, i] + gains[2 + i] * workspace[RATE, i]
+    return float(force)
+
+
+@compiled
+def spring_acceleration(car: Vehicle, deflection: Array) -> float:
+    """Acceleration at K by the springs alone [m/s2].
+
+    Equation: a_0 = D^T S, S_i = k_i U_i      Source: Makowski and Knap 2021, eq. (9)
+    """
+    a0 = 0.0
+    for i in range(2):
+        a0 += car.comfort[i] * car.stiffness[i] * deflection[i]
+    return a0
+
+
+@compiled
+def choose_hardness(control_spec: ControlSpec, car: Vehicle, y: Array, control: Array, workspace: Array) -> None:
+    """Fill whether each damper is to be hard, by the workspace as the motion left it."""
+    for i in range(2):
+        signal = feedback_force(control_spec.gains[i], y, workspace)
+        acceleration = workspace[BODY, 0] + car.arms[i] * workspace[BODY, 1]
+        hard = is_hard(workspace[RATE, i], signal, acceleration, control_spec.crossover)
+        control[HARD, i] = 1.0 if hard else 0.0
+
+
+@inlined
+def wanted_force(control_spec: ControlSpec, axle: int, y: Array, control: Array, workspace: Array) -> float:
+    """What a feedback or a switch asks of one axle within the workspace's bounds [N]."""
+    low, high = workspace[LOW, axle], workspace[HIGH, axle]
+    if control_spec.aim == SWITCH:
+        return switched_force(control[HARD, axle] > 0.0, workspace[SIDED_RATE, axle], low, high)
+    return float(min(max(feedback_force(control_spec.gains[axle], y, workspace), low), high))
+
+
+@compiled
+def demand(control_spec: ControlSpec, car: Vehicle, y: Array, control: Array, workspace: Array) -> None:
+    """Fill the workspace's forces with what the policy asks of both axles within the workspace's bounds [N]."""
+    if control_spec.aim == MINIMISE and control_spec.tie == LEAST_LOAD:
+        springs = (car.stiffness[0] * workspace[DEFLECTION, 0], car.stiffness[1] * workspace[DEFLECTION, 1])
+        least_load_forces(springs, car.comfort, workspace[LOW], workspace[HIGH], workspace[FORCE])
+        return
+    if control_spec.aim == MINIMISE:
+        a0 = spring_acceleration(car, workspace[DEFLECTION])
+        least_acceleration_forces(
+            a0,
+            car.comfort,
+            workspace[LOW],
+            workspace[HIGH],
+            control_spec.tie,
+            int(control[TIE_END, 1]),
+            workspace[FORCE],
+        )
+        return
+    for i in range(2):
+        workspace[FORCE, i] = wanted_force(control_spec, i, y, control, workspace)

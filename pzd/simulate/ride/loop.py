@@ -1,0 +1,304 @@
+"""The ride as one compiled loop: the controller by its clock, the integration by its step, the records beside."""
+
+from __future__ import annotations
+
+import math
+
+from pzd.compiled import compiled, inlined
+from pzd.damper.compiled.kernels import keep_voltage
+from pzd.force_table.lookup import table_voltage
+from pzd.record import Array
+from pzd.simulate.control.demand import LARGEST, bounds_of, choose_hardness, demand, farther_end, spring_acceleration
+from pzd.simulate.control.prediction.choice import predict
+from pzd.simulate.control.prediction.plant import Predictor
+from pzd.simulate.control.sensing import Electronics, sense, supplied
+from pzd.simulate.ride.equations import motion
+from pzd.simulate.ride.model import (
+    ASKED,
+    BEHIND,
+    COMFORT,
+    CONTACT,
+    DEFLECTION,
+    DISSIPATED,
+    FORCE,
+    HIGH,
+    IDEAL,
+    LOW,
+    MINIMISE,
+    RATE,
+    SCHEDULE,
+    SET,
+    SIDE,
+    SIDED_RATE,
+    SINCE,
+    SPRINGS,
+    SWITCH,
+    TIE_END,
+    VOLTAGE,
+    ControlSpec,
+    RideModel,
+    place,
+)
+from pzd.simulate.ride.stepper import STAGES, advance, choose_side
+
+# ----------------------------------------------------------------------------------------------------
+# The controller, once in a control period: what it asks of each axle, and the voltage that is set there.
+
+
+_SAME_PLACE = 1e-9
+"""Of an interval of a schedule: the clock meets its beginning but for rounding."""
+
+
+@inlined
+def _acts_at_once(control_spec: ControlSpec) -> bool:
+    """Whether nothing is left to the clock: `ideal` forces are, but for the choice between two that lie apart."""
+    chooses = control_spec.aim == SWITCH or (control_spec.aim == MINIMISE and control_spec.tie == LARGEST)
+    return control_spec.fidelity == IDEAL and not chooses
+
+
+@inlined
+def _stays(control_spec: ControlSpec, control: Array) -> bool:
+    """Whether the voltage of a policy that holds one is set already."""
+    set_already = control[SET, 0] == control_spec.voltage and control[SET, 1] == control_spec.voltage
+    return control_spec.aim == VOLTAGE and set_already
+
+
+@inlined
+def _choose_ends(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+    """Fill the bounds of both axles, and what stays as it is until the controller acts again."""
+    control_spec, car = model.control_spec, model.car
+    for i in range(2):
+        workspace[LOW, i], workspace[HIGH, i] = bounds_of(control_spec, car, model.grid, i, workspace[RATE, i])
+        workspace[SIDED_RATE, i] = workspace[RATE, i]
+    if control_spec.aim == SWITCH:
+        choose_hardness(control_spec, car, y, control, workspace)
+    if control_spec.aim == MINIMISE and control_spec.tie == LARGEST:
+        a0 = spring_acceleration(car, workspace[DEFLECTION])
+        control[TIE_END, 1] = farther_end(a0, car.comfort, workspace[LOW], workspace[HIGH])
+
+
+@compiled
+def set_control(
+    time: float,
+    y: Array,
+    model: RideModel,
+    plan: Predictor | None,
+    electronics: Electronics | None,
+    control: Array,
+    workspace: Array,
+    scratch: Array,
+) -> None:
+    """Let the controller act once: what it asks of each axle, and the voltage that gives it by the table.
+
+    Parameters
+    ----------
+    time : [s]
+    y : (n,) state
+    model : see `ride_model`
+    plan : of the aim `PREDICT`; without it nothing of the prediction is compiled
+    electronics : sensors and supply; without it the controller sees all, and its voltage is set, exactly and at once
+    control, workspace : see `ride_model`; the control is changed in place
+    scratch : (n,) to work in
+    """
+    control_spec, car = model.control_spec, model.car
+    if _acts_at_once(control_spec) or _stays(control_spec, control):
+        return
+    motion(time, y, model, control, workspace, scratch)
+    if control_spec.fidelity == IDEAL:
+        _choose_ends(y, model, control, workspace)
+        return
+    seen, room, age = y, workspace, 0.0
+    if electronics is not None:
+        age = sense(y, car, workspace, electronics)
+        seen, room = electronics.state, electronics.workspace
+    _choose_ends(seen, model, control, room)
+    if plan is not None:
+        predict(time, age, seen, model, plan, electronics, control, room)
+        for i in range(2):
+            _set_voltage(time, model, electronics, control, i, float(plan.candidates[plan.chosen[i]]))
+    else:
+        if control_spec.aim not in (VOLTAGE, SCHEDULE):
+            demand(control_spec, car, seen, control, room)
+        for i in range(2):
+            _set_voltage(time, model, electronics, control, i, _wanted_voltage(time, model, control, room, i))
+    control[SINCE, 0] = time
+    for i in range(2):
+        if control[SIDE, i] == 0.0:
+            choose_side(i, time, y, model, control, workspace, scratch)
+
+
+@inlined
+def scheduled(time: float, model: RideModel, axle: int) -> float:
+    """The voltage [V] that a schedule has for an axle at a time [s], by where axle 1 is in the harmonic of the road."""
+    count = model.control_spec.schedule.shape[1]
+    turns = model.road_coefficients.wavenumber * model.car.speed * time / (2.0 * math.pi)
+    place = min(int((turns - math.floor(turns)) * count + _SAME_PLACE), count - 1)
+    return float(model.control_spec.schedule[axle, place])
+
+
+@inlined
+def _wanted_voltage(time: float, model: RideModel, control: Array, workspace: Array, axle: int) -> float:
+    """The voltage that the policy asks of an axle [V]; a force that it asks is noted."""
+    aim = model.control_spec.aim
+    if aim == VOLTAGE:
+        return model.control_spec.voltage
+    if aim == SCHEDULE:
+        return scheduled(time, model, axle)
+    control[ASKED, axle] = workspace[FORCE, axle]
+    return _voltage_for(model, axle, workspace[FORCE, axle], workspace[RATE, axle], control[SET, axle])
+
+
+@inlined
+def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, otherwise: float) -> float:
+    """The voltage that gives a force of the axle within its bounds; a rounding beyond them is let pass."""
+    grid, car = model.grid, model.car
+    ratio = car.ratio[axle]
+    alone = force / (car.dampers[axle] * ratio)
+    for share in (0.0, 1e-12, -1e-12):
+        voltage = table_voltage(
+            grid.voltages, grid.speeds, grid.rebound, grid.compression, alone * (1.0 + share), ratio * velocity
+        )
+        if not math.isnan(voltage):
+            return voltage
+    return otherwise
+
+
+@compiled
+def _set_voltage(
+    time: float,
+    model: RideModel,
+    electronics: Electronics | None,
+    control: Array,
+    axle: int,
+    asked: float,
+) -> None:
+    voltage = asked
+    if electronics is not None:
+        voltages = model.grid.voltages
+        voltage = supplied(asked, control[SET, axle], voltages[0], voltages[-1], electronics)
+    keep_voltage(control[SET, axle], time - control[SINCE, 0], control[BEHIND:, axle], model.damper.drive)
+    control[SET, axle] = voltage
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+OUTSIDE, STEPS_DONE, NEXT_PIECE = range(3)
+"""Steps beyond what the rig reached, steps done, and length of the piece of a step to try next [s]."""
+TALLIES = 3
+A_K, LOAD_1, LOAD_2, TRAVEL, LOST = range(5)
+"""What is kept of every step: acceleration at K [m/s2], what each axle takes off the road's static load [N], S + T
+where the wheels have no mass, larger deflection of the two suspensions [m], energy dissipated so far [J]."""
+COURSE_COLUMNS = 5
+COLUMNS = 16
+"""time, z, phi, a_K, and per axle deflection, rate, spring, damper and demanded force, voltage."""
+
+
+@inlined
+def beyond_reach(model: RideModel, control: Array, workspace: Array) -> bool:
+    """Whether a damper moves faster than the rig did at its voltage; `ideal` has none, so at the best one."""
+    grid, car = model.grid, model.car
+    last = grid.reach.size - 1
+    for i in range(2):
+        n, share = place(grid.voltages, control[SET, i])
+        reach = grid.reach[n] + share * (grid.reach[min(n + 1, last)] - grid.reach[n])
+        if model.control_spec.fidelity == IDEAL:
+            for n in range(last + 1):
+                reach = max(reach, grid.reach[n])
+        if abs(car.ratio[i] * workspace[RATE, i]) > reach * (1.0 + 1e-9):
+            return True
+    return False
+
+
+@inlined
+def _note(time: float, y: Array, model: RideModel, control: Array, workspace: Array, row: Array) -> None:
+    """Fill one row of the history."""
+    row[0], row[1], row[2], row[3] = time, y[0], y[1], workspace[COMFORT, 0]
+    for i in range(2):
+        row[4 + 6 * i] = workspace[DEFLECTION, i]
+        row[5 + 6 * i] = workspace[RATE, i]
+        row[6 + 6 * i] = workspace[SPRINGS, i]
+        row[7 + 6 * i] = workspace[FORCE, i]
+        row[8 + 6 * i] = workspace[FORCE, i] if model.control_spec.fidelity == IDEAL else control[ASKED, i]
+        row[9 + 6 * i] = control[SET, i]
+
+
+@inlined
+def _keep(y: Array, workspace: Array, row: Array) -> None:
+    """Fill one row of the course."""
+    row[A_K], row[LOST] = workspace[COMFORT, 0], y[DISSIPATED]
+    for i in range(2):
+        row[LOAD_1 + i] = -workspace[CONTACT, i]
+    row[TRAVEL] = max(abs(workspace[DEFLECTION, 0]), abs(workspace[DEFLECTION, 1]))
+
+
+@compiled
+def ride(
+    y: Array,
+    model: RideModel,
+    plan: Predictor | None,
+    electronics: Electronics | None,
+    control: Array,
+    workspace: Array,
+    first: int,
+    last: int,
+    steps: int,
+    h: float,
+    tolerance: float,
+    per_control: int,
+    per_output: int,
+    course: Array,
+    history: Array,
+    tally: Array,
+    stages: Array,
+    end: Array,
+) -> None:
+    """Ride on, from one step to another; from step 0 on at rest.
+
+    Parameters
+    ----------
+    y : (n,) state; changed in place
+    model : see `ride_model`
+    plan, electronics : see `set_control`; the noise of as many acts as are due
+    control, workspace : see `ride_model`
+    first, last : steps to be kept, the last one not
+    steps, h : number and length of the steps of integration in the whole ride [s]
+    tolerance : see `advance`
+    per_control, per_output : steps between two acts of the controller, and between two rows of the history
+    course : (last - first, COURSE_COLUMNS) what is kept of these steps, filled
+    history : (m, COLUMNS) a row for each of these steps that is a multiple of `per_output`, filled
+    tally : (TALLIES,) filled; fewer steps are done where the table ends
+    stages, end : room to work in, see `advance`
+    """
+    scratch = stages[STAGES]
+    if first == 0:
+        tally[NEXT_PIECE] = h
+        _start(y, model, control, workspace, scratch)
+    dt, noted = tally[NEXT_PIECE], 0
+    for n in range(first, last):
+        time = n * h
+        if n % per_control == 0:
+            set_control(time, y, model, plan, electronics, control, workspace, scratch)
+        motion(time, y, model, control, workspace, stages[0])
+        _keep(y, workspace, course[n - first])
+        tally[STEPS_DONE] = n
+        if math.isnan(workspace[COMFORT, 0]):
+            return
+        if beyond_reach(model, control, workspace):
+            tally[OUTSIDE] += 1.0
+        if n % per_output == 0:
+            _note(time, y, model, control, workspace, history[noted])
+            noted += 1
+        if n < steps:
+            dt = advance(time, h, y, model, control, workspace, tolerance, min(dt, h), stages, end)
+    tally[NEXT_PIECE] = dt
+
+
+@inlined
+def _start(y: Array, model: RideModel, control: Array, workspace: Array, scratch: Array) -> None:
+    """Find to which side each axle sets off, or that it sticks."""
+    motion(0.0, y, model, control, workspace, scratch)
+    for i in range(2):
+        control[SIDE, i] = 1.0 if workspace[RATE, i] >= 0.0 else -1.0
+        if model.control_spec.jumps and workspace[RATE, i] == 0.0:
+            choose_side(i, 0.0, y, model, control, workspace, scratch)

@@ -1,0 +1,283 @@
+"""One ride: the car, its road, the law and the damper put together, ridden, and its energies balanced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pzd.record import Array
+from pzd.schema.errors import DataError
+from pzd.simulate.compiled_ahead import wait
+from pzd.simulate.config import KM_PER_H, SimulateConfig
+from pzd.simulate.control.demand import LEAST_LOAD, TIE_BREAKS
+from pzd.simulate.control.prediction.planning import predictor_of
+from pzd.simulate.control.prediction.plant import Predictor
+from pzd.simulate.control.sensing import Electronics, electronics_of, with_noise
+from pzd.simulate.ride.energy import balance_error, oil_energy, ride_exactly, stored_energy
+from pzd.simulate.ride.equations import relax_oil
+from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALLIES, ride
+from pzd.simulate.ride.model import (
+    BY_COEFFICIENTS,
+    BY_TABLE,
+    DYNAMIC,
+    FEEDBACK,
+    IDEAL,
+    MINIMISE,
+    OIL_WORK,
+    PREDICT,
+    SCHEDULE,
+    SENSED,
+    SWITCH,
+    TABLE,
+    UNBOUNDED,
+    VOLTAGE,
+    ControlSpec,
+    DynamicDamper,
+    RideModel,
+    TableArrays,
+    at_rest,
+    control,
+    road_coefficients,
+    rubs,
+    vehicle,
+    workspace,
+)
+from pzd.simulate.ride.outcome import Outcome, SpilledRows, longest_piece
+from pzd.simulate.ride.stepper import STAGES
+from pzd.simulate.road.profile import Profile
+from pzd.simulate.study.plan import Case
+from pzd.simulate.vehicle.car import HalfCar
+
+Take = Callable[[int, Array], None]
+"""Takes the rows of the course from a step on, which are written over afterwards."""
+_FIDELITIES = {"ideal": IDEAL, "table": TABLE, "dynamic": DYNAMIC}
+_AIMS = {
+    "damping": FEEDBACK,
+    "feedback": FEEDBACK,
+    "switch": SWITCH,
+    "minimise": MINIMISE,
+    "voltage": VOLTAGE,
+    "predict": PREDICT,
+    "schedule": SCHEDULE,
+}
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Steps of a ride."""
+
+    step: float
+    steps: int
+    per_control: int
+    per_output: int
+
+    @classmethod
+    def of(cls, config: SimulateConfig) -> Clock:
+        """The clock of a config."""
+        h = config.integration_step_s
+        return cls(
+            h,
+            round(config.duration_s / h),
+            round(config.control_period_s / h),
+            round(1.0 / (config.output_rate_Hz * h)),
+        )
+
+
+@dataclass(frozen=True)
+class RideFound:
+    """The most comfortable ride that was found within a bound on the wheel load."""
+
+    by: str
+    """`search`, or the policy that none of the schedules beats."""
+    most_load: float
+    """The bound [N]."""
+    evaluations: int
+    """Rides that the search took."""
+    voltages: tuple[tuple[float, ...], ...] = ()
+    """Of each axle over a period of the road, from where axle 1 meets its rising zero [V]; empty for a policy."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a policy may hold constant during a ride."""
+
+    voltage: float
+    """Of `passive` and the like, and of every valve before the ride [V]."""
+    damping: float
+    """c of `constant` and the like, per axle [N s/m]."""
+    found: RideFound | None = None
+    """What `best_found` came to."""
+
+    @classmethod
+    def of(cls, config: SimulateConfig, grid: TableArrays) -> Held:
+        """What the config says; without a word the voltage of the table that is nearest to 0."""
+        nearest = float(grid.voltages[np.argmin(np.abs(grid.voltages))])
+        voltage = nearest if config.passive_voltage_V is None else config.passive_voltage_V
+        return cls(voltage, config.constant_damping_Ns_per_m)
+
+
+def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamper, held: Held) -> ControlSpec:
+    """Policy, bounds and fidelity of a case as numbers."""
+    policy, fidelity = case.policy, _FIDELITIES[case.fidelity]
+    bounds = BY_TABLE
+    if fidelity == IDEAL:
+        bounds = BY_TABLE if config.coefficients is None else BY_COEFFICIENTS
+        if policy.aim == "damping":
+            bounds = UNBOUNDED
+    gains, crossover, own = np.zeros((2, SENSED)), 0.0, config.own_block(policy.name)
+    if policy.feedback is not None:
+        gains = np.ascontiguousarray(policy.feedback(car, held.damping, own))
+    if policy.switch is not None:
+        gains, crossover = policy.switch(car, own)
+    jumps = rubs(damper) or damper.slips if fidelity == DYNAMIC else bounds == BY_TABLE
+    return ControlSpec(
+        fidelity,
+        _AIMS[policy.aim],
+        bounds,
+        LEAST_LOAD if policy.tie_break == "least_load" else TIE_BREAKS[policy.tie_break or config.tie_break],
+        *(config.coefficients or (0.0, np.inf)),
+        held.voltage,
+        jumps,
+        crossover,
+        gains,
+        np.array(held.found.voltages) if held.found is not None and held.found.voltages else np.zeros((2, 1)),
+    )
+
+
+def ride_case(
+    config: SimulateConfig,
+    case: Case,
+    profile: Profile,
+    grid: TableArrays,
+    damper: DynamicDamper,
+    ends: bool,
+    held: Held | None = None,
+    take: Take | None = None,
+) -> Outcome:
+    """Ride one case.
+
+    Parameters
+    ----------
+    config : the block
+    case : what to ride
+    profile : the road
+    grid, damper : the damper as table and with its dynamics
+    ends : whether the table ends where the rig did, so that a ride beyond is refused
+    held : by default what the config says
+    take : takes the course piece by piece, so that the outcome has none; by default it has all of it
+
+    Returns
+    -------
+    the ride
+
+    Raises
+    ------
+    DataError : when the ride needs the table where it ends
+    """
+    wait()
+    car, clock, held = config.car.car(), Clock.of(config), held or Held.of(config, grid)
+    speed = config.vehicle_speed_km_per_h * KM_PER_H
+    linear = take is None and case.fidelity == "ideal" and case.policy.aim == "damping" and not car.wheels_have_mass
+    if linear and profile.smooth:
+        frequency = profile.wavenumber * speed / (2.0 * np.pi)
+        return ride_exactly(
+            car,
+            held.damping,
+            frequency,
+            profile.amplitude,
+            speed,
+            clock.step,
+            clock.steps,
+            clock.per_output,
+            float(np.max(grid.reach)),
+        )
+    own = damper._replace(  # rides at the same time work in rooms of their own
+        scratch=np.zeros_like(damper.scratch), memory=np.zeros_like(damper.memory)
+    )
+    model = RideModel(
+        vehicle(car, speed),
+        road_coefficients(profile, car.wheelbase),
+        control_spec_of(config, case, car, damper, held),
+        grid,
+        own,
+    )
+    plan = None
+    if case.policy.aim == "predict":
+        plan = predictor_of(config.comfort_predictive, config.control_period_s, own, car, speed, grid.voltages)
+    states = at_rest(model.car).size
+    electronics = electronics_of(config.sensors, config.supply, config.control_period_s, states, model.car.arms)
+    return ride_of_model(model, plan, electronics, clock, config.tolerance, case.name, ends, take)
+
+
+def ride_of_model(
+    model: RideModel,
+    plan: Predictor | None,
+    electronics: Electronics | None,
+    clock: Clock,
+    tolerance: float,
+    name: str,
+    ends: bool,
+    take: Take | None = None,
+) -> Outcome:
+    """Ride from rest on a level start, and balance the energies; see `ride_case`."""
+    acts, scratch, y = control(model.control_spec.voltage), workspace(), at_rest(model.car)
+    count = clock.steps + 1
+    course = np.zeros((count if take is None else min(longest_piece(clock.step), count), COURSE_COLUMNS))
+    history = np.zeros((-(-len(course) // clock.per_output), COLUMNS))
+    spilled = None if take is None else SpilledRows(COLUMNS)
+    tally = np.zeros(TALLIES)
+    relax_oil(0.0, y, model, scratch)
+    before = stored_energy(0.0, y, model, scratch)
+    stages, end = np.zeros((STAGES + 1, y.size)), np.zeros(y.size)
+    rng = np.random.default_rng(0 if electronics is None else electronics.seed)
+    for first in range(0, count, len(course)):
+        last = min(first + len(course), count)
+        if electronics is not None:
+            acts_due = -(-last // clock.per_control) - -(-first // clock.per_control)
+            electronics = with_noise(electronics, rng, acts_due)
+        ride(
+            y,
+            model,
+            plan,
+            electronics,
+            acts,
+            scratch,
+            first,
+            last,
+            clock.steps,
+            clock.step,
+            tolerance,
+            clock.per_control,
+            clock.per_output,
+            course,
+            history,
+            tally,
+            stages,
+            end,
+        )
+        if tally[STEPS_DONE] < last - 1 or not np.all(np.isfinite(y)):
+            raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(scratch[1])))))
+        if take is not None and spilled is not None:
+            take(first, course[: last - first])
+            spilled.add(history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
+    ended, moves = clock.steps * clock.step, model.control_spec.aim != VOLTAGE
+    change = stored_energy(ended, y, model, scratch) - before
+    oil_change = y[OIL_WORK] if moves else oil_energy(ended, y, model, acts, scratch)  # none at the start
+    return Outcome(
+        history=history if spilled is None else spilled,
+        course=course if take is None else np.zeros((0, COURSE_COLUMNS)),
+        step=clock.step,
+        outside=float(tally[OUTSIDE] / (clock.steps + 1)),
+        energy_error=balance_error(change, oil_change, y),
+    )
+
+
+def _lost(name: str, time: float, ends: bool, speed: float) -> str:
+    if ends:
+        return (
+            f"4-table/force.csv: {name}: at {time:.3g} s a damper moves at {speed:.2g} m/s, where the table ends; "
+            "test the rig faster, or set table.outside to model or clamp"
+        )
+    return f"5-simulate/{name}.csv: the ride is lost at {time:.3g} s: the motion has no finite value there"

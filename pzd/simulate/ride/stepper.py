@@ -1,0 +1,290 @@
+"""One step of integration: Dormand and Prince 5(4) with its own error control, cut where an axle sticks or slips.
+
+The right-hand side is continuous but for the crossing of V = 0 where a dry friction turns round:
+there the step is cut at the crossing, and the axle goes on slipping or sticks. Everywhere else the
+embedded error shortens the step as often as the tolerance asks.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pzd.compiled import compiled, inlined
+from pzd.record import Array
+from pzd.simulate.ride.equations import motion, remember_step
+from pzd.simulate.ride.model import (
+    COMPRESSION_PUSH,
+    DYNAMIC,
+    ENERGIES,
+    HEAVE_RATE,
+    OIL_1,
+    OIL_2,
+    PITCH_RATE,
+    RATE,
+    REBOUND_PUSH,
+    SIDE,
+    STATES,
+    WHEEL_RATE_1,
+    RideModel,
+)
+
+# ----------------------------------------------------------------------------------------------------
+# The coefficients of Dormand and Prince's pair of order 5(4), the last stage being the first of the next step.
+#
+# Source: Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2
+
+
+STAGES = 7
+"""Number of stages."""
+TIMES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
+"""(STAGES,) share of the step at which each stage stands."""
+STAGE_WEIGHTS = np.array(
+    [
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0],
+        [44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0],
+        [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+)
+"""(STAGES, STAGES - 1) what each stage takes of those before it; the last row is the step itself."""
+ERROR_WEIGHTS = np.array([-71 / 57600, 0.0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40])
+"""(STAGES,) difference between the orders 5 and 4."""
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+SCALES = np.array([1e-2, 1e-2, 1e-1, 1e-1, 1e-3, 1e-3, 10.0, 10.0, 10.0, 10.0, 1e-2, 1e-2, 1e-1, 1e-1, 10.0])
+"""A motion of ordinary size, below which the error is absolute; that of the oil always is, which flows much farther
+than its spring is deflected: m, rad, m/s, rad/s, m, J; wheels: m, m/s, J."""
+
+_CROSSED = 1e-9  # m/s on the other side of zero: the moment lies between this speed and twice as much
+_PUSHED = 1e-6  # m/s2: an axle that sticks slips between no push and this one
+_SMALLEST = 1e-6  # of the step: what is taken whatever the error
+_SHARP = 1e-13  # of the step: how closely the moment is found at which an axle turns round or sticks, where it jumps
+_MOST_CUTS = 50
+_AIM = 0.5  # of what is let pass: where the moment is looked for
+_INSIDE = 1e-3  # of a bracket: no guess is closer to its ends
+_HALVED = 4  # every so many guesses the bracket is halved, so that it shrinks whatever the law
+
+
+@inlined
+def _reach(i: int, dt: float, first: int, last: int, y: Array, stages: Array, end: Array) -> None:
+    """Fill a part of the state at which a stage stands; no motion depends on the energies before the last one."""
+    for n in range(first, last):
+        change = 0.0
+        for j in range(i):
+            change += STAGE_WEIGHTS[i, j] * stages[j, n]
+        end[n] = y[n] + dt * change
+
+
+@inlined
+def trial(
+    time: float, dt: float, y: Array, model: RideModel, control: Array, workspace: Array, stages: Array, end: Array
+) -> float:
+    """Fill `end` with the state after dt; the workspace is left as it is there.
+
+    Source: Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2
+
+    Parameters
+    ----------
+    time, dt : [s]
+    y : (n,) state
+    model, control, workspace : see `ride_model`
+    stages : (STAGES, n) derivatives; the first is that at the start, the others are filled, the last is that at the end
+    end : (n,) filled
+
+    Returns
+    -------
+    largest embedded error, as a share of |y| + `SCALES`, that of the oil of `SCALES` alone
+    """
+    for i in range(1, STAGES):
+        _reach(i, dt, 0, y.size if i == STAGES - 1 else ENERGIES, y, stages, end)
+        if model.car.wheels:
+            _reach(i, dt, STATES, y.size, y, stages, end)
+        motion(time + TIMES[i] * dt, end, model, control, workspace, stages[i])
+    worst = 0.0
+    for n in range(y.size):
+        error = 0.0
+        for i in range(STAGES):
+            error += ERROR_WEIGHTS[i] * stages[i, n]
+        size = SCALES[n] if OIL_1 <= n <= OIL_2 else SCALES[n] + abs(y[n])
+        share = abs(dt * error) / size
+        if not share < math.inf:  # a stage of too long a step overflowed
+            return math.inf
+        worst = max(worst, share)
+    return worst
+
+
+@compiled
+def choose_side(
+    axle: int, time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array
+) -> None:
+    """Stop the suspension of an axle that is at V = 0, and let it slip to whichever side its forces push it."""
+    car = model.car
+    impulse = workspace[RATE, axle] / car.mobility[axle]
+    y[HEAVE_RATE] -= impulse / car.mass
+    y[PITCH_RATE] -= impulse * car.arms[axle] / car.inertia
+    if car.wheels:
+        y[WHEEL_RATE_1 + axle] += impulse / car.unsprung[axle]
+    control[SIDE, axle] = 0.0
+    motion(time, y, model, control, workspace, dy)
+    if workspace[REBOUND_PUSH, axle] > 0.0:
+        control[SIDE, axle] = 1.0
+    elif workspace[COMPRESSION_PUSH, axle] > 0.0:
+        control[SIDE, axle] = -1.0
+
+
+@inlined
+def beyond(control: Array, workspace: Array, axle: int) -> float:
+    """How far an axle has left its side of V = 0 or its stick, as a share of what is let pass; not above 0 before."""
+    side = control[SIDE, axle]
+    if side == 0.0:
+        return float(max(workspace[REBOUND_PUSH, axle], workspace[COMPRESSION_PUSH, axle]) / _PUSHED)
+    return float(-side * workspace[RATE, axle] / _CROSSED - 1.0)
+
+
+@inlined
+def farthest(model: RideModel, control: Array, workspace: Array) -> float:
+    """The larger `beyond` of both axles; -1 where the force does not jump at V = 0."""
+    if not model.control_spec.jumps:
+        return -1.0
+    return max(beyond(control, workspace, 0), beyond(control, workspace, 1))
+
+
+@inlined
+def guess(number: int, shortest: float, longest: float, before: float, behind: float) -> float:
+    """Where in a bracket the moment may lie at which an axle leaves its side or its stick.
+
+    Source: false position; Dowell and Jarratt 1971, BIT 11 (Illinois), with a halving now and then
+
+    Parameters
+    ----------
+    number : of guesses before
+    shortest, longest : the bracket [s]
+    before, behind : `farthest` at its ends, or half of it where an end did not move
+    """
+    share = 0.5
+    if number % _HALVED != _HALVED - 1:
+        share = min(max((_AIM - before) / (max(behind, 1.0) - before), _INSIDE), 1.0 - _INSIDE)
+    return shortest + share * (longest - shortest)
+
+
+@compiled
+def cut(
+    time: float,
+    longest: float,
+    sharp: float,
+    before: float,
+    y: Array,
+    model: RideModel,
+    control: Array,
+    workspace: Array,
+    stages: Array,
+    end: Array,
+) -> tuple[float, float]:
+    """Cut a piece of a step right behind a moment at which an axle leaves its side or its stick.
+
+    Parameters
+    ----------
+    time, longest : start and length of the piece, at the end of which they have changed [s]
+    sharp : how closely the moment is found where `farthest` jumps there [s]
+    before : `farthest` at the start, below 0
+    y, model, control, workspace, stages, end : see `advance`
+
+    Returns
+    -------
+    the length that is left [s], and its embedded error, see `trial`
+    """
+    shortest, behind, moved, number = 0.0, farthest(model, control, workspace), 0, 0
+    while longest - shortest > sharp:
+        dt = guess(number, shortest, longest, before, behind)
+        worst = trial(time, dt, y, model, control, workspace, stages, end)
+        now = farthest(model, control, workspace)
+        if 0.0 < now <= 1.0:
+            return dt, worst
+        if now > 0.0:
+            before *= 0.5 if moved > 0 else 1.0
+            longest, behind, moved = dt, now, 1
+        else:
+            behind *= 0.5 if moved < 0 else 1.0
+            shortest, before, moved = dt, min(now, -_AIM), -1
+        number += 1
+    return longest, trial(time, longest, y, model, control, workspace, stages, end)
+
+
+@compiled
+def advance(
+    time: float,
+    h: float,
+    y: Array,
+    model: RideModel,
+    control: Array,
+    workspace: Array,
+    tolerance: float,
+    first: float,
+    stages: Array,
+    end: Array,
+) -> float:
+    """Carry the state through one step of integration.
+
+    Parameters
+    ----------
+    time, h : start and length of the step [s]
+    y : (n,) state; changed in place
+    model, control, workspace : see `ride_model`; the workspace as `motion` left it at the start
+    tolerance : largest local error as a share of the motion; infinite for a fixed step
+    first : length of the first piece to try [s]
+    stages : (STAGES + 1, n) the first is the derivative at the start; the others are room to work in
+    end : (n,) room to work in
+
+    Returns
+    -------
+    length of the piece to try next [s]
+    """
+    done, dt, cuts = 0.0, first, 0
+    before = min(farthest(model, control, workspace), -_AIM)
+    while done < h * (1.0 - 1e-12):
+        dt = tried = min(dt, h - done)
+        worst = trial(time + done, dt, y, model, control, workspace, stages, end)
+        if cuts < _MOST_CUTS and farthest(model, control, workspace) > 0.0:
+            dt, worst = cut(time + done, dt, _SHARP * h, before, y, model, control, workspace, stages, end)
+            cuts += 1
+        growth = 0.9 * (tolerance / max(worst, 1e-3 * tolerance)) ** 0.2 if tolerance < math.inf else 5.0
+        if worst > tolerance and dt > _SMALLEST * h:
+            dt *= max(growth, 0.1)
+            continue
+        for n in range(y.size):
+            y[n] = end[n]
+        done += dt
+        if not worst < math.inf:  # the shortest piece overflowed, too: the ride is lost, see `ride`
+            return h
+        if model.damper.slips and model.control_spec.fidelity == DYNAMIC:
+            remember_step(time + done, model, control, workspace)
+        turned = False
+        if model.control_spec.jumps:
+            turned = _choose_sides(time + done, y, model, control, workspace, stages[STAGES])
+            before = min(farthest(model, control, workspace), -_AIM)
+        if turned:
+            motion(time + done, y, model, control, workspace, stages[0])
+        else:
+            for n in range(y.size):
+                stages[0, n] = stages[STAGES - 1, n]
+        dt = tried if dt < tried else dt * min(growth, 5.0)
+    return dt
+
+
+@inlined
+def _choose_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array) -> bool:
+    """Let every axle that is beyond its side slip to the other one or stick; whether there was one."""
+    turned = False
+    for i in range(2):
+        if beyond(control, workspace, i) > 0.0:
+            choose_side(i, time, y, model, control, workspace, dy)
+            turned = True
+    return turned

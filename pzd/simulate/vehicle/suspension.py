@@ -1,0 +1,152 @@
+"""Wheels with mass: the force between tyre and road, which never pulls, and what the tyre stores and loses."""
+
+from __future__ import annotations
+
+import math
+
+from pzd.compiled import compiled, inlined
+from pzd.record import Array
+from pzd.simulate.ride.model import (
+    CONTACT,
+    DEFLECTION,
+    HEAVE,
+    HEAVE_RATE,
+    LIFT,
+    PITCH,
+    PITCH_RATE,
+    RATE,
+    RISE,
+    ROAD_RISE,
+    SPRINGS,
+    TYRE_LOSS,
+    TYRE_POWER,
+    WHEEL_1,
+    WHEEL_RATE_1,
+    RoadCoefficients,
+    Vehicle,
+)
+from pzd.simulate.road.profile import spline_at
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@inlined
+def contact_force(static: float, stiffness: float, damping: float, squeeze: float, rate: float) -> float:
+    """Force between wheel and road beyond that at rest [N]: the wheel leaves the road where it would pull.
+
+    Equation: N - N_0 = max(k_t s + c_t ds/dt, -N_0), s = xi - zeta
+    Source: a spring and a damper beside each other on the weight that they carry, which press alone
+
+    Parameters
+    ----------
+    static : N_0 [N]
+    stiffness, damping : of the tyre k_t [N/m], c_t [N s/m]
+    squeeze, rate : s, how much closer wheel and road are than at rest [m], and its rate [m/s]
+    """
+    return max(stiffness * squeeze + damping * rate, -static)
+
+
+@inlined
+def tyre_spring_force(static: float, stiffness: float, squeeze: float) -> float:
+    """What of the contact force the spring of the tyre holds, beyond that at rest [N]: it does not pull either."""
+    return max(stiffness * squeeze, -static)
+
+
+@inlined
+def tyre_energy(static: float, stiffness: float, squeeze: float) -> float:
+    """Energy of the tyre's spring and of the weight on it, beyond that at rest [J].
+
+    Equation: E = integral of max(k_t s, -N_0) ds
+    """
+    if stiffness * squeeze >= -static:
+        return 0.5 * stiffness * squeeze * squeeze
+    return -static * (squeeze + 0.5 * static / stiffness)
+
+
+@compiled
+def press(y: Array, car: Vehicle, axle: int, height: float, workspace: Array) -> None:
+    """Fill the contact force of an axle [N], and the power lost in its tyres [W].
+
+    Equation: P = (N - N_s) ds/dt, N_s the force of the spring; never below 0, by what `contact_force` is
+
+    Parameters
+    ----------
+    y : state
+    car : the half-car
+    axle : 0 or 1
+    height : of the road under it [m]; its speed stands in the workspace
+    workspace : see `ride_model`; filled
+    """
+    static, stiffness = car.static_load[axle], car.tyre_stiffness[axle]
+    squeeze, rate = height - y[WHEEL_1 + axle], workspace[ROAD_RISE, axle] - y[WHEEL_RATE_1 + axle]
+    contact = contact_force(static, stiffness, car.tyre_damping[axle], squeeze, rate)
+    workspace[CONTACT, axle] = contact
+    workspace[TYRE_POWER, axle] = (contact - tyre_spring_force(static, stiffness, squeeze)) * rate
+
+
+@inlined
+def move_wheels(y: Array, car: Vehicle, loads: tuple[float, float], workspace: Array, dy: Array) -> None:
+    """Fill the derivative of the wheels' part of the state.
+
+    Equation: m_i d2zeta_i/dt2 = S_i + T_i + N_i - N_i0      Source: Newton, from where the wheel stands at rest
+
+    Parameters
+    ----------
+    y : state
+    car : the half-car
+    loads : S + T of both axles [N]
+    workspace : see `ride_model`
+    dy : filled
+    """
+    dy[TYRE_LOSS] = workspace[TYRE_POWER, 0] + workspace[TYRE_POWER, 1]
+    for i in range(2):
+        dy[WHEEL_1 + i] = y[WHEEL_RATE_1 + i]
+        dy[WHEEL_RATE_1 + i] = (loads[i] + workspace[CONTACT, i]) / car.unsprung[i]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Deflection of the suspensions and its derivatives from the body and the road, evaluated where the step is.
+
+
+@compiled
+def road_at(road_coefficients: RoadCoefficients, distance: float) -> tuple[float, float, float]:
+    """Height [m] of the road at a distance [m], its slope [-] and its curvature [1/m]."""
+    height = slope = curvature = 0.0
+    if road_coefficients.amplitude != 0.0:
+        phase = road_coefficients.wavenumber * distance
+        height = road_coefficients.amplitude * math.sin(phase)
+        slope = road_coefficients.amplitude * road_coefficients.wavenumber * math.cos(phase)
+        curvature = -road_coefficients.wavenumber * road_coefficients.wavenumber * height
+    if road_coefficients.coefficients.size == 0:
+        return height, slope, curvature
+    spacing = road_coefficients.spacing
+    above, rising, bending = spline_at(road_coefficients.coefficients, distance / spacing)
+    return height + above, slope + rising / spacing, curvature + bending / (spacing * spacing)
+
+
+@inlined
+def suspension(time: float, y: Array, car: Vehicle, road_coefficients: RoadCoefficients, workspace: Array) -> None:
+    """Fill deflection and its rate, speed and acceleration of what the axles stand on, and spring force.
+
+    Equation: U = H^T X - xi, V = dU/dt, S_i = k_i U_i      Source: Makowski and Knap 2021, section 5;
+    where the wheels have mass their height zeta takes the place of that of the road, xi
+
+    Parameters
+    ----------
+    time : [s]
+    y : state
+    car, road_coefficients : the half-car and its road
+    workspace : see `ride_model`; filled
+    """
+    for i in range(2):
+        height, slope, curvature = road_at(road_coefficients, car.speed * time - road_coefficients.behind[i])
+        workspace[ROAD_RISE, i] = slope * car.speed
+        workspace[RISE, i] = slope * car.speed
+        workspace[LIFT, i] = curvature * car.speed * car.speed
+        if car.wheels:
+            press(y, car, i, height, workspace)
+            height, workspace[RISE, i] = y[WHEEL_1 + i], y[WHEEL_RATE_1 + i]
+            workspace[LIFT, i] = workspace[CONTACT, i] / car.unsprung[i]
+        workspace[DEFLECTION, i] = y[HEAVE] + car.arms[i] * y[PITCH] - height
+        workspace[RATE, i] = y[HEAVE_RATE] + car.arms[i] * y[PITCH_RATE] - workspace[RISE, i]
+        workspace[SPRINGS, i] = car.stiffness[i] * workspace[DEFLECTION, i]

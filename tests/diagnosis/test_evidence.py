@@ -1,0 +1,167 @@
+"""The evidence: what counts as noise of a test, so that a misfit is worth what it says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from campaign import damper_of, sine, sines
+
+from pzd.damper.compose import respond
+from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
+from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.data import TRAINING, UNTOUCHED, VALIDATION, prepare, split
+from pzd.diagnosis.fit.least_squares import fit
+from pzd.diagnosis.fit.likelihood import RecordLikelihood
+from pzd.diagnosis.fit.prediction import BESIDE_STEP, counted, expected
+from pzd.diagnosis.search.evidence import Evidence, evidence_of
+from pzd.record import Record
+from pzd.signals.nuisance import NuisanceConfig
+
+TWO = (0.0, 150.0)
+
+
+def evidence(records: tuple[Record, ...], damper: Damper) -> Evidence:
+    prepared = prepare(records)
+    return evidence_of(Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig()), damper)
+
+
+@pytest.mark.parametrize(
+    "effects", [{}, {"stribeck_friction": {"F_s": 80.0, "v_s": 0.04}}, {"lash": {"delta": 3e-4}}], ids=str
+)
+def test_the_right_damper_leaves_no_more_than_noise(
+    effects: dict[str, dict[str, float]], rng: np.random.Generator
+) -> None:
+    # Also where dry friction jumps between two samples, which no simulation can know.
+    truth = damper_of(TWO, **effects)
+    whole = evidence(sines(truth, rng, TWO, jitter=0.01), truth).whole
+    found = fit(whole, tuple(effects), whole.start_with(truth))
+    freedom = found.size - found.searched.size
+    # About a thousand residuals, and noise estimated from seven differences: over 36 draws 0.975, sd 0.058; 4.5 sd.
+    assert 0.71 < found.misfit / freedom < 1.24
+
+
+def test_what_a_wrong_damper_leaves_counts_as_noise_of_every_harmonic(rng: np.random.Generator) -> None:
+    right = damper_of(TWO, gas_spring={"k_g": 3000.0})
+    records = sines(right, rng, TWO)
+    pairs = zip(*(evidence(records, d).whole.observations for d in (damper_of(TWO), right)), strict=True)
+    for wrong, known in pairs:
+        assert np.all(wrong.weights < known.weights)
+        quietest = int(np.argmax(known.weights))
+        assert wrong.weights[quietest] < 0.7 * known.weights[quietest]
+
+
+def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(rng: np.random.Generator) -> None:
+    # A damper that never slips is a spring: s_F = k s_x at every harmonic that is kept.
+    k, noise, shares = 2e5, 2e-5, []
+    stuck = Damper(base=(BaseRow(voltage_V=0.0, T0_N=1e6, C_Ns_per_m=3000.0, k_N_per_m=k),))
+    for _ in range(20):
+        (prepared,) = prepare((sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=noise, cycles=8),))
+        run = prepared.cycles
+        assert run is not None
+        variance = expected(stuck, prepared, 0.0).displacement_variance
+        assert isinstance(variance, np.ndarray)
+        assert variance[0] == 0.0
+        single = noise**2 / run.points(prepared.record.time) / run.count
+        # An average over harmonics 0 to 3, of which one is kept.
+        shares.append(4.0 * variance[1] / (k**2 * single))
+    # Never half as unsure as it must be: of 400 draws the smallest is 0.68. What noise lets through besides makes the
+    # median 1.2, sd 0.3.
+    assert min(shares) > 0.5
+    assert 0.9 < np.median(shares) < 1.6
+
+
+def test_the_instant_of_a_standing_voltage_does_not_matter(rng: np.random.Generator) -> None:
+    (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, rng),))
+    assert expected(damper_of(TWO), prepared, 5e-4).timing.shape == (prepared.record.time.size, 0)
+
+
+def test_a_sample_beside_a_jump_is_worth_nothing(rng: np.random.Generator) -> None:
+    truth = damper_of(TWO, stribeck_friction={"F_s": 200.0, "v_s": 0.04})
+    (prepared,) = prepare((sine(truth, 0.0, 1.0, 0.02, rng, noise=0.002),))
+    made = evidence((prepared.record, sine(truth, 150.0, 1.0, 0.02, rng)), truth)
+    one = made.whole.observations[0]
+    bend = np.abs(np.convolve(one.measured, (1.0, -2.0, 1.0), "same"))
+    bend[[0, -1]] = 0.0
+    spike = np.zeros(one.measured.size)
+    spike[int(np.argmax(bend))] = 100.0
+    elsewhere = np.roll(spike, 100)
+    worth = [float(np.sum(one.in_noise(s) ** 2)) for s in (spike, elsewhere)]
+    assert worth[0] < 0.1 * worth[1]
+
+
+def test_samples_beside_a_step_of_the_voltage_are_not_judged(rng: np.random.Generator) -> None:
+    (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, rng),))
+    voltage = np.where(np.arange(prepared.record.time.size) < 3000, 0.0, 150.0)
+    stepped = replace(prepared, record=replace(prepared.record, voltage=voltage), lead=None, cycles=None)
+    before, after = 2999, 3000
+    reach = round(BESIDE_STEP * stepped.record.rate)
+    assert reach >= 1
+    assert not counted(stepped)[before - reach : after + reach + 1].any()
+    assert counted(stepped)[[before - reach - 1, after + reach + 1]].all()
+
+
+def test_the_hardest_tests_of_the_rig_are_fitted(rng: np.random.Generator) -> None:
+    prepared = prepare(sines(damper_of(), rng, cycles=4))
+    roles = split(prepared, None, 2.0).roles
+    for channel in ("force", "velocity", "displacement"):
+        peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in prepared]
+        assert roles[int(np.argmax(peaks))][0] == TRAINING
+
+
+# ---------------------------------------------------------------- no sample is in two parts
+
+
+def road_record(rng: np.random.Generator, count: int, name: str) -> Record:
+    """A test that does not repeat: three tones without a common period."""
+    time = np.arange(count) / 500.0
+    tones = ((1.13, 0.012), (2.71, 0.006), (6.97, 0.002))
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(tones))
+    angles = [2.0 * np.pi * f * time + p for (f, _), p in zip(tones, phases, strict=True)]
+    x, v, a = (
+        sum(X * (2.0 * np.pi * f) ** n * wave(at) for (f, X), at in zip(tones, angles, strict=True))
+        for n, wave in ((0, np.sin), (1, np.cos), (2, lambda at: -np.sin(at)))
+    )
+    force = respond(damper_of((0.0,)), Motion(time, x, v, a, np.zeros(count)))
+    measured = force + 5.0 * rng.standard_normal(count)
+    return Record(name, None, time, x, v, a, measured, np.zeros(count))
+
+
+def samples_of(observation: RecordLikelihood) -> set[tuple[str, int]]:
+    """The samples of the record that an observation is compared at."""
+    assert np.all(np.diff(observation.places) == 1)
+    return {(observation.name, int(i)) for i in observation.places[observation.compared]}
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_no_sample_is_in_two_parts(rng: np.random.Generator, count: int) -> None:
+    records = tuple(road_record(rng, 10_000, f"road-{i}") for i in range(count))
+    found = evidence(records, damper_of((0.0,)))
+    compared = {
+        part: {s for o in problem.observations for s in samples_of(o)}
+        for part, problem in (
+            (TRAINING, found.halves[0]),
+            (VALIDATION, found.halves[1]),
+            ((TRAINING, VALIDATION), found.whole),
+        )
+    }
+    assert not compared[TRAINING] & compared[VALIDATION]
+    assert compared[TRAINING] | compared[VALIDATION] == compared[TRAINING, VALIDATION]
+    roles = dict(zip((p.record.name for p in found.campaign.prepared), found.campaign.parts.roles, strict=True))
+    for part, samples in compared.items():
+        wanted = part if isinstance(part, tuple) else (part,)
+        assert samples
+        assert {int(roles[name][i]) for name, i in samples} == set(wanted)
+    assert UNTOUCHED not in {int(roles[name][i]) for name, i in compared[TRAINING, VALIDATION]}
+
+
+def test_noise_is_white_within_the_stretches_that_are_compared(rng: np.random.Generator) -> None:
+    found = evidence((road_record(rng, 10_000, "road"),), damper_of((0.0,)))
+    (training,) = found.halves[0].observations
+    (force,) = fit(found.halves[0], (), found.halves[0].start()).simulated
+    left = training.in_noise(training.measured - force)
+    assert np.count_nonzero(np.diff(training.compared.astype(int)) == 1) == 3  # four stretches
+    assert left.size < training.measured.size or not training.noise.coefficients.size
+    assert float(left @ left) / left.size == pytest.approx(1.0, abs=0.15)

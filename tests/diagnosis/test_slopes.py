@@ -1,0 +1,110 @@
+"""Residuals and slopes of a search: those of the whole damper, by every variable, at every kind of test."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from campaign import damper_of
+from numpy.random import Generator
+
+from pzd.damper.compose import respond, sensors_of
+from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
+from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.data import prepare, split
+from pzd.diagnosis.fit.forces import left_at
+from pzd.diagnosis.fit.least_squares import fit
+from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
+from pzd.diagnosis.fit.parameters import Problem
+from pzd.diagnosis.search.evidence import evidence_of
+from pzd.record import Array, Record
+from pzd.signals.kinematics import kinematics
+from pzd.signals.nuisance import NuisanceConfig
+
+ROW = BaseRow(voltage_V=0.0, T0_N=400.0, C_Ns_per_m=2500.0, k_N_per_m=4.0e5)
+CHARGED = Damper(base=(ROW,), effects={"gas_spring": {"k_g": 1330.0}})
+
+
+def two_tones(damper: Damper, tones: Sequence[tuple[float, float]], rng: Generator) -> Problem:
+    """Two tones of those amplitudes [m] and frequencies [Hz], sampled at 500 Hz, with 5 N of noise."""
+    t = np.arange(0.0, 10.0, 1.0 / 500.0)
+    x = np.sum([a * np.sin(2.0 * np.pi * f * t) for a, f in tones], axis=0)
+    clean = kinematics(t, x, None)
+    volts = np.zeros(t.size)
+    force = respond(damper, Motion(t, x, clean.velocity, clean.acceleration, volts))
+    measured = force + 5.0 * rng.standard_normal(t.size)
+    tests = prepare((Record("two tones", None, t, x, clean.velocity, clean.acceleration, measured, volts),))
+    return evidence_of(Campaign(tests, split(tests, None, 2.0), NuisanceConfig()), damper).whole
+
+
+BOTH = (0.0, 150.0)
+EFFECTS = {
+    "orifice_quadratic": {"q": 3000.0},
+    "rounded_yield": {"w_s": 0.01},
+    "relief_valve": {"F_r": 900.0, "C_r": 700.0},
+    "lash": {"delta": 4e-4},
+    "asymmetry": {"alpha": 0.2},
+    "gas_spring": {"k_g": 4000.0},
+    "accumulator": {"F_g": 300.0, "L": 0.1},
+    "stribeck_friction": {"F_s": 80.0, "v_s": 0.04},
+    "second_branch": {"T0_2": 100.0, "k_2": 5e4},
+    "sensor_delay": {"tau": 2e-3},
+    "temperature_drift": {"beta_T0": 0.01, "beta_C": 0.02},
+    "valve_lag": {"tau": 8e-3},
+    "piezo_hysteresis": {"r": 6.0},
+}
+
+
+def whole(effects: dict[str, dict[str, float]], rng: Generator, *, moving: bool) -> tuple[Problem, Damper]:
+    """A sine at one voltage that repeats, or two tones at a voltage that goes to and fro while the oil warms by 8 K."""
+    plain = damper_of(BOTH)
+    damper = Damper(base=plain.base, effects=effects, reference_temperature_degC=22.0)
+    t = np.arange(0.0, 4.0, 2e-3)
+    warmth = np.full(t.size, 22.0) + (2.0 * t if "temperature_drift" in effects else 0.0)
+    x = 0.02 * np.sin(2.0 * np.pi * t) + (0.004 * np.sin(2.0 * np.pi * 4.3 * t) if moving else 0.0)
+    volts = 75.0 + 70.0 * np.sin(2.0 * np.pi * 0.7 * t) if moving else np.full(t.size, 150.0)
+    clean = kinematics(t, x, None)
+    force = respond(damper, Motion(t, x, clean.velocity, clean.acceleration, volts, warmth))
+    measured = force + 5.0 * rng.standard_normal(t.size)
+    record = Record("test", None, t, x, clean.velocity, clean.acceleration, measured, volts, warmth)
+    tests = prepare((record,))
+    return evidence_of(Campaign(tests, split(tests, None, 2.0), NuisanceConfig()), damper).whole, damper
+
+
+@pytest.mark.parametrize("moving", [False, True], ids=["one voltage", "moving"])
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_they_are_those_of_the_whole_damper(effect: str, moving: bool, rng: Generator) -> None:
+    """As the stand computes it from the config, and differenced with an exact path, by every searched variable."""
+    problem, damper = whole({effect: EFFECTS[effect]}, rng, moving=moving)
+    (o,), unknowns, x = problem.observations, problem.unknowns((effect,)), problem.start_with(damper)
+    free = np.full(x.size, np.inf)
+    left = left_at(problem, unknowns, x, (-free, free))
+
+    def force(place: int, by: float, tolerance: float) -> Array:
+        moved = x.copy()
+        moved[place] += by
+        of = problem.point(moved, unknowns).damper
+        sensors = sensors_of(of)
+        prompt = of.model_copy(update={"effects": {n: e for n, e in of.effects.items() if n not in sensors}})
+        return o.at_compared(o.shown(respond(prompt, o.motion, o.begins_with, tolerance), sensors))
+
+    np.testing.assert_allclose(left.simulated[0], force(0, 0.0, SIMULATION_TOLERANCE), atol=1e-6 * o.peak)
+    counted = o.in_noise(o.measured - left.simulated[0])
+    np.testing.assert_allclose(left.residuals[0], counted, rtol=1e-9, atol=1e-9)
+    for j in range(x.size):
+        exact = o.in_noise(force(j, -2e-4, 1e-11) - force(j, 2e-4, 1e-11)) / 4e-4
+        missed = np.linalg.norm(left.slopes.dense()[:, j] - exact)
+        assert missed <= 0.02 * np.linalg.norm(exact) + 1e-9, (j, missed / np.linalg.norm(exact))
+
+
+def test_a_factor_common_to_all_forces_moves_them_in_proportion(rng: Generator) -> None:
+    """The gain of a test leaves this one direction nearly open, where a search goes by what little is left of it."""
+    asked = two_tones(CHARGED, ((0.01, 1.38), (0.01, 1.42)), rng)
+    start = asked.start_with(CHARGED)
+    found = fit(asked, ("gas_spring",), start, evaluations=1)
+    friction, _, _, charge = start
+    along = found.slopes.dense() @ np.array([friction, 1.0, 1.0, charge])
+    exact = [-o.in_noise(force) for o, force in zip(asked.observations, found.simulated, strict=True)]
+    assert np.linalg.norm(along - np.concatenate(exact)) < 0.02 * np.linalg.norm(along)

@@ -1,0 +1,363 @@
+"""Passive dampers: bleed, knee and blow-off are found, and the law that predicts kept-back tests is handed on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pzd.artefacts import (
+    Diagnosed,
+    Identified,
+    KneeForceRow,
+    KneeRow,
+    Knees,
+    LawRow,
+    PredictedRow,
+    Rig,
+    identified_damper,
+)
+from pzd.artefacts.knee import knee_damper
+from pzd.damper.compose import respond, static_force, steady_force
+from pzd.damper.model import BaseRow, Damper
+from pzd.damper.motion import Motion
+from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.stage import as_fitted
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.knee import TRADE_SPEEDS, clicks, knees, law_row, per_unit
+from pzd.identification.stage import identify
+from pzd.parallel.processes import no_listener
+from pzd.quantities import Control
+from pzd.record import Array, Record
+from pzd.schema.errors import ConfigError, DataError
+
+RATE = 400.0
+TESTS = ((0.5, 0.02), (1.0, 0.02), (2.0, 0.02), (3.0, 0.02), (5.0, 0.012))
+"""Frequency [Hz] and amplitude [m]."""
+TRUTH = Damper(
+    base=(BaseRow(T0_N=40.0, C_Ns_per_m=2000.0, k_N_per_m=2e6),),
+    effects={
+        "knee": {"beta": 0.3, "F_reb": 300.0, "C_reb": 800.0, "F_comp": 180.0, "C_comp": 500.0},
+        "preload_offset": {"F_0": -250.0},
+        "gas_spring": {"k_g": 2500.0},
+    },
+)
+BINGHAM = Damper(base=(BaseRow(T0_N=120.0, C_Ns_per_m=1500.0, k_N_per_m=1e6),))
+Law = Callable[[Motion], Array]
+
+
+def swing(frequency: float, amplitude: float) -> Motion:
+    """Four cycles of a sine, or two seconds."""
+    time = np.arange(round(max(2.0, 4.0 / frequency) * RATE)) / RATE
+    w = 2.0 * np.pi * frequency
+    x, v, a = (amplitude * f for f in (np.sin(w * time), w * np.cos(w * time), -(w**2) * np.sin(w * time)))
+    return Motion(time, x, v, a)
+
+
+def rig(law: Law, rng: np.random.Generator, noise: float = 0.003) -> Rig:
+    """The tests on a damper, with white noise of a share of peak force."""
+    records = []
+    for number, test in enumerate(TESTS):
+        motion = swing(*test)
+        force = law(motion)
+        force = force + noise * float(np.max(np.abs(force))) * rng.standard_normal(force.size)
+        parts = (motion.time, motion.displacement, motion.velocity, motion.acceleration, force)
+        records.append(Record(f"r{number}", None, *parts))
+    return Rig(tuple(records), ())
+
+
+def of(damper: Damper) -> Law:
+    """The force of a damper of ours."""
+    return lambda motion: respond(damper, motion)
+
+
+def round_knees(motion: Motion) -> Array:
+    """A passive monotube damper whose knees are round: no law of ours."""
+    x, v = motion.displacement, motion.velocity
+    rebound = 1500.0 * v / (1.0 + np.abs(v) / 0.15) + 400.0 * v
+    compression = 700.0 * v / (1.0 + np.abs(v) / 0.1) + 350.0 * v
+    return np.where(v > 0.0, rebound, compression) + 35.0 * np.tanh(v / 0.004) - 280.0 / (1.0 + x / 0.12) ** 1.2
+
+
+def found(law: Law, rng: np.random.Generator) -> Identified:
+    return identify(IdentifyConfig(law="auto"), rig(law, rng), 1)
+
+
+@pytest.fixture(scope="module")
+def tests_of_a_knee(generator_for: Callable[[str], np.random.Generator]) -> Rig:
+    return rig(of(TRUTH), generator_for("a damper with knees"))
+
+
+@pytest.fixture(scope="module")
+def with_a_knee(tests_of_a_knee: Rig) -> Identified:
+    return identify(IdentifyConfig(law="knee"), tests_of_a_knee, 1)
+
+
+@pytest.fixture(scope="module")
+def with_round_knees(generator_for: Callable[[str], np.random.Generator]) -> Identified:
+    return found(round_knees, generator_for("a damper with round knees"))
+
+
+def test_bleed_knee_and_blow_off_of_each_direction_lie_in_their_intervals(with_a_knee: Identified) -> None:
+    (row,) = with_a_knee.knees.rows
+    truth = {
+        "rebound_bleed_Ns_per_m": 2600.0,
+        "rebound_knee_force_N": 300.0,
+        "rebound_knee_velocity_m_per_s": 260.0 / 2600.0,
+        "rebound_blow_off_Ns_per_m": 800.0,
+        "compression_bleed_Ns_per_m": 1400.0,
+        "compression_knee_force_N": 180.0,
+        "compression_knee_velocity_m_per_s": 140.0 / 1400.0,
+        "compression_blow_off_Ns_per_m": 500.0,
+        "friction_N": 40.0,
+        "gas_force_N": -250.0,
+        "gas_spring_N_per_m": 2500.0,
+        "k_N_per_m": 2e6,
+    }
+    outside = []
+    for name, expected in truth.items():
+        value, low, high = row.interval(name)
+        assert value == pytest.approx(expected, rel=0.1)
+        outside += [] if low <= expected <= high else [name]
+    assert len(outside) <= 2  # twelve intervals of 95 %: three or more fail once in fifty
+    assert row.W_s < 1e-4
+    assert row.missed_share == 0.0
+
+
+def test_kept_back_tests_of_a_damper_with_round_knees_are_predicted_five_times_better(
+    with_round_knees: Identified,
+) -> None:
+    (law,) = with_round_knees.knees.laws
+    assert law.law == "knee"
+    assert law.tests == len(TESTS)
+    assert law.W_s_knee < 0.2 * law.W_s_bingham
+    (row,) = with_round_knees.knees.rows
+    assert row.gas_force_N == pytest.approx(-287.0, abs=10.0)  # the mean of 280 / (1 + x / 0.12)^1.2 over the stroke
+    assert row.friction_N == pytest.approx(35.0, rel=0.15)
+    assert row.missed_share > 0.0025
+    assert row.status.startswith("weak:")
+
+
+def test_a_bingham_damper_has_no_knee_and_keeps_its_law(rng: np.random.Generator) -> None:
+    here = found(of(BINGHAM), rng)
+    (row,), (law,) = here.knees.rows, here.knees.laws
+    assert row.rebound_knee_force_N is None
+    assert row.compression_blow_off_Ns_per_m is None
+    assert row.rebound_bleed_Ns_per_m == pytest.approx(1500.0, rel=0.03)
+    assert law.law == "bingham"
+    assert identified_damper(here, None).effects == {}
+
+
+def test_a_knee_in_one_direction_alone_is_found_in_that_direction_alone(rng: np.random.Generator) -> None:
+    values = {**TRUTH.effects["knee"], "F_comp": 1e7, "C_comp": 1400.0}
+    (row,) = found(of(TRUTH.with_effect("knee", values)), rng).knees.rows
+    assert row.rebound_knee_force_N == pytest.approx(300.0, rel=0.05)
+    assert row.compression_knee_force_N is None
+    assert row.compression_bleed_Ns_per_m == pytest.approx(1400.0, rel=0.03)
+
+
+def test_bingham_stays_the_law_unless_asked_with_the_same_rows_and_no_file_of_the_knee(
+    tests_of_a_knee: Rig, with_a_knee: Identified, tmp_path: Path
+) -> None:
+    here = identify(IdentifyConfig(), tests_of_a_knee, 1)
+    here.write(tmp_path, Control())
+    assert not (tmp_path / "knee.csv").exists()
+    assert Identified.read(tmp_path, Control()).knees == here.knees == Knees()
+    assert here.rows == with_a_knee.rows
+
+
+def test_the_files_read_back_as_they_were_written(with_a_knee: Identified, tmp_path: Path) -> None:
+    with_a_knee.write(tmp_path, Control())
+    assert Identified.read(tmp_path, Control()).knees == with_a_knee.knees
+
+
+def test_the_damper_with_the_knee_goes_through_diagnose_as_it_was_fitted(
+    with_a_knee: Identified, tmp_path: Path
+) -> None:
+    handed = as_fitted(with_a_knee, None, DiagnoseConfig())
+    assert handed.damper == handed.plain == identified_damper(with_a_knee, None)
+    assert handed.diagnosis.verdict == "none"
+    assert "no effect was looked for" in handed.diagnosis.reason
+    handed.write(tmp_path, Control())
+    assert Diagnosed.read(tmp_path, Control()).damper == handed.damper
+    speeds = np.array([-0.3, -0.05, 0.05, 0.3])
+    expected = steady_force(TRUTH, None, None, speeds)
+    np.testing.assert_allclose(steady_force(handed.damper, None, None, speeds), expected, rtol=0.03)
+    text = (tmp_path / "damper.yaml").read_text().replace("preload_offset", "lash").replace("F_0: ", "delta: 0")
+    (tmp_path / "damper.yaml").write_text(text)
+    with pytest.raises(DataError):
+        Diagnosed.read(tmp_path, Control())
+
+
+def test_what_the_law_misses_visibly_is_unexplained_and_not_nothing(with_round_knees: Identified) -> None:
+    handed = as_fitted(with_round_knees, None, DiagnoseConfig())
+    assert handed.diagnosis.verdict == "unexplained"
+    assert "misses up to" in handed.diagnosis.reason
+
+
+def test_a_setting_whose_control_signal_always_moves_has_no_knee_law() -> None:
+    with pytest.raises(ConfigError, match=r"law: needs tests of setting soft at a constant control.*\(got knee\)"):
+        knees((), ("soft",), IdentifyConfig(law="knee"), Control(), no_listener)
+    (law,) = knees((), ("soft",), IdentifyConfig(law="auto"), Control(), no_listener).laws
+    assert law.law == "bingham"
+    assert "constant control signal" in law.reason
+
+
+def predicted(
+    apart: float, count: int, scatter: float = 0.0, unseen: float = 0.001
+) -> list[tuple[PredictedRow, Array]]:
+    """Tests that Bingham misses by so much more than the knee law, give or take."""
+    rows = []
+    for i in range(count):
+        bingham = 0.02 + apart + scatter * (-1) ** i
+        row = PredictedRow(
+            record=f"r{i}", setting=None, voltage_V=None, temperature_degC=None, W_s_bingham=bingham, W_s_knee=0.02
+        )
+        rows.append((row, np.array([bingham, 0.02, 1.0, unseen])))
+    return rows
+
+
+def test_the_knee_is_taken_where_it_predicts_better_by_two_standard_errors_and_not_below() -> None:
+    # Six differences of 0.01 +- s have a standard error of s / sqrt(5): twice that is 0.01 at s = 0.01118.
+    assert law_row("auto", None, predicted(0.01, 6, 0.0111), 1).law == "knee"
+    assert law_row("auto", None, predicted(0.01, 6, 0.0113), 1).law == "bingham"
+    assert law_row("auto", None, predicted(-0.01, 6), 1).law == "bingham"
+
+
+def test_what_nobody_can_see_makes_no_law_however_sure_it_is() -> None:
+    law = law_row("auto", None, predicted(0.01, 6, unseen=0.011), 1)
+    assert law.law == "bingham"
+    assert "less than 0.25% of peak" in law.reason
+
+
+def test_too_few_tests_choose_nothing_and_the_reason_says_so() -> None:
+    law = law_row("auto", None, predicted(0.01, 2), 1)
+    assert law.law == "bingham"
+    assert "3 are needed" in law.reason
+    assert law_row("knee", None, [], 1).law == "knee"
+
+
+def knee_row(voltage: float | None = None, zero: float = 0.0, temperature: float | None = None) -> KneeRow:
+    """A row whose forces grow with the control signal."""
+    u = 1.0 + (voltage or 0.0)
+    values = {
+        "rebound_bleed_Ns_per_m": 1000.0 * u,
+        "rebound_knee_force_N": 200.0 * u,
+        "rebound_knee_velocity_m_per_s": 0.15,
+        "rebound_blow_off_Ns_per_m": 400.0 * u,
+        "compression_bleed_Ns_per_m": 500.0 * u,
+        "compression_knee_force_N": None,
+        "compression_knee_velocity_m_per_s": None,
+        "compression_blow_off_Ns_per_m": None,
+        "friction_N": 50.0 * u,
+        "gas_force_N": -200.0,
+        "gas_spring_N_per_m": 3000.0,
+        "k_N_per_m": 1e6,
+    }
+    ends = {f"{name}_{end}": value for name, value in values.items() for end in ("low95", "high95")}
+    return KneeRow.model_validate(
+        {"setting": None, "voltage_V": voltage, "temperature_degC": temperature, **values, **ends}
+        | {"zero_m": zero, "reached_m_per_s": 0.4, "W_s": 0.0, "rmse_N": 0.0, "missed_share": 0.0, "status": "ok"}
+    )
+
+
+def test_the_damper_of_several_conditions_has_the_law_of_each_at_its_voltage_and_is_linear_between() -> None:
+    damper = knee_damper([knee_row(0.0), knee_row(2.0)])
+    at = [float(steady_force(damper, voltage, None, 0.3)) for voltage in (0.0, 1.0, 2.0)]
+    assert at[0] == pytest.approx(200.0 + 400.0 * 0.15)
+    assert at[2] == pytest.approx(3.0 * at[0])
+    assert at[1] == pytest.approx(2.0 * at[0], rel=1e-6)
+    assert float(steady_force(damper, 0.0, None, -0.3)) == pytest.approx(-50.0 - 500.0 * 0.3)
+
+
+def test_a_gas_that_no_condition_shows_is_no_effect_of_the_damper() -> None:
+    rows = [
+        knee_row(u).model_copy(update={"gas_force_N_high95": 5.0, "gas_spring_N_per_m_low95": -1.0}) for u in (0.0, 2.0)
+    ]
+    assert set(knee_damper(rows).effects) == {"knee"}
+    assert set(knee_damper([rows[0], knee_row(2.0)]).effects) == {"knee", "preload_offset", "gas_spring"}
+
+
+def test_a_spring_below_zero_that_the_tests_show_is_read_back(tmp_path: Path) -> None:
+    ends = {f"gas_spring_N_per_m{end}": value for end, value in (("", -900.0), ("_low95", -950.0), ("_high95", -850.0))}
+    law = LawRow(setting=None, law="knee", tests=0, W_s_bingham=None, W_s_knee=None, reason="as the config asks for")
+    here = Identified((), (), knees=Knees((knee_row().model_copy(update=ends),), laws=(law,)))
+    handed = as_fitted(here, None, DiagnoseConfig())
+    handed.write(tmp_path, Control())
+    assert Diagnosed.read(tmp_path, Control()).damper.effects["gas_spring"] == {"k_g": -900.0}
+
+
+def test_the_gas_force_counts_from_one_zero_of_the_displacement_in_all_conditions() -> None:
+    damper = knee_damper([knee_row(0.0, zero=-0.01), knee_row(2.0, zero=0.01)])
+    assert damper.zero_m == 0.0
+    np.testing.assert_allclose(static_force(damper, np.array([0.0, 2.0])), [-170.0, -230.0])
+
+
+def force_row(setting: str | None, voltage: float | None, force: float, gas: float = -100.0) -> KneeForceRow:
+    return KneeForceRow(
+        setting=setting,
+        voltage_V=voltage,
+        temperature_degC=None,
+        velocity_m_per_s=0.131,
+        rebound_force_N=force + gas,
+        compression_force_N=-0.5 * force + gas,
+        gas_force_N=gas,
+        inside=1,
+    )
+
+
+def test_a_click_is_the_force_between_neighbouring_positions_over_their_distance_without_the_gas() -> None:
+    forces = [force_row(None, 4.0, 460.0, gas=-150.0), force_row(None, 0.0, 300.0), force_row(None, 1.0, 310.0)]
+    rows = clicks(forces, Control("rebound", "clicks"))
+    assert [(row.from_click, row.to_click) for row in rows] == [(0.0, 1.0), (1.0, 4.0)]
+    assert [row.rebound_N_per_click for row in rows] == pytest.approx([10.0, 50.0])
+    assert [row.compression_N_per_click for row in rows] == pytest.approx([5.0, 25.0])
+
+
+def test_clickers_in_the_name_of_a_setting_are_told_apart() -> None:
+    forces = [force_row("R3 C8", None, 300.0), force_row("R5 C8", None, 340.0), force_row("R3 C9", None, 303.0)]
+    rows = clicks(forces, Control())
+    assert {(row.setting, row.rebound_N_per_click) for row in rows} == {("R# C8", 20.0), ("R3 C#", 3.0)}
+
+
+def test_settings_without_a_number_have_no_clicks() -> None:
+    assert clicks([force_row("soft", None, 300.0), force_row("hard", None, 600.0)], Control()) == ()
+
+
+def test_a_volt_is_no_click() -> None:
+    assert clicks([force_row(None, 0.0, 300.0), force_row(None, 1.0, 310.0)], Control()) == ()
+
+
+@pytest.mark.parametrize("unit", ["psi", "bar", "kPa"])
+def test_of_a_gas_pressure_is_told_the_force_a_unit_and_what_it_makes_of_the_gas_force(unit: str) -> None:
+    forces = [force_row(f"gas {p} {unit}", 5.0, 300.0 + 0.2 * p, gas=-1.5 * p) for p in (200, 100)]
+    (row,) = per_unit(forces, Control())
+    assert (row.setting, row.voltage_V, row.unit) == (f"gas # {unit}", 5.0, unit)
+    assert (row.from_value, row.to_value) == (100.0, 200.0)
+    assert row.rebound_N_per_unit == pytest.approx(0.2)
+    assert row.compression_N_per_unit == pytest.approx(0.1)
+    assert row.gas_force_N_per_unit == pytest.approx(-1.5)
+    assert clicks(forces, Control()) == ()
+
+
+def test_a_gas_pressure_may_be_the_control_signal() -> None:
+    forces = [force_row(None, p, 300.0 + 20.0 * p, gas=-30.0 * p) for p in (5.0, 10.0, 20.0)]
+    rows = per_unit(forces, Control("gas", "bar"))
+    assert [(row.setting, row.voltage_V, row.unit) for row in rows] == [(None, None, "bar")] * 2
+    assert [(row.from_value, row.to_value) for row in rows] == [(5.0, 10.0), (10.0, 20.0)]
+    assert [row.rebound_N_per_unit for row in rows] == pytest.approx([20.0, 20.0])
+    assert [row.gas_force_N_per_unit for row in rows] == pytest.approx([-30.0, -30.0])
+    assert clicks(forces, Control("gas", "bar")) == ()
+
+
+def test_a_clicker_and_a_gas_pressure_in_one_name_are_told_apart() -> None:
+    names = {"C4 100psi": 300.0, "C6 100psi": 340.0, "C4 150psi": 310.0}
+    forces = [force_row(name, None, force) for name, force in names.items()]
+    assert [(row.setting, row.rebound_N_per_click) for row in clicks(forces, Control())] == [("C# 100psi", 20.0)]
+    assert [(row.setting, row.rebound_N_per_unit) for row in per_unit(forces, Control())] == [("C4 #psi", 0.2)]
+
+
+def test_the_trade_reads_its_forces_at_the_speeds_of_a_crank_of_100_mm() -> None:
+    assert TRADE_SPEEDS == (0.052, 0.131, 0.262, 0.393, 0.524, 1.047, 1.571)

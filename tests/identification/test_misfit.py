@@ -1,0 +1,80 @@
+"""What repeats and the Bingham element misses is told from noise and from what the sensors of a test do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from campaigns import ROWS, campaign
+from fresh_truths import sine_test, with_noise
+
+from pzd.artefacts import ParameterRow
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.fit import fit_separable, identify_condition
+from pzd.identification.prepared_record import Objective, parts_of, trial_of
+from pzd.identification.trust import VISIBLE, Misfit, misfit_of
+from pzd.record import Condition, Record
+
+QUICKSTART = ((1.0, 0.01), (1.0, 0.03), (2.0, 0.01), (2.0, 0.03))
+ORIFICE = 2500.0
+
+
+def sines(*, hidden: float, noise: float, rng: np.random.Generator) -> list[Record]:
+    """The sines of configs/quickstart.yaml at 0 V, with so much of a quadratic orifice [N s2/m2] beside the element."""
+    records = [sine_test(ROWS[0], f, x, cycles=6, rate=500, name=f"{f}-{x}") for f, x in QUICKSTART]
+    return [
+        with_noise(replace(r, force=r.force + hidden * r.velocity * np.abs(r.velocity)), rng, noise, 0.5)
+        for r in records
+    ]
+
+
+def row_for(records: list[Record]) -> ParameterRow:
+    return identify_condition(Condition(None, 0.0, None, tuple(records)), IdentifyConfig(), seed=1)[0]
+
+
+def misfit_for(records: tuple[Record, ...]) -> Misfit:
+    """What the element alone misses, nothing carried beside it."""
+    objective = Objective(tuple(trial_of(record) for record in records))
+    fit = fit_separable(objective)
+    return misfit_of(parts_of(records, objective.trials, (fit.residuals, fit.slopes), IdentifyConfig().nuisance))
+
+
+def test_a_hidden_orifice_makes_the_parameters_the_model_s_and_not_the_damper_s(rng: np.random.Generator) -> None:
+    row = row_for(sines(hidden=ORIFICE, noise=0.005, rng=rng))
+    assert row.C_Ns_per_m > 1.2 * ROWS[0].damping
+    assert row.status.startswith("weak: T0, C, k (the model misses ")
+    assert row.status.endswith("of peak: the parameters are the model's, not the damper's)")
+
+
+def test_without_it_they_are_the_damper_s(rng: np.random.Generator) -> None:
+    assert row_for(sines(hidden=0.0, noise=0.005, rng=rng)).status == "ok"
+    assert misfit_for(tuple(sines(hidden=0.0, noise=0.005, rng=rng))).share == 0.0
+
+
+def test_gain_offset_and_delay_within_their_priors_are_no_misfit(rng: np.random.Generator) -> None:
+    spoken = [misfit_for(campaign(draw, "five tests", correlation=0.9)[1]).is_large for draw in rng.spawn(5)]
+    assert not any(spoken)
+
+
+def test_noise_alone_seldom_speaks(rng: np.random.Generator) -> None:
+    draws = [campaign(draw, "two sines", correlation=0.9, noise=0.05)[1] for draw in rng.spawn(20)]
+    assert sum(misfit_for(records).share > 0.0 for records in draws) <= 1
+
+
+def test_a_misfit_that_the_class_of_the_load_cell_may_cause_does_not_speak(rng: np.random.Generator) -> None:
+    small = misfit_for(tuple(sines(hidden=0.1 * ORIFICE, noise=0.0005, rng=rng)))
+    assert 0.0 < small.share < VISIBLE
+    assert not small.is_large
+    assert row_for(sines(hidden=0.1 * ORIFICE, noise=0.0005, rng=rng)).status == "ok"
+
+
+@pytest.mark.parametrize("kind", ["one sine", "one random"])
+def test_what_is_hidden_is_seen_whether_the_motion_repeats_or_not(kind, rng: np.random.Generator) -> None:
+    speaks = [misfit_for(campaign(draw, kind, hidden=0.2)[1]).is_large for draw in rng.spawn(8)]
+    assert sum(speaks) >= 7
+
+
+def test_a_motion_that_does_not_repeat_is_no_misfit(rng: np.random.Generator) -> None:
+    speaks = [misfit_for(campaign(draw, "one random", correlation=0.9)[1]).is_large for draw in rng.spawn(10)]
+    assert not any(speaks)

@@ -1,0 +1,120 @@
+"""What the data do not determine gets no number, and the reason is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fresh_truths import SENSORS_ALIKE, TABLE_2, acceptance_test, sine_test, with_noise
+
+from pzd.artefacts import ParameterRow
+from pzd.identification.config import EvolutionaryConfig, IdentifyConfig
+from pzd.identification.fit import fit_evolutionary, fit_separable, identify_condition
+from pzd.identification.prepared_record import Bingham, Objective, trial_of
+from pzd.identification.trust import ParameterEvidence, displacement_noise, trust_of, visible_shares
+from pzd.record import Condition, Record
+from pzd.signals.nuisance import NuisanceConfig
+
+
+def row_for(*records: Record, config: IdentifyConfig | None = None) -> ParameterRow:
+    return identify_condition(Condition(None, None, None, records), config or IdentifyConfig(), seed=1)[0]
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_a_slow_small_test_cannot_tell_the_damping(rng: np.random.Generator, noise) -> None:
+    record = sine_test(Bingham(400.0, 2500.0, 4e5), 0.2, 0.002, cycles=6)
+    row = row_for(with_noise(record, rng, noise, correlation=0.9))
+    assert row.C_Ns_per_m is None
+    assert row.C_Ns_per_m_low95 is None
+    assert row.status.startswith("undetermined: C (")
+    assert pytest.approx(400.0, rel=0.03) == row.T0_N
+
+
+def test_a_damper_that_never_slips_shows_neither_friction_nor_damping() -> None:
+    row = row_for(sine_test(Bingham(5000.0, 2500.0, 4e5), 2.0, 0.005))
+    assert row.T0_N is None
+    assert row.C_Ns_per_m is None
+    assert "undetermined: T0, C" in row.status
+
+
+def test_a_tare_of_the_load_cell_is_not_explained_by_an_element_that_never_slips() -> None:
+    record = sine_test(Bingham(50.0, 1000.0, 4e5), 2.0, 0.01)
+    tared = Objective((trial_of(replace(record, force=record.force + 600.0)),))
+    for fit in (fit_separable(tared), fit_evolutionary(tared, EvolutionaryConfig(), seed=1)):
+        assert fit.parameters.friction < 0.5 * fit.parameters.stiffness * np.ptp(record.displacement)
+    assert row_for(replace(record, force=record.force + 600.0)).status != "ok"
+
+
+def test_a_damper_without_friction_has_a_friction_of_nothing_and_not_an_unknown_one(rng: np.random.Generator) -> None:
+    record = sine_test(Bingham(0.0, 2500.0, 4e5), 2.0, 0.02)
+    row = row_for(with_noise(record, rng))
+    assert row.T0_N is not None
+    assert row.T0_N_high95 < 0.01 * np.abs(record.force).max()
+    assert row.C_Ns_per_m == pytest.approx(2500.0, rel=0.01)
+
+
+def test_a_rigid_oil_spring_is_undetermined_and_the_others_are_not(rng: np.random.Generator) -> None:
+    row = row_for(with_noise(sine_test(Bingham(400.0, 2500.0, 4e9), 2.0, 0.02), rng))
+    assert row.k_N_per_m is None
+    assert row.status.startswith("undetermined: k (")
+    assert pytest.approx(400.0, rel=0.05) == row.T0_N
+    assert row.C_Ns_per_m == pytest.approx(2500.0, rel=0.02)
+
+
+def test_displacement_noise_that_hides_the_oil_spring_is_named(rng: np.random.Generator) -> None:
+    record = sine_test(Bingham(400.0, 2500.0, 3e7), 2.0, 0.02)
+    noisy = replace(record, displacement=record.displacement + 1e-5 * rng.standard_normal(record.time.size))
+    row = row_for(noisy)
+    assert row.k_N_per_m is None
+    assert "the displacement's noise is" in row.status
+
+
+def test_displacement_noise_is_measured_and_the_motion_itself_is_not_taken_for_it(rng: np.random.Generator) -> None:
+    record = sine_test(TABLE_2[0.0], 2.0, 0.03)
+    noise = 5e-6 * rng.standard_normal(record.time.size)
+    assert displacement_noise(record.displacement) < 1e-7
+    assert displacement_noise(record.displacement + noise) == pytest.approx(5e-6, rel=0.1)
+
+
+def test_a_model_that_misses_half_of_the_force_is_weak_throughout() -> None:
+    record = sine_test(TABLE_2[0.0], 2.0, 0.03)
+    spoiled = replace(record, force=record.force + 400.0 * np.sin(2.0 * np.pi * 11.0 * record.time))
+    row = row_for(spoiled)
+    assert row.status.startswith("weak: T0, C, k (")
+    assert "of the force's r.m.s." in row.status
+
+
+@pytest.mark.parametrize("draw", range(6))
+def test_good_tests_are_ok(draw, rng: np.random.Generator) -> None:
+    _, records = acceptance_test(rng)
+    assert row_for(*(with_noise(r, rng) for r in records), config=SENSORS_ALIKE).status == "ok"
+
+
+def test_what_the_sensors_leave_open_is_weak_and_never_undetermined(rng: np.random.Generator) -> None:
+    # Friction over damping: a gain of 20 % between two tests says nothing of C, and yet noise alone would.
+    records = [sine_test(TABLE_2[150.0], f, 0.02, rate=500) for f in (0.5, 1.0)]
+    noisy = [with_noise(r, rng, 0.002) for r in records]
+    row = row_for(*noisy, config=IdentifyConfig(nuisance=NuisanceConfig(gain=0.2)))
+    assert row.status.startswith("weak: ")
+    assert row.C_Ns_per_m == pytest.approx(TABLE_2[150.0].damping, rel=0.02)
+    assert row.C_Ns_per_m_high95 > 1.5 * row.C_Ns_per_m
+
+
+def test_linearly_dependent_slopes_are_invisible(rng: np.random.Generator) -> None:
+    base = rng.standard_normal((100, 2))
+    slopes = np.column_stack([base, base @ [1.0, 2.0]])
+    np.testing.assert_allclose(visible_shares(slopes, np.ones(3), 100.0), 0.0, atol=1e-7)
+    assert np.all(visible_shares(base, np.ones(2), 100.0) > 0.5)
+
+
+def test_undetermined_and_weak_stand_in_one_status() -> None:
+    trust = trust_of(
+        [
+            ParameterEvidence("T0", 100.0, 1.0, 1.0, 0.3),
+            ParameterEvidence("C", 1000.0, 600.0, 600.0, 0.3),
+            ParameterEvidence("k", 1e5, 2e4, 2e4, 0.3),
+        ]
+    )
+    assert trust.determined == (True, False, True)
+    assert trust.status == "undetermined: C (95 % interval of +-60 % by noise alone); weak: k (95 % interval of +-20 %)"
