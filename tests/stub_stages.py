@@ -186,8 +186,9 @@ def report(report: ReportConfig, rides: Rides, control: Control, setting: str | 
 _FUNCTIONS: dict[str, Callable[..., Any]] = dict(
     zip(NAMES, (ingest, identify, diagnose, tabulate, simulate, report), strict=True)
 )
+_PACKAGES = {"ingest": "rig", "identify": "identification", "diagnose": "diagnosis", "table": "force_table"}
 for _name, _function in _FUNCTIONS.items():
-    _function.__module__ = f"pzd.{'rig' if _name == 'ingest' else _name}.stage"
+    _function.__module__ = f"pzd.{_PACKAGES.get(_name, _name)}.stage"
 
 
 def stages(config: RunConfig) -> tuple[Stage, ...]:

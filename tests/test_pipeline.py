@@ -250,7 +250,7 @@ def test_the_code_of_a_stage_is_all_that_it_may_import_and_the_data_beside(tmp_p
         ("__init__.py", ""),
         (
             "identify/stage.py",
-            "from pzd.identification import (\n    fit,\n)\nif TYPE_CHECKING:\n    import pzd.report.page\n",
+            "from pzd.identify import (\n    fit,\n)\nif TYPE_CHECKING:\n    import pzd.report.page\n",
         ),
         ("identify/fit.py", "from pzd.damper.element import f\n"),
         ("identify/alone.py", "import pzd.report.page\n"),
@@ -259,13 +259,13 @@ def test_the_code_of_a_stage_is_all_that_it_may_import_and_the_data_beside(tmp_p
         ("identify/README.md", "1\n"),
         (
             "damper/element.py",
-            "def f():\n    from pzd.quantities import x\n    find(f'pzd.damper.compiled.laws.{name}')\n",
+            "def f():\n    from pzd.quantities import x\n    find(f'pzd.damper.laws.{name}')\n",
         ),
         ("damper/laws/__init__.py", ""),
         ("damper/laws/lash.py", ""),
         ("quantities.py", "x = 1\n"),
         ("report/__init__.py", "found = pkgutil.iter_modules(__path__)\n"),
-        ("report/stage.py", "import pzd.identification.fit as fit\n"),
+        ("report/stage.py", "import pzd.identify.fit as fit\n"),
         ("report/page.py", ""),
     ):
         (package / name).parent.mkdir(parents=True, exist_ok=True)
@@ -415,12 +415,12 @@ def test_an_edited_artefact_that_must_be_made_anew_is_laid_beside(bench: Bench) 
     path = parameters(bench, lambda text: text.replace("200.0", "222.0"))
     edited = path.read_bytes()
     assert bench("seed=2")[0] == "identify"
-    assert "now beside the new as .edited: parameters.csv" in bench.said("identify")
-    assert (path.parent / "parameters.csv.edited").read_bytes() == edited
+    assert "kept beside the new as .edited-HASH: parameters.csv" in bench.said("identify")
+    assert [copy.read_bytes() for copy in path.parent.glob("parameters.csv.edited-*")] == [edited]
     assert "222.0" not in path.read_text()
     assert bench("seed=2") == []
     assert bench("seed=3")[0] == "identify"
-    assert (path.parent / "parameters.csv.edited").read_bytes() == edited
+    assert [copy.read_bytes() for copy in path.parent.glob("parameters.csv.edited-*")] == [edited]
 
 
 def test_what_a_person_laid_beside_the_results_stays_and_counts_for_nothing(bench: Bench) -> None:

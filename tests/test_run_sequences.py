@@ -40,7 +40,7 @@ RESULTS = [
     "1-rig/a.csv",
     "1-rig/records.json",
     "2-identify/parameters.csv",
-    "2-identify/parameters.csv.edited",
+    "2-identify/parameters.csv.edited-00000000",
     "2-identify/manifest.json",
     "6-report/comfort.csv",
     "6-report/report.html",

@@ -79,11 +79,9 @@ class Pipeline:
         reason = "forced" if force else stale(state, inputs)
         if reason is None:
             self.marks[stage.folder] = self._marks_as_it_stands(stage, state)
-            by_hand = f"; edited by hand and kept: {', '.join(state.edited)}" if state.edited else ""
-            self._say(stage, f"fresh: nothing it depends on has changed{by_hand}")
+            self._say(stage, f"fresh: nothing it depends on has changed{_edited(' and kept', state)}")
             return
-        lost = f"; edited by hand, now beside the new as .edited: {', '.join(state.edited)}" if state.edited else ""
-        self._say(stage, f"runs: {reason}{lost}")
+        self._say(stage, f"runs: {reason}{_edited(', kept beside the new as .edited-HASH', state)}")
         self._run(stage, inputs)
 
     def stale_stages(self) -> dict[str, str]:
@@ -178,6 +176,10 @@ class Pipeline:
 
     def _say(self, stage: Stage, line: str) -> None:
         self.say(f"{stage.name:<10} {line}")
+
+
+def _edited(what_becomes: str, state: StageFolder) -> str:
+    return f"; edited by hand{what_becomes}: {', '.join(state.edited)}" if state.edited else ""
 
 
 def stale(state: StageFolder, inputs: dict[str, str]) -> str | None:

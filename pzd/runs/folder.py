@@ -7,11 +7,12 @@ the next time the run is opened.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import logging
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -24,139 +25,24 @@ from pzd.runs.disk import as_files_error, file_hash, locked, sync, sync_folder, 
 from pzd.schema.errors import ConfigError, DataError, FilesError
 from pzd.schema.validate import read_json, write_json
 
-# ----------------------------------------------------------------------------------------------------
-# What a person wrote into a folder of results is kept when the results are written anew.
-
-
-def carry_over(
-    target: Path, fresh: Path, files: Mapping[str, str], before: Mapping[str, str], now: Mapping[str, str]
-) -> None:
-    """Copy what a person left in a folder into the one that takes its place.
-
-    Files of their own keep their names. A file that they edited, or that stands where a result is
-    written now, is laid beside the result as ``NAME.edited``, ``NAME.edited-2`` and so on.
-
-    Parameters
-    ----------
-    target : the folder as it is
-    fresh : the folder that takes its place
-    files : hash of every file in `target`, by its path in the folder
-    before : hash of every file that was written into `target`
-    now : hash of every file that was written into `fresh`
-    """
-    for name, digest in files.items():
-        if digest in (before.get(name), now.get(name)):
-            continue
-        if name not in before and name not in now:
-            _copy(target / name, fresh / name)
-        elif (free := free_name(target, name, digest, {*files, *now})) is not None:
-            _copy(target / name, fresh / free)
-
-
-def free_name(folder: Path, name: str, digest: str, taken: Collection[str]) -> str | None:
-    """The name under which an edited file is kept; None where it is kept already.
-
-    Parameters
-    ----------
-    folder : where the edited copies so far stand
-    name : of the edited file
-    digest : its hash
-    taken : names that are in use
-    """
-    number = 1
-    while True:
-        free = f"{name}.edited" if number == 1 else f"{name}.edited-{number}"
-        if free not in taken:
-            return free
-        if (folder / free).is_file() and file_hash(folder / free) == digest:
-            return None
-        number += 1
-
-
-def _copy(source: Path, goal: Path) -> None:
-    goal.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copy2(source, goal)
-
-
-# ----------------------------------------------------------------------------------------------------
-# What a command that was killed left half done in a run's folder: finished, undone, or removed.
-
-
-NEW = ".new"
-"""Ending of what is being written; it is renamed once it is whole."""
-OLD = ".old"
-"""Ending of the old folder until the new one is in its place."""
-
 log = logging.getLogger(__name__)
-
-
-def hidden(folder: Path, name: str, ending: str) -> Path:
-    """Where something is written, or waits, until it has its name."""
-    return folder / f".{name}{ending}"
-
-
-def clean_up(folder: Path, folders: Collection[str], files: Collection[str]) -> None:
-    """Settle what a killed command left; what only looks like it is named and left.
-
-    Parameters
-    ----------
-    folder : the folder of the run
-    folders : names of the folders that are written there
-    files : names of the files that are written there
-    """
-    for name in files:
-        path = hidden(folder, name, NEW)
-        if path.is_file() and not path.is_symlink():
-            path.unlink()
-    for name in folders:
-        _settle(folder, name)
-    for path in sorted(folder.glob(".*")):
-        if path.suffix in (NEW, OLD):
-            log.warning("%s: pzd did not write this, so it is left as it is; move it away if you do not need it", path)
-
-
-def in_the_way(folder: Path, name: str) -> None:
-    """Refuse to write a folder where something stands that is not ours.
-
-    Raises
-    ------
-    FilesError : naming it
-    """
-    for path in (hidden(folder, name, NEW), hidden(folder, name, OLD)):
-        if os.path.lexists(path):
-            raise FilesError(f"{path}: this stands where {folder / name} is written, and is not of pzd; move it away")
-
-
-def _settle(folder: Path, name: str) -> None:
-    new, old, target = hidden(folder, name, NEW), hidden(folder, name, OLD), folder / name
-    if _is_folder(new):
-        shutil.rmtree(new)
-    if _is_folder(old):
-        if target.exists():
-            shutil.rmtree(old)
-        else:
-            old.rename(target)
-
-
-def _is_folder(path: Path) -> bool:
-    return path.is_dir() and not path.is_symlink()
-
-
-# ----------------------------------------------------------------------------------------------------
-
 
 Made = TypeVar("Made", Rig, Identified, Diagnosed, Table, Rides, Report, Artefact)
 
 MANIFEST = "manifest.json"
 CONFIG = "config.yaml"
-_CONFIG_HASHES = ".config.sha256"
-"""Hashes of the config as it was written, the last two times: a config with another one was edited by hand."""
+_CONFIG_HEAD = "# Written by pzd with every default. An output: edit the config itself. sha256 {digest}\n"
+"""First line of the written config, with the hash of the rest: where it does not fit, somebody edited the file."""
 _WRITTEN = ".written.json"
 """Hashes of what was written into a folder that is no stage and has no manifest."""
 _FOLDERS = (*(kind.folder for kind in (Rig, Identified, Diagnosed, Table, Rides, Report)), "figures", "peers")
 """What a run's folder may hold."""
 _NAMES = Control()
 """Manifests name files and keys as they are, whatever the control is called."""
+NEW = ".new"
+"""Ending of what is being written; it is renamed once it is whole."""
+OLD = ".old"
+"""Ending of the old folder until the new one is in its place."""
 
 
 @dataclass(frozen=True)
@@ -269,21 +155,16 @@ class Run:
             yield
 
     def write_config(self, text: str) -> None:
-        """Write the config with every default, unless it is there; one edited by hand is kept under another name."""
-        path, hashes = self.folder / CONFIG, self.folder / _CONFIG_HASHES
+        """Write the config with every default; one that somebody edited is kept under another name."""
+        path, fresh = self.folder / CONFIG, hidden(self.folder, CONFIG, NEW)
         with as_files_error(path):
-            if path.exists() and path.read_bytes() == text.encode():
+            whole = _CONFIG_HEAD.format(digest=_digest(text)) + text
+            if path.exists() and path.read_bytes() == whole.encode():
                 return
-            fresh = hidden(self.folder, CONFIG, NEW)
-            fresh.write_text(text, encoding="utf-8", newline="\n")
+            fresh.write_text(whole, encoding="utf-8", newline="\n")
             sync(fresh)
-            written = hashes.read_text(encoding="utf-8").split() if hashes.exists() else []
-            if path.exists() and (digest := file_hash(path)) not in written:
-                free = free_name(self.folder, CONFIG, digest, {other.name for other in self.folder.iterdir()})
-                if free is not None:
-                    shutil.copy2(path, self.folder / free)
-            # Killed before the rename, the old config still counts as ours; killed behind it, the new one does.
-            hashes.write_text("\n".join([*written[-1:], file_hash(fresh)]) + "\n", encoding="utf-8")
+            if path.exists() and not _as_written(path.read_text(encoding="utf-8", errors="replace")):
+                _keep_edited(path, self.folder)
             fresh.replace(path)
 
     def write(
@@ -362,8 +243,7 @@ class Run:
                 fresh.mkdir()
                 made = True
                 fill(fresh)
-                now = self.hashes(fresh.name) | {MANIFEST: "", _WRITTEN: ""}
-                carry_over(target, fresh, self._by_hand(name), self._written(name), now)
+                self._keep_edits(name, fresh)
                 sync_folder(fresh)
                 self._swap(target, fresh)
         finally:
@@ -380,11 +260,20 @@ class Run:
             return {}
         return written if isinstance(written, dict) else {}
 
-    def _by_hand(self, name: str) -> dict[str, str]:
-        """Hash of every file that a person may have written; a manifest that cannot be read is one."""
-        manifest = self.folder / name / MANIFEST
-        broken = manifest.is_file() and self._manifest(name) is None
-        return self.hashes(name) | ({MANIFEST: file_hash(manifest)} if broken else {})
+    def _keep_edits(self, name: str, fresh: Path) -> None:
+        """Copy what a person left in a folder into the one that takes its place, edited results as NAME.edited-HASH."""
+        target, written = self.folder / name, self._written(name)
+        now = self.hashes(fresh.name) | {MANIFEST: "", _WRITTEN: ""}
+        by_hand = self.hashes(name)
+        if (target / MANIFEST).is_file() and self._manifest(name) is None:
+            by_hand[MANIFEST] = file_hash(target / MANIFEST)  # one that cannot be read was edited
+        by_hand = {file: digest for file, digest in by_hand.items() if digest not in (written.get(file), now.get(file))}
+        edited = [file for file in by_hand if file in written or file in now]
+        for file in by_hand.keys() - set(edited):
+            (fresh / file).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(target / file, fresh / file)
+        for file in edited:
+            _keep_edited(target / file, fresh / Path(file).parent)
 
     def _swap(self, target: Path, fresh: Path) -> None:
         old = hidden(self.folder, target.name, OLD)
@@ -393,3 +282,81 @@ class Run:
         fresh.rename(target)
         sync(self.folder)
         shutil.rmtree(old, ignore_errors=True)
+
+
+# --- Hand edits
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _as_written(text: str) -> bool:
+    """Check a written config against the hash in its first line."""
+    head, _, rest = text.partition("\n")
+    return head.endswith(f"sha256 {_digest(rest)}")
+
+
+def _keep_edited(path: Path, folder: Path) -> None:
+    """Copy an edited result into a folder, under a name that its content gives: another edit never takes its place."""
+    digest = file_hash(path)
+    names = (f"{path.name}.edited-{digest[:length]}" for length in range(8, len(digest) + 1))
+    free = next(copy for name in names if not (copy := folder / name).exists() or file_hash(copy) == digest)
+    free.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copy2(path, free)
+
+
+# --- What a killed command left half done: finished, undone, or removed
+
+
+def hidden(folder: Path, name: str, ending: str) -> Path:
+    """Return where something is written, or waits, until it has its name."""
+    return folder / f".{name}{ending}"
+
+
+def clean_up(folder: Path, folders: Collection[str], files: Collection[str]) -> None:
+    """Settle what a killed command left; what only looks like it is reported and left.
+
+    Parameters
+    ----------
+    folder : the folder of the run
+    folders : names of the folders that are written there
+    files : names of the files that are written there
+    """
+    for name in files:
+        path = hidden(folder, name, NEW)
+        if path.is_file() and not path.is_symlink():
+            path.unlink()
+    for name in folders:
+        _settle(folder, name)
+    for path in sorted(folder.glob(".*")):
+        if path.suffix in (NEW, OLD):
+            log.warning("%s: pzd did not write this, so it is left as it is; move it away if you do not need it", path)
+
+
+def in_the_way(folder: Path, name: str) -> None:
+    """Refuse to write a folder where something stands that is not ours.
+
+    Raises
+    ------
+    FilesError : naming it
+    """
+    for path in (hidden(folder, name, NEW), hidden(folder, name, OLD)):
+        if os.path.lexists(path):
+            raise FilesError(f"{path}: this stands where {folder / name} is written, and is not of pzd; move it away")
+
+
+def _settle(folder: Path, name: str) -> None:
+    """Remove a half-written folder, and put the old one back where a command was killed between the two renames."""
+    new, old, target = hidden(folder, name, NEW), hidden(folder, name, OLD), folder / name
+    if _is_folder(new):
+        shutil.rmtree(new)
+    if _is_folder(old):
+        if target.exists():
+            shutil.rmtree(old)
+        else:
+            old.rename(target)
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
