@@ -93,7 +93,7 @@ def test_every_option_of_the_readme_exists() -> None:
 
 
 def test_every_exit_code_is_in_the_readme() -> None:
-    codes = {value for name, value in vars(output).items() if name.isupper() and isinstance(value, int)}
+    codes = {value for name, value in vars(output).items() if name.isupper() and type(value) is int}
     codes |= {error.exit_code for error in (ConfigError, DataError, FilesError)}
     assert codes == {int(code) for code in re.findall(r"^\| (\d+) \|", page("README.md"), re.MULTILINE)}
 

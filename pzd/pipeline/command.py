@@ -153,7 +153,7 @@ def stale_stages(given: Opened) -> dict[str, str]:
 
 
 def preflight(given: Opened) -> Rig:
-    """The rig's records, what the preflight finds in them, and what was done to their files; written nowhere.
+    """Return the rig's records, what the preflight finds in them, and what was done to their files; written nowhere.
 
     Raises
     ------
@@ -215,7 +215,7 @@ class Resolved:
 
 
 def resolved(given: Opened) -> tuple[Resolved, ...]:
-    """The values of a config in the order of the reference, the control under its own name.
+    """Return the values of a config in the order of the reference, the control under its own name.
 
     Parameters
     ----------

@@ -97,7 +97,7 @@ def modules_used(module: str, package: Path = PACKAGE) -> set[str]:
 
 @cache
 def _imports_of(name: str, package: Path) -> frozenset[str]:
-    """The modules that one module names, and the packages above it, which are imported before it."""
+    """Return the modules that one module names, and the packages above it, which are imported before it."""
     path = _file(name, package)
     if path is None:
         return frozenset()
@@ -119,13 +119,13 @@ def _below(name: str, package: Path) -> set[str]:
 
 
 def _file(name: str, package: Path) -> Path | None:
-    """The file of a module or package; None where there is none of that name."""
+    """Return the file of a module or package; None where there is none of that name."""
     return _modules(package).get(name)
 
 
 @cache
 def _modules(package: Path) -> dict[str, Path]:
-    """The file of every module and package, by its full name, from one walk through the folders."""
+    """Return the file of every module and package, by its full name, from one walk through the folders."""
     return {
         ".".join(path.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__"): path
         for path in package.rglob("*.py")
@@ -133,7 +133,7 @@ def _modules(package: Path) -> dict[str, Path]:
 
 
 def _data(folder: Path) -> Iterator[Path]:
-    """The files of a package that are no modules and no pages for people, also in folders that hold no modules."""
+    """Yield the data files of a package folder: neither modules nor pages for people, folders without modules too."""
     for path in folder.iterdir():
         if path.is_dir():
             if path.name != "__pycache__" and not any(path.glob("*.py")):
@@ -154,7 +154,7 @@ _MOST_CHANGES = 3
 
 
 def setting_of(config: RunConfig, run: Run) -> str | None:
-    """The setting in use, by the config and by what the rig's records are.
+    """Return the setting in use, by the config and by what the rig's records are.
 
     Raises
     ------
@@ -212,7 +212,7 @@ def dependencies(stage: Stage, config: RunConfig, run: Run, marks: Sequence[str]
 
 
 def key_of(inputs: Mapping[str, str]) -> str:
-    """The hash of everything that a stage depends on."""
+    """Return the hash of everything that a stage depends on."""
     return _hash(dict(sorted(inputs.items())))
 
 

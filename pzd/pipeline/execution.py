@@ -126,11 +126,11 @@ class Pipeline:
         self._say(stage, f"done in {seconds:.1f} s: {self.run.folder / stage.folder}")
 
     def made(self, stage: Stage) -> Artefact:
-        """What a stage makes of its inputs, written nowhere."""
+        """Return what a stage makes of its inputs, written nowhere."""
         return stage.function(**{name: self._argument(name, kind) for name, kind in stage.takes.items()})
 
     def _argument(self, name: str, annotation: Any) -> Any:
-        """What a parameter of a stage is given; artefacts are what their files hold, however they were made."""
+        """Return what a parameter of a stage is given; artefacts are what their files hold, however they were made."""
         if is_artefact(annotation):
             return self.read_back(annotation)
         if block := block_of(self.config, annotation):
@@ -143,11 +143,11 @@ class Pipeline:
         return (given | {"jobs": self.jobs, "progress": self.progress, "preflight": True})[name]
 
     def setting(self) -> str | None:
-        """The setting in use, by the config and the records of the run."""
+        """Return the setting in use, by the config and the records of the run."""
         return setting_of(self.config, self.run)
 
     def read_back(self, kind: type[Artefact]) -> Artefact:
-        """An artefact as its files have it: read and checked once, and again where they have changed since.
+        """Return an artefact as its files have it: read and checked once, and again where they have changed since.
 
         The records are as they were written, to the last bit, and by far the most there is to read.
         """
@@ -159,7 +159,7 @@ class Pipeline:
         return artefact
 
     def _marks_as_it_stands(self, stage: Stage, state: StageFolder) -> tuple[str, ...]:
-        """The marks of the manifest, or of the artefact itself where it was edited, which checks it too."""
+        """Return the marks of the manifest, or of the artefact itself where it was edited, which checks it too."""
         if state.edited:
             return self._carried(stage, self._untrusted(self.read_back(stage.makes)))
         return state.manifest.marks if state.manifest else ()
@@ -170,7 +170,7 @@ class Pipeline:
         return reasons(self.run.control) if reasons else ()
 
     def _carried(self, stage: Stage, own: Sequence[str]) -> tuple[str, ...]:
-        """A stage's own marks behind those of what it was made from."""
+        """Return a stage's own marks behind those of what it was made from."""
         before = [self.marks.get(kind.folder, ()) for kind in stage.takes.values() if is_artefact(kind)]
         return tuple(dict.fromkeys([mark for marks in before for mark in marks] + list(own)))
 
@@ -218,27 +218,27 @@ class InMemory(Pipeline):
         return self.artefacts
 
     def of(self, kind: type[Made]) -> Made:
-        """An artefact that was made."""
+        """Return an artefact that was made."""
         found = self.artefacts[kind.folder]
         if not isinstance(found, kind):
             raise TypeError(f"{kind.folder} holds {type(found).__name__}")
         return found
 
     def read_back(self, kind: type[Artefact]) -> Artefact:
-        """An artefact that a stage asks for."""
+        """Return an artefact that a stage asks for."""
         return self.artefacts[kind.folder]
 
     def _argument(self, name: str, annotation: Any) -> Any:
-        """What a parameter of a stage is given."""
+        """Return what a parameter of a stage is given."""
         return False if name == "preflight" else super()._argument(name, annotation)
 
     def setting(self) -> str | None:
-        """The setting in use."""
+        """Return the setting in use."""
         return setting_in_use(self.config.setting, [entry.setting for entry in self.of(Rig).entries])
 
 
 def unaffected(before: RunConfig, now: RunConfig) -> tuple[Stage, ...]:
-    """The stages that make the same of two configs, from the first one on.
+    """Return the stages that make the same of two configs, from the first one on.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def unaffected(before: RunConfig, now: RunConfig) -> tuple[Stage, ...]:
 
 
 def _taken(stage: Stage, config: RunConfig) -> Sequence[Any]:
-    """What a stage takes of a config."""
+    """Return what a stage takes of a config."""
     found: list[Any] = [config.control]
     for name, annotation in stage.takes.items():
         if not is_artefact(annotation) and (block := block_of(config, annotation)):

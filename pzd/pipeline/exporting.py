@@ -77,7 +77,7 @@ def exported(given: Opened, to: str, out: Path | None, remedy: str) -> Exported:
 
 
 def _outdated(folder: Path, wanted: Format, content: Content, files: Collection[str]) -> list[Path]:
-    """What an earlier export of this config in this form left that the new one does not write: curves, tables."""
+    """Return files that an earlier export of this config in this form left and the new one does not write."""
     if wanted.ending is None:
         return []
     ours = re.compile(WRITTEN_BY_PZD.pattern + re.escape(content.config.encode()) + rb"(?![\w.-])")
@@ -96,7 +96,7 @@ def _check_own(files: Iterable[Path]) -> None:
 
 
 def content_of(given: Opened) -> Content:
-    """What there is to export of a run.
+    """Return what there is to export of a run.
 
     Raises
     ------

@@ -68,7 +68,7 @@ def page_of(run: Run) -> Path:
 
 
 def run_summary(run: Run) -> RunSummary:
-    """The numbers in a run's folder, checked, under the name that the control had when they were written.
+    """Return the numbers in a run's folder, checked, under the name that the control had when they were written.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def run_summary(run: Run) -> RunSummary:
 
 
 def summary_with_stale(given: Opened) -> RunSummary:
-    """The numbers of a config's run, with what they assume, and what makes them those of an older config or files.
+    """Return the numbers of a config's run, what they assume, and why they may be those of an older config.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def summary_with_stale(given: Opened) -> RunSummary:
 
 
 def summary_of(folder: Path) -> RunSummary:
-    """The numbers in a folder that a run wrote, with what makes them stale against the config that it is of.
+    """Return the numbers in a folder that a run wrote, with what makes them stale against the config that it is of.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def summary_of(folder: Path) -> RunSummary:
 
 
 def _beside_its_config(found: RunSummary, given: Opened) -> RunSummary:
-    """The numbers with what a config says of them: what is stale, and what the rides assume since it does not say."""
+    """Add what the config says of the numbers: what is stale, and what the rides assume."""
     effects = found.diagnosis.effects if found.diagnosis else ()
     with_voltage = all(row.voltage_V is not None for row in found.parameters)
     lines = assumed(given.config.simulate, effects, with_voltage) if found.summary else ()

@@ -42,7 +42,7 @@ class Stage:
 
 
 def stages(config: RunConfig) -> tuple[Stage, ...]:
-    """The stages of a config, first to last."""
+    """Return the stages of a config, first to last."""
     from pzd.diagnosis.stage import diagnose
     from pzd.force_table.stage import tabulate
     from pzd.identification.stage import identify

@@ -52,7 +52,7 @@ class WatchedFiles:
 
 
 def looks(state: Callable[[], State], wait: Callable[[], None]) -> Iterator[Look]:
-    """What there is to say after each look, for ever; the first time that all stand still counts as a change.
+    """Return what there is to say after each look, for ever; the first time that all stand still counts as a change.
 
     Parameters
     ----------

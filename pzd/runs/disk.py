@@ -34,7 +34,7 @@ def file_hash(path: Path) -> str:
 
 @cache
 def _hash_as_of(path: Path, _changed: int, _size: int, _inode: int) -> str:
-    """The hash of a file, computed once as long as the file system says that it is the same."""
+    """Return the hash of a file, computed once as long as the file system says that it is the same."""
     return _hash(path)
 
 
@@ -130,7 +130,7 @@ def _holder(command: str) -> str:
 
 
 def _acquired(folder: Path) -> BaseFileLock:
-    """The lock of a folder, held.
+    """Return the lock of a folder, held.
 
     A command whose first run comes to no result takes folder and lock file away while others wait for them;
     these try again on a new file, for a lock on a file that is no longer at its path excludes nobody.

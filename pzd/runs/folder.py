@@ -67,7 +67,7 @@ class Run:
 
     @classmethod
     def of(cls, config: Path, runs: Path, control: Control) -> Run:
-        """The run of a config below a folder of runs.
+        """Return the run of a config below a folder of runs.
 
         Raises
         ------
@@ -84,7 +84,7 @@ class Run:
         return run
 
     def config_of_results(self) -> Path | None:
-        """The config that the results are of, by the manifests; None where there are none."""
+        """Return the config that the results are of, by the manifests; None where there are none."""
         owners = (self._owner(manifest.parent.name) for manifest in sorted(self.folder.glob(f"*/{MANIFEST}")))
         owner = next((owner for owner in owners if owner is not None), None)
         return Path(os.path.relpath(owner)) if owner else None
@@ -116,7 +116,7 @@ class Run:
         return {name: digest for name, digest in self.hashes(stage).items() if name in written}
 
     def stage_folder(self, stage: str) -> StageFolder:
-        """What stands in a stage's folder."""
+        """Return what stands in a stage's folder."""
         manifest = self._manifest(stage)
         if manifest is None:
             return StageFolder(None)
