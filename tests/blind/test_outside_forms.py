@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.blind.case import Clean
+from pzd.blind.case import NoiseFreeRecord
 from pzd.blind.hide import gap_after_refit
-from pzd.blind.outside import FORMS, Reached
+from pzd.blind.outside import FORMS, Envelope
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
@@ -16,7 +16,7 @@ from pzd.record import Array
 
 STROKE, FREQUENCY = 0.02, 2.0
 SPEED = 2.0 * np.pi * FREQUENCY * STROKE
-REACHED = Reached(STROKE, SPEED)
+ENVELOPE = Envelope(STROKE, SPEED)
 MIDDLE = {name: {key: 0.5 * (low + high) for key, (low, high) in form.ranges.items()} for name, form in FORMS.items()}
 MIDDLE |= {"tapered_rod": {"side": 1.0}, "even_spring": {"side": 1.0}}
 
@@ -28,7 +28,7 @@ def sine(cycles: int = 3, stroke: float = STROKE, frequency: float = FREQUENCY, 
 
 
 def force(name: str, motion: Motion) -> Array:
-    return FORMS[name].shape(motion, REACHED, MIDDLE[name])
+    return FORMS[name].shape(motion, ENVELOPE, MIDDLE[name])
 
 
 @pytest.mark.parametrize("name", FORMS)
@@ -97,8 +97,8 @@ PLAIN = Damper(base=(BaseRow(T0_N=500.0, C_Ns_per_m=3000.0, k_N_per_m=3e5),))
 MOTIONS = [sine(stroke=s, frequency=f) for s, f in ((0.01, 2.0), (0.02, 2.0), (0.02, 1.0))]
 
 
-def hidden(damper: Damper) -> list[Clean]:
-    return [Clean(motion, force, force) for motion in MOTIONS for force in (respond(damper, motion),)]
+def hidden(damper: Damper) -> list[NoiseFreeRecord]:
+    return [NoiseFreeRecord(motion, force, force) for motion in MOTIONS for force in (respond(damper, motion),)]
 
 
 def test_nothing_hidden_leaves_no_visible_gap_wherever_the_search_starts() -> None:

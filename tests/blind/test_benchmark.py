@@ -1,4 +1,7 @@
-"""The benchmark keeps the truth apart, goes on where it was, and gives the same whatever the number of processes."""
+"""The benchmark keeps the truth apart, goes on where it was, and gives the same whatever the number of processes.
+
+A seed is scored once: the ledger refuses it for other code, and lets the same run go on.
+"""
 
 from __future__ import annotations
 
@@ -21,10 +24,11 @@ import pytest
 
 from pzd.artefacts import Diagnosed, Diagnosis
 from pzd.artefacts.diagnosis import Gap
-from pzd.blind.benchmark import COST, Benchmark, diagnose_case, gap_cut, gap_cut_of_truth
-from pzd.blind.case import Clean, Places, Scored
-from pzd.blind.hide import BenchmarkSetup, drawn, hide
+from pzd.blind.benchmark import Benchmark, ScoredSeed, diagnose_case, enter, read_ledger
+from pzd.blind.case import COST, CaseFiles, NoiseFreeRecord, Scored
+from pzd.blind.hide import BenchmarkSetup, draw_case, hide
 from pzd.blind.plan import plan
+from pzd.blind.score import gap_cut, gap_cut_of_truth
 from pzd.cli.app import status
 from pzd.config import RunConfig
 from pzd.damper.compose import respond
@@ -36,7 +40,7 @@ from pzd.parallel.chunks import ChunkedWork
 from pzd.parallel.config import Pools, Where
 from pzd.parallel.engines import local
 from pzd.parallel.processes import spawned_pool
-from pzd.schema.errors import ConfigError
+from pzd.schema.errors import ConfigError, DataError
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -108,11 +112,11 @@ def test_cases_are_drawn_and_diagnosed_in_processes_of_their_own(
 ) -> None:
     begun: list[int] = []
 
-    def counted(count: int) -> Executor:
+    def counting_pool(count: int) -> Executor:
         begun.append(count)
         return spawned_pool(count)
 
-    monkeypatch.setattr(local, "spawned_pool", counted)
+    monkeypatch.setattr(local, "spawned_pool", counting_pool)
     (case,) = benchmark_of(small("blind.cases=1"), tmp_path).run(jobs=2)
     assert begun == [1, 1]
     assert case.failure is None
@@ -132,10 +136,10 @@ def test_the_diagnosis_is_given_a_folder_without_the_truth(
     small: Small, setup_of: SetupOf, benchmark_of: BenchmarkOf, tmp_path: Path
 ) -> None:
     config = small()
-    setup, places = setup_of(config), Places(tmp_path / "here")
+    setup, files = setup_of(config), CaseFiles(tmp_path / "here")
     (planned, _) = plan(setup.blind)
-    hide(setup, planned, places)
-    given = places.case(planned.id)
+    hide(setup, planned, files)
+    given = files.case(planned.id)
     assert {path.relative_to(given).as_posix() for path in given.rglob("*.*")} == {
         "rig/r01.csv",
         "rig/r02.csv",
@@ -143,10 +147,10 @@ def test_the_diagnosis_is_given_a_folder_without_the_truth(
     }
     header = (given / "rig" / "r01.csv").read_text(encoding="utf-8").partition("\n")[0]
     assert set(header.split(",")) <= {"time_s", "displacement_m", "force_N", "voltage_V", "temperature_degC"}
-    hidden = json.loads(places.truth(planned.id).read_text(encoding="utf-8"))
+    hidden = json.loads(files.truth(planned.id).read_text(encoding="utf-8"))
     assert hidden["effects"] == list(planned.hidden)
 
-    places.truth(planned.id).parent.rename(tmp_path / "elsewhere")
+    files.truth(planned.id).parent.rename(tmp_path / "elsewhere")
     diagnose_case(benchmark_of(config, tmp_path).methods, given)
     assert json.loads((given / COST).read_text(encoding="utf-8"))["failure"] is None
     assert (given / "diagnosis.json").exists()
@@ -155,13 +159,13 @@ def test_the_diagnosis_is_given_a_folder_without_the_truth(
 def test_a_failed_diagnosis_is_a_case_with_its_message(
     small: Small, setup_of: SetupOf, benchmark_of: BenchmarkOf, tmp_path: Path
 ) -> None:
-    config, places = small(), Places(tmp_path)
+    config, files = small(), CaseFiles(tmp_path)
     (planned, _) = plan(setup_of(config).blind)
-    hide(setup_of(config), planned, places)
-    for path in places.rig(planned.id).iterdir():
+    hide(setup_of(config), planned, files)
+    for path in files.rig(planned.id).iterdir():
         path.write_text("time_s,force_N\n0,1\n", encoding="utf-8")
-    diagnose_case(benchmark_of(config, tmp_path).methods, places.case(planned.id))
-    cost = json.loads((places.case(planned.id) / COST).read_text(encoding="utf-8"))
+    diagnose_case(benchmark_of(config, tmp_path).methods, files.case(planned.id))
+    cost = json.loads((files.case(planned.id) / COST).read_text(encoding="utf-8"))
     assert "DataError" in cost["failure"] or "ConfigError" in cost["failure"]
 
 
@@ -169,12 +173,11 @@ def test_what_is_drawn_hangs_on_seed_and_number_alone(small: Small, setup_of: Se
     short, long = setup_of(small()), setup_of(small("blind.cases=5"))
     for setup in (short, long):
         assert plan(setup.blind)[:2] == plan(short.blind)
-    one, records = drawn(short, plan(short.blind)[0])
-    same, others = drawn(long, plan(long.blind)[0])
-    assert one == same
-    assert all(np.array_equal(a.force, b.force) for a, b in zip(records, others, strict=True))
-    fresh, _ = drawn(setup_of(small("blind.seed=78")), plan(short.blind)[0])
-    assert fresh.damper != one.damper
+    one, same = (draw_case(setup, plan(setup.blind)[0]) for setup in (short, long))
+    assert one.truth == same.truth
+    assert all(np.array_equal(a["force_N"], b["force_N"]) for a, b in zip(one.rig_files, same.rig_files, strict=True))
+    other_seed = draw_case(setup_of(small("blind.seed=78")), plan(short.blind)[0])
+    assert other_seed.truth.damper != one.truth.damper
 
 
 def test_an_effect_has_the_size_that_was_drawn(
@@ -182,7 +185,7 @@ def test_an_effect_has_the_size_that_was_drawn(
 ) -> None:
     setup = setup_of(small(f"blind.seed={seeds(1)[0]}", "blind.kinds.none=0", "blind.cases=12"))
     for planned in plan(setup.blind)[1:12:5]:
-        truth, _ = drawn(setup, planned)
+        truth = draw_case(setup, planned).truth
         assert truth.sizes[planned.hidden[0]] == pytest.approx(0.05, rel=0.02)
 
 
@@ -289,7 +292,7 @@ def test_a_diagnosis_that_kills_its_process_every_time_is_a_failed_case(
     (case,) = benchmark.run(jobs=1)
     assert case.failure == "the process that did it was lost 3 times: it was killed"
     assert case.verdict is None
-    assert benchmark.finished(benchmark.plan()) == {case.id: case}
+    assert benchmark.finished(plan(benchmark.setup.blind)) == {case.id: case}
 
 
 def test_a_case_that_cannot_be_drawn_has_no_score_and_is_told(
@@ -346,7 +349,7 @@ def test_the_gap_cut_is_one_when_the_truth_is_found_and_nothing_when_nothing_cha
     w = 2.0 * np.pi
     motion = Motion(t, 0.02 * np.sin(w * t), 0.02 * w * np.cos(w * t), -0.02 * w**2 * np.sin(w * t))
     force = respond(true, motion)
-    clean = {"r01": Clean(motion, force, 1.02 * force - 5.0)}
+    clean = {"r01": NoiseFreeRecord(motion, force, 1.02 * force - 5.0)}
     stronger = Damper(base=(row.model_copy(update={"T0_N": 510.0, "C_Ns_per_m": 3060.0, "k_N_per_m": 3.06e5}),))
 
     def said(damper: Damper) -> Diagnosed:
@@ -365,3 +368,63 @@ def test_the_gap_cut_is_one_when_the_truth_is_found_and_nothing_when_nothing_cha
     # A force that is recorded 2 % too large is that of a damper whose T0, C and k are.
     most = gap_cut_of_truth(said(plain), clean)
     assert most == pytest.approx(cut(stronger.with_effect("asymmetry", {"alpha": 0.1})), abs=1e-3)
+
+
+# --- The ledger ---
+
+
+def scored_run(seed: int = 5, generator: str = "own", made_from: str = "a", cases: int = 60) -> ScoredSeed:
+    return ScoredSeed(seed=seed, generator=generator, made_from=made_from, cases=cases, date="2026-11-22")
+
+
+def test_a_seed_of_other_code_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
+    ledger = tmp_path / "ledger.csv"
+    enter(ledger, scored_run())
+    before = ledger.read_bytes()
+    with pytest.raises(ConfigError, match="seed 5 was scored with another config or other code on 2026-11-22"):
+        enter(ledger, scored_run(made_from="b"))
+    assert ledger.read_bytes() == before
+
+
+def test_the_same_run_goes_on_and_one_of_more_cases_is_entered(tmp_path: Path) -> None:
+    ledger = tmp_path / "ledger.csv"
+    for one in (
+        scored_run(),
+        scored_run(cases=20),
+        scored_run(),
+        scored_run(cases=200),
+        scored_run(seed=6),
+        scored_run(generator="independent", made_from="b"),
+    ):
+        enter(ledger, one)
+    assert [(one.seed, one.generator, one.cases) for one in read_ledger(ledger)] == [
+        (5, "own", 60),
+        (5, "own", 200),
+        (6, "own", 60),
+        (5, "independent", 60),
+    ]
+
+
+def test_a_ledger_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    ledger = tmp_path / "ledger.csv"
+    ledger.write_text("seed,what\n1,2\n", encoding="utf-8")
+    with pytest.raises(DataError, match=r"ledger\.csv"):
+        enter(ledger, scored_run())
+
+
+def test_the_command_refuses_a_seed_that_the_ledger_holds_for_other_code(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = tmp_path / "blind.yaml"
+    text = (ROOT / "configs" / "blind.yaml").read_text(encoding="utf-8")
+    config.write_text(text, encoding="utf-8")
+    enter(tmp_path / "blind-ledger.csv", scored_run(seed=777))
+    given = ["blind", str(config), "--runs", str(tmp_path / "runs"), "--set", "blind.seed=777"]
+    assert status(given) == ConfigError.exit_code
+    assert "seed 777 was scored with another config or other code" in capsys.readouterr().err
+    assert not list(tmp_path.rglob("cases"))
+
+
+def test_the_committed_ledger_can_be_read_ledger() -> None:
+    assert all(one.cases > 0 for one in read_ledger(ROOT / "configs" / "blind-ledger.csv"))
+    assert read_ledger(ROOT / "configs" / "blind-ledger.csv")
