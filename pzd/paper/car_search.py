@@ -4,176 +4,36 @@ A plausible car has a wheelbase of 2.2 to 3.6 m, its centre of gravity 30 to 70 
 J_y / (m a1 a2) of 0.7 to 1.3 and K between the axles. The two peaks with constant c of Figure 19 leave a
 surface of such cars, over which the two controlled peaks vary widely. Nor does equation (12) say
 which of many minimisers is taken, so each of the three tie-breaks has its own closest car.
+
+The rides are those of `pzd.simulate`, some 0.1 s a car and tie-break. The peaks in cars.csv were found with fixed steps
+of 1 ms. The rides agree with them to 3e-4 in the median and 1 % at most: where the control jumps from one end of its
+range to the other, a peak is not defined more closely.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import cache
 from importlib.resources import as_file, files
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from pzd.compiled import compiled
+from pzd.artefacts import Diagnosed, Table
+from pzd.artefacts.table import ForceRow, TableNotes
+from pzd.damper.model import BaseRow, Damper
 from pzd.paper.published import published
 from pzd.quantities import Control
 from pzd.record import Array
 from pzd.schema.csvfile import read_rows
 from pzd.schema.model import Frozen
-from pzd.simulate.config import KM_PER_H
-from pzd.simulate.control.demand import (
-    LARGEST,
-    TIE_BREAKS,
-    coefficient_bounds,
-    farther_end,
-    least_acceleration_forces,
-    spring_acceleration,
-)
+from pzd.simulate.config import KM_PER_H, CarBlock, SimulateConfig
 from pzd.simulate.policies import TieBreak
 from pzd.simulate.ride.energy import harmonic_response
-from pzd.simulate.ride.equations import body_acceleration
-from pzd.simulate.ride.model import (
-    DEFLECTION,
-    FORCE,
-    HIGH,
-    LOW,
-    RATE,
-    SPRINGS,
-    RoadCoefficients,
-    Vehicle,
-    road_coefficients,
-    vehicle,
-    workspace,
-)
-from pzd.simulate.road.profile import Profile
+from pzd.simulate.roads.sine import Sine
 from pzd.simulate.vehicle.car import HalfCar
-from pzd.simulate.vehicle.suspension import suspension
-
-# ----------------------------------------------------------------------------------------------------
-# The paper's controlled ride on a sine, settled, for thousands of cars: ideal forces, fixed step, no records.
-#
-# Car, road, bounds and tie-break are those of `pzd.simulate`; only the loop is one of its own. The rides of
-# `pzd.simulate` balance energies, cut steps and write histories, which takes six times as long (0.075 against 0.012 s a
-# car and tie-break): the survey of 690 rows with eight neighbours each would take half an hour instead of minutes.
-# Over every sixtieth row of cars.csv the peaks agree to 1e-4 in the median and 1 % at most (fixed steps or a tolerance
-# of 1e-9), which is also how far those of `pzd.simulate` move between these two: where the control jumps from one end of
-# its range to the other, a peak is not defined more closely. tests/paper/test_car_search.py holds both against each
-# other.
-
-
-STEP, SETTLE, DURATION = 0.001, 8.0, 16.0
-"""Step of integration, time before the peak is taken, and end of the ride [s]."""
-_BODY = 4
-"""States: z, phi and their rates."""
-
-
-def settled_peak(
-    car: HalfCar,
-    tie_break: TieBreak,
-    frequency: float,
-    amplitude: float,
-    vehicle_speed: float,
-    bounds: tuple[float, float],
-    step: float = STEP,
-) -> float:
-    """Largest |a_K| of the settled ride under the paper's control on a sine.
-
-    Equation: T_K in Arg min |a_0 + D^T T|, T_i in [c_min V_i, c_max V_i]     Source: Makowski and Knap 2021, (10)-(12)
-
-    Parameters
-    ----------
-    car : the half-car
-    tie_break : which of many minimisers
-    frequency : that the car feels [Hz]
-    amplitude : of the road [m]
-    vehicle_speed : [m/s]
-    bounds : c_min, c_max [N s/m]
-    step : of integration [s]
-
-    Returns
-    -------
-    peak between `SETTLE` and `DURATION` [m/s2]
-    """
-    road = Profile(amplitude=amplitude, wavenumber=2.0 * math.pi * frequency / vehicle_speed)
-    return float(
-        _peak(
-            vehicle(car, vehicle_speed),
-            road_coefficients(road, car.wheelbase),
-            bounds,
-            TIE_BREAKS[tie_break],
-            step,
-            round(DURATION / step),
-            round(SETTLE / step),
-            workspace(),
-            np.zeros((6, _BODY)),
-        )
-    )
-
-
-@compiled
-def _peak(
-    car: Vehicle,
-    road: RoadCoefficients,
-    bounds: tuple[float, float],
-    tie: int,
-    step: float,
-    steps: int,
-    settle: int,
-    workspace: Array,
-    scratch: Array,
-) -> float:
-    """Largest |a_K| at the steps from `settle` on; scratch (6, 4) holds the state, a trial state and four rates."""
-    x, trial, rates = scratch[0], scratch[1], scratch[2:]
-    peak = 0.0
-    for n in range(steps + 1):
-        time = n * step
-        end = _rates(time, x, car, road, bounds, tie, -1, workspace, rates[0])
-        if n >= settle:
-            a = 0.0
-            for i in range(2):
-                a += car.comfort[i] * (workspace[SPRINGS, i] + workspace[FORCE, i])
-            peak = max(peak, abs(a))
-        for stage in range(1, 4):
-            part = step if stage == 3 else 0.5 * step
-            for i in range(_BODY):
-                trial[i] = x[i] + part * rates[stage - 1, i]
-            _rates(time + part, trial, car, road, bounds, tie, end, workspace, rates[stage])
-        for i in range(_BODY):
-            x[i] += step / 6.0 * (rates[0, i] + 2.0 * rates[1, i] + 2.0 * rates[2, i] + rates[3, i])
-    return peak
-
-
-@compiled
-def _rates(
-    time: float,
-    x: Array,
-    car: Vehicle,
-    road: RoadCoefficients,
-    bounds: tuple[float, float],
-    tie: int,
-    end: int,
-    workspace: Array,
-    rates: Array,
-) -> int:
-    """Fill the derivative of the body's state; the end of the segment that `largest` takes is chosen where it is -1."""
-    suspension(time, x, car, road, workspace)
-    for i in range(2):
-        workspace[LOW, i], workspace[HIGH, i] = coefficient_bounds(workspace[RATE, i], bounds[0], bounds[1])
-    a0 = spring_acceleration(car, workspace[DEFLECTION])
-    if tie == LARGEST and end < 0:
-        end = farther_end(a0, car.comfort, workspace[LOW], workspace[HIGH])
-    least_acceleration_forces(a0, car.comfort, workspace[LOW], workspace[HIGH], tie, end, workspace[FORCE])
-    rates[0], rates[1] = x[2], x[3]
-    rates[2], rates[3] = body_acceleration(
-        car, workspace[SPRINGS, 0] + workspace[FORCE, 0], workspace[SPRINGS, 1] + workspace[FORCE, 1]
-    )
-    return end
-
-
-# ----------------------------------------------------------------------------------------------------
-
 
 _PRINTED = published()
 FREQUENCIES = (2.25, 4.5)
@@ -199,7 +59,7 @@ Found = Literal["survey", "refined"]
 
 
 class CarRow(Frozen):
-    """One car and one tie-break; a and b are 2.25 and 4.5 Hz, low and high the spread when a parameter moves by 1 %."""
+    """One car under one tie-break; a and b are 2.25 and 4.5 Hz, low and high the ends when a parameter moves by 1 %."""
 
     a1_m: float
     a2_m: float
@@ -207,7 +67,7 @@ class CarRow(Frozen):
     x_K_m: float
     tie_break: TieBreak
     found: Found
-    """Whether it stands on the grid of the survey or was refined from there."""
+    """Whether it is of the grid of the survey or was refined from there."""
     constant_a_m_per_s2: float
     constant_b_m_per_s2: float
     controlled_a_m_per_s2: float
@@ -233,18 +93,28 @@ class CarRow(Frozen):
         return self.controlled_a_m_per_s2, self.controlled_b_m_per_s2
 
     @property
-    def miss(self) -> float:
-        """How far the worst of all four peaks is from the paper's, as a share of it."""
-        return miss(self.constant, self.controlled)
+    def controlled_low(self) -> Pair:
+        """Least of them when a parameter moves by 1 % [m/s2]."""
+        return self.controlled_a_low_m_per_s2, self.controlled_b_low_m_per_s2
+
+    @property
+    def controlled_high(self) -> Pair:
+        """Largest of them when a parameter moves by 1 % [m/s2]."""
+        return self.controlled_a_high_m_per_s2, self.controlled_b_high_m_per_s2
+
+    @property
+    def largest_deviation(self) -> float:
+        """Deviation of the worst of all four peaks from the paper's, as a share of it."""
+        return largest_deviation(self.constant, self.controlled)
 
 
 def half_car(a1: float, a2: float, inertia: float, comfort_point: float) -> HalfCar:
-    """The paper's body on its springs, with what the paper leaves out: a1, a2 [m], J_y [kg m2], x_K [m]."""
+    """Return the paper's body on its springs, with what the paper leaves out: a1, a2 [m], J_y [kg m2], x_K [m]."""
     return HalfCar("plausible", MASS, inertia, (a1, a2), (STIFFNESS, STIFFNESS), comfort_point)
 
 
 def plausible(car: HalfCar) -> bool:
-    """Whether proportions are those of a car and K lies between its axles."""
+    """Return whether the proportions are those of a car and K lies between its axles."""
     a1, a2 = car.distances
     shares = (a1 / car.wheelbase, car.pitch_inertia / (car.mass * a1 * a2), car.wheelbase)
     ranges = (SHARES, INERTIAS, WHEELBASES)
@@ -256,33 +126,73 @@ def plausible(car: HalfCar) -> bool:
 
 
 def constant_peaks(car: HalfCar, damping: float = DAMPING) -> Pair:
-    """Largest |a_K| with constant damping at 2.25 and 4.5 Hz, exactly [m/s2]."""
+    """Compute the largest |a_K| with constant damping at 2.25 and 4.5 Hz, exactly [m/s2].
+
+    >>> car = half_car(1.962, 1.068, 2216.0, -0.856)
+    >>> [round(float(peak), 3) for peak in constant_peaks(car)]
+    [2.185, 3.626]
+    """
     a, b = (abs(harmonic_response(car, damping, f, AMPLITUDE, SPEED)[1]) for f in FREQUENCIES)
     return a, b
 
 
-def controlled_peaks(car: HalfCar, tie_break: TieBreak, step: float = STEP) -> Pair:
-    """Largest |a_K| under the paper's control at 2.25 and 4.5 Hz, forces ideal within `BOUNDS` [m/s2]."""
-    a, b = (settled_peak(car, tie_break, f, AMPLITUDE, SPEED, BOUNDS, step) for f in FREQUENCIES)
+def controlled_peaks(car: HalfCar, tie_break: TieBreak) -> Pair:
+    """Ride under the paper's control at 2.25 and 4.5 Hz, forces ideal within `BOUNDS`; the largest |a_K| [m/s2].
+
+    Equation: T_K in Arg min |a_0 + D^T T|, T_i in [c_min V_i, c_max V_i]     Source: Makowski and Knap 2021, (10)-(12)
+    """
+    from pzd.simulate.stage import simulate
+
+    block = CarBlock(
+        name=car.name,
+        mass_kg=car.mass,
+        spring_stiffness_N_per_m=car.stiffnesses,
+        a1_m=car.distances[0],
+        a2_m=car.distances[1],
+        pitch_inertia_kgm2=car.pitch_inertia,
+        x_K_m=car.comfort_point,
+    )
+    config = SimulateConfig(
+        car=block,
+        vehicle_speed_km_per_h=_PRINTED["IN-V"].number,
+        roads=tuple(Sine(frequency_Hz=frequency, amplitude_m=AMPLITUDE) for frequency in FREQUENCIES),
+        policies=("comfort",),
+        fidelities=("ideal",),
+        c_min_Ns_per_m=BOUNDS[0],
+        c_max_Ns_per_m=BOUNDS[1],
+        tie_break=tie_break,
+        histories="none",
+    )
+    a, b = (row.peak_abs_aK_m_per_s2 for row in simulate(config, *_any_damper(), 0, Path()).summary)
     return a, b
 
 
-def miss(constant: Pair, controlled: Pair) -> float:
-    """How far the worst of the four peaks of Figure 19 is missed, as a share of the paper's."""
+@cache
+def _any_damper() -> tuple[Diagnosed, Table]:
+    """Return a damper and its table, which the stage asks for; ideal forces within bounds depend on neither."""
+    base = tuple(BaseRow(voltage_V=u, T0_N=0.0, C_Ns_per_m=DAMPING, k_N_per_m=1e6) for u in (0.0, 1.0))
+    rows = tuple(
+        ForceRow(temperature_degC=None, voltage_V=u, velocity_m_per_s=v, force_N=DAMPING * v, inside=1)
+        for u in (0.0, 1.0)
+        for v in (-10.0, -0.0, 0.0, 10.0)
+    )
+    notes = TableNotes(outside="model", reached_m_per_s=10.0, lost=(), not_monotone=())
+    return Diagnosed.undiagnosed(Damper(base=base)), Table(rows, (), notes)
+
+
+def largest_deviation(constant: Pair, controlled: Pair) -> float:
+    """Return the largest deviation of the four peaks from those of Figure 19, as a share of the paper's."""
     wanted = (*CONSTANT_PEAKS, *CONTROLLED_PEAKS)
     return max(abs(found / target - 1.0) for found, target in zip((*constant, *controlled), wanted, strict=True))
 
 
 def meets_constant(peaks: Pair, tolerance: float = TOLERANCE) -> bool:
-    """Whether both peaks with constant c are the paper's within a share."""
+    """Return whether both peaks with constant c are the paper's within a share."""
     return all(abs(found / target - 1.0) <= tolerance for found, target in zip(peaks, CONSTANT_PEAKS, strict=True))
 
 
 def candidates() -> Iterator[HalfCar]:
-    """The plausible cars of a grid that meet both peaks with constant c within `TOLERANCE`.
-
-    a_K is affine in x_K, so two places of K give it at all of them.
-    """
+    """Yield the plausible cars of a grid that meet both peaks with constant c within `TOLERANCE`."""
     for wheelbase in np.arange(2.2, 3.61, 0.1):
         for share in np.arange(0.3, 0.71, 0.05):
             for ratio in np.arange(0.7, 1.31, 0.1):
@@ -293,11 +203,12 @@ def candidates() -> Iterator[HalfCar]:
 
 
 def _meeting(car: HalfCar, places: Array) -> Iterator[HalfCar]:
+    """Yield a car with K at those places where it does; a_K is affine in x_K, so that two places give all of them."""
     at_centre, at_metre = (
         [harmonic_response(replace(car, comfort_point=x), DAMPING, f, AMPLITUDE, SPEED)[1] for f in FREQUENCIES]
         for x in (0.0, 1.0)
     )
-    peaks = [np.abs(zero + places * (one - zero)) for zero, one in zip(at_centre, at_metre, strict=True)]
+    peaks = [np.abs(centre + places * (metre - centre)) for centre, metre in zip(at_centre, at_metre, strict=True)]
     for x, a, b in zip(places, *peaks, strict=True):
         found = replace(car, comfort_point=float(x))
         if meets_constant((float(a), float(b))) and plausible(found):
@@ -305,7 +216,7 @@ def _meeting(car: HalfCar, places: Array) -> Iterator[HalfCar]:
 
 
 def neighbours(car: HalfCar, share: float = 0.01) -> Iterator[HalfCar]:
-    """The car with each of a1, a2, J_y and x_K moved by a share, down and up."""
+    """Yield the car with each of a1, a2, J_y and x_K moved by a share, down and up."""
     a1, a2 = car.distances
     for factor in (1.0 - share, 1.0 + share):
         yield replace(car, distances=(a1 * factor, a2))
@@ -315,10 +226,9 @@ def neighbours(car: HalfCar, share: float = 0.01) -> Iterator[HalfCar]:
 
 
 def row_of(car: HalfCar, tie_break: TieBreak, found: Found = "survey") -> CarRow:
-    """The peaks of one car under one tie-break, and their spread when each parameter moves by 1 %."""
+    """Ride one car under one tie-break, as it is and with each parameter moved by 1 %."""
     constant, controlled = constant_peaks(car), controlled_peaks(car, tie_break)
     spread = np.array([controlled, *(controlled_peaks(other, tie_break) for other in neighbours(car))])
-    low, high = spread.min(axis=0), spread.max(axis=0)
     return CarRow(
         a1_m=car.distances[0],
         a2_m=car.distances[1],
@@ -326,25 +236,23 @@ def row_of(car: HalfCar, tie_break: TieBreak, found: Found = "survey") -> CarRow
         x_K_m=car.comfort_point,
         tie_break=tie_break,
         found=found,
-        constant_a_m_per_s2=_rounded(constant[0]),
-        constant_b_m_per_s2=_rounded(constant[1]),
-        controlled_a_m_per_s2=_rounded(controlled[0]),
-        controlled_a_low_m_per_s2=_rounded(low[0]),
-        controlled_a_high_m_per_s2=_rounded(high[0]),
-        controlled_b_m_per_s2=_rounded(controlled[1]),
-        controlled_b_low_m_per_s2=_rounded(low[1]),
-        controlled_b_high_m_per_s2=_rounded(high[1]),
+        **{
+            f"{name}_m_per_s2": round(float(peak), 4)
+            for pair, values in (
+                ("constant_{}", constant),
+                ("controlled_{}", controlled),
+                ("controlled_{}_low", spread.min(axis=0)),
+                ("controlled_{}_high", spread.max(axis=0)),
+            )
+            for name, peak in zip((pair.format("a"), pair.format("b")), values, strict=True)
+        },
     )
 
 
-def _rounded(peak: float) -> float:
-    return float(round(peak, 4))
-
-
 def refined(start: HalfCar, tie_break: TieBreak) -> HalfCar:
-    """The plausible car near another whose four peaks are closest to the paper's: seconds.
+    """Search for the plausible car near another whose four peaks are closest to the paper's: half a minute.
 
-    Source: Nelder and Mead 1965, on the largest of the four misses
+    Source: Nelder and Mead 1965, on the largest of the four deviations
 
     Parameters
     ----------
@@ -365,7 +273,7 @@ def refined(start: HalfCar, tie_break: TieBreak) -> HalfCar:
 
     def cost(x: Array) -> float:
         car = car_at(x)
-        return miss(constant_peaks(car), controlled_peaks(car, tie_break)) if plausible(car) else _IMPLAUSIBLE
+        return largest_deviation(constant_peaks(car), controlled_peaks(car, tie_break)) if plausible(car) else _IMPLAUSIBLE
 
     first = np.array([*start.distances, start.pitch_inertia, start.comfort_point]) / scale
     simplex = first * (1.0 + 0.03 * np.vstack([np.zeros(4), np.eye(4)]))
@@ -379,11 +287,11 @@ def refined(start: HalfCar, tie_break: TieBreak) -> HalfCar:
 
 
 def stored() -> tuple[CarRow, ...]:
-    """The survey as it was computed last; `tests/studies/car_search.py` computes it anew."""
+    """Read the survey in cars.csv; `tests/studies/car_search.py` computes it anew."""
     with as_file(files("pzd.paper").joinpath("cars.csv")) as path:
         return read_rows(path, CarRow, Control())
 
 
 def closest(rows: Iterable[CarRow], tie_break: TieBreak | None = None) -> CarRow:
-    """The row whose worst peak is closest to the paper's, of one tie-break or of all."""
-    return min((row for row in rows if tie_break in (None, row.tie_break)), key=lambda row: row.miss)
+    """Return the row whose worst peak is closest to the paper's, of one tie-break or of all."""
+    return min((row for row in rows if tie_break in (None, row.tie_break)), key=lambda row: row.deviation)

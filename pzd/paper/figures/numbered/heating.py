@@ -1,4 +1,4 @@
-"""Figure 7: thermal pictures; in their place the heating by a lumped balance."""
+"""Figure 7: thermal pictures in the paper; in their place the heating of the damper by a lumped heat balance."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _STALLED = 1e-5
 
 
 def heating(power_cold: float, power_warm: float, start: float, end: float) -> tuple[list[float], list[float]]:
-    """Temperature over time of one lump that the damper's own power warms.
+    """Compute the temperature over time of one lump that the damper's own power warms.
 
     Equation: m c dT/dt = P(T) - h A (T - T_ambient), P linear between 23 and 43 degC      Source: first law
 
@@ -56,7 +56,7 @@ def heating(power_cold: float, power_warm: float, start: float, end: float) -> t
 
 
 def draw(data: FigureData) -> Iterator[Drawing]:
-    """Heating from 25 to 43 degC, at 0 V as the stand dissipates."""
+    """Draw the heating from 25 to 43 degC, at 0 V as the stand dissipates."""
     rows = published()
     cold, warm = (
         measure.work_per_cycle_J * (measure.frequency_Hz or 0.0)
@@ -85,11 +85,13 @@ def draw(data: FigureData) -> Iterator[Drawing]:
     yield Drawing("heating", figure, "Temperature of the damper over time by a lumped heat balance.", caption)
 
 
-FIGURE = PaperFigure(
-    7,
-    "Temperature of the damper at the start and after a longer run",
-    "computed",
-    "The paper shows thermal pictures, which cannot be made. In their place: heating by a lumped balance of the power "
-    "that the stand dissipates.",
-    draw,
+FIGURES = (
+    PaperFigure(
+        7,
+        "Temperature of the damper at the start and after a longer run",
+        "computed",
+        "The paper shows thermal pictures, which cannot be made. In their place: heating by a lumped balance of the "
+        "power that the stand dissipates.",
+        draw,
+    ),
 )

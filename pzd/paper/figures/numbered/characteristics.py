@@ -1,4 +1,4 @@
-"""Figure 18: the characteristics of the damper, and the range that the control may use."""
+"""Figure 18: the characteristics of the damper, and the range of force that the control may use."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _CHOSEN_SHARE = 0.6
 
 
 def draw(data: FigureData) -> Iterator[Drawing]:
-    """Force over velocity for each voltage of the table, shaded between both limits, and one V_i that leads to T_i."""
+    """Draw force over velocity by voltage, shaded between both limits, and one V_i that leads to T_i."""
     temperature = data.simulate.temperature_degC
     known = [row.temperature_degC for row in data.rides_of_setting.table.force]
     if temperature not in known:
@@ -55,10 +55,12 @@ def draw(data: FigureData) -> Iterator[Drawing]:
     yield Drawing("characteristics", figure, "Force over velocity by voltage; the control range is shaded.", caption)
 
 
-FIGURE = PaperFigure(
-    18,
-    "Characteristics of the damper and the control range between its limits",
-    "stand",
-    "The table of force over voltage and velocity computed from the plain Bingham damper that was identified.",
-    draw,
+FIGURES = (
+    PaperFigure(
+        18,
+        "Characteristics of the damper and the control range between its limits",
+        "stand",
+        "The table of force over voltage and velocity computed from the plain Bingham damper that was identified.",
+        draw,
+    ),
 )
