@@ -103,7 +103,7 @@ class CarRow(Frozen):
         return self.controlled_a_high_m_per_s2, self.controlled_b_high_m_per_s2
 
     @property
-    def largest_deviation(self) -> float:
+    def deviation(self) -> float:
         """Deviation of the worst of all four peaks from the paper's, as a share of it."""
         return largest_deviation(self.constant, self.controlled)
 
@@ -170,10 +170,10 @@ def controlled_peaks(car: HalfCar, tie_break: TieBreak) -> Pair:
 @cache
 def _any_damper() -> tuple[Diagnosed, Table]:
     """Return a damper and its table, which the stage asks for; ideal forces within bounds depend on neither."""
-    base = tuple(BaseRow(voltage_V=u, T0_N=0.0, C_Ns_per_m=DAMPING, k_N_per_m=1e6) for u in (0.0, 1.0))
+    base = tuple(BaseRow(voltage_V=u, T0_N=0.0, C_Ns_per_m=c, k_N_per_m=1e6) for u, c in enumerate(BOUNDS))
     rows = tuple(
-        ForceRow(temperature_degC=None, voltage_V=u, velocity_m_per_s=v, force_N=DAMPING * v, inside=1)
-        for u in (0.0, 1.0)
+        ForceRow(temperature_degC=None, voltage_V=u, velocity_m_per_s=v, force_N=c * v, inside=1)
+        for u, c in enumerate(BOUNDS)
         for v in (-10.0, -0.0, 0.0, 10.0)
     )
     notes = TableNotes(outside="model", reached_m_per_s=10.0, lost=(), not_monotone=())
@@ -273,7 +273,9 @@ def refined(start: HalfCar, tie_break: TieBreak) -> HalfCar:
 
     def cost(x: Array) -> float:
         car = car_at(x)
-        return largest_deviation(constant_peaks(car), controlled_peaks(car, tie_break)) if plausible(car) else _IMPLAUSIBLE
+        if not plausible(car):
+            return _IMPLAUSIBLE
+        return largest_deviation(constant_peaks(car), controlled_peaks(car, tie_break))
 
     first = np.array([*start.distances, start.pitch_inertia, start.comfort_point]) / scale
     simplex = first * (1.0 + 0.03 * np.vstack([np.zeros(4), np.eye(4)]))

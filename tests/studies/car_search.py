@@ -14,7 +14,15 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from pzd.paper.car_search import CarRow, candidates, constant_peaks, controlled_peaks, largest_deviation, refined, row_of
+from pzd.paper.car_search import (
+    CarRow,
+    candidates,
+    constant_peaks,
+    controlled_peaks,
+    largest_deviation,
+    refined,
+    row_of,
+)
 from pzd.quantities import Control
 from pzd.schema.csvfile import write_rows
 from pzd.simulate.control.demand import TIE_BREAKS
