@@ -203,7 +203,7 @@ def rate_rows(cases: Iterable[Scored]) -> list[RateRow]:
             if (c.campaign, c.kind, low_noise(c)) == (campaign, kind, low) and start <= c.visible_gap < end
         ]
         if found:
-            rows.append(_row((campaign, kind, "to 1 %" if low else "above 1 %", _bin(start, end)), found))
+            rows.append(_row(campaign, kind, "to 1 %" if low else "above 1 %", _bin(start, end), found))
     return rows
 
 
@@ -211,29 +211,27 @@ def _bin(start: float, end: float) -> str:
     return f"{100 * start:g}-{100 * end:g}" if math.isfinite(end) else f"over {100 * start:g}"
 
 
-def _row(labels: tuple[str, str, str, str], cases: list[Scored]) -> RateRow:
-    def share(hit: Predicate) -> float:
-        return round(Rate.of(cases, hit).share or 0.0, 4)
+_COUNTED: dict[str, Predicate] = {
+    "right": right_answer,
+    "ambiguous_with_truth": ambiguous_with_truth,
+    "wrong_name": wrong_answer,
+    "truth_and_more": truth_and_more,
+    "truth_among": truth_among,
+    "none": lambda case: case.verdict == "none",
+    "unexplained": unexplained,
+    "failed": failed,
+}
+"""Columns of `RateRow` that are rates."""
 
-    exact, wrong = Rate.of(cases, right_answer), Rate.of(cases, wrong_answer)
+
+def _row(campaign: str, kind: str, force_noise: str, gap: str, cases: list[Scored]) -> RateRow:
+    rates = {name: Rate.of(cases, hit) for name, hit in _COUNTED.items()}
+    numbers = {name: rate.share or 0.0 for name, rate in rates.items()}
+    for name in ("right", "wrong_name"):
+        numbers[f"{name}_low95"], numbers[f"{name}_high95"] = rates[name].interval
+    rounded = {name: round(number, 4) for name, number in numbers.items()}
     return RateRow(
-        campaign=labels[0],
-        kind=labels[1],
-        force_noise=labels[2],
-        visible_gap_percent=labels[3],
-        cases=len(cases),
-        right=share(right_answer),
-        right_low95=round(exact.interval[0], 4),
-        right_high95=round(exact.interval[1], 4),
-        ambiguous_with_truth=share(ambiguous_with_truth),
-        wrong_name=share(wrong_answer),
-        wrong_name_low95=round(wrong.interval[0], 4),
-        wrong_name_high95=round(wrong.interval[1], 4),
-        truth_and_more=share(truth_and_more),
-        truth_among=share(truth_among),
-        none=share(lambda c: c.verdict == "none"),
-        unexplained=share(unexplained),
-        failed=share(failed),
+        campaign=campaign, kind=kind, force_noise=force_noise, visible_gap_percent=gap, cases=len(cases), **rounded
     )
 
 

@@ -6,7 +6,7 @@ surface of such cars, over which the two controlled peaks vary widely. Nor does 
 which of many minimisers is taken, so each of the three tie-breaks has its own closest car.
 
 The rides are those of `pzd.simulate`, some 0.1 s a car and tie-break. The peaks in cars.csv were found with fixed steps
-of 1 ms. The rides agree with them to 3e-4 in the median and 1 % at most: where the control jumps from one end of its
+of 1 ms. The rides agree with them to 1e-4 in the median and 3 % at most: where the control jumps from one end of its
 range to the other, a peak is not defined more closely.
 """
 

@@ -102,7 +102,7 @@ def test_the_survey_computes_again(rows: tuple[CarRow, ...], rng: np.random.Gene
     """Where the control jumps from one end of its range to the other, a peak is not defined more closely."""
     for row in (rows[i] for i in rng.choice(len(rows), 4, replace=False)):
         assert constant_peaks(row.car) == pytest.approx(row.constant, abs=1e-4)
-        assert controlled_peaks(row.car, row.tie_break) == pytest.approx(row.controlled, rel=0.03)
+        assert controlled_peaks(row.car, row.tie_break) == pytest.approx(row.controlled, rel=0.05, abs=2e-3)
 
 
 @pytest.mark.ci

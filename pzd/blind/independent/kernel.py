@@ -15,38 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.random import Generator
 
-from pzd.blind.independent.laws import (
-    dead_zone,
-    direction_factor,
-    end_stop_force,
-    gas_spring_force,
-    inertia_force,
-    orifice_force,
-    preload_force,
-    relief_flow,
-    relief_opening,
-    stribeck_force,
-    viscous_force,
-    yield_force,
-)
-from pzd.blind.independent.outside import (
-    aeration_factor,
-    blow_off_flow,
-    branch_force,
-    bushing_force,
-    bypass_factor,
-    cubic_force,
-    duct_force,
-    gas_charge_force,
-    groove_factor,
-    late_extension,
-    mount_slips,
-    relaxation_rate,
-    slip_rate,
-    spool_rate,
-    structure_factor,
-    structure_rate,
-)
+from pzd.blind.independent import laws, outside
 from pzd.compiled import compiled
 from pzd.record import Array
 
@@ -159,8 +128,8 @@ def integrated(
 @compiled
 def _resistance(w: float, T0: float, C: float, p: Parameters) -> float:
     """Return the force [N] that the closed valve takes at a flow speed > 0 [m/s]."""
-    force = yield_force(w, T0, p.w_s) + viscous_force(w, C, p.n) + orifice_force(w, p.q)
-    return force + duct_force(w, p.duct) if p.duct > 0.0 else force
+    force = laws.yield_force(w, T0, p.w_s) + laws.viscous_force(w, C, p.n) + laws.orifice_force(w, p.q)
+    return force + outside.duct_force(w, p.duct) if p.duct > 0.0 else force
 
 
 @compiled
@@ -200,14 +169,14 @@ def _closed_flow(force: float, T0: float, C: float, p: Parameters) -> float:
 @compiled
 def _flow(force: float, T0: float, C: float, p: Parameters) -> float:
     """Return the flow speed [m/s], with its sign, that a force drives through the valves."""
-    factor = direction_factor(force > 0.0, p.alpha)
+    factor = laws.direction_factor(force > 0.0, p.alpha)
     size, friction, damping = abs(force), T0 * factor, C * factor
-    opens = relief_opening(p.F_r, friction)
+    opens = laws.relief_opening(p.F_r, friction)
     if size > opens:
-        w = _closed_flow(opens, friction, damping, p) + relief_flow(size - opens, p.C_r)
+        w = _closed_flow(opens, friction, damping, p) + laws.relief_flow(size - opens, p.C_r)
     elif size > p.first_force > friction:
         w = _closed_flow(p.first_force, friction, damping, p)
-        w += blow_off_flow(size, p.first_force, p.first_slope, p.second_force, p.second_slope)
+        w += outside.blow_off_flow(size, p.first_force, p.first_slope, p.second_force, p.second_slope)
     else:
         w = _closed_flow(size, friction, damping, p)
     return math.copysign(w, force)
@@ -216,15 +185,20 @@ def _flow(force: float, T0: float, C: float, p: Parameters) -> float:
 @compiled
 def _spring_force(deflection: float, k: float, p: Parameters) -> float:
     """Return the force [N] of the oil spring."""
-    return k * (late_extension(deflection, p.gap) if p.gap > 0.0 else dead_zone(deflection, p.delta))
+    return k * (outside.late_extension(deflection, p.gap) if p.gap > 0.0 else laws.dead_zone(deflection, p.delta))
 
 
 @compiled
 def _parallel_force(x: float, v: float, a: float, relaxed: float, p: Parameters) -> float:
     """Return the force [N] beside the oil spring, but for that of the second branch, which has a memory of its own."""
-    force = end_stop_force(x, p.k_e, p.x_e) + gas_spring_force(x, p.k_g) + inertia_force(a, p.m) + preload_force(p.F_0)
-    force += stribeck_force(v, p.F_s, p.v_s) + bushing_force(x, relaxed, p.bushing_stiffness)
-    return force + cubic_force(x, p.cubic) + gas_charge_force(x, p.charge, p.column)
+    force = (
+        laws.end_stop_force(x, p.k_e, p.x_e)
+        + laws.gas_spring_force(x, p.k_g)
+        + laws.inertia_force(a, p.m)
+        + laws.preload_force(p.F_0)
+    )
+    force += laws.stribeck_force(v, p.F_s, p.v_s) + outside.bushing_force(x, relaxed, p.bushing_stiffness)
+    return force + outside.cubic_force(x, p.cubic) + outside.gas_charge_force(x, p.charge, p.column)
 
 
 @compiled
@@ -235,21 +209,21 @@ def _rates(
     force = _spring_force(x - s[_MOUNT] - s[_FLOW], k, p)
     friction, damping = T0, C
     if p.structure > 0.0:
-        friction *= structure_factor(s[_STRUCTURE], p.structure)
+        friction *= outside.structure_factor(s[_STRUCTURE], p.structure)
     if p.bypass > 0.0:
-        damping *= bypass_factor(s[_SPOOL], p.bypass, p.bypass_force)
+        damping *= outside.bypass_factor(s[_SPOOL], p.bypass, p.bypass_force)
     if p.groove > 0.0:
-        damping *= groove_factor(x, p.groove, p.groove_end, p.groove_run_out)
+        damping *= outside.groove_factor(x, p.groove, p.groove_end, p.groove_run_out)
     if p.fade > 0.0:
-        damping *= aeration_factor(t, p.fade, p.fade_time)
+        damping *= outside.aeration_factor(t, p.fade, p.fade_time)
     w = _flow(force, friction, damping, p)
     out[_FLOW] = w
     out[_MOUNT] = (
-        slip_rate(force - p.mount_stiffness * s[_MOUNT], p.mount_stiffness, p.mount_slides) if slipping else 0.0
+        outside.slip_rate(force - p.mount_stiffness * s[_MOUNT], p.mount_stiffness, p.mount_slides) if slipping else 0.0
     )
-    out[_SPOOL] = spool_rate(force, s[_SPOOL], p.bypass_lag)
-    out[_STRUCTURE] = structure_rate(s[_STRUCTURE], w, p.rebuilding, p.breakdown)
-    out[_BUSHING] = relaxation_rate(x, s[_BUSHING], p.bushing_time)
+    out[_SPOOL] = outside.spool_rate(force, s[_SPOOL], p.bypass_lag)
+    out[_STRUCTURE] = outside.structure_rate(s[_STRUCTURE], w, p.rebuilding, p.breakdown)
+    out[_BUSHING] = outside.relaxation_rate(x, s[_BUSHING], p.bushing_time)
 
 
 @compiled
@@ -283,7 +257,7 @@ def _march(
         if j == force.size - 1:
             break
         h, m, e = time[i + 2] - time[i], i + 1, i + 2  # the step, its middle and its end
-        slipping = mount_slips(spring - p.mount_stiffness * s[_MOUNT], slipping, p.mount_holds, p.mount_slides)
+        slipping = outside.mount_slips(spring - p.mount_stiffness * s[_MOUNT], slipping, p.mount_holds, p.mount_slides)
         _rates(s, x[i], time[i], T0[i], C[i], k[i], slipping, p, r1)
         _moved(s, r1, 0.5 * h, moved)
         _rates(moved, x[m], time[m], T0[m], C[m], k[m], slipping, p, r2)
@@ -294,5 +268,5 @@ def _march(
         for n in range(s.size):
             s[n] += h / 6.0 * (r1[n] + 2.0 * r2[n] + 2.0 * r3[n] + r4[n])
         if p.T0_2 > 0.0:
-            branch = branch_force(branch, x[m] - x[i], p.T0_2, p.k_2)
-            branch = branch_force(branch, x[e] - x[m], p.T0_2, p.k_2)
+            branch = outside.branch_force(branch, x[m] - x[i], p.T0_2, p.k_2)
+            branch = outside.branch_force(branch, x[e] - x[m], p.T0_2, p.k_2)

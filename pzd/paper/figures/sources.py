@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -69,38 +69,6 @@ def rides_on(
 # --- Tests, conditions and parameters of the run ---
 
 
-@dataclass(frozen=True)
-class Sine:
-    """A sine of the stand."""
-
-    frequency: float
-    """[Hz]"""
-    amplitude: float
-    """[m]"""
-
-    def __str__(self) -> str:
-        """Return it in words."""
-        return f"{self.frequency:g} Hz, {self.amplitude:g} m"
-
-
-@dataclass(frozen=True)
-class Condition:
-    """Setting, voltage [V] and temperature [degC] of the damper."""
-
-    setting: str
-    voltage: float
-    temperature: float = 22.0
-
-    def __str__(self) -> str:
-        """Return it in words."""
-        return f"{self.setting}, {self.voltage:g} V, {self.temperature:g} °C"
-
-    @property
-    def conditions(self) -> Conditions:
-        """The conditions of a test that it states."""
-        return Conditions(self.setting, self.voltage, self.temperature)
-
-
 @dataclass(frozen=True, eq=False)
 class RigTest:
     """One test of the rig with its measures."""
@@ -158,17 +126,16 @@ class FigureData:
         rides_of_setting = rides_on(base_of(identified.rows, setting), setting, rig, ideal, config.table, run.control)
         return cls(rig, identified, rides_of_setting, config.simulate, config.table, run.control, setting)
 
-    def test(self, condition: Condition, sine: Sine) -> RigTest:
-        """Return the test of a condition with a sine.
+    def test(self, conditions: Conditions) -> RigTest:
+        """Return the test of some conditions, its sine among them.
 
         Raises
         ------
         LookupError : when the rig has none
         """
-        wanted = replace(condition.conditions, frequency_Hz=sine.frequency, amplitude_m=sine.amplitude)
-        found = matching(self.identified.measures, wanted)
+        found = matching(self.identified.measures, conditions)
         if not found:
-            raise LookupError(f"the rig has no test at {condition}, {sine}")
+            raise LookupError(f"the rig has no test at {conditions}")
         return RigTest(next(record for record in self.rig.records if record.name == found[0].record), found[0])
 
     def test_of(self, row: Expected) -> RigTest:
@@ -178,19 +145,18 @@ class FigureData:
         ------
         LookupError : when the rig has none
         """
-        condition = Condition(str(row.setting), row.voltage_V or 0.0, row.temperature_degC or 22.0)
-        return self.test(condition, Sine(row.frequency_Hz or 0.0, row.amplitude_m or 0.0))
+        return self.test(row.conditions)
 
-    def row(self, condition: Condition) -> ParameterRow:
-        """Return the identified parameters of a condition.
+    def row(self, conditions: Conditions) -> ParameterRow:
+        """Return the identified parameters of a condition of the damper.
 
         Raises
         ------
         LookupError : when there are none
         """
-        found = matching(self.identified.rows, condition.conditions)
+        found = matching(self.identified.rows, conditions)
         if not found:
-            raise LookupError(f"the rig has no tests at {condition}")
+            raise LookupError(f"the rig has no tests at {conditions}")
         return found[0]
 
     def ride(self, frequency: float, policy: str, fidelity: str) -> SummaryRow:

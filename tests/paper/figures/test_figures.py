@@ -16,12 +16,13 @@ import numpy as np
 import pytest
 
 from pzd.artefacts import base_of
+from pzd.artefacts.rig import Conditions
 from pzd.config import RunConfig
 from pzd.paper.figures.draw import FigureSet, _entry, drawn
 from pzd.paper.figures.numbered import library
 from pzd.paper.figures.numbered.heating import heating
 from pzd.paper.figures.numbered.modelled_loops import loop, tabulated
-from pzd.paper.figures.sources import Condition, FigureData, Sine, rides_on
+from pzd.paper.figures.sources import FigureData, rides_on
 from pzd.paper.published import published
 
 SMALL, LARGE = "gap 0.15 mm", "gap 0.25 mm"
@@ -227,10 +228,10 @@ def test_a_run_without_the_papers_tests_says_what_it_lacks(data: FigureData) -> 
 
 def test_the_papers_element_gives_the_peaks_that_its_tables_give() -> None:
     for voltage, peak in ((0.0, 2085.0), (100.0, 4232.0), (150.0, 5298.0)):
-        found = loop(tabulated(Condition(SMALL, voltage)), Sine(1.0, 0.022))
+        found = loop(tabulated(Conditions(SMALL, voltage, 22.0)), Conditions(frequency_Hz=1.0, amplitude_m=0.022))
         assert found.peak == pytest.approx(peak, abs=1.0)
     for voltage, peak in ((0.0, 1311.0), (50.0, 1592.0), (100.0, 1936.0), (150.0, 2287.0)):
-        found = loop(tabulated(Condition(LARGE, voltage)), Sine(2.0, 0.030))
+        found = loop(tabulated(Conditions(LARGE, voltage, 22.0)), Conditions(frequency_Hz=2.0, amplitude_m=0.030))
         assert found.peak == pytest.approx(peak, abs=1.0)
 
 

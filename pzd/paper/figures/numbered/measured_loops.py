@@ -38,40 +38,31 @@ def measured(data: FigureData, labels: Mapping[str, str], what: str) -> Iterator
     yield Drawing("measured", both_planes(curves), alt, "Peak of the average cycle, " + "; ".join(captions) + ".")
 
 
-def _figure(number: int, title: str, labels: Mapping[str, str], what: str, remark: str = "") -> PaperFigure:
+def _figure(number: int, title: str, unit: str, values: tuple[int, ...], what: str, remark: str = "") -> PaperFigure:
+    """Return the figure of the tests whose published peaks end with those values, which name the curves."""
+    labels = {f"F{number}-{value}": f"{value} {unit}" for value in values}
     return PaperFigure(number, title, "stand", _RECORDS + remark, partial(measured, labels=labels, what=what))
 
 
 FIGURES = (
-    _figure(
-        4,
-        "Measured force by voltage, 1 Hz, 0.022 m, gap 0.15 mm",
-        {"F4-0": "0 V", "F4-100": "100 V", "F4-150": "150 V"},
-        "0, 100 and 150 V",
-    ),
+    _figure(4, "Measured force by voltage, 1 Hz, 0.022 m, gap 0.15 mm", "V", (0, 100, 150), "0, 100 and 150 V"),
     _figure(
         5,
         "Measured force by voltage, 2 Hz, 0.03 m, gap 0.25 mm",
-        {"F5-0": "0 V", "F5-50": "50 V", "F5-100": "100 V", "F5-150": "150 V"},
+        "V",
+        (0, 50, 100, 150),
         "0, 50, 100 and 150 V",
         remark=" The text prints 227 N at 100 V, read as 2270 N.",
     ),
-    _figure(
-        6,
-        "Measured force at 1 and 2 Hz without voltage, 0.03 m, gap 0.25 mm",
-        {"F6-1": "1 Hz", "F6-2": "2 Hz"},
-        "1 and 2 Hz",
-    ),
+    _figure(6, "Measured force at 1 and 2 Hz without voltage, 0.03 m, gap 0.25 mm", "Hz", (1, 2), "1 and 2 Hz"),
     _figure(
         8,
         "Measured force at 23 and 43 °C without voltage, 2 Hz, 0.03 m, gap 0.25 mm",
-        {"F8-23": "23 °C", "F8-43": "43 °C"},
+        "°C",
+        (23, 43),
         "23 and 43 °C, 0 V",
     ),
     _figure(
-        9,
-        "Measured force at 23 and 43 °C at 150 V, 2 Hz, 0.03 m, gap 0.25 mm",
-        {"F9-23": "23 °C", "F9-43": "43 °C"},
-        "23 and 43 °C, 150 V",
+        9, "Measured force at 23 and 43 °C at 150 V, 2 Hz, 0.03 m, gap 0.25 mm", "°C", (23, 43), "23 and 43 °C, 150 V"
     ),
 )

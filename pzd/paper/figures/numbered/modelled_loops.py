@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from pzd.artefacts import ParameterRow
+from pzd.artefacts.rig import Conditions
 from pzd.damper.model import BaseRow, Damper
 from pzd.paper.figures.canvas import (
     BASELINE,
@@ -24,7 +25,7 @@ from pzd.paper.figures.canvas import (
     panels,
 )
 from pzd.paper.figures.numbered import Drawing, PaperFigure
-from pzd.paper.figures.sources import Condition, FigureData, RigTest, Sine
+from pzd.paper.figures.sources import FigureData, RigTest
 from pzd.paper.published import LARGE_GAP, SMALL_GAP, TABLES, Loop, loop_of, table_damper
 from pzd.record import Array
 from pzd.signals.criterion import criterion
@@ -48,7 +49,7 @@ def identified(row: ParameterRow) -> BaseRow:
     return BaseRow(voltage_V=row.voltage_V, T0_N=row.T0_N, C_Ns_per_m=row.C_Ns_per_m, k_N_per_m=row.k_N_per_m)
 
 
-def tabulated(condition: Condition) -> BaseRow:
+def tabulated(condition: Conditions) -> BaseRow:
     """Return the paper's parameters of a condition.
 
     Raises
@@ -56,9 +57,9 @@ def tabulated(condition: Condition) -> BaseRow:
     LookupError : when no table has it
     """
     for table, (setting, temperature) in TABLES.items():
-        if setting == condition.setting and abs(temperature - condition.temperature) <= 2.0:
+        if setting == condition.setting and abs(temperature - (condition.temperature_degC or 0.0)) <= 2.0:
             for row in table_damper(table):
-                if row.voltage_V == condition.voltage:
+                if row.voltage_V == condition.voltage_V:
                     return row
     raise LookupError(f"the paper has no parameters at {condition}")
 
@@ -68,9 +69,9 @@ def element(row: BaseRow) -> Damper:
     return Damper(base=(row.model_copy(update={"voltage_V": None, "temperature_degC": None}),))
 
 
-def loop(row: BaseRow, sine: Sine) -> Loop:
+def loop(row: BaseRow, sine: Conditions) -> Loop:
     """Compute the settled cycle of the element in a sine."""
-    return loop_of(element(row), sine.frequency, sine.amplitude, samples=_POINTS)
+    return loop_of(element(row), sine.frequency_Hz or 0.0, sine.amplitude_m or 0.0, samples=_POINTS)
 
 
 def parameters(row: ParameterRow) -> str:
@@ -90,7 +91,7 @@ def parameters(row: ParameterRow) -> str:
 # --- Figures 11 and 12: the test of Figure 4 at 100 V ---
 
 
-_AT, _SINE = Condition(SMALL_GAP, 100.0), Sine(1.0, 0.022)
+_TEST = Conditions(SMALL_GAP, 100.0, 22.0, 1.0, 0.022)
 
 
 def fitted(test: RigTest, row: ParameterRow) -> tuple[Array, float]:
@@ -120,7 +121,7 @@ def fitted(test: RigTest, row: ParameterRow) -> tuple[Array, float]:
 
 def over_time(data: FigureData) -> Iterator[Drawing]:
     """Draw the last three cycles of the record, and the identified element in the same motion."""
-    test, row = data.test(_AT, _SINE), data.row(_AT)
+    test, row = data.test(_TEST), data.row(_TEST)
     force, w_s = fitted(test, row)
     part = test.last(3)
     figure, (ax,) = panels(ratios=(1.0,), height=3.2)
@@ -131,22 +132,20 @@ def over_time(data: FigureData) -> Iterator[Drawing]:
     ax.set_ylabel(FORCE)
     ax.set_xlim(0.0, float(np.ceil(time[-1])))
     key(figure, ax)
-    caption = (
-        f"{_AT}, {_SINE}: W_s = {w_s:.2e} over this record, {row.W_s:.2e} over all of the condition; {parameters(row)}."
-    )
+    caption = f"{_TEST}: W_s = {w_s:.2e} over this record, {row.W_s:.2e} over all of the condition; {parameters(row)}."
     yield Drawing("time", figure, "Measured and modelled force over time at 100 V.", caption)
 
 
 def on_both_planes(data: FigureData) -> Iterator[Drawing]:
     """Draw both planes of the same test, measured and modelled."""
-    test, row = data.test(_AT, _SINE), data.row(_AT)
+    test, row = data.test(_TEST), data.row(_TEST)
     force, w_s = fitted(test, row)
     cycle, modelled = test.cycle(), test.loop(1, force)
     curves = [
         Curve("measured", cycle, test, MEASURED),
         Curve("model", modelled, colour=BASELINE, style={"linestyle": "--", "linewidth": 1.3}),
     ]
-    caption = f"{_AT}, {_SINE}: W_s = {w_s:.2e}; peak measured {cycle.peak:.0f} N, model {modelled.peak:.0f} N."
+    caption = f"{_TEST}: W_s = {w_s:.2e}; peak measured {cycle.peak:.0f} N, model {modelled.peak:.0f} N."
     yield Drawing("planes", both_planes(curves), "Measured and modelled force on both planes at 100 V.", caption)
 
 
@@ -154,7 +153,7 @@ def on_both_planes(data: FigureData) -> Iterator[Drawing]:
 
 
 def modelled(
-    data: FigureData, conditions: Mapping[str, Condition], sines: Mapping[str, Sine], what: str
+    data: FigureData, conditions: Mapping[str, Conditions], sines: Mapping[str, Conditions], what: str
 ) -> Iterator[Drawing]:
     """Draw the identified element at several conditions, the paper's element beside each.
 
@@ -189,13 +188,17 @@ def modelled(
         yield Drawing(part, figure, alt, caption)
 
 
-def _by_voltage(setting: str, *voltages: float) -> dict[str, Condition]:
-    return {f"{voltage:g} V": Condition(setting, voltage) for voltage in voltages}
+_SLOW = Conditions(frequency_Hz=1.0, amplitude_m=0.022)
+_FAST = Conditions(frequency_Hz=2.0, amplitude_m=0.030)
+
+
+def _by_voltage(setting: str, *voltages: float) -> dict[str, Conditions]:
+    return {f"{voltage:g} V": Conditions(setting, voltage, 22.0) for voltage in voltages}
 
 
 def _at_two_temperatures(number: int, voltage: float, in_words: str) -> PaperFigure:
     """Return the model at 23 and 43 °C at one voltage [V], which the title gives in words."""
-    conditions = {f"{warm:g} °C": Condition(LARGE_GAP, voltage, warm) for warm in (23.0, 43.0)}
+    conditions = {f"{warm:g} °C": Conditions(LARGE_GAP, voltage, warm) for warm in (23.0, 43.0)}
     what = f"23 and 43 °C, {voltage:g} V"
     return PaperFigure(
         number,
@@ -203,7 +206,7 @@ def _at_two_temperatures(number: int, voltage: float, in_words: str) -> PaperFig
         "model",
         f"{_ELEMENT} those of Tables 2 and 3. The paper states no motion: 2 Hz and 0.03 m are assumed, as in Figures 8 "
         "and 9.",
-        partial(modelled, conditions=conditions, sines={"model": Sine(2.0, 0.030)}, what=what),
+        partial(modelled, conditions=conditions, sines={"model": _FAST}, what=what),
     )
 
 
@@ -233,7 +236,7 @@ FIGURES = (
         partial(
             modelled,
             conditions=_by_voltage(SMALL_GAP, 0.0, 100.0, 150.0),
-            sines={"model": _SINE},
+            sines={"model": _SLOW},
             what="0, 100 and 150 V, gap 0.15 mm",
         ),
     ),
@@ -245,7 +248,7 @@ FIGURES = (
         partial(
             modelled,
             conditions=_by_voltage(LARGE_GAP, 0.0, 50.0, 100.0, 150.0),
-            sines={"by-caption": _SINE, "by-text": Sine(2.0, 0.030)},
+            sines={"by-caption": _SLOW, "by-text": _FAST},
             what="0 to 150 V, gap 0.25 mm",
         ),
     ),
