@@ -14,7 +14,7 @@ import numpy as np
 
 from pzd.artefacts import RIDE_COLUMNS, Rides, SummaryRow, base_of
 from pzd.comfort.iso2631_1978 import TRUST, Boundary, Exposure, exposure, shortest
-from pzd.paper.car_search import (
+from pzd.paper.cars import (
     BOUNDS,
     CONSTANT_PEAKS,
     CONTROLLED_PEAKS,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pzd.config import RunConfig, load
-from pzd.paper.car_search import (
+from pzd.paper.cars import (
     BOUNDS,
     CONSTANT_PEAKS,
     CONTROLLED_PEAKS,
@@ -17,17 +17,13 @@ from pzd.paper.car_search import (
     CarRow,
     closest,
     constant_peaks,
-    controlled_peaks,
     half_car,
     largest_deviation,
-    meets_constant,
-    neighbours,
-    plausible,
-    refined,
     stored,
 )
 from pzd.simulate.control.demand import TIE_BREAKS
 from pzd.simulate.vehicle.car import HalfCar
+from tests.studies.car_search import controlled_peaks, meets_constant, neighbours, plausible, refined
 
 
 @pytest.fixture(scope="module")
