@@ -20,6 +20,12 @@ SMALL_OFFSET = 0.01
 SMALL_DELAY = 1e-3
 """So does a sensor_delay shorter than this [s]."""
 
+_OF_THE_TRUTH = {
+    *("id", "kind", "campaign", "one_frequency", "described_by", "visible_gap", "gap_given_other"),
+    *("force_noise", "noise_rho", "displacement_noise_m"),
+}
+"""Fields that a score takes over from the truth."""
+
 NoiseFree = Mapping[str, NoiseFreeRecord]
 """The noise-free records of a case by name."""
 
@@ -66,19 +72,11 @@ def scored(truth: Truth, cost: Cost, diagnosed: Diagnosed | None, noise_free: No
     adopted = diagnosed if diagnosed and diagnosed.diagnosis.effects else None
     true_effects = counted_effects(truth)
     return Scored(
-        id=truth.id,
+        **truth.model_dump(include=_OF_THE_TRUTH),
+        **cost.model_dump(),
         made_from=made_from,
-        kind=truth.kind,
-        campaign=truth.campaign,
-        one_frequency=truth.one_frequency,
         hidden=truth.form or "+".join(truth.effects) or "none",
-        described_by=truth.described_by,
         truth=true_effects,
-        force_noise=truth.force_noise,
-        noise_rho=truth.noise_rho,
-        displacement_noise_m=truth.displacement_noise_m,
-        visible_gap=truth.visible_gap,
-        gap_given_other=truth.gap_given_other,
         verdict=diagnosis.verdict if diagnosis else None,
         effects=diagnosis.effects if diagnosis else (),
         rivals=diagnosis.rivals if diagnosis else (),
@@ -89,10 +87,6 @@ def scored(truth: Truth, cost: Cost, diagnosed: Diagnosed | None, noise_free: No
         gap_cut_gains_out=gap_cut(adopted, noise_free, gains_out=True) if adopted else None,
         gap_cut_of_truth=gap_cut_of_truth(adopted, noise_free) if adopted else None,
         next_test=bool(diagnosis and diagnosis.next_test),
-        seconds=cost.seconds,
-        diagnose_seconds=cost.diagnose_seconds,
-        peak_memory_MB=cost.peak_memory_MB,
-        failure=cost.failure,
     )
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from pzd.blind.case import Scored
+from pzd.blind.config import BlindConfig
 from pzd.blind.outside import FORMS
 from pzd.blind.rates import CalibrationRow, RateRow, calibration_rows, rate_rows, truth_among, visible
 from pzd.blind.targets import Line, campaign_lines, independent_lines, lines
@@ -108,15 +109,7 @@ def draw(matrix: Confusion, path: Path) -> None:
 # --- All files and lines ---
 
 
-def write(
-    cases: Sequence[Scored],
-    folder: Path,
-    control: Control,
-    *,
-    tuning: bool,
-    generator: str = "own",
-    by_campaign: bool = False,
-) -> list[str]:
+def write(cases: Sequence[Scored], folder: Path, control: Control, blind: BlindConfig) -> list[str]:
     """Write tables and picture beside the scored cases, and return the lines to print.
 
     Parameters
@@ -124,13 +117,7 @@ def write(
     cases : all that are scored
     folder : takes rates.csv, calibration.csv, confusion.csv, confusion.png and summary.json
     control : the control signal
-    tuning : whether the seed is one that thresholds were tuned on
-    generator : where the cases come from, `own` or `independent`
-    by_campaign : whether each campaign gets rates of its own as well
-
-    Returns
-    -------
-    the lines to print
+    blind : the generator, whether the seed is one that thresholds were tuned on, and whether campaigns get rates
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_rows(folder / "rates.csv", RateRow, rate_rows(cases), control)
@@ -138,12 +125,12 @@ def write(
     matrix = confusion(cases)
     write_table(matrix, folder / "confusion.csv")
     draw(matrix, folder / "confusion.png")
-    summary = lines(cases) if generator == "own" else independent_lines(cases)
-    if by_campaign:
+    summary = lines(cases) if blind.generator == "own" else independent_lines(cases)
+    if blind.by_campaign:
         summary = [*summary, *campaign_lines(cases)]
     write_json(folder / "summary.json", summary, control)
     head = f"{len(cases)} cases"
-    if tuning:
+    if blind.tuning:
         head += "; thresholds were tuned on this seed, so these figures are no result"
     return [head, *(_printed(line) for line in summary), *_failures(cases), _cost(cases)]
 

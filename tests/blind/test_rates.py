@@ -12,6 +12,7 @@ from pzd.blind.case import Scored
 from pzd.blind.rates import Rate, brier_gain, calibration_rows, confidence_holds, rate_rows
 from pzd.blind.summary import confusion, write
 from pzd.blind.targets import Line, campaign_lines, lines
+from pzd.config import RunConfig
 from pzd.quantities import Control
 
 Make = Callable[..., Scored]
@@ -223,17 +224,20 @@ def test_every_case_has_one_cell_of_the_matrix(case: Make) -> None:
     assert matrix.counts[matrix.rows.index("none"), matrix.columns.index("several")] == 1
 
 
-def test_tables_picture_and_page_are_written(case: Make, tmp_path: Path) -> None:
-    printed = write([case(), case(effects=("lash",))], tmp_path, Control(), tuning=True)
+def test_tables_picture_and_page_are_written(case: Make, small: Callable[..., RunConfig], tmp_path: Path) -> None:
+    blind = small("blind.seed=1", "blind.tuning=true").blind
+    assert blind is not None
+    folder = tmp_path / "written"
+    printed = write([case(), case(effects=("lash",))], folder, Control(), blind)
     assert "no result" in printed[0]
     assert len(printed) < 45
-    assert {path.name for path in tmp_path.iterdir()} == {
+    assert {path.name for path in folder.iterdir()} == {
         "rates.csv",
         "calibration.csv",
         "confusion.csv",
         "confusion.png",
         "summary.json",
     }
-    with (tmp_path / "confusion.csv").open(encoding="utf-8") as file:
+    with (folder / "confusion.csv").open(encoding="utf-8") as file:
         rows = list(csv.reader(file))
     assert sum(int(cell) for row in rows[1:] for cell in row[1:]) == 2

@@ -214,12 +214,7 @@ def _scale(run: LaboratoryCampaign, base: BinghamTable, motions: Sequence[Driven
 
 
 def _sized_laws(
-    hidden: Sequence[str],
-    baseline: HiddenDamper,
-    coarse: Sequence[Driven],
-    scale: Scale,
-    rise: float,
-    rng: Generator,
+    hidden: Sequence[str], baseline: HiddenDamper, coarse: Sequence[Driven], scale: Scale, rise: float, rng: Generator
 ) -> dict[str, dict[str, float]]:
     """Return every hidden law with parameters at which it alone leaves about the gap that was drawn."""
     highest = baseline.base.values[-1]

@@ -235,16 +235,7 @@ def _moved(s: Array, rate: Array, h: float, out: Array) -> None:
 
 @compiled
 def _march(
-    time: Array,
-    x: Array,
-    v: Array,
-    a: Array,
-    T0: Array,
-    C: Array,
-    k: Array,
-    p: Parameters,
-    work: Array,
-    force: Array,
+    time: Array, x: Array, v: Array, a: Array, T0: Array, C: Array, k: Array, p: Parameters, work: Array, force: Array
 ) -> None:
     """Compute the force at every second instant: four rates a step, all structure built at the start."""
     s, moved, r1, r2, r3, r4 = work[0], work[1], work[2], work[3], work[4], work[5]
