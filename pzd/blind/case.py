@@ -139,7 +139,7 @@ class CaseFiles:
         return self.folder / "scored" / f"{name}.json"
 
 
-# --- Noise-free records, which lie beside the truth ---
+# --- Noise-free records, written next to the truth ---
 
 
 _CHANNELS = ("time", "displacement", "velocity", "acceleration", "voltage", "temperature")
@@ -194,7 +194,7 @@ def read_noise_free(path: Path) -> dict[str, NoiseFreeRecord]:
     numbers = sorted({key.split(".")[0] for key in arrays})
     return {
         f"r{number}": NoiseFreeRecord(
-            Motion(*(arrays.get(f"{number}.{key}") for key in _CHANNELS)),  # type: ignore[arg-type]  # the first four always stand there
+            Motion(*(arrays.get(f"{number}.{key}") for key in _CHANNELS)),  # type: ignore[arg-type]  # the first four are always there
             arrays[f"{number}.force"],
             arrays[f"{number}.recorded"],
         )

@@ -419,7 +419,7 @@ def draw_independent_case(setup: BenchmarkSetup, planned: PlannedCase) -> DrawnC
     rig_files = [_columns(t.time, t.displacement, t.force, t.signal, t.temperature) for t in case.tests]
     noise_free = []
     for t in case.tests:
-        # without a control signal in the records the damper has no voltage, whatever the stand held
+        # a damper whose records have no control signal has no voltage either, so that its truth has none
         signal = None if t.signal is None else t.true_signal
         kinematics = (t.true_displacement, t.true_velocity, t.true_acceleration)
         noise_free.append(

@@ -1,4 +1,4 @@
-"""Forces outside the library, each a formula of the motion that acts beside the damper of the virtual rig.
+"""Forces outside the library, each a formula of the motion, in parallel with the damper of the virtual rig.
 
 None of the fifteen effects that a verdict names has their shape (`rubber` is a `second_branch`, which none names):
 position enters the damping, or friction, or a force that does not rise with x, or the force changes from one cycle to

@@ -135,7 +135,7 @@ def gap_cut(diagnosed: Diagnosed, noise_free: NoiseFree, *, gains_out: bool = Fa
 
 
 def gap_cut_of_truth(diagnosed: Diagnosed, noise_free: NoiseFree) -> float:
-    """Compute the same of the truth itself, its force at every voltage with the mean gain of the tests fitted there.
+    """Compute the same of the true force, scaled at every voltage by the mean gain of the tests that were fitted there.
 
     About what a fit can reach: a gain that the tests of a voltage share is the same to it as a larger T0, C and k.
 

@@ -1,4 +1,4 @@
-"""What the diagnosis has to reach, each target beside the figure: pure functions of the scored cases."""
+"""Targets of the diagnosis, each with the figure that was reached: pure functions of the scored cases."""
 
 from __future__ import annotations
 

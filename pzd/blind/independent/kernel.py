@@ -190,7 +190,7 @@ def _spring_force(deflection: float, k: float, p: Parameters) -> float:
 
 @compiled
 def _parallel_force(x: float, v: float, a: float, relaxed: float, p: Parameters) -> float:
-    """Return the force [N] beside the oil spring, but for that of the second branch, which has a memory of its own."""
+    """Return the force [N] in parallel with the oil spring, but for the second branch, which has a memory."""
     force = (
         laws.end_stop_force(x, p.k_e, p.x_e)
         + laws.gas_spring_force(x, p.k_g)

@@ -46,7 +46,7 @@ Draw = Callable[[Generator, Scale, float], dict[str, float]]
 
 @dataclass(frozen=True)
 class Law:
-    """A law that a case can hide; its force stands beside its declaration."""
+    """A law that a case can hide; its equations precede its declaration."""
 
     name: str
     draw: Draw

@@ -1,7 +1,7 @@
-"""Laws that no name of the library is right about, or a name that is not its own, and how each is drawn for a case.
+"""Laws outside the library, and how each is drawn for a case.
 
-`described_by` of a law names the effects of the library with which a verdict is right about it; `unexplained` is right
-about all of them. The kernel integrates the laws together with those of `laws`.
+No name of a verdict is theirs. The effects that describe a law rightly are its `described_by`: a verdict that names
+them is right, and `unexplained` is right for every law. The kernel integrates them together with those of `laws`.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ VISCOELASTIC_MOUNT = Law("viscoelastic_mount", _draw_viscoelastic_mount)
 def aeration_factor(time: float, fade: float, fade_time: float) -> float:
     """Return the factor on C of an oil that air mixes with since the beginning of the recording [s].
 
-    No temperature tells of it.
+    The temperature does not change with it.
 
     Equation: C (1 - a (1 - exp(-t/tau)))           Source: Duym, Stiens and Reybrouck 1997, Vehicle System Dynamics 27
     """

@@ -62,7 +62,7 @@ class LaboratoryCampaign:
 RATES = (500.0, 512.0, 1000.0, 1024.0, 2000.0, 4000.0)
 """Usual rates of data loggers [Hz]."""
 MOST_SAMPLES = 40_000
-"""In all tests of a case; longer campaigns are sampled more slowly."""
+"""In all tests of a case, so that a diagnosis takes seconds; longer campaigns are sampled more slowly."""
 
 
 def one_frequency(rng: Generator, stroke: float) -> list[LaboratoryTest]:
@@ -162,10 +162,10 @@ def campaign(name: str, rng: Generator) -> LaboratoryCampaign:
 # --- The motion of a test, and the heat of all of them ---
 
 
-FINEST = 1.25e-4
-"""Longest step of the integration [s]: `tests/blind` shows what it costs."""
+LONGEST_STEP = 1.25e-4
+"""Of the integration [s]: it costs less than 1e-5 of the force, see tests/blind/test_independent_laws.py."""
 REST = 0.3
-"""The actuator stands still for so long before it starts [s]."""
+"""Rest of the actuator before it starts [s]."""
 COOLING = 120.0
 """Time constant with which the damper loses its heat to the stand [s]."""
 PAUSE = 20.0
@@ -242,7 +242,7 @@ def driven(
     coarse : steps four times as long, for a first look
     """
     step = 1.0 / campaign.rate
-    per_sample = int(np.ceil(step / (FINEST * (4.0 if coarse else 1.0))))
+    per_sample = int(np.ceil(step / (LONGEST_STEP * (4.0 if coarse else 1.0))))
     half = 0.5 * step / per_sample
     before = round((REST + _run_in(test)) / step) * per_sample * 2
     after = round(test.seconds / step) * per_sample * 2
