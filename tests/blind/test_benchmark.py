@@ -169,7 +169,7 @@ def test_a_failed_diagnosis_is_a_case_with_its_message(
     assert "DataError" in cost["failure"] or "ConfigError" in cost["failure"]
 
 
-def test_what_is_drawn_hangs_on_seed_and_number_alone(small: Small, setup_of: SetupOf) -> None:
+def test_a_drawn_case_depends_on_seed_and_number_alone(small: Small, setup_of: SetupOf) -> None:
     short, long = setup_of(small()), setup_of(small("blind.cases=5"))
     for setup in (short, long):
         assert plan(setup.blind)[:2] == plan(short.blind)
@@ -295,7 +295,7 @@ def test_a_diagnosis_that_kills_its_process_every_time_is_a_failed_case(
     assert benchmark.finished(plan(benchmark.setup.blind)) == {case.id: case}
 
 
-def test_a_case_that_cannot_be_drawn_has_no_score_and_is_told(
+def test_a_case_that_cannot_be_drawn_has_no_score_and_is_reported(
     small: Small, benchmark_of: BenchmarkOf, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _with_losses(monkeypatch, step=0)
@@ -354,9 +354,9 @@ def test_the_gap_cut_is_one_when_the_truth_is_found_and_nothing_when_nothing_cha
 
     def said(damper: Damper) -> Diagnosed:
         gap = Gap(before=1.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=("r01",), hold_out="records")
-        told = Diagnosis(verdict="named", reason="", effects=("asymmetry",), confidence=None, gap=gap, parameters={},
+        diagnosis = Diagnosis(verdict="named", reason="", effects=("asymmetry",), confidence=None, gap=gap, parameters={},
                          ranking=(), rivals=(), where=(), next_test=None)  # fmt: skip
-        return Diagnosed(told, damper, plain)
+        return Diagnosed(diagnosis, damper, plain)
 
     def cut(damper: Damper, *, gains_out: bool = False) -> float:
         return gap_cut(said(damper), clean, gains_out=gains_out)
@@ -425,6 +425,6 @@ def test_the_command_refuses_a_seed_that_the_ledger_holds_for_other_code(
     assert not list(tmp_path.rglob("cases"))
 
 
-def test_the_committed_ledger_can_be_read_ledger() -> None:
+def test_the_committed_ledger_can_be_read() -> None:
     assert all(one.cases > 0 for one in read_ledger(ROOT / "configs" / "blind-ledger.csv"))
     assert read_ledger(ROOT / "configs" / "blind-ledger.csv")

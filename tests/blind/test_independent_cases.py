@@ -49,7 +49,7 @@ def test_the_diagnosis_is_given_records_and_nothing_else(
     assert 0.002 < truth.visible_gap < 0.15
 
 
-def test_a_case_hangs_on_seed_and_number_alone() -> None:
+def test_an_independent_case_depends_on_seed_and_number_alone() -> None:
     one, same, other = (drawn_case(seed, 7, "one_frequency", ()) for seed in (11, 11, 12))
     assert all(np.array_equal(a.force, b.force) for a, b in zip(one.tests, same.tests, strict=True))
     assert one.base != other.base

@@ -39,7 +39,7 @@ def test_a_rate_of_nothing_is_no_number() -> None:
     assert Rate(0, 0).interval == (0.0, 1.0)
 
 
-def test_right_is_exactly_what_was_there(case: Make) -> None:
+def test_a_name_is_right_where_it_is_exactly_what_was_hidden(case: Make) -> None:
     said = [
         case(),
         case(effects=("asymmetry", "lash")),
@@ -66,8 +66,8 @@ def test_each_campaign_has_rates_of_its_own(case: Make) -> None:
         case(campaign="road", **outside, verdict="unexplained", effects=()),
         case(campaign="road", **outside, verdict="none", effects=()),
     ]
-    told = {(one.about, one.figure): (one.value, one.count) for one in campaign_lines(said)}
-    assert told == {
+    found = {(one.about, one.figure): (one.value, one.count) for one in campaign_lines(said)}
+    assert found == {
         ("swept, visible", "right, or ambiguous with the truth"): (1.0, 1),
         ("swept, visible", "wrong name"): (0.0, 1),
         ("swept, no effect", "false names"): (0.0, 1),
@@ -131,10 +131,10 @@ def test_both_of_a_pair_must_be_adopted(case: Make) -> None:
     assert (found.value, found.count) == (0.5, 2)
 
 
-def test_a_shape_is_rightly_told_when_it_is_among_the_first_two(case: Make) -> None:
+def test_a_shape_counts_as_found_among_the_first_two_hypotheses(case: Make) -> None:
     outside = {"kind": "outside", "truth": (), "hidden": "tapered_rod", "verdict": "unexplained", "effects": ()}
-    told = (("x v", "x sign v"), ("x sign v", "x v"), ("x sign v", "x |v| v", "x v"), (), ("sin 2 pi x/lambda",))
-    said = [case(**outside, shapes=shapes) for shapes in told]
+    reported = (("x v", "x sign v"), ("x sign v", "x v"), ("x sign v", "x |v| v", "x v"), (), ("sin 2 pi x/lambda",))
+    said = [case(**outside, shapes=shapes) for shapes in reported]
     unseen = case(**{**outside, "visible_gap": 0.004}, shapes=("x v",))
     found = line([*said, unseen], "outside the library, visible", "shape among the first two")
     assert (found.value, found.count, found.met) == (0.4, 5, "missed")
