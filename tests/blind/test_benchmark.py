@@ -354,8 +354,18 @@ def test_the_gap_cut_is_one_when_the_truth_is_found_and_nothing_when_nothing_cha
 
     def said(damper: Damper) -> Diagnosed:
         gap = Gap(before=1.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=("r01",), hold_out="records")
-        diagnosis = Diagnosis(verdict="named", reason="", effects=("asymmetry",), confidence=None, gap=gap, parameters={},
-                         ranking=(), rivals=(), where=(), next_test=None)  # fmt: skip
+        diagnosis = Diagnosis(
+            verdict="named",
+            reason="",
+            effects=("asymmetry",),
+            confidence=None,
+            gap=gap,
+            parameters={},
+            ranking=(),
+            rivals=(),
+            where=(),
+            next_test=None,
+        )
         return Diagnosed(diagnosis, damper, plain)
 
     def cut(damper: Damper, *, gains_out: bool = False) -> float:
