@@ -188,8 +188,10 @@ def modelled(
         yield Drawing(part, figure, alt, caption)
 
 
+_ELEMENT = "The Bingham element with the parameters identified from the virtual stand; dashed with"
 _SLOW = Conditions(frequency_Hz=1.0, amplitude_m=0.022)
 _FAST = Conditions(frequency_Hz=2.0, amplitude_m=0.030)
+"""Motions of the tests of Figure 4 and of Figure 5."""
 
 
 def _by_voltage(setting: str, *voltages: float) -> dict[str, Conditions]:
@@ -209,8 +211,6 @@ def _at_two_temperatures(number: int, voltage: float, in_words: str) -> PaperFig
         partial(modelled, conditions=conditions, sines={"model": _FAST}, what=what),
     )
 
-
-_ELEMENT = "The Bingham element with the parameters identified from the virtual stand; dashed with"
 
 FIGURES = (
     PaperFigure(
