@@ -1,4 +1,4 @@
-"""What is kept of a case: the truth, what the diagnosis cost, and the score."""
+"""Records of a case: its truth, noise-free records, the cost of its diagnosis, and its score; and where they lie."""
 
 from __future__ import annotations
 
@@ -14,15 +14,13 @@ from pzd.damper.motion import Motion
 from pzd.record import Array
 from pzd.schema.model import Frozen
 
-# ----------------------------------------------------------------------------------------------------
-
 
 class Truth(Frozen):
-    """What was hidden, and how well it can be seen."""
+    """The hidden effects, and how well they can be seen."""
 
     id: str
     seed: int
-    """Seed of the benchmark; with the number of the case it fixes every draw."""
+    """Of the benchmark; with the number of the case it fixes every draw."""
     kind: Kind
     campaign: str
     effects: tuple[str, ...]
@@ -36,7 +34,9 @@ class Truth(Frozen):
     sizes: dict[str, float]
     """How much each changes the force, as `blind.sizes` counts it."""
     force_noise: float
+    """As a share of the record's peak."""
     noise_rho: float
+    """Correlation of the noise of the force from sample to sample."""
     displacement_noise_m: float
     warming: bool
     one_frequency: bool
@@ -45,35 +45,39 @@ class Truth(Frozen):
     visible_gap: float
     """R.m.s. left by the best Bingham refit, as a share of the record's peak."""
     gap_given_other: dict[str, float]
-    """Of a pair: what is left when the other effect is known and T0, C and k are refitted."""
+    """Of a pair, by the name of each effect: visible gap that it leaves where the other one is known."""
+
+
+COST = "cost.json"
+"""Beside the diagnosis of a case."""
 
 
 class Cost(Frozen):
-    """What ingest, identify and diagnose took."""
+    """Time and memory that ingest, identify and diagnose took."""
 
     seconds: float
     diagnose_seconds: float
     peak_memory_MB: float
     """Largest memory of the process so far."""
     failure: str | None = None
-    """What went wrong where no diagnosis came."""
+    """The error where no diagnosis came."""
 
 
 class Scored(Frozen):
-    """One finished case."""
+    """A case whose diagnosis is compared with its truth."""
 
     id: str
     made_from: str
-    """What config and code it was made with."""
+    """Hash of the config and the code it was made with."""
     kind: Kind
     campaign: str
     one_frequency: bool
     hidden: str
-    """Names of all that was hidden, joined by `+`; `none`."""
+    """Names of the hidden effects, joined by `+`; `none`."""
     described_by: tuple[str, ...] = ()
     """Effects with which a verdict is right about a form outside the library."""
     truth: tuple[str, ...]
-    """Effects that were there to be named: what counts as nothing is left out."""
+    """Hidden effects that should be named; those too small to count are left out."""
     force_noise: float
     noise_rho: float
     displacement_noise_m: float
@@ -85,17 +89,16 @@ class Scored(Frozen):
     rivals: tuple[str, ...]
     confidence: float | None
     shapes: tuple[str, ...]
-    """Of what is left, as the diagnosis tells them, the best first."""
+    """Of the residual, as the diagnosis reports them, the best first."""
     inside: dict[str, bool]
     """Of each parameter of a rightly named effect: whether it lies in its 95 % interval."""
     gap_cut: float | None
-    """1 - W_s after / W_s before against the noise-free force of the held-out records; None where nothing was
+    """1 - W_s after / W_s before against the noise-free force of the held-out records; None where no effect was
     adopted."""
     gap_cut_gains_out: float | None
-    """The same with the best gain of each record taken out, before and after alike: what tests whose gains jitter can
-    show of the shape."""
+    """The same with the best gain of each record taken out, before and after alike: gains scatter from test to test."""
     gap_cut_of_truth: float | None
-    """What the truth itself would cut, with the mean gain of the tests that were fitted."""
+    """The same of the truth itself, with the mean gain of the tests that were fitted."""
     next_test: bool
     """Whether a next test was proposed."""
     seconds: float
@@ -105,57 +108,56 @@ class Scored(Frozen):
 
 
 @dataclass(frozen=True)
-class Places:
-    """Where the files of a benchmark lie below its folder; the truth lies apart from what the diagnosis is given."""
+class CaseFiles:
+    """Where the files of every case lie below the folder of a benchmark; the truth is apart from the rig files."""
 
     folder: Path
 
     @property
-    def absolute(self) -> Places:
+    def absolute(self) -> CaseFiles:
         """The same for a process that works in another folder."""
-        return Places(self.folder.absolute())
+        return CaseFiles(self.folder.absolute())
 
     def case(self, name: str) -> Path:
-        """All that the diagnosis of a case sees and writes."""
+        """Return the folder of all that the diagnosis of a case reads and writes."""
         return self.folder / "cases" / name
 
     def rig(self, name: str) -> Path:
-        """The rig files of a case."""
+        """Return the folder of the rig files of a case."""
         return self.case(name) / "rig"
 
     def truth(self, name: str) -> Path:
-        """The truth of a case."""
+        """Return the file of its truth."""
         return self.folder / "truth" / f"{name}.json"
 
-    def clean(self, name: str) -> Path:
-        """Its noise-free records."""
+    def noise_free(self, name: str) -> Path:
+        """Return the file of its noise-free records."""
         return self.folder / "truth" / f"{name}.npz"
 
     def scored(self, name: str) -> Path:
-        """Its score."""
+        """Return the file of its score."""
         return self.folder / "scored" / f"{name}.json"
 
 
-# ----------------------------------------------------------------------------------------------------
-# The noise-free records of a case, which are kept beside its truth.
+# --- Noise-free records, written next to the truth ---
 
 
 _CHANNELS = ("time", "displacement", "velocity", "acceleration", "voltage", "temperature")
 
 
 @dataclass(frozen=True, eq=False)
-class Clean:
-    """One record without noise, gain, offset or delay."""
+class NoiseFreeRecord:
+    """A record without noise, gain, offset or delay."""
 
     motion: Motion
     force: Array
     """(n,) [N]"""
     recorded: Array
-    """(n,) what the force channel has of it [N]."""
+    """(n,) reading of the force channel [N]."""
 
     @property
     def gain(self) -> float:
-        """Slope of what was recorded over the force."""
+        """Gain of the force channel: slope of its reading over the force."""
         force = self.force - np.mean(self.force)
         return float(force @ self.recorded / (force @ force))
 
@@ -170,7 +172,7 @@ class Clean:
         return float(np.max(np.abs(self.force)))
 
 
-def write_clean(path: Path, records: Sequence[Clean]) -> None:
+def write_noise_free(path: Path, records: Sequence[NoiseFreeRecord]) -> None:
     """Write the noise-free records of a case, in the order of its rig files."""
     arrays = {
         f"{number:02d}.{key}": channel
@@ -185,14 +187,14 @@ def write_clean(path: Path, records: Sequence[Clean]) -> None:
     np.savez(path, allow_pickle=False, **arrays)
 
 
-def read_clean(path: Path) -> dict[str, Clean]:
-    """The noise-free records of a case, by the names that the rig files gave them."""
+def read_noise_free(path: Path) -> dict[str, NoiseFreeRecord]:
+    """Read the noise-free records of a case, by the names of its rig files."""
     with np.load(path) as file:
         arrays = dict(file)
     numbers = sorted({key.split(".")[0] for key in arrays})
     return {
-        f"r{number}": Clean(
-            Motion(*(arrays.get(f"{number}.{key}") for key in _CHANNELS)),  # type: ignore[arg-type]  # the first four always stand there
+        f"r{number}": NoiseFreeRecord(
+            Motion(*(arrays.get(f"{number}.{key}") for key in _CHANNELS)),  # type: ignore[arg-type]  # the first four are always there
             arrays[f"{number}.force"],
             arrays[f"{number}.recorded"],
         )

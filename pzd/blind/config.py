@@ -37,12 +37,12 @@ class TestPlan(Frozen):
 
     @property
     def moves_voltage(self) -> bool:
-        """Whether the voltage moves in some test, without which no effect of the drive can be seen."""
+        """Whether the voltage moves in some test: without that, no effect of the drive can be seen."""
         return any(not isinstance(voltage, float | int) for test in self.tests for voltage in test.voltages_V or ())
 
     @property
     def one_frequency(self) -> bool:
-        """Whether all tests share one frequency, so that a spring and a mass are the same thing."""
+        """Whether all tests are sines of one frequency, so that a spring and a mass cannot be told apart."""
         blocks = [test.waveform.model_dump() for test in self.tests]
         return {block["kind"] for block in blocks} == {"sine"} and len({b["frequency_Hz"] for b in blocks}) == 1
 

@@ -1,13 +1,13 @@
-"""Forces that are not in the library, each a formula of the motion that stands beside the damper.
+"""Forces outside the library, each a formula of the motion, in parallel with the damper of the virtual rig.
 
 None of the fifteen effects that a verdict names has their shape (`rubber` is a `second_branch`, which none names):
-position enters the damping, or friction, or a force that is no function rising with x, or the force changes from one
-cycle to the next without a temperature.
-(Shapes that an effect of the library nearly has, as x^3 is nearly an end stop that begins early, v^3 nearly
-a quadratic orifice, and a chamber that fills late on one side nearly a lash, are left out: to name that
-effect is no mistake.) At 10 % of the peak, in two tests of two frequencies each, the effect that follows
-best leaves 77 to 100 % of the visible gap of each form.
-Each gives a force of about one; it is scaled afterwards to its size.
+position enters the damping, or friction, or a force that does not rise with x, or the force changes from one cycle to
+the next without a temperature. Shapes that an effect of the library nearly has are left out, since to name that effect
+is no mistake: x^3 is nearly an end stop that begins early, v^3 a quadratic orifice, a chamber that fills late a lash.
+At 10 % of the peak, in two tests of two frequencies each, the effect that follows best leaves 77 to 100 % of the
+visible gap of each form.
+
+Each shape has a size of about one, and is scaled to the size that was drawn.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from pzd.record import Array
 
 
 @dataclass(frozen=True)
-class Reached:
-    """How far and how fast the campaign goes."""
+class Envelope:
+    """Operating envelope of a campaign."""
 
     stroke: float
     """Largest displacement X [m]."""
@@ -32,7 +32,7 @@ class Reached:
     """Largest speed V [m/s]."""
 
 
-Shape = Callable[[Motion, Reached, Mapping[str, float]], Array]
+Shape = Callable[[Motion, Envelope, Mapping[str, float]], Array]
 
 
 @dataclass(frozen=True)
@@ -44,77 +44,77 @@ class Form:
     ranges: Mapping[str, tuple[float, float]]
     """Its parameters, each drawn evenly between two limits."""
     named_shapes: tuple[str, ...]
-    """Names of the shapes in `pzd/diagnosis/hypotheses/shapes.py` that describe it rightly."""
+    """Shapes among the hypotheses of `pzd/diagnosis/hypotheses/` that describe it rightly."""
 
 
-def position_damping(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Array:
-    """Damping that rises towards both ends of the stroke (a grooved cylinder).
+def position_damping(motion: Motion, envelope: Envelope, values: Mapping[str, float]) -> Array:
+    """Compute damping that rises towards both ends of the stroke (a grooved cylinder).
 
     Equation: F = (|x|/X)^p v/V
     """
-    return np.asarray(np.abs(motion.displacement / reached.stroke) ** values["p"] * motion.velocity / reached.speed)
+    return np.asarray(np.abs(motion.displacement / envelope.stroke) ** values["p"] * motion.velocity / envelope.speed)
 
 
-def tapered_rod(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Array:
-    """Damping that rises from one end of the stroke to the other (a metering rod).
+def tapered_rod(motion: Motion, envelope: Envelope, values: Mapping[str, float]) -> Array:
+    """Compute damping that rises from one end of the stroke to the other (a metering rod).
 
     Equation: F = s (x/X) (v/V)
     """
-    return np.asarray(values["side"] * motion.displacement * motion.velocity / (reached.stroke * reached.speed))
+    return np.asarray(values["side"] * motion.displacement * motion.velocity / (envelope.stroke * envelope.speed))
 
 
-def covered_port(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Array:
-    """A jump of the friction where the piston covers a port, on one side.
+def covered_port(motion: Motion, envelope: Envelope, values: Mapping[str, float]) -> Array:
+    """Compute a jump of the friction where the piston covers a port, on one side.
 
     Equation: F = tanh(v / (0.05 V)) (1 + tanh((x - x_p) / (0.02 X))) / 2
     """
-    beyond = 0.5 + 0.5 * np.tanh((motion.displacement / reached.stroke - values["x_p"]) / 0.02)
-    return np.asarray(np.tanh(motion.velocity / (0.05 * reached.speed)) * beyond)
+    beyond = 0.5 + 0.5 * np.tanh((motion.displacement / envelope.stroke - values["x_p"]) / 0.02)
+    return np.asarray(np.tanh(motion.velocity / (0.05 * envelope.speed)) * beyond)
 
 
-def ripple(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Array:
-    """A force that waves over the position (cogging, a thread).
+def ripple(motion: Motion, envelope: Envelope, values: Mapping[str, float]) -> Array:
+    """Compute a force that is periodic in the position (cogging, a thread).
 
     Equation: F = sin(2 pi x / (lambda X))
     """
-    return np.asarray(np.sin(2.0 * np.pi * motion.displacement / (values["length"] * reached.stroke)))
+    return np.asarray(np.sin(2.0 * np.pi * motion.displacement / (values["length"] * envelope.stroke)))
 
 
-def even_spring(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Array:
-    """A spring that pushes the same way on both sides of the middle (a gas charge at high compression).
+def even_spring(motion: Motion, envelope: Envelope, values: Mapping[str, float]) -> Array:
+    """Compute a spring that pushes the same way on both sides of the middle (a gas charge at high compression).
 
     Equation: F = s (x/X)^2
     """
-    return np.asarray(values["side"] * (motion.displacement / reached.stroke) ** 2)
+    return np.asarray(values["side"] * (motion.displacement / envelope.stroke) ** 2)
 
 
-def tight_spot(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Array:
-    """Friction at one place of the stroke (a dent in the tube).
+def tight_spot(motion: Motion, envelope: Envelope, values: Mapping[str, float]) -> Array:
+    """Compute friction at one place of the stroke (a dent in the tube).
 
     Equation: F = tanh(v / (0.05 V)) exp(-((x - x_d) / b)^2)
     """
-    far = (motion.displacement / reached.stroke - values["x_d"]) / values["width"]
-    return np.asarray(np.tanh(motion.velocity / (0.05 * reached.speed)) * np.exp(-(far**2)))
+    far = (motion.displacement / envelope.stroke - values["x_d"]) / values["width"]
+    return np.asarray(np.tanh(motion.velocity / (0.05 * envelope.speed)) * np.exp(-(far**2)))
 
 
-def rubber(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Array:
-    """A rubber seat that goes with the rod a good part of the stroke before it slips, whatever the speed.
+def rubber(motion: Motion, envelope: Envelope, values: Mapping[str, float]) -> Array:
+    """Compute the force of a rubber seat that follows the rod a good part of the stroke before it slips.
 
     Equation: F = (x - P_r[x]) / r, P the play operator of half-width r
     """
-    half_width = values["r"] * reached.stroke
+    half_width = values["r"] * envelope.stroke
     play = drive_row({"piezo_hysteresis": {"r": half_width}})
     follows = effective_voltage(np.ascontiguousarray(motion.displacement), np.diff(motion.time), play)
     return np.asarray((motion.displacement - follows) / half_width)
 
 
-def aeration(motion: Motion, reached: Reached, values: Mapping[str, float]) -> Array:
-    """Damping that fades while a test runs, as air mixes with the oil.
+def aeration(motion: Motion, envelope: Envelope, values: Mapping[str, float]) -> Array:
+    """Compute damping that fades during a test, as air mixes with the oil.
 
     Equation: F = -(1 - exp(-t/tau)) v/V from the beginning of the recording
     """
     mixed = -np.expm1(-np.maximum(motion.time, 0.0) / values["tau_s"])
-    return np.asarray(-mixed * motion.velocity / reached.speed)
+    return np.asarray(-mixed * motion.velocity / envelope.speed)
 
 
 FORMS: Mapping[str, Form] = {

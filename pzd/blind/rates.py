@@ -1,4 +1,4 @@
-"""From scored cases to rates: what counts as right, ambiguous, wrong, and how sure a rate is."""
+"""From scored cases to rates: what counts as right, ambiguous or wrong, and how sure a rate is."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from pzd.schema.model import Frozen
 
 Z95 = 1.959963984540054
 """Two-sided 95 % point of the normal distribution."""
-GAPS = (0.0, 0.0025, 0.005, 0.01, 0.02, math.inf)
+GAP_EDGES = (0.0, 0.0025, 0.005, 0.01, 0.02, math.inf)
 """Edges of the bins of the visible gap, as shares of the peak force."""
-VISIBLE = 0.005
-"""A truth is visible from this gap on."""
-COUNTS = DiagnoseConfig().visible
+VISIBLE_TRUTH_GAP = 0.005
+"""A hidden effect that leaves this visible gap must be found: twice the gap from which on an effect is adopted."""
+NEGLIGIBLE_GAP = DiagnoseConfig().visible
 """A smaller gap counts as nothing missing."""
 LOW_NOISE = 0.01
 """Noise up to this share of the peak is low."""
@@ -30,20 +30,25 @@ Predicate = Callable[[Scored], bool]
 
 @dataclass(frozen=True)
 class Rate:
-    """So many of so many, with the Wilson 95 % interval."""
+    """Hits among cases, with the Wilson 95 % interval.
+
+    >>> rate = Rate(8, 10)
+    >>> rate.share, [round(end, 3) for end in rate.interval]
+    (0.8, [0.49, 0.943])
+    """
 
     hits: int
     count: int
 
     @classmethod
     def of(cls, cases: Iterable[Scored], hit: Predicate) -> Rate:
-        """How many of the cases pass a test."""
+        """Count how many of the cases pass a test."""
         hits = [hit(case) for case in cases]
         return cls(sum(hits), len(hits))
 
     @property
     def share(self) -> float | None:
-        """Hits over count; None of nothing."""
+        """Hits over count; None without a case."""
         return self.hits / self.count if self.count else None
 
     @property
@@ -61,66 +66,105 @@ class Rate:
         return max((middle - half) / whole, 0.0), min((middle + half) / whole, 1.0)
 
 
-# ---------------------------------------------------------------- what is said of one case
+# --- The answer to one case; a failed diagnosis is always wrong ---
 
 
 def right(case: Scored) -> bool:
-    """Named, and exactly what was there."""
+    """Return whether exactly the hidden effects are named."""
     return case.verdict == "named" and set(case.effects) == set(case.truth)
 
 
 def ambiguous_with_truth(case: Scored) -> bool:
-    """Called ambiguous, everything that was there being among the effects and rivals."""
-    return case.verdict == "ambiguous" and among(case)
+    """Return whether the verdict is ambiguous, and every hidden effect is among its effects and rivals."""
+    return case.verdict == "ambiguous" and truth_among(case)
 
 
 def wrong_name(case: Scored) -> bool:
-    """Named, and something else than what was there; a failed diagnosis is wrong as well."""
+    """Return whether something else than the hidden effects is named."""
     return case.failure is not None or (case.verdict == "named" and not right(case))
 
 
 def truth_and_more(case: Scored) -> bool:
-    """Named what was there, and something beside it."""
+    """Return whether the hidden effects are named, and others with them."""
     return case.verdict == "named" and bool(case.truth) and set(case.truth) < set(case.effects)
 
 
-def among(case: Scored) -> bool:
-    """What was there is among what was adopted and what would do as well."""
+def truth_among(case: Scored) -> bool:
+    """Return whether every hidden effect is among the adopted ones and their rivals."""
     return bool(case.truth) and set(case.truth) <= {*case.effects, *case.rivals}
 
 
 def wrong_single(case: Scored) -> bool:
-    """Named one effect, though what was there is not in the library; a failed diagnosis is wrong as well."""
+    """Return whether one effect is named, of a case that hides something outside the library."""
     return case.failure is not None or (case.verdict == "named" and len(case.effects) == 1)
 
 
-def shape_told(case: Scored) -> bool:
-    """The shape of a force outside the library is among the first two that are told of what is left."""
+def shape_found(case: Scored) -> bool:
+    """Return whether the shape of a form outside the library is among the first two hypotheses of the residual."""
     return case.hidden in FORMS and bool({*case.shapes[:2]} & {*FORMS[case.hidden].named_shapes})
 
 
+def unexplained(case: Scored) -> bool:
+    """Return whether the verdict is `unexplained`."""
+    return case.verdict == "unexplained"
+
+
 def rightly_outside(case: Scored) -> bool:
-    """Left unexplained, or named by what describes it rightly."""
+    """Return whether a form outside the library is left unexplained, or named by effects that describe it rightly."""
     described = bool(case.described_by) and bool(case.effects) and set(case.effects) <= set(case.described_by)
-    return case.verdict == "unexplained" or (case.verdict in ("named", "ambiguous") and described)
+    return unexplained(case) or (case.verdict in ("named", "ambiguous") and described)
 
 
 def false_name(case: Scored) -> bool:
-    """Something named or adopted where nothing was there; a failed diagnosis is wrong as well."""
+    """Return whether an effect is named or adopted, of a case that hides none."""
     return case.failure is not None or case.verdict in ("named", "ambiguous")
 
 
+def failed(case: Scored) -> bool:
+    """Return whether no diagnosis came."""
+    return case.failure is not None
+
+
 def visible(case: Scored) -> bool:
-    """Whether what was hidden can be seen: of a pair, each one given the other."""
-    return case.visible_gap >= VISIBLE and all(gap >= VISIBLE for gap in case.gap_given_other.values())
+    """Return whether the hidden effects can be seen: of a pair, each one given the other."""
+    return min([case.visible_gap, *case.gap_given_other.values()]) >= VISIBLE_TRUTH_GAP
 
 
 def low_noise(case: Scored) -> bool:
-    """Whether the noise is at most 1 % of the peak."""
+    """Return whether the noise is at most 1 % of the peak."""
     return case.force_noise <= LOW_NOISE + 1e-12
 
 
-# ---------------------------------------------------------------- tables
+def right_answer(case: Scored) -> bool:
+    """Return whether the verdict is right: the names, `none` for nothing, `unexplained` for a form outside."""
+    if case.kind == "outside":
+        return unexplained(case)
+    return right(case) if case.truth else case.verdict == "none"
+
+
+def wrong_answer(case: Scored) -> bool:
+    """Return whether something wrong is named."""
+    if case.kind == "outside":
+        return wrong_single(case)
+    return wrong_name(case) if case.truth else false_name(case)
+
+
+def confidence_holds(case: Scored) -> bool:
+    """Return whether what a confidence is stated for holds: every effect that counts is found, and no false one.
+
+    A hidden effect below `NEGLIGIBLE_GAP` may be named or not. An ambiguous verdict holds if the truth is among its
+    names.
+    """
+    if case.kind == "outside":
+        return rightly_outside(case) or (case.visible_gap < NEGLIGIBLE_GAP and not case.effects)
+    possible = {*case.effects, *(case.rivals if case.verdict == "ambiguous" else ())}
+    counting = {name for name in case.truth if case.gap_given_other.get(name, case.visible_gap) >= NEGLIGIBLE_GAP}
+    if not counting <= possible:
+        return False
+    return {*case.effects} <= {*case.truth} or (case.verdict == "ambiguous" and bool(counting))
+
+
+# --- Rates by campaign, noise and visible gap ---
 
 
 class RateRow(Frozen):
@@ -146,12 +190,12 @@ class RateRow(Frozen):
 
 
 def rate_rows(cases: Iterable[Scored]) -> list[RateRow]:
-    """A row for each campaign, kind, noise and bin of the visible gap that holds a case."""
+    """Return a row for each campaign, kind, noise and bin of the visible gap that holds a case."""
     every = list(cases)
     campaigns = sorted({case.campaign for case in every})
     rows = []
     for campaign, kind, low, (start, end) in product(
-        campaigns, ("single", "pair", "none", "outside"), (True, False), pairwise(GAPS)
+        campaigns, ("single", "pair", "none", "outside"), (True, False), pairwise(GAP_EDGES)
     ):
         found = [
             c
@@ -159,7 +203,7 @@ def rate_rows(cases: Iterable[Scored]) -> list[RateRow]:
             if (c.campaign, c.kind, low_noise(c)) == (campaign, kind, low) and start <= c.visible_gap < end
         ]
         if found:
-            rows.append(_row((campaign, kind, "to 1 %" if low else "above 1 %", _bin(start, end)), found))
+            rows.append(_row(campaign, kind, "to 1 %" if low else "above 1 %", _bin(start, end), found))
     return rows
 
 
@@ -167,44 +211,31 @@ def _bin(start: float, end: float) -> str:
     return f"{100 * start:g}-{100 * end:g}" if math.isfinite(end) else f"over {100 * start:g}"
 
 
-def _row(labels: tuple[str, str, str, str], cases: list[Scored]) -> RateRow:
-    def share(hit: Predicate) -> float:
-        return round(Rate.of(cases, hit).share or 0.0, 4)
+_COUNTED: dict[str, Predicate] = {
+    "right": right_answer,
+    "ambiguous_with_truth": ambiguous_with_truth,
+    "wrong_name": wrong_answer,
+    "truth_and_more": truth_and_more,
+    "truth_among": truth_among,
+    "none": lambda case: case.verdict == "none",
+    "unexplained": unexplained,
+    "failed": failed,
+}
+"""Columns of `RateRow` that are rates."""
 
-    exact, wrong = Rate.of(cases, rightly), Rate.of(cases, wrongly)
+
+def _row(campaign: str, kind: str, force_noise: str, gap: str, cases: list[Scored]) -> RateRow:
+    rates = {name: Rate.of(cases, hit) for name, hit in _COUNTED.items()}
+    numbers = {name: rate.share or 0.0 for name, rate in rates.items()}
+    for name in ("right", "wrong_name"):
+        numbers[f"{name}_low95"], numbers[f"{name}_high95"] = rates[name].interval
+    rounded = {name: round(number, 4) for name, number in numbers.items()}
     return RateRow(
-        campaign=labels[0],
-        kind=labels[1],
-        force_noise=labels[2],
-        visible_gap_percent=labels[3],
-        cases=len(cases),
-        right=share(rightly),
-        right_low95=round(exact.interval[0], 4),
-        right_high95=round(exact.interval[1], 4),
-        ambiguous_with_truth=share(ambiguous_with_truth),
-        wrong_name=share(wrongly),
-        wrong_name_low95=round(wrong.interval[0], 4),
-        wrong_name_high95=round(wrong.interval[1], 4),
-        truth_and_more=share(truth_and_more),
-        truth_among=share(among),
-        none=share(lambda c: c.verdict == "none"),
-        unexplained=share(lambda c: c.verdict == "unexplained"),
-        failed=share(lambda c: c.failure is not None),
+        campaign=campaign, kind=kind, force_noise=force_noise, visible_gap_percent=gap, cases=len(cases), **rounded
     )
 
 
-def rightly(case: Scored) -> bool:
-    """The right word for what was there: its name, `none` for nothing, `unexplained` for what is not in the library."""
-    if case.kind == "outside":
-        return case.verdict == "unexplained"
-    return right(case) if case.truth else case.verdict == "none"
-
-
-def wrongly(case: Scored) -> bool:
-    """A wrong name for what was there, or for nothing."""
-    if case.kind == "outside":
-        return wrong_single(case)
-    return wrong_name(case) if case.truth else false_name(case)
+# --- Calibration of stated confidences ---
 
 
 class CalibrationRow(Frozen):
@@ -220,40 +251,26 @@ class CalibrationRow(Frozen):
     hit_high95: float
 
 
-def held(case: Scored) -> bool:
-    """Whether what a confidence is stated for holds: that what is named is there, or a rival, and nothing else counts.
-
-    Where nothing counts, an effect that was hidden is rightly named and rightly not.
-    """
-    if case.kind == "outside":
-        return rightly_outside(case) or (case.visible_gap < COUNTS and not case.effects)
-    said = {*case.effects, *(case.rivals if case.verdict == "ambiguous" else ())}
-    there = {name for name in case.truth if case.gap_given_other.get(name, case.visible_gap) >= COUNTS}
-    if not there <= said:
-        return False
-    return {*case.effects} <= {*case.truth} or (case.verdict == "ambiguous" and bool(there))
-
-
 def brier_gain(cases: Iterable[Scored]) -> float | None:
-    """By which share the mean square error of stated confidences is below that of the best constant.
+    """Compute by which share the mean square error of stated confidences is below that of the best constant.
 
     Equation: 1 - sum (c - h)^2 / sum (h - mean h)^2                Source: Brier 1950, Mon. Weather Rev. 78, eq. (2)
 
-    None where nothing, or always the same, came of them.
+    None where every stated confidence held, or none did.
     """
-    stated = [(case.confidence, held(case)) for case in cases if case.confidence is not None]
-    if not stated:
+    pairs = [(case.confidence, confidence_holds(case)) for case in cases if case.confidence is not None]
+    if not pairs:
         return None
-    said, came = np.array(stated, dtype=np.float64).T
-    spread = float(np.sum((came - came.mean()) ** 2))
-    return 1.0 - float(np.sum((said - came) ** 2)) / spread if spread > 0.0 else None
+    stated, held = np.array(pairs, dtype=np.float64).T
+    spread = float(np.sum((held - held.mean()) ** 2))
+    return 1.0 - float(np.sum((stated - held) ** 2)) / spread if spread > 0.0 else None
 
 
-CONFIDENCES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
+CONFIDENCE_EDGES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
 
 
-def calibration_rows(cases: Iterable[Scored], limits: Sequence[float] = CONFIDENCES) -> list[CalibrationRow]:
-    """Bins of the confidence, and how often what it was stated for held.
+def calibration_rows(cases: Iterable[Scored], limits: Sequence[float] = CONFIDENCE_EDGES) -> list[CalibrationRow]:
+    """Return bins of the confidence, and how often what it was stated for holds.
 
     Parameters
     ----------
@@ -265,7 +282,7 @@ def calibration_rows(cases: Iterable[Scored], limits: Sequence[float] = CONFIDEN
     for low, high in pairwise(limits):
         inside = [(c, case) for c, case in stated if low < c <= high or low == c == limits[0]]
         if inside:
-            rate = Rate.of((case for _, case in inside), held)
+            rate = Rate.of((case for _, case in inside), confidence_holds)
             rows.append(
                 CalibrationRow(
                     confidence_low=low,

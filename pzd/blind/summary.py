@@ -1,4 +1,4 @@
-"""What the benchmark says: tables, a picture, and each target beside its figure."""
+"""The summary of a benchmark: its tables, the confusion matrix with its picture, and the lines that are printed."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from pzd.blind.case import Scored
+from pzd.blind.config import BlindConfig
 from pzd.blind.outside import FORMS
-from pzd.blind.rates import CalibrationRow, RateRow, among, calibration_rows, rate_rows, visible
+from pzd.blind.rates import CalibrationRow, RateRow, calibration_rows, rate_rows, truth_among, visible
 from pzd.blind.targets import Line, campaign_lines, independent_lines, lines
 from pzd.damper.effects import nameable
 from pzd.quantities import Control
@@ -20,11 +21,10 @@ from pzd.record import Array
 from pzd.schema.csvfile import write_rows
 from pzd.schema.validate import write_json
 
-# ----------------------------------------------------------------------------------------------------
-# What was there against what was said: the confusion matrix, as numbers and as a picture.
+# --- The confusion matrix: truth against answer ---
 
 
-SAID = ("several", "ambiguous, truth among", "ambiguous, truth not", "none", "unexplained", "failed")
+OTHER_ANSWERS = ("several", "ambiguous, truth among", "ambiguous, truth not", "none", "unexplained", "failed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,28 +32,27 @@ class Confusion:
     """Counts of cases."""
 
     rows: tuple[str, ...]
-    """What was there."""
+    """Truth."""
     columns: tuple[str, ...]
-    """What was said."""
+    """Answer."""
     counts: Array
     """(rows, columns)"""
 
 
 def confusion(cases: Sequence[Scored]) -> Confusion:
-    """Every case by what was there and what was said of it.
+    """Count the cases by truth and answer.
 
     Effects and pairs whose visible gap is below 0.5 % of the peak have rows of their own.
     """
-    found = Counter((true_row(case), said(case)) for case in cases)
+    found = Counter((_truth_row(case), _answer_column(case)) for case in cases)
     others = sorted({case.hidden for case in cases if case.kind == "outside"} - set(FORMS))
     rows = (*nameable(), "pair", "invisible effect", "invisible pair", "none", *FORMS, *others, "invisible form")
-    columns = (*nameable(), *SAID)
+    columns = (*nameable(), *OTHER_ANSWERS)
     kept = tuple(row for row in rows if any(found[row, column] for column in columns))
     return Confusion(kept, columns, np.array([[float(found[row, column]) for column in columns] for row in kept]))
 
 
-def true_row(case: Scored) -> str:
-    """The row of a case."""
+def _truth_row(case: Scored) -> str:
     if case.kind == "outside":
         return case.hidden if visible(case) else "invisible form"
     if not case.truth:
@@ -63,12 +62,11 @@ def true_row(case: Scored) -> str:
     return case.truth[0] if visible(case) else "invisible effect"
 
 
-def said(case: Scored) -> str:
-    """The column of a case."""
+def _answer_column(case: Scored) -> str:
     if case.verdict is None:
         return "failed"
     if case.verdict == "ambiguous":
-        return "ambiguous, truth among" if among(case) else "ambiguous, truth not"
+        return "ambiguous, truth among" if truth_among(case) else "ambiguous, truth not"
     if case.verdict != "named":
         return case.verdict
     return case.effects[0] if len(case.effects) == 1 else "several"
@@ -84,7 +82,7 @@ def write_table(matrix: Confusion, path: Path) -> None:
 
 
 def draw(matrix: Confusion, path: Path) -> None:
-    """Draw the matrix: shares of each row, counts written in."""
+    """Draw the matrix: colours are shares of each row, numbers are counts."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -108,32 +106,18 @@ def draw(matrix: Confusion, path: Path) -> None:
         figure.savefig(path, dpi=150, metadata={"Software": None})
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- All files and lines ---
 
 
-def write(
-    cases: Sequence[Scored],
-    folder: Path,
-    control: Control,
-    *,
-    tuning: bool,
-    generator: str = "own",
-    by_campaign: bool = False,
-) -> list[str]:
-    """Write tables and picture beside the scored cases.
+def write(cases: Sequence[Scored], folder: Path, control: Control, blind: BlindConfig) -> list[str]:
+    """Write tables and picture beside the scored cases, and return the lines to print.
 
     Parameters
     ----------
     cases : all that are scored
     folder : takes rates.csv, calibration.csv, confusion.csv, confusion.png and summary.json
     control : the control signal
-    tuning : whether the seed is one that thresholds were tuned on
-    generator : where the cases come from, `own` or `independent`
-    by_campaign : whether each campaign gets rates of its own as well
-
-    Returns
-    -------
-    the lines to print
+    blind : the generator, whether the seed is one that thresholds were tuned on, and whether campaigns get rates
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_rows(folder / "rates.csv", RateRow, rate_rows(cases), control)
@@ -141,14 +125,14 @@ def write(
     matrix = confusion(cases)
     write_table(matrix, folder / "confusion.csv")
     draw(matrix, folder / "confusion.png")
-    said = lines(cases) if generator == "own" else independent_lines(cases)
-    if by_campaign:
-        said = [*said, *campaign_lines(cases)]
-    write_json(folder / "summary.json", said, control)
+    summary = lines(cases) if blind.generator == "own" else independent_lines(cases)
+    if blind.by_campaign:
+        summary = [*summary, *campaign_lines(cases)]
+    write_json(folder / "summary.json", summary, control)
     head = f"{len(cases)} cases"
-    if tuning:
+    if blind.tuning:
         head += "; thresholds were tuned on this seed, so these figures are no result"
-    return [head, *(_printed(line) for line in said), *_failures(cases), _cost(cases)]
+    return [head, *(_printed(line) for line in summary), *_failures(cases), _cost(cases)]
 
 
 def _printed(line: Line) -> str:
@@ -162,8 +146,8 @@ def _printed(line: Line) -> str:
 
 
 def _failures(cases: Sequence[Scored]) -> list[str]:
-    found = Counter(case.failure for case in cases if case.failure)
-    return [f"failed {count} times: {failure}" for failure, count in found.most_common(3)]
+    failures = Counter(case.failure for case in cases if case.failure)
+    return [f"failed {count} times: {failure}" for failure, count in failures.most_common(3)]
 
 
 def _cost(cases: Sequence[Scored]) -> str:

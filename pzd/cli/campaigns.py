@@ -55,19 +55,17 @@ def blind(
     output = Output(quiet=quiet, verbose=verbose)
     given = opened(config, runs, overrides or ())
     setup, whole = _setup(given.config), given.config
-    places = folder_of(given.run.folder / FOLDER, setup.blind)
+    files = folder_of(given.run.folder / FOLDER, setup.blind)
     methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
     with given.run.locked("pzd blind"):
         made_from = _made_from(whole)
         with given.placed():
             _entered(setup.blind, made_from, config.parent)
-        where = Where(setup.blind, FOLDER, config.parent, places.folder / "slurm")
-        benchmark = Benchmark(setup, methods, places, made_from, where, output.progress)
+        where = Where(setup.blind, FOLDER, config.parent, files.folder / "slurm")
+        benchmark = Benchmark(setup, methods, files, made_from, where, output.progress)
         cases = benchmark.run(jobs, afresh=force)
-        tuning, generator = setup.blind.tuning, setup.blind.generator
-        by_campaign = setup.blind.by_campaign
-        lines = write(cases, places.folder, setup.control, tuning=tuning, generator=generator, by_campaign=by_campaign)
-    output.say(*lines, f"tables and picture: {places.folder}")
+        lines = write(cases, files.folder, setup.control, setup.blind)
+    output.say(*lines, f"tables and picture: {files.folder}")
     complain(f"not to be trusted: case {name} could not be drawn: {why}" for name, why in benchmark.undrawn.items())
     return UNTRUSTED if benchmark.undrawn else DONE
 

@@ -1,4 +1,7 @@
-"""The numbers that the paper prints, each with its id: measured, identified, simulated, stated, claimed, and inputs."""
+"""The numbers that the paper prints, each with its id, and the settled loop of a damper in a sinusoidal test.
+
+Kinds of numbers: measured, identified, simulated, stated, claimed, and inputs.
+"""
 
 from __future__ import annotations
 
@@ -16,34 +19,31 @@ from pzd.quantities import Control
 from pzd.record import Array
 from pzd.report.reference import SHIPPED, Expected, range_of, read_reference
 
-# ----------------------------------------------------------------------------------------------------
-
-
 SMALL_GAP, LARGE_GAP = "gap 0.15 mm", "gap 0.25 mm"
 """The two settings of the valve that the paper tested."""
-PEAK, AT_ZERO = "peak_force", "force_at_zero_velocity"
+PEAK, FORCE_AT_REST = "peak_force", "force_at_zero_velocity"
 """Quantities that a test of the damper gives."""
 TABLES = {"Table 1": (SMALL_GAP, 22.0), "Table 2": (LARGE_GAP, 22.0), "Table 3": (LARGE_GAP, 43.0)}
 """Setting and temperature of each table of identified parameters."""
 
 
-WARM_DEGC = 30.0
-"""Above this a test counts as the warm one of 43 degC, below it as one of those at 22 and 23 degC [degC]."""
-
-
 @cache
 def published() -> Mapping[str, Expected]:
-    """Every published number by its id, in the order of the file."""
+    """Return every published number by its id, in the order of the file.
+
+    >>> published()["F4-0"].number
+    2280.0
+    """
     return {row.id: row for row in read_reference(SHIPPED["makowski2021"], Control())}
 
 
 def rig_tests() -> tuple[Expected, ...]:
-    """The measured forces of Figures 4, 5, 6, 8 and 9."""
-    return tuple(row for row in published().values() if row.quantity in (PEAK, AT_ZERO))
+    """Return the measured forces of Figures 4, 5, 6, 8 and 9."""
+    return tuple(row for row in published().values() if row.quantity in (PEAK, FORCE_AT_REST))
 
 
 def table_damper(table: str) -> tuple[BaseRow, ...]:
-    """The parameters of one of the paper's tables, by voltage.
+    """Return the parameters of one of the paper's tables, by voltage.
 
     Parameters
     ----------
@@ -55,19 +55,35 @@ def table_damper(table: str) -> tuple[BaseRow, ...]:
     return tuple(BaseRow(voltage_V=u, T0_N=by[u, "T0"], C_Ns_per_m=by[u, "C"], k_N_per_m=by[u, "k"]) for u in voltages)
 
 
+def peak_speed(row: Expected) -> float:
+    """Return the largest speed of a sinusoidal test [m/s].
+
+    Raises
+    ------
+    ValueError : when the row is no test of the damper
+    """
+    frequency, amplitude = _sine_of(row)
+    return 2.0 * math.pi * frequency * amplitude
+
+
+def _sine_of(row: Expected) -> tuple[float, float]:
+    if row.frequency_Hz is None or row.amplitude_m is None:
+        raise ValueError(f"{row.id} is no test of the damper")
+    return row.frequency_Hz, row.amplitude_m
+
+
 def span(row: Expected) -> tuple[float, float]:
-    """Smallest and largest number that the paper prints for the test of this row."""
+    """Return the smallest and the largest number that the paper prints for the test of this row."""
     return range_of(row, rig_tests())
 
 
-# ----------------------------------------------------------------------------------------------------
-# The settled loop of a damper in a sinusoidal test, exact and free of noise: its peak and its force at rest.
+# --- The settled loop of a damper in a sinusoidal test, exact and free of noise ---
 
 
 SAMPLES = 2000
 """In a cycle, unless asked for otherwise; a multiple of 4."""
 _CYCLES = 2
-"""The second is settled: an oil spring forgets its start with C / k, some 20 ms, a small part of one cycle."""
+"""The second is settled: the start decays with C / k, some 20 ms, a small part of one cycle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +101,7 @@ class Loop:
         return float(np.max(np.abs(self.force)))
 
     @property
-    def at_zero(self) -> float:
+    def force_at_rest(self) -> float:
         """Mean |F| of both branches at v = 0 [N], where the cycle is one of `loop_of`."""
         quarter = self.force.size // 4
         return float(0.5 * (abs(self.force[quarter]) + abs(self.force[3 * quarter])))
@@ -99,7 +115,7 @@ def loop_of(
     temperature: float | None = None,
     samples: int = SAMPLES,
 ) -> Loop:
-    """The settled loop of a damper under x = A sin(2 pi f t).
+    """Compute the settled loop of a damper under x = A sin(2 pi f t).
 
     Parameters
     ----------
@@ -125,12 +141,10 @@ def loop_of(
 
 
 def loop_in(damper: Damper, row: Expected) -> Loop:
-    """The settled loop of a damper in the test of a published row.
+    """Compute the settled loop of a damper in the test of a published row.
 
     Raises
     ------
     ValueError : when the row is no test of the damper
     """
-    if row.frequency_Hz is None or row.amplitude_m is None:
-        raise ValueError(f"{row.id} is no test of the damper")
-    return loop_of(damper, row.frequency_Hz, row.amplitude_m, row.voltage_V, row.temperature_degC)
+    return loop_of(damper, *_sine_of(row), row.voltage_V, row.temperature_degC)

@@ -2,25 +2,33 @@
 
     F = T0(T) + F_v,   F_v = c exp(-beta (T - 22)) v / h^3 + b v^2 / h^2,   h = h0 + e - s(U) + kappa F_v
 
-The damper of the virtual stand follows from it: Bingham rows, and a flow curve that bends as the slot opens.
+The damper of the virtual stand follows from it: Bingham rows, and a flow curve that bends as the slot opens. The valve
+is calibrated on the published rig forces.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pzd.damper.effects.shear_thinning import REFERENCE_SPEED
 from pzd.damper.model import BaseRow, Damper
-from pzd.paper.published import AT_ZERO, LARGE_GAP, PEAK, SMALL_GAP, loop_in, published, rig_tests, span
+from pzd.paper.published import (
+    FORCE_AT_REST,
+    LARGE_GAP,
+    PEAK,
+    SMALL_GAP,
+    loop_in,
+    peak_speed,
+    published,
+    rig_tests,
+    span,
+)
 from pzd.record import Array
 from pzd.report.reference import Expected
-
-# ----------------------------------------------------------------------------------------------------
-
 
 INITIAL_GAPS = {SMALL_GAP: 0.15e-3, LARGE_GAP: 0.25e-3}
 """Width of the slot as the paper sets it [m]."""
@@ -58,17 +66,17 @@ class Valve:
     """Relative fall of T0 a kelvin [1/K]."""
 
     def stroke(self, setting: str, voltage: float) -> float:
-        """Stroke of the unloaded stack [m]."""
+        """Return the stroke of the unloaded stack [m]."""
         at_100 = self.stroke_100_small if setting == SMALL_GAP else self.stroke_100
         return {0.0: 0.0, 50.0: self.stroke_50, 100.0: at_100, 150.0: self.stroke_150}[voltage]
 
     def friction_at(self, temperature: float) -> float:
-        """T0 [N] at a temperature [degC]."""
+        """Return T0 [N] at a temperature [degC]."""
         return self.friction * math.exp(-self.friction_fall * (temperature - COLD_DEGC))
 
 
 def flow_force(valve: Valve, setting: str, voltage: float, temperature: float, speed: float) -> float:
-    """Force that presses the oil through the slot.
+    """Compute the force that presses the oil through the slot.
 
     Equation: F_v = c v / h^3 + b v^2 / h^2, h = h0 + e - s(U) + kappa F_v
               Source: plane Poiseuille flow, c ~ viscosity, and a sharp edge; Merritt 1967, Hydraulic Control Systems
@@ -111,25 +119,18 @@ VALVE = Valve(
     friction=121.985,
     friction_fall=0.058171,
 )
-"""What `calibrate` finds; the dampers of configs/paper.yaml are written from it."""
-
-
-def peak_speed(row: Expected) -> float:
-    """Largest speed of a sinusoidal test [m/s]."""
-    if row.frequency_Hz is None or row.amplitude_m is None:
-        raise ValueError(f"{row.id} is no test of the damper")
-    return 2.0 * math.pi * row.frequency_Hz * row.amplitude_m
+"""Result of `calibrate`; the dampers of configs/paper.yaml are written from it."""
 
 
 def peak_force(valve: Valve, row: Expected) -> float:
-    """Peak force [N] of the test of a published row, the oil spring rigid."""
+    """Compute the peak force [N] of the test of a published row, the oil spring rigid."""
     temperature = row.temperature_degC or REFERENCE_DEGC
     flow = flow_force(valve, row.setting or "", row.voltage_V or 0.0, temperature, peak_speed(row))
-    return valve.friction_at(temperature) + flow
+    return _friction_in(valve, row) + flow
 
 
 def stand_damper(valve: Valve, setting: str, stiffness: float = STIFFNESS) -> Damper:
-    """The damper that the virtual stand tests: Bingham rows, and a flow curve that bends as the slot opens.
+    """Return the damper that the virtual stand tests: Bingham rows, and a flow curve that bends as the slot opens.
 
     A slot that the pressure opens gives less than proportional forces. Of the effects, `shear_thinning` has
     that shape: its C and n are those of the curve through the forces at the largest test speed and at half of it.
@@ -142,7 +143,10 @@ def stand_damper(valve: Valve, setting: str, stiffness: float = STIFFNESS) -> Da
     setting : which gap
     stiffness : of the oil spring [N/m]
     """
-    speed = _largest_speed(setting)
+    tests = [row for row in rig_tests() if row.setting == setting]
+    speed = max(peak_speed(row) for row in tests)
+    voltages = sorted({row.voltage_V or 0.0 for row in tests})
+    hot = any(row.temperature_degC == HOT_DEGC for row in tests)
     n = flow_index(valve, setting, 0.0, speed)
     rows = tuple(
         BaseRow(
@@ -152,60 +156,41 @@ def stand_damper(valve: Valve, setting: str, stiffness: float = STIFFNESS) -> Da
             C_Ns_per_m=_coefficient(flow_force(valve, setting, u, t, speed), speed, n),
             k_N_per_m=stiffness,
         )
-        for t in _temperatures(setting)
-        for u in _voltages(setting)
+        for t in ([REFERENCE_DEGC, HOT_DEGC] if hot else [REFERENCE_DEGC])
+        for u in voltages
     )
     return Damper(base=rows).with_effect("shear_thinning", {"n": n})
 
 
 def flow_index(valve: Valve, setting: str, voltage: float, speed: float) -> float:
-    """Exponent n of the power law through the forces at a speed [m/s] and at half of it, 22 degC."""
+    """Return the exponent n of the power law through the forces at a speed [m/s] and at half of it, 22 degC."""
     full, half = (flow_force(valve, setting, voltage, REFERENCE_DEGC, share * speed) for share in (1.0, 0.5))
     return min(math.log2(full / half), 1.0)
 
 
 def _coefficient(force: float, speed: float, index: float) -> float:
-    """C [N s/m] of the power law through one force [N] at one speed [m/s]."""
+    """Return C [N s/m] of the power law through one force [N] at one speed [m/s]."""
     return force / (REFERENCE_SPEED * math.pow(speed / REFERENCE_SPEED, index))
 
 
-def _tests(setting: str) -> Iterator[Expected]:
-    return (row for row in rig_tests() if row.setting == setting)
-
-
-def _voltages(setting: str) -> list[float]:
-    return sorted({row.voltage_V or 0.0 for row in _tests(setting)})
-
-
-def _temperatures(setting: str) -> list[float]:
-    """The hot row only where the paper tested hot."""
-    hot = any((row.temperature_degC or 0.0) == HOT_DEGC for row in _tests(setting))
-    return [REFERENCE_DEGC, HOT_DEGC] if hot else [REFERENCE_DEGC]
-
-
-def _largest_speed(setting: str) -> float:
-    return max(peak_speed(row) for row in _tests(setting))
-
-
 def least_stiffness() -> Mapping[str, float]:
-    """The softest oil spring [N/m] with which the force at zero velocity can be as small as published, by id.
+    """Compute the softest oil spring [N/m] with which the force at zero velocity can be as small as published, by id.
 
     Without any friction the spring still carries C^2 A (2 pi f)^2 / k when the piston turns, C being the
     slope that the published peak asks for.
 
     Equation: k >= C^2 A (2 pi f)^2 / F(0), C = F_peak / (2 pi f A)      Source: eq. (1)-(3) at small C / k
     """
-    found = {}
-    for at_zero, peak in (("F8z-23", "F8-23"), ("F8z-43", "F8-43")):
-        row = published()[at_zero]
+    least = {}
+    for at_rest, peak in (("F8z-23", "F8-23"), ("F8z-43", "F8-43")):
+        row = published()[at_rest]
         speed = peak_speed(row)
         slope = published()[peak].number / speed
-        found[at_zero] = slope**2 * speed**2 / ((row.amplitude_m or 1.0) * row.number)
-    return found
+        least[at_rest] = slope**2 * speed**2 / ((row.amplitude_m or 1.0) * row.number)
+    return least
 
 
-# ----------------------------------------------------------------------------------------------------
-# The valve of the paper's damper, calibrated on its published rig forces.
+# --- Calibration on the published rig forces ---
 #
 # What fixes what: c the peaks of 0 V at gap 0.25 mm (F5-0, F6-2), b the peak at half the speed (F6-1),
 # the zero error e of the micrometer screw the peak of 0 V at gap 0.15 mm (F4-0), the stroke of 150 V and
@@ -233,13 +218,13 @@ _SCALES = {
 
 
 def calibrate() -> Valve:
-    """The valve fitted to the thirteen published peaks and the two forces at zero velocity.
+    """Fit the valve to the thirteen published peaks and the two forces at zero velocity.
 
-    The peaks are fitted with the friction held, then the friction by the whole element, in turns. The fit
+    The peaks are fitted with constant friction, then the friction by the whole element, in turns. The fit
     keeps every peak as far inside its 2 % (or inside the range that the paper prints for one test) as it can.
     """
     valve = Valve(**_SCALES, friction=170.0, friction_fall=0.04)
-    for power in (0, 2, 2):
+    for power in (0, 2, 2):  # least squares first, then the deviations cubed, so that the largest count most
         valve = _fit_friction(_fit_peaks(valve, power))
     return valve
 
@@ -253,17 +238,17 @@ def _fit_peaks(valve: Valve, power: int) -> Valve:
     def valve_at(values: Array) -> Valve:
         return replace(valve, **dict(zip(_SCALES, (values * scales).tolist(), strict=True)))
 
-    def misses(values: Array) -> Array:
-        now = valve_at(values)
-        miss = np.array([_miss(peak_force(now, row), row) for row in tests])
-        return np.asarray(miss * np.abs(miss) ** power)
+    def residuals(values: Array) -> Array:
+        trial = valve_at(values)
+        deviations = np.array([_deviation(peak_force(trial, row), row) for row in tests])
+        return np.asarray(deviations * np.abs(deviations) ** power)
 
     start = np.array([getattr(valve, name) for name in _SCALES]) / scales
-    return valve_at(least_squares(misses, start).x)
+    return valve_at(least_squares(residuals, start).x)
 
 
-def _miss(force: float, row: Expected) -> float:
-    """How far a peak is from the published one, 1 at the edge of what is admitted."""
+def _deviation(force: float, row: Expected) -> float:
+    """Return the deviation of a peak from the published one, 1 at the edge of the tolerance."""
     low, high = span(row)
     if low == high:
         return (force / low - 1.0) / _TOLERANCE
@@ -271,12 +256,14 @@ def _miss(force: float, row: Expected) -> float:
 
 
 def _fit_friction(valve: Valve) -> Valve:
-    """The friction that leaves the published forces at zero velocity, where the oil spring is still loaded."""
-    rows = [row for row in rig_tests() if row.quantity == AT_ZERO]
-    cold, hot = (_friction_for(valve, row) for row in rows)
+    """Fit the friction to the published forces at zero velocity, where the oil spring is still loaded."""
+    cold, hot = (
+        row.number - (loop_in(stand_damper(valve, row.setting or ""), row).force_at_rest - _friction_in(valve, row))
+        for row in rig_tests()
+        if row.quantity == FORCE_AT_REST
+    )
     return replace(valve, friction=cold, friction_fall=math.log(cold / hot) / (HOT_DEGC - COLD_DEGC))
 
 
-def _friction_for(valve: Valve, row: Expected) -> float:
-    loaded = loop_in(stand_damper(valve, row.setting or ""), row).at_zero - valve.friction_at(row.temperature_degC or 0)
-    return row.number - loaded
+def _friction_in(valve: Valve, row: Expected) -> float:
+    return valve.friction_at(row.temperature_degC or REFERENCE_DEGC)

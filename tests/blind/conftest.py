@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pzd.blind.benchmark import Benchmark, Methods
-from pzd.blind.case import Places, Scored
+from pzd.blind.case import CaseFiles, Scored
 from pzd.blind.hide import BenchmarkSetup
 from pzd.config import RunConfig, load
 from pzd.parallel.config import Where
@@ -62,7 +62,7 @@ def benchmark_of(setup_of: Callable[[RunConfig], BenchmarkSetup]) -> Callable[[R
     def made(config: RunConfig, folder: Path) -> Benchmark:
         setup = setup_of(config)
         methods = Methods(config.identify, config.diagnose, config.rig.limits, setup.control, config.seed)
-        return Benchmark(setup, methods, Places(folder), "test", Where(setup.blind, "blind", folder, folder))
+        return Benchmark(setup, methods, CaseFiles(folder), "test", Where(setup.blind, "blind", folder, folder))
 
     return made
 

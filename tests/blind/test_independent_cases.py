@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pzd.blind.case import Places, Scored, Truth, read_clean
-from pzd.blind.hide import BenchmarkSetup
-from pzd.blind.hide_independent import hide_independent, hideable, plan_independent
-from pzd.blind.independent.case import LAWS, OUTSIDE, drawn_case
-from pzd.blind.independent.stand import SHARES
-from pzd.blind.plan import PlannedCase
+from pzd.blind.case import CaseFiles, Scored, Truth, read_noise_free
+from pzd.blind.hide import BenchmarkSetup, hide
+from pzd.blind.independent.case import drawn_case
+from pzd.blind.independent.laws import LAWS
+from pzd.blind.independent.outside import OUTSIDE
+from pzd.blind.independent.stand import CAMPAIGNS
+from pzd.blind.plan import PlannedCase, hideable_independently, plan
 from pzd.blind.rates import false_name, rightly_outside, visible, wrong_name
 from pzd.blind.targets import independent_lines
 from pzd.config import RunConfig
@@ -32,23 +33,23 @@ def test_the_diagnosis_is_given_records_and_nothing_else(
     small: Callable[..., RunConfig], setup_of: Callable[[RunConfig], BenchmarkSetup], tmp_path: Path
 ) -> None:
     planned = PlannedCase(4, "single", "one_frequency", ("asymmetry",))
-    places = Places(tmp_path)
-    hide_independent(setup_of(small()), planned, places)
-    given = [path for path in places.case(planned.id).rglob("*") if path.is_file()]
-    assert {path.parent for path in given} == {places.rig(planned.id)}
+    files = CaseFiles(tmp_path)
+    hide(setup_of(small("blind.generator=independent")), planned, files)
+    given = [path for path in files.case(planned.id).rglob("*") if path.is_file()]
+    assert {path.parent for path in given} == {files.rig(planned.id)}
     header = given[0].read_text(encoding="utf-8").partition("\n")[0]
     assert set(header.split(",")) <= {"time_s", "displacement_m", "force_N", "voltage_V", "temperature_degC"}
-    truth = read_json(places.truth(planned.id), Truth, Control())
+    truth = read_json(files.truth(planned.id), Truth, Control())
     assert truth.effects == ("asymmetry",)
     assert truth.one_frequency
-    clean = read_clean(places.clean(planned.id))
+    clean = read_noise_free(files.noise_free(planned.id))
     assert len(clean) == len(given)
     for record in clean.values():  # gain, offset and noise of the channel stay below a few per cent
         assert np.std(record.recorded - record.force) < 0.05 * record.peak
     assert 0.002 < truth.visible_gap < 0.15
 
 
-def test_a_case_hangs_on_seed_and_number_alone() -> None:
+def test_an_independent_case_depends_on_seed_and_number_alone() -> None:
     one, same, other = (drawn_case(seed, 7, "one_frequency", ()) for seed in (11, 11, 12))
     assert all(np.array_equal(a.force, b.force) for a, b in zip(one.tests, same.tests, strict=True))
     assert one.base != other.base
@@ -58,12 +59,12 @@ def test_a_case_hangs_on_seed_and_number_alone() -> None:
 def test_the_cases_hide_every_law_and_every_form(small: Callable[..., RunConfig]) -> None:
     config = small("blind.cases=400", "blind.kinds.outside=1", "blind.kinds.pair=1", "blind.generator=independent")
     assert config.blind is not None
-    cases = plan_independent(config.blind)
+    cases = plan(config.blind)
     assert {c.hidden[0] for c in cases if c.kind == "outside"} == set(OUTSIDE)
     assert {c.hidden[0] for c in cases if c.kind == "single"} == set(LAWS)
-    assert {c.campaign for c in cases} == set(SHARES)
+    assert {c.campaign for c in cases} == set(CAMPAIGNS)
     assert all(len(set(c.hidden)) == 2 for c in cases if c.kind == "pair")
-    assert ("valve_lag",) not in hideable("two_by_two", "single")
+    assert ("valve_lag",) not in hideable_independently("two_by_two", "single")
 
 
 def test_a_form_outside_is_rightly_left_or_rightly_described(case: Callable[..., Scored]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from fresh_truths import autoregressive
 from numpy.random import Generator
 
-from pzd.blind.hide import of_size
+from pzd.blind.hide import parameters_of_size
 from pzd.damper.compose import respond
 from pzd.damper.effect import Scales
 from pzd.damper.effects import library
@@ -166,7 +166,7 @@ def _hiding(rng: Generator, plain: Damper, motions: list[Motion], size: float) -
 
     hiding = library()[name].hidden
     assert hiding is not None, name
-    values = of_size(hiding(rng, scales), changed, size)
+    values = parameters_of_size(hiding(rng, scales), changed, size)
     if name == "relief_valve" and values["F_r"] <= plain.base[0].T0_N:
         # Always open, it leaves a Bingham element with C_r for C: nothing is hidden, so another effect is drawn.
         return _hiding(rng, plain, motions, size)

@@ -6,14 +6,14 @@ import pytest
 
 from pzd.artefacts import Identified, ReferenceRow, Rides
 from pzd.config import RunConfig
-from pzd.paper.published import AT_ZERO, LARGE_GAP, PEAK, SMALL_GAP, published, rig_tests, span
+from pzd.paper.published import FORCE_AT_REST, LARGE_GAP, PEAK, SMALL_GAP, published, rig_tests, span
 from pzd.paper.valve import VALVE
 from pzd.quantities import Control
 from pzd.report.reference import Expected, compared
 from pzd.report.run_numbers import RunNumbers
 
 PEAKS = [row for row in rig_tests() if row.quantity == PEAK]
-AT_REST = [row for row in rig_tests() if row.quantity == AT_ZERO]
+FORCES_AT_REST = [row for row in rig_tests() if row.quantity == FORCE_AT_REST]
 NOT_COMPUTED = {"POWER", "TEMP-start", "TEMP-end"}
 
 IDENTIFIED = {
@@ -41,7 +41,7 @@ def test_maxima_of_the_stand_are_within_2_percent(row: Expected, beside: dict[st
     assert allowed[0] * low <= found <= allowed[1] * high
 
 
-@pytest.mark.parametrize("row", AT_REST, ids=lambda row: row.id)
+@pytest.mark.parametrize("row", FORCES_AT_REST, ids=lambda row: row.id)
 def test_forces_at_zero_velocity_are_within_10_percent(row: Expected, beside: dict[str, ReferenceRow]) -> None:
     assert beside[row.id].computed == pytest.approx(row.number, rel=0.10)
 

@@ -6,7 +6,7 @@ import pytest
 
 from pzd.damper.effects import library
 from pzd.paper.__main__ import verdict_on
-from pzd.paper.contradiction import Attempt, _attempt, attempts, excluded, misses
+from pzd.paper.contradiction import Attempt, attempt, attempts, excluded, model_errors
 
 FORCES = {
     "F4-0": 2085,
@@ -34,33 +34,33 @@ def tried() -> dict[tuple[str, str], Attempt]:
 
 
 def test_the_element_with_the_tables_parameters_gives_other_forces_than_measured() -> None:
-    assert {miss.id: miss.element for miss in misses()} == pytest.approx(FORCES, abs=1.0)
+    assert {error.id: error.element for error in model_errors()} == pytest.approx(FORCES, abs=1.0)
 
 
 def test_the_model_is_short_by_8_to_22_percent_at_the_higher_speed_and_7_at_half_of_it() -> None:
-    shares = {miss.id: miss.share for miss in misses()}
+    shares = {error.id: error.share for error in model_errors()}
     higher = [shares[name] for name in ("F5-0", "F5-50", "F5-100", "F5-150")]
     assert (max(higher), min(higher)) == pytest.approx((-0.077, -0.222), abs=0.001)
     assert shares["F6-1"] == pytest.approx(-0.067, abs=0.001)
 
 
 def test_the_model_gets_stiffer_with_heat_where_the_measurement_gets_softer() -> None:
-    found = {miss.id: miss for miss in misses()}
+    found = {error.id: error for error in model_errors()}
     assert found["F8-43"].element > found["F8-23"].element
     assert found["F8-43"].measured < found["F8-23"].measured
 
 
 def test_no_one_orifice_coefficient_closes_the_tables() -> None:
-    needed = {miss.id: miss.orifice or 0.0 for miss in misses()}
+    needed = {error.id: error.orifice or 0.0 for error in model_errors()}
     assert needed["F4-0"] > 3.0 * needed["F4-100"]  # falls where the slot closes
     assert needed["F8-43"] < 0.0 < needed["F8-23"]
 
 
 def test_the_element_closes_the_gap_without_the_tables_and_an_orifice_does_not_with_them() -> None:
     """Of what the whole survey below says, the two that need no other effect tried."""
-    assert _attempt("nothing of the tables", None).closes
-    assert _attempt("tables", None).worst > 5.0
-    assert _attempt("tables", library()["orifice_quadratic"]).worst > 5.0
+    assert attempt("nothing of the tables", None).closes
+    assert attempt("tables", None).worst > 5.0
+    assert attempt("tables", library()["orifice_quadratic"]).worst > 5.0
 
 
 @pytest.mark.ci

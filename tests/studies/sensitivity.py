@@ -30,10 +30,10 @@ import numpy as np
 
 from pzd.artefacts import base_of
 from pzd.blind import rates
-from pzd.blind.benchmark import counted
-from pzd.blind.case import Places, Scored, Truth
+from pzd.blind.case import CaseFiles, Scored, Truth
 from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.plan import PlannedCase, plan
+from pzd.blind.score import counted_effects
 from pzd.config import RunConfig, load
 from pzd.damper.effect import Effect
 from pzd.damper.model import Damper
@@ -211,9 +211,15 @@ def outcome(case: PlannedCase, truth: Truth, answer: Answer) -> str:
     """`right`, `wrong` or, where it is neither, `open`."""
     verdict, effects, rivals = answer
     score = Scored.model_construct(
-        kind=case.kind, hidden=truth.form or "", described_by=truth.described_by, truth=counted(truth), failure=None,
-        verdict=verdict, effects=tuple(effects), rivals=tuple(rivals),
-    )  # fmt: skip
+        kind=case.kind,
+        hidden=truth.form or "",
+        described_by=truth.described_by,
+        truth=counted_effects(truth),
+        failure=None,
+        verdict=verdict,
+        effects=tuple(effects),
+        rivals=tuple(rivals),
+    )
     judged: dict[str, tuple[rates.Predicate, rates.Predicate]] = {
         "none": (lambda s: s.verdict == "none", rates.false_name),
         "outside": (rates.rightly_outside, rates.wrong_single),
@@ -225,7 +231,7 @@ def outcome(case: PlannedCase, truth: Truth, answer: Answer) -> str:
 def prepared_case(config: RunConfig, setup: BenchmarkSetup, case: PlannedCase) -> Case:
     """A case drawn, ingested, identified and cleaned."""
     with tempfile.TemporaryDirectory() as folder:
-        places = Places(Path(folder))
+        places = CaseFiles(Path(folder))
         hide(setup, case, places)
         truth = read_json(places.truth(case.id), Truth, setup.control)
         rig = ingest(RigConfig(files=(FilesEntry(path="rig/*.csv"),)), setup.control, places.case(case.id))

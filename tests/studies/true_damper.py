@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import pzd.cli  # noqa: F401  # before numpy: as in the command, the linear algebra has one thread
 from pzd.artefacts import base_of
-from pzd.blind.case import Places, Truth
+from pzd.blind.case import CaseFiles, Truth
 from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.plan import plan
 from pzd.config import RunConfig
@@ -70,7 +70,7 @@ def audited(asked: argparse.Namespace, folder: Path) -> Iterator[tuple[Truth, Le
     if config.blind is None or config.rig.virtual is None:
         raise SystemExit(f"{asked.config}: needs a block blind and a virtual rig, as configs/blind.yaml has")
     setup = BenchmarkSetup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
-    places = Places(folder)
+    places = CaseFiles(folder)
     for case in plan(setup.blind):
         if case.kind == "outside" or asked.campaign not in (None, case.campaign):
             continue

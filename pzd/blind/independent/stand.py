@@ -1,4 +1,8 @@
-"""The stand: an actuator that does not quite follow, a control signal, an oil that warms."""
+"""A test stand as laboratories have them: campaigns of tests, the motion of the actuator, and the measuring chain.
+
+A campaign draws its tests. The actuator follows each as a loop of second order, and the damper warms by its work. The
+data logger adds gains, offsets and their drift, noise, hum, a coarse clock and coarse numbers.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +15,7 @@ from numpy.random import Generator
 
 from pzd.record import Array, Rows
 
-# ----------------------------------------------------------------------------------------------------
-# Campaigns as laboratories run them: which motions, at which values of the control signal, sampled how fast.
+# --- Campaigns: which motions, at which values of the control signal, sampled how fast ---
 
 
 MotionKind = Literal["sine", "two_tone", "triangle", "sweep", "random"]
@@ -36,7 +39,7 @@ class LaboratoryTest:
 
     @property
     def seconds(self) -> float:
-        """How long it is recorded."""
+        """Length of the recording [s]."""
         return float(self.cycles) if self.kind in ("sweep", "random") else self.cycles / self.frequency
 
 
@@ -52,25 +55,25 @@ class LaboratoryCampaign:
 
     @property
     def one_frequency(self) -> bool:
-        """Whether all tests are sines of one frequency, so that a spring and a mass are the same thing."""
+        """Whether all tests are sines of one frequency, so that a spring and a mass cannot be told apart."""
         return {t.kind for t in self.tests} == {"sine"} and len({t.frequency for t in self.tests}) == 1
 
 
 RATES = (500.0, 512.0, 1000.0, 1024.0, 2000.0, 4000.0)
 """Usual rates of data loggers [Hz]."""
 MOST_SAMPLES = 40_000
-"""In all tests of a case; longer campaigns are sampled more slowly."""
+"""In all tests of a case, so that a diagnosis takes seconds; longer campaigns are sampled more slowly."""
 
 
-def one_frequency(draw: Generator, stroke: float) -> list[LaboratoryTest]:
-    """A crank drive: one frequency, one stroke."""
-    frequency = float(draw.choice([0.5, 1.0, 1.5, 2.0]))
+def one_frequency(rng: Generator, stroke: float) -> list[LaboratoryTest]:
+    """Plan the test of a crank drive: one frequency, one stroke."""
+    frequency = float(rng.choice([0.5, 1.0, 1.5, 2.0]))
     return [LaboratoryTest("sine", stroke, frequency, 10)]
 
 
-def two_by_two(draw: Generator, stroke: float) -> list[LaboratoryTest]:
-    """Two frequencies at two strokes each."""
-    low, ratio = float(draw.choice([0.5, 1.0, 1.3])), float(draw.choice([2.0, 2.5, 3.0]))
+def two_by_two(rng: Generator, stroke: float) -> list[LaboratoryTest]:
+    """Plan two frequencies at two strokes each."""
+    low, ratio = float(rng.choice([0.5, 1.0, 1.3])), float(rng.choice([2.0, 2.5, 3.0]))
     return [
         LaboratoryTest("sine", stroke * size * (1.0 if f == low else 0.7), f, 8)
         for f in (low, low * ratio)
@@ -78,16 +81,16 @@ def two_by_two(draw: Generator, stroke: float) -> list[LaboratoryTest]:
     ]
 
 
-def constant_stroke(draw: Generator, stroke: float) -> list[LaboratoryTest]:
-    """The usual acceptance test of suspension dampers: one stroke, the speed set by the frequency."""
+def constant_stroke(rng: Generator, stroke: float) -> list[LaboratoryTest]:
+    """Plan the usual acceptance test of suspension dampers: one stroke, the speed set by the frequency."""
     speeds = (0.052, 0.131, 0.262, 0.393, 0.524)  # the series 52 to 524 mm/s of the manufacturers
     frequencies = [round(speed / (2.0 * np.pi * stroke), 2) for speed in speeds]
     return [LaboratoryTest("sine", stroke, f, 5) for f in frequencies]
 
 
-def sines_and_triangles(draw: Generator, stroke: float) -> list[LaboratoryTest]:
-    """Constant speeds by triangles, between sines."""
-    low = float(draw.choice([0.5, 1.0]))
+def sines_and_triangles(rng: Generator, stroke: float) -> list[LaboratoryTest]:
+    """Plan constant speeds by triangles, between sines."""
+    low = float(rng.choice([0.5, 1.0]))
     return [
         LaboratoryTest("sine", stroke, low, 6),
         LaboratoryTest("sine", 0.4 * stroke, 3.0 * low, 8),
@@ -96,9 +99,9 @@ def sines_and_triangles(draw: Generator, stroke: float) -> list[LaboratoryTest]:
     ]
 
 
-def broadband(draw: Generator, stroke: float) -> list[LaboratoryTest]:
-    """Sines, two tones, a sweep and a random motion."""
-    low = float(draw.choice([0.7, 1.0, 1.2]))
+def broadband(rng: Generator, stroke: float) -> list[LaboratoryTest]:
+    """Plan sines, two tones, a sweep and a random motion."""
+    low = float(rng.choice([0.7, 1.0, 1.2]))
     return [
         LaboratoryTest("sine", stroke, low, 6),
         LaboratoryTest("sine", 0.4 * stroke, 2.5 * low, 8),
@@ -108,51 +111,43 @@ def broadband(draw: Generator, stroke: float) -> list[LaboratoryTest]:
     ]
 
 
-def moving_signal(draw: Generator, stroke: float) -> list[LaboratoryTest]:
-    """Two by two, and tests in which the control signal steps and ramps."""
-    low = float(draw.choice([1.0, 1.3]))
+def moving_signal(rng: Generator, stroke: float) -> list[LaboratoryTest]:
+    """Plan two by two, and tests in which the control signal steps and ramps."""
+    low = float(rng.choice([1.0, 1.3]))
     return [
-        *two_by_two(draw, stroke),
+        *two_by_two(rng, stroke),
         LaboratoryTest("sine", 0.8 * stroke, low, 8, "steps"),
         LaboratoryTest("sine", 0.8 * stroke, low, 8, "ramp"),
     ]
 
 
-CAMPAIGNS: Mapping[str, Callable[[Generator, float], list[LaboratoryTest]]] = {
-    "one_frequency": one_frequency,
-    "two_by_two": two_by_two,
-    "constant_stroke": constant_stroke,
-    "sines_and_triangles": sines_and_triangles,
-    "broadband": broadband,
-    "moving_signal": moving_signal,
+CAMPAIGNS: Mapping[str, tuple[float, Callable[[Generator, float], list[LaboratoryTest]]]] = {
+    "one_frequency": (0.1, one_frequency),
+    "two_by_two": (0.22, two_by_two),
+    "constant_stroke": (0.2, constant_stroke),
+    "sines_and_triangles": (0.16, sines_and_triangles),
+    "broadband": (0.16, broadband),
+    "moving_signal": (0.16, moving_signal),
 }
-"""Every campaign by name."""
-SHARES: Mapping[str, float] = {
-    "one_frequency": 0.1,
-    "two_by_two": 0.22,
-    "constant_stroke": 0.2,
-    "sines_and_triangles": 0.16,
-    "broadband": 0.16,
-    "moving_signal": 0.16,
-}
-"""How many of the cases run each."""
+"""Every campaign by name: the share of the cases that run it, and its tests from the largest stroke [m]."""
 
 
-def campaign(name: str, draw: Generator) -> LaboratoryCampaign:
-    """The tests of a case.
+def campaign(name: str, rng: Generator) -> LaboratoryCampaign:
+    """Draw the campaign of a case.
 
     Parameters
     ----------
     name : of the campaign
-    draw : where stroke, speeds, control values and the sampling rate come from
+    rng : where stroke, speeds, control values and the sampling rate come from
     """
-    stroke = float(draw.choice([0.01, 0.015, 0.02, 0.025, 0.03]))
-    tests = CAMPAIGNS[name](draw, stroke)
-    count = int(draw.integers(2, 4)) if name == "moving_signal" else int(draw.integers(1, 6))
+    stroke = float(rng.choice([0.01, 0.015, 0.02, 0.025, 0.03]))
+    _, planned = CAMPAIGNS[name]
+    tests = planned(rng, stroke)
+    count = int(rng.integers(2, 4)) if name == "moving_signal" else int(rng.integers(1, 6))
     count = min(count, 3) if len(tests) > 1 else count
     if len(tests) > 4:
         count = min(count, 2)
-    highest = float(draw.choice([2.0, 5.0, 12.0, 150.0]))
+    highest = float(rng.choice([2.0, 5.0, 12.0, 150.0]))
     values = tuple(float(v) for v in np.round(np.linspace(0.0, highest, count), 3))
     every = [
         LaboratoryTest(t.kind, t.amplitude, t.frequency, t.cycles, t.signal, value)
@@ -161,16 +156,16 @@ def campaign(name: str, draw: Generator) -> LaboratoryCampaign:
     ]
     seconds = sum(test.seconds for test in every)
     fast_enough = [r for r in RATES if r * seconds <= MOST_SAMPLES]
-    return LaboratoryCampaign(tuple(every), values, float(draw.choice(fast_enough or RATES[:1])))
+    return LaboratoryCampaign(tuple(every), values, float(rng.choice(fast_enough or RATES[:1])))
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- The motion of a test, and the heat of all of them ---
 
 
-FINEST = 1.25e-4
-"""Longest step of the integration [s]: `tests/blind` shows what it costs."""
+LONGEST_STEP = 1.25e-4
+"""Of the integration [s]: it costs less than 1e-5 of the force, see tests/blind/test_independent_laws.py."""
 REST = 0.3
-"""The actuator stands still for so long before it starts [s]."""
+"""Rest of the actuator before it starts [s]."""
 COOLING = 120.0
 """Time constant with which the damper loses its heat to the stand [s]."""
 PAUSE = 20.0
@@ -179,7 +174,7 @@ PAUSE = 20.0
 
 @dataclass(frozen=True)
 class Actuator:
-    """How the position follows what is asked for."""
+    """How the position follows its demand."""
 
     natural_frequency: float
     """Of the closed loop [Hz]."""
@@ -193,20 +188,20 @@ class Actuator:
     """How far the middle of the motion moves during a test, as a share of its amplitude."""
 
     @classmethod
-    def drawn(cls, draw: Generator) -> Actuator:
-        """One as they stand in laboratories."""
+    def drawn(cls, rng: Generator) -> Actuator:
+        """Draw one as laboratories have them."""
         return cls(
-            natural_frequency=float(draw.uniform(12.0, 40.0)),
-            damping_ratio=float(draw.uniform(0.35, 0.9)),
-            even=float(draw.normal(0.0, 0.004)),
-            odd=float(draw.normal(0.0, 0.008)),
-            wander=float(draw.normal(0.0, 0.004)),
+            natural_frequency=float(rng.uniform(12.0, 40.0)),
+            damping_ratio=float(rng.uniform(0.35, 0.9)),
+            even=float(rng.normal(0.0, 0.004)),
+            odd=float(rng.normal(0.0, 0.008)),
+            wander=float(rng.normal(0.0, 0.004)),
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """What one test does to the damper, on the fine grid; every array is (2 n + 1,)."""
+    """The motion and the control signal of one test on a fine grid; every array is (2 n + 1,)."""
 
     test: LaboratoryTest
     time: Array
@@ -217,66 +212,72 @@ class Driven:
     acceleration: Array
     signal: Array
     """The control signal [V]."""
-    thinned: int
+    steps_per_sample: int
     """Steps of the integration from one recorded sample to the next."""
+
+    @property
+    def kinematics(self) -> tuple[Array, Array, Array]:
+        """Displacement [m], velocity [m/s] and acceleration [m/s2]."""
+        return self.displacement, self.velocity, self.acceleration
 
     @property
     def recorded(self) -> Rows:
         """(m,) indices of the fine grid at which the logger samples."""
-        every = 2 * self.thinned
+        every = 2 * self.steps_per_sample
         first = int(np.argmin(np.abs(self.time)))
         return np.arange(first, self.time.size, every)
 
 
 def driven(
-    campaign: LaboratoryCampaign, test: LaboratoryTest, actuator: Actuator, draw: Generator, coarse: bool = False
+    campaign: LaboratoryCampaign, test: LaboratoryTest, actuator: Actuator, rng: Generator, coarse: bool = False
 ) -> Driven:
-    """The motion of a test on the fine grid.
+    """Compute the motion of a test on the fine grid.
 
     Parameters
     ----------
     campaign : which it is of
-    test : what is asked for
-    actuator : how it is followed
-    draw : phases of tones and of a random motion
+    test : the demand
+    actuator : how the demand is followed
+    rng : phases of tones and of a random motion
     coarse : steps four times as long, for a first look
     """
     step = 1.0 / campaign.rate
-    thinned = int(np.ceil(step / (FINEST * (4.0 if coarse else 1.0))))
-    half = 0.5 * step / thinned
-    before = round((REST + _run_in(test)) / step) * thinned * 2
-    after = round(test.seconds / step) * thinned * 2
+    per_sample = int(np.ceil(step / (LONGEST_STEP * (4.0 if coarse else 1.0))))
+    half = 0.5 * step / per_sample
+    before = round((REST + _run_in(test)) / step) * per_sample * 2
+    after = round(test.seconds / step) * per_sample * 2
     time = np.asarray(np.arange(-before, after + 1) * half, dtype=np.float64)
-    asked = _asked(test, time, draw)
+    demand = _demand(test, time, rng)
     begun = np.clip((time - time[0] - REST) / (0.6 * _run_in(test)), 0.0, 1.0)
-    asked *= begun * begun * (3.0 - 2.0 * begun)
-    x = _followed(asked, half, actuator)
+    demand *= begun * begun * (3.0 - 2.0 * begun)
+    x = _followed(demand, half, actuator)
     share = x / test.amplitude
     x = x * (1.0 + actuator.even * share + actuator.odd * share**2)
     x = x + actuator.wander * test.amplitude * np.clip(time, 0.0, None) / test.seconds
     velocity = np.gradient(x, half)
-    return Driven(test, time, x, velocity, np.gradient(velocity, half), _signal(campaign, test, time), thinned)
+    return Driven(test, time, x, velocity, np.gradient(velocity, half), _signal(campaign, test, time), per_sample)
 
 
 def _run_in(test: LaboratoryTest) -> float:
-    """Seconds between rest and recording."""
+    """Return the time between rest and recording [s]."""
     return 1.0 if test.kind in ("sweep", "random") else max(1.0, 1.5 / test.frequency)
 
 
-def _asked(test: LaboratoryTest, time: Array, draw: Generator) -> Array:
+def _demand(test: LaboratoryTest, time: Array, rng: Generator) -> Array:
+    """Return the (n,) displacement that the actuator is asked for [m]."""
     phase = 2.0 * np.pi * test.frequency * time
     if test.kind == "sine":
         return np.asarray(test.amplitude * np.sin(phase))
     if test.kind == "triangle":
         return np.asarray(test.amplitude * 2.0 / np.pi * np.arcsin(np.sin(phase)))
     if test.kind == "two_tone":
-        second = np.sin(3.0 * phase + draw.uniform(0.0, 2.0 * np.pi))
+        second = np.sin(3.0 * phase + rng.uniform(0.0, 2.0 * np.pi))
         return np.asarray(test.amplitude * (0.7 * np.sin(phase) + 0.3 * second))
     if test.kind == "sweep":
         return test.amplitude * _swept(test, time)
     frequencies = np.arange(0.2, 3.0 * test.frequency, 0.07)
     strength = 1.0 / (1.0 + (frequencies / test.frequency) ** 4)
-    phases = draw.uniform(0.0, 2.0 * np.pi, frequencies.size)
+    phases = rng.uniform(0.0, 2.0 * np.pi, frequencies.size)
     summed = np.zeros_like(time)
     for frequency, size, start in zip(frequencies, strength, phases, strict=True):
         summed += size * np.sin(2.0 * np.pi * frequency * time + start)
@@ -284,7 +285,7 @@ def _asked(test: LaboratoryTest, time: Array, draw: Generator) -> Array:
 
 
 def _swept(test: LaboratoryTest, time: Array) -> Array:
-    """(n,) logarithmic sweep whose amplitude falls with the root of the frequency; before it a sine of the lowest."""
+    """Return an (n,) logarithmic sweep whose amplitude falls with the root of its frequency, led in by a sine."""
     lowest = 0.5
     ratio = np.log(test.frequency / lowest)
     share = np.clip(time, 0.0, test.seconds) / test.seconds
@@ -292,16 +293,17 @@ def _swept(test: LaboratoryTest, time: Array) -> Array:
     return np.asarray(np.exp(-0.5 * ratio * share) * np.sin(2.0 * np.pi * turns))
 
 
-def _followed(asked: Array, step: float, actuator: Actuator) -> Array:
-    """(n,) what a loop of second order makes of what is asked for."""
+def _followed(demand: Array, step: float, actuator: Actuator) -> Array:
+    """Return the (n,) response of a loop of second order to a demand."""
     from scipy.signal import bilinear, lfilter
 
     omega = 2.0 * np.pi * actuator.natural_frequency
     b, a = bilinear([omega**2], [1.0, 2.0 * actuator.damping_ratio * omega, omega**2], 1.0 / step)
-    return np.asarray(lfilter(b, a, asked))
+    return np.asarray(lfilter(b, a, demand))
 
 
 def _signal(campaign: LaboratoryCampaign, test: LaboratoryTest, time: Array) -> Array:
+    """Return the (n,) control signal of a test [V]."""
     low, high = campaign.values[0], campaign.values[-1]
     if test.signal == "constant":
         return np.full_like(time, test.value)
@@ -314,7 +316,7 @@ def _signal(campaign: LaboratoryCampaign, test: LaboratoryTest, time: Array) -> 
 
 
 def warmed(motions: Sequence[Driven], forces: Sequence[Array], start: float, capacity: float) -> list[Array]:
-    """Temperatures of the damper over the tests, one after the other.
+    """Compute the temperature of the damper over the tests, one after the other.
 
     Equation: c dT/dt = F v - c (T - T_start)/t_c
 
@@ -329,7 +331,7 @@ def warmed(motions: Sequence[Driven], forces: Sequence[Array], start: float, cap
     -------
     of each test, (2 n + 1,) [degC]
     """
-    above, found = 0.0, []
+    above, temperatures = 0.0, []  # kelvin above the room, as a test begins
     for motion, force in zip(motions, forces, strict=True):
         time = motion.time[::2]
         power = np.clip(force * motion.velocity[::2], 0.0, None)
@@ -337,13 +339,12 @@ def warmed(motions: Sequence[Driven], forces: Sequence[Array], start: float, cap
         step = time[1] - time[0]
         heat = np.concatenate([[0.0], np.cumsum(0.5 * step * (power[1:] * growth[1:] + power[:-1] * growth[:-1]))])
         excess = (above + heat / capacity) / growth
-        found.append(np.interp(motion.time, time, start + excess))
+        temperatures.append(np.interp(motion.time, time, start + excess))
         above = float(excess[-1]) * float(np.exp(-PAUSE / COOLING))
-    return found
+    return temperatures
 
 
-# ----------------------------------------------------------------------------------------------------
-# What the data logger has of a test: gains, offsets and their drift, noise, hum, a coarse clock and coarse numbers.
+# --- The measuring chain ---
 
 
 SPECTRUM = (
@@ -376,8 +377,8 @@ class Chain:
     """Mains frequency [Hz]."""
     displacement_noise: float
     """[m]"""
-    zero: float
-    """What the displacement shows in the middle of the stroke [m]."""
+    displacement_zero: float
+    """Reading of the displacement in the middle of the stroke [m]."""
     force_step: float
     """[N]"""
     displacement_step: float
@@ -386,18 +387,18 @@ class Chain:
     """Time stamps are multiples of this [s]."""
 
     @classmethod
-    def drawn(cls, draw: Generator, peak: float, stroke: float, rate: float) -> Chain:
-        """One as they stand in laboratories."""
+    def drawn(cls, rng: Generator, peak: float, stroke: float, rate: float) -> Chain:
+        """Draw one as laboratories have them."""
         return cls(
-            white=float(np.exp(draw.uniform(np.log(3e-4), np.log(3e-3)))),
-            recorded=float(draw.uniform(0.1, 0.8)),
-            hum=float(draw.choice([0.0, 0.5e-3, 2e-3])),
-            mains=float(draw.choice([50.0, 60.0]) + draw.normal(0.0, 0.02)),
-            displacement_noise=float(np.exp(draw.uniform(np.log(1e-6), np.log(2e-5)))),
-            zero=float(draw.choice([0.0, 1.0]) * draw.normal(0.0, 0.3)) * stroke,
-            force_step=2.5 * peak / 2 ** int(draw.choice([12, 14, 16])),
-            displacement_step=float(draw.choice([1e-6, 2e-6, 5e-6])),
-            clock=float(draw.choice([c for c in (1e-6, 1e-5, 1e-4) if c <= 0.25 / rate])),
+            white=float(np.exp(rng.uniform(np.log(3e-4), np.log(3e-3)))),
+            recorded=float(rng.uniform(0.1, 0.8)),
+            hum=float(rng.choice([0.0, 0.5e-3, 2e-3])),
+            mains=float(rng.choice([50.0, 60.0]) + rng.normal(0.0, 0.02)),
+            displacement_noise=float(np.exp(rng.uniform(np.log(1e-6), np.log(2e-5)))),
+            displacement_zero=float(rng.choice([0.0, 1.0]) * rng.normal(0.0, 0.3)) * stroke,
+            force_step=2.5 * peak / 2 ** int(rng.choice([12, 14, 16])),
+            displacement_step=float(rng.choice([1e-6, 2e-6, 5e-6])),
+            clock=float(rng.choice([c for c in (1e-6, 1e-5, 1e-4) if c <= 0.25 / rate])),
         )
 
 
@@ -416,19 +417,19 @@ class ErrorsOfTest:
     """Displacement at rest [m]."""
 
     @classmethod
-    def drawn(cls, draw: Generator, peak: float) -> ErrorsOfTest:
-        """Those of one test whose largest force is the peak [N]."""
+    def drawn(cls, rng: Generator, peak: float) -> ErrorsOfTest:
+        """Draw those of one test whose largest force is the peak [N]."""
         return cls(
-            gain=float(np.clip(draw.normal(0.0, 0.01), -0.025, 0.025)),
-            offset=float(np.clip(draw.normal(0.0, 0.003), -0.008, 0.008)) * peak,
-            drift=float(np.clip(draw.normal(0.0, 0.002), -0.005, 0.005)) * peak,
-            delay=float(np.clip(draw.normal(0.0, 2e-4), -5e-4, 5e-4)),
-            position=float(draw.normal(0.0, 2e-5)),
+            gain=float(np.clip(rng.normal(0.0, 0.01), -0.025, 0.025)),
+            offset=float(np.clip(rng.normal(0.0, 0.003), -0.008, 0.008)) * peak,
+            drift=float(np.clip(rng.normal(0.0, 0.002), -0.005, 0.005)) * peak,
+            delay=float(np.clip(rng.normal(0.0, 2e-4), -5e-4, 5e-4)),
+            position=float(rng.normal(0.0, 2e-5)),
         )
 
 
-def sensed_force(time: Array, force: Array, peak: float, chain: Chain, errors: ErrorsOfTest, draw: Generator) -> Array:
-    """(n,) what the force channel shows [N].
+def sensed_force(time: Array, force: Array, peak: float, chain: Chain, errors: ErrorsOfTest, rng: Generator) -> Array:
+    """Return the (n,) reading of the force channel [N].
 
     Parameters
     ----------
@@ -437,41 +438,41 @@ def sensed_force(time: Array, force: Array, peak: float, chain: Chain, errors: E
     peak : largest force of the case [N]
     chain : of the case
     errors : of the test
-    draw : of the noise
+    rng : of the noise
     """
     own = float(np.max(np.abs(force)))
-    shown = (1.0 + errors.gain) * np.interp(time - errors.delay, time, force) + errors.offset
-    shown = shown + errors.drift * (time - time[0]) / (time[-1] - time[0])
-    phase = 2.0 * np.pi * chain.mains * time + draw.uniform(0.0, 2.0 * np.pi)
-    shown = shown + chain.hum * peak * (np.sin(phase) + 0.3 * np.sin(3.0 * phase))
-    shown = shown + chain.white * peak * draw.normal(size=time.size)
-    shown = shown + chain.recorded * own * coloured(time.size, float(time[1] - time[0]), draw)
-    return np.asarray(np.round(shown / chain.force_step) * chain.force_step)
+    reading = (1.0 + errors.gain) * np.interp(time - errors.delay, time, force) + errors.offset
+    reading = reading + errors.drift * (time - time[0]) / (time[-1] - time[0])
+    phase = 2.0 * np.pi * chain.mains * time + rng.uniform(0.0, 2.0 * np.pi)
+    reading = reading + chain.hum * peak * (np.sin(phase) + 0.3 * np.sin(3.0 * phase))
+    reading = reading + chain.white * peak * rng.normal(size=time.size)
+    reading = reading + chain.recorded * own * coloured(time.size, float(time[1] - time[0]), rng)
+    return np.asarray(np.round(reading / chain.force_step) * chain.force_step)
 
 
-def coloured(count: int, step: float, draw: Generator) -> Array:
-    """(n,) noise of the recorded spectrum, of a force whose peak is 1; below 1 Hz as at 1 Hz.
+def coloured(count: int, step: float, rng: Generator) -> Array:
+    """Draw (n,) noise of the recorded spectrum, of a force whose peak is 1; below 1 Hz as at 1 Hz.
 
     Parameters
     ----------
     count : n
     step : sampling interval [s]
-    draw : of the noise
+    rng : of the noise
     """
     length = 2 * count  # twice as long, so that its end does not run into its beginning
     frequency = np.fft.rfftfreq(length, step)
     known, density = np.array(SPECTRUM).T
     wanted = np.exp(np.interp(np.log(np.maximum(frequency, known[0])), np.log(known), np.log(density)))
-    white = np.fft.rfft(draw.normal(size=length))
+    white = np.fft.rfft(rng.normal(size=length))
     return np.asarray(np.fft.irfft(white * np.sqrt(wanted / (2.0 * step)), length)[:count])
 
 
-def sensed_displacement(time: Array, x: Array, chain: Chain, errors: ErrorsOfTest, draw: Generator) -> Array:
-    """(n,) what the displacement channel shows [m]; `x` (n,) counts from the middle of the stroke."""
-    shown = x + chain.zero + errors.position + chain.displacement_noise * draw.normal(size=time.size)
-    return np.asarray(np.round(shown / chain.displacement_step) * chain.displacement_step)
+def sensed_displacement(time: Array, x: Array, chain: Chain, errors: ErrorsOfTest, rng: Generator) -> Array:
+    """Return the (n,) reading of the displacement channel [m]; `x` (n,) counts from the middle of the stroke."""
+    reading = x + chain.displacement_zero + errors.position + chain.displacement_noise * rng.normal(size=time.size)
+    return np.asarray(np.round(reading / chain.displacement_step) * chain.displacement_step)
 
 
 def stamped(time: Array, chain: Chain) -> Array:
-    """(n,) time stamps as the clock gives them [s]."""
+    """Return the (n,) time stamps of a coarse clock [s]."""
     return np.asarray(np.round(time / chain.clock) * chain.clock)

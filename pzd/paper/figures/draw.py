@@ -1,4 +1,4 @@
-"""All twenty figures drawn and written: PNG and SVG, the index and the manifest."""
+"""Draws all twenty figures and writes them: PNG and SVG, the manifest and the index."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ from pzd.quantities import Control
 from pzd.schema.model import Frozen
 from pzd.schema.validate import write_json
 
-# ----------------------------------------------------------------------------------------------------
-# What the manifest of the figures says of each.
+# --- The manifest ---
 
 
 class FigureFiles(Frozen):
-    """One picture of a figure."""
+    """The files of one picture."""
 
     png: str
     svg: str
     """Names of its files."""
     alt: str
     caption: str
-    """What it shows, with its numbers beside the paper's."""
+    """Its numbers, beside the paper's."""
     sha256: dict[str, str]
     """Hash of each file."""
 
@@ -44,26 +43,7 @@ class FigureEntry(Frozen):
     """Why nothing is drawn; None where something is."""
 
 
-# ----------------------------------------------------------------------------------------------------
-# index.html: all twenty figures with what each is made from, relative links, no script.
-
-
-def page(entries: Sequence[FigureEntry]) -> str:
-    """Fill the template; every text is escaped there."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("pzd.paper.figures", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template("index.html").render(entries=entries)
-
-
-# ----------------------------------------------------------------------------------------------------
+# --- Drawing and writing ---
 
 
 FOLDER = "figures"
@@ -82,20 +62,31 @@ class FigureSet:
         for name, content in self.files.items():
             (folder / name).write_bytes(content)
         write_json(folder / "manifest.json", self.entries, Control())
-        (folder / "index.html").write_text(page(self.entries), encoding="utf-8", newline="\n")
+        (folder / "index.html").write_text(_page(self.entries), encoding="utf-8", newline="\n")
+
+
+def _page(entries: Sequence[FigureEntry]) -> str:
+    """Return index.html: every figure with its sources, relative links, no script; the template escapes every text."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("pzd.paper.figures", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template("index.html").render(entries=entries)
 
 
 def drawn(data: FigureData, say: Callable[[str], None] = lambda _: None) -> FigureSet:
-    """Every figure of the paper from a run.
+    """Draw every figure of the paper from a run; a figure whose test the run lacks says so.
 
     Parameters
     ----------
     data : the run
-    say : takes a line about each picture
-
-    Returns
-    -------
-    the figure_set; a figure whose test the run lacks says so
+    say : is called with a line about each picture
     """
     import matplotlib as mpl
 
@@ -106,12 +97,12 @@ def drawn(data: FigureData, say: Callable[[str], None] = lambda _: None) -> Figu
             entry, mine = _entry(figure, data)
             entries.append(entry)
             files |= mine
-            for line in _described(entry):
+            for line in _lines(entry):
                 say(line)
     return FigureSet(tuple(entries), files)
 
 
-def _described(entry: FigureEntry) -> Iterator[str]:
+def _lines(entry: FigureEntry) -> Iterator[str]:
     if entry.missing is not None:
         yield f"figure {entry.figure:2d}: not drawn: {entry.missing}"
     for picture in entry.pictures:

@@ -1,8 +1,8 @@
-"""All that the figures are drawn from: the artefacts of a run, and how tests and rows are found in them."""
+"""The sources of the figures: the artefacts of a run, tests and parameters found in them, and rides on its dampers."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +14,12 @@ from pzd.damper.model import Damper
 from pzd.force_table.config import TableConfig
 from pzd.paper.published import Loop
 from pzd.quantities import Control
-from pzd.record import Record
+from pzd.record import Array, Record
 from pzd.report.reference import Expected
 from pzd.runs import Run
 from pzd.simulate.config import SimulateConfig
 
-# ----------------------------------------------------------------------------------------------------
-# What becomes of the paper's ride when the damper is not ideal: the same car on what each gap can do.
+# --- The paper's ride on the damper of one setting ---
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,20 +41,16 @@ def rides_on(
     table: TableConfig,
     control: Control,
 ) -> SettingRides:
-    """The run's car and roads on the plain damper of one setting of the valve.
+    """Ride the run's car and roads on the baseline damper of one setting of the valve.
 
     Parameters
     ----------
     damper : identified at this setting
     setting : of the valve
     rig : its records say how fast the damper was tested
-    simulate : what is ridden
+    simulate : the rides
     table : how the table is made
     control : the control signal
-
-    Returns
-    -------
-    the table and the rides
     """
     from pzd.force_table.stage import force_table
     from pzd.simulate.stage import simulate as ride
@@ -71,50 +66,23 @@ def rides_on(
     return SettingRides(setting, made, rides, min(slopes))
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Sine:
-    """A sine of the stand."""
-
-    frequency: float
-    """[Hz]"""
-    amplitude: float
-    """[m]"""
-
-    def __str__(self) -> str:
-        """In words."""
-        return f"{self.frequency:g} Hz, {self.amplitude:g} m"
-
-
-@dataclass(frozen=True)
-class Condition:
-    """Setting, voltage [V] and temperature [degC] of the damper."""
-
-    setting: str
-    voltage: float
-    temperature: float = 22.0
-
-    def __str__(self) -> str:
-        """In words."""
-        return f"{self.setting}, {self.voltage:g} V, {self.temperature:g} °C"
-
-    @property
-    def conditions(self) -> Conditions:
-        """What of a test it states."""
-        return Conditions(self.setting, self.voltage, self.temperature)
+# --- Tests, conditions and parameters of the run ---
 
 
 @dataclass(frozen=True, eq=False)
-class Test:
+class RigTest:
     """One test of the rig with its measures."""
 
     record: Record
     measure: MeasureRow
 
     def cycle(self) -> Loop:
-        """The average cycle, closed."""
+        """Return the average cycle, closed.
+
+        Raises
+        ------
+        LookupError : when the record does not repeat
+        """
         from pzd.signals.cycles import cycles
 
         record = self.record
@@ -126,19 +94,24 @@ class Test:
         return Loop(x[points], v[points], force[points], np.linspace(0.0, run.period, points.size))
 
     def last(self, count: int) -> slice:
-        """The samples of the last cycles."""
+        """Return the samples of the last cycles."""
         period = 1.0 / (self.measure.frequency_Hz or 1.0)
         return slice(int(np.searchsorted(self.record.time, self.record.time[-1] - count * period)), None)
+
+    def loop(self, count: int, force: Array) -> Loop:
+        """Return an (n,) force [N] in the motion of the test, over its last cycles."""
+        part, record = self.last(count), self.record
+        return Loop(record.displacement[part], record.velocity[part], force[part], record.time[part])
 
 
 @dataclass(frozen=True, eq=False)
 class FigureData:
-    """A run, as far as its parameters, and what its plain dampers do in the car."""
+    """A run as far as its parameters, and rides on its baseline damper."""
 
     rig: Rig
     identified: Identified
     rides_of_setting: SettingRides
-    """The plain damper's table in the chosen setting, and the ideal rides."""
+    """Table of the baseline damper in the chosen setting, and the ideal rides."""
     simulate: SimulateConfig
     tabulate: TableConfig
     control: Control
@@ -146,50 +119,48 @@ class FigureData:
 
     @classmethod
     def of(cls, run: Run, config: RunConfig) -> FigureData:
-        """What a run that is up to date as far as its parameters leads to by the paper's own, plain model."""
+        """Read a run that is up to date as far as its parameters, and ride on the paper's own Bingham model."""
         rig, identified = run.read(Rig), run.read(Identified)
         setting = setting_in_use(config.setting, [entry.setting for entry in rig.entries])
         ideal = config.simulate.model_copy(update={"policies": ("constant", "comfort"), "fidelities": ("ideal",)})
         rides_of_setting = rides_on(base_of(identified.rows, setting), setting, rig, ideal, config.table, run.control)
         return cls(rig, identified, rides_of_setting, config.simulate, config.table, run.control, setting)
 
-    def test(self, condition: Condition, sine: Sine) -> Test:
-        """The test of a condition with a sine.
+    def test(self, conditions: Conditions) -> RigTest:
+        """Return the test of some conditions, its sine among them.
 
         Raises
         ------
         LookupError : when the rig has none
         """
-        wanted = replace(condition.conditions, frequency_Hz=sine.frequency, amplitude_m=sine.amplitude)
-        found = matching(self.identified.measures, wanted)
+        found = matching(self.identified.measures, conditions)
         if not found:
-            raise LookupError(f"the rig has no test at {condition}, {sine}")
-        return Test(next(record for record in self.rig.records if record.name == found[0].record), found[0])
+            raise LookupError(f"the rig has no test at {conditions}")
+        return RigTest(next(record for record in self.rig.records if record.name == found[0].record), found[0])
 
-    def test_of(self, row: Expected) -> Test:
-        """The test in which a published number was measured.
+    def test_of(self, row: Expected) -> RigTest:
+        """Return the test in which a published number was measured.
 
         Raises
         ------
         LookupError : when the rig has none
         """
-        condition = Condition(str(row.setting), row.voltage_V or 0.0, row.temperature_degC or 22.0)
-        return self.test(condition, Sine(row.frequency_Hz or 0.0, row.amplitude_m or 0.0))
+        return self.test(row.conditions)
 
-    def row(self, condition: Condition) -> ParameterRow:
-        """The identified parameters of a condition.
+    def row(self, conditions: Conditions) -> ParameterRow:
+        """Return the identified parameters of a condition of the damper.
 
         Raises
         ------
         LookupError : when there are none
         """
-        found = matching(self.identified.rows, condition.conditions)
+        found = matching(self.identified.rows, conditions)
         if not found:
-            raise LookupError(f"the rig has no tests at {condition}")
+            raise LookupError(f"the rig has no tests at {conditions}")
         return found[0]
 
     def ride(self, frequency: float, policy: str, fidelity: str) -> SummaryRow:
-        """The line of a ride over a sine.
+        """Return the summary of a ride over a sine.
 
         Raises
         ------

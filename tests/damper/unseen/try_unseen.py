@@ -15,8 +15,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from pzd.artefacts import Diagnosed, ForceRow, Table, TableNotes
-from pzd.blind.benchmark import COST, Methods, diagnose_case
-from pzd.blind.case import Places
+from pzd.blind.benchmark import Methods, diagnose_case
+from pzd.blind.case import COST, CaseFiles
 from pzd.blind.hide import BenchmarkSetup, hide
 from pzd.blind.plan import PlannedCase, hideable
 from pzd.config import load
@@ -197,7 +197,7 @@ def named(name: str) -> dict[str, object]:
         path.write_text(CONFIG, encoding="utf-8")
         config = load(path, ())
         setup = BenchmarkSetup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
-        places, planned = Places(Path(folder)), PlannedCase(0, "single", "all", (name,))
+        places, planned = CaseFiles(Path(folder)), PlannedCase(0, "single", "all", (name,))
         hide(setup, planned, places)
         methods = Methods(config.identify, config.diagnose, config.rig.limits, setup.control, config.seed)
         diagnose_case(methods, places.case(planned.id))

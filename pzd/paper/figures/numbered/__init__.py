@@ -1,4 +1,4 @@
-"""The figures by the paper's number, one file each; every module here is found by itself."""
+"""The figures by the paper's number: every module here declares a family as `FIGURES`, and is found by itself."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ import pkgutil
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
+from types import ModuleType
 from typing import TYPE_CHECKING, Literal
 
 from pzd.paper.figures.sources import FigureData
-
-# ----------------------------------------------------------------------------------------------------
-# What a figure of the paper is here: what it is made from, and what draws it.
-
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,28 +29,30 @@ class Drawing:
     figure: Figure
     alt: str
     caption: str
-    """What the picture shows, with its numbers beside the paper's."""
+    """Its numbers, beside the paper's."""
 
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """One figure of the paper."""
+    """One figure of the paper, and how it is drawn."""
 
     number: int
     title: str
-    """What the paper shows there."""
+    """Of the figure in the paper."""
     source: Source
     made_from: str
-    """What ours is made from, in one sentence."""
+    """Data or model that ours is made from, in one sentence."""
     draw: Callable[[FigureData], Iterable[Drawing]] | None = None
     """None for a photograph; raises LookupError where the run has no test that the figure needs."""
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
 @cache
 def library() -> dict[int, PaperFigure]:
-    """Every figure by its number, in the order of the paper."""
-    found = [importlib.import_module(f"{__name__}.{info.name}").FIGURE for info in pkgutil.iter_modules(__path__)]
-    return {figure.number: figure for figure in sorted(found, key=lambda figure: figure.number)}
+    """Return every figure by its number, in the order of the paper."""
+    figures = [figure for family in families() for figure in family.FIGURES]
+    return {figure.number: figure for figure in sorted(figures, key=lambda figure: figure.number)}
+
+
+def families() -> list[ModuleType]:
+    """Import every module of this package."""
+    return [importlib.import_module(f"{__name__}.{info.name}") for info in pkgutil.iter_modules(__path__)]

@@ -1,1 +1,0 @@
-"""The laws that the library of effects names, written anew from their sources, one file each."""
