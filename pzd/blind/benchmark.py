@@ -28,7 +28,7 @@ from pzd.diagnosis.config import DiagnoseConfig
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.prepared_record import warm_up
 from pzd.parallel.chunks import ChunkedWork
-from pzd.parallel.config import Where
+from pzd.parallel.engines import Where
 from pzd.parallel.processes import Listener, Progress, no_listener
 from pzd.quantities import Control
 from pzd.rig.config import FilesEntry, Limits, RigConfig

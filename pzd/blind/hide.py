@@ -22,7 +22,7 @@ from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Cont
 from pzd.record import Array
 from pzd.rig.stand.config import DisplacementNoise, ForceNoise, Jitter, Noise, VirtualEntry
 from pzd.rig.stand.frame import force_in_frame
-from pzd.rig.stand.recording import Taken, take
+from pzd.rig.stand.recording import StandRecord, run_campaign
 from pzd.schema.csvfile import write_columns
 from pzd.schema.validate import write_json
 from pzd.signals.nuisance import NuisanceConfig
@@ -294,7 +294,7 @@ def hide(setup: BenchmarkSetup, planned: PlannedCase, places: Places) -> None:
     write_clean(places.clean(planned.id), _known(records))
 
 
-def drawn(setup: BenchmarkSetup, planned: PlannedCase) -> tuple[Truth, list[Taken]]:
+def drawn(setup: BenchmarkSetup, planned: PlannedCase) -> tuple[Truth, list[StandRecord]]:
     """The truth of a case, and what the data logger has of it.
 
     Parameters
@@ -318,7 +318,7 @@ def drawn(setup: BenchmarkSetup, planned: PlannedCase) -> tuple[Truth, list[Take
         hidden, law = None, force_in_frame
         damper = with_effects(stand.damper, wanted, plain, draw)
     recorded = stand.model_copy(update={"damper": damper, **_noise(setup, share, rho, unsteady)})
-    records = list(take(recorded, stand_seed, control=setup.control, law=law))
+    records = list(run_campaign(recorded, stand_seed, control=setup.control, law=law))
     clean = _known(records)
     return Truth(
         id=planned.id,
@@ -382,10 +382,10 @@ def _noise(setup: BenchmarkSetup, share: float, rho: float, unsteady: float) -> 
 
 
 def _clean(stand: VirtualEntry, seed: int, control: Control) -> list[Clean]:
-    return _known(take(stand, seed, control=control))
+    return _known(run_campaign(stand, seed, control=control))
 
 
-def _known(records: Iterable[Taken]) -> list[Clean]:
+def _known(records: Iterable[StandRecord]) -> list[Clean]:
     return [Clean(record.truth, record.true_force, record.force) for record in records]
 
 
@@ -401,7 +401,7 @@ def _given_other(records: Sequence[Clean], damper: Damper) -> dict[str, float]:
     }
 
 
-def _channels(record: Taken) -> dict[str, Array | None]:
+def _channels(record: StandRecord) -> dict[str, Array | None]:
     """The columns of a rig file: what a data logger has."""
     columns = {TIME.column: record.time, DISPLACEMENT.column: record.displacement, FORCE.column: record.force}
     more = {VOLTAGE.column: record.voltage, TEMPERATURE.column: record.temperature}

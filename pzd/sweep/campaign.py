@@ -14,7 +14,8 @@ from pathlib import Path
 from pzd.artefacts import Diagnosed
 from pzd.config import SweepConfig
 from pzd.parallel.chunks import ChunkedWork
-from pzd.parallel.config import HOW, Where
+from pzd.parallel.config import HOW
+from pzd.parallel.engines import Where
 from pzd.parallel.processes import Listener, Progress, no_listener
 from pzd.pipeline.dependencies import code_hash
 from pzd.quantities import Control

@@ -33,8 +33,7 @@ from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.parallel import chunks
 from pzd.parallel.chunks import ChunkedWork
-from pzd.parallel.config import Pools, Where
-from pzd.parallel.engines import local
+from pzd.parallel.engines import Pools, Where
 from pzd.parallel.processes import spawned_pool
 from pzd.schema.errors import ConfigError
 
@@ -112,7 +111,7 @@ def test_cases_are_drawn_and_diagnosed_in_processes_of_their_own(
         begun.append(count)
         return spawned_pool(count)
 
-    monkeypatch.setattr(local, "spawned_pool", counted)
+    monkeypatch.setattr(engines, "spawned_pool", counted)
     (case,) = benchmark_of(small("blind.cases=1"), tmp_path).run(jobs=2)
     assert begun == [1, 1]
     assert case.failure is None

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from pzd.parallel.chunks import TRIES, ChunkedWork
-from pzd.parallel.config import EngineConfig, Pools, Where
-from pzd.parallel.engines import ENGINES
+from pzd.parallel.config import EngineConfig
+from pzd.parallel.engines import ENGINES, Pools, Where
 from pzd.schema.errors import DataError
 
 CHUNKS = tuple((first, first + 1) for first in range(0, 12, 2))

@@ -16,7 +16,7 @@ from pzd.damper.element import element_force
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
 from pzd.rig.stand.config import VirtualEntry
-from pzd.rig.stand.recording import take
+from pzd.rig.stand.recording import run_campaign
 
 
 def test_canonical_columns_need_nothing_but_the_path(tmp_path: Path) -> None:
@@ -173,7 +173,7 @@ def test_the_virtual_fixture_and_its_removal_are_one_law(tmp_path: Path) -> None
         "tests": [{"waveform": {"kind": "sine", "frequency_Hz": 2.0, "amplitude_m": 0.01}, "cycles": 4}],
     }
     with_fixture = VirtualEntry.model_validate_json(json.dumps(stand | {"fixture": fixture}))
-    (shown,) = take(with_fixture, 1)
+    (shown,) = run_campaign(with_fixture, 1)
     columns = {"time_s": shown.time, "displacement_m": shown.displacement, "force_N": shown.force}
     write(tmp_path / "a.csv", lines(columns))
     (record,) = run(tmp_path, {"path": "a.csv", "fixture": fixture}).records

@@ -20,7 +20,7 @@ from pzd.config import load
 from pzd.quantities import Control
 from pzd.rig.files.formats import formats
 from pzd.rig.files.guess import guessed
-from pzd.rig.files.layouts import all_layouts
+from pzd.rig.files.layout import all_layouts
 from pzd.rig.stage import ingest
 
 INCH, KIP, POUND = 0.0254, 4448.2216152605, 4.4482216152605

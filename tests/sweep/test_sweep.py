@@ -20,7 +20,7 @@ from pzd.artefacts import Diagnosed, ParameterRow
 from pzd.config import SweepConfig
 from pzd.damper.model import BaseRow, Damper
 from pzd.parallel import chunks
-from pzd.parallel.config import Pools, Where
+from pzd.parallel.engines import Pools, Where
 from pzd.parallel.processes import Progress
 from pzd.pipeline.command import execute
 from pzd.quantities import Control

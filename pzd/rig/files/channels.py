@@ -283,7 +283,7 @@ def _instants(sheet: Sheet, source: _Source) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Test:
+class RawRecord:
     """One test of one file, in SI and degC; every channel is (n,)."""
 
     __test__ = False
@@ -314,7 +314,7 @@ class Test:
 
 def split_into_tests(
     channels: Channels, sheet: Sheet, layout: Layout, values: Values, setting: str | None
-) -> tuple[Test, ...]:
+) -> tuple[RawRecord, ...]:
     """Every test of one file, with the values that no column holds.
 
     Raises
@@ -334,7 +334,7 @@ def split_into_tests(
         raise ConfigError(twice)
     alone = split is None and len(sheet.starts) == 1
     if channels.faults:
-        return (Test(None, setting, channels.values, sheet, faults=channels.faults, whole=alone),)
+        return (RawRecord(None, setting, channels.values, sheet, faults=channels.faults, whole=alone),)
     starts = _starts(sheet, split, channels.values[TIME], place)
     bounds = list(zip(starts, [*starts[1:], sheet.rows], strict=True))
     faults = [
@@ -346,7 +346,7 @@ def split_into_tests(
     if faults:
         raise ConfigError(faults)
     return tuple(
-        Test(
+        RawRecord(
             index + 1 if len(bounds) > 1 else None,
             setting,
             _piece(channels.values, values, index, first, last),
@@ -422,7 +422,7 @@ def _piece(channels: dict[Quantity, Array], values: Values, index: int, first: i
 
 
 @dataclass(frozen=True, eq=False)
-class Freed:
+class DamperAlone:
     """Displacement and force of the damper alone, and what was taken out."""
 
     displacement: Array
@@ -432,15 +432,15 @@ class Freed:
     """Whether the displacement was recorded on the damper itself, no frame in between."""
 
 
-def damper_alone(test: Test, fixture: Fixture | None) -> Freed:
+def damper_alone(test: RawRecord, fixture: Fixture | None) -> DamperAlone:
     """Displacement and force of the damper alone, of a test behind a fixture; None where nothing is known of one."""
     time, displacement, force = (test.channels[quantity] for quantity in (TIME, DISPLACEMENT, FORCE))
     if fixture is None:
-        return Freed(displacement, force, "")
+        return DamperAlone(displacement, force, "")
     return free(fixture, time, displacement, force, test.force_sign)
 
 
-def free(fixture: Fixture, time: Array, displacement: Array, force: Array, sign: int = 1) -> Freed:
+def free(fixture: Fixture, time: Array, displacement: Array, force: Array, sign: int = 1) -> DamperAlone:
     """Displacement and force of the damper alone.
 
     Equation: F = s (F_cell - F_tare) - m a, x = x_rig - F / k_frame
@@ -469,4 +469,4 @@ def free(fixture: Fixture, time: Array, displacement: Array, force: Array, sign:
     if fixture.stiffness_N_per_m:
         displacement = displacement - force / fixture.stiffness_N_per_m
         said.append(f"give of the frame at {fixture.stiffness_N_per_m:g} N/m")
-    return Freed(displacement, force, ", ".join(said), on_the_damper=not fixture.stiffness_N_per_m)
+    return DamperAlone(displacement, force, ", ".join(said), on_the_damper=not fixture.stiffness_N_per_m)

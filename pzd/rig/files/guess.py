@@ -16,8 +16,7 @@ from pzd.record import Array
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
 from pzd.rig.files.dialect import after_lines
 from pzd.rig.files.formats import TEXT, read_sheet
-from pzd.rig.files.layout import NEEDED, own_quantity
-from pzd.rig.files.layouts import all_layouts, named_layout
+from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, own_quantity
 from pzd.rig.files.reading import read
 from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.sniffing import (

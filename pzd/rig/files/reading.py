@@ -18,12 +18,12 @@ from pzd.artefacts import IngestRow
 from pzd.quantities import ACCELERATION, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
 from pzd.record import Array, Record
 from pzd.rig.config import FilesEntry, Limits
-from pzd.rig.files.channels import Freed, Test, channels, damper_alone, split_into_tests
+from pzd.rig.files.channels import DamperAlone, RawRecord, channels, damper_alone, split_into_tests
 from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import Layout, layouts
 from pzd.rig.files.refusals import refuse, sign_fault, works_on_the_rig
 from pzd.rig.files.sheet import ReadingStep
-from pzd.rig.preflight import Measured
+from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.model import safe_name
 from pzd.signals.cycles import cycles
@@ -116,7 +116,7 @@ def matching(folder: Path, pattern: str) -> list[Path]:
 # Accepted tests as records with all their channels, and the names of the records.
 
 
-def measured(name: str, test: Test, freed: Freed, limits: Limits, control: Control) -> Measured:
+def measured(name: str, test: RawRecord, freed: DamperAlone, limits: Limits, control: Control) -> PreflightRecord:
     """The record of a test, with velocity and acceleration recorded or derived.
 
     Parameters
@@ -142,10 +142,12 @@ def measured(name: str, test: Test, freed: Freed, limits: Limits, control: Contr
         freed.force,
         *(test.channels.get(quantity) for quantity in (VOLTAGE, TEMPERATURE, PRESSURE)),
     )
-    return Measured(record, run, clean, limits, freed.said or None, control, test.remarks, _ingested(name, test, freed))
+    return PreflightRecord(
+        record, run, clean, limits, freed.said or None, control, test.remarks, _ingested(name, test, freed)
+    )
 
 
-def _ingested(name: str, test: Test, freed: Freed) -> tuple[IngestRow, ...]:
+def _ingested(name: str, test: RawRecord, freed: DamperAlone) -> tuple[IngestRow, ...]:
     """What was done to the file of a record, as rows of the ingest report."""
     steps = (*test.steps, *([ReadingStep("fixture", None, freed.said, "taken out")] if freed.said else []))
     return tuple(
@@ -209,7 +211,7 @@ SAME_STEP = 1e-3
 """Steps that differ by less than this share of the usual one are the same, written with many digits."""
 
 
-def on_regular_clock(test: Test) -> Test:
+def on_regular_clock(test: RawRecord) -> RawRecord:
     """The test with the stamps of its clock unrounded; as it is where its clock shows no rounding.
 
     Parameters
@@ -253,7 +255,7 @@ def _unrounded(time: Array) -> tuple[Array, float] | None:
 
 def read(
     entries: Sequence[FilesEntry], limits: Limits, control: Control, folder: Path
-) -> tuple[Callable[[], Measured], ...]:
+) -> tuple[Callable[[], PreflightRecord], ...]:
     """Every test of every file, refused or accepted; what is returned makes the record of each, in any order.
 
     Parameters
@@ -271,7 +273,7 @@ def read(
     """
     files = listed(entries, folder)
     described = layouts(entries, control, folder)
-    tests: list[tuple[Test, Freed]] = []
+    tests: list[tuple[RawRecord, DamperAlone]] = []
     layout_of: dict[Path, Layout] = {}
     config_faults: list[str] = []
     data_faults: list[str] = []
@@ -296,7 +298,7 @@ def read(
     )
 
 
-def _read_file(path: Path, layout: Layout) -> list[tuple[Test, Freed]]:
+def _read_file(path: Path, layout: Layout) -> list[tuple[RawRecord, DamperAlone]]:
     """The tests of one file, and displacement and force of the damper alone in each."""
     entry = layout.entry
     values, setting = layout.values(path)

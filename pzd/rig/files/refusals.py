@@ -11,7 +11,7 @@ import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, TIME, VELOCITY
 from pzd.record import Array, clock_fault
-from pzd.rig.files.channels import COMPRESSION, Freed, Test
+from pzd.rig.files.channels import COMPRESSION, DamperAlone, RawRecord
 from pzd.rig.files.layout import Layout
 from pzd.schema.errors import DataError
 from pzd.signals.smoothing import REVERSAL_SHARE, reversals, work, work_of_chance
@@ -24,7 +24,7 @@ CLEAR_OFFSET = 0.1
 """Mean force, as a share of half the force's range, from which its sign says which way the force is counted."""
 
 
-def works_on_the_rig(freed: Freed) -> bool:
+def works_on_the_rig(freed: DamperAlone) -> bool:
     """Whether the damper does work on the rig over a test.
 
     Not where a steady force over a net displacement does it, nor where it is so little that a damper which hardly slips
@@ -35,7 +35,9 @@ def works_on_the_rig(freed: Freed) -> bool:
     return work(x, force) < -chance and work(x, force - force.mean()) < -chance
 
 
-def sign_fault(test: Test, freed: Freed, layout: Layout, others: Sequence[tuple[Test, Freed]]) -> str:
+def sign_fault(
+    test: RawRecord, freed: DamperAlone, layout: Layout, others: Sequence[tuple[RawRecord, DamperAlone]]
+) -> str:
     """What to do about a test over which the damper does work on the rig, and which channel is turned over.
 
     Parameters
@@ -54,7 +56,7 @@ def sign_fault(test: Test, freed: Freed, layout: Layout, others: Sequence[tuple[
     return f"{what}: {channel} has the wrong sign, since {why}; say sign: {{{channel}: {sign}}}"
 
 
-def _by_header(test: Test, layout: Layout) -> tuple[str, str] | None:
+def _by_header(test: RawRecord, layout: Layout) -> tuple[str, str] | None:
     for spec in layout.channels:
         if spec.quantity in (DISPLACEMENT, FORCE) and spec.sign == 1:
             heads = [head for head in test.sheet.header if head in spec.headers and COMPRESSION.search(head)]
@@ -63,7 +65,9 @@ def _by_header(test: Test, layout: Layout) -> tuple[str, str] | None:
     return None
 
 
-def _by_others(test: Test, freed: Freed, others: Sequence[tuple[Test, Freed]]) -> tuple[str, str] | None:
+def _by_others(
+    test: RawRecord, freed: DamperAlone, others: Sequence[tuple[RawRecord, DamperAlone]]
+) -> tuple[str, str] | None:
     offsets = [_offset(other) for mate, other in others if mate.setting == test.setting]
     clear = [offset for offset in offsets if offset is not None]
     mine = _offset(freed)
@@ -74,7 +78,7 @@ def _by_others(test: Test, freed: Freed, others: Sequence[tuple[Test, Freed]]) -
     return channel, f"the mean force is {mine:+.4g} N here and {theirs:+.4g} N in the files whose work is right"
 
 
-def _by_gas(freed: Freed) -> tuple[str, str] | None:
+def _by_gas(freed: DamperAlone) -> tuple[str, str] | None:
     """A gas force pushes the rod out, so it is negative at every position and less so the further the rod is out."""
     offset = _offset(freed)
     if offset is None:
@@ -83,7 +87,7 @@ def _by_gas(freed: Freed) -> tuple[str, str] | None:
     return channel, f"the mean force of {offset:+.4g} N, if it is the gas force and no tare, is negative in extension"
 
 
-def _offset(freed: Freed) -> float | None:
+def _offset(freed: DamperAlone) -> float | None:
     """The mean force where it is clearly off zero."""
     low, high = np.percentile(freed.force, (1.0, 99.0))
     middle = 0.5 * float(low + high)
@@ -111,7 +115,7 @@ LEAST_REVERSALS = 2
 """Fewer turns of the motion are no test of a damper."""
 
 
-def refuse(tests: Sequence[Test], layout: Layout) -> None:
+def refuse(tests: Sequence[RawRecord], layout: Layout) -> None:
     """Refuse a file one of whose tests cannot be used, whatever its fixture.
 
     Parameters
@@ -129,7 +133,7 @@ def refuse(tests: Sequence[Test], layout: Layout) -> None:
             raise DataError(found)
 
 
-def _faults(test: Test, layout: Layout) -> list[str]:
+def _faults(test: RawRecord, layout: Layout) -> list[str]:
     if test.faults:
         readable = test.whole and TIME in test.channels
         return [*test.faults, *(_standstills(test) if readable else [])]
@@ -147,7 +151,7 @@ def _faults(test: Test, layout: Layout) -> list[str]:
     return _too_large(test) + _too_few(test, x) + _two_rates(test) + _milliseconds(test, layout)
 
 
-def _standstills(test: Test) -> list[str]:
+def _standstills(test: RawRecord) -> list[str]:
     """Where the clock stands still or goes back, in a line; empty where it goes on. NaN is another's fault."""
     time = test.channels[TIME]
     fault = clock_fault(time)
@@ -163,7 +167,7 @@ def _rounded(time: Array) -> str:
     return f"; it has too few digits: leave its column out and say rate_Hz, about {rate:.5g} here"
 
 
-def _two_rates(test: Test) -> list[str]:
+def _two_rates(test: RawRecord) -> list[str]:
     """A clock that goes on at another rate: neither rate is the record's."""
     time = test.channels[TIME]
     steps = np.diff(time)
@@ -183,7 +187,7 @@ def _two_rates(test: Test) -> list[str]:
     return []
 
 
-def _milliseconds(test: Test, layout: Layout) -> list[str]:
+def _milliseconds(test: RawRecord, layout: Layout) -> list[str]:
     """A clock in steps of seconds beside a motion that creeps, unless the config itself says its unit."""
     time, x = test.channels[TIME], test.channels[DISPLACEMENT]
     said = any(spec.quantity is TIME and spec.unit is not None for spec in layout.channels)
@@ -195,7 +199,7 @@ def _milliseconds(test: Test, layout: Layout) -> list[str]:
     return [f"{test.place(0)}: {what}; {remedy}"]
 
 
-def _too_large(test: Test) -> list[str]:
+def _too_large(test: RawRecord) -> list[str]:
     time, x = test.channels[TIME], test.channels[DISPLACEMENT]
     found: list[str] = []
     if np.ptp(x) > LONGEST_STROKE:
@@ -234,7 +238,7 @@ def _despiked(x: Array) -> Array:
     return np.concatenate((middle[:1], middle[:1], middle, middle[-1:], middle[-1:]))
 
 
-def _too_few(test: Test, x: Array) -> list[str]:
+def _too_few(test: RawRecord, x: Array) -> list[str]:
     count = len(reversals(x))
     if count >= LEAST_REVERSALS:
         return []

@@ -20,10 +20,9 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.quantities import Control
 from pzd.record import Array, Record
-from pzd.rig.stand.config import ChannelNoise, PlannedRecord, StandTest, VirtualEntry
+from pzd.rig.stand.config import ChannelNoise, PlannedRecord, StandTest, VirtualEntry, Warming, voltage_over
 from pzd.rig.stand.frame import force_in_frame
-from pzd.rig.stand.programmes import Warming, voltage_over
-from pzd.rig.stand.waveform import started
+from pzd.rig.stand.waveforms import started
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import Kinematics, kinematics
 from pzd.signals.noise import recursion
@@ -153,7 +152,7 @@ ForceLaw = Callable[[Damper, Motion, float | None], Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
+class StandRecord:
     """One record as the data logger has it, and the truth behind it; every array is (n,)."""
 
     name: str
@@ -191,13 +190,13 @@ def records(
     DataError : when the file of a motion cannot be read
     """
     found = []
-    for taken in take(entry, seed, folder, control):
+    for taken in run_campaign(entry, seed, folder, control):
         clean = kinematics(taken.time, taken.displacement, cycles(taken.time, taken.displacement))
         found.append(record_of(taken, clean))
     return tuple(found)
 
 
-def record_of(taken: Taken, clean: Kinematics) -> Record:
+def record_of(taken: StandRecord, clean: Kinematics) -> Record:
     """The record of a test, its velocity and acceleration derived from the recorded displacement."""
     return Record(
         taken.name,
@@ -212,13 +211,13 @@ def record_of(taken: Taken, clean: Kinematics) -> Record:
     )
 
 
-def take(
+def run_campaign(
     entry: VirtualEntry,
     seed: int,
     folder: Path = Path(),
     control: Control | None = None,
     law: ForceLaw = force_in_frame,
-) -> Iterator[Taken]:
+) -> Iterator[StandRecord]:
     """Run the campaign, one record after the other.
 
     Parameters
@@ -229,12 +228,12 @@ def take(
     control : the control signal, whose unit stands in the names
     law : gives the force; another law puts another damper into the stand
     """
-    return map(taker(entry, seed, folder, law), entry.plan(control))
+    return map(recorder(entry, seed, folder, law), entry.plan(control))
 
 
-def taker(
+def recorder(
     entry: VirtualEntry, seed: int, folder: Path = Path(), law: ForceLaw = force_in_frame
-) -> Callable[[PlannedRecord], Taken]:
+) -> Callable[[PlannedRecord], StandRecord]:
     """What takes one planned record, in any order; it keeps the motion of the test that it took last.
 
     Parameters
@@ -243,7 +242,7 @@ def taker(
     """
     drive: _Drive | None = None
 
-    def taken(planned: PlannedRecord) -> Taken:
+    def taken(planned: PlannedRecord) -> StandRecord:
         nonlocal drive
         if drive is None or drive.test is not planned.test:
             drive = _drive(entry, planned.test, seed, folder)
@@ -279,7 +278,7 @@ def _duration(test: StandTest, folder: Path) -> float:
     return (test.cycles or test.waveform.usual_cycles) * test.waveform.cycle(folder)
 
 
-def _taken(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, seed: int, law: ForceLaw) -> Taken:
+def _taken(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, seed: int, law: ForceLaw) -> StandRecord:
     motion, force = _truth(entry, planned, drive, law)
     force += entry.fixture.tare_N + entry.fixture.mass_kg * motion.acceleration
     draw = partial(draw_for, seed, planned.name)
@@ -287,7 +286,7 @@ def _taken(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, seed: int
     late = _sensed_force(entry, motion.time, force, sampled, draw("jitter"))
     truth = _sampled(motion, sampled)
     noise, resolution = entry.noise, entry.resolution
-    return Taken(
+    return StandRecord(
         planned.name,
         entry.setting,
         truth.time,

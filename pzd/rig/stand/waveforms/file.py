@@ -10,7 +10,7 @@ from pydantic import Field
 
 from pzd.quantities import DISPLACEMENT, TIME, Control
 from pzd.record import Array
-from pzd.rig.stand.waveform import Course, Waveform
+from pzd.rig.stand.waveforms import Course, Waveform
 from pzd.schema.csvfile import read_columns
 from pzd.schema.errors import ConfigError, DataError, at
 

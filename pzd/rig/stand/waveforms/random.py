@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from pzd.rig.stand.waveform import Course, Lines
+from pzd.rig.stand.waveforms import Course, Lines
 from pzd.signals.harmonics import FourierSum
 
 

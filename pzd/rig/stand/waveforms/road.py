@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from pzd.record import Array
-from pzd.rig.stand.waveform import Course, Lines
+from pzd.rig.stand.waveforms import Course, Lines
 from pzd.signals.harmonics import FourierSum
 from pzd.signals.iso8608 import classes, profile
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from pzd.record import Array
-from pzd.rig.stand.waveform import Course, Waveform, two_turns
+from pzd.rig.stand.waveforms import Course, Waveform, two_turns
 from pzd.signals.harmonics import FourierSum
 
 
