@@ -17,7 +17,7 @@ from pzd.rig.config import Fixture, RigConfig
 from pzd.rig.files.channels import free
 from pzd.rig.stage import synthesise
 from pzd.rig.stand.config import VirtualEntry
-from pzd.rig.stand.recording import StandRecord, records, run_campaign
+from pzd.rig.stand.recording import StandRecord, run_campaign
 
 SINE = {"kind": "sine", "frequency_Hz": 2.0, "amplitude_m": 0.03}
 TRIANGLE = {"kind": "triangle", "frequency_Hz": 1.5, "amplitude_m": 0.02}
@@ -220,9 +220,9 @@ def test_ramped_voltage_goes_from_start_to_end() -> None:
 
 
 def test_a_damper_without_valve_records_no_voltage_and_no_temperature() -> None:
-    (record,) = records(stand(), 1)
-    assert record.voltage is None
-    assert record.temperature is None
+    (test,) = taken(stand())
+    assert test.voltage is None
+    assert test.temperature is None
 
 
 # ---------------------------------------------------------------- what is recorded
@@ -283,7 +283,8 @@ def test_a_delayed_force_is_the_force_of_before() -> None:
 
 def test_velocity_and_acceleration_of_a_record_come_from_its_noisy_displacement(seed: int) -> None:
     entry = stand(tests=[{"waveform": SINE, "cycles": 10}], noise=NOISY["noise"])
-    (record,), (test,) = records(entry, seed), taken(entry, seed)
+    (test,) = taken(entry, seed)
+    (record,) = synthesise(RigConfig(virtual=(entry,)), seed, Control(), Path()).records
     np.testing.assert_array_equal(record.displacement, test.displacement)
     assert 0.0 < np.std(record.velocity - test.truth.velocity) < 0.05 * np.std(test.truth.velocity)
 

@@ -18,8 +18,7 @@ from pzd.record import Array
 from pzd.rig.stand.waveforms import Waveform, waveforms
 from pzd.schema.model import Frozen, safe_name
 
-# ----------------------------------------------------------------------------------------------------
-# What the stand sets beside the motion: the voltage over a test, and how the damper warms.
+# --- Voltage and temperature over a test ---
 
 
 class Steps(Frozen):
@@ -41,11 +40,11 @@ class Steps(Frozen):
         return self
 
     def name(self, unit: str) -> str:
-        """`steps-0-150V`."""
+        """Return the name of the programme in names of records: `steps-0-150V`."""
         return f"steps-{'-'.join(f'{level:g}' for level in self.voltages_V)}{unit}"
 
     def at(self, time: Array, duration: float) -> Array:
-        """(n,) voltage; the first level before 0."""
+        """Compute the voltage (n,) at times (n,) [s]; the first level before 0."""
         levels = np.array(self.voltages_V)
         number = np.maximum(np.floor(time / self.dwell_s), 0.0).astype(int)
         now, last = levels[number % levels.size], levels[np.maximum(number - 1, 0) % levels.size]
@@ -64,11 +63,11 @@ class Ramp(Frozen):
     """Voltage at the end."""
 
     def name(self, unit: str) -> str:
-        """`ramp-0-150V`."""
+        """Return the name of the programme in names of records: `ramp-0-150V`."""
         return f"ramp-{self.start_voltage_V:g}-{self.end_voltage_V:g}{unit}"
 
     def at(self, time: Array, duration: float) -> Array:
-        """(n,) voltage over a test of the given length [s]."""
+        """Compute the voltage (n,) at times (n,) of a test of this duration [s]."""
         return np.interp(time, [0.0, duration], [self.start_voltage_V, self.end_voltage_V])
 
 
@@ -90,23 +89,22 @@ class Warming(Frozen):
     """G, by convection and through the clamps."""
 
     def name(self) -> str:
-        """`warming-22degC`."""
+        """Return the name of the programme in names of records: `warming-22degC`."""
         return f"warming-{self.start_degC:g}degC"
 
 
 Voltage = float | Annotated[Steps | Ramp, Field(discriminator="kind")]
-"""What a test does with the voltage: one constant number, or a programme."""
+"""Voltage over a test: one constant number, or a programme."""
 Temperature = float | Warming
-"""What a test does with the temperature: one constant number, or warming."""
+"""Temperature over a test: one constant number, or warming."""
 
 
 def voltage_over(programme: Voltage, time: Array, duration: float) -> Array:
-    """(n,) voltage of a programme over a test of the given length [s]."""
+    """Compute the voltage (n,) of a programme at times (n,) of a test of this duration [s]."""
     return np.full(time.size, programme) if isinstance(programme, float | int) else programme.at(time, duration)
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Tests ---
 
 if TYPE_CHECKING:
     WaveformBlock = Waveform
@@ -138,6 +136,9 @@ class StandTest(Frozen):
         return self
 
 
+# --- Fixture and sensors ---
+
+
 class StandFixture(Frozen):
     """What stands between the damper and the sensors of the virtual stand."""
 
@@ -159,8 +160,8 @@ class ChannelNoise(Frozen):
 
     @property
     def absolute(self) -> float:
-        """Standard deviation in the unit of the channel, 0 where it is a share."""
-        return 0.0
+        """Standard deviation in the unit of the channel, which only the channel's own block can give; else 0."""
+        return next((float(size) for name, size in self if name.startswith("sd_")), 0.0)
 
     @model_validator(mode="after")
     def _one_size(self) -> ChannelNoise:
@@ -175,22 +176,12 @@ class ForceNoise(ChannelNoise):
     sd_N: float = Field(default=0.0, ge=0.0)
     """Standard deviation."""
 
-    @property
-    def absolute(self) -> float:
-        """Standard deviation [N]."""
-        return self.sd_N
-
 
 class DisplacementNoise(ChannelNoise):
     """Noise of the displacement."""
 
     sd_m: float = Field(default=0.0, ge=0.0)
     """Standard deviation."""
-
-    @property
-    def absolute(self) -> float:
-        """Standard deviation [m]."""
-        return self.sd_m
 
 
 class VoltageNoise(ChannelNoise):
@@ -199,22 +190,12 @@ class VoltageNoise(ChannelNoise):
     sd_voltage_V: float = Field(default=0.0, ge=0.0)
     """Standard deviation."""
 
-    @property
-    def absolute(self) -> float:
-        """Standard deviation [V]."""
-        return self.sd_voltage_V
-
 
 class TemperatureNoise(ChannelNoise):
     """Noise of the recorded temperature."""
 
     sd_degC: float = Field(default=0.0, ge=0.0)
     """Standard deviation."""
-
-    @property
-    def absolute(self) -> float:
-        """Standard deviation [K]."""
-        return self.sd_degC
 
 
 class Noise(Frozen):
@@ -252,6 +233,9 @@ class Jitter(Frozen):
     """Of an offset of the force, as a share of the record's largest force."""
     delay_s: float = Field(default=0.0, ge=0.0)
     """Of a delay of the force behind the displacement."""
+
+
+# --- The stand, and its plan of records ---
 
 
 @dataclass(frozen=True)
@@ -314,7 +298,7 @@ class VirtualEntry(Frozen):
             yield f"{field} is missing: {reason}"
 
     def plan(self, control: Control | None = None) -> tuple[PlannedRecord, ...]:
-        """Every record that the stand is going to take, in order, with its name.
+        """Return every record that the stand is going to take, in order, with its name.
 
         Parameters
         ----------
@@ -332,25 +316,18 @@ class VirtualEntry(Frozen):
     def _name(
         self, test: StandTest, voltage: Voltage | None, temperature: Temperature | None, number: int, unit: str
     ) -> str:
-        parts = [self.setting or "", test.waveform.name, _voltage_name(voltage, unit), _temperature_name(temperature)]
-        parts += [str(number)] if test.repeats > 1 else []
+        parts = [self.setting or "", test.waveform.name]
+        if voltage is not None:
+            parts.append(f"{voltage:g}{unit}" if isinstance(voltage, float | int) else voltage.name(unit))
+        if temperature is not None:
+            parts.append(f"{temperature:g}degC" if isinstance(temperature, float | int) else temperature.name())
+        if test.repeats > 1:
+            parts.append(str(number))
         return safe_name("-".join(part for part in parts if part))
 
 
-def _voltage_name(voltage: Voltage | None, unit: str) -> str:
-    if voltage is None:
-        return ""
-    return f"{voltage:g}{unit}" if isinstance(voltage, float | int) else voltage.name(unit)
-
-
-def _temperature_name(temperature: Temperature | None) -> str:
-    if temperature is None:
-        return ""
-    return f"{temperature:g}degC" if isinstance(temperature, float | int) else temperature.name()
-
-
 def _needs_voltage(damper: Damper) -> str | None:
-    """Why a damper cannot be tested without a voltage, None where it can."""
+    """Return why a damper cannot be tested without a voltage, None where it can."""
     if len({row.voltage_V for row in damper.base}) > 1:
         return "the damper has base rows at several voltages"
     for name, values in damper.effects.items():
@@ -360,7 +337,7 @@ def _needs_voltage(damper: Damper) -> str | None:
 
 
 def _needs_temperature(damper: Damper) -> str | None:
-    """Why a damper cannot be tested without a temperature, None where it can."""
+    """Return why a damper cannot be tested without a temperature, None where it can."""
     if len({row.temperature_degC for row in damper.base}) > 1:
         return "the damper has base rows at several temperatures"
     material = [name for name in damper.effects if known()[name].place == "material"]

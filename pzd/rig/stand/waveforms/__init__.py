@@ -20,42 +20,42 @@ from pzd.record import Array
 from pzd.schema.model import OneOfAKind
 
 Course = Callable[[Array], tuple[Array, Array, Array]]
-"""Displacement [m], velocity [m/s] and acceleration [m/s2] at any times (n,) [s], exactly."""
+"""Exact displacement [m], velocity [m/s] and acceleration [m/s2] at any times (n,) [s]."""
 
 
 class Waveform(OneOfAKind):
-    """The motion of the actuator in one test; each kind is one file in `waveforms/` with `kind` of its own."""
+    """The motion of the actuator in one test; each kind is one file here, with a `kind` of its own."""
 
     usual_cycles: ClassVar[int] = 10
     """Cycles of a test that says nothing of its length."""
 
     @abstractmethod
     def cycle(self, folder: Path) -> float:
-        """After which the motion repeats, or ends where it does not repeat [s]."""
+        """Return the time after which the motion repeats, or ends where it does not repeat [s]."""
 
     @property
     def settling_time(self) -> float:
-        """How long the motion has to go on before the damper has forgotten its start [s]."""
+        """Length of the lead-in after which the transient of the start has died out [s]."""
         return 1.0
 
     @abstractmethod
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
-        """The motion as a continuous function of time, from before 0 on.
+        """Return the motion as a continuous function of time, from before 0 on.
 
         Parameters
         ----------
-        draw : where random phases come from
+        draw : generator of random phases
         folder : of the config, for motions that are read
         """
 
 
-def two_turns(frequency: float) -> float:
-    """Time [s] after which a damper has forgotten its start at a frequency [Hz]: two turns, at least a second."""
+def two_cycles(frequency: float) -> float:
+    """Return the length [s] of two cycles at a frequency [Hz], at least a second."""
     return max(2.0 / frequency, 1.0)
 
 
 def started(course: Course, lead: float) -> Course:
-    """The same motion started from rest, smoothly, and untouched from the middle of the lead on.
+    """Return the motion started smoothly from rest, and unchanged from the middle of the lead-in on.
 
     Equation: x s(r), s = 10 r^3 - 15 r^4 + 6 r^5, r = 2 (t + lead) / lead between 0 and 1
               Source: the lowest polynomial that is level with level slope at both ends
@@ -100,13 +100,13 @@ class Lines(Waveform):
         return self
 
     def cycle(self, folder: Path) -> float:
-        """The period."""
+        """Return the period."""
         return self.period_s
 
     @property
     def settling_time(self) -> float:
-        """Two turns at the lowest frequency, or a second."""
-        return two_turns(self.low_Hz)
+        """Two cycles at the lowest frequency, or a second."""
+        return two_cycles(self.low_Hz)
 
 
 @cache
