@@ -14,7 +14,7 @@ from pzd.damper.element import element_force
 from pzd.damper.motion import Motion
 from pzd.quantities import Control
 from pzd.rig.config import Fixture, RigConfig
-from pzd.rig.files.channels import free
+from pzd.rig.files.channels import without_fixture
 from pzd.rig.stage import synthesise
 from pzd.rig.stand.config import VirtualEntry
 from pzd.rig.stand.recording import StandRecord, run_campaign
@@ -157,9 +157,9 @@ def test_a_moving_mass_adds_its_inertia_and_a_tare_its_weight() -> None:
 def test_taking_out_a_known_fixture_gives_the_damper_back() -> None:
     fixture = {"mass_kg": 4.0, "tare_N": -35.0, "stiffness_N_per_m": 2e7}
     (test,) = taken(stand(fixture=fixture, tests=[{"waveform": SINE, "cycles": 6}]))
-    freed = free(Fixture(**fixture), test.time, test.displacement, test.force)
-    force = element_force(freed.displacement, 1e-3, 400.0, 2500.0, 300_000.0, float(freed.force[0]))
-    assert np.sqrt(np.mean((freed.force - force) ** 2)) < 2e-3 * np.abs(force).max()
+    alone = without_fixture(Fixture(**fixture), test.time, test.displacement, test.force)
+    force = element_force(alone.displacement, 1e-3, 400.0, 2500.0, 300_000.0, float(alone.force[0]))
+    assert np.sqrt(np.mean((alone.force - force) ** 2)) < 2e-3 * np.abs(force).max()
 
 
 # ---------------------------------------------------------------- warming

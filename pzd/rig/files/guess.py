@@ -1,4 +1,4 @@
-"""Guesses, from rig files, a config that reads them; what only a person knows stays empty."""
+"""Guess of a config from rig files; what only a person knows stays empty."""
 
 from __future__ import annotations
 
@@ -35,16 +35,14 @@ from pzd.schema.errors import DataError, UserError, at
 from pzd.schema.yamltree import written
 from pzd.signals.smoothing import work
 
-# ----------------------------------------------------------------------------------------------------
-# Which layout fits a rig file: the file has its columns, and what is read by it is accepted.
-
+# --- Layout that fits a file: its columns are there, and its tests are accepted ---
 
 _HERE = Path()
-"""The current folder: rig files are named as seen from it, and layouts of the user may lie in it."""
+"""The current folder, from which rig files are named; layouts of the user may lie in it."""
 
 
 def best_layout(path: Path, header: Sequence[str], asked: str | None = None) -> tuple[str, NamedLayout] | None:
-    """Name and content of the layout that fits a file; the one that names most of its columns where several do.
+    """Find the layout that fits a file; of several, the one that names most of its columns.
 
     Parameters
     ----------
@@ -54,7 +52,7 @@ def best_layout(path: Path, header: Sequence[str], asked: str | None = None) -> 
 
     Returns
     -------
-    the layout, None where none fits
+    name and content of the layout, None where none fits
 
     Raises
     ------
@@ -62,12 +60,12 @@ def best_layout(path: Path, header: Sequence[str], asked: str | None = None) -> 
     """
     if asked is not None:
         layout = named_layout(asked, _HERE, "--layout")
-        _read(path, asked, layout)
+        _try_reading(path, asked, layout)
         return asked, layout
     likely = {name: layout for name, layout in all_layouts(_HERE).items() if _likely(layout, path, header)}
     for name in sorted(likely, key=lambda name: len(likely[name].columns), reverse=True):
         try:
-            _read(path, name, likely[name])
+            _try_reading(path, name, likely[name])
         except UserError:
             continue
         return name, likely[name]
@@ -75,22 +73,20 @@ def best_layout(path: Path, header: Sequence[str], asked: str | None = None) -> 
 
 
 def _likely(layout: NamedLayout, path: Path, header: Sequence[str]) -> bool:
-    """Whether a layout names the columns of a recording, all of them are there, and the file's name is as it says."""
+    """Whether a layout names the columns of a recording, all of them are there, and the file's name matches."""
     columns = layout.columns
     recording = all(quantity.name in columns for quantity in NEEDED)
     named = layout.name is None or re.search(layout.name, path.stem) is not None
     return recording and named and {head for head in columns.values() if head} <= set(header)
 
 
-def _read(path: Path, name: str, layout: NamedLayout) -> None:
+def _try_reading(path: Path, name: str, layout: NamedLayout) -> None:
     """Read a file by a layout, for its refusals alone."""
     # A refusal names the file as it was given, as seen from where the command stands.
     read((FilesEntry(path=str(path), layout=name),), Limits(), layout.control.signal(), _HERE)
 
 
-# ----------------------------------------------------------------------------------------------------
-# Entries of `rig.files` that read rig files, by the layout that fits them or guessed from their headers and names.
-
+# --- Entries of `rig.files`, by the layout that fits or guessed from headers and names ---
 
 _DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y")
 _TIMES = ("%H:%M:%S.%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
@@ -99,48 +95,47 @@ FORMATS = (
     *_TIMES,
 )
 """Formats of date and time that are tried on the first row."""
-
 _RATE = re.compile(r"(?:sampl|abtast|\brate\b)[^\n\d]*(\d+(?:[.,]\d+)?)\s*(k)?Hz", re.IGNORECASE)
-"""A sampling rate in the lines above the header; a frequency alone may be that of the test."""
+"""Sampling rate in the lines above the header; a frequency without such a word may be that of the test."""
 _EVENTS = re.compile(r"event|marker|marke|ereignis", re.IGNORECASE)
 _GOES_ON = re.compile(r"resume|restart|start|begin|weiter", re.IGNORECASE)
-"""Words of an event with which another recording begins."""
+"""Words in an event that begins another recording."""
 
 
 @dataclass(frozen=True)
 class GuessedEntry:
-    """An entry of `rig.files`."""
+    """An entry of `rig.files` as lines of YAML."""
 
     lines: tuple[str, ...]
     controlled: bool
-    """Whether a control signal is read."""
+    """Whether it reads a control signal."""
     settings: tuple[str | None, ...]
-    """How the clickers of each file stood, by its name."""
+    """Position of the clickers in the name of each file."""
 
 
 @dataclass(frozen=True)
-class Sniffed:
-    """A rig file as it was sniffed."""
+class SniffedFile:
+    """A rig file, its dialect, and the headers of its quantities."""
 
     path: Path
     dialect: Dialect
     columns: tuple[tuple[Quantity, str], ...]
     form: str
-    """Its format."""
+    """Name of its format."""
 
     @property
     def layout(self) -> tuple[object, ...]:
-        """What two files must share to be read by one entry."""
+        """Key that is equal for files that one entry can read."""
         d = self.dialect
         kind = [_date_format(cell) for cell in d.first]
         return self.form, d.header, d.units, d.separator, d.decimal, d.skip, d.encoding, tuple(kind)
 
 
 def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path]) -> Iterator[GuessedEntry]:
-    """The entries of files that a layout fits."""
-    said = {*layout.columns, *layout.constants, *(re.compile(layout.pattern or "").groupindex)}
-    said |= set(layout.split.constants) if layout.split else set()
-    controlled = not said.isdisjoint((VOLTAGE.name, layout.control.signal().name))
+    """Make the entries of files that a layout fits."""
+    quantities = {*layout.columns, *layout.constants, *(re.compile(layout.pattern or "").groupindex)}
+    quantities |= set(layout.split.constants) if layout.split else set()
+    controlled = not quantities.isdisjoint((VOLTAGE.name, layout.control.signal().name))
     for path, members in _patterns(paths):
         lines = [f"    - path: {written(path)}", f"      layout: {name}    # {layout.about}"]
         pattern = layout.pattern or setting_in_names([file.stem for file in members])
@@ -149,9 +144,9 @@ def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path]) -> Iterator
         yield GuessedEntry(tuple(lines), controlled, tuple(setting_of(pattern, file) for file in members))
 
 
-def by_headers(found: Sequence[Sniffed], control: Control) -> Iterator[GuessedEntry]:
-    """The entries of files whose headers say what they hold."""
-    groups: dict[tuple[object, ...], list[Sniffed]] = {}
+def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[GuessedEntry]:
+    """Make the entries of files from their headers."""
+    groups: dict[tuple[object, ...], list[SniffedFile]] = {}
     for file in found:
         groups.setdefault(file.layout, []).append(file)
     for group in groups.values():
@@ -166,9 +161,9 @@ def by_headers(found: Sequence[Sniffed], control: Control) -> Iterator[GuessedEn
 
 
 def _from_names(
-    files: Sequence[Sniffed], columns: dict[Quantity, str], control: Control
+    files: Sequence[SniffedFile], columns: dict[Quantity, str], control: Control
 ) -> tuple[str | None, dict[str, str]]:
-    """The pattern that finds in the files' names what no column holds, and the unit of each quantity in it."""
+    """Return the pattern for what no column holds but the files' names do, and the unit of each quantity in it."""
     names = stems(files)
     labels = {VOLTAGE: control.name, TEMPERATURE: TEMPERATURE.name}
     values = {
@@ -182,27 +177,27 @@ def _from_names(
 
 
 def _keys(
-    files: Sequence[Sniffed],
+    files: Sequence[SniffedFile],
     control: Control,
     columns: dict[Quantity, str],
     pattern: str | None,
     in_names: dict[str, str],
 ) -> Iterator[str]:
-    """The keys of an entry; `in_names` are the units of what the pattern finds."""
+    """Write the keys of an entry; `in_names` holds the units of the quantities in the pattern."""
     dialect = files[0].dialect
     yield from _dialect_keys(dialect)
     named = {own_quantity(q, control): c for q, c in columns.items() if not is_canonical(c, q, control)}
-    lost = [q for q in NEEDED if q not in columns]
-    rates = {_rate(file) for file in files} if TIME in lost else set()
+    missing = [q for q in NEEDED if q not in columns]
+    rates = {_rate(file) for file in files} if TIME in missing else set()
     if len(rates) == 1 and (rate := rates.pop()):
-        lost.remove(TIME)
+        missing.remove(TIME)
         yield f"rate_Hz: {rate:.10g}    # from the lines above the header: no column holds the time"
-    if named or lost:
+    if named or missing:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
         left = ", ".join(header for header in dialect.header if header.strip() and header not in columns.values())
         counted = "; or say rate_Hz: N instead, where no column holds it"
-        yield from (f"  {q.name}:   # fill in: one of {left}{counted if q is TIME else ''}" for q in lost)
+        yield from (f"  {q.name}:   # fill in: one of {left}{counted if q is TIME else ''}" for q in missing)
     units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, unit in in_names.items())]
     if units:
         yield "units:"
@@ -210,12 +205,12 @@ def _keys(
     if pattern:
         yield _pattern_key(pattern)
     yield from _events(files[0])
-    if not lost and any(_turned(file, columns) for file in files):
+    if not missing and any(_turned(file, columns) for file in files):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
 
 
-def _rate(file: Sniffed) -> float | None:
-    """The sampling rate [Hz] that the lines above the header of a text file tell, None where they tell none."""
+def _rate(file: SniffedFile) -> float | None:
+    """Return the sampling rate [Hz] in the lines above the header of a text file, None without one."""
     if file.form != TEXT:
         return None
     text = file.path.read_bytes().decode(file.dialect.encoding, errors="replace")
@@ -224,7 +219,7 @@ def _rate(file: Sniffed) -> float | None:
 
 
 def _patterns(paths: Sequence[Path]) -> list[tuple[str, Sequence[Path]]]:
-    """One pattern for all the files where one matches exactly these, else every file by itself."""
+    """Return one path pattern for all files where one matches exactly these, else every file by itself."""
     folders, endings = {path.parent for path in paths}, {path.suffix for path in paths}
     if len(paths) > 1 and len(folders) == len(endings) == 1:
         folder, pattern = paths[0].parent, f"*{paths[0].suffix}"
@@ -233,8 +228,8 @@ def _patterns(paths: Sequence[Path]) -> list[tuple[str, Sequence[Path]]]:
     return [(path.as_posix(), [path]) for path in paths]
 
 
-def stems(files: Sequence[Sniffed]) -> list[str]:
-    """The names of files without their endings."""
+def stems(files: Sequence[SniffedFile]) -> list[str]:
+    """Return the names of files without their endings."""
     return [file.path.stem for file in files]
 
 
@@ -256,7 +251,7 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
 
 
 def _units(named: dict[Quantity, str], dialect: Dialect) -> Iterator[str]:
-    """The units that the header and the row of units do not say as they are read."""
+    """Write the units that the reader would not see by itself, and leave empty those that are unknown."""
     for quantity, column in named.items():
         index = dialect.header.index(column)
         below = dialect.units[index] if dialect.units else None
@@ -271,7 +266,7 @@ def _units(named: dict[Quantity, str], dialect: Dialect) -> Iterator[str]:
 
 
 def _read_alike(column: str, below: str | None, unit: str) -> bool:
-    """Whether the reader sees the same unit by itself: in the row of units, or in brackets at the header's end."""
+    """Whether the reader sees the unit by itself: in the row of units, or in brackets at the header's end."""
     if below and below.strip("[]() "):
         return below.strip("[]() ") == unit
     return re.search(rf"[\[(]\s*{re.escape(unit)}\s*[\])]\s*$", column) is not None
@@ -287,8 +282,8 @@ def _date_format(cell: str) -> str | None:
     return None
 
 
-def _events(file: Sniffed) -> Iterator[str]:
-    """Where a logger that was paused says so in its last column: the event with which it went on."""
+def _events(file: SniffedFile) -> Iterator[str]:
+    """Write how to cut a file of a logger that was paused, by the event in its last column with which it went on."""
     head = file.dialect.header[-1]
     if file.form != TEXT or not _EVENTS.search(head):
         return
@@ -302,7 +297,7 @@ def _events(file: Sniffed) -> Iterator[str]:
         yield f"split: {{event: {written(head)}, begins: {written(later[0])}}}"
 
 
-def _as_sniffed(file: Sniffed, split: FileSplit | None = None) -> FilesEntry:
+def _as_sniffed(file: SniffedFile, split: FileSplit | None = None) -> FilesEntry:
     dialect = file.dialect
     said: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
     if file.form == TEXT:
@@ -310,8 +305,8 @@ def _as_sniffed(file: Sniffed, split: FileSplit | None = None) -> FilesEntry:
     return FilesEntry(path=str(file.path), split=split, **said)
 
 
-def _turned(file: Sniffed, columns: dict[Quantity, str]) -> bool:
-    """Whether the work of a file is negative as its numbers stand, whatever their units."""
+def _turned(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
+    """Whether the work of a file is negative, whatever its units."""
     heads = frozenset((columns[DISPLACEMENT], columns[FORCE]))
     try:
         needed = tuple(frozenset((head,)) for head in heads)
@@ -326,11 +321,10 @@ def _turned(file: Sniffed, columns: dict[Quantity, str]) -> bool:
     return known and work(x, force) < 0.0 and work(x, force - force.mean()) < 0.0
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- The whole config ---
 
 _SHOWN = 6
-"""Headers that a refusal shows."""
+"""Headers that a refusal shows: the quantities of a rig, mostly."""
 _WITHOUT_CAR = (
     "# No control signal was found. A report on the damper alone, without a car that rides on it, needs this line too:",
     "# stages: [rig, identify, diagnose, table, report]",
@@ -338,7 +332,7 @@ _WITHOUT_CAR = (
 
 
 def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
-    """A config for rig files, as lines of YAML, with empty places where only a person knows the answer.
+    """Guess a config for rig files, with empty places where only a person knows the answer.
 
     Parameters
     ----------
@@ -347,14 +341,14 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
 
     Returns
     -------
-    the lines; each empty place says in a comment what to fill in
+    lines of YAML; each empty place has a comment on what to fill in
 
     Raises
     ------
     DataError : when a file is no table of a rig's channels, a line a file
     UserError : when a file cannot be read, or not by the layout that was asked for
     """
-    fitting, found = _sorted_out(files, layout)
+    fitting, found = _by_fit(files, layout)
     control = next((one.control.signal() for one, _ in fitting.values()), None) or _control(found)
     entries = [entry for name, (fits, paths) in fitting.items() for entry in by_layout(name, fits, paths)]
     entries += by_headers(found, control)
@@ -374,12 +368,12 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
     return [*lines, "rig:", "  files:", *(line for entry in entries for line in entry.lines)]
 
 
-def _sorted_out(
+def _by_fit(
     files: Sequence[Path], layout: str | None
-) -> tuple[dict[str, tuple[NamedLayout, list[Path]]], list[Sniffed]]:
-    """The layouts that fit, each with its files, and the files that none fits."""
+) -> tuple[dict[str, tuple[NamedLayout, list[Path]]], list[SniffedFile]]:
+    """Return the layouts that fit, each with its files, and the files that none fits."""
     fitting: dict[str, tuple[NamedLayout, list[Path]]] = {}
-    found: list[Sniffed] = []
+    found: list[SniffedFile] = []
     faults: list[str] = []
     for path in files:
         try:
@@ -396,17 +390,17 @@ def _sorted_out(
     return fitting, found
 
 
-def _control(files: Sequence[Sniffed]) -> Control:
+def _control(files: Sequence[SniffedFile]) -> Control:
     control = control_of([header for file in files for header in file.dialect.header])
     if control == Control() and not any(VOLTAGE in dict(file.columns) for file in files):
         control = Control("current", "A") if value_in_names(stems(files), "current") else control
     return control
 
 
-def _file(path: Path, dialect: Dialect, form: str) -> Sniffed:
+def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:
     columns = assigned(dialect.header, dialect.units, control_of(dialect.header))
     if not columns:
         shown = ", ".join(dialect.header[:_SHOWN]) + (", ..." if len(dialect.header) > _SHOWN else "")
         line = dialect.header_line if form == TEXT else None
         raise DataError(f"{at(path, line)}: no header names time, displacement or force (got {shown})")
-    return Sniffed(path, dialect, tuple(columns.items()), form)
+    return SniffedFile(path, dialect, tuple(columns.items()), form)

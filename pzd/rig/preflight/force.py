@@ -295,7 +295,7 @@ def fit_element(section: Section, forces: Array) -> ReferenceFit:
     )
 
     def closest(grid: _Grid) -> tuple[int, int, float]:
-        """Indices of the element and the force that fit best, and the share of the squares that is left."""
+        """Return the indices of the best element and force, and the share of the squares that is left."""
         left = unexplained * (1.0 - np.maximum(grid.forces @ targets.T, 0.0) ** 2)
         element, force = (int(i) for i in np.unravel_index(int(np.argmin(left)), left.shape))
         return element, force, float(left[element, force])
@@ -327,7 +327,7 @@ def _grid(section: Section, spans: Sequence[tuple[float, float]], counts: tuple[
 
 
 def forces_per_stiffness(section: Section, pairs: Sequence[tuple[float, float]]) -> Array:
-    """Forces (g, n) of elements over their stiffness [m], in the second pass where the motion is periodic.
+    """Compute forces (g, n) of elements over their stiffness [m], in the second pass where the motion is periodic.
 
     Parameters
     ----------
