@@ -1,4 +1,4 @@
-"""The `rig` block of the config: measured files, or a virtual stand, and what the stand can do."""
+"""The `rig` block of the config: measured files or a virtual stand, and the limits of the stand."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _text(value: object) -> object:
 
 
 def _filled_in(what: str) -> BeforeValidator:
-    """Refuses the empty value that `pzd init` leaves where only a person knows the answer."""
+    """Refuse the empty value that `pzd init` leaves where only a person knows the answer."""
 
     def checked(value: object) -> object:
         if value is None:
@@ -60,7 +60,7 @@ class ControlConfig(Frozen):
         return name
 
     def signal(self) -> Control:
-        """The control signal as the files name it."""
+        """Return the control signal under its name in the files."""
         return Control(self.name, self.unit)
 
 

@@ -58,8 +58,8 @@ class SweepRuns:
         config = base.opened.config
         if config.sweep is None:
             raise ConfigError("sweep: the config has no such block; configs/sweep.yaml is an example")
-        if config.sweep.until == "simulate" and not config.with_car:
-            raise ConfigError("sweep.until: stages leaves simulate out; say until: diagnose, or add simulate to stages")
+        if config.sweep.until == "simulate" and not config.car:
+            raise ConfigError("sweep.until: car: false leaves the rides out; say until: diagnose, or car: true")
         return cls(base, config.sweep, tasks(config.sweep, config.seed), progress)
 
     @property

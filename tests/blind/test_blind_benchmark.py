@@ -31,7 +31,7 @@ from pzd.damper.compose import respond
 from pzd.damper.effects import nameable
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.parallel import chunks
+from pzd.parallel import chunks, engines
 from pzd.parallel.chunks import ChunkedWork
 from pzd.parallel.engines import Pools, Where
 from pzd.parallel.processes import spawned_pool

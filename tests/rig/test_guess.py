@@ -11,7 +11,7 @@ import pytest
 from written_files import FORCE, TIME, X
 
 from pzd.artefacts import Rig
-from pzd.config import WITHOUT_CAR, load
+from pzd.config import load
 from pzd.rig.files.guess import guessed
 from pzd.rig.stage import ingest
 from pzd.schema.errors import ConfigError, DataError
@@ -238,8 +238,8 @@ def test_one_setting_or_none_needs_no_choice(tmp_path: Path) -> None:
 def test_without_a_control_signal_the_line_that_leaves_the_car_out_is_shown(tmp_path: Path) -> None:
     columns = [numbers(values) for values in (TIME, X, FORCE)]
     path = stored(tmp_path / "a.csv", ["time_s,displacement_m,force_N"], columns, ",")
-    (line,) = [line for line in guessed([path]) if line.startswith("# stages:")]
+    (line,) = [line for line in guessed([path]) if line == "# car: false"]
     (tmp_path / "guess.yaml").write_text("\n".join([line.removeprefix("# "), *guessed([path])]), encoding="utf-8")
-    assert load(tmp_path / "guess.yaml").stages == WITHOUT_CAR
+    assert not load(tmp_path / "guess.yaml").car
     driven = stored(tmp_path / "b_100V.csv", ["time_s,displacement_m,force_N"], columns, ",")
-    assert "stages" not in "\n".join(guessed([driven]))
+    assert "# car: false" not in guessed([driven])

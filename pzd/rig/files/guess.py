@@ -327,7 +327,7 @@ _SHOWN = 6
 """Headers that a refusal shows: the quantities of a rig, mostly."""
 _WITHOUT_CAR = (
     "# No control signal was found. A report on the damper alone, without a car that rides on it, needs this line too:",
-    "# stages: [rig, identify, diagnose, table, report]",
+    "# car: false",
 )
 
 

@@ -112,7 +112,7 @@ class Layout:
     def _labels(self) -> list[ChannelSpec]:
         return [spec for spec in self.channels if spec.quantity in LABELS]
 
-    def _misfits(self, name: str, path: Path) -> list[str]:
+    def _misfit(self, name: str, path: Path) -> list[str]:
         """Describe a pattern that fits the file's name in several places, or leaves out a minus."""
         found = list(re.finditer(self.entry.pattern or "", name))
         values = list(dict.fromkeys(", ".join(filter(None, match.groups())) for match in found))

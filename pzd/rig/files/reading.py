@@ -298,11 +298,9 @@ def _read_file(path: Path, layout: Layout) -> list[tuple[RawRecord, DamperAlone]
     sheet = read_sheet(path, entry, layout.wanted(), layout.place)
     tests = split_into_tests(channels(sheet, layout), sheet, layout, values, setting)
     refuse(tests, layout)
-    motion_and_force = (TIME, DISPLACEMENT, FORCE)
-    return [
-        (
-            test,
-            without_fixture(entry.fixture or Fixture(), *(test.channels[q] for q in motion_and_force), test.force_sign),
-        )
-        for test in map(on_regular_clock, tests)
-    ]
+    found = []
+    for test in map(on_regular_clock, tests):
+        time, displacement, force = (test.channels[quantity] for quantity in (TIME, DISPLACEMENT, FORCE))
+        alone = without_fixture(entry.fixture or Fixture(), time, displacement, force, test.force_sign)
+        found.append((test, alone))
+    return found

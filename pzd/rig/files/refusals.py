@@ -225,7 +225,7 @@ def _slope(time: Array, x: Array) -> Array:
 
 
 def _despiked(x: Array) -> Array:
-    """Running median of five samples."""
+    """Take the running median of five samples."""
     if x.size < 5:
         return x
     middle = np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1)

@@ -1,9 +1,9 @@
 """Formats of rig files, one file each: `KIND`, `SUFFIXES`, `NEEDS`, `OPTIONS`, `holds(path, start)` and `tables`.
 
 `NEEDS` is the library that reads the format, None where pzd itself needs it anyway; it is imported inside `tables`.
-`OPTIONS` are the keys of `ALL_OPTIONS` that apply to the format; others are refused. A format of loose cells (a workbook)
-has `rows(path)` too, from which `pzd init` guesses the layout. Delimited text alone has `read` instead of `tables`: it
-parses only the columns that are asked for.
+`OPTIONS` are the keys of `ALL_OPTIONS` that apply to the format; others are refused. A format of loose cells (a
+workbook) has `rows(path)` too, from which `pzd init` guesses the layout. Delimited text alone has `read` instead of
+`tables`: it parses only the columns that are asked for.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def read_sheet(path: Path, entry: FilesEntry, wanted: Wanted, place: str) -> She
 
 
 def tables_in(path: Path, entry: FilesEntry, module: ModuleType) -> list[FileTable]:
-    """The tables of a file of one format.
+    """Read the tables of a file of one format.
 
     Raises
     ------
