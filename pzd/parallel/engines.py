@@ -93,11 +93,7 @@ def dask_pools(where: Where, jobs: int, steps: int) -> Iterator[Pools]:
     with ExitStack() as stack:
         if address is None:
             cluster = LocalCluster(  # type: ignore[no-untyped-call]  # Dask declares no types
-                n_workers=jobs,
-                threads_per_worker=1,
-                host=LOOPBACK,
-                dashboard_address=NO_DASHBOARD,
-                security=secured,
+                n_workers=jobs, threads_per_worker=1, host=LOOPBACK, dashboard_address=NO_DASHBOARD, security=secured
             )
             client = Client(stack.enter_context(cluster))  # type: ignore[no-untyped-call]  # Dask declares no types
         else:

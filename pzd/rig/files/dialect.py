@@ -30,13 +30,7 @@ def text_of(path: Path, encoding: str) -> str:
     FilesError : when the file cannot be read
     DataError : when it is no text of this encoding, or a file of another kind, by its content
     """
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise FilesError(f"{at(path)}: cannot be read ({error.strerror})") from None
-    kind = kind_of(raw)
-    if kind:
-        raise DataError(unread(path, kind))
+    raw = text_bytes(path)
     try:
         text = raw.decode("utf-8-sig" if encoding.lower().replace("_", "-") in ("utf-8", "utf8") else encoding)
     except UnicodeError as error:
@@ -49,14 +43,22 @@ def text_of(path: Path, encoding: str) -> str:
     return text
 
 
-def kind_of(raw: bytes) -> str | None:
-    """Return the kind of a file that no format reads, by its content; None where it may be text."""
-    return next((kind for magic, kind in KINDS if raw.startswith(magic)), None)
+def text_bytes(path: Path) -> bytes:
+    """Read the bytes of a text file.
 
-
-def unread(path: Path, kind: str) -> str:
-    """Return the message about a file of a kind that no format reads."""
-    return f"{at(path)}: this is {kind}; export the table as xlsx, CSV or other delimited text"
+    Raises
+    ------
+    FilesError : when the file cannot be read
+    DataError : when it is a file of a kind that no format reads, by its content whatever its name
+    """
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise FilesError(f"{at(path)}: cannot be read ({error.strerror})") from None
+    for magic, kind in KINDS:
+        if raw.startswith(magic):
+            raise DataError(f"{at(path)}: this is {kind}; export the table as xlsx, CSV or other delimited text")
+    return raw
 
 
 def after_lines(text: str, count: int) -> int:

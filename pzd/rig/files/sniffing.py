@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -28,12 +29,12 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, kind_of, unread
+from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, text_bytes
 from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in, tables_in
 from pzd.rig.files.layout import ALSO_READ, own_quantity
 from pzd.rig.files.sheet import Wanted, spelled
 from pzd.rig.files.units import UnitError, in_header, to_canonical
-from pzd.schema.errors import DataError, FilesError, at
+from pzd.schema.errors import DataError, at
 
 # --- Quantity of a column, by its header in English, German, French or Spanish ---
 
@@ -191,7 +192,8 @@ def setting_in_names(stems: Sequence[str]) -> str | None:
 
 def one_pattern(patterns: Sequence[str], stems: Sequence[str]) -> str | None:
     """Join patterns in the order of the names; None where names have no common order."""
-    found = sorted(patterns, key=lambda one: _begin(one, stems[0]))
+    matches = [(match.start() if (match := re.search(one, stems[0])) else 0, one) for one in patterns]
+    found = [one for _, one in sorted(matches, key=itemgetter(0))]
     whole = ".*?".join(found)  # as little as can be between them: else a first digit is lost
     return whole if found and all(re.search(whole, stem) for stem in stems) else None
 
@@ -200,11 +202,6 @@ def setting_of(pattern: str | None, path: Path) -> str | None:
     """Return the setting that a pattern finds in the name of a file; None where it finds none."""
     found = (re.search(pattern, path.stem) or re.search(pattern, path.name)) if pattern else None
     return found.groupdict().get("setting") if found else None
-
-
-def _begin(pattern: str, stem: str) -> int:
-    found = re.search(pattern, stem)
-    return found.start() if found else 0
 
 
 # --- Dialect ---
@@ -220,15 +217,16 @@ _UNIT = re.compile(r"[\[(]?\s*[A-Za-zµ°%/²³^*.0-9-]{1,8}\s*[\])]?|-")
 class Dialect:
     """Encoding, separators and header of a file; where they are the defaults, the config need not give them."""
 
-    encoding: str
-    separator: str
-    decimal: str
-    skip: int
     header: tuple[str, ...]
     units: tuple[str, ...] | None
     """Unit of every column where the file gives it apart from the header."""
     first: tuple[str, ...]
     """First row of data."""
+    encoding: str = "utf-8"
+    separator: str = ","
+    decimal: str = "."
+    skip: int = 0
+    """Lines above the header."""
     units_row: bool = False
     """Whether the units are in a row below the header."""
 
@@ -252,17 +250,13 @@ def described(path: Path) -> tuple[Dialect, str]:
         if found is not None:
             return found, form
         sheet = read_sheet(path, entry, Wanted(known=frozenset(q.column for q in CHANNELS)), "rig.files")
-        skip = (sheet.header_line or 1) - 1
-        return Dialect("utf-8", ",", ".", skip, sheet.header, None, ("",) * len(sheet.header)), form
+        return Dialect(sheet.header, None, ("",) * len(sheet.header), skip=(sheet.header_line or 1) - 1), form
     sheets = rows_in(path, module)
     if sheets is not None:
         sniffs = [dialect for rows in sheets.values() if (dialect := sniffed_rows(rows)) is not None]
     else:
         filled = [table for table in tables_in(path, entry, module) if table.rows]
-        sniffs = [
-            Dialect("utf-8", ",", ".", 0, t.header, t.units, tuple(spelled(cells[0]) for cells in t.cells))
-            for t in filled
-        ]
+        sniffs = [Dialect(t.header, t.units, tuple(spelled(cells[0]) for cells in t.cells)) for t in filled]
     if not sniffs:
         raise DataError(f"{at(path)}: {module.KIND} without a table of numbers below headers")
     return max(sniffs, key=lambda d: len(assigned(d.header, d.units, control_of(d.header)))), form
@@ -276,13 +270,7 @@ def sniffed(path: Path) -> Dialect | None:
     FilesError : when the file cannot be read
     DataError : when it is a file of another kind
     """
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise FilesError(f"{at(path)}: cannot be read ({error.strerror})") from None
-    kind = kind_of(raw)
-    if kind:
-        raise DataError(unread(path, kind))
+    raw = text_bytes(path)
     encoding = _encoding(raw)
     text = raw.decode(encoding, errors="replace").removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     lines = text.split("\n")[:MOST_LINES]
@@ -334,16 +322,8 @@ def _table(
     # A row may leave out the last column where that is one of events.
     shortest = width - (not _numbers(rows[first][-1:], decimal))
     alike = [n for n in data if shortest <= len(rows[n]) <= width]
-    found = Dialect(
-        encoding,
-        separator,
-        decimal,
-        top,
-        tuple(rows[top]),
-        tuple(rows[first - 1]) if units else None,
-        tuple(rows[first]),
-        units_row=units,
-    )
+    named = tuple(rows[first - 1]) if units else None
+    found = Dialect(tuple(rows[top]), named, tuple(rows[first]), encoding, separator, decimal, top, units_row=units)
     return (len(alike), sum(numbers[n] for n in alike[:1])), found
 
 

@@ -103,21 +103,21 @@ def recorded_velocity(test: PreflightRecord) -> Iterator[Finding]:
     gain = float(recorded @ derived / (derived @ derived))
     rest = rms(recorded - gain * derived) / rms(derived)
     if abs(gain - 1.0) > GAIN:
-        yield Finding(
-            check="velocity",
-            where="the whole record, velocity over the rate of displacement",
-            size=gain,
-            unit="-",
-            follows="another unit, sign or filter than the displacement's; leave the column out to have it derived",
-        )
+        where, cause = "velocity over the rate of displacement", "another unit, sign or filter than the displacement's"
     elif rest > SHAPE:
-        yield Finding(
-            check="velocity",
-            where="the whole record, what the rate of displacement leaves of the velocity",
-            size=rest,
-            unit="-",
-            follows="noise, a delay or a filter in the velocity; leave the column out to have it derived",
+        where, cause = (
+            "what the rate of displacement leaves of the velocity",
+            "noise, a delay or a filter in the velocity",
         )
+    else:
+        return
+    yield Finding(
+        check="velocity",
+        where=f"the whole record, {where}",
+        size=gain if abs(gain - 1.0) > GAIN else rest,
+        unit="-",
+        follows=f"{cause}; leave the column out to have it derived",
+    )
 
 
 # --- Several tests in one record ---
