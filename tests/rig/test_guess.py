@@ -34,7 +34,7 @@ def test_what_is_no_rig_file_is_refused_in_one_line(tmp_path: Path, kind: str) -
     assert said in line
 
 
-def test_every_such_file_is_named(tmp_path: Path) -> None:
+def test_every_file_that_is_no_rig_file_is_named(tmp_path: Path) -> None:
     for name in ("one.csv", "two.csv"):
         (tmp_path / name).write_text("name,age\na,1\n", encoding="utf-8")
     with pytest.raises(DataError) as caught:
@@ -143,7 +143,7 @@ def test_a_rate_above_the_header_stands_for_a_column_of_time(tmp_path: Path, sai
 
 
 @pytest.mark.parametrize("above", [[], ["Test frequency: 5 Hz"], ["Generated at 5 Hz"]])
-def test_where_nothing_tells_the_rate_it_is_asked_for(tmp_path: Path, above: list[str]) -> None:
+def test_a_rate_that_no_line_gives_is_asked_for(tmp_path: Path, above: list[str]) -> None:
     path = stored(tmp_path / "a.csv", [*above, "Stroke (mm);Load (N)"], [numbers(MM), numbers(FORCE)], ";")
     text = guessed([path])
     assert any("or say rate_Hz: N instead" in line for line in text)
