@@ -23,8 +23,8 @@ class ChunkedWork(Generic[T, R]):
     """Steps that are done with every chunk of tasks."""
 
     steps: tuple[Callable[[tuple[T, ...]], Any], ...]
-    """Done one after the other with a chunk, by processes of their own where the engine has such; the last one returns a
-    result for each task. Each can be repeated after it was cut short."""
+    """Done one after the other with a chunk, by processes of their own where the engine has such; the last one returns
+    a result for each task. Each can be repeated after it was cut short."""
     keep: Callable[[tuple[T, ...], Sequence[R]], None]
     """Takes the results of a chunk, in this process."""
     lost: Callable[[T, int, str], R]

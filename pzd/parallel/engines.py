@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from distributed.security import Security
 
 NO_DASHBOARD = f"{LOOPBACK}:0"
-"""A scheduler answers questions by HTTP without TLS, whatever it is told: on the loopback alone, then."""
+"""A scheduler serves HTTP without TLS, whatever its settings: on the loopback alone, then."""
 WAIT_S = 10.0
 """How long a scheduler at an address may take to answer."""
 
@@ -189,8 +189,8 @@ def _check_accepted(where: Where, script: str) -> None:
     command = [sbatch, "--test-only"]
     asked = subprocess.run(command, input=script, capture_output=True, text=True, check=False)  # noqa: S603  # of SLURM
     if asked.returncode != 0:
-        said = " ".join(asked.stderr.split())
-        raise ConfigError(f"{where.block}.slurm: SLURM takes no such job: {said}")
+        reason = " ".join(asked.stderr.split())
+        raise ConfigError(f"{where.block}.slurm: SLURM takes no such job: {reason}")
 
 
 Engine = Callable[[Where, int, int], AbstractContextManager[Pools]]

@@ -17,7 +17,7 @@ Item = TypeVar("Item")
 Made = TypeVar("Made")
 
 _FORKS = sys.platform == "linux"
-"""Elsewhere a process would have to import everything anew, which takes longer than what is saved."""
+"""Elsewhere a process would have to import everything anew, which takes longer than it saves."""
 
 
 def parallel_map(
@@ -60,7 +60,7 @@ def parallel_map(
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
-    # What a forked process is started with is not pickled: the function may be any, and the items are not copied.
+    # The arguments of a forked process are not pickled: the function may be any, and the items are not copied.
     context = multiprocessing.get_context("fork")
     pool = ProcessPoolExecutor(jobs, context, _start_worker, (function, items))
     finished = False

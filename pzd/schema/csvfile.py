@@ -97,7 +97,7 @@ def read_rows(path: Path, model: type[Row], control: Control) -> tuple[Row, ...]
 
     Raises
     ------
-    DataError : when the header or a cell is not what the model asks for, with every place
+    DataError : when the header or a cell does not fit the model, with every place
     """
     lines = _records(path)
     _check_header(path, lines[0][1] if lines else [], [control.renamed(name) for name in model.model_fields])
@@ -124,7 +124,7 @@ def read_table(
 
     Raises
     ------
-    DataError : when the header or a cell is not what the model asks for, with every place
+    DataError : when the header or a cell does not fit the model, with every place
     """
     lines = _records(path)
     names = _columns_of(path, lines[0][1] if lines else [], model, control, also or {})

@@ -264,7 +264,7 @@ def read_json(path: Path, model: type[Model], control: Control) -> Model:
 
     Raises
     ------
-    DataError : when the file is not what the model asks for, with every place
+    DataError : when the file does not fit the model, with every place
     """
     found: Model = _read(path, model, control)
     return found
@@ -275,7 +275,7 @@ def read_json_list(path: Path, model: type[Model], control: Control) -> tuple[Mo
 
     Raises
     ------
-    DataError : when the file is not a list of what the model asks for, with every place
+    DataError : when the file is no list that fits the model, with every place
     """
     found: tuple[Model, ...] = _read(path, tuple[model, ...], control)  # type: ignore[valid-type]  # made at run time
     return found

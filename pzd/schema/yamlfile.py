@@ -36,8 +36,8 @@ class Document:
         Parameters
         ----------
         path : keys and indices
-        message : what is wrong there; where it begins with a key of the value, the place is that of what stands under
-            this key, or of the key itself where the message ends with it, as in ``mas: no such key (got 'mas')``
+        message : about the value; where it begins with a key of the value, the place is that of the value under this
+            key, or of the key itself where the message ends with it, as in ``mas: no such key (got 'mas')``
         """
         node = self.root
         for part in path:
@@ -98,7 +98,7 @@ def read_yaml_model(path: Path, model: type[Model], control: Control) -> Model:
 
     Raises
     ------
-    DataError : when the file is not what the model asks for, with every place
+    DataError : when the file does not fit the model, with every place
     """
     document = read_yaml(path, DataError)
     if faults := misnamed(document.root, control):

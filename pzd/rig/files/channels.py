@@ -75,7 +75,7 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
     Raises
     ------
     DataError : when a column is missing or occurs twice, or a cell is no date
-    ConfigError : when nothing says the unit of a column, or the unit is of another quantity
+    ConfigError : when a column has no unit, or the unit is of another quantity
     """
     found = _sources(sheet, layout)
     bad = [fault for source in found for fault in sheet.faults.get(source.column, [])]
@@ -119,10 +119,10 @@ def _steps(sheet: Sheet, layout: Layout, found: list[_Source], values: dict[Quan
         if source.dated:
             yield ReadingStep("unit", own.name, f"dates and times like {source.unit}", "s since the first")
         elif source.unit != own.unit:
-            zero, one = to_canonical(np.array([0.0, 1.0]), source.unit, own)
-            offset = f" {zero:+.10g}" if zero else ""
-            if offset or one != 1.0:
-                yield ReadingStep("unit", own.name, source.unit, f"{own.unit}: times {one - zero:.10g}{offset}")
+            start, end = to_canonical(np.array([0.0, 1.0]), source.unit, own)
+            offset = f" {start:+.10g}" if start else ""
+            if offset or end != 1.0:
+                yield ReadingStep("unit", own.name, source.unit, f"{own.unit}: times {end - start:.10g}{offset}")
         if spec.sign < 0:
             yield ReadingStep("sign", own.name, "as recorded", "times -1")
     if layout.entry.rate_Hz is not None:
@@ -294,7 +294,7 @@ def split_into_tests(
 
     Raises
     ------
-    ConfigError : when there are more or fewer values than tests, or a column holds what the config gives as well
+    ConfigError : when there are more or fewer values than tests, or the config gives a value that a column holds
     DataError : when the column that cuts the file is missing or doubled
     """
     split, place = layout.entry.split, layout.place
@@ -414,7 +414,7 @@ def without_fixture(fixture: Fixture, time: Array, displacement: Array, force: A
 
     Parameters
     ----------
-    fixture : what is known of it
+    fixture : as far as it is known
     time : (n,) [s]
     displacement : (n,) as the rig measures it [m]
     force : (n,) as the cell measures it, times its sign: s F_cell [N]
@@ -422,7 +422,7 @@ def without_fixture(fixture: Fixture, time: Array, displacement: Array, force: A
 
     Returns
     -------
-    both without the fixture, and what was taken out
+    both without the fixture, and its effects in words
 
     Examples
     --------

@@ -56,7 +56,7 @@ def best_layout(path: Path, header: Sequence[str], asked: str | None = None) -> 
 
     Raises
     ------
-    UserError : when the file cannot be read by the layout that was asked for, with what is wrong
+    UserError : when the file cannot be read by the layout that was asked for
     """
     if asked is not None:
         layout = named_layout(asked, _HERE, "--layout")
@@ -299,10 +299,10 @@ def _events(file: SniffedFile) -> Iterator[str]:
 
 def _as_sniffed(file: SniffedFile, split: FileSplit | None = None) -> FilesEntry:
     dialect = file.dialect
-    said: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
+    options: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
     if file.form == TEXT:
-        said |= {"separator": dialect.separator, "decimal": dialect.decimal, "encoding": dialect.encoding}
-    return FilesEntry(path=str(file.path), split=split, **said)
+        options |= {"separator": dialect.separator, "decimal": dialect.decimal, "encoding": dialect.encoding}
+    return FilesEntry(path=str(file.path), split=split, **options)
 
 
 def _turned(file: SniffedFile, columns: dict[Quantity, str]) -> bool:

@@ -257,7 +257,7 @@ SHIPPED = Path(__file__).with_name("layouts")
 _OWN = ("path", "layout", "source")
 """Keys of an entry that no layout gives."""
 _ABOUT = re.compile(rb"^about:", re.MULTILINE)
-"""A layout is told from other YAML files beside it by this key."""
+"""Key of every layout, by which it differs from other YAML files beside it."""
 
 
 def all_layouts(folder: Path) -> dict[str, NamedLayout]:

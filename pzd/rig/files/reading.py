@@ -115,7 +115,7 @@ def preflight_record(
     name : of the record
     test : as the rig measured it
     alone : displacement and force of the damper alone
-    limits : what the stand can do
+    limits : of the stand
     control : the control signal
     """
     time = test.channels[TIME]
@@ -248,7 +248,7 @@ def read(
     Parameters
     ----------
     entries : `rig.files` of the config
-    limits : what the stand can do
+    limits : of the stand
     control : the control signal
     folder : the config's folder, which relative paths start from
 

@@ -119,7 +119,7 @@ def refuse(tests: Sequence[RawRecord], layout: Layout) -> None:
 
     Raises
     ------
-    DataError : with what is wrong with the first such test, each with file and line
+    DataError : with the faults of the first such test, each with file and line
     """
     for test in tests:
         found = _faults(test, layout)

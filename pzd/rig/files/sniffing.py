@@ -1,6 +1,6 @@
 """Guesses about a file of unknown layout: its dialect, the quantity in each column, the values in its name.
 
-Only for the guess of a config: a run reads files as the config says.
+Only for the guess of a config: a run reads files by its config.
 """
 
 from __future__ import annotations

@@ -34,8 +34,8 @@ def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
     Parameters
     ----------
     values : (n,) in `unit`
-    unit : as pint spells it (`mm`, `kN`, `degF`, `m/s2`), or a size with a unit (`980.665 N`:
-        what one recorded unit, say a volt of the logger, stands for)
+    unit : as pint spells it (`mm`, `kN`, `degF`, `m/s2`), or a size with a unit (`980.665 N`
+        for one recorded unit, such as a volt of the logger)
     quantity : of the values
 
     Returns

@@ -19,6 +19,7 @@ LONGEST_PEAK = 4
 STEEP = 20.0
 """A plateau is entered steeply where the third sample before it lies this many digitisation steps away."""
 LEAST_PLATEAUS = 2
+"""One plateau may be chance; a channel beyond its range is cut off in every cycle."""
 BENT = 0.1
 """A control signal that bends at fewer of its samples than this share is a programme of straight lines."""
 

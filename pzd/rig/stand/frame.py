@@ -26,6 +26,7 @@ from pzd.record import Array
 TOLERANCE = 1e-7
 """Admissible error of one piece of the path, as a share of the force; steps are so short that few pieces reach it."""
 _MOST_ITERATIONS = 12
+"""Each takes the error of the last times the ratio of the parallel stiffness to that of the frame, which is small."""
 _CONVERGED = 1e-10
 """Change of a force in an iteration that ends it, as a share of the largest force: far below `TOLERANCE`."""
 

@@ -1,6 +1,6 @@
 """Text of servo-hydraulic stands by MTS: blocks of a line `Data Acquisition`, headers, units and rows, tab between.
 
-Every block is a table, so one with other channels (peaks and valleys) is left out. The first line says the decimal
+Every block is a table, so one with other channels (peaks and valleys) is left out. The first line holds the decimal
 sign: `MTS793|MPT|DEU|1|2|,|.|:|...`.
 """
 

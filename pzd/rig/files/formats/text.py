@@ -287,8 +287,8 @@ class _Table:
                     bad.append(row)
             if bad:
                 advice = _advice([cells[row] for row in bad])
-                told = [(row, f"a number is needed (got {cells[row]!r}){advice}") for row in bad]
-                faults[column] = self._faults(column, told)
+                wrong = [(row, f"a number is needed (got {cells[row]!r}){advice}") for row in bad]
+                faults[column] = self._faults(column, wrong)
             else:
                 found[column] = values
         return found, faults

@@ -1,4 +1,4 @@
-"""A motion from a file: the cubic spline through its samples, whose derivatives are exact for the spline."""
+"""Motion from a file: the cubic spline through its samples, with exact derivatives."""
 
 from __future__ import annotations
 

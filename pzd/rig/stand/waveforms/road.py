@@ -1,4 +1,4 @@
-"""The deflection of a suspension on a road of ISO 8608, which is what a damper sees of it.
+"""Deflection of a suspension, and so of its damper, on a road of ISO 8608.
 
 Equation: X(f) = Xi(f) r^2 / (1 - r^2 + 2 i zeta r), r = f / f_body
 Source: a body on one spring and one damper over a moving base, deflection = body - road up to sign;
