@@ -204,8 +204,8 @@ def read_config(path: Path, overrides: Sequence[str] = ()) -> Document:
         raise ConfigError(f"{former.place}: stages: is the former spelling of car; take this key away (got both)")
     if stages not in (list(_STAGES), [stage for stage in _STAGES if stage != "simulate"]):
         raise ConfigError(
-            f"{former.node.place}: stages: is the former spelling of car, and must be {', '.join(_STAGES)} in this order, "
-            "of which only simulate may be left out; say car: true, or car: false to leave the car out "
+            f"{former.node.place}: stages: is the former spelling of car, and must be {', '.join(_STAGES)} in this "
+            "order, of which only simulate may be left out; say car: true, or car: false to leave the car out "
             "(to run fewer stages, give the command of the last, say pzd identify)"
         )
     car = Entry(former.place, Node("simulate" in stages, former.node.place))
