@@ -84,11 +84,11 @@ _MOST_FAULTS = 20
 
 def write_rows(path: Path, model: type[Row], rows: Iterable[Row], control: Control) -> None:
     """Write one line for each row under the model's field names; None is an empty cell."""
+    names = tuple(model.model_fields)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([control.renamed(name) for name in model.model_fields])
+        writer.writerow([control.renamed(name) for name in names])
         # The writer leaves None empty and writes a float as `repr` has it, which reads back exactly.
-        names = tuple(model.model_fields)
         writer.writerows([getattr(row, name) for name in names] for row in rows)
 
 

@@ -81,16 +81,17 @@ def _fault(detail: Mapping[str, Any], root: Node) -> _Fault:
             path.append(part)
         else:
             skipped = True
-    inside = detail.get("ctx", {}).get("error")
-    if not isinstance(inside, InsideError):
-        return _Fault(tuple(path), node, detail, skipped)
-    for part in inside.path:
-        below = _below(node, part)
-        if below is None:
-            return _Fault(tuple(path), node, detail, skipped)
-        node = below
-        path.append(part)
-    return _Fault(tuple(path), node, detail, skipped, inside.of_key)
+    inside, of_key = detail.get("ctx", {}).get("error"), False
+    if isinstance(inside, InsideError):
+        for part in inside.path:
+            below = _below(node, part)
+            if below is None:
+                break
+            node = below
+            path.append(part)
+        else:
+            of_key = inside.of_key
+    return _Fault(tuple(path), node, detail, skipped, of_key)
 
 
 def _below(node: Node, part: str | int) -> Node | None:

@@ -201,14 +201,14 @@ def read_extended(path: Path, seen: tuple[Path, ...] = ()) -> Document:
     """
     document = read_yaml(path)
     entries = document.root.value
-    named = entries.get(KEY) if isinstance(entries, Mapping) else None
-    if not isinstance(entries, Mapping) or named is None or named.node.value is None:
+    if not isinstance(entries, Mapping) or KEY not in entries or entries[KEY].node.value is None:
         return document
-    name, place = named.node.value, named.node.place
+    named = entries[KEY].node
+    name, place = named.value, named.place
     if not isinstance(name, str) or not name or Path(name).name != name:
         raise ConfigError(
             f"{place}: {KEY}: must be the name of a config beside this one, as its paths count from there "
-            f"(got {named.node.data()})"
+            f"(got {named.data()})"
         )
     other = path.parent / name
     if other.resolve() in {each.resolve() for each in (*seen, path)}:

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
-from pzd.record import Array
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
 from pzd.rig.files.dialect import after_lines
 from pzd.rig.files.formats import TEXT, read_sheet
@@ -164,13 +163,10 @@ def _from_names(
     files: Sequence[SniffedFile], columns: dict[Quantity, str], control: Control
 ) -> tuple[str | None, dict[str, str]]:
     """Return the pattern for what no column holds but the files' names do, and the unit of each quantity in it."""
-    names = stems(files)
+    names = [file.path.stem for file in files]
     labels = {VOLTAGE: control.name, TEMPERATURE: TEMPERATURE.name}
-    values = {
-        name: value
-        for quantity, name in labels.items()
-        if quantity not in columns and (value := value_in_names(names, name))
-    }
+    wanted = [name for quantity, name in labels.items() if quantity not in columns]
+    values = {name: value for name in wanted if (value := value_in_names(names, name))}
     setting = setting_in_names(names)
     pattern = one_pattern([pattern for pattern, _ in values.values()] + ([setting] if setting else []), names)
     return pattern, {name: unit for name, (_, unit) in values.items()} if pattern else {}
@@ -226,11 +222,6 @@ def _patterns(paths: Sequence[Path]) -> list[tuple[str, Sequence[Path]]]:
         if set(folder.glob(pattern)) == set(paths):
             return [((folder / pattern).as_posix(), paths)]
     return [(path.as_posix(), [path]) for path in paths]
-
-
-def stems(files: Sequence[SniffedFile]) -> list[str]:
-    """Return the names of files without their endings."""
-    return [file.path.stem for file in files]
 
 
 def _pattern_key(pattern: str | None) -> str:
@@ -313,10 +304,8 @@ def _turned(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
         sheet = read_sheet(file.path, _as_sniffed(file), Wanted(heads, numbers=heads, needed=needed), "rig.files")
     except DataError:
         return False
-    numbers: list[Array] = [
-        sheet.numbers.get(sheet.header.index(columns[quantity]), np.empty(0)) for quantity in (DISPLACEMENT, FORCE)
-    ]
-    x, force = numbers
+    places = (sheet.header.index(columns[quantity]) for quantity in (DISPLACEMENT, FORCE))
+    x, force = (sheet.numbers.get(place, np.empty(0)) for place in places)
     known = x.size == force.size > 2 and bool(np.isfinite(x).all() and np.isfinite(force).all())
     return known and work(x, force) < 0.0 and work(x, force - force.mean()) < 0.0
 
@@ -362,9 +351,8 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
     settings = {setting for entry in entries for setting in entry.settings}
     names = sorted(setting for setting in settings if setting is not None)
     if len(settings) > 1:
-        lines.append(
-            f"setting: {written(names[0])}    # diagnose and all behind it are about one of {', '.join(names)}"
-        )
+        one_of = f"diagnose and all behind it are about one of {', '.join(names)}"
+        lines.append(f"setting: {written(names[0])}    # {one_of}")
     return [*lines, "rig:", "  files:", *(line for entry in entries for line in entry.lines)]
 
 
@@ -392,8 +380,9 @@ def _by_fit(
 
 def _control(files: Sequence[SniffedFile]) -> Control:
     control = control_of([header for file in files for header in file.dialect.header])
-    if control == Control() and not any(VOLTAGE in dict(file.columns) for file in files):
-        control = Control("current", "A") if value_in_names(stems(files), "current") else control
+    controlled = any(VOLTAGE in dict(file.columns) for file in files)
+    if control == Control() and not controlled and value_in_names([file.path.stem for file in files], "current"):
+        return Control("current", "A")
     return control
 
 

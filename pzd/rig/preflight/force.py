@@ -198,10 +198,10 @@ RATE = 250.0
 LEAST_RESIDUAL = 2e-3
 """Share of the force's squares worth explaining: less is noise, or how coarse the element is."""
 _GRID = (24, 16)
-"""Values of T0 / k and of C / k in the first search, each some 30 % above the last."""
+"""Values of T0 / k and of C / k in the first search, each 30 to 50 % above the last."""
 _ZOOM = (7, 7)
 _ZOOMS = 4
-"""Each zoom divides the steps by three: four of them leave 0.4 %, finer than the element is true."""
+"""Each zoom divides the steps by three: four of them leave 0.3 to 0.5 %, finer than the element is true."""
 
 
 @dataclass(frozen=True, eq=False)

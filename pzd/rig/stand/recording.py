@@ -83,7 +83,7 @@ def sensed(truth: Array, noise: ChannelNoise, resolution: float, draw: np.random
 # --- Warming ---
 
 _MOST_ITERATIONS = 20
-"""Each takes about a hundredth of the error of the last: warming is slow, and softens the damper by little."""
+"""Warming is slow and softens the damper by little, so that a few suffice."""
 _CONVERGED = 1e-6
 """Change of the temperature in an iteration that ends it [K]: a millionth of what a thermocouple tells apart."""
 
