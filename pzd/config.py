@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -27,25 +28,24 @@ from pzd.rig.config import ControlConfig, RigConfig
 from pzd.schema.errors import ConfigError
 from pzd.schema.model import Frozen, for_editors, nearest
 from pzd.schema.yamlfile import Document, read_extended
+from pzd.schema.yamltree import Entry, Node, collection
 from pzd.simulate.config import SimulateConfig
 
-StageName = Literal["rig", "identify", "diagnose", "table", "simulate", "report"]
-STAGES: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "simulate", "report")
-WITHOUT_CAR: tuple[StageName, ...] = ("rig", "identify", "diagnose", "table", "report")
-"""What `stages` of a config may say."""
+_STAGES = ("rig", "identify", "diagnose", "table", "simulate", "report")
+"""Stages of a run, of which the former key `stages` listed all, or all but `simulate`."""
 
 
 def _rig_may_stand_elsewhere(schema: dict[str, Any], model: type[RunConfig]) -> None:
-    """Ask for `rig` only where the config extends no other one, in which it may stand."""
+    """Require `rig` only where the config extends no other one, in which it may stand."""
     for_editors(schema, model)
     del schema["required"]
     schema["anyOf"] = [{"required": ["rig"]}, {"required": ["extends"]}]
 
 
 SCHEMA = Path(__file__).with_name("config.schema.json")
-"""What `pzd schema` prints, as a file that editors read; `pzd schema > pzd/config.schema.json` makes it anew."""
+"""JSON schema for editors; made by `pzd schema > pzd/config.schema.json`."""
 EDITORS = "# yaml-language-server: $schema="
-"""How the first line of a config names its schema to an editor."""
+"""Beginning of the first line of a config, which names its schema to an editor."""
 
 
 class Uniform(Frozen):
@@ -128,8 +128,8 @@ class RunConfig(Frozen):
     """The control signal of the valve."""
     setting: str | None = None
     """Which of the rig's settings diagnose and everything behind it use; needed where there are several."""
-    stages: tuple[StageName, ...] = STAGES
-    """What a run consists of. Only `simulate` may be left out: the damper without a car, and its report."""
+    car: bool = True
+    """Whether the damper is ridden in a car; with `false` the run ends with a report on the damper alone."""
     rig: RigConfig
     """Where the rig records come from."""
     identify: IdentifyConfig = IdentifyConfig()
@@ -147,11 +147,6 @@ class RunConfig(Frozen):
     sweep: SweepConfig | None = None
     """What `pzd sweep` runs many times."""
 
-    @property
-    def with_car(self) -> bool:
-        """Whether the damper is ridden."""
-        return "simulate" in self.stages
-
     @field_validator("extends")
     @classmethod
     def _of_a_file(cls, extends: str | None) -> str | None:
@@ -159,22 +154,12 @@ class RunConfig(Frozen):
             raise ValueError("stands in the config alone, for --set comes after it")
         return extends
 
-    @field_validator("stages")
-    @classmethod
-    def _in_order(cls, stages: tuple[StageName, ...]) -> tuple[StageName, ...]:
-        if stages not in (STAGES, WITHOUT_CAR):
-            raise ValueError(
-                f"must be {', '.join(STAGES)} in this order, of which only simulate may be left out: each of the "
-                "others needs the one before it (to run fewer, give the command of the last, say pzd identify)"
-            )
-        return stages
-
     @field_validator("simulate")
     @classmethod
     def _ridden(cls, simulate: SimulateConfig, info: ValidationInfo) -> SimulateConfig:
         # The config that a run writes has every block with its defaults, which contradict nothing.
-        if "simulate" not in info.data.get("stages", STAGES) and simulate != SimulateConfig():
-            raise ValueError("stages leaves simulate out; take this block away, or add simulate to stages")
+        if not info.data.get("car", True) and simulate != SimulateConfig():
+            raise ValueError("car: false leaves the rides out; take this block away, or say car: true")
         return simulate
 
 
@@ -194,11 +179,42 @@ def load(path: Path, overrides: Sequence[str] = ()) -> RunConfig:
     ------
     ConfigError : when anything is wrong with it, with every place
     """
-    return validated(read_extended(path).overridden(overrides))
+    return validated(read_config(path, overrides))
+
+
+def read_config(path: Path, overrides: Sequence[str] = ()) -> Document:
+    """Read a config with all that it extends, override values of it, and put former keys in their present spelling.
+
+    Parameters
+    ----------
+    path : the YAML file
+    overrides : any number of ``a.b=VALUE``, VALUE one YAML scalar
+
+    Raises
+    ------
+    ConfigError : when it cannot be read, an override has no place in it, or a former key is used wrongly
+    """
+    document = read_extended(path).overridden(overrides)
+    entries = document.root.value
+    if not isinstance(entries, Mapping) or "stages" not in entries:
+        return document
+    former = entries["stages"]
+    stages = former.node.data()
+    if "car" in entries:
+        raise ConfigError(f"{former.place}: stages: is the former spelling of car; take this key away (got both)")
+    if stages not in (list(_STAGES), [stage for stage in _STAGES if stage != "simulate"]):
+        raise ConfigError(
+            f"{former.node.place}: stages: is the former spelling of car, and must be {', '.join(_STAGES)} in this "
+            "order, of which only simulate may be left out; say car: true, or car: false to leave the car out "
+            "(to run fewer stages, give the command of the last, say pzd identify)"
+        )
+    car = Entry(former.place, Node("simulate" in stages, former.node.place))
+    present = {"car": car} | {key: entry for key, entry in entries.items() if key != "stages"}
+    return replace(document, root=collection(present, document.root.place))
 
 
 def validated(document: Document) -> RunConfig:
-    """The config that a document describes.
+    """Validate the config that a document describes.
 
     Raises
     ------
@@ -208,7 +224,7 @@ def validated(document: Document) -> RunConfig:
 
 
 def control_of(data: Any) -> Control:
-    """The control that the document names; the usual one where that block is itself at fault."""
+    """Return the control signal of a document; the default one where that block is itself at fault."""
     block = data.get("control", {}) if isinstance(data, dict) else {}
     try:
         return TypeAdapter(ControlConfig).validate_python(block).signal()
@@ -217,7 +233,7 @@ def control_of(data: Any) -> Control:
 
 
 def check_settings(config: RunConfig, found: Sequence[str | None]) -> str | None:
-    """The setting in use, after a look at the settings that the table is to hold besides.
+    """Return the setting in use, and check the settings that the table is to interpolate.
 
     Parameters
     ----------
@@ -234,7 +250,7 @@ def check_settings(config: RunConfig, found: Sequence[str | None]) -> str | None
 
 
 def setting_in_use(chosen: str | None, found: Sequence[str | None]) -> str | None:
-    """The setting that diagnose and everything behind it use.
+    """Return the setting that diagnose and everything behind it use.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ from hypothesis import settings
 from installed import Installed
 
 from pzd.parallel import chunks
-from pzd.parallel.config import Pools, Where
+from pzd.parallel.engines import Pools, Where
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -762,7 +762,7 @@ def test_help_imports_neither_numbers_nor_what_checks_them() -> None:
 def test_nothing_heavy_is_imported_to_find_that_all_is_fresh() -> None:
     text = (
         "import sys\nfrom pzd.pipeline.stages import stages\nfrom types import SimpleNamespace as S\n"
-        "import pzd.pipeline.command, pzd.rig.files.reading\nstages(S(rig=S(virtual=None), with_car=True))\n"
+        "import pzd.pipeline.command, pzd.rig.files.reading\nstages(S(rig=S(virtual=None), car=True))\n"
         f"print([name for name in {HEAVY!r} if name in sys.modules])"
     )
     printed = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, env=ENVIRONMENT)

@@ -36,11 +36,21 @@ def test_the_smallest_config_names_its_files_and_nothing_else(tmp_path: Path) ->
 
 
 def test_the_config_with_every_default_reads_back_equal(tmp_path: Path) -> None:
-    alone = "stages: [rig, identify, diagnose, table, report]\n"
-    for text in (SMALLEST, "control: {name: current, unit: A}\n" + SMALLEST, alone + SMALLEST):
+    for text in (SMALLEST, "control: {name: current, unit: A}\n" + SMALLEST, "car: false\n" + SMALLEST):
         config = read(tmp_path, text)
         write_yaml_model(tmp_path / "whole.yaml", config, config.control.signal())
         assert load(tmp_path / "whole.yaml") == config
+
+
+def test_stages_is_read_as_the_former_spelling_of_car(tmp_path: Path) -> None:
+    for stages, car in (("table, simulate, report", True), ("table, report", False)):
+        former = read(tmp_path, f"stages: [rig, identify, diagnose, {stages}]\n" + SMALLEST)
+        assert former == read(tmp_path, f"car: {str(car).lower()}\n" + SMALLEST)
+        assert former.car is car
+        write_yaml_model(tmp_path / "whole.yaml", former, Control())
+        text = (tmp_path / "whole.yaml").read_text(encoding="utf-8")
+        assert f"\ncar: {str(car).lower()}\n" in text
+        assert "stages" not in text
 
 
 @pytest.mark.parametrize(

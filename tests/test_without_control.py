@@ -20,7 +20,7 @@ from pzd.schema.errors import ConfigError
 CONTROL = re.compile(r"(?i)volt|\bcontrol|\bvalve\b|\d[\s\u00a0]V\b")
 """Words about a control signal; `relief_valve` is an effect."""
 CONFIG = """\
-stages: [rig, identify, diagnose, table, report]
+car: false
 setting: click1
 rig:
   files:
@@ -81,16 +81,19 @@ def test_from_raw_files_to_the_report_nothing_speaks_of_a_control(
 @pytest.mark.parametrize(
     ("stages", "fault"),
     [
-        ("[rig, identify]", r"stages: must be rig, identify, diagnose, table, simulate, report in this order"),
-        ("[rig, diagnose, identify, table, report]", r"stages: must be rig, identify"),
-        ("[rig, identify, diagnose, table, rides, report]", r"stages\.4: must be one of"),
+        ("[rig, identify]", "1:9: stages: .* must be rig, identify, diagnose, table, simulate, report in this order"),
+        ("[rig, diagnose, identify, table, report]", "1:9: stages: is the former spelling of car, and must be rig"),
+        ("[rig, identify, diagnose, table, rides, report]", "say car: true, or car: false"),
+        ("[rig, identify, diagnose, table, report]\ncar: false", "1:1: stages: .* take this key away"),
         (
             "[rig, identify, diagnose, table, report]\nsimulate: {duration_s: 9}",
-            r"simulate: stages leaves simulate out",
+            "simulate: car: false leaves the rides",
         ),
     ],
 )
-def test_only_the_ride_may_be_left_out(tmp_path: Path, stages: str, fault: str) -> None:
+def test_the_former_spelling_of_car_is_refused_where_it_leaves_out_another_stage(
+    tmp_path: Path, stages: str, fault: str
+) -> None:
     config = tmp_path / "c.yaml"
     config.write_text(f"stages: {stages}\nrig: {{files: [{{path: a.csv}}]}}\n", encoding="utf-8")
     with pytest.raises(ConfigError, match=fault):
@@ -104,4 +107,4 @@ def test_the_ride_that_is_left_out_is_no_command(
     config.write_text(CONFIG, encoding="utf-8")
     done = pzd_here("simulate", config)
     assert done.returncode == 2
-    assert done.stderr == "pzd simulate: stages leaves simulate out; add it to stages of the config\n"
+    assert done.stderr == "pzd simulate: car: false leaves the rides out; take this key out of the config\n"

@@ -24,7 +24,7 @@ from pzd.blind.score import score_case
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.identification.config import IdentifyConfig
 from pzd.parallel.chunks import ChunkedWork
-from pzd.parallel.config import Where
+from pzd.parallel.engines import Where
 from pzd.parallel.processes import Listener, Progress, no_listener
 from pzd.quantities import Control
 from pzd.rig.config import FilesEntry, Limits, RigConfig

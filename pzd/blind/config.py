@@ -7,8 +7,7 @@ from typing import Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from pzd.parallel.config import EngineConfig
-from pzd.rig.stand.config import StandTest
-from pzd.rig.stand.programmes import Warming
+from pzd.rig.stand.config import StandTest, Warming
 from pzd.schema.model import Frozen
 
 

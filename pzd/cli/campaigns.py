@@ -49,7 +49,7 @@ def blind(
     """Hide effects in virtual rigs, diagnose them, score the verdicts."""
     from pzd.blind.benchmark import Benchmark, Methods, folder_of
     from pzd.blind.summary import write
-    from pzd.parallel.config import Where
+    from pzd.parallel.engines import Where
     from pzd.pipeline.command import opened
 
     output = Output(quiet=quiet, verbose=verbose)

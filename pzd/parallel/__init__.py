@@ -1,1 +1,1 @@
-"""Work in chunks, on the cores of one machine or on a cluster: the same results wherever it is done."""
+"""Tasks in chunks on the cores of one machine or on a cluster, with the same results everywhere."""

@@ -1,4 +1,4 @@
-"""Tasks in chunks, side by side; one whose process is killed is done again, and set aside when it is so each time."""
+"""Chunks of tasks done side by side; a task whose process is killed is repeated, and given up after some tries."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from pzd.parallel.config import Pools, Where
-from pzd.parallel.engines import ENGINES
+from pzd.parallel.engines import ENGINES, Pools, Where
 from pzd.schema.errors import UserError
 
 TRIES = 3
-"""How often a task is done whose process is killed."""
+"""Tries of a task whose process is killed: once may be chance (memory, a node), thrice is the task."""
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -21,11 +20,11 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class ChunkedWork(Generic[T, R]):
-    """What is done with chunks of tasks."""
+    """Steps that are done with every chunk of tasks."""
 
     steps: tuple[Callable[[tuple[T, ...]], Any], ...]
-    """Done one after the other with a chunk, by processes of their own where the engine has such; the last one gives a
-    result a task. Each can be done again after it was cut short."""
+    """Done one after the other with a chunk, by processes of their own where the engine has such; the last one returns
+    a result for each task. Each can be repeated after it was cut short."""
     keep: Callable[[tuple[T, ...], Sequence[R]], None]
     """Takes the results of a chunk, in this process."""
     lost: Callable[[T, int, str], R]
@@ -35,7 +34,7 @@ class ChunkedWork(Generic[T, R]):
     """Chunks given to each worker: one, or more where it must not wait for the next one to come."""
 
     def do(self, chunks: Sequence[tuple[T, ...]], jobs: int) -> None:
-        """Do all chunks.
+        """Do all chunks, and keep their results.
 
         Parameters
         ----------
@@ -55,7 +54,7 @@ class ChunkedWork(Generic[T, R]):
     def _side_by_side(
         self, chunks: Sequence[tuple[T, ...]], jobs: int
     ) -> tuple[list[tuple[T, ...]], list[tuple[T, ...]]]:
-        """Do chunks until a process is lost; those that are left, and those that were at work in it."""
+        """Do chunks until a process is lost; return those that are left, and those that were in work."""
         ready: list[list[tuple[T, ...]]] = [list(reversed(chunks)), *([] for _ in self.steps[1:])]
         flying: dict[Future[Any], tuple[int, tuple[T, ...]]] = {}
         lost: list[tuple[T, ...]] = []
@@ -77,19 +76,19 @@ class ChunkedWork(Generic[T, R]):
                         found = future.result()
                     except UserError:
                         raise
-                    except Exception:  # noqa: BLE001  # whatever a worker cannot tell of is the end of its process
+                    except Exception:  # noqa: BLE001  # an error that does not reach us unharmed is the end of a process
                         lost.append(chunk)
                     else:
-                        self._passed_on(step, chunk, found, ready)
+                        self._hand_over(step, chunk, found, ready)
 
-    def _passed_on(self, step: int, chunk: tuple[T, ...], found: Any, ready: list[list[tuple[T, ...]]]) -> None:
+    def _hand_over(self, step: int, chunk: tuple[T, ...], found: Any, ready: list[list[tuple[T, ...]]]) -> None:
         if step + 1 < len(self.steps):
             ready[step + 1].append(chunk)
         else:
             self.keep(chunk, found)
 
     def _alone(self, chunk: tuple[T, ...]) -> None:
-        """Do a chunk task by task, with nothing beside it: the one that kills its process is found."""
+        """Do a chunk task by task, with nothing beside it, to find the task that kills its process."""
         found: list[R] = []
         tries = 0
         while len(found) < len(chunk):
@@ -133,6 +132,6 @@ class _LostError(Exception):
 
 
 def _why(error: Exception) -> str:
-    """Why a process was lost, in the same words whatever the engine."""
+    """Return why a process was lost, in the same words whatever the engine."""
     killed = isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
     return "it was killed" if killed else f"{type(error).__name__}: {error}"

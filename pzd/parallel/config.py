@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass
 from ipaddress import ip_address
-from pathlib import Path
 from typing import Literal
 from urllib.parse import urlsplit
 
@@ -14,11 +10,8 @@ from pydantic import Field, model_validator
 
 from pzd.schema.model import Frozen
 
-# ----------------------------------------------------------------------------------------------------
-
-
 LOOPBACK = "127.0.0.1"
-"""Where a scheduler listens that nobody beyond this machine is to reach."""
+"""Address of a scheduler that only this machine can reach."""
 
 
 class SecurityConfig(Frozen):
@@ -85,11 +78,11 @@ class EngineConfig(Frozen):
 
 
 HOW = frozenset(EngineConfig.model_fields)
-"""Keys that change nothing of the results."""
+"""Keys that do not change the results."""
 
 
 def host_of(address: str | None) -> str:
-    """The host of `tcp://HOST:PORT`; the loopback where there is no address."""
+    """Return the host of `tcp://HOST:PORT`; the loopback where there is no address."""
     if address is None:
         return LOOPBACK
     return urlsplit(address if "//" in address else f"//{address}").hostname or address
@@ -101,30 +94,3 @@ def is_loopback(host: str) -> bool:
         return ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
-
-
-# ----------------------------------------------------------------------------------------------------
-# What an engine is given, and what it lends.
-
-
-@dataclass(frozen=True)
-class Where:
-    """Where work is done, as the config says."""
-
-    how: EngineConfig
-    block: str
-    """Of the config, for messages."""
-    folder: Path
-    """Of the config, to which its paths are relative."""
-    logs: Path
-    """Folder for what jobs of SLURM print."""
-
-
-@dataclass(frozen=True)
-class Pools:
-    """Processes that are lent."""
-
-    executors: Sequence[Executor]
-    """One for each step."""
-    workers: int
-    """How many chunks are worked on at a time."""

@@ -1,4 +1,4 @@
-"""Work of Python itself on several cores at once: in processes that are forked and share what stands in memory."""
+"""Processes of this machine: a map over forked ones that share memory, pools of spawned ones; events of progress."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-# ----------------------------------------------------------------------------------------------------
-
-
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
 
@@ -20,48 +17,57 @@ Item = TypeVar("Item")
 Made = TypeVar("Made")
 
 _FORKS = sys.platform == "linux"
-"""Elsewhere a process would have to import everything anew, which takes longer than what is saved."""
+"""Elsewhere a process would have to import everything anew, which takes longer than it saves."""
 
 
 def parallel_map(
     function: Callable[[Item], Made], items: Sequence[Item], jobs: int, made_one: Callable[[Made], None] | None = None
 ) -> list[Made]:
-    """What a function makes of each item, in order, however many processes there are.
+    """Call a function with each item, in forked processes.
 
     Parameters
     ----------
-    function : is called once an item; what it changes in memory may be lost
-    items : what to call it with
-    jobs : processes at the same time
-    made_one : hears in this process of each that is made, in order
+    function : is called once for each item; what it changes in memory may be lost
+    items : its arguments
+    jobs : processes at the same time; the results do not depend on it
+    made_one : is called in this process with each result, in order
+
+    Returns
+    -------
+    the results, in the order of the items
 
     Raises
     ------
     whatever the function does
+
+    Examples
+    --------
+    >>> parallel_map(lambda number: number**2, [1, 2, 3], jobs=1)
+    [1, 4, 9]
     """
     jobs = min(jobs, len(items)) if _FORKS else 1
     made: list[Made] = []
 
-    def heard(one: Made) -> None:
+    def collect(one: Made) -> None:
         made.append(one)
         if made_one is not None:
             made_one(one)
 
     if jobs < 2:
         for item in items:
-            heard(function(item))
+            collect(function(item))
         return made
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
-    # What a forked process is started with is not pickled: the function may be any, and the items are not copied.
+    # The arguments of a forked process are not pickled: the function may be any, and the items are not copied.
     context = multiprocessing.get_context("fork")
     pool = ProcessPoolExecutor(jobs, context, _start_worker, (function, items))
     finished = False
     try:
         futures = [pool.submit(_one, place) for place in range(len(items))]
         for future, item in zip(futures, items, strict=True):
-            heard(_result(future, function, item))
+            collect(_result(future, function, item))
         finished = True
     finally:
         pool.shutdown(wait=finished, cancel_futures=True)
@@ -69,7 +75,7 @@ def parallel_map(
 
 
 def spawned_pool(jobs: int) -> Executor:
-    """A pool of processes that share nothing with this one, say nothing, and end with it however it ends."""
+    """Return a pool of processes that share nothing with this one, log nothing, and end with it however it ends."""
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
@@ -82,9 +88,9 @@ def _work_quietly() -> None:
 
 
 def end_with_parent() -> None:
-    """Let this process, a worker of a pool, end without a word when it is interrupted or its parent has ended.
+    """Let this process, a worker of a pool, end silently when it is interrupted or its parent has ended.
 
-    A parent that is killed tells nobody: its workers would wait for work for ever.
+    A parent that is killed cannot end its workers: they would wait for work for ever.
     """
     import multiprocessing
     from threading import Thread
@@ -101,7 +107,7 @@ def end_with_parent() -> None:
 
 
 def _result(future: Future[Made], function: Callable[[Item], Made], item: Item) -> Made:
-    """What a worker made; where it failed or was killed, the item is done here, where a failure can be told."""
+    """Return what a worker made; where it failed or was killed, call the function here, so that the error is whole."""
     try:
         return future.result()
     except Exception:  # noqa: BLE001  # whatever it is, the same call here raises it, with all that belongs to it
@@ -122,21 +128,20 @@ def _one(place: int) -> Any:
     return function(items[place])
 
 
-# ----------------------------------------------------------------------------------------------------
-# How far a stage that takes long has come, as an event for whoever shows it.
+# --- Progress of a stage that takes long ---
 
 
 @dataclass(frozen=True)
 class Progress:
-    """So many parts of the work are done."""
+    """Event of progress: so many parts of the work are done."""
 
     done: int
     whole: int
     what: str
-    """What is counted, in the plural, and what there is to say about the part that was done last."""
+    """What is counted, in the plural, and a remark on the part that was done last."""
 
     def __str__(self) -> str:
-        """How far, in words."""
+        """Return the progress in words."""
         return f"{self.done} of {self.whole} {self.what}"
 
 
@@ -145,4 +150,4 @@ Listener = Callable[[Progress], None]
 
 
 def no_listener(_: Progress) -> None:
-    """Does nothing: for a stage whose progress nobody follows."""
+    """Ignore an event, where nobody follows the progress of a stage."""

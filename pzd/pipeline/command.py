@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pzd.artefacts import RecordEntry, Rig
-from pzd.config import RunConfig, check_settings, validated
+from pzd.config import RunConfig, check_settings, read_config, validated
 from pzd.identification.stage import refuse_one_condition, refuse_partly_recorded
 from pzd.parallel.processes import Listener, no_listener
 from pzd.pipeline.execution import Pipeline, Say
@@ -20,7 +20,7 @@ from pzd.runs import Run
 from pzd.schema.errors import ConfigError
 from pzd.schema.model import nearest
 from pzd.schema.validate import canonical_nodes
-from pzd.schema.yamlfile import Document, read_extended
+from pzd.schema.yamlfile import Document
 from pzd.schema.yamltree import Node
 
 # ----------------------------------------------------------------------------------------------------
@@ -69,7 +69,7 @@ def opened(path: Path, runs: Path, overrides: Sequence[str] = ()) -> Opened:
     """
     check_given(path)
     try:
-        document = read_extended(path).overridden(overrides)
+        document = read_config(path, overrides)
         config = validated(document)
     except ConfigError as error:
         if path.suffix.lower() in _SUFFIXES:
@@ -141,7 +141,7 @@ def _check_reference(given: Opened) -> None:
 
 def _right_source(line: Sequence[Stage], target: str) -> None:
     if target == "simulate" and target not in [stage.name for stage in line]:
-        raise ConfigError("pzd simulate: stages leaves simulate out; add it to stages of the config")
+        raise ConfigError("pzd simulate: car: false leaves the rides out; take this key out of the config")
     if target not in [stage.name for stage in line]:
         held = "rig.virtual" if line[0].name == "synthesise" else "rig.files"
         raise ConfigError(f"pzd {target}: the config has {held}, so the command is pzd {line[0].name}")

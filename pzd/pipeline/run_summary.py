@@ -22,13 +22,13 @@ from pzd.artefacts import (
     SummaryRow,
     Table,
 )
-from pzd.config import control_of, validated
+from pzd.config import control_of, read_config, validated
 from pzd.pipeline.command import Opened, stale_stages
 from pzd.quantities import Control
 from pzd.runs import CONFIG, Run
 from pzd.schema.csvfile import read_rows
 from pzd.schema.errors import ConfigError, UserError
-from pzd.schema.yamlfile import read_extended, read_yaml
+from pzd.schema.yamlfile import read_yaml
 from pzd.simulate.study.plan import assumed
 
 
@@ -134,7 +134,7 @@ def summary_of(folder: Path) -> RunSummary:
         lost = f"their config {config or ''} is missing, so nobody can say whether these are its numbers"
         return replace(found, stale={"all": lost})
     try:
-        document = read_extended(config)
+        document = read_config(config)
         return _beside_its_config(found, Opened(document, validated(document), replace(run, config=config)))
     except UserError as error:
         return replace(found, stale={"all": f"their config would be refused: {'; '.join(error.messages)}"})
@@ -145,7 +145,7 @@ def _beside_its_config(found: RunSummary, given: Opened) -> RunSummary:
     effects = found.diagnosis.effects if found.diagnosis else ()
     with_voltage = all(row.voltage_V is not None for row in found.parameters)
     lines = assumed(given.config.simulate, effects, with_voltage) if found.summary else ()
-    if not given.config.with_car:  # rides that an earlier config left in the folder are none of this run
+    if not given.config.car:  # rides that an earlier config left in the folder are none of this run
         found = replace(found, summary=(), comfort=())
         lines = ()
     return replace(found, stale=stale_stages(given), assumed=lines)

@@ -56,5 +56,5 @@ def stages(config: RunConfig) -> tuple[Stage, ...]:
         Stage("identify", identify),
         Stage("diagnose", diagnose),
         Stage("table", tabulate),
-        *(ridden if config.with_car else (Stage(LAST, report_without_car),)),
+        *(ridden if config.car else (Stage(LAST, report_without_car),)),
     )

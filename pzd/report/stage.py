@@ -86,7 +86,7 @@ def report_without_car(
     folder: Path,
     jobs: int = 1,
 ) -> Report:
-    """Write one page on the damper alone, where `stages` leaves the ride out; there is no comfort to rate.
+    """Write one page on the damper alone, where `car: false` leaves the rides out; there is no comfort to rate.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The `rig` block of the config: measured files, or a virtual stand, and what the stand can do."""
+"""The `rig` block of the config: measured files or a virtual stand, and the limits of the stand."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _text(value: object) -> object:
 
 
 def _filled_in(what: str) -> BeforeValidator:
-    """Refuses the empty value that `pzd init` leaves where only a person knows the answer."""
+    """Refuse the empty value that `pzd init` leaves where only a person knows the answer."""
 
     def checked(value: object) -> object:
         if value is None:
@@ -60,7 +60,7 @@ class ControlConfig(Frozen):
         return name
 
     def signal(self) -> Control:
-        """The control signal as the files name it."""
+        """Return the control signal under its name in the files."""
         return Control(self.name, self.unit)
 
 
@@ -107,7 +107,7 @@ class FilesEntry(Frozen):
     """Path or glob pattern (`*`, `?`, `**`), relative to the folder of this config."""
     layout: str | None = Field(default=None, pattern=r"^[A-Za-z0-9_-]+$")
     """Name of a layout, which says everything below for files of one kind: one that comes with pzd, or NAME.yaml
-    beside this config. What is said here is put over it, key by key."""
+    beside this config. The keys of the entry take precedence."""
     columns: dict[str, Header] = Field(default={})
     """Quantity -> header in the file, e.g. `{time: t, force: Load}`; what is not named has its canonical header.
     An empty header (`{voltage: ''}`) leaves a column out."""
@@ -192,7 +192,7 @@ class NamedLayout(FilesEntry):
 
 
 class Limits(Frozen):
-    """What the test stand can do; where nothing is said, what the records of a setting reached.
+    """Limits of the test stand; by default the largest values in the records of a setting.
 
     The next test that a diagnosis proposes lies within these limits, be they wider or narrower than the records.
     """
@@ -224,7 +224,7 @@ class RigConfig(Frozen):
     virtual: tuple[VirtualEntry, ...] | None = Field(default=None, min_length=1)
     """Virtual test stands, one a setting."""
     limits: Limits = Limits()
-    """What the stand can do."""
+    """Limits of the stand."""
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:

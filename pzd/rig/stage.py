@@ -1,4 +1,4 @@
-"""The rig stage: measured files or a virtual stand into records in SI, with what the preflight found."""
+"""The rig stage: records in SI from measured files or a virtual stand, with the findings of the preflight."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING
 
 from pzd.artefacts import Rig
 from pzd.quantities import Control
-from pzd.rig.config import Limits, RigConfig
+from pzd.rig.config import RigConfig
 from pzd.schema.errors import ConfigError
 
 if TYPE_CHECKING:
-    from pzd.rig.preflight import Measured
     from pzd.rig.stand.config import PlannedRecord
-    from pzd.rig.stand.recording import Taken
 
 log = logging.getLogger(__name__)
 
@@ -64,29 +62,21 @@ def synthesise(rig: RigConfig, seed: int, control: Control, folder: Path, jobs: 
     ------
     ConfigError : when the config has measured files instead, or two records would have one name
     """
-    from pzd.rig.preflight import examined
-    from pzd.rig.stand.recording import taker
-
-    if rig.virtual is None:
-        raise ConfigError("rig: this config has measured files and no virtual stand; use ingest (got rig.files)")
-    takers = [(entry, taker(entry, seed, folder)) for entry in rig.virtual]
-    tests = [
-        partial(_taken, take, planned, rig.limits, control) for entry, take in takers for planned in entry.plan(control)
-    ]
-    log.info("taking %d records", len(tests))
-    return examined(tests, jobs, preflight)
-
-
-def _taken(
-    take: Callable[[PlannedRecord], Taken], planned: PlannedRecord, limits: Limits, control: Control
-) -> Measured:
-    """A record of the virtual stand, with its cycles and clean motion."""
-    from pzd.rig.preflight import Measured
-    from pzd.rig.stand.recording import record_of
+    from pzd.rig.preflight import PreflightRecord, examined
+    from pzd.rig.stand.recording import StandRecord, recorder
     from pzd.signals.cycles import cycles
     from pzd.signals.kinematics import kinematics
 
-    taken = take(planned)
-    run = cycles(taken.time, taken.displacement)
-    clean = kinematics(taken.time, taken.displacement, run)
-    return Measured(record_of(taken, clean), run, clean, limits, control=control)
+    if rig.virtual is None:
+        raise ConfigError("rig: this config has measured files and no virtual stand; use ingest (got rig.files)")
+
+    def tested(record_one: Callable[[PlannedRecord], StandRecord], planned: PlannedRecord) -> PreflightRecord:
+        raw = record_one(planned)
+        periodic = cycles(raw.time, raw.displacement)
+        clean = kinematics(raw.time, raw.displacement, periodic)
+        return PreflightRecord(raw.as_record(clean), periodic, clean, rig.limits, control=control)
+
+    recorders = [(entry, recorder(entry, seed, folder)) for entry in rig.virtual]
+    tests = [partial(tested, record_one, planned) for entry, record_one in recorders for planned in entry.plan(control)]
+    log.info("taking %d records", len(tests))
+    return examined(tests, jobs, preflight)

@@ -1,1 +1,1 @@
-"""Reading and checking what people and programs write: models, YAML, CSV, errors."""
+"""Validated models, and reading them from YAML, CSV and JSON with the place of every fault."""

@@ -1,7 +1,7 @@
-"""CSV artefacts: rows of a validated model, or long columns of numbers, read back strictly.
+"""CSV and Parquet artefacts: rows of a validated model, or long columns of numbers, read back strictly.
 
-The header is the model's field names (or the columns named), with the control signal
-under its own name; every refusal says file and line.
+The header is the model's field names (or the columns named), with the control signal under its own name; every refusal
+has file and line.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from types import NoneType
@@ -23,17 +23,15 @@ from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError, at, read_text, worded
 from pzd.schema.model import Frozen, nearest
 
-# ----------------------------------------------------------------------------------------------------
-# Columns of numbers as lines of text, each number as a shortest decimal that reads back exactly, and read back.
-
+# --- Columns of numbers as text: each number as the shortest decimal that reads back exactly ---
 
 _NUMBERS = TypeAdapter(list[float])
 _EMPTY = b"nul"
-"""Letters of `null`, which JSON has for a NaN and a number has none of."""
+"""Letters of `null`, which is JSON for a NaN; no number holds one of them."""
 
 
 def lines(columns: Sequence[NDArray[np.float64] | None], rows: int) -> bytes:
-    """Rows of a CSV file, one line a row.
+    """Write the rows of a CSV file.
 
     Parameters
     ----------
@@ -42,7 +40,7 @@ def lines(columns: Sequence[NDArray[np.float64] | None], rows: int) -> bytes:
 
     Returns
     -------
-    the bytes, each number as JSON has it, which takes a quarter of the time of `repr`
+    the bytes, one line for each row
     """
     if not rows:
         return b""
@@ -50,6 +48,7 @@ def lines(columns: Sequence[NDArray[np.float64] | None], rows: int) -> bytes:
     for place, column in enumerate(columns):
         if column is not None:
             cells[:, place] = column
+    # JSON writes the same digits as `repr` in a quarter of its time.
     text = np.frombuffer(_NUMBERS.dump_json(cells.ravel().tolist()), dtype=np.uint8)[1:].copy()
     ends = np.flatnonzero(text == ord(","))[len(columns) - 1 :: len(columns)]
     text[ends] = text[-1] = ord("\n")
@@ -57,7 +56,7 @@ def lines(columns: Sequence[NDArray[np.float64] | None], rows: int) -> bytes:
 
 
 def numbers(body: str, columns: Sequence[int], width: int) -> NDArray[np.float64]:
-    """What so many columns of such lines hold, each `width` cells long: (rows, columns).
+    """Read some columns of lines with `width` cells each, as an array (rows, columns).
 
     Raises
     ------
@@ -68,29 +67,28 @@ def numbers(body: str, columns: Sequence[int], width: int) -> NDArray[np.float64
             cells = _NUMBERS.validate_json("[" + body.strip().replace("\n", ",") + "]", strict=True)
             return np.array(cells).reshape(-1, width)
         except ValueError:
-            pass  # written by hand, perhaps: what JSON does not know may be a number for others
+            pass  # written by hand, perhaps, with numbers that JSON does not know: .5, 1., +1
     return np.loadtxt(io.StringIO(body), delimiter=",", comments=None, usecols=columns, ndmin=2)
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- CSV files ---
 
 Row = TypeVar("Row", bound=Frozen)
 Columns = dict[str, NDArray[np.float64]]
 
 _WRITTEN = 10_000
-"""Rows whose numbers are turned into text at a time, so that the room for it does not grow with the file."""
+"""Rows that are turned into text at a time, so that memory does not grow with the file."""
 _MOST_FAULTS = 20
-"""Faults that one file's message lists before it only counts them."""
+"""Faults of one file that a message lists before it only counts them."""
 
 
 def write_rows(path: Path, model: type[Row], rows: Iterable[Row], control: Control) -> None:
-    """Write one line a row under the model's field names; None is an empty cell."""
+    """Write one line for each row under the model's field names; None is an empty cell."""
+    names = tuple(model.model_fields)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([control.renamed(name) for name in model.model_fields])
+        writer.writerow([control.renamed(name) for name in names])
         # The writer leaves None empty and writes a float as `repr` has it, which reads back exactly.
-        names = tuple(model.model_fields)
         writer.writerows([getattr(row, name) for name in names] for row in rows)
 
 
@@ -99,23 +97,11 @@ def read_rows(path: Path, model: type[Row], control: Control) -> tuple[Row, ...]
 
     Raises
     ------
-    DataError : when the header or a cell is not what the model asks for, with every place
+    DataError : when the header or a cell does not fit the model, with every place
     """
-    numbered = _records(path)
-    _check_header(path, numbered[0][1] if numbered else [], [control.renamed(name) for name in model.model_fields])
-    rows: list[Row] = []
-    faults: list[str] = []
-    for number, cells in numbered[1:]:
-        if len(cells) != len(model.model_fields):
-            faults.append(f"{at(path, number)}: {len(cells)} fields where the header has {len(model.model_fields)}")
-            continue
-        fields = zip(model.model_fields.items(), cells, strict=True)
-        try:
-            rows.append(model.model_validate({n: _typed(cell, field.annotation) for (n, field), cell in fields}))
-        except ValidationError as error:
-            faults += [_fault(path, number, detail, control) for detail in error.errors()]
-    _refuse(path, faults)
-    return tuple(rows)
+    lines = _records(path)
+    _check_header(path, lines[0][1] if lines else [], [control.renamed(name) for name in model.model_fields])
+    return tuple(row for _, row in _validated_rows(path, lines[1:], model, list(model.model_fields), control))
 
 
 def read_table(
@@ -130,32 +116,57 @@ def read_table(
     path : the file
     model : of a row
     control : the control signal, which names its columns
-    also : other names that columns may carry, with the field that each stands for
+    also : other headers, with the field of each
 
     Returns
     -------
-    each row with the line that it begins in
+    each row with the number of its line
 
     Raises
     ------
-    DataError : when the header or a cell is not what the model asks for, with every place
+    DataError : when the header or a cell does not fit the model, with every place
     """
-    numbered = _records(path)
-    names = _columns_of(path, numbered[0][1] if numbered else [], model, control, also or {})
+    lines = _records(path)
+    names = _columns_of(path, lines[0][1] if lines else [], model, control, also or {})
+    filled = [(number, cells) for number, cells in lines[1:] if cells]
+    return _validated_rows(path, filled, model, names, control, defaults=True)
+
+
+def _validated_rows(
+    path: Path,
+    lines: Sequence[tuple[int, list[str]]],
+    model: type[Row],
+    names: Sequence[str],
+    control: Control,
+    *,
+    defaults: bool = False,
+) -> tuple[tuple[int, Row], ...]:
+    """Validate lines of cells, each with its number.
+
+    Parameters
+    ----------
+    path, lines : of the file
+    model : of a row
+    names : field of each column
+    control : the control signal, for messages
+    defaults : whether an empty cell of a field with a default takes the default
+    """
     rows: list[tuple[int, Row]] = []
     faults: list[str] = []
-    for number, cells in numbered[1:]:
-        if not cells:
-            continue
+    for number, cells in lines:
         if len(cells) != len(names):
             faults.append(f"{at(path, number)}: {len(cells)} fields where the header has {len(names)}")
             continue
-        given = [(n, model.model_fields[n], cell) for n, cell in zip(names, cells, strict=True)]
-        values = {n: _typed(cell, field.annotation) for n, field, cell in given if cell or field.is_required()}
+        given = [(name, model.model_fields[name], cell) for name, cell in zip(names, cells, strict=True)]
+        taken = [(name, field, cell) for name, field, cell in given if cell or field.is_required() or not defaults]
         try:
-            rows.append((number, model.model_validate(values)))
+            row = model.model_validate({name: _typed(cell, field.annotation) for name, field, cell in taken})
+            rows.append((number, row))
         except ValidationError as error:
-            faults += [_fault(path, number, detail, control) for detail in error.errors()]
+            for detail in error.errors():
+                column = control.renamed(str(detail["loc"][0])) if detail["loc"] else "row"
+                wrong = worded(detail["type"], str(detail["msg"]))
+                faults.append(f"{at(path, number)}: {column}: {wrong} (got {detail['input']!r})")
     _refuse(path, faults)
     return tuple(rows)
 
@@ -163,7 +174,7 @@ def read_table(
 def _columns_of(
     path: Path, header: Sequence[str], model: type[Row], control: Control, also: Mapping[str, str]
 ) -> list[str]:
-    """The field of each column."""
+    """Return the field of each column."""
     known = {control.renamed(name): name for name in model.model_fields}
     names = [known.get(name) or also.get(name) or "" for name in header]
     faults = []
@@ -207,7 +218,7 @@ def write_columns(
 def _block(
     columns: Mapping[str, NDArray[np.float64] | None], names: Sequence[str], first: int
 ) -> Iterator[tuple[str, NDArray[np.float64] | None]]:
-    """Some rows of each column, which is asked for anew, so that a column in a file is mapped no longer than that."""
+    """Yield some rows of each column, asked for anew, so that a column in a file is mapped no longer than needed."""
     for name in names:
         values = columns.get(name)
         yield name, None if values is None else np.array(values[first : first + _WRITTEN], dtype=np.float64)
@@ -229,18 +240,22 @@ def read_columns(path: Path, header: Sequence[str], control: Control, optional: 
     widths = _widths(path, body, len(names))
     empty = [i for i, width in enumerate(widths[0]) if names[i] in optional and width == 0]
     filled = [i for i in range(len(names)) if i not in empty]
-    _check_empty(path, body, widths, {i: control.renamed(names[i]) for i in empty})
+    if widths[:, empty].any():
+        columns = {i: control.renamed(names[i]) for i in empty}
+        _refuse(path, _cell_faults(path, body, columns, bool, "the column is empty above, so it must be here"))
     try:
         table = numbers(body, filled, len(names))
     except ValueError:
         table = None
     if table is None or not np.isfinite(table).all():
-        _refuse(path, _bad_cells(path, body, {i: control.renamed(names[i]) for i in filled}))
+        columns = {i: control.renamed(names[i]) for i in filled}
+        bad = _cell_faults(path, body, columns, lambda cell: not _is_number(cell), "a finite number is needed")
+        _refuse(path, bad)
     return {names[i]: np.ascontiguousarray(table[:, n]) for n, i in enumerate(filled)} if table is not None else {}
 
 
 def _widths(path: Path, body: str, wanted: int) -> NDArray[np.int64]:
-    """(lines, wanted) bytes of each field; lines with more or fewer are refused. Quotes are no part of such a file."""
+    """Return the bytes of each field (lines, wanted); refuse lines with more or fewer. Such a file has no quotes."""
     codes = np.frombuffer(body.removesuffix("\n").encode() + b"\n", dtype=np.uint8)
     ends = np.flatnonzero((codes == ord(",")) | (codes == ord("\n")))
     fields = np.diff(np.flatnonzero(codes[ends] == ord("\n")), prepend=-1)
@@ -249,31 +264,17 @@ def _widths(path: Path, body: str, wanted: int) -> NDArray[np.int64]:
     return (np.diff(ends, prepend=-1) - 1).reshape(-1, wanted)
 
 
-def _check_empty(path: Path, body: str, widths: NDArray[np.int64], columns: Mapping[int, str]) -> None:
-    """Refuse cells in columns that begin as wholly empty ones."""
-    if widths[:, list(columns)].any():
-        _refuse(
-            path,
-            [
-                f"{at(path, number)}: {name}: the column is empty above, so it must be here (got {cells[i]!r})"
-                for number, cells in _lines(body)
-                for i, name in columns.items()
-                if cells[i]
-            ],
-        )
-
-
-def _bad_cells(path: Path, body: str, columns: Mapping[int, str]) -> list[str]:
+def _cell_faults(
+    path: Path, body: str, columns: Mapping[int, str], wrong: Callable[[str], object], message: str
+) -> list[str]:
+    """List the cells of some columns that are wrong, each with its line."""
+    lines = body.removesuffix("\n").split("\n")
     return [
-        f"{at(path, number)}: {name}: a finite number is needed (got {cells[i]!r})"
-        for number, cells in _lines(body)
+        f"{at(path, number)}: {name}: {message} (got {cells[i]!r})"
+        for number, cells in enumerate((line.split(",") for line in lines), start=2)
         for i, name in columns.items()
-        if not _is_number(cells[i])
+        if wrong(cells[i])
     ]
-
-
-def _lines(body: str) -> Iterable[tuple[int, list[str]]]:
-    return enumerate((line.split(",") for line in body.removesuffix("\n").split("\n")), start=2)
 
 
 def _is_number(cell: str) -> bool:
@@ -291,7 +292,7 @@ def _text(path: Path) -> str:
 
 
 def _records(path: Path) -> list[tuple[int, list[str]]]:
-    """Every record of the file with the line that it begins in; a quoted cell may span several."""
+    """Read every record of the file with the number of its first line; a quoted cell may span several."""
     found: list[tuple[int, list[str]]] = []
     reader = csv.reader(io.StringIO(_text(path)), strict=True)
     line = 1
@@ -313,8 +314,8 @@ def _check_header(path: Path, given: Sequence[str], wanted: Sequence[str]) -> No
         "unknown": [name for name in given if name not in wanted],
         "twice": twice,
     }
-    said = "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names) or "another order"
-    raise DataError(f"{at(path, 1)}: the header must read {','.join(wanted)}; {said} (got {','.join(given)})")
+    wrong = "; ".join(f"{what}: {', '.join(names)}" for what, names in parts.items() if names) or "another order"
+    raise DataError(f"{at(path, 1)}: the header must read {','.join(wanted)}; {wrong} (got {','.join(given)})")
 
 
 def _refuse(path: Path, faults: Sequence[str]) -> None:
@@ -324,7 +325,7 @@ def _refuse(path: Path, faults: Sequence[str]) -> None:
 
 
 def _typed(cell: str, annotation: Any) -> str | float | None:
-    """What a cell stands for: nothing, a number where the field takes one, else its text."""
+    """Read a cell: None where it is empty and may be, a number where the field takes one, else its text."""
     kinds = {annotation, *get_args(annotation)}
     if not cell:
         return None if NoneType in kinds else cell
@@ -334,13 +335,7 @@ def _typed(cell: str, annotation: Any) -> str | float | None:
     return int(cell) if cell.lstrip("+-").isdecimal() else float(cell)
 
 
-def _fault(path: Path, number: int, detail: Any, control: Control) -> str:
-    name = control.renamed(str(detail["loc"][0])) if detail["loc"] else "row"
-    return f"{at(path, number)}: {name}: {worded(detail['type'], str(detail['msg']))} (got {detail['input']!r})"
-
-
-# ----------------------------------------------------------------------------------------------------
-# Columns of numbers in a Parquet file, where a CSV of them would be large; pyarrow writes it, an extra.
+# --- Parquet files, where a CSV would be large; they need pyarrow, an extra ---
 
 
 def check_installed(key: str) -> None:

@@ -1,4 +1,4 @@
-"""The errors that a user can cause, each with the exit code of the contract."""
+"""Errors that a user can cause, each with its exit code; texts of files; wording of messages."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import ClassVar
 
-# ----------------------------------------------------------------------------------------------------
-
 
 class UserError(Exception):
-    """Something the user can mend; all messages of one cause are raised at once."""
+    """A fault that the user can mend; all messages of one cause are raised at once."""
 
     exit_code: ClassVar[int]
 
@@ -34,39 +32,35 @@ class DataError(UserError):
 
 
 class FilesError(UserError):
-    """Files, disk or locks that stand in the way."""
+    """Files, disk or locks that cannot be used."""
 
     exit_code = 5
 
 
 def at(path: object, line: int | None = None, column: int | None = None) -> str:
-    """The place of an error as ``file:line:column``, as far as it is known."""
+    """Return the place of an error as ``file:line:column``, as far as it is known."""
     return ":".join(str(part) for part in (path, line, column) if part is not None)
 
 
 class InsideError(ValueError):
-    """What a validator of a whole value finds wrong with one key or item of it."""
+    """A fault of one key or item that a validator of the whole value finds."""
 
     def __init__(self, message: str, *path: str | int, of_key: bool = False) -> None:
-        """Say what is wrong.
+        """Make the fault.
 
         Parameters
         ----------
         message : what the key or item must be
-        path : keys and indices that lead to it from the value
-        of_key : whether the last key itself is wrong, and not what stands under it
+        path : keys and indices from the value to it
+        of_key : whether the last key itself is wrong, not its value
         """
         super().__init__(message)
         self.path = path
         self.of_key = of_key
 
 
-# ----------------------------------------------------------------------------------------------------
-# Reads the text of a file, and says in one line why it cannot.
-
-
 def read_text(path: Path, missing: type[UserError], advice: str) -> str:
-    """The text of a UTF-8 file, without a byte order mark.
+    """Read the text of a UTF-8 file, without a byte order mark.
 
     Raises
     ------
@@ -86,12 +80,10 @@ def read_text(path: Path, missing: type[UserError], advice: str) -> str:
         raise FilesError(f"{at(path)}: {error.strerror}") from None
 
 
-# ----------------------------------------------------------------------------------------------------
-# Numbers and faults in the words of a person: digits that are known, counted things, what pydantic says of a value.
-
+# --- Wording of messages: significant digits, counted nouns, faults of pydantic ---
 
 MOST_DIGITS = 6
-"""Significant digits of a number, however narrow its interval."""
+"""Most significant digits of a number, however narrow its interval."""
 
 _WORDS = {
     "float_type": "must be a number",
@@ -109,7 +101,13 @@ _WORDS = {
 
 
 def supported(value: float, low: float, high: float) -> str:
-    """A number to the second digit of the width of its interval: what is far less than the interval is 0."""
+    """Write a number to the second digit of the width of its interval; far less than the interval is 0.
+
+    Examples
+    --------
+    >>> supported(2713.4, 2650.0, 2790.0)
+    '2710'
+    """
     width = high - low
     if not (math.isfinite(width) and width > 0.0):
         return f"{value:.4g}"
@@ -117,18 +115,18 @@ def supported(value: float, low: float, high: float) -> str:
 
 
 def rounded_as(value: float, other: float, digits: int) -> float:
-    """A value to the decimal place of the last of so many digits of another one, from which it was read."""
+    """Round a value to the decimal place of the last of so many digits of another one, from which it was read."""
     if other == 0.0 or not math.isfinite(other):
         return value
     return round(value, digits - 1 - math.floor(math.log10(abs(other)))) + 0.0
 
 
 def counted(count: int, noun: str) -> str:
-    """So many of a thing: 1 record, 2 records."""
+    """Write a count with its noun: 1 record, 2 records."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def worded(kind: str, message: str) -> str:
-    """What a value must be, by pydantic's kind of error and its message."""
+    """Write what a value must be, by pydantic's kind of error and its message."""
     plain = re.sub(r"^(Input|String|Tuple|List|Dictionary|Value) should", "must", message.removeprefix("Value error, "))
     return _WORDS.get(kind, plain.replace(" after validation", ""))

@@ -1,4 +1,4 @@
-"""A tree of nodes against a model: every fault at once, each with its place and what to do."""
+"""Validation of a tree of nodes against a model, every fault at once with its place and what to do; JSON artefacts."""
 
 from __future__ import annotations
 
@@ -16,21 +16,18 @@ from pzd.schema.errors import DataError, InsideError, UserError, at, read_text, 
 from pzd.schema.model import Frozen, KeyPath, former_keys, keys_at, nearest
 from pzd.schema.yamltree import Entry, Node, collection, compose
 
-# ----------------------------------------------------------------------------------------------------
-
-
 _LONGEST = 60
 """Characters of a wrong value that a message repeats."""
 
 
 def validated(annotation: Any, root: Node, control: Control, error: type[UserError]) -> Any:
-    """The model that a tree describes.
+    """Validate a tree against a model.
 
     Parameters
     ----------
     annotation : the model, or a type made of models
     root : the tree, with canonical keys
-    control : how the control signal is called in messages
+    control : the control signal, for messages
     error : the kind of error to raise
 
     Returns
@@ -51,27 +48,27 @@ def validated(annotation: Any, root: Node, control: Control, error: type[UserErr
 
 
 def _position(message: str) -> list[int]:
-    """Line and column of a message, to sort by; none for what the command line set."""
+    """Return line and column of a message, to sort by; none for what the command line set."""
     place = re.match(r".*?:(\d+):(\d+): ", message)
     return [int(number) for number in place.groups()] if place else []
 
 
 @dataclass(frozen=True)
 class _Fault:
-    """What pydantic found, at a path of the tree."""
+    """A fault that pydantic found, at a path of the tree."""
 
     path: KeyPath
     node: Node
-    """The deepest node of the path that is there."""
+    """Deepest existing node of the path."""
     detail: Mapping[str, Any]
     in_union: bool
-    """Whether it is the complaint of one member of a union."""
+    """Whether it is that of one member of a union."""
     of_key: bool = False
-    """Whether the last key of the path is at fault."""
+    """Whether the last key of the path is wrong itself."""
 
 
 def _fault(detail: Mapping[str, Any], root: Node) -> _Fault:
-    """Follow pydantic's location, which also names members of unions, through the tree."""
+    """Follow the location of pydantic, which also names members of unions, through the tree."""
     path: list[str | int] = []
     node, skipped = root, False
     location = detail["loc"]
@@ -84,16 +81,17 @@ def _fault(detail: Mapping[str, Any], root: Node) -> _Fault:
             path.append(part)
         else:
             skipped = True
-    inside = detail.get("ctx", {}).get("error")
-    if not isinstance(inside, InsideError):
-        return _Fault(tuple(path), node, detail, skipped)
-    for part in inside.path:
-        below = _below(node, part)
-        if below is None:
-            return _Fault(tuple(path), node, detail, skipped)
-        node = below
-        path.append(part)
-    return _Fault(tuple(path), node, detail, skipped, inside.of_key)
+    inside, of_key = detail.get("ctx", {}).get("error"), False
+    if isinstance(inside, InsideError):
+        for part in inside.path:
+            below = _below(node, part)
+            if below is None:
+                break
+            node = below
+            path.append(part)
+        else:
+            of_key = inside.of_key
+    return _Fault(tuple(path), node, detail, skipped, of_key)
 
 
 def _below(node: Node, part: str | int) -> Node | None:
@@ -105,7 +103,7 @@ def _below(node: Node, part: str | int) -> Node | None:
 
 
 def _merged(faults: list[_Fault]) -> list[list[_Fault]]:
-    """The faults by path; of a union's members only those that got furthest are heard."""
+    """Group the faults by path; of the members of a union only those that got furthest count."""
     furthest = [fault.path for fault in faults if fault.in_union]
     groups: dict[tuple[KeyPath, str], list[_Fault]] = {}
     for fault in faults:
@@ -116,13 +114,13 @@ def _merged(faults: list[_Fault]) -> list[list[_Fault]]:
 
 
 def _follows(fault: _Fault) -> bool:
-    """Whether a list is only too short since items of it are faulty, which is said of the items."""
+    """Whether a list is only too short because items of it are faulty, which are reported by themselves."""
     items = fault.node.value if isinstance(fault.node.value, tuple) else ()
     return bool(fault.detail["type"] == "too_short" and len(items) >= fault.detail["ctx"]["min_length"])
 
 
 def _message(faults: list[_Fault], annotation: Any, root: Node, data: Any, control: Control) -> str:
-    """One line about one place; several faults there are the members of a union."""
+    """Write one line about one place; several faults there are those of the members of a union."""
     fault = faults[0]
     kind, path, node = fault.detail["type"], fault.path, fault.node
     place, got = node.place, _shown(node.data())
@@ -190,12 +188,17 @@ def _shown(value: Any) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
-# ----------------------------------------------------------------------------------------------------
-# The names of the control signal in files: `voltage_V` to the code, `current_A` where the config says so.
+# --- Names of the control signal: `voltage_V` in the code, `current_A` in files where the config says so ---
 
 
 def canonical(name: str, control: Control) -> str:
-    """The canonical name of a column or key that a file calls by the control: current_1_A -> voltage_1_V."""
+    """Return the canonical name of a column or key that bears the name of the control.
+
+    Examples
+    --------
+    >>> canonical("current_1_A", Control("current", "A"))
+    'voltage_1_V'
+    """
     if control == Control():
         return name
     unit = control.quantity.column.removeprefix(control.name)
@@ -205,17 +208,8 @@ def canonical(name: str, control: Control) -> str:
     return candidate if control.renamed(candidate) == name else name
 
 
-def renamed_keys(data: Any, control: Control) -> Any:
-    """Plain data with every canonical key under the control's name."""
-    if isinstance(data, Mapping):
-        return {control.renamed(key): renamed_keys(value, control) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [renamed_keys(value, control) for value in data]
-    return data
-
-
 def canonical_nodes(root: Node, control: Control) -> Node:
-    """The tree with every key of the control under its canonical name."""
+    """Return the tree with every key of the control under its canonical name."""
     if control == Control() or not isinstance(root.value, Mapping | tuple):
         return root
     if isinstance(root.value, tuple):
@@ -229,7 +223,7 @@ def canonical_nodes(root: Node, control: Control) -> Node:
 
 
 def misnamed(root: Node, control: Control) -> list[str]:
-    """Every key that carries the canonical name although the control is called otherwise, with its place."""
+    """List every key under its canonical name although the control has another name, with its place."""
     faults: list[str] = []
     if isinstance(root.value, tuple):
         for item in root.value:
@@ -242,9 +236,7 @@ def misnamed(root: Node, control: Control) -> list[str]:
     return faults
 
 
-# ----------------------------------------------------------------------------------------------------
-# JSON artefacts: a validated model or a list of them, read back strictly with file and line.
-
+# --- JSON artefacts: a validated model or a list of them, read back strictly ---
 
 Model = TypeVar("Model", bound=Frozen)
 
@@ -255,13 +247,17 @@ def write_json(path: Path, content: Frozen | Sequence[Frozen] | Mapping[str, Any
 
 
 def json_text(data: Any) -> str:
-    """Plain data as JSON, indented, without a line break at its end."""
+    """Write plain data as indented JSON, without a line break at its end."""
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def plain_data(content: Any, control: Control) -> Any:
-    """Models, and lists and mappings of them, as plain data with keys of the control under its own name."""
-    return renamed_keys(_built_in_types(content), control)
+    """Return models, and lists and mappings of them, as plain data with keys of the control under its own name."""
+    if isinstance(content, Frozen):
+        content = content.model_dump(mode="json")
+    if isinstance(content, Mapping):
+        return {control.renamed(key): plain_data(value, control) for key, value in content.items()}
+    return [plain_data(value, control) for value in content] if isinstance(content, list | tuple) else content
 
 
 def read_json(path: Path, model: type[Model], control: Control) -> Model:
@@ -269,7 +265,7 @@ def read_json(path: Path, model: type[Model], control: Control) -> Model:
 
     Raises
     ------
-    DataError : when the file is not what the model asks for, with every place
+    DataError : when the file does not fit the model, with every place
     """
     found: Model = _read(path, model, control)
     return found
@@ -280,18 +276,10 @@ def read_json_list(path: Path, model: type[Model], control: Control) -> tuple[Mo
 
     Raises
     ------
-    DataError : when the file is not a list of what the model asks for, with every place
+    DataError : when the file is no list that fits the model, with every place
     """
     found: tuple[Model, ...] = _read(path, tuple[model, ...], control)  # type: ignore[valid-type]  # made at run time
     return found
-
-
-def _built_in_types(content: Any) -> Any:
-    if isinstance(content, Frozen):
-        return content.model_dump(mode="json")
-    if isinstance(content, Mapping):
-        return {key: _built_in_types(value) for key, value in content.items()}
-    return [_built_in_types(value) for value in content] if isinstance(content, list | tuple) else content
 
 
 def _read(path: Path, annotation: Any, control: Control) -> Any:
@@ -317,7 +305,7 @@ def _canonical_object(pairs: list[tuple[str, Any]], control: Control) -> dict[st
 
 
 def _read_with_places(path: Path, text: str, annotation: Any, control: Control) -> Any:
-    """Read the text once more as YAML, of which JSON is a part, to know the places of the faults."""
+    """Read the text once more as YAML, which includes JSON, for the places of the faults."""
     root = compose(text.replace("\t", " "), path, DataError)
     if faults := misnamed(root, control):
         raise DataError(faults)

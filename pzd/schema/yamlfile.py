@@ -1,4 +1,4 @@
-"""YAML 1.2 files: read with the place of every value, overridden from the command line, written plainly."""
+"""YAML 1.2 files: read with the place of every value, extended, overridden from the command line, written plainly."""
 
 from __future__ import annotations
 
@@ -10,23 +10,20 @@ from typing import Any, Self, TypeVar
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError, UserError, read_text
 from pzd.schema.model import Frozen
-from pzd.schema.validate import canonical_nodes, misnamed, renamed_keys, validated
+from pzd.schema.validate import canonical_nodes, misnamed, plain_data, validated
 from pzd.schema.yamltree import Entry, Node, collection, compose, written
-
-# ----------------------------------------------------------------------------------------------------
-
 
 Model = TypeVar("Model", bound=Frozen)
 
 
 @dataclass(frozen=True)
 class Document:
-    """One YAML document: plain data, and where each value stands."""
+    """One YAML document: plain data, and the place of each value."""
 
     path: Path
     root: Node
     error: type[UserError] = ConfigError
-    """The kind of error that a fault in it is."""
+    """Kind of error for a fault in it."""
 
     @property
     def data(self) -> Any:
@@ -34,13 +31,13 @@ class Document:
         return self.root.data()
 
     def place(self, path: Iterable[str], message: str = "") -> str:
-        """The place of a value by its keys and indices, or of the last thing on the way to it that is there.
+        """Return the place of a value by its keys and indices, or of the deepest node on the way to it.
 
         Parameters
         ----------
         path : keys and indices
-        message : what is wrong there; where it begins with a key of the value, the place is that of what stands under
-            this key, or of the key itself where the message ends with it, as in ``mas: no such key (got 'mas')``
+        message : about the value; where it begins with a key of the value, the place is that of the value under this
+            key, or of the key itself where the message ends with it, as in ``mas: no such key (got 'mas')``
         """
         node = self.root
         for part in path:
@@ -56,7 +53,7 @@ class Document:
         return entry.place if message.endswith((f"(got {key!r})", f"(got {key})")) else entry.node.place
 
     def overridden(self, overrides: Iterable[str]) -> Self:
-        """The document with ``a.b=VALUE`` set, VALUE one YAML scalar; items of lists by index.
+        """Return the document with ``a.b=VALUE`` set, VALUE one YAML scalar; items of lists by index.
 
         Raises
         ------
@@ -74,7 +71,7 @@ class Document:
         return replace(self, root=root)
 
     def validated(self, model: type[Model], control: Control) -> Model:
-        """The model that the document describes.
+        """Validate the document against a model.
 
         The keys of the control signal may stand under the control's own name.
 
@@ -101,7 +98,7 @@ def read_yaml_model(path: Path, model: type[Model], control: Control) -> Model:
 
     Raises
     ------
-    DataError : when the file is not what the model asks for, with every place
+    DataError : when the file does not fit the model, with every place
     """
     document = read_yaml(path, DataError)
     if faults := misnamed(document.root, control):
@@ -115,8 +112,8 @@ def write_yaml_model(path: Path, model: Frozen, control: Control) -> None:
 
 
 def yaml_text(model: Frozen, control: Control) -> str:
-    """A model as YAML, keys of the control under its own name."""
-    return "".join(f"{line}\n" for line in _lines(renamed_keys(model.model_dump(mode="json"), control)))
+    """Write a model as YAML, keys of the control under its own name."""
+    return "".join(f"{line}\n" for line in _lines(plain_data(model, control)))
 
 
 def _with(root: Node, override: str) -> Node:
@@ -181,24 +178,22 @@ def _flow(data: Any) -> str:
     return "{}" if isinstance(data, Mapping) else written(data)
 
 
-# ----------------------------------------------------------------------------------------------------
-# A config that extends another one: what it says goes over what that one says, key by key.
-
+# --- A config that extends another one, key by key ---
 
 KEY = "extends"
-"""Names the other config."""
+"""Key with the name of the other config."""
 
 
 def read_extended(path: Path, seen: tuple[Path, ...] = ()) -> Document:
     """Read a config with all that it extends.
 
-    Mappings are put together key by key; a list, or a single value, takes the place of that of the other config.
-    Every value keeps the place where it stands, in whichever file.
+    Mappings are merged key by key; a list, or a single value, replaces that of the other config. Every value keeps its
+    place, in whichever file.
 
     Parameters
     ----------
     path : the config
-    seen : those that led here
+    seen : configs that led here
 
     Raises
     ------
@@ -206,14 +201,14 @@ def read_extended(path: Path, seen: tuple[Path, ...] = ()) -> Document:
     """
     document = read_yaml(path)
     entries = document.root.value
-    named = entries.get(KEY) if isinstance(entries, Mapping) else None
-    if not isinstance(entries, Mapping) or named is None or named.node.value is None:
+    if not isinstance(entries, Mapping) or KEY not in entries or entries[KEY].node.value is None:
         return document
-    name, place = named.node.value, named.node.place
+    named = entries[KEY].node
+    name, place = named.value, named.place
     if not isinstance(name, str) or not name or Path(name).name != name:
         raise ConfigError(
             f"{place}: {KEY}: must be the name of a config beside this one, as its paths count from there "
-            f"(got {named.node.data()})"
+            f"(got {named.data()})"
         )
     other = path.parent / name
     if other.resolve() in {each.resolve() for each in (*seen, path)}:
@@ -222,11 +217,11 @@ def read_extended(path: Path, seen: tuple[Path, ...] = ()) -> Document:
         raise ConfigError(f"{place}: {KEY}: no such file in {path.parent}; check the name (got {name})")
     base = read_extended(other, (*seen, path))
     own = {key: entry for key, entry in entries.items() if key != KEY}
-    return replace(document, root=_over(base.root, collection(own, document.root.place)))
+    return replace(document, root=_merged(base.root, collection(own, document.root.place)))
 
 
 def chain(path: Path) -> tuple[Path, ...]:
-    """A config, the one that it extends, and so on, as far as they can be read."""
+    """Return a config, the one that it extends, and so on, as far as they can be read."""
     found = [path]
     while True:
         try:
@@ -240,12 +235,12 @@ def chain(path: Path) -> tuple[Path, ...]:
         found.append(other)
 
 
-def _over(base: Node, own: Node) -> Node:
-    """One node over another."""
+def _merged(base: Node, own: Node) -> Node:
+    """Merge one node over another."""
     if not isinstance(base.value, Mapping) or not isinstance(own.value, Mapping):
         return own
     entries = dict(base.value)
     for key, entry in own.value.items():
         before = entries.get(key)
-        entries[key] = Entry(entry.place, _over(before.node, entry.node)) if before else entry
+        entries[key] = Entry(entry.place, _merged(before.node, entry.node)) if before else entry
     return collection(entries, own.place)

@@ -14,7 +14,8 @@ from pathlib import Path
 from pzd.artefacts import Diagnosed
 from pzd.config import SweepConfig
 from pzd.parallel.chunks import ChunkedWork
-from pzd.parallel.config import HOW, Where
+from pzd.parallel.config import HOW
+from pzd.parallel.engines import Where
 from pzd.parallel.processes import Listener, Progress, no_listener
 from pzd.pipeline.dependencies import code_hash
 from pzd.quantities import Control
@@ -57,8 +58,8 @@ class SweepRuns:
         config = base.opened.config
         if config.sweep is None:
             raise ConfigError("sweep: the config has no such block; configs/sweep.yaml is an example")
-        if config.sweep.until == "simulate" and not config.with_car:
-            raise ConfigError("sweep.until: stages leaves simulate out; say until: diagnose, or add simulate to stages")
+        if config.sweep.until == "simulate" and not config.car:
+            raise ConfigError("sweep.until: car: false leaves the rides out; say until: diagnose, or car: true")
         return cls(base, config.sweep, tasks(config.sweep, config.seed), progress)
 
     @property

@@ -11,7 +11,7 @@ from pzd.blind.benchmark import Benchmark, Methods
 from pzd.blind.case import CaseFiles, Scored
 from pzd.blind.hide import BenchmarkSetup
 from pzd.config import RunConfig, load
-from pzd.parallel.config import Where
+from pzd.parallel.engines import Where
 
 SMALL = """
 rig:

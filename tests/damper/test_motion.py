@@ -9,7 +9,7 @@ from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import PARTS_OF_STEP, Motion, parts_of_steps
 from pzd.record import Array, Rows
-from pzd.rig.stand.programmes import Steps
+from pzd.rig.stand.config import Steps
 
 DURATION = 4.0
 BENT = Damper(

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from pzd.parallel.chunks import TRIES, ChunkedWork
-from pzd.parallel.config import EngineConfig, Pools, Where
-from pzd.parallel.engines import ENGINES
+from pzd.parallel.chunks import ChunkedWork
+from pzd.parallel.config import EngineConfig
+from pzd.parallel.engines import ENGINES, Pools, Where
 from pzd.schema.errors import DataError
 
 CHUNKS = tuple((first, first + 1) for first in range(0, 12, 2))
@@ -66,7 +66,7 @@ def worked(tmp_path: Path, *steps: object, jobs: int = 2) -> tuple[dict[int, int
 def test_a_task_whose_process_is_killed_every_time_is_set_aside_and_all_others_are_done(tmp_path: Path) -> None:
     found, lost = worked(tmp_path, killed_by_five)
     assert found == {task: None if task == 5 else 2 * task for task in range(12)}
-    assert lost == [(0, f"5: the process that did it was lost {TRIES} times: it was killed")]
+    assert lost == [(0, "5: the process that did it was lost 3 times: it was killed")]
 
 
 @pytest.mark.ci
@@ -78,7 +78,7 @@ def test_a_task_whose_process_is_killed_once_has_its_result(tmp_path: Path) -> N
 
 
 @pytest.mark.ci
-def test_a_loss_in_the_second_of_two_steps_is_told_as_such(tmp_path: Path) -> None:
+def test_a_loss_in_the_second_of_two_steps_is_reported_as_such(tmp_path: Path) -> None:
     found, lost = worked(tmp_path, doubled, killed_by_five, jobs=1)
     assert found == {task: None if task == 5 else 2 * task for task in range(12)}
     assert [step for step, _ in lost] == [1]
@@ -101,7 +101,7 @@ class AtOnce(Executor):
         return future
 
 
-def test_of_several_mistakes_found_at_the_same_time_the_first_chunk_s_is_told(
+def test_of_several_mistakes_found_at_the_same_time_the_first_chunk_s_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(ENGINES, "local", lambda where, jobs, steps: nullcontext(Pools([AtOnce()], jobs)))

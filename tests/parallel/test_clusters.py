@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from one_node import NoSlurmError, one_node
 
-from pzd.parallel.config import EngineConfig, Where
-from pzd.parallel.engines import dask as of_dask
+from pzd.parallel import engines
+from pzd.parallel.config import EngineConfig
+from pzd.parallel.engines import Where
 from pzd.parallel.processes import Progress
 from pzd.schema.errors import ConfigError
 from pzd.sweep.campaign import SweepRuns
@@ -115,7 +116,7 @@ def test_a_cluster_under_tls_gives_the_same_bytes_and_takes_no_stranger(
     secured = EngineConfig.model_validate(
         {"engine": "dask", "security": {"ca": "ca.pem", "cert": "cert.pem", "key": "key.pem"}}
     )
-    security = of_dask.security(Where(secured, "sweep", certificates, tmp_path))
+    security = engines.security(Where(secured, "sweep", certificates, tmp_path))
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, security=security
     ) as cluster:
@@ -123,7 +124,7 @@ def test_a_cluster_under_tls_gives_the_same_bytes_and_takes_no_stranger(
         given = [f"sweep.address={cluster.scheduler_address}", "sweep.engine=dask"]
         given += [f"sweep.security.{key}={certificates / f'{key}.pem'}" for key in ("ca", "cert", "key")]
         assert files(swept(small, tmp_path / "b", *given)) == files(swept(small, tmp_path / "a"))
-        monkeypatch.setattr(of_dask, "_WAIT_S", 2.0)
+        monkeypatch.setattr(engines, "WAIT_S", 2.0)
         stranger = [
             f"sweep.security.{key}={certificates}/strange.{end}" for key, end in (("cert", "pem"), ("key", "key"))
         ]

@@ -43,7 +43,7 @@ def test_a_speed_derived_over_rounded_stamps_is_that_of_the_clock_behind_them(
 
 
 @pytest.mark.parametrize("clock", ["even", "wavers", "gap", "two rates"])
-def test_any_other_clock_is_believed(tmp_path: Path, clock: str, rng: np.random.Generator) -> None:
+def test_a_clock_that_is_not_rounded_is_left_as_it_is(tmp_path: Path, clock: str, rng: np.random.Generator) -> None:
     time = np.arange(2000) / 500.0
     if clock == "wavers":
         time = time + 2e-4 * rng.uniform(-1.0, 1.0, time.size)

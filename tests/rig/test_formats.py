@@ -165,7 +165,7 @@ def test_every_value_of_a_format_is_read(tmp_path: Path, name: str) -> None:
 
 
 @every_format
-def test_content_tells_the_format_whatever_the_name(tmp_path: Path, name: str) -> None:
+def test_the_format_is_recognised_by_content_whatever_the_name(tmp_path: Path, name: str) -> None:
     file, written, entry = WRITERS[name]
     written(tmp_path / file)
     (tmp_path / file).rename(tmp_path / "b.csv")
@@ -419,7 +419,7 @@ def test_the_file_of_the_shaking_table_is_its_converted_one(tmp_path: Path, shar
     assert ours.force == pytest.approx(theirs.force, abs=1e-4)
 
 
-def test_a_decimal_comma_is_told_by_the_first_line_of_a_block_file(tmp_path: Path) -> None:
+def test_a_decimal_comma_is_reported_by_the_first_line_of_a_block_file(tmp_path: Path) -> None:
     mts(tmp_path / "a.dat", decimal=",")
     (record,) = run(tmp_path, {"path": "a.dat"} | NAMED).records
     assert record.force == pytest.approx(FORCE, abs=1e-5)

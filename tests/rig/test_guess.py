@@ -11,7 +11,7 @@ import pytest
 from written_files import FORCE, TIME, X
 
 from pzd.artefacts import Rig
-from pzd.config import WITHOUT_CAR, load
+from pzd.config import load
 from pzd.rig.files.guess import guessed
 from pzd.rig.stage import ingest
 from pzd.schema.errors import ConfigError, DataError
@@ -34,7 +34,7 @@ def test_what_is_no_rig_file_is_refused_in_one_line(tmp_path: Path, kind: str) -
     assert said in line
 
 
-def test_every_such_file_is_named(tmp_path: Path) -> None:
+def test_every_file_that_is_no_rig_file_is_named(tmp_path: Path) -> None:
     for name in ("one.csv", "two.csv"):
         (tmp_path / name).write_text("name,age\na,1\n", encoding="utf-8")
     with pytest.raises(DataError) as caught:
@@ -143,7 +143,7 @@ def test_a_rate_above_the_header_stands_for_a_column_of_time(tmp_path: Path, sai
 
 
 @pytest.mark.parametrize("above", [[], ["Test frequency: 5 Hz"], ["Generated at 5 Hz"]])
-def test_where_nothing_tells_the_rate_it_is_asked_for(tmp_path: Path, above: list[str]) -> None:
+def test_a_rate_that_no_line_gives_is_asked_for(tmp_path: Path, above: list[str]) -> None:
     path = stored(tmp_path / "a.csv", [*above, "Stroke (mm);Load (N)"], [numbers(MM), numbers(FORCE)], ";")
     text = guessed([path])
     assert any("or say rate_Hz: N instead" in line for line in text)
@@ -238,8 +238,8 @@ def test_one_setting_or_none_needs_no_choice(tmp_path: Path) -> None:
 def test_without_a_control_signal_the_line_that_leaves_the_car_out_is_shown(tmp_path: Path) -> None:
     columns = [numbers(values) for values in (TIME, X, FORCE)]
     path = stored(tmp_path / "a.csv", ["time_s,displacement_m,force_N"], columns, ",")
-    (line,) = [line for line in guessed([path]) if line.startswith("# stages:")]
+    (line,) = [line for line in guessed([path]) if line == "# car: false"]
     (tmp_path / "guess.yaml").write_text("\n".join([line.removeprefix("# "), *guessed([path])]), encoding="utf-8")
-    assert load(tmp_path / "guess.yaml").stages == WITHOUT_CAR
+    assert not load(tmp_path / "guess.yaml").car
     driven = stored(tmp_path / "b_100V.csv", ["time_s,displacement_m,force_N"], columns, ",")
-    assert "stages" not in "\n".join(guessed([driven]))
+    assert "# car: false" not in guessed([driven])

@@ -16,7 +16,7 @@ from pzd.damper.element import element_force
 from pzd.quantities import Control
 from pzd.rig.config import RigConfig
 from pzd.rig.stand.config import VirtualEntry
-from pzd.rig.stand.recording import take
+from pzd.rig.stand.recording import run_campaign
 
 
 def test_canonical_columns_need_nothing_but_the_path(tmp_path: Path) -> None:
@@ -148,7 +148,7 @@ def test_names_take_the_parent_folder_only_where_stems_are_equal(tmp_path: Path)
     assert "two records would be called one-run" in wrong(tmp_path, {"path": "**/*.csv"})[0]
 
 
-def test_a_known_fixture_is_taken_out_and_said(tmp_path: Path) -> None:
+def test_a_known_fixture_is_taken_out_and_reported(tmp_path: Path) -> None:
     acceleration = -((2 * np.pi * 5.0) ** 2) * X
     write(tmp_path / "mass.csv", lines(CANONICAL | {"force_N": FORCE + 40.0 + 3.0 * acceleration}))
     write(tmp_path / "frame.csv", lines(CANONICAL | {"displacement_m": X + FORCE / 2e6, "velocity_m_per_s": 9.0 * V}))
@@ -173,7 +173,7 @@ def test_the_virtual_fixture_and_its_removal_are_one_law(tmp_path: Path) -> None
         "tests": [{"waveform": {"kind": "sine", "frequency_Hz": 2.0, "amplitude_m": 0.01}, "cycles": 4}],
     }
     with_fixture = VirtualEntry.model_validate_json(json.dumps(stand | {"fixture": fixture}))
-    (shown,) = take(with_fixture, 1)
+    (shown,) = run_campaign(with_fixture, 1)
     columns = {"time_s": shown.time, "displacement_m": shown.displacement, "force_N": shown.force}
     write(tmp_path / "a.csv", lines(columns))
     (record,) = run(tmp_path, {"path": "a.csv", "fixture": fixture}).records
@@ -276,7 +276,7 @@ def test_what_cannot_be_a_damper_is_refused(tmp_path: Path, fault: str) -> None:
     assert any(message in line for line in refused(tmp_path)), refused(tmp_path)
 
 
-def test_a_clock_of_too_few_digits_is_told_with_what_to_do_about_it(tmp_path: Path) -> None:
+def test_a_clock_of_too_few_digits_is_reported_with_what_to_do_about_it(tmp_path: Path) -> None:
     """Five digits of a second, as a table is exported: from 10 s on three samples have one time."""
     later = 10.0 + np.arange(TIME.size) / 3000.0
     write(tmp_path / "a.csv", lines(CANONICAL | {"time_s": np.array([float(f"{t:.5g}") for t in later])}))
@@ -285,7 +285,7 @@ def test_a_clock_of_too_few_digits_is_told_with_what_to_do_about_it(tmp_path: Pa
     assert said.endswith("; it has too few digits: leave its column out and say rate_Hz, about 3006 here")
 
 
-def test_a_clock_that_never_goes_on_is_told_no_rate(tmp_path: Path) -> None:
+def test_a_clock_that_never_goes_on_is_reported_no_rate(tmp_path: Path) -> None:
     write(tmp_path / "a.csv", lines(CANONICAL | {"time_s": np.zeros(TIME.size)}))
     assert any("time does not increase" in line for line in refused(tmp_path))
     assert not any("rate_Hz" in line for line in refused(tmp_path))
@@ -313,7 +313,7 @@ def test_a_spike_and_a_tare_are_findings_and_no_refusal(tmp_path: Path) -> None:
     assert "offset" in {finding.check for finding in rig.entries[1].findings}
 
 
-def test_records_that_are_handed_on_are_those_in_the_files(tmp_path: Path) -> None:
+def test_the_records_of_the_stage_are_those_in_the_files(tmp_path: Path) -> None:
     write(tmp_path / "a.csv", lines(CANONICAL))
     made = run(tmp_path)
     (record,) = made.records

@@ -20,7 +20,7 @@ from pzd.config import load
 from pzd.quantities import Control
 from pzd.rig.files.formats import formats
 from pzd.rig.files.guess import guessed
-from pzd.rig.files.layouts import all_layouts
+from pzd.rig.files.layout import all_layouts
 from pzd.rig.stage import ingest
 
 INCH, KIP, POUND = 0.0254, 4448.2216152605, 4.4482216152605
@@ -302,7 +302,7 @@ def test_the_ingest_report_lists_everything_that_was_done(tmp_path: Path) -> Non
     assert Rig.read(tmp_path / "1-rig", Control()).ingested == rig.ingested
 
 
-def test_degrees_fahrenheit_are_said_with_their_zero(tmp_path: Path) -> None:
+def test_degrees_fahrenheit_are_reported_with_their_zero(tmp_path: Path) -> None:
     us(tmp_path / "a.csv")
     rig = run(tmp_path, {"path": "a.csv", "layout": "us_dyno"})
     (said,) = [row.became for row in rig.ingested if row.step == "unit" and row.quantity == "temperature"]

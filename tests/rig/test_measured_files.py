@@ -19,8 +19,9 @@ CURRENT = Control("current", "A")
 MILLIMETRES = {"columns": {"displacement": "displacement_mm"}, "units": {"displacement": "mm"}}
 
 
-def read(folder: Path, entry: dict[str, Any], control: Control) -> Rig:
-    return ingest(RigConfig.model_validate_json(json.dumps({"files": [entry]})), control, folder)
+def read(folder: Path, entry: dict[str, Any], control: Control, *, preflight: bool = True) -> Rig:
+    config = RigConfig.model_validate_json(json.dumps({"files": [entry]}))
+    return ingest(config, control, folder, preflight=preflight)
 
 
 def checks(rig: Rig) -> set[str]:
@@ -56,9 +57,9 @@ def test_the_export_of_the_logger_and_the_converted_files_are_the_same_tests(sha
             "constants": {"current": ["0 A", "0.25 A", "0.5 A", "0.75 A", "1 A"]},
         },
     }
-    exported = {record.name: record for record in read(shared / "data", raw, CURRENT).records}
+    exported = {record.name: record for record in read(shared / "data", raw, CURRENT, preflight=False).records}
     assert len(exported) == 10
-    rig = read(shared / "data", {"path": "utfsm-mr/converted/2*mm*5Hz_*.csv", **MILLIMETRES}, CURRENT)
+    rig = read(shared / "data", {"path": "utfsm-mr/converted/2*mm*5Hz_*.csv", **MILLIMETRES}, CURRENT, preflight=False)
     converted = {record.name: record for record in rig.records}
     for number, current in ((1, "0"), (3, "0.5"), (5, "1")):
         for test in ("25mm0x5Hz", "2mm5Hz"):

@@ -14,7 +14,7 @@ from pzd.artefacts import Finding
 from pzd.damper.element import element_force
 from pzd.record import Record
 from pzd.rig.config import Limits
-from pzd.rig.preflight import Measured, checks, findings
+from pzd.rig.preflight import PreflightRecord, checks, findings
 from pzd.signals.cycles import Cycles, cycles
 from pzd.signals.kinematics import kinematics
 
@@ -73,7 +73,7 @@ def found(one: Record, limits: Limits = NO_LIMITS) -> tuple[Finding, ...]:
     run = cycles(one.time, one.displacement)
     clean = kinematics(one.time, one.displacement, run)
     whole = replace(one, velocity=clean.velocity, acceleration=clean.acceleration)
-    return findings(Measured(whole, run, clean, limits))
+    return findings(PreflightRecord(whole, run, clean, limits))
 
 
 def only(one: Record, check: str) -> Finding:
@@ -83,13 +83,13 @@ def only(one: Record, check: str) -> Finding:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_clean_records_are_not_accused(kind: str, rng: np.random.Generator) -> None:
-    said = [finding for _ in range(12) for finding in found(record(kind, rng))]
+def test_clean_records_have_no_findings(kind: str, rng: np.random.Generator) -> None:
+    said = [finding for _ in range(6) for finding in found(record(kind, rng))]
     assert len(said) <= 1, said
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_noise_free_records_are_not_accused(kind: str, rng: np.random.Generator) -> None:
+def test_noise_free_records_have_no_findings(kind: str, rng: np.random.Generator) -> None:
     for _ in range(3):
         assert found(record(kind, rng, noise=0.0)) == ()
 
@@ -181,7 +181,7 @@ def test_an_unsteady_clock_is_measured(rng: np.random.Generator) -> None:
     assert only(replace(one, time=shaken), "sampling").size == pytest.approx(1e-4 * np.sqrt(2.0 / 3.0) * 1e3, rel=0.1)
 
 
-def test_few_samples_and_few_cycles_are_said(rng: np.random.Generator) -> None:
+def test_few_samples_and_few_cycles_are_reported(rng: np.random.Generator) -> None:
     slow = record("sine", rng, rate=20.0, seconds=30.0)  # 33 samples a cycle at most: the sine is at 0.6 Hz or more
     assert only(slow, "sampling").unit == "samples a cycle"
     one = record("sine", rng)
@@ -191,19 +191,19 @@ def test_few_samples_and_few_cycles_are_said(rng: np.random.Generator) -> None:
     assert only(short, "cycles").size == pytest.approx(2.2, abs=0.5)
 
 
-def test_a_velocity_at_odds_with_the_displacement_is_said(rng: np.random.Generator) -> None:
+def test_a_velocity_at_odds_with_the_displacement_is_reported(rng: np.random.Generator) -> None:
     for kind in KINDS:
         one = record(kind, rng)
         run = cycles(one.time, one.displacement)
         clean = kinematics(one.time, one.displacement, run)
         for factor in (1e3, -1.0, 1.1):
             whole = replace(one, velocity=factor * clean.velocity)
-            (finding,) = checks()["recorded_velocity"].check(Measured(whole, run, clean, Limits()))
+            (finding,) = checks()["recorded_velocity"](PreflightRecord(whole, run, clean, Limits()))
             assert finding.size == pytest.approx(factor, rel=0.01)
         late = replace(one, velocity=np.roll(clean.velocity, int(0.05 * 1000 / 2.0)))
-        assert checks()["recorded_velocity"].check(Measured(late, run, clean, Limits()))
+        assert list(checks()["recorded_velocity"](PreflightRecord(late, run, clean, Limits())))
         noisy = replace(one, velocity=clean.velocity + 0.02 * clean.velocity.std() * rng.standard_normal(one.time.size))
-        assert not checks()["recorded_velocity"].check(Measured(noisy, run, clean, Limits()))
+        assert not list(checks()["recorded_velocity"](PreflightRecord(noisy, run, clean, Limits())))
 
 
 def test_units_off_by_a_thousand_are_suspected(rng: np.random.Generator) -> None:
@@ -214,7 +214,7 @@ def test_units_off_by_a_thousand_are_suspected(rng: np.random.Generator) -> None
     assert only(replace(one, time=1e3 * one.time), "scale").unit == "m/s"
 
 
-def test_limits_of_the_stand_and_rest_are_said(rng: np.random.Generator) -> None:
+def test_limits_of_the_stand_and_rest_are_reported(rng: np.random.Generator) -> None:
     one = record("sine", rng)
     limits = Limits(stroke_m=1e-3, speed_m_per_s=1e-3, force_N=10.0, frequency_Hz=0.1)
     assert len([finding for finding in found(one, limits) if finding.check == "reach"]) == 4
@@ -246,7 +246,7 @@ def test_noise_of_a_small_stroke_feeds_no_energy_in_wherever_its_cycles_are_cut(
     clean = kinematics(one.time, one.displacement, None)
     for share in np.linspace(0.0, 0.9, 10):
         run = Cycles(start=share / 1.3, period=1.0 / 1.3, count=25)
-        assert checks()["sign"].check(Measured(one, run, clean, NO_LIMITS)) == []
+        assert list(checks()["sign"](PreflightRecord(one, run, clean, NO_LIMITS))) == []
 
 
 def two_tests(one: Record) -> Record:
@@ -300,7 +300,7 @@ def test_every_check_finds_its_fault_and_says_what_follows(name: str, rng: np.ra
     clean = kinematics(one.time, one.displacement, run)
     velocity = 1e3 * clean.velocity if name == "recorded_velocity" else clean.velocity
     limits = Limits(stroke_m=1e-3, force_N=10.0) if name == "reach" else NO_LIMITS
-    said = checks()[name].check(Measured(replace(one, velocity=velocity), run, clean, limits))
+    said = list(checks()[name](PreflightRecord(replace(one, velocity=velocity), run, clean, limits)))
     assert said
     for finding in said:
         assert finding.where

@@ -86,7 +86,7 @@ def plain() -> Record:
     return written(TIME, X, FORCE, **PLAIN)
 
 
-@settings(derandomize=True, max_examples=60)
+@settings(derandomize=True, max_examples=30)
 @given(how=WAYS)
 def test_dialect_unit_sign_and_order_of_columns_change_nothing(plain: Record, how: dict[str, Any]) -> None:
     record = written(TIME, X, FORCE, **how)
@@ -94,7 +94,7 @@ def test_dialect_unit_sign_and_order_of_columns_change_nothing(plain: Record, ho
         assert same(getattr(record, channel), getattr(plain, channel)), channel
 
 
-@settings(derandomize=True, max_examples=25)
+@settings(derandomize=True, max_examples=12)
 @given(scale=st.floats(0.1, 3.0), shift=st.floats(-1e5, 1e5), mirror=st.booleans(), gain=st.floats(0.01, 100.0))
 def test_a_test_scaled_shifted_in_time_and_mirrored_gives_the_record_so_changed(
     plain: Record, scale: float, shift: float, mirror: bool, gain: float

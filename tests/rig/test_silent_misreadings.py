@@ -87,7 +87,7 @@ def test_glitches_of_temperature_and_pressure_are_findings_under_their_own_names
     assert (entry.temperature_degC, entry.voltage_V) == (22.0, 0.5)
 
 
-def test_hum_of_a_constant_control_and_of_a_thermocouple_is_said(tmp_path: Path) -> None:
+def test_hum_of_a_constant_control_and_of_a_thermocouple_is_reported(tmp_path: Path) -> None:
     hum = np.sin(2.0 * np.pi * 50.0 * LONG)
     quiet = 0.01 * np.sin(2.0 * np.pi * 3.7 * LONG)
     channels = {"voltage_V": 100.0 + 1.0 * hum + quiet, "temperature_degC": 22.0 + 0.5 * hum + quiet}
@@ -97,7 +97,7 @@ def test_hum_of_a_constant_control_and_of_a_thermocouple_is_said(tmp_path: Path)
     assert "hum: temperature, the whole record, at 50 Hz" in found
 
 
-def test_a_control_cut_off_at_its_range_is_said_and_a_programme_is_not(tmp_path: Path) -> None:
+def test_a_control_cut_off_at_its_range_is_reported_and_a_programme_is_not(tmp_path: Path) -> None:
     sine = 80.0 * np.sin(2.0 * np.pi * 1.3 * LONG)
     programmes = {
         "steps": 100.0 * (np.sin(2.0 * np.pi * 1.3 * LONG + 1.0) > 0.0),
@@ -165,7 +165,7 @@ def test_a_header_among_the_data_is_named_as_such(tmp_path: Path) -> None:
     assert "a file of its own" in said
 
 
-def test_so_is_one_below_a_blank_line_and_a_title(tmp_path: Path) -> None:
+def test_a_header_below_a_blank_line_and_a_title_among_the_data_is_named_as_such(tmp_path: Path) -> None:
     text = lines(CANONICAL)
     write(tmp_path / "a.csv", [*text, "", "Test 2", *text, "", "Test 3", *text])
     (said,) = refused(tmp_path)
@@ -175,7 +175,7 @@ def test_so_is_one_below_a_blank_line_and_a_title(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("cell", "decimal"), [("1.129,9", ","), ("1,129.9", "."), ("1'129.9", "."), ("-12 129,9", ",")]
 )
-def test_grouped_thousands_are_told_as_such(tmp_path: Path, cell: str, decimal: str) -> None:
+def test_grouped_thousands_are_reported_as_such(tmp_path: Path, cell: str, decimal: str) -> None:
     text = [line.replace(".", decimal) for line in lines(CANONICAL, separator=";")]
     text[7] = ";".join([*text[7].split(";")[:2], cell, *text[7].split(";")[3:]])
     write(tmp_path / "a.csv", text)
@@ -287,7 +287,9 @@ def held(values: np.ndarray) -> np.ndarray:
     return result
 
 
-def test_channels_that_are_held_and_samples_that_are_missing_are_said(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_channels_that_are_held_and_samples_that_are_missing_are_reported(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
     noisy = LONG_FORCE + rng.standard_normal(8000)
     gone = {name: np.delete(values, np.s_[3000:3100]) for name, values in LONGER.items()} | {"time_s": LONG[:-100]}
     missing = noisy.copy()

@@ -23,7 +23,7 @@ def stored(folder: Path, name: str, x: Array, force: Array) -> None:
 
 
 @pytest.mark.parametrize("kind", STEPS)
-def test_two_tests_in_one_record_are_said_with_how_to_split_them(tmp_path: Path, kind: str) -> None:
+def test_two_tests_in_one_record_are_reported_with_how_to_split_them(tmp_path: Path, kind: str) -> None:
     stored(tmp_path, "a", STEPS[kind], damper(STEPS[kind]))
     (finding,) = [f for f in run(tmp_path).entries[0].findings if f.check == "steps"]
     assert "split: {column" in finding.follows
@@ -86,7 +86,7 @@ def test_a_hysteresis_is_no_delay_for_that_is_the_same_in_all_files(tmp_path: Pa
     assert delays(tmp_path / "all") == []
 
 
-def test_a_delay_that_is_the_same_in_all_files_is_said(tmp_path: Path, rng: np.random.Generator) -> None:
+def test_a_delay_that_is_the_same_in_all_files_is_reported(tmp_path: Path, rng: np.random.Generator) -> None:
     for name in ("a", "b", "c"):
         one = record("random", rng, noise=0.01, delay=0.008)
         columns = {"time_s": one.time, "displacement_m": one.displacement, "force_N": one.force}
@@ -94,7 +94,7 @@ def test_a_delay_that_is_the_same_in_all_files_is_said(tmp_path: Path, rng: np.r
     assert delays(tmp_path) == pytest.approx([0.008] * 3, abs=0.0015)
 
 
-def test_a_file_with_force_and_displacement_both_turned_over_is_said(tmp_path: Path) -> None:
+def test_a_file_with_force_and_displacement_both_turned_over_is_reported(tmp_path: Path) -> None:
     said = offsets(tmp_path, [-150.0, -150.0, -150.0, 150.0])
     assert "both turned over here" in said[3]
 
@@ -108,7 +108,9 @@ def test_a_damper_that_hardly_slips_has_no_wrong_sign(tmp_path: Path, rng: np.ra
     assert min(works) < 0.0 < max(works)
 
 
-def test_which_channel_is_turned_over_is_told_by_the_gas_force_the_other_files_and_the_header(tmp_path: Path) -> None:
+def test_which_channel_is_turned_over_is_found_by_the_gas_force_the_other_files_and_the_header(
+    tmp_path: Path,
+) -> None:
     x = sine(0.01, 1.5)
     force = damper(x, gas=-200.0)
     stored(tmp_path / "gas", "a", x, -force)

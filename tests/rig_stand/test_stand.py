@@ -14,10 +14,10 @@ from pzd.damper.element import element_force
 from pzd.damper.motion import Motion
 from pzd.quantities import Control
 from pzd.rig.config import Fixture, RigConfig
-from pzd.rig.files.channels import free
+from pzd.rig.files.channels import without_fixture
 from pzd.rig.stage import synthesise
 from pzd.rig.stand.config import VirtualEntry
-from pzd.rig.stand.recording import Taken, records, take
+from pzd.rig.stand.recording import StandRecord, run_campaign
 
 SINE = {"kind": "sine", "frequency_Hz": 2.0, "amplitude_m": 0.03}
 TRIANGLE = {"kind": "triangle", "frequency_Hz": 1.5, "amplitude_m": 0.02}
@@ -38,8 +38,8 @@ def stand(base: Any = ONE, effects: Any = None, reference: Any = None, **changes
     return VirtualEntry.model_validate_json(json.dumps(usual | changes))
 
 
-def taken(entry: VirtualEntry, seed: int = 1) -> list[Taken]:
-    return list(take(entry, seed))
+def taken(entry: VirtualEntry, seed: int = 1) -> list[StandRecord]:
+    return list(run_campaign(entry, seed))
 
 
 # ---------------------------------------------------------------- the truth
@@ -87,7 +87,7 @@ def test_a_test_starts_from_rest_before_its_recording_begins() -> None:
         seen.append(motion)
         return motion.velocity.copy()
 
-    list(take(stand(), 1, law=law))
+    list(run_campaign(stand(), 1, law=law))
     assert seen[0].time[0] == pytest.approx(-1.0)
     assert (seen[0].displacement[0], seen[0].velocity[0], seen[0].acceleration[0]) == (0.0, 0.0, 0.0)
 
@@ -157,9 +157,9 @@ def test_a_moving_mass_adds_its_inertia_and_a_tare_its_weight() -> None:
 def test_taking_out_a_known_fixture_gives_the_damper_back() -> None:
     fixture = {"mass_kg": 4.0, "tare_N": -35.0, "stiffness_N_per_m": 2e7}
     (test,) = taken(stand(fixture=fixture, tests=[{"waveform": SINE, "cycles": 6}]))
-    freed = free(Fixture(**fixture), test.time, test.displacement, test.force)
-    force = element_force(freed.displacement, 1e-3, 400.0, 2500.0, 300_000.0, float(freed.force[0]))
-    assert np.sqrt(np.mean((freed.force - force) ** 2)) < 2e-3 * np.abs(force).max()
+    alone = without_fixture(Fixture(**fixture), test.time, test.displacement, test.force)
+    force = element_force(alone.displacement, 1e-3, 400.0, 2500.0, 300_000.0, float(alone.force[0]))
+    assert np.sqrt(np.mean((alone.force - force) ** 2)) < 2e-3 * np.abs(force).max()
 
 
 # ---------------------------------------------------------------- warming
@@ -220,9 +220,9 @@ def test_ramped_voltage_goes_from_start_to_end() -> None:
 
 
 def test_a_damper_without_valve_records_no_voltage_and_no_temperature() -> None:
-    (record,) = records(stand(), 1)
-    assert record.voltage is None
-    assert record.temperature is None
+    (test,) = taken(stand())
+    assert test.voltage is None
+    assert test.temperature is None
 
 
 # ---------------------------------------------------------------- what is recorded
@@ -234,8 +234,8 @@ NOISY: dict[str, Any] = {
 }
 
 
-def by_name(entry: VirtualEntry, seed: int) -> dict[str, Taken]:
-    return {test.name: test for test in take(entry, seed)}
+def by_name(entry: VirtualEntry, seed: int) -> dict[str, StandRecord]:
+    return {test.name: test for test in run_campaign(entry, seed)}
 
 
 def test_a_record_does_not_depend_on_the_other_records(seed: int) -> None:
@@ -267,7 +267,7 @@ def test_the_same_road_is_driven_at_every_voltage(seed: int) -> None:
 def test_tests_differ_in_gain_offset_and_delay_as_configured(seed: int) -> None:
     entry = stand(jitter=NOISY["jitter"], tests=[{"waveform": SINE, "cycles": 1, "repeats": 150}], rate_Hz=200)
     drawn = []
-    for test in take(entry, seed):
+    for test in run_campaign(entry, seed):
         rise = np.gradient(test.true_force, test.time)
         columns = np.stack([test.true_force, np.full(rise.size, np.abs(test.true_force).max()), -rise], axis=1)
         drawn.append(np.linalg.lstsq(columns, test.force - test.true_force, rcond=None)[0])
@@ -283,13 +283,14 @@ def test_a_delayed_force_is_the_force_of_before() -> None:
 
 def test_velocity_and_acceleration_of_a_record_come_from_its_noisy_displacement(seed: int) -> None:
     entry = stand(tests=[{"waveform": SINE, "cycles": 10}], noise=NOISY["noise"])
-    (record,), (test,) = records(entry, seed), taken(entry, seed)
+    (test,) = taken(entry, seed)
+    (record,) = synthesise(RigConfig(virtual=(entry,)), seed, Control(), Path()).records
     np.testing.assert_array_equal(record.displacement, test.displacement)
     assert 0.0 < np.std(record.velocity - test.truth.velocity) < 0.05 * np.std(test.truth.velocity)
 
 
 def test_another_law_puts_another_damper_into_the_stand() -> None:
-    (test,) = take(stand(), 1, law=lambda damper, motion, frame: 100.0 * motion.velocity**3)
+    (test,) = run_campaign(stand(), 1, law=lambda damper, motion, frame: 100.0 * motion.velocity**3)
     np.testing.assert_allclose(test.true_force, 100.0 * test.truth.velocity**3)
 
 

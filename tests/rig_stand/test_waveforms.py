@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from pzd.rig.stand.recording import draw_for
-from pzd.rig.stand.waveform import Course, Waveform, started
-from pzd.rig.stand.waveforms import waveforms
+from pzd.rig.stand.waveforms import Course, Waveform, started, waveforms
 from pzd.schema.errors import ConfigError, DataError
 from pzd.signals.harmonics import FourierSum
 

@@ -35,7 +35,7 @@ def faults(path: Path, text: str, control: Control = VOLTAGE) -> list[str]:
 
 
 @pytest.mark.parametrize("control", [VOLTAGE, CURRENT])
-def test_what_is_written_reads_back(tmp_path: Path, control: Control) -> None:
+def test_json_that_is_written_reads_back(tmp_path: Path, control: Control) -> None:
     path = tmp_path / "r.json"
     model = Rig(tests=(Test(name="ä\n", at_voltage_V=(0.0, 0.1 + 0.2)), Test(name="b", size=(1e-300, 2.0))))
     write_json(path, model, control)
@@ -88,7 +88,7 @@ def test_the_control_under_another_name_is_refused(tmp_path: Path) -> None:
         ("null", "r.json:1:1: must be"),
     ],
 )
-def test_what_is_no_such_file_is_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:
+def test_a_file_that_is_not_the_json_of_a_model_is_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:
     found = faults(tmp_path / "r.json", text)
     assert len(found) == 1
     assert found[0].startswith(message)

@@ -15,7 +15,7 @@ from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError, FilesError
 from pzd.schema.model import Frozen
 from pzd.schema.yamlfile import read_yaml, read_yaml_model, write_yaml_model
-from pzd.schema.yamltree import MOST_VALUES, scalar_of, written
+from pzd.schema.yamltree import scalar_of, written
 
 VOLTAGE = Control()
 CURRENT = Control("current", "A")
@@ -94,7 +94,7 @@ def test_a_plain_scalar_means_what_yaml_1_2_says(text: str, value: Any) -> None:
     assert type(found) is type(value)
 
 
-def test_not_a_number_is_one() -> None:
+def test_nan_is_a_number() -> None:
     assert math.isnan(float(str(scalar_of(".nan"))))
 
 
@@ -165,7 +165,7 @@ def test_a_bomb_of_aliases_is_refused_before_it_goes_off(tmp_path: Path) -> None
     lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]" for i in range(1, 30)]
     (found,) = faults(tmp_path, "\n".join(lines))
-    assert f"aliases that give more than {MOST_VALUES} values" in found
+    assert "aliases that give more than 1000000 values" in found
 
 
 def test_a_missing_file_and_a_folder_are_wrong_configs(tmp_path: Path) -> None:
@@ -183,7 +183,7 @@ def test_a_file_that_may_not_be_read_is_a_fault_of_files(tmp_path: Path, monkeyp
         read_yaml(tmp_path / "c.yaml")
 
 
-def test_every_fault_is_said_at_once_with_the_nearest_key(tmp_path: Path) -> None:
+def test_every_fault_is_reported_at_once_with_the_nearest_key(tmp_path: Path) -> None:
     text = "nmae: b\noutside: clmap\ninner:\n  - {voltage: 3, setting: 1}\n  - voltage_V: [1, x]\n"
     text += "limits: {a: true}\nzzz: 1\n"
     assert faults(tmp_path, text) == [
@@ -228,7 +228,7 @@ def test_a_value_that_several_types_may_take_gets_one_message(tmp_path: Path) ->
     ]
 
 
-def test_a_list_that_is_too_short_is_said_and_one_with_a_faulty_item_is_not_called_short(tmp_path: Path) -> None:
+def test_a_list_that_is_too_short_is_reported_and_one_with_a_faulty_item_is_not_called_short(tmp_path: Path) -> None:
     assert len(faults(tmp_path, "inner: []\n")) == 1
     assert all("at least" not in message for message in faults(tmp_path, "inner: [{voltage_V: x}]\n"))
 
@@ -271,11 +271,11 @@ def test_a_faulty_override_is_named_as_it_was_typed(tmp_path: Path, override: st
     assert found[0].startswith(message)
 
 
-def test_faulty_overrides_are_said_at_once(tmp_path: Path) -> None:
+def test_faulty_overrides_are_reported_at_once(tmp_path: Path) -> None:
     assert len(faults(tmp_path, "inner: [{}]\n", "a", "b", "inner.9=1")) == 3
 
 
-def test_the_control_goes_by_its_own_name(tmp_path: Path) -> None:
+def test_keys_of_the_control_bear_its_own_name(tmp_path: Path) -> None:
     text = "inner: [{current_A: 2}]\n"
     assert read(tmp_path, text, control=CURRENT).inner[0].voltage_V == 2.0
     assert faults(tmp_path, text) == [

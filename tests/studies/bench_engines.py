@@ -12,7 +12,8 @@ from pathlib import Path
 from bench_table import Row
 
 from pzd.parallel.chunks import ChunkedWork
-from pzd.parallel.config import EngineConfig, Where
+from pzd.parallel.config import EngineConfig
+from pzd.parallel.engines import Where
 from pzd.sweep.campaign import SweepRuns
 from pzd.sweep.task import BaseRun, outcomes
 

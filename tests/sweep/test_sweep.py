@@ -20,7 +20,7 @@ from pzd.artefacts import Diagnosed, ParameterRow
 from pzd.config import SweepConfig
 from pzd.damper.model import BaseRow, Damper
 from pzd.parallel import chunks
-from pzd.parallel.config import Pools, Where
+from pzd.parallel.engines import Pools, Where
 from pzd.parallel.processes import Progress
 from pzd.pipeline.command import execute
 from pzd.quantities import Control
@@ -280,8 +280,8 @@ def test_a_value_that_is_no_value_of_the_config_is_refused_before_anything_runs(
 
 def test_rides_of_a_config_without_a_car_are_refused(small: Path, tmp_path: Path) -> None:
     text = SMALL.replace("until: identify", "until: simulate")
-    small.write_text(f"stages: [rig, identify, diagnose, table, report]\n{text}", encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"sweep\.until: stages leaves simulate out"):
+    small.write_text(f"car: false\n{text}", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"sweep\.until: car: false leaves the rides out"):
         SweepRuns.of(BaseRun(small, tmp_path, ()))
 
 

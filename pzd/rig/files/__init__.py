@@ -1,1 +1,1 @@
-"""Rig files into tests: which files, their format and dialect, units, channels, and what is refused."""
+"""Rig files into records: listing, format and dialect, layout, units, channels, refusals; and the guess of a config."""

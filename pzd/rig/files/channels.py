@@ -1,4 +1,7 @@
-"""The columns of a sheet as channels in SI: which column is which quantity, its unit, its sign."""
+"""Channels of a file in SI: column, unit and sign of every quantity, tests cut apart, a known fixture taken out.
+
+sheet -> channels -> tests as recorded -> damper alone
+"""
 
 from __future__ import annotations
 
@@ -20,40 +23,36 @@ from pzd.schema.model import nearest
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
-# ----------------------------------------------------------------------------------------------------
-
-
 COMPRESSION = re.compile(r"compr|druckkraft|einfed|einschub", re.IGNORECASE)
-"""Words of a header that counts compression positive."""
+"""Words in the header of a channel that counts compression positive."""
 OPTIONAL = (VELOCITY, ACCELERATION, VOLTAGE, TEMPERATURE, PRESSURE)
 """Quantities whose column may be wholly empty, which counts as absent."""
-
-
 HALF_DAY = 43200.0
 """Twelve hours [s]."""
 _DATES = ("%d", "%j", "%x", "%c", "%D", "%F")
-"""Codes of a format that tells one day from the next."""
+"""Codes of a time format that hold the date."""
 ROUNDING = 1e-9
-"""A control signal, temperature or pressure that varies by less, relative to itself or to one unit, is constant."""
+"""A control signal, temperature or pressure that varies by less, relative to itself or to one unit, is constant:
+conversion of units leaves some 1e-16, and no sensor resolves 1e-9."""
 
 
 @dataclass(frozen=True, eq=False)
 class Channels:
-    """The channels of one file, in SI and degC; where cells are at fault, of them the clock alone, as recorded."""
+    """Channels of one file, in SI and degC; where cells are faulty, the clock alone, as recorded."""
 
-    values: dict[Quantity, Array]
+    by_quantity: dict[Quantity, Array]
     """Canonical quantity -> (rows,); the control signal under `VOLTAGE`."""
     faults: tuple[str, ...] = ()
     """Cells that are bad or empty, each with its line."""
     remarks: tuple[Finding, ...] = ()
-    """What the file itself says otherwise than the config."""
+    """Contradictions between the file and the config."""
     steps: tuple[ReadingStep, ...] = ()
-    """What was renamed, converted and turned."""
+    """Columns renamed, converted and multiplied by a sign."""
 
 
 @dataclass(frozen=True)
 class _Source:
-    """Where one quantity stands in a sheet."""
+    """Column and unit of one quantity in a sheet."""
 
     spec: ChannelSpec
     column: int
@@ -66,24 +65,25 @@ class _Source:
 
 
 def channels(sheet: Sheet, layout: Layout) -> Channels:
-    """The channels that a sheet holds.
+    """Take the channels from a sheet.
 
     Parameters
     ----------
     sheet : the file as its reader gives it
-    layout : what the config says about each quantity
+    layout : specification of each quantity
 
     Raises
     ------
     DataError : when a column is missing or occurs twice, or a cell is no date
-    ConfigError : when nothing says the unit of a column, or the unit is none of the quantity
+    ConfigError : when a column has no unit, or the unit is of another quantity
     """
     found = _sources(sheet, layout)
     bad = [fault for source in found for fault in sheet.faults.get(source.column, [])]
     if bad:
         return Channels(_clock(sheet, layout, found), tuple(bad))
     values = {source.spec.quantity: _instants(sheet, source) for source in found if source.dated}
-    values |= _counted(sheet, layout)
+    if layout.entry.rate_Hz is not None:
+        values |= _clock(sheet, layout, found)
     faults: list[str] = []
     for source in found:
         if source.dated:
@@ -103,12 +103,12 @@ def channels(sheet: Sheet, layout: Layout) -> Channels:
         values[source.spec.quantity] = _steady(channel) if source.spec.quantity in LABELS else channel
     if faults:
         return Channels(_clock(sheet, layout, found), tuple(faults))
-    steps = (*_steps(sheet, found, values), *_counting(layout))
-    return Channels(values, remarks=_remarks(sheet, found), steps=steps)
+    remarks, steps = tuple(_remarks(sheet, found)), tuple(_steps(sheet, layout, found, values))
+    return Channels(values, remarks=remarks, steps=steps)
 
 
-def _steps(sheet: Sheet, found: list[_Source], values: dict[Quantity, Array]) -> Iterator[ReadingStep]:
-    """What was done to each column; nothing for one that stands there as it is handed on."""
+def _steps(sheet: Sheet, layout: Layout, found: list[_Source], values: dict[Quantity, Array]) -> Iterator[ReadingStep]:
+    """Report what was done to each column, and that samples were counted for the time."""
     for source in found:
         spec, own, head = source.spec, source.spec.own, sheet.header[source.column]
         if spec.quantity not in values:
@@ -119,63 +119,58 @@ def _steps(sheet: Sheet, found: list[_Source], values: dict[Quantity, Array]) ->
         if source.dated:
             yield ReadingStep("unit", own.name, f"dates and times like {source.unit}", "s since the first")
         elif source.unit != own.unit:
-            zero, one = to_canonical(np.array([0.0, 1.0]), source.unit, own)
-            offset = f" {zero:+.10g}" if zero else ""
-            if offset or one != 1.0:
-                yield ReadingStep("unit", own.name, source.unit, f"{own.unit}: times {one - zero:.10g}{offset}")
+            start, end = to_canonical(np.array([0.0, 1.0]), source.unit, own)
+            offset = f" {start:+.10g}" if start else ""
+            if offset or end != 1.0:
+                yield ReadingStep("unit", own.name, source.unit, f"{own.unit}: times {end - start:.10g}{offset}")
         if spec.sign < 0:
             yield ReadingStep("sign", own.name, "as recorded", "times -1")
+    if layout.entry.rate_Hz is not None:
+        yield ReadingStep("clock", TIME.name, "no column", f"samples counted at {layout.entry.rate_Hz:.10g} Hz")
 
 
-def _remarks(sheet: Sheet, found: list[_Source]) -> tuple[Finding, ...]:
-    """Headers that name another unit or another sign than the one the channel was read with."""
-    remarks: list[Finding] = []
+def _remarks(sheet: Sheet, found: list[_Source]) -> Iterator[Finding]:
+    """Find headers that name another unit or another sign than the one the channel was read with."""
     for source in found:
         spec, header = source.spec, sheet.header[source.column]
-        for told, ratio in _other_units(source, sheet):
-            said = "the config says" if spec.unit is not None else "the file says beside it"
-            remarks.append(
-                Finding(
-                    check="units",
-                    where=f"{spec.own.name}, whose header is {header!r}{told}; {said} {source.unit}",
-                    size=ratio,
-                    unit="-",
-                    follows=f"{source.unit} was taken; by the other the channel would be this many times as large",
-                )
+        for beside, ratio in _other_units(source, sheet):
+            origin = "the config says" if spec.unit is not None else "the file says beside it"
+            yield Finding(
+                check="units",
+                where=f"{spec.own.name}, whose header is {header!r}{beside}; {origin} {source.unit}",
+                size=ratio,
+                unit="-",
+                follows=f"{source.unit} was taken; by the other the channel would be this many times as large",
             )
-        if spec.quantity in (DISPLACEMENT, FORCE) and not spec.sign_said and COMPRESSION.search(header):
-            remarks.append(
-                Finding(
-                    check="sign",
-                    where=f"{spec.own.name}, whose header is {header!r}",
-                    size=float(spec.sign),
-                    unit="-",
-                    follows=f"extension is positive: say sign: {{{spec.own.name}: -1}}, or 1 if it is so already",
-                )
+        if spec.quantity in (DISPLACEMENT, FORCE) and not spec.sign_given and COMPRESSION.search(header):
+            yield Finding(
+                check="sign",
+                where=f"{spec.own.name}, whose header is {header!r}",
+                size=float(spec.sign),
+                unit="-",
+                follows=f"extension is positive: say sign: {{{spec.own.name}: -1}}, or 1 if it is so already",
             )
-    return tuple(remarks)
 
 
 def _other_units(source: _Source, sheet: Sheet) -> Iterator[tuple[str, float]]:
-    """How many times as large a channel would be by another unit that the file names, in its header or beside it."""
+    """Find other units that the file names, in the header or beside it, and the factor they would make."""
     spec, header = source.spec, sheet.header[source.column]
     if source.dated or spec.quantity is TEMPERATURE:
         return
     inside = spec.own.unit if header in spec.canonical_headers else in_header(header, spec.own)
     beside = sheet.units[source.column].strip("[]() ") if sheet.units else ""
-    for told, shown in ((inside, ""), (beside, f" and its unit {beside!r}")):
+    for unit, shown in ((inside, ""), (beside, f" and its unit {beside!r}")):
         try:
-            theirs, ours = (
-                float(to_canonical(np.ones(1), unit, spec.own)[0]) for unit in (told or source.unit, source.unit)
-            )
+            theirs, ours = (to_canonical(np.ones(1), one, spec.own) for one in (unit or source.unit, source.unit))
         except UnitError:
             continue
-        if abs(theirs / ours - 1.0) > 1e-9:
-            yield shown, theirs / ours
+        ratio = float(theirs[0]) / float(ours[0])
+        if abs(ratio - 1.0) > 1e-9:
+            yield shown, ratio
 
 
 def _steady(channel: Array) -> Array:
-    """A channel that varies by no more than rounding as the constant that it is."""
+    """Return a channel that varies by rounding alone as the constant that it is."""
     middle = float(np.median(channel))
     constant = np.ptp(channel) <= ROUNDING * max(1.0, abs(middle))
     return np.full_like(channel, middle) if constant else channel
@@ -193,7 +188,10 @@ def _sources(sheet: Sheet, layout: Layout) -> list[_Source]:
         elif columns:
             unit = _unit(sheet, columns[0], spec)
             if unit is None:
-                config_faults.append(_no_unit(sheet, columns[0], layout.place, spec.own))
+                config_faults.append(
+                    f"{layout.place}.units: {spec.own.name}: the header {sheet.header[columns[0]]!r} of {sheet.path} "
+                    f"names no unit; say it, e.g. units: {{{spec.own.name}: {spec.own.unit}}}"
+                )
             else:
                 found.append(_Source(spec, columns[0], unit))
         elif spec.named or spec.quantity in NEEDED:
@@ -206,20 +204,13 @@ def _sources(sheet: Sheet, layout: Layout) -> list[_Source]:
 
 
 def _unit(sheet: Sheet, column: int, spec: ChannelSpec) -> str | None:
-    """The unit that the config says, then the file's own row of units, then its header."""
+    """Return the unit by the config, else by the file's own row of units, else by its header."""
     if spec.unit is not None:
         return spec.unit
     if sheet.units is not None and sheet.units[column]:
         return sheet.units[column].strip("[]() ")
     header = sheet.header[column]
     return spec.own.unit if header in spec.canonical_headers else in_header(header, spec.own)
-
-
-def _no_unit(sheet: Sheet, column: int, place: str, quantity: Quantity) -> str:
-    return (
-        f"{place}.units: {quantity.name}: the header {sheet.header[column]!r} of {sheet.path} names no unit; "
-        f"say it, e.g. units: {{{quantity.name}: {quantity.unit}}}"
-    )
 
 
 def _missing(sheet: Sheet, spec: ChannelSpec, place: str) -> str:
@@ -233,31 +224,18 @@ def _missing(sheet: Sheet, spec: ChannelSpec, place: str) -> str:
     return f"{sheet.top}: missing column {wanted}{hint} (got {', '.join(sheet.header)})"
 
 
-def _counted(sheet: Sheet, layout: Layout) -> dict[Quantity, Array]:
-    """The clock of files without a column of it, from 0 in every recording; nothing where a column holds it."""
-    if layout.entry.rate_Hz is None:
-        return {}
-    rows = np.arange(sheet.rows, dtype=np.float64)
-    begins = np.array(sheet.starts)[np.searchsorted(sheet.starts, rows, side="right") - 1]
-    return {TIME: (rows - begins) / layout.entry.rate_Hz}
-
-
-def _counting(layout: Layout) -> Iterator[ReadingStep]:
-    """That samples were counted for the time."""
-    if layout.entry.rate_Hz is not None:
-        yield ReadingStep("clock", TIME.name, "no column", f"samples counted at {layout.entry.rate_Hz:.10g} Hz")
-
-
 def _clock(sheet: Sheet, layout: Layout, found: list[_Source]) -> dict[Quantity, Array]:
-    """The clock as it stands in the file; nothing where it holds dates or bad cells."""
+    """Return the clock: counted from 0 in every recording, or its column unless that holds dates or bad cells."""
     if layout.entry.rate_Hz is not None:
-        return _counted(sheet, layout)
+        rows = np.arange(sheet.rows, dtype=np.float64)
+        begins = np.array(sheet.starts)[np.searchsorted(sheet.starts, rows, side="right") - 1]
+        return {TIME: (rows - begins) / layout.entry.rate_Hz}
     (clock,) = (source for source in found if source.spec.quantity is TIME)
     return {} if clock.dated or clock.column in sheet.faults else {TIME: sheet.numbers[clock.column]}
 
 
 def _instants(sheet: Sheet, source: _Source) -> Array:
-    """Dates and times as seconds since the first."""
+    """Convert dates and times to seconds since the first."""
     import pandas as pd
 
     cells = sheet.texts[source.column]
@@ -278,18 +256,15 @@ def _instants(sheet: Sheet, source: _Source) -> Array:
     return seconds + turn * np.concatenate(([0.0], np.cumsum(np.diff(seconds) < -0.5 * turn)))
 
 
-# ----------------------------------------------------------------------------------------------------
-# The channels of one file as its tests, cut where the config says.
+# --- Tests of a file ---
 
 
 @dataclass(frozen=True, eq=False)
-class Test:
-    """One test of one file, in SI and degC; every channel is (n,)."""
-
-    __test__ = False
+class RawRecord:
+    """One test of one file as recorded, in SI and degC; every channel is (n,)."""
 
     number: int | None
-    """Which test of the file, None where it holds one."""
+    """Number of the test in the file, None where it holds one."""
     setting: str | None
     channels: dict[Quantity, Array]
     """By canonical quantity; the control signal under `VOLTAGE`."""
@@ -297,45 +272,46 @@ class Test:
     first: int = 0
     """Row of the sheet at which the test begins."""
     remarks: tuple[Finding, ...] = ()
-    """What the file itself says otherwise than the config."""
+    """Contradictions between the file and the config."""
     faults: tuple[str, ...] = ()
-    """Cells that are bad or empty; then the test is the whole file, uncut."""
+    """Bad or empty cells; the test is then the whole file, uncut."""
     force_sign: int = 1
-    """What the force of the cell was multiplied by."""
+    """Factor between the force of the cell and the force here."""
     whole: bool = True
     """Whether the file is meant to be one test, in which the clock must go on."""
     steps: tuple[ReadingStep, ...] = ()
-    """What was done to the file on the way here."""
+    """Steps from the file to this test."""
 
     def place(self, row: int) -> str:
-        """File and line of one sample."""
+        """Return file and line of one sample."""
         return self.sheet.place(self.first + row)
 
 
 def split_into_tests(
     channels: Channels, sheet: Sheet, layout: Layout, values: Values, setting: str | None
-) -> tuple[Test, ...]:
-    """Every test of one file, with the values that no column holds.
+) -> tuple[RawRecord, ...]:
+    """Cut the channels of one file into tests, and add the values that no column holds.
 
     Raises
     ------
-    ConfigError : when there are more or fewer values than tests, or a column holds what the config gives as well
+    ConfigError : when there are more or fewer values than tests, or the config gives a value that a column holds
     DataError : when the column that cuts the file is missing or doubled
     """
     split, place = layout.entry.split, layout.place
     twice = [
-        f"{place}: {spec.own.name}: stands in column {_header(sheet, spec)} of {sheet.path} and under "
+        f"{place}: {spec.own.name}: stands in column "
+        f"{next(head for head in sheet.header if head in spec.headers)!r} of {sheet.path} and under "
         f"{_given_under(layout, spec)} as well; leave that out, or say columns: {{{spec.own.name}: ''}} to leave "
         "the column out"
         for spec in layout.channels
-        if spec.quantity in channels.values and spec.quantity in values
+        if spec.quantity in channels.by_quantity and spec.quantity in values
     ]
     if twice:
         raise ConfigError(twice)
     alone = split is None and len(sheet.starts) == 1
     if channels.faults:
-        return (Test(None, setting, channels.values, sheet, faults=channels.faults, whole=alone),)
-    starts = _starts(sheet, split, channels.values[TIME], place)
+        return (RawRecord(None, setting, channels.by_quantity, sheet, faults=channels.faults, whole=alone),)
+    starts = _starts(sheet, split, channels.by_quantity[TIME], place)
     bounds = list(zip(starts, [*starts[1:], sheet.rows], strict=True))
     faults = [
         f"{place}.split.constants: {spec.own.name}: {len(values[spec.quantity])} values for {len(bounds)} tests "
@@ -346,10 +322,10 @@ def split_into_tests(
     if faults:
         raise ConfigError(faults)
     return tuple(
-        Test(
+        RawRecord(
             index + 1 if len(bounds) > 1 else None,
             setting,
-            _piece(channels.values, values, index, first, last),
+            _cut_out(channels.by_quantity, values, index, first, last),
             sheet,
             first,
             channels.remarks,
@@ -365,12 +341,8 @@ def split_into_tests(
     )
 
 
-def _header(sheet: Sheet, spec: ChannelSpec) -> str:
-    return repr(next(head for head in sheet.header if head in spec.headers))
-
-
 def _given_under(layout: Layout, spec: ChannelSpec) -> str:
-    """The key of the config that gives the value of a quantity."""
+    """Return the key of the config that gives the value of a quantity."""
     entry, names = layout.entry, {spec.own.name, spec.quantity.name}
     if names & set(entry.constants):
         return "constants"
@@ -378,7 +350,7 @@ def _given_under(layout: Layout, spec: ChannelSpec) -> str:
 
 
 def _starts(sheet: Sheet, split: FileSplit | None, time: Array, place: str) -> list[int]:
-    """First rows of the tests: where the config says, and where the file itself begins another table."""
+    """Return the first rows of the tests, by the config and where the file itself begins another table."""
     begins = np.zeros(sheet.rows, dtype=np.bool_)
     if split is not None and split.gap_s is not None:
         jump = np.diff(time)
@@ -397,7 +369,7 @@ def _starts(sheet: Sheet, split: FileSplit | None, time: Array, place: str) -> l
 def _splitting_steps(
     sheet: Sheet, layout: Layout, values: Values, index: int, first: int, last: int, count: int
 ) -> Iterator[ReadingStep]:
-    """Which rows are this test, and the values that no column holds."""
+    """Report the rows of this test, and the values that no column holds."""
     if count > 1:
         yield ReadingStep(
             "cut", None, f"test {index + 1} of {count}", f"{last - first} rows from {sheet.place_in_file(first)}"
@@ -410,45 +382,39 @@ def _splitting_steps(
             yield ReadingStep("value", spec.own.name, f"no column; {under}", f"{value:.6g} {spec.own.unit}")
 
 
-def _piece(channels: dict[Quantity, Array], values: Values, index: int, first: int, last: int) -> dict[Quantity, Array]:
+def _cut_out(
+    channels: dict[Quantity, Array], values: Values, index: int, first: int, last: int
+) -> dict[Quantity, Array]:
     piece = {quantity: column[first:last] for quantity, column in channels.items()}
     for quantity, given in values.items():
         piece[quantity] = np.full(last - first, given[index if len(given) > 1 else 0])
     return piece
 
 
-# ----------------------------------------------------------------------------------------------------
-# The known fixture taken out of a record: tare and moving mass from the force, the frame from the displacement.
+# --- Known fixture ---
 
 
 @dataclass(frozen=True, eq=False)
-class Freed:
-    """Displacement and force of the damper alone, and what was taken out."""
+class DamperAlone:
+    """Displacement and force of the damper alone, a known fixture taken out."""
 
     displacement: Array
     force: Array
-    said: str
-    on_the_damper: bool = True
-    """Whether the displacement was recorded on the damper itself, no frame in between."""
+    removed: str
+    """What was taken out, in words; empty where nothing was."""
+    displacement_measured: bool
+    """Whether the displacement is that of the sensor, no frame taken out."""
 
 
-def damper_alone(test: Test, fixture: Fixture | None) -> Freed:
-    """Displacement and force of the damper alone, of a test behind a fixture; None where nothing is known of one."""
-    time, displacement, force = (test.channels[quantity] for quantity in (TIME, DISPLACEMENT, FORCE))
-    if fixture is None:
-        return Freed(displacement, force, "")
-    return free(fixture, time, displacement, force, test.force_sign)
-
-
-def free(fixture: Fixture, time: Array, displacement: Array, force: Array, sign: int = 1) -> Freed:
-    """Displacement and force of the damper alone.
+def without_fixture(fixture: Fixture, time: Array, displacement: Array, force: Array, sign: int = 1) -> DamperAlone:
+    """Take tare and moving mass out of the force, and the give of the frame out of the displacement.
 
     Equation: F = s (F_cell - F_tare) - m a, x = x_rig - F / k_frame
               Source: equilibrium of the mass, springs in series
 
     Parameters
     ----------
-    fixture : what is known of it
+    fixture : as far as it is known
     time : (n,) [s]
     displacement : (n,) as the rig measures it [m]
     force : (n,) as the cell measures it, times its sign: s F_cell [N]
@@ -456,17 +422,25 @@ def free(fixture: Fixture, time: Array, displacement: Array, force: Array, sign:
 
     Returns
     -------
-    both without the fixture, and a sentence that says so
+    both without the fixture, and its effects in words
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> time = np.linspace(0.0, 1.0, 5)
+    >>> alone = without_fixture(Fixture(tare_N=20.0), time, 0.01 * time, np.full(5, 120.0))
+    >>> float(alone.force[0]), alone.removed
+    (100.0, 'tare of 20 N')
     """
-    said: list[str] = []
-    force = force - sign * fixture.tare_N
+    removed: list[str] = []
     if fixture.tare_N:
-        said.append(f"tare of {fixture.tare_N:g} N")
+        force = force - sign * fixture.tare_N
+        removed.append(f"tare of {fixture.tare_N:g} N")
     if fixture.mass_kg:
         motion = kinematics(time, displacement, cycles(time, displacement))
         force = force - fixture.mass_kg * motion.acceleration
-        said.append(f"inertia of {fixture.mass_kg:g} kg")
+        removed.append(f"inertia of {fixture.mass_kg:g} kg")
     if fixture.stiffness_N_per_m:
         displacement = displacement - force / fixture.stiffness_N_per_m
-        said.append(f"give of the frame at {fixture.stiffness_N_per_m:g} N/m")
-    return Freed(displacement, force, ", ".join(said), on_the_damper=not fixture.stiffness_N_per_m)
+        removed.append(f"give of the frame at {fixture.stiffness_N_per_m:g} N/m")
+    return DamperAlone(displacement, force, ", ".join(removed), displacement_measured=not fixture.stiffness_N_per_m)

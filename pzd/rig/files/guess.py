@@ -1,4 +1,4 @@
-"""Guesses, from rig files, a config that reads them; what only a person knows stays empty."""
+"""Guess of a config from rig files; what only a person knows stays empty."""
 
 from __future__ import annotations
 
@@ -12,12 +12,10 @@ from typing import Any
 import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
-from pzd.record import Array
 from pzd.rig.config import FilesEntry, FileSplit, Limits, NamedLayout
 from pzd.rig.files.dialect import after_lines
 from pzd.rig.files.formats import TEXT, read_sheet
-from pzd.rig.files.layout import NEEDED, own_quantity
-from pzd.rig.files.layouts import all_layouts, named_layout
+from pzd.rig.files.layout import NEEDED, all_layouts, named_layout, own_quantity
 from pzd.rig.files.reading import read
 from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.sniffing import (
@@ -36,16 +34,14 @@ from pzd.schema.errors import DataError, UserError, at
 from pzd.schema.yamltree import written
 from pzd.signals.smoothing import work
 
-# ----------------------------------------------------------------------------------------------------
-# Which layout fits a rig file: the file has its columns, and what is read by it is accepted.
-
+# --- Layout that fits a file: its columns are there, and its tests are accepted ---
 
 _HERE = Path()
-"""The current folder: rig files are named as seen from it, and layouts of the user may lie in it."""
+"""The current folder, from which rig files are named; layouts of the user may lie in it."""
 
 
 def best_layout(path: Path, header: Sequence[str], asked: str | None = None) -> tuple[str, NamedLayout] | None:
-    """Name and content of the layout that fits a file; the one that names most of its columns where several do.
+    """Find the layout that fits a file; of several, the one that names most of its columns.
 
     Parameters
     ----------
@@ -55,20 +51,20 @@ def best_layout(path: Path, header: Sequence[str], asked: str | None = None) -> 
 
     Returns
     -------
-    the layout, None where none fits
+    name and content of the layout, None where none fits
 
     Raises
     ------
-    UserError : when the file cannot be read by the layout that was asked for, with what is wrong
+    UserError : when the file cannot be read by the layout that was asked for
     """
     if asked is not None:
         layout = named_layout(asked, _HERE, "--layout")
-        _read(path, asked, layout)
+        _try_reading(path, asked, layout)
         return asked, layout
     likely = {name: layout for name, layout in all_layouts(_HERE).items() if _likely(layout, path, header)}
     for name in sorted(likely, key=lambda name: len(likely[name].columns), reverse=True):
         try:
-            _read(path, name, likely[name])
+            _try_reading(path, name, likely[name])
         except UserError:
             continue
         return name, likely[name]
@@ -76,22 +72,20 @@ def best_layout(path: Path, header: Sequence[str], asked: str | None = None) -> 
 
 
 def _likely(layout: NamedLayout, path: Path, header: Sequence[str]) -> bool:
-    """Whether a layout names the columns of a recording, all of them are there, and the file's name is as it says."""
+    """Whether a layout names the columns of a recording, all of them are there, and the file's name matches."""
     columns = layout.columns
     recording = all(quantity.name in columns for quantity in NEEDED)
     named = layout.name is None or re.search(layout.name, path.stem) is not None
     return recording and named and {head for head in columns.values() if head} <= set(header)
 
 
-def _read(path: Path, name: str, layout: NamedLayout) -> None:
+def _try_reading(path: Path, name: str, layout: NamedLayout) -> None:
     """Read a file by a layout, for its refusals alone."""
     # A refusal names the file as it was given, as seen from where the command stands.
     read((FilesEntry(path=str(path), layout=name),), Limits(), layout.control.signal(), _HERE)
 
 
-# ----------------------------------------------------------------------------------------------------
-# Entries of `rig.files` that read rig files, by the layout that fits them or guessed from their headers and names.
-
+# --- Entries of `rig.files`, by the layout that fits or guessed from headers and names ---
 
 _DATES = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y")
 _TIMES = ("%H:%M:%S.%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
@@ -100,48 +94,47 @@ FORMATS = (
     *_TIMES,
 )
 """Formats of date and time that are tried on the first row."""
-
 _RATE = re.compile(r"(?:sampl|abtast|\brate\b)[^\n\d]*(\d+(?:[.,]\d+)?)\s*(k)?Hz", re.IGNORECASE)
-"""A sampling rate in the lines above the header; a frequency alone may be that of the test."""
+"""Sampling rate in the lines above the header; a frequency without such a word may be that of the test."""
 _EVENTS = re.compile(r"event|marker|marke|ereignis", re.IGNORECASE)
 _GOES_ON = re.compile(r"resume|restart|start|begin|weiter", re.IGNORECASE)
-"""Words of an event with which another recording begins."""
+"""Words in an event that begins another recording."""
 
 
 @dataclass(frozen=True)
 class GuessedEntry:
-    """An entry of `rig.files`."""
+    """An entry of `rig.files` as lines of YAML."""
 
     lines: tuple[str, ...]
     controlled: bool
-    """Whether a control signal is read."""
+    """Whether it reads a control signal."""
     settings: tuple[str | None, ...]
-    """How the clickers of each file stood, by its name."""
+    """Position of the clickers in the name of each file."""
 
 
 @dataclass(frozen=True)
-class Sniffed:
-    """A rig file as it was sniffed."""
+class SniffedFile:
+    """A rig file, its dialect, and the headers of its quantities."""
 
     path: Path
     dialect: Dialect
     columns: tuple[tuple[Quantity, str], ...]
     form: str
-    """Its format."""
+    """Name of its format."""
 
     @property
     def layout(self) -> tuple[object, ...]:
-        """What two files must share to be read by one entry."""
+        """Key that is equal for files that one entry can read."""
         d = self.dialect
         kind = [_date_format(cell) for cell in d.first]
         return self.form, d.header, d.units, d.separator, d.decimal, d.skip, d.encoding, tuple(kind)
 
 
 def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path]) -> Iterator[GuessedEntry]:
-    """The entries of files that a layout fits."""
-    said = {*layout.columns, *layout.constants, *(re.compile(layout.pattern or "").groupindex)}
-    said |= set(layout.split.constants) if layout.split else set()
-    controlled = not said.isdisjoint((VOLTAGE.name, layout.control.signal().name))
+    """Make the entries of files that a layout fits."""
+    quantities = {*layout.columns, *layout.constants, *(re.compile(layout.pattern or "").groupindex)}
+    quantities |= set(layout.split.constants) if layout.split else set()
+    controlled = not quantities.isdisjoint((VOLTAGE.name, layout.control.signal().name))
     for path, members in _patterns(paths):
         lines = [f"    - path: {written(path)}", f"      layout: {name}    # {layout.about}"]
         pattern = layout.pattern or setting_in_names([file.stem for file in members])
@@ -150,9 +143,9 @@ def by_layout(name: str, layout: NamedLayout, paths: Sequence[Path]) -> Iterator
         yield GuessedEntry(tuple(lines), controlled, tuple(setting_of(pattern, file) for file in members))
 
 
-def by_headers(found: Sequence[Sniffed], control: Control) -> Iterator[GuessedEntry]:
-    """The entries of files whose headers say what they hold."""
-    groups: dict[tuple[object, ...], list[Sniffed]] = {}
+def by_headers(found: Sequence[SniffedFile], control: Control) -> Iterator[GuessedEntry]:
+    """Make the entries of files from their headers."""
+    groups: dict[tuple[object, ...], list[SniffedFile]] = {}
     for file in found:
         groups.setdefault(file.layout, []).append(file)
     for group in groups.values():
@@ -167,43 +160,40 @@ def by_headers(found: Sequence[Sniffed], control: Control) -> Iterator[GuessedEn
 
 
 def _from_names(
-    files: Sequence[Sniffed], columns: dict[Quantity, str], control: Control
+    files: Sequence[SniffedFile], columns: dict[Quantity, str], control: Control
 ) -> tuple[str | None, dict[str, str]]:
-    """The pattern that finds in the files' names what no column holds, and the unit of each quantity in it."""
-    names = stems(files)
+    """Return the pattern for what no column holds but the files' names do, and the unit of each quantity in it."""
+    names = [file.path.stem for file in files]
     labels = {VOLTAGE: control.name, TEMPERATURE: TEMPERATURE.name}
-    values = {
-        name: value
-        for quantity, name in labels.items()
-        if quantity not in columns and (value := value_in_names(names, name))
-    }
+    wanted = [name for quantity, name in labels.items() if quantity not in columns]
+    values = {name: value for name in wanted if (value := value_in_names(names, name))}
     setting = setting_in_names(names)
     pattern = one_pattern([pattern for pattern, _ in values.values()] + ([setting] if setting else []), names)
     return pattern, {name: unit for name, (_, unit) in values.items()} if pattern else {}
 
 
 def _keys(
-    files: Sequence[Sniffed],
+    files: Sequence[SniffedFile],
     control: Control,
     columns: dict[Quantity, str],
     pattern: str | None,
     in_names: dict[str, str],
 ) -> Iterator[str]:
-    """The keys of an entry; `in_names` are the units of what the pattern finds."""
+    """Write the keys of an entry; `in_names` holds the units of the quantities in the pattern."""
     dialect = files[0].dialect
     yield from _dialect_keys(dialect)
     named = {own_quantity(q, control): c for q, c in columns.items() if not is_canonical(c, q, control)}
-    lost = [q for q in NEEDED if q not in columns]
-    rates = {_rate(file) for file in files} if TIME in lost else set()
+    missing = [q for q in NEEDED if q not in columns]
+    rates = {_rate(file) for file in files} if TIME in missing else set()
     if len(rates) == 1 and (rate := rates.pop()):
-        lost.remove(TIME)
+        missing.remove(TIME)
         yield f"rate_Hz: {rate:.10g}    # from the lines above the header: no column holds the time"
-    if named or lost:
+    if named or missing:
         yield "columns:"
         yield from (f"  {q.name}: {written(column)}" for q, column in named.items())
         left = ", ".join(header for header in dialect.header if header.strip() and header not in columns.values())
         counted = "; or say rate_Hz: N instead, where no column holds it"
-        yield from (f"  {q.name}:   # fill in: one of {left}{counted if q is TIME else ''}" for q in lost)
+        yield from (f"  {q.name}:   # fill in: one of {left}{counted if q is TIME else ''}" for q in missing)
     units = [*_units(named, dialect), *(f"  {name}: {unit}" for name, unit in in_names.items())]
     if units:
         yield "units:"
@@ -211,12 +201,12 @@ def _keys(
     if pattern:
         yield _pattern_key(pattern)
     yield from _events(files[0])
-    if not lost and any(_turned(file, columns) for file in files):
+    if not missing and any(_turned(file, columns) for file in files):
         yield "sign: {force: -1}   # or {displacement: -1}: as they stand, the damper does work on the rig"
 
 
-def _rate(file: Sniffed) -> float | None:
-    """The sampling rate [Hz] that the lines above the header of a text file tell, None where they tell none."""
+def _rate(file: SniffedFile) -> float | None:
+    """Return the sampling rate [Hz] in the lines above the header of a text file, None without one."""
     if file.form != TEXT:
         return None
     text = file.path.read_bytes().decode(file.dialect.encoding, errors="replace")
@@ -225,18 +215,13 @@ def _rate(file: Sniffed) -> float | None:
 
 
 def _patterns(paths: Sequence[Path]) -> list[tuple[str, Sequence[Path]]]:
-    """One pattern for all the files where one matches exactly these, else every file by itself."""
+    """Return one path pattern for all files where one matches exactly these, else every file by itself."""
     folders, endings = {path.parent for path in paths}, {path.suffix for path in paths}
     if len(paths) > 1 and len(folders) == len(endings) == 1:
         folder, pattern = paths[0].parent, f"*{paths[0].suffix}"
         if set(folder.glob(pattern)) == set(paths):
             return [((folder / pattern).as_posix(), paths)]
     return [(path.as_posix(), [path]) for path in paths]
-
-
-def stems(files: Sequence[Sniffed]) -> list[str]:
-    """The names of files without their endings."""
-    return [file.path.stem for file in files]
 
 
 def _pattern_key(pattern: str | None) -> str:
@@ -257,7 +242,7 @@ def _dialect_keys(dialect: Dialect) -> Iterator[str]:
 
 
 def _units(named: dict[Quantity, str], dialect: Dialect) -> Iterator[str]:
-    """The units that the header and the row of units do not say as they are read."""
+    """Write the units that the reader would not see by itself, and leave empty those that are unknown."""
     for quantity, column in named.items():
         index = dialect.header.index(column)
         below = dialect.units[index] if dialect.units else None
@@ -272,7 +257,7 @@ def _units(named: dict[Quantity, str], dialect: Dialect) -> Iterator[str]:
 
 
 def _read_alike(column: str, below: str | None, unit: str) -> bool:
-    """Whether the reader sees the same unit by itself: in the row of units, or in brackets at the header's end."""
+    """Whether the reader sees the unit by itself: in the row of units, or in brackets at the header's end."""
     if below and below.strip("[]() "):
         return below.strip("[]() ") == unit
     return re.search(rf"[\[(]\s*{re.escape(unit)}\s*[\])]\s*$", column) is not None
@@ -288,8 +273,8 @@ def _date_format(cell: str) -> str | None:
     return None
 
 
-def _events(file: Sniffed) -> Iterator[str]:
-    """Where a logger that was paused says so in its last column: the event with which it went on."""
+def _events(file: SniffedFile) -> Iterator[str]:
+    """Write how to cut a file of a logger that was paused, by the event in its last column with which it went on."""
     head = file.dialect.header[-1]
     if file.form != TEXT or not _EVENTS.search(head):
         return
@@ -303,43 +288,40 @@ def _events(file: Sniffed) -> Iterator[str]:
         yield f"split: {{event: {written(head)}, begins: {written(later[0])}}}"
 
 
-def _as_sniffed(file: Sniffed, split: FileSplit | None = None) -> FilesEntry:
+def _as_sniffed(file: SniffedFile, split: FileSplit | None = None) -> FilesEntry:
     dialect = file.dialect
-    said: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
+    options: dict[str, Any] = {"skip": dialect.skip, "units_row": dialect.units_row}
     if file.form == TEXT:
-        said |= {"separator": dialect.separator, "decimal": dialect.decimal, "encoding": dialect.encoding}
-    return FilesEntry(path=str(file.path), split=split, **said)
+        options |= {"separator": dialect.separator, "decimal": dialect.decimal, "encoding": dialect.encoding}
+    return FilesEntry(path=str(file.path), split=split, **options)
 
 
-def _turned(file: Sniffed, columns: dict[Quantity, str]) -> bool:
-    """Whether the work of a file is negative as its numbers stand, whatever their units."""
+def _turned(file: SniffedFile, columns: dict[Quantity, str]) -> bool:
+    """Whether the work of a file is negative, whatever its units."""
     heads = frozenset((columns[DISPLACEMENT], columns[FORCE]))
     try:
         needed = tuple(frozenset((head,)) for head in heads)
         sheet = read_sheet(file.path, _as_sniffed(file), Wanted(heads, numbers=heads, needed=needed), "rig.files")
     except DataError:
         return False
-    numbers: list[Array] = [
-        sheet.numbers.get(sheet.header.index(columns[quantity]), np.empty(0)) for quantity in (DISPLACEMENT, FORCE)
-    ]
-    x, force = numbers
+    places = (sheet.header.index(columns[quantity]) for quantity in (DISPLACEMENT, FORCE))
+    x, force = (sheet.numbers.get(place, np.empty(0)) for place in places)
     known = x.size == force.size > 2 and bool(np.isfinite(x).all() and np.isfinite(force).all())
     return known and work(x, force) < 0.0 and work(x, force - force.mean()) < 0.0
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- The whole config ---
 
 _SHOWN = 6
-"""Headers that a refusal shows."""
+"""Headers that a refusal shows: the quantities of a rig, mostly."""
 _WITHOUT_CAR = (
     "# No control signal was found. A report on the damper alone, without a car that rides on it, needs this line too:",
-    "# stages: [rig, identify, diagnose, table, report]",
+    "# car: false",
 )
 
 
 def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
-    """A config for rig files, as lines of YAML, with empty places where only a person knows the answer.
+    """Guess a config for rig files, with empty places where only a person knows the answer.
 
     Parameters
     ----------
@@ -348,14 +330,14 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
 
     Returns
     -------
-    the lines; each empty place says in a comment what to fill in
+    lines of YAML; each empty place has a comment on what to fill in
 
     Raises
     ------
     DataError : when a file is no table of a rig's channels, a line a file
     UserError : when a file cannot be read, or not by the layout that was asked for
     """
-    fitting, found = _sorted_out(files, layout)
+    fitting, found = _by_fit(files, layout)
     control = next((one.control.signal() for one, _ in fitting.values()), None) or _control(found)
     entries = [entry for name, (fits, paths) in fitting.items() for entry in by_layout(name, fits, paths)]
     entries += by_headers(found, control)
@@ -369,18 +351,17 @@ def guessed(files: Sequence[Path], layout: str | None = None) -> list[str]:
     settings = {setting for entry in entries for setting in entry.settings}
     names = sorted(setting for setting in settings if setting is not None)
     if len(settings) > 1:
-        lines.append(
-            f"setting: {written(names[0])}    # diagnose and all behind it are about one of {', '.join(names)}"
-        )
+        one_of = f"diagnose and all behind it are about one of {', '.join(names)}"
+        lines.append(f"setting: {written(names[0])}    # {one_of}")
     return [*lines, "rig:", "  files:", *(line for entry in entries for line in entry.lines)]
 
 
-def _sorted_out(
+def _by_fit(
     files: Sequence[Path], layout: str | None
-) -> tuple[dict[str, tuple[NamedLayout, list[Path]]], list[Sniffed]]:
-    """The layouts that fit, each with its files, and the files that none fits."""
+) -> tuple[dict[str, tuple[NamedLayout, list[Path]]], list[SniffedFile]]:
+    """Return the layouts that fit, each with its files, and the files that none fits."""
     fitting: dict[str, tuple[NamedLayout, list[Path]]] = {}
-    found: list[Sniffed] = []
+    found: list[SniffedFile] = []
     faults: list[str] = []
     for path in files:
         try:
@@ -397,17 +378,18 @@ def _sorted_out(
     return fitting, found
 
 
-def _control(files: Sequence[Sniffed]) -> Control:
+def _control(files: Sequence[SniffedFile]) -> Control:
     control = control_of([header for file in files for header in file.dialect.header])
-    if control == Control() and not any(VOLTAGE in dict(file.columns) for file in files):
-        control = Control("current", "A") if value_in_names(stems(files), "current") else control
+    controlled = any(VOLTAGE in dict(file.columns) for file in files)
+    if control == Control() and not controlled and value_in_names([file.path.stem for file in files], "current"):
+        return Control("current", "A")
     return control
 
 
-def _file(path: Path, dialect: Dialect, form: str) -> Sniffed:
+def _file(path: Path, dialect: Dialect, form: str) -> SniffedFile:
     columns = assigned(dialect.header, dialect.units, control_of(dialect.header))
     if not columns:
         shown = ", ".join(dialect.header[:_SHOWN]) + (", ..." if len(dialect.header) > _SHOWN else "")
         line = dialect.header_line if form == TEXT else None
         raise DataError(f"{at(path, line)}: no header names time, displacement or force (got {shown})")
-    return Sniffed(path, dialect, tuple(columns.items()), form)
+    return SniffedFile(path, dialect, tuple(columns.items()), form)

@@ -1,6 +1,6 @@
-"""What an entry of the config says about each quantity: its header, unit and sign, or its value.
+"""Layout of a rig file: header, unit and sign of each quantity, or its value, by the config or a layout with a name.
 
-Known before any file is opened: the reader is told which columns to read, `channels` takes them from there.
+Known before any file is opened: it names the columns to read, and `channels` takes them from there.
 """
 
 from __future__ import annotations
@@ -12,62 +12,61 @@ from pathlib import Path
 from typing import TypeVar
 
 from pzd.quantities import CHANNELS, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VOLTAGE, Control, Quantity
-from pzd.rig.config import FilesEntry
-from pzd.rig.files.layouts import named_layout, with_layout
+from pzd.rig.config import FilesEntry, NamedLayout
 from pzd.rig.files.sheet import Wanted
 from pzd.rig.files.units import UnitError, constant
 from pzd.schema.errors import ConfigError
 from pzd.schema.model import nearest
+from pzd.schema.yamlfile import read_yaml
 
 Value = TypeVar("Value")
 Values = dict[Quantity, tuple[float, ...]]
-"""Values that no column holds: one for the file, or one for each test in it."""
+"""Values of quantities without a column: one for the file, or one for each test in it."""
 
 NEEDED = (TIME, DISPLACEMENT, FORCE)
 """Quantities that a file must have."""
 LABELS = (VOLTAGE, TEMPERATURE, PRESSURE)
-"""Quantities that a constant or the file's name may give."""
+"""Quantities that a constant or the name of the file may give."""
 ALSO_READ = {TEMPERATURE: "temperature_C"}
-"""Other headers that are read without being named."""
+"""Second headers that are read without being named."""
 
 
 @dataclass(frozen=True)
 class ChannelSpec:
-    """What the config says about one quantity."""
+    """Specification of one quantity in the config."""
 
     quantity: Quantity
-    """The canonical quantity; the control signal stands under `VOLTAGE`."""
+    """Canonical quantity; `VOLTAGE` for the control signal."""
     own: Quantity
-    """The quantity as this rig calls it: the control signal under its own name and unit."""
+    """Quantity as this rig calls it: the control signal under its own name and unit."""
     named: str | None
-    """The header that the config names; empty where no column is to be read."""
+    """Header in the config; empty where no column is to be read."""
     unit: str | None
-    """The unit that the config names; for time also a format of date and time."""
+    """Unit in the config; for time also a format of date and time."""
     sign: int
-
     canonical_headers: tuple[str, ...]
     """Headers that are read without being named; their unit is known."""
     headers: tuple[str, ...]
-    """Headers that this quantity may have in a file."""
-    sign_said: bool
-    """Whether the config names a sign, be it 1."""
+    """Headers of this quantity in a file."""
+    sign_given: bool
+    """Whether the config gives a sign, be it 1."""
     dated: bool
-    """Whether the config says that the cells are dates and times."""
+    """Whether the unit in the config is a format of dates and times."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """An entry of the config as one specification a quantity."""
+    """Entry of the config as one specification for each quantity."""
 
     entry: FilesEntry
     place: str
-    """Where the entry stands in the config."""
+    """Place of the entry in the config."""
     control: Control
     channels: tuple[ChannelSpec, ...]
-    """One a canonical quantity, in the order of `CHANNELS`."""
+    """One for each canonical quantity, in the order of `CHANNELS`."""
 
     def wanted(self) -> Wanted:
-        """The columns that a reader is asked for."""
+        """Return the columns to read."""
         split = self.entry.split
         texts = {header for spec in self.channels if spec.dated for header in spec.headers}
         texts |= {header for header in (split.column, split.event) if header} if split else set()
@@ -80,7 +79,7 @@ class Layout:
         )
 
     def values(self, path: Path) -> tuple[Values, str | None]:
-        """Values that constants and the file's name give (one, or one a test), and the setting.
+        """Return the values in constants and the file's name (one, or one for each test), and the setting.
 
         Raises
         ------
@@ -90,10 +89,10 @@ class Layout:
         values: Values = {}
         entry, place, setting = self.entry, self.place, self.entry.setting
         for spec in self._labels():
-            given = _of(entry.constants, spec.own, spec.quantity)
+            given = _lookup(entry.constants, spec.own, spec.quantity)
             if given is not None:
                 values[spec.quantity] = (_constant(given, spec, f"{place}.constants", faults),)
-            many = _of(entry.split.constants, spec.own, spec.quantity) if entry.split else None
+            many = _lookup(entry.split.constants, spec.own, spec.quantity) if entry.split else None
             if many is not None:
                 at_place = f"{place}.split.constants"
                 values[spec.quantity] = tuple(_constant(text, spec, at_place, faults) for text in many)
@@ -102,7 +101,7 @@ class Layout:
             if match is None:
                 faults.append(f"{place}.pattern: the file's name does not match {entry.pattern!r} (got {path.name})")
             else:
-                faults += self._misfits(path.stem if re.search(entry.pattern, path.stem) else path.name, path)
+                faults += self._misfit(path.stem if re.search(entry.pattern, path.stem) else path.name, path)
                 groups = match.groupdict()
                 setting = groups.pop("setting", None) or setting
                 values |= self._from_name(groups, path, faults)
@@ -113,8 +112,8 @@ class Layout:
     def _labels(self) -> list[ChannelSpec]:
         return [spec for spec in self.channels if spec.quantity in LABELS]
 
-    def _misfits(self, name: str, path: Path) -> list[str]:
-        """Where the pattern fits the file's name in several places, or leaves out a minus."""
+    def _misfit(self, name: str, path: Path) -> list[str]:
+        """Describe a pattern that fits the file's name in several places, or leaves out a minus."""
         found = list(re.finditer(self.entry.pattern or "", name))
         values = list(dict.fromkeys(", ".join(filter(None, match.groups())) for match in found))
         if len(values) > 1:
@@ -132,7 +131,7 @@ class Layout:
     def _from_name(self, groups: dict[str, str | None], path: Path, faults: list[str]) -> Values:
         values: Values = {}
         for spec in self._labels():
-            text, own = _of(groups, spec.own, spec.quantity), spec.own
+            text, own = _lookup(groups, spec.own, spec.quantity), spec.own
             if text is None:
                 continue
             if spec.unit is None:
@@ -147,7 +146,7 @@ class Layout:
 
 
 def layouts(entries: Sequence[FilesEntry], control: Control, folder: Path) -> tuple[Layout, ...]:
-    """The layout of every entry of `rig.files`, each checked: its keys name quantities, no two say the same.
+    """Make the layout of every entry of `rig.files`, each checked: its keys name quantities, no two give the same.
 
     Parameters
     ----------
@@ -163,7 +162,7 @@ def layouts(entries: Sequence[FilesEntry], control: Control, folder: Path) -> tu
 
 
 def own_quantity(quantity: Quantity, control: Control) -> Quantity:
-    """The quantity as this rig calls it: the control signal under its own name and unit."""
+    """Return the quantity as this rig calls it: the control signal under its own name and unit."""
     return control.quantity if quantity is VOLTAGE else quantity
 
 
@@ -177,8 +176,8 @@ def _layout(entry: FilesEntry, place: str, control: Control, folder: Path) -> La
                 f"control: {{name: {theirs.name}, unit: {theirs.unit}}} (got {entry.layout!r})"
             )
         entry = with_layout(entry, named)
-    held = (quantity for quantity in CHANNELS if quantity is not TIME or entry.rate_Hz is None)
-    layout = Layout(entry, place, control, tuple(_spec(quantity, entry, control) for quantity in held))
+    in_columns = (quantity for quantity in CHANNELS if quantity is not TIME or entry.rate_Hz is None)
+    layout = Layout(entry, place, control, tuple(_spec(quantity, entry, control) for quantity in in_columns))
     faults = _faults(layout)
     if faults:
         raise ConfigError(faults)
@@ -187,12 +186,12 @@ def _layout(entry: FilesEntry, place: str, control: Control, folder: Path) -> La
 
 def _spec(quantity: Quantity, entry: FilesEntry, control: Control) -> ChannelSpec:
     own = own_quantity(quantity, control)
-    named, unit = _of(entry.columns, own, quantity), _of(entry.units, own, quantity)
+    named, unit = _lookup(entry.columns, own, quantity), _lookup(entry.units, own, quantity)
     also = ALSO_READ.get(quantity)
     canonical = (own.column,) if also is None else (own.column, also)
     headers = canonical if named is None else (named.strip(),) if named.strip() else ()
     dated = quantity is TIME and unit is not None and "%" in unit
-    sign = _of(entry.sign, own, quantity)
+    sign = _lookup(entry.sign, own, quantity)
     return ChannelSpec(quantity, own, named, unit, sign or 1, canonical, headers, sign is not None, dated)
 
 
@@ -206,14 +205,14 @@ def _faults(layout: Layout) -> list[str]:
     faults += _wrong(f"{place}.pattern", [g for g in groups if g != "setting"], LABELS, control)
     a_test = entry.split.constants if entry.split else {}
     faults += _wrong(f"{place}.split.constants", a_test, LABELS, control)
-    said_by: dict[str, Iterable[str]] = {
+    given_by: dict[str, Iterable[str]] = {
         "columns": entry.columns,
         "constants": entry.constants,
         "split.constants": a_test,
         "pattern": groups,
     }
     for spec in layout.channels:
-        ways = [field for field, keys in said_by.items() if spec.own.name in keys or spec.quantity.name in keys]
+        ways = [field for field, keys in given_by.items() if spec.own.name in keys or spec.quantity.name in keys]
         ways = [field for field in ways if field != "columns" or spec.headers]
         if spec.quantity in LABELS and len(ways) > 1:
             faults.append(f"{place}: {spec.own.name}: said twice, under {' and '.join(ways)}")
@@ -225,8 +224,8 @@ def _faults(layout: Layout) -> list[str]:
     return faults
 
 
-def _of(given: Mapping[str, Value], own: Quantity, quantity: Quantity) -> Value | None:
-    """What a mapping of the config says about a quantity, by its name or, for the control, by either name."""
+def _lookup(given: Mapping[str, Value], own: Quantity, quantity: Quantity) -> Value | None:
+    """Look up a quantity in a mapping of the config, the control signal by either of its names."""
     return given.get(own.name, given.get(quantity.name))
 
 
@@ -249,3 +248,80 @@ def _wrong(place: str, given: Iterable[str], allowed: tuple[Quantity, ...], cont
     if VOLTAGE.name in given and control.name in given and control.name != VOLTAGE.name:
         faults.append(f"{place}: {control.name}: the control signal is named twice (also as {VOLTAGE.name})")
     return faults
+
+
+# --- Layouts by name ---
+
+SHIPPED = Path(__file__).with_name("layouts")
+"""Folder of the layouts that come with pzd, one YAML file each."""
+_OWN = ("path", "layout", "source")
+"""Keys of an entry that no layout gives."""
+_ABOUT = re.compile(rb"^about:", re.MULTILINE)
+"""Key of every layout, by which it differs from other YAML files beside it."""
+
+
+def all_layouts(folder: Path) -> dict[str, NamedLayout]:
+    """Read every layout: those that come with pzd, and over them the YAML files of a folder that are layouts.
+
+    Parameters
+    ----------
+    folder : of layouts of the user
+
+    Raises
+    ------
+    ConfigError : when one of them is wrong
+    """
+    files = [path for place in (SHIPPED, folder) for path in sorted(place.glob("*.yaml"))]
+    return {path.stem: read_layout(path) for path in files if _ABOUT.search(path.read_bytes())}
+
+
+def named_layout(name: str, folder: Path, place: str) -> NamedLayout:
+    """Read the layout of a name.
+
+    Parameters
+    ----------
+    name : of the layout
+    folder : the config's folder
+    place : of the name in the config
+
+    Raises
+    ------
+    ConfigError : when there is none, or its file is wrong
+    """
+    path = layout_file(name, folder)
+    if path is None:
+        shipped = [file.stem for file in sorted(SHIPPED.glob("*.yaml"))]
+        near = nearest(name, shipped)
+        hint = f"did you mean {near}?" if near else f"there are {', '.join(shipped)}"
+        raise ConfigError(f"{place}: no such layout, here or as {name}.yaml beside the config; {hint} (got {name!r})")
+    return read_layout(path)
+
+
+def layout_file(name: str, folder: Path) -> Path | None:
+    """Find the file of a layout: beside the config, else the one that comes with pzd; None where there is none."""
+    places = (folder / f"{name}.yaml", SHIPPED / f"{name}.yaml")
+    return next((path for path in places if path.is_file()), None)
+
+
+def read_layout(path: Path) -> NamedLayout:
+    """Read the layout that a file describes.
+
+    Raises
+    ------
+    ConfigError : when it is wrong, with every place
+    """
+    return read_yaml(path).validated(NamedLayout, Control())
+
+
+def with_layout(entry: FilesEntry, layout: NamedLayout) -> FilesEntry:
+    """Complete an entry by its layout; the keys of the entry take precedence."""
+    completed: dict[str, object] = {}
+    for name, field in FilesEntry.model_fields.items():
+        ours, theirs = getattr(entry, name), getattr(layout, name)
+        if name in _OWN:
+            continue
+        if isinstance(theirs, dict):  # quantities, each by itself
+            completed[name] = {**theirs, **ours}
+        elif ours == field.default:
+            completed[name] = theirs
+    return entry.model_copy(update=completed)

@@ -1,6 +1,6 @@
-"""Reads rig files: listing, layout, channels, tests, refusals and records, each step once and in this order.
+"""Rig files into records: each step once and in this order.
 
-listing -> layout -> format reader -> channels -> tests -> refusals -> fixture -> work -> record
+listing -> layout -> format reader -> channels -> tests -> refusals -> clock -> fixture -> work -> record
 """
 
 from __future__ import annotations
@@ -15,22 +15,21 @@ from pathlib import Path
 import numpy as np
 
 from pzd.artefacts import IngestRow
-from pzd.quantities import ACCELERATION, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
+from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
 from pzd.record import Array, Record
-from pzd.rig.config import FilesEntry, Limits
-from pzd.rig.files.channels import Freed, Test, channels, damper_alone, split_into_tests
+from pzd.rig.config import FilesEntry, Fixture, Limits
+from pzd.rig.files.channels import DamperAlone, RawRecord, channels, split_into_tests, without_fixture
 from pzd.rig.files.formats import read_sheet
 from pzd.rig.files.layout import Layout, layouts
 from pzd.rig.files.refusals import refuse, sign_fault, works_on_the_rig
 from pzd.rig.files.sheet import ReadingStep
-from pzd.rig.preflight import Measured
+from pzd.rig.preflight import PreflightRecord
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.model import safe_name
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
-# ----------------------------------------------------------------------------------------------------
-# The rig files that the paths and patterns of a config name.
+# --- Listing ---
 
 
 @dataclass(frozen=True)
@@ -40,11 +39,11 @@ class Listed:
     path: Path
     entry: FilesEntry
     number: int
-    """Which entry of the config it is, from 0."""
+    """Number of the entry in the config, from 0."""
 
 
 def listed(entries: Sequence[FilesEntry], folder: Path) -> tuple[Listed, ...]:
-    """Every file of every entry, sorted by path.
+    """List the files of every entry, sorted by path.
 
     Parameters
     ----------
@@ -64,46 +63,37 @@ def listed(entries: Sequence[FilesEntry], folder: Path) -> tuple[Listed, ...]:
         if not paths:
             hint = f"; {entry.source}" if entry.source else "; the path is relative to the config's folder"
             faults.append(f"{place}.path: no such file under {folder}{hint} (got {entry.path!r})")
-    faults += _read_twice(found)
+    faults += _conflicts(found)
     if faults:
         raise ConfigError(faults)
     return tuple(sorted(found, key=lambda one: (one.path.as_posix(), one.number)))
 
 
-def _read_twice(found: Sequence[Listed]) -> list[str]:
-    """Pairs of entries that read the same of a file; each may take other tables, columns or tests."""
+def _conflicts(found: Sequence[Listed]) -> list[str]:
+    """Describe pairs of entries that read the same of a file; each may take other tables, columns or tests."""
     first: dict[tuple[Path, str], Listed] = {}
-    pairs: dict[tuple[int, int], list[Path]] = {}
+    pairs: dict[tuple[int, int], list[tuple[Listed, Listed]]] = {}
     for one in found:
         way = one.entry.model_dump_json(include={"layout", "columns", "table", "split"})
         before = first.setdefault((one.path.resolve(), way), one)
         if before is not one:
-            pairs.setdefault((before.number, one.number), []).append(one.path)
+            pairs.setdefault((before.number, one.number), []).append((before, one))
     faults: list[str] = []
-    for (first_number, number), paths in pairs.items():
-        earlier, later = _entry(found, first_number), _entry(found, number)
-        more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
+    for same in pairs.values():
+        earlier, later = same[0]
+        more = f" and {len(same) - 1} more" if len(same) > 1 else ""
+        settings = [one.entry.setting for one in same[0]]
+        named = f", as setting {' and '.join(setting or 'without a name' for setting in settings)}"
         faults.append(
-            f"rig.files.{number}.path: reads {paths[0].name}{more}, which rig.files.{first_number} reads too"
-            f"{_settings(earlier, later)}; each test belongs to one entry: narrow one of the paths "
-            f"(got {earlier.path!r} and {later.path!r})"
+            f"rig.files.{later.number}.path: reads {later.path.name}{more}, which rig.files.{earlier.number} reads too"
+            f"{named if settings[0] != settings[1] else ''}; each test belongs to one entry: narrow one of the paths "
+            f"(got {earlier.entry.path!r} and {later.entry.path!r})"
         )
     return faults
 
 
-def _entry(found: Sequence[Listed], number: int) -> FilesEntry:
-    return next(one.entry for one in found if one.number == number)
-
-
-def _settings(one: FilesEntry, other: FilesEntry) -> str:
-    """Under which settings, where two entries name different ones."""
-    if one.setting == other.setting:
-        return ""
-    return f", as setting {one.setting or 'without a name'} and {other.setting or 'without a name'}"
-
-
 def matching(folder: Path, pattern: str) -> list[Path]:
-    """Files that a path or glob pattern of the config names, seen from the config's folder."""
+    """Return the files that a path or glob pattern of the config names, seen from the config's folder."""
     literal = folder / pattern
     if literal.is_file():
         return [literal]
@@ -112,50 +102,49 @@ def matching(folder: Path, pattern: str) -> list[Path]:
     return [path for path in found if path.is_file()]
 
 
-# ----------------------------------------------------------------------------------------------------
-# Accepted tests as records with all their channels, and the names of the records.
+# --- Records, and their names ---
 
 
-def measured(name: str, test: Test, freed: Freed, limits: Limits, control: Control) -> Measured:
-    """The record of a test, with velocity and acceleration recorded or derived.
+def preflight_record(
+    name: str, test: RawRecord, alone: DamperAlone, limits: Limits, control: Control
+) -> PreflightRecord:
+    """Make the record of a test, with velocity and acceleration recorded or derived.
 
     Parameters
     ----------
-    name : what the record is called
-    test : the test as the rig measured it
-    freed : displacement and force of the damper alone
-    limits : what the stand can do
+    name : of the record
+    test : as the rig measured it
+    alone : displacement and force of the damper alone
+    limits : of the stand
     control : the control signal
     """
     time = test.channels[TIME]
-    run = cycles(time, freed.displacement)
-    clean = kinematics(time, freed.displacement, run)
+    periodic = cycles(time, alone.displacement)
+    clean = kinematics(time, alone.displacement, periodic)
     # A velocity recorded on the frame's side is not the damper's: it is derived anew.
-    recorded = test.channels if freed.on_the_damper else {}
+    recorded = test.channels if alone.displacement_measured else {}
     record = Record(
         name,
         test.setting,
         time,
-        freed.displacement,
+        alone.displacement,
         recorded.get(VELOCITY, clean.velocity),
         recorded.get(ACCELERATION, clean.acceleration),
-        freed.force,
+        alone.force,
         *(test.channels.get(quantity) for quantity in (VOLTAGE, TEMPERATURE, PRESSURE)),
     )
-    return Measured(record, run, clean, limits, freed.said or None, control, test.remarks, _ingested(name, test, freed))
-
-
-def _ingested(name: str, test: Test, freed: Freed) -> tuple[IngestRow, ...]:
-    """What was done to the file of a record, as rows of the ingest report."""
-    steps = (*test.steps, *([ReadingStep("fixture", None, freed.said, "taken out")] if freed.said else []))
-    return tuple(
+    steps = test.steps
+    if alone.removed:
+        steps = (*steps, ReadingStep("fixture", None, alone.removed, "taken out"))
+    ingested = tuple(
         IngestRow(record=name, file=test.sheet.path.name, step=s.step, quantity=s.quantity, was=s.was, became=s.became)
         for s in steps
     )
+    return PreflightRecord(record, periodic, clean, limits, alone.removed or None, control, test.remarks, ingested)
 
 
 def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:
-    """The name of every record, by the file and the number of the test in it.
+    """Name every record by its file and the number of the test in it.
 
     Parameters
     ----------
@@ -171,10 +160,14 @@ def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:
     """
     files = list(dict.fromkeys(path for path, _ in tests))
     stems = Counter(safe_name(path.stem) for path in files)
-    called = [_called(path, number, stems) for path, number in tests]
+    called: list[str] = []
     first: dict[str, Path] = {}
     faults: list[str] = []
-    for name, (path, _) in zip(called, tests, strict=True):
+    for path, number in tests:
+        stem = safe_name(path.stem)
+        file = stem if stems[stem] == 1 else safe_name(f"{path.resolve().parent.name}-{path.stem}")
+        name = file if number is None else f"{file}-{number}"
+        called.append(name)
         if name in first:
             faults.append(f"rig.files: two records would be called {name}: {first[name]} and {path}; rename one")
         first.setdefault(name, path)
@@ -183,17 +176,9 @@ def names(tests: Sequence[tuple[Path, int | None]]) -> tuple[str, ...]:
     return tuple(called)
 
 
-def _called(path: Path, number: int | None, stems: Counter[str]) -> str:
-    stem = safe_name(path.stem)
-    whole = stem if stems[stem] == 1 else safe_name(f"{path.resolve().parent.name}-{path.stem}")
-    return whole if number is None else f"{whole}-{number}"
-
-
-# ----------------------------------------------------------------------------------------------------
-# A regular clock whose stamps a file gives with few digits: the samples are where the clock was, not where it says.
+# --- Rounded time stamps of a regular clock ---
 #
 # At 512 Hz and stamps of 1 ms the steps are 1 and 2 ms; a speed derived over them would be wrong by as much.
-
 
 FEWEST = 50
 """Fewer samples do not tell a rounded clock from one that wavers."""
@@ -209,12 +194,16 @@ SAME_STEP = 1e-3
 """Steps that differ by less than this share of the usual one are the same, written with many digits."""
 
 
-def on_regular_clock(test: Test) -> Test:
-    """The test with the stamps of its clock unrounded; as it is where its clock shows no rounding.
+def on_regular_clock(test: RawRecord) -> RawRecord:
+    """Put the samples of a test at the instants of its regular clock, where its time stamps are rounded.
 
     Parameters
     ----------
-    test : its time rising
+    test : time strictly increasing
+
+    Returns
+    -------
+    the test as it is where its clock shows no rounding
     """
     time = test.channels[TIME]
     unrounded = _unrounded(time)
@@ -227,7 +216,7 @@ def on_regular_clock(test: Test) -> Test:
 
 
 def _unrounded(time: Array) -> tuple[Array, float] | None:
-    """(n,) instants of a regular clock [s] and the resolution [s] to which it is rounded; None without any.
+    """Fit a regular clock to its stamps: its instants (n,) [s] and its resolution [s]; None where none is rounded.
 
     Equation: t_i = t_0 + i/f, least squares over all stamps
     """
@@ -248,20 +237,24 @@ def _unrounded(time: Array) -> tuple[Array, float] | None:
     return regular, resolution
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- All files ---
 
 
 def read(
     entries: Sequence[FilesEntry], limits: Limits, control: Control, folder: Path
-) -> tuple[Callable[[], Measured], ...]:
-    """Every test of every file, refused or accepted; what is returned makes the record of each, in any order.
+) -> tuple[Callable[[], PreflightRecord], ...]:
+    """Read every test of every file.
 
     Parameters
     ----------
     entries : `rig.files` of the config
-    limits : what the stand can do
+    limits : of the stand
     control : the control signal
     folder : the config's folder, which relative paths start from
+
+    Returns
+    -------
+    functions that make the record of each test, in any order
 
     Raises
     ------
@@ -271,7 +264,7 @@ def read(
     """
     files = listed(entries, folder)
     described = layouts(entries, control, folder)
-    tests: list[tuple[Test, Freed]] = []
+    tests: list[tuple[RawRecord, DamperAlone]] = []
     layout_of: dict[Path, Layout] = {}
     config_faults: list[str] = []
     data_faults: list[str] = []
@@ -285,22 +278,29 @@ def read(
             data_faults += error.messages
     if config_faults:
         raise ConfigError(dict.fromkeys(config_faults))
-    wrong = [test for test in tests if works_on_the_rig(test[1])]
-    right = [test for test in tests if not works_on_the_rig(test[1])]
-    data_faults += [sign_fault(test, freed, layout_of[test.sheet.path], right) for test, freed in wrong]
+    right = [both for both in tests if not works_on_the_rig(both[1])]
+    data_faults += [
+        sign_fault(test, alone, layout_of[test.sheet.path], right) for test, alone in tests if works_on_the_rig(alone)
+    ]
     if data_faults:
         raise DataError(data_faults)
     called = names([(test.sheet.path, test.number) for test, _ in tests])
     return tuple(
-        partial(measured, name, test, freed, limits, control) for name, (test, freed) in zip(called, tests, strict=True)
+        partial(preflight_record, name, test, alone, limits, control)
+        for name, (test, alone) in zip(called, tests, strict=True)
     )
 
 
-def _read_file(path: Path, layout: Layout) -> list[tuple[Test, Freed]]:
-    """The tests of one file, and displacement and force of the damper alone in each."""
+def _read_file(path: Path, layout: Layout) -> list[tuple[RawRecord, DamperAlone]]:
+    """Read the tests of one file, with displacement and force of the damper alone in each."""
     entry = layout.entry
     values, setting = layout.values(path)
     sheet = read_sheet(path, entry, layout.wanted(), layout.place)
     tests = split_into_tests(channels(sheet, layout), sheet, layout, values, setting)
     refuse(tests, layout)
-    return [(test, damper_alone(test, entry.fixture)) for test in map(on_regular_clock, tests)]
+    found = []
+    for test in map(on_regular_clock, tests):
+        time, displacement, force = (test.channels[quantity] for quantity in (TIME, DISPLACEMENT, FORCE))
+        alone = without_fixture(entry.fixture or Fixture(), time, displacement, force, test.force_sign)
+        found.append((test, alone))
+    return found

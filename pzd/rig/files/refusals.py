@@ -1,7 +1,4 @@
-"""What a test must satisfy to be used at all; a test that does not is refused.
-
-Everything milder is a finding of the preflight.
-"""
+"""Refusal of tests that cannot be used, with file, line and remedy; everything milder is a finding of the preflight."""
 
 from __future__ import annotations
 
@@ -11,50 +8,50 @@ import numpy as np
 
 from pzd.quantities import DISPLACEMENT, FORCE, TIME, VELOCITY
 from pzd.record import Array, clock_fault
-from pzd.rig.files.channels import COMPRESSION, Freed, Test
+from pzd.rig.files.channels import COMPRESSION, DamperAlone, RawRecord
 from pzd.rig.files.layout import Layout
 from pzd.schema.errors import DataError
 from pzd.signals.smoothing import REVERSAL_SHARE, reversals, work, work_of_chance
 
-# ----------------------------------------------------------------------------------------------------
-# The work that a test does on the damper: over a whole test it is positive, or a sign is wrong.
-
+# --- Work over a whole test: negative where a sign is wrong ---
 
 CLEAR_OFFSET = 0.1
-"""Mean force, as a share of half the force's range, from which its sign says which way the force is counted."""
+"""Mean force, as a share of half the force's range, above which its sign tells which way the force is counted."""
 
 
-def works_on_the_rig(freed: Freed) -> bool:
+def works_on_the_rig(alone: DamperAlone) -> bool:
     """Whether the damper does work on the rig over a test.
 
-    Not where a steady force over a net displacement does it, nor where it is so little that a damper which hardly slips
-    may do it by its noise.
+    A steady force over a net displacement does not count, nor does work that noise alone may do on a damper which
+    hardly slips.
     """
-    x, force = freed.displacement, freed.force
+    x, force = alone.displacement, alone.force
     chance = work_of_chance(x, force)
     return work(x, force) < -chance and work(x, force - force.mean()) < -chance
 
 
-def sign_fault(test: Test, freed: Freed, layout: Layout, others: Sequence[tuple[Test, Freed]]) -> str:
-    """What to do about a test over which the damper does work on the rig, and which channel is turned over.
+def sign_fault(
+    test: RawRecord, alone: DamperAlone, layout: Layout, others: Sequence[tuple[RawRecord, DamperAlone]]
+) -> str:
+    """Describe a test over which the damper does work on the rig, and guess which channel has the wrong sign.
 
     Parameters
     ----------
     test : the test, for its place
-    freed : displacement and force of the damper, a known fixture taken out
-    layout : what the config says about each quantity
+    alone : displacement and force of the damper, a known fixture taken out
+    layout : specification of each quantity
     others : the tests of the rig whose work is positive
     """
-    done = work(freed.displacement, freed.force)
+    done = work(alone.displacement, alone.force)
     what = f"{test.place(0)}: the damper does work on the rig over the whole test, {done:.4g} J"
-    channel, why = _by_header(test, layout) or _by_others(test, freed, others) or _by_gas(freed) or (None, "")
+    channel, why = _by_header(test, layout) or _by_others(test, alone, others) or _by_gas(alone) or (None, "")
     sign = -next(spec.sign for spec in layout.channels if spec.quantity.name == (channel or FORCE.name))
     if channel is None:
         return f"{what}: force or displacement has the wrong sign; say sign: {{force: {sign}}}"
     return f"{what}: {channel} has the wrong sign, since {why}; say sign: {{{channel}: {sign}}}"
 
 
-def _by_header(test: Test, layout: Layout) -> tuple[str, str] | None:
+def _by_header(test: RawRecord, layout: Layout) -> tuple[str, str] | None:
     for spec in layout.channels:
         if spec.quantity in (DISPLACEMENT, FORCE) and spec.sign == 1:
             heads = [head for head in test.sheet.header if head in spec.headers and COMPRESSION.search(head)]
@@ -63,10 +60,12 @@ def _by_header(test: Test, layout: Layout) -> tuple[str, str] | None:
     return None
 
 
-def _by_others(test: Test, freed: Freed, others: Sequence[tuple[Test, Freed]]) -> tuple[str, str] | None:
+def _by_others(
+    test: RawRecord, alone: DamperAlone, others: Sequence[tuple[RawRecord, DamperAlone]]
+) -> tuple[str, str] | None:
     offsets = [_offset(other) for mate, other in others if mate.setting == test.setting]
     clear = [offset for offset in offsets if offset is not None]
-    mine = _offset(freed)
+    mine = _offset(alone)
     if mine is None or not clear or abs(np.mean(np.sign(clear))) < 1.0:
         return None
     theirs = float(np.median(clear))
@@ -74,33 +73,32 @@ def _by_others(test: Test, freed: Freed, others: Sequence[tuple[Test, Freed]]) -
     return channel, f"the mean force is {mine:+.4g} N here and {theirs:+.4g} N in the files whose work is right"
 
 
-def _by_gas(freed: Freed) -> tuple[str, str] | None:
-    """A gas force pushes the rod out, so it is negative at every position and less so the further the rod is out."""
-    offset = _offset(freed)
+def _by_gas(alone: DamperAlone) -> tuple[str, str] | None:
+    """Judge by a gas force, which pushes the rod out: negative everywhere, less so the further the rod is out."""
+    offset = _offset(alone)
     if offset is None:
         return None
     channel = FORCE.name if offset > 0.0 else DISPLACEMENT.name
     return channel, f"the mean force of {offset:+.4g} N, if it is the gas force and no tare, is negative in extension"
 
 
-def _offset(freed: Freed) -> float | None:
-    """The mean force where it is clearly off zero."""
-    low, high = np.percentile(freed.force, (1.0, 99.0))
+def _offset(alone: DamperAlone) -> float | None:
+    """Return the middle of the force range where it is clearly off zero."""
+    low, high = np.percentile(alone.force, (1.0, 99.0))
     middle = 0.5 * float(low + high)
     return middle if abs(middle) > CLEAR_OFFSET * 0.5 * float(high - low) else None
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Limits of a usable test ---
 
 LONGEST_STROKE = 1.0
 """Largest stroke, end to end [m]; more is most often millimetres read as metres."""
 HIGHEST_SPEED = 10.0
 """Largest speed [m/s]."""
 STRETCH = 20
-"""Steps of the clock whose median is one rate."""
+"""Steps of the clock in a block, whose median is one rate."""
 OTHER_RATE = 1.5
-"""Ratio of two rates from which they are two; lost samples and jitter stay below over a stretch."""
+"""Ratio above which two rates differ; lost samples and jitter stay below over a block."""
 SLOWEST_STEP = 0.05
 """Step of the clock [s] from which it may be in milliseconds: stands take 20 samples a second and more,"""
 CREEPING = 5e-3
@@ -108,20 +106,20 @@ CREEPING = 5e-3
 OFTEN = 0.01
 """Share of its steps at which a clock that stands still has too few digits; a logger repeats a row now and then."""
 LEAST_REVERSALS = 2
-"""Fewer turns of the motion are no test of a damper."""
+"""A motion of fewer reversals is no test of a damper."""
 
 
-def refuse(tests: Sequence[Test], layout: Layout) -> None:
+def refuse(tests: Sequence[RawRecord], layout: Layout) -> None:
     """Refuse a file one of whose tests cannot be used, whatever its fixture.
 
     Parameters
     ----------
     tests : the tests of the file in SI, as recorded
-    layout : what the config says about each quantity
+    layout : specification of each quantity
 
     Raises
     ------
-    DataError : with what is wrong with the first such test, each with file and line
+    DataError : with the faults of the first such test, each with file and line
     """
     for test in tests:
         found = _faults(test, layout)
@@ -129,7 +127,7 @@ def refuse(tests: Sequence[Test], layout: Layout) -> None:
             raise DataError(found)
 
 
-def _faults(test: Test, layout: Layout) -> list[str]:
+def _faults(test: RawRecord, layout: Layout) -> list[str]:
     if test.faults:
         readable = test.whole and TIME in test.channels
         return [*test.faults, *(_standstills(test) if readable else [])]
@@ -147,15 +145,15 @@ def _faults(test: Test, layout: Layout) -> list[str]:
     return _too_large(test) + _too_few(test, x) + _two_rates(test) + _milliseconds(test, layout)
 
 
-def _standstills(test: Test) -> list[str]:
-    """Where the clock stands still or goes back, in a line; empty where it goes on. NaN is another's fault."""
+def _standstills(test: RawRecord) -> list[str]:
+    """Describe where the clock stands still or goes back; NaN is reported as a bad cell."""
     time = test.channels[TIME]
     fault = clock_fault(time)
     return [f"{test.place(fault[0])}: {fault[1]}{_rounded(time)}"] if fault else []
 
 
 def _rounded(time: Array) -> str:
-    """What to do where a clock (n,) stands still often, goes on, and never goes back: it has too few digits."""
+    """Return the remedy where a clock (n,) stands still often and never goes back: it has too few digits."""
     steps = np.diff(time)
     if steps.min() < 0.0 or steps.max() == 0.0 or np.mean(steps == 0.0) < OFTEN:
         return ""
@@ -163,8 +161,8 @@ def _rounded(time: Array) -> str:
     return f"; it has too few digits: leave its column out and say rate_Hz, about {rate:.5g} here"
 
 
-def _two_rates(test: Test) -> list[str]:
-    """A clock that goes on at another rate: neither rate is the record's."""
+def _two_rates(test: RawRecord) -> list[str]:
+    """Describe where the clock goes on at another rate: neither rate is the record's."""
     time = test.channels[TIME]
     steps = np.diff(time)
     if steps.size < 2 * STRETCH:
@@ -183,19 +181,19 @@ def _two_rates(test: Test) -> list[str]:
     return []
 
 
-def _milliseconds(test: Test, layout: Layout) -> list[str]:
-    """A clock in steps of seconds beside a motion that creeps, unless the config itself says its unit."""
+def _milliseconds(test: RawRecord, layout: Layout) -> list[str]:
+    """Describe a clock in steps of seconds beside a creeping motion, unless the config gives its unit."""
     time, x = test.channels[TIME], test.channels[DISPLACEMENT]
-    said = any(spec.quantity is TIME and spec.unit is not None for spec in layout.channels)
+    unit_given = any(spec.quantity is TIME and spec.unit is not None for spec in layout.channels)
     step, speed = float(np.median(np.diff(time))), float(np.abs(_slope(time, x)).max())
-    if said or step < SLOWEST_STEP or speed > CREEPING:
+    if unit_given or step < SLOWEST_STEP or speed > CREEPING:
         return []
     what = f"the clock goes in steps of {step:.4g} s while the motion reaches {1e3 * speed:.3g} mm/s"
     remedy = "are these milliseconds? say units: {time: ms}, or units: {time: s} if they are seconds"
     return [f"{test.place(0)}: {what}; {remedy}"]
 
 
-def _too_large(test: Test) -> list[str]:
+def _too_large(test: RawRecord) -> list[str]:
     time, x = test.channels[TIME], test.channels[DISPLACEMENT]
     found: list[str] = []
     if np.ptp(x) > LONGEST_STROKE:
@@ -217,7 +215,7 @@ def _too_large(test: Test) -> list[str]:
 
 
 def _slope(time: Array, x: Array) -> Array:
-    """Speed over four samples, blind to spikes of one or two."""
+    """Compute the speed over four samples, insensitive to spikes of one or two."""
     if time.size < 6:
         return np.gradient(x, time)
     clean = _despiked(x)
@@ -227,14 +225,14 @@ def _slope(time: Array, x: Array) -> Array:
 
 
 def _despiked(x: Array) -> Array:
-    """Running median of five samples."""
+    """Take the running median of five samples."""
     if x.size < 5:
         return x
     middle = np.median(np.lib.stride_tricks.sliding_window_view(x, 5), axis=1)
     return np.concatenate((middle[:1], middle[:1], middle, middle[-1:], middle[-1:]))
 
 
-def _too_few(test: Test, x: Array) -> list[str]:
+def _too_few(test: RawRecord, x: Array) -> list[str]:
     count = len(reversals(x))
     if count >= LEAST_REVERSALS:
         return []

@@ -1,4 +1,8 @@
-"""A rig file as its reader gives it: headers, and the columns that were asked for."""
+"""A rig file as its format reads it: headers, and the columns that were asked for.
+
+A workbook has several sheets, a TDMS or MDF file several groups, a MATLAB or JSON file several structures: every table
+that holds a recording is read, the others are reported as left out.
+"""
 
 from __future__ import annotations
 
@@ -15,15 +19,13 @@ from numpy.typing import NDArray
 from pzd.record import Array
 from pzd.schema.errors import DataError, at
 
-# ----------------------------------------------------------------------------------------------------
-
 
 @dataclass(frozen=True)
 class Wanted:
-    """The columns that a reader is asked for, by their headers."""
+    """Columns to read, by their headers."""
 
     known: frozenset[str] = frozenset()
-    """Every header that may stand in the file; they tell the separator."""
+    """Every header that may occur in the file, from which the separator is recognised."""
     numbers: frozenset[str] = frozenset()
     """Columns of numbers."""
     texts: frozenset[str] = frozenset()
@@ -34,20 +36,20 @@ class Wanted:
 
 @dataclass(frozen=True)
 class ReadingStep:
-    """One thing that was done on the way from a file to its records, for the ingest report."""
+    """One step from a file to its records, for the ingest report."""
 
     step: Literal["read", "left out", "rename", "unit", "sign", "value", "cut", "clock", "fixture"]
     quantity: str | None
     """The quantity concerned; None for the file as a whole."""
     was: str
-    """What stands in the file or in the config."""
+    """As in the file or in the config."""
     became: str
-    """What was made of it."""
+    """As in the record."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """What a format hands on: every line has been counted and every wanted cell read."""
+    """A file as its format reads it: every line counted and every wanted cell read."""
 
     path: Path
     header: tuple[str, ...]
@@ -55,7 +57,7 @@ class Sheet:
     header_line: int | None
     """Line of the header in the file, None where a format has no lines."""
     units: tuple[str, ...] | None
-    """Unit of every column where the file says it apart from the header."""
+    """Unit of every column where the file gives it apart from the header."""
     rows: int
     """Number of data rows."""
     lines: NDArray[np.int64] | None = None
@@ -63,7 +65,7 @@ class Sheet:
     numbers: dict[int, Array] = field(default_factory=dict)
     """Column -> (rows,); an empty cell is NaN."""
     texts: dict[int, list[str]] = field(default_factory=dict)
-    """Column -> its cells as they stand, stripped."""
+    """Column -> its cells as text, stripped."""
     faults: dict[int, list[str]] = field(default_factory=dict)
     """Column of numbers -> the cells that are no finite numbers, each with its line."""
     starts: tuple[int, ...] = (0,)
@@ -81,35 +83,37 @@ class Sheet:
         return at(table_place(self.path, self.tables[0]), self.header_line)
 
     def place(self, row: int) -> str:
-        """File, table and line of a data row; the number of the row where a format has no lines."""
+        """Return file, table and line of a data row; the number of the row where a format has no lines."""
         number = bisect_right(self.starts, row) - 1
         file = table_place(self.path, self.tables[number])
         return f"{file}: row {row - self.starts[number] + 1}" if self.lines is None else f"{file}:{self.lines[row]}"
 
     def place_in_file(self, row: int) -> str:
-        """The same in words, without the file."""
+        """Return the place of a data row in words, without the file."""
         number = bisect_right(self.starts, row) - 1
         line = f"row {row - self.starts[number] + 1}" if self.lines is None else f"line {self.lines[row]}"
         return f"{line} of {self.tables[number]!r}" if self.tables[number] else line
 
 
 def table_place(path: Path, table: str) -> str:
-    """A file, and the table in it where that has a name."""
+    """Return a file with the table in it, where that has a name."""
     return f"{path}:{table}" if table else at(path)
 
 
-# ----------------------------------------------------------------------------------------------------
-# The tables that a file of named columns holds, and the one sheet that is read from them.
-#
-# A workbook has several sheets, a TDMS or MDF file several groups, a MATLAB or JSON file several structures: every
-# table that holds a recording is one, the others are left out and said so.
+def listed_faults(path: Path, header: str, bad: Sequence[tuple[str, str]]) -> list[str]:
+    """List bad cells of one column by their places and what is wrong; the first few, and how many more."""
+    shown = [f"{place}: {header}: {message}" for place, message in bad[:MOST_FAULTS]]
+    more = len(bad) - len(shown)
+    return shown + ([f"{at(path)}: {header}: and {more} more"] if more else [])
 
+
+# --- Tables of a file, and the sheet that is read from them ---
 
 Cells = Array | list[str]
 """One column: numbers (an empty cell is NaN), or texts."""
 
 MOST_FAULTS = 5
-"""Faults of one kind that are listed for one column."""
+"""Faults of one kind that are listed for one file or column: enough to see what they have in common."""
 _UNITS, _VALUES = ("unit", "units"), ("values", "value", "data")
 """Keys under which a structure holds the unit and the samples of one column."""
 
@@ -124,7 +128,7 @@ class FileTable:
     cells: tuple[Cells, ...]
     """One a column, all of one length."""
     units: tuple[str, ...] | None = None
-    """Unit of every column where the file says it apart from the header."""
+    """Unit of every column where the file gives it apart from the header."""
     lines: NDArray[np.int64] | None = None
     """(rows,) line of every data row in the file, None where a format has no lines."""
     header_line: int | None = None
@@ -137,13 +141,13 @@ class FileTable:
 
 
 def sheet_of(path: Path, tables: Sequence[FileTable], pattern: str | None, wanted: Wanted) -> Sheet:
-    """The wanted columns of every table that holds a recording, one below the other.
+    """Read the wanted columns of every table that holds a recording, one below the other.
 
     Parameters
     ----------
     path : the file
-    tables : what its format found in it
-    pattern : name or pattern of the tables to read; every one where nothing is said
+    tables : of the file
+    pattern : name or pattern of the tables to read; by default every one
     wanted : the columns to read
 
     Raises
@@ -182,17 +186,17 @@ def sheet_of(path: Path, tables: Sequence[FileTable], pattern: str | None, wante
 def tables_of_tree(
     tree: Mapping[str, Any], name: str = "", constants: Mapping[str, float] | None = None
 ) -> list[FileTable]:
-    """The tables of a tree of structures: arrays of one length in one structure are the columns of one table.
+    """Make tables of a tree of structures: arrays of one length in one structure are the columns of one table.
 
     Parameters
     ----------
     tree : name -> array (n,) or (n, k), list, number, text, or a structure below
-    name : what the structure is called, its parents in front; empty at the top
+    name : of the structure, its parents in front; empty at the top
     constants : numbers of the parents
 
     Returns
     -------
-    tables, each with the single numbers beside and above it as columns of one value behind its own
+    tables, each with the single numbers of its structure and the parents as constant columns behind its own
     """
     columns: dict[str, tuple[Cells, str]] = {}
     numbers = dict(constants or {})
@@ -207,27 +211,27 @@ def tables_of_tree(
             numbers[key] = float(inner)
         else:
             columns |= {head: (cells, unit) for head, cells in _columns(key, inner)}
-    found = _by_length(name, columns, numbers)
+    found = tables_by_length(name, columns, numbers)
     for key, inner in below:
         found += tables_of_tree(inner, f"{name}.{key}" if name else key, numbers)
     return found
 
 
 def table_of_rows(name: str, rows: Sequence[Mapping[str, Any]]) -> FileTable:
-    """The table of a list of rows, each a mapping of header to cell."""
+    """Make the table of a list of rows, each a mapping of header to cell."""
     header = list(dict.fromkeys(head for row in rows for head in row))
     return FileTable(name, tuple(header), tuple(cells_of([row.get(head) for row in rows]) for head in header))
 
 
 def cells_of(values: Sequence[Any]) -> Cells:
-    """A column of loose cells: numbers where every filled cell is one, else texts."""
+    """Make a column of loose cells: numbers where every filled cell is one, else texts."""
     if all(value is None or (isinstance(value, int | float | np.number)) for value in values):
         return np.array([np.nan if value is None else float(value) for value in values])
     return ["" if value is None else spelled(value) for value in values]
 
 
 def spelled(value: Any) -> str:
-    """A cell as text: instants as ISO 8601 with microseconds, numbers as short as they are exact."""
+    """Write a cell as text: instants as ISO 8601 with microseconds, numbers with up to 15 digits."""
     if hasattr(value, "isoformat"):
         try:
             return str(value.isoformat(timespec="microseconds"))
@@ -237,7 +241,7 @@ def spelled(value: Any) -> str:
 
 
 def number(text: str) -> float:
-    """The number that a text is; infinities, NaN and what Python alone takes for one are none.
+    """Read the number in a text; infinities, NaN and digits grouped by `_` are none.
 
     Raises
     ------
@@ -249,28 +253,32 @@ def number(text: str) -> float:
     return value
 
 
-def equal_lengths(name: str, columns: Mapping[str, tuple[Cells, str]]) -> list[FileTable]:
-    """Columns of one group as tables, one a length: channels of different rates are not one table."""
-    return _by_length(name, columns, {})
+def tables_by_length(
+    name: str, columns: Mapping[str, tuple[Cells, str]], numbers: Mapping[str, float] | None = None
+) -> list[FileTable]:
+    """Make one table of the columns of each length: channels of different rates are not one table.
 
-
-def _by_length(name: str, columns: Mapping[str, tuple[Cells, str]], numbers: Mapping[str, float]) -> list[FileTable]:
+    Parameters
+    ----------
+    name : of the group
+    columns : header -> cells and unit
+    numbers : header -> value of columns that are constant in every table
+    """
     lengths = list(dict.fromkeys(len(cells) for cells, _ in columns.values()))
     found = []
     for length in lengths:
         mine = {head: both for head, both in columns.items() if len(both[0]) == length}
-        constant = {head: (np.full(length, value), "") for head, value in numbers.items() if head not in mine}
+        constant = {head: (np.full(length, value), "") for head, value in (numbers or {}).items() if head not in mine}
         every: dict[str, tuple[Cells, str]] = {**mine, **constant}
         units = tuple(unit for _, unit in every.values())
-        said = f"{name} of {length} rows".strip() if len(lengths) > 1 else name
-        found.append(
-            FileTable(said, tuple(every), tuple(cells for cells, _ in every.values()), units if any(units) else None)
-        )
+        called = f"{name} of {length} rows".strip() if len(lengths) > 1 else name
+        cells = tuple(cells for cells, _ in every.values())
+        found.append(FileTable(called, tuple(every), cells, units if any(units) else None))
     return found
 
 
 def _leaf(value: Any) -> tuple[Any, str]:
-    """The samples of a column and its unit where a structure holds just these; else the value itself."""
+    """Return the samples of a column and its unit where a structure holds just these; else the value itself."""
     if not isinstance(value, Mapping):
         return value, ""
     keys = {key.lower(): key for key in value}
@@ -280,7 +288,7 @@ def _leaf(value: Any) -> tuple[Any, str]:
 
 
 def _columns(key: str, value: Any) -> Iterator[tuple[str, Cells]]:
-    """One column, or one for each of the short side of a matrix; nothing where it is no list of samples."""
+    """Yield one column, or one for each of the short side of a matrix; none where it is no list of samples."""
     if isinstance(value, list):
         if not all(value is None or isinstance(value, bool | int | float | str) for value in value):
             try:
@@ -303,12 +311,12 @@ def _columns(key: str, value: Any) -> Iterator[tuple[str, Cells]]:
 
 
 def _matches(table: FileTable, wanted: Wanted) -> int:
-    """How many of the quantities that a recording must have stand in a table."""
+    """Count the quantities of a table that a recording must have."""
     return sum(bool(heads & set(table.header)) for heads in wanted.needed)
 
 
 def _differences(path: Path, first: FileTable, other: FileTable, asked: Iterable[str]) -> Iterator[str]:
-    """Where a second table cannot be read as the first is."""
+    """Describe where a second table cannot be read as the first is."""
     for head in asked:
         if (head in first.header) != (head in other.header):
             holds, lacks = (first, other) if head in first.header else (other, first)
@@ -328,7 +336,7 @@ def _unit(table: FileTable, head: str) -> str:
 
 
 def _steps(tables: Sequence[FileTable], taken: Sequence[FileTable], asked: Iterable[str]) -> Iterator[ReadingStep]:
-    """Which tables and columns are read, and which are left out."""
+    """Report the tables and columns that are read, and those that are left out."""
     names = ", ".join(repr(table.name) for table in taken if table.name)
     yield ReadingStep("read", None, f"table {names}".strip(), f"{sum(table.rows for table in taken)} rows")
     unread = list(dict.fromkeys(head for table in taken for head in table.header if head not in asked))
@@ -342,7 +350,7 @@ def _steps(tables: Sequence[FileTable], taken: Sequence[FileTable], asked: Itera
 
 
 def _with_cells(bare: Sheet, tables: Sequence[FileTable], wanted: Wanted) -> Sheet:
-    """The sheet with the wanted cells of every table, and what is wrong with them."""
+    """Fill in the wanted cells of every table, and their faults."""
     for index, head in enumerate(bare.header):
         unit = bare.units[index] if bare.units else ""
         dated = "%S" in head or "%S" in unit
@@ -358,7 +366,7 @@ def _with_cells(bare: Sheet, tables: Sequence[FileTable], wanted: Wanted) -> She
 
 
 def _numbers(sheet: Sheet, head: str, pieces: Sequence[Cells]) -> tuple[Array, list[str]]:
-    """A column as numbers, and the cells that are none."""
+    """Read a column as numbers, and list the cells that are none."""
     values, bad = np.full(sheet.rows, np.nan), []
     for start, piece in zip(sheet.starts, pieces, strict=True):
         if not isinstance(piece, list):
@@ -370,6 +378,5 @@ def _numbers(sheet: Sheet, head: str, pieces: Sequence[Cells]) -> tuple[Array, l
                 values[row] = number(cell) if cell else np.nan
             except ValueError:
                 bad.append((row, cell))
-    faults = [f"{sheet.place(row)}: {head}: a number is needed (got {cell!r})" for row, cell in bad[:MOST_FAULTS]]
-    more = len(bad) - len(faults)
-    return values, faults + ([f"{at(sheet.path)}: {head}: and {more} more"] if more > 0 else [])
+    places = [(sheet.place(row), f"a number is needed (got {cell!r})") for row, cell in bad]
+    return values, listed_faults(sheet.path, head, places)

@@ -1,6 +1,6 @@
-"""How a file of unknown layout is written: encoding, separator, decimal sign, preamble, row of units.
+"""Guesses about a file of unknown layout: its dialect, the quantity in each column, the values in its name.
 
-Only for the guess of a config: what is read for a run is read as the config says.
+Only for the guess of a config: a run reads files by its config.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -28,16 +29,14 @@ from pzd.quantities import (
     Quantity,
 )
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, kind_of, unread
+from pzd.rig.files.dialect import BLANKS, SEPARATORS, fields_of, text_bytes
 from pzd.rig.files.formats import TEXT, format_of, formats, read_sheet, rows_in, tables_in
 from pzd.rig.files.layout import ALSO_READ, own_quantity
 from pzd.rig.files.sheet import Wanted, spelled
 from pzd.rig.files.units import UnitError, in_header, to_canonical
-from pzd.schema.errors import DataError, FilesError, at
+from pzd.schema.errors import DataError, at
 
-# ----------------------------------------------------------------------------------------------------
-# Which column of a rig file holds which quantity, guessed from its header in English, German, French or Spanish.
-
+# --- Quantity of a column, by its header in English, German, French or Spanish ---
 
 _LOOKS_LIKE = {
     TIME: r"^t$|^tout$|time|clock|zeit|\btemps\b|tiempo|^second|^sek",
@@ -48,12 +47,12 @@ _LOOKS_LIKE = {
     TEMPERATURE: r"temp(?!s\b)|t[eé]mp[eé]r",
     PRESSURE: r"^p$|press|druck|presi",
 }
-"""What headers of each quantity look like, a unit in brackets taken off."""
+"""Headers of each quantity, without a unit in brackets."""
 CONTROLS = {
     Control(): r"^u$|volt|spannung|tension|tensi[oó]n",
     Control("current", "A"): r"^i$|current|strom|courant|corriente",
 }
-"""What the header of the control signal looks like."""
+"""Headers of the control signal."""
 _WITH_UNIT = {
     TIME: "^t$",
     DISPLACEMENT: "^[xs]$",
@@ -63,38 +62,38 @@ _WITH_UNIT = {
     TEMPERATURE: "^t$",
     PRESSURE: "^p$",
 }
-"""What names a quantity where a unit of it stands behind: `x_m`, `F_kN`, `T [degC]`."""
+"""Symbols of a quantity where a unit of it follows: `x_m`, `F_kN`, `T [degC]`."""
 _CONTROLS_WITH_UNIT = {
     Control(): "^u$|ctrl|control|valve|piezo|coil",
     Control("current", "A"): "^i$|ctrl|control|valve|coil",
 }
-"""The same of the control signal: `U_V`, `ctrl [V]`, `Coil/A`."""
+"""Symbols of the control signal where a unit of it follows: `U_V`, `ctrl [V]`, `Coil/A`."""
 _LAST_WORD = re.compile(r"[ _/,]\s*([A-Za-zµ°%][A-Za-zµ°/²^0-9]*)$")
 _DEGREES = dict.fromkeys(("C", "°C", "deg C", "grad C", "Grad C"), "degC") | dict.fromkeys(("F", "°F", "deg F"), "degF")
-"""What headers call degrees, and pint does not or takes for coulombs and farads."""
+"""Spellings of degrees that pint does not know, or takes for coulombs and farads."""
 
 
 def control_of(headers: Sequence[str]) -> Control:
-    """The control signal that the headers show; a voltage where they show none."""
+    """Guess the control signal from the headers; a voltage where they show none."""
     shown = [
         control
         for control, pattern in CONTROLS.items()
         for header in headers
-        if (re.search(pattern, _bare(header)) and _word(header, None, Control()) not in (FORCE, DISPLACEMENT))
+        if (re.search(pattern, _bare(header)) and _quantity_of(header, None, Control()) not in (FORCE, DISPLACEMENT))
         or _by_unit(header, None, control) is VOLTAGE
     ]
     return next(iter(shown), Control())
 
 
 def assigned(headers: Sequence[str], units: Sequence[str] | None, control: Control) -> dict[Quantity, str]:
-    """The header of every quantity that is found, each header for one quantity alone.
+    """Assign headers to quantities, each header to one quantity alone.
 
     A column in a unit of the quantity is taken before one in volts or without a unit.
     """
     found: dict[Quantity, tuple[int, str]] = {}
     for index, header in enumerate(headers):
         below = units[index] if units else None
-        quantity = _word(header, below, control)
+        quantity = _quantity_of(header, below, control)
         if quantity is None:
             continue
         canonical = is_canonical(header, quantity, control)
@@ -106,17 +105,17 @@ def assigned(headers: Sequence[str], units: Sequence[str] | None, control: Contr
 
 
 def is_canonical(header: str, quantity: Quantity, control: Control) -> bool:
-    """Whether a header is read without being named."""
+    """Whether a header is read without being named in the config."""
     return header in (own_quantity(quantity, control).column, ALSO_READ.get(quantity))
 
 
 def unit_of(header: str, below: str | None, quantity: Quantity) -> str | None:
-    """The unit that the row of units or the header names, as pint spells it; None where it is none of the quantity."""
+    """Return the unit in the row of units or the header, as pint spells it; None where it is of another quantity."""
     last = _LAST_WORD.search(header)
-    told = below.strip("[]() ") if below and below.strip("[]() ") else in_header(header, quantity) or (last and last[1])
-    if not told:
+    text = below.strip("[]() ") if below and below.strip("[]() ") else in_header(header, quantity) or (last and last[1])
+    if not text:
         return None
-    unit = _DEGREES.get(told, told) if quantity is TEMPERATURE else told
+    unit = _DEGREES.get(text, text) if quantity is TEMPERATURE else text
     try:
         to_canonical(np.zeros(1), unit, quantity)
     except UnitError:
@@ -124,8 +123,8 @@ def unit_of(header: str, below: str | None, quantity: Quantity) -> str | None:
     return unit
 
 
-def _word(header: str, below: str | None, control: Control) -> Quantity | None:
-    """The quantity that a header names; where it names two (Druckkraft, load cell voltage) the mechanical one."""
+def _quantity_of(header: str, below: str | None, control: Control) -> Quantity | None:
+    """Return the quantity in a header; of two (Druckkraft, load cell voltage) the mechanical one."""
     for quantity in CHANNELS:
         if is_canonical(header, quantity, control):
             return quantity
@@ -139,7 +138,7 @@ def _word(header: str, below: str | None, control: Control) -> Quantity | None:
 
 
 def _by_unit(header: str, below: str | None, control: Control) -> Quantity | None:
-    """The quantity that a header means by the unit behind it; None where there is none."""
+    """Return the quantity of a header by the unit in it; None without one."""
     word = _LAST_WORD.sub("", _bare(header))
     for quantity, pattern in {**_WITH_UNIT, VOLTAGE: _CONTROLS_WITH_UNIT[control]}.items():
         if re.search(pattern, word) and unit_of(header, below, own_quantity(quantity, control)) is not None:
@@ -148,7 +147,7 @@ def _by_unit(header: str, below: str | None, control: Control) -> Quantity | Non
 
 
 def _in_brackets(header: str, units: Sequence[str] | None, index: int) -> bool:
-    """Whether a header has a unit in brackets, whatever it is a unit of."""
+    """Whether a header has any unit in brackets."""
     return bool(units and units[index]) or bool(re.search(r"[\[(].*[\])]", header))
 
 
@@ -156,9 +155,7 @@ def _bare(header: str) -> str:
     return re.sub(r"[\[(].*", "", header).strip().lower()
 
 
-# ----------------------------------------------------------------------------------------------------
-# What the names of rig files tell that no column holds: control signal, temperature, and how the clickers stood.
-
+# --- Values in the name of a file: control signal, temperature, position of the clickers ---
 
 _NUMBER = r"(?<![A-Za-z0-9])([0-9]+(?:[.x,][0-9]+)?)"
 _VALUES = {
@@ -172,7 +169,7 @@ _CLICKERS = ("C[0-9]+_?R[0-9]+", "(?i:[ck]lick(?:er|s)?[ _-]?[0-9]+)", "(?i:[0-9
 
 
 def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
-    """The pattern that finds a quantity in every name, and its unit; None where a name lacks it or units differ.
+    """Return the pattern that finds a quantity in every name, and its unit; None where a name lacks it or units differ.
 
     Parameters
     ----------
@@ -188,54 +185,50 @@ def value_in_names(stems: Sequence[str], name: str) -> tuple[str, str] | None:
 
 
 def setting_in_names(stems: Sequence[str]) -> str | None:
-    """The pattern that finds in every name how the clickers stood; None where a name does not say it."""
+    """Return the pattern that finds the position of the clickers in every name; None where a name lacks it."""
     patterns = (f"(?<![A-Za-z0-9])(?P<setting>{clickers})(?![A-Za-z0-9])" for clickers in _CLICKERS)
     return next((one for one in patterns if all(re.search(one, stem) for stem in stems)), None)
 
 
 def one_pattern(patterns: Sequence[str], stems: Sequence[str]) -> str | None:
-    """One pattern for all that several find, in the order of the names; None where names have no common order."""
-    found = sorted(patterns, key=lambda one: _begin(one, stems[0]))
+    """Join patterns in the order of the names; None where names have no common order."""
+    matches = [(match.start() if (match := re.search(one, stems[0])) else 0, one) for one in patterns]
+    found = [one for _, one in sorted(matches, key=itemgetter(0))]
     whole = ".*?".join(found)  # as little as can be between them: else a first digit is lost
     return whole if found and all(re.search(whole, stem) for stem in stems) else None
 
 
 def setting_of(pattern: str | None, path: Path) -> str | None:
-    """The setting that a pattern finds in the name of a file; None where it finds none."""
+    """Return the setting that a pattern finds in the name of a file; None where it finds none."""
     found = (re.search(pattern, path.stem) or re.search(pattern, path.name)) if pattern else None
     return found.groupdict().get("setting") if found else None
 
 
-def _begin(pattern: str, stem: str) -> int:
-    found = re.search(pattern, stem)
-    return found.start() if found else 0
-
-
-# ----------------------------------------------------------------------------------------------------
-
+# --- Dialect ---
 
 MOST_LINES = 400
-"""Lines from the top that are looked at."""
-_SNIFFING_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+"""Lines from the top that are looked at: a preamble is shorter, and a table shows itself in fewer."""
+_CELL_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _CLOCK = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d{1,2}:\d{2}(:\d{2}.*)?|\d{4}-\d{2}-\d{2}T.*")
 _UNIT = re.compile(r"[\[(]?\s*[A-Za-zµ°%/²³^*.0-9-]{1,8}\s*[\])]?|-")
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """How the lines of a file are written; the keys that the config needs differ from the defaults alone."""
+    """Encoding, separators and header of a file; where they are the defaults, the config need not give them."""
 
-    encoding: str
-    separator: str
-    decimal: str
-    skip: int
     header: tuple[str, ...]
     units: tuple[str, ...] | None
-    """The unit of every column where the file says it apart from the header."""
+    """Unit of every column where the file gives it apart from the header."""
     first: tuple[str, ...]
-    """The first row of data."""
+    """First row of data."""
+    encoding: str = "utf-8"
+    separator: str = ","
+    decimal: str = "."
+    skip: int = 0
+    """Lines above the header."""
     units_row: bool = False
-    """Whether the units are the row below the header, as the config then has to say."""
+    """Whether the units are in a row below the header."""
 
     @property
     def header_line(self) -> int:
@@ -244,7 +237,7 @@ class Dialect:
 
 
 def described(path: Path) -> tuple[Dialect, str]:
-    """How a file is written, and its format; of several tables, the one with most of a rig's channels.
+    """Guess dialect and format of a file; of several tables, by the one with most of a rig's channels.
 
     Raises
     ------
@@ -257,48 +250,38 @@ def described(path: Path) -> tuple[Dialect, str]:
         if found is not None:
             return found, form
         sheet = read_sheet(path, entry, Wanted(known=frozenset(q.column for q in CHANNELS)), "rig.files")
-        skip = (sheet.header_line or 1) - 1
-        return Dialect("utf-8", ",", ".", skip, sheet.header, None, ("",) * len(sheet.header)), form
+        return Dialect(sheet.header, None, ("",) * len(sheet.header), skip=(sheet.header_line or 1) - 1), form
     sheets = rows_in(path, module)
     if sheets is not None:
         sniffs = [dialect for rows in sheets.values() if (dialect := sniffed_rows(rows)) is not None]
     else:
         filled = [table for table in tables_in(path, entry, module) if table.rows]
-        sniffs = [
-            Dialect("utf-8", ",", ".", 0, t.header, t.units, tuple(spelled(cells[0]) for cells in t.cells))
-            for t in filled
-        ]
+        sniffs = [Dialect(t.header, t.units, tuple(spelled(cells[0]) for cells in t.cells)) for t in filled]
     if not sniffs:
         raise DataError(f"{at(path)}: {module.KIND} without a table of numbers below headers")
     return max(sniffs, key=lambda d: len(assigned(d.header, d.units, control_of(d.header)))), form
 
 
 def sniffed(path: Path) -> Dialect | None:
-    """How a file is written; None where no line of numbers below a header is found.
+    """Guess the dialect of a text file; None where no line of numbers below a header is found.
 
     Raises
     ------
     FilesError : when the file cannot be read
     DataError : when it is a file of another kind
     """
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise FilesError(f"{at(path)}: cannot be read ({error.strerror})") from None
-    kind = kind_of(raw)
-    if kind:
-        raise DataError(unread(path, kind))
+    raw = text_bytes(path)
     encoding = _encoding(raw)
     text = raw.decode(encoding, errors="replace").removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     lines = text.split("\n")[:MOST_LINES]
-    ways = [(separator, decimal) for separator in (*SEPARATORS, BLANKS) for decimal in ".," if separator != decimal]
-    tables = [_table([fields_of(line, way[0]) for line in lines], encoding, *way) for way in ways]
+    readings = [(separator, decimal) for separator in (*SEPARATORS, BLANKS) for decimal in ".," if separator != decimal]
+    tables = [_table([fields_of(line, reading[0]) for line in lines], encoding, *reading) for reading in readings]
     found = [table for table in tables if table is not None]
     return max(found, key=lambda rated: rated[0])[1] if found else None
 
 
 def sniffed_rows(rows: Sequence[Sequence[str]]) -> Dialect | None:
-    """The same of rows of cells, say those of a workbook's sheet."""
+    """Guess the header and first row among rows of cells, as in the sheet of a workbook."""
     width = max((sum(bool(cell) for cell in row) for row in rows), default=0)
     found = _table([[cell.strip() for cell in row[:width]] for row in rows[:MOST_LINES]], "utf-8", ",", ".")
     return found[1] if found else None
@@ -317,7 +300,7 @@ def _encoding(raw: bytes) -> str:
 def _table(
     cells: list[list[str]], encoding: str, separator: str, decimal: str
 ) -> tuple[tuple[int, int], Dialect] | None:
-    """The table that the rows hold read this way, rated by the rows and then the numbers in it."""
+    """Find the table in rows read this way, rated by its rows and then the numbers in them."""
     rows = [[cell.strip('"') for cell in row] for row in cells]
     numbers = [_numbers(row, decimal) for row in rows]
     data = [n for n, row in enumerate(rows) if len(row) > 1 and 2 * numbers[n] >= len(row) and numbers[n]]
@@ -339,20 +322,12 @@ def _table(
     # A row may leave out the last column where that is one of events.
     shortest = width - (not _numbers(rows[first][-1:], decimal))
     alike = [n for n in data if shortest <= len(rows[n]) <= width]
-    found = Dialect(
-        encoding,
-        separator,
-        decimal,
-        top,
-        tuple(rows[top]),
-        tuple(rows[first - 1]) if units else None,
-        tuple(rows[first]),
-        units_row=units,
-    )
+    named = tuple(rows[first - 1]) if units else None
+    found = Dialect(tuple(rows[top]), named, tuple(rows[first]), encoding, separator, decimal, top, units_row=units)
     return (len(alike), sum(numbers[n] for n in alike[:1])), found
 
 
 def _numbers(row: list[str], decimal: str) -> int:
-    """Cells of a row that are numbers, or a date or time."""
+    """Count the cells of a row that are numbers, or a date or time."""
     spelled = [cell.replace(",", ".") if decimal == "," and "." not in cell else cell for cell in row]
-    return sum(bool(_SNIFFING_NUMBER.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in spelled)
+    return sum(bool(_CELL_NUMBER.fullmatch(cell) or _CLOCK.fullmatch(cell)) for cell in spelled)

@@ -1,6 +1,6 @@
-"""Units of rig files: what a file or the config says, into SI and degC.
+"""Conversion of the units in rig files and configs to SI and degC, by pint.
 
-pint knows the units; a quantity whose unit is not said is an error elsewhere, never a guess.
+A quantity without a unit is an error elsewhere, never a guess.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ if TYPE_CHECKING:
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d.+-].*?)\s*")
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
 _LOGGERS = {"Sec": "s", "sec": "s", "Volts": "V", "Amps": "A", "lbs": "lbf", "kips": "kip", "deg_C": "degC"}
-"""How loggers spell units that pint does not know, or takes for others: a rig's `lbs` are pounds of force."""
+"""Spellings of loggers that pint does not know, or takes for other units: the `lbs` of a rig are pounds of force."""
 
 
 class UnitError(ValueError):
-    """A unit that is unknown or measures something else, with what to write instead."""
+    """A unit that is unknown or of another quantity, with what to write instead."""
 
 
 def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
-    """Values in the quantity's own unit.
+    """Convert values to the unit of their quantity.
 
     Parameters
     ----------
     values : (n,) in `unit`
-    unit : as pint spells it (`mm`, `kN`, `degF`, `m/s2`), or a size with a unit (`980.665 N`:
-        what one recorded unit, say a volt of the logger, stands for)
-    quantity : what the values measure
+    unit : as pint spells it (`mm`, `kN`, `degF`, `m/s2`), or a size with a unit (`980.665 N`
+        for one recorded unit, such as a volt of the logger)
+    quantity : of the values
 
     Returns
     -------
@@ -44,7 +44,13 @@ def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
 
     Raises
     ------
-    UnitError : when the unit is unknown, or measures something else
+    UnitError : when the unit is unknown, or of another quantity
+
+    Examples
+    --------
+    >>> from pzd.quantities import FORCE
+    >>> to_canonical(np.array([1.5]), "kN", FORCE).tolist()
+    [1500.0]
     """
     if unit == quantity.unit:
         return values
@@ -63,11 +69,11 @@ def to_canonical(values: Array, unit: str, quantity: Quantity) -> Array:
 
 
 def constant(text: str, quantity: Quantity) -> float:
-    """The number of a text like `100 V` or `22 degC`, in the quantity's own unit.
+    """Read a text like `100 V` or `22 degC` in the unit of the quantity.
 
     Raises
     ------
-    UnitError : when there is no number, no unit, or a unit of something else
+    UnitError : when there is no number, no unit, or a unit of another quantity
     """
     parts = _NUMBER_AND_UNIT.fullmatch(text)
     if parts is None:
@@ -76,7 +82,7 @@ def constant(text: str, quantity: Quantity) -> float:
 
 
 def in_header(header: str, quantity: Quantity) -> str | None:
-    """The unit that a header names: in brackets at its end, or as the canonical columns do (`force_kN`)."""
+    """Return the unit in a header: in brackets at its end, or as in canonical columns (`force_kN`)."""
     brackets = _IN_BRACKETS.search(header)
     if brackets:
         return brackets[1]
@@ -94,7 +100,7 @@ def _registry() -> pint.UnitRegistry[float]:
 
 
 def _spelled(unit: str) -> str:
-    """Exponents as pint reads them, m/s2 as m/s^2; and what loggers call a unit that pint knows by another name."""
+    """Spell a unit as pint reads it: m/s2 as m/s^2, and `Sec` as `s`."""
     return re.sub(r"([A-Za-z])(\d)", r"\1^\2", _LOGGERS.get(unit, unit))
 
 

@@ -1,13 +1,14 @@
-"""What a test engineer would ask of a record before trusting it, one file a check.
+"""Checks of a record before anything is fitted to it, in families of one file each.
 
-A check is `check(test) -> list[Finding]`; one that compares records has `compared(entries) -> entries` as well.
+A file declares `CHECKS`: functions of a record that yield findings. Where records have to be compared with each other
+it also declares `COMPARISONS`: functions of all entries that return them with findings added, reworded or dropped.
 Nothing here changes a record.
 """
 
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib import import_module
@@ -25,24 +26,26 @@ from pzd.signals.kinematics import Kinematics
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
-    """One record, its cycles and clean motion, and what a known fixture took out of it."""
+class PreflightRecord:
+    """A record with its cycles and clean motion, and what is known of its file."""
 
     record: Record
-    run: Cycles | None
-    """Of the record's clock and displacement, as `cycles` finds it."""
+    cycles: Cycles | None
+    """Periodic part of the record; None without one."""
     clean: Kinematics
+    """Displacement without noise, and its derivatives."""
     limits: Limits
     removed: str | None = None
+    """What a known fixture took out of the record."""
     control: Control = field(default_factory=Control)
     """The control signal, recorded as the voltage."""
     remarks: tuple[Finding, ...] = ()
-    """What the file itself says otherwise than the config."""
+    """Contradictions between the file and the config."""
     ingested: tuple[IngestRow, ...] = ()
-    """What was done to the file on the way to this record."""
+    """Steps from the file to this record."""
 
     def channels(self) -> tuple[Channel, ...]:
-        """Every recorded channel but the clock: what is sensed of the motion first, then what labels the record."""
+        """Return every recorded channel but the clock: force and motion first, then what labels the record."""
         record, signal = self.record, self.control.quantity
         labels = (
             (signal.name, signal.unit, record.voltage, 0.0),
@@ -62,56 +65,69 @@ class Measured:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One recorded channel that is not one constant."""
+    """One recorded channel that is not constant."""
 
     name: str
     unit: str
     values: Array
     """(n,)"""
-    least: float | None = None
-    """Of a control signal, temperature or pressure: what is less is no other condition; None for x and F."""
+    same_condition: float | None = None
+    """Largest change within one condition, of a control signal, temperature or pressure; None for x and F."""
+
+
+Check = Callable[[PreflightRecord], Iterable[Finding]]
 
 
 @lru_cache(maxsize=1)
-def checks() -> dict[str, ModuleType]:
-    """Every check by its name, as found in this folder."""
-    return {found.name: import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__)}
+def families() -> tuple[ModuleType, ...]:
+    """Return the modules of this folder."""
+    return tuple(import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__))
 
 
-def findings(test: Measured) -> tuple[Finding, ...]:
-    """What the file remarks, and what every check found in one record, in the order of the checks' names."""
-    return (*test.remarks, *(finding for module in checks().values() for finding in module.check(test)))
+@lru_cache(maxsize=1)
+def checks() -> dict[str, Check]:
+    """Return every check by its name, in alphabetical order: findings stand in this order in records.json."""
+    return dict(sorted((check.__name__, check) for family in families() for check in family.CHECKS))
 
 
-def examined(tests: Sequence[Callable[[], Measured]], jobs: int, preflight: bool = True) -> Rig:
-    """The artefact of the rig: every record, and an entry about each with what the checks found.
+def findings(test: PreflightRecord) -> tuple[Finding, ...]:
+    """Return the remarks of the file and the findings of every check."""
+    return (*test.remarks, *(finding for check in checks().values() for finding in check(test)))
+
+
+def examined(tests: Sequence[Callable[[], PreflightRecord]], jobs: int, preflight: bool = True) -> Rig:
+    """Make and examine every record.
 
     Parameters
     ----------
     tests : each makes one record
     jobs : records made and examined at the same time
     preflight : whether they are examined; an entry has no findings otherwise
+
+    Returns
+    -------
+    the artefact of the rig: the records, and an entry with findings for each
     """
 
-    def listed(given: Callable[[], Measured]) -> tuple[Record, Cycles | None, RecordEntry, tuple[IngestRow, ...]]:
-        test = given()
-        return test.record, test.run, _entry(test, findings(test) if preflight else ()), test.ingested
+    def examine(
+        make: Callable[[], PreflightRecord],
+    ) -> tuple[Record, Cycles | None, RecordEntry, tuple[IngestRow, ...]]:
+        test = make()
+        entry = RecordEntry(
+            name=test.record.name,
+            setting=test.record.setting,
+            findings=findings(test) if preflight else (),
+            removed=test.removed,
+            **extent(test.record, test.cycles),
+        )
+        return test.record, test.cycles, entry, test.ingested
 
-    found = parallel_map(listed, tests, jobs)
-    for record, run, _, _ in found:
-        remember(record, run)
-    entries = tuple(entry for _, _, entry, _ in found)
-    for module in checks().values():
-        entries = module.compared(entries) if hasattr(module, "compared") else entries
-    return Rig(tuple(record for record, *_ in found), entries, tuple(row for *_, rows in found for row in rows))
-
-
-def _entry(test: Measured, found: tuple[Finding, ...]) -> RecordEntry:
-    record = test.record
-    return RecordEntry(
-        name=record.name,
-        setting=record.setting,
-        findings=found,
-        removed=test.removed,
-        **extent(record, test.run),
-    )
+    results = parallel_map(examine, tests, jobs)
+    # Records were made in other processes, whose memory of the cycles is lost here.
+    for record, cycles, _, _ in results:
+        remember(record, cycles)
+    entries = tuple(entry for _, _, entry, _ in results)
+    for family in families():
+        for compare in getattr(family, "COMPARISONS", ()):
+            entries = compare(entries)
+    return Rig(tuple(record for record, *_ in results), entries, tuple(row for *_, rows in results for row in rows))

@@ -6,17 +6,105 @@ import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import reduce
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from pzd.damper.confounders import known
 from pzd.damper.model import Damper
 from pzd.quantities import Control
-from pzd.rig.stand.programmes import Temperature, Voltage
-from pzd.rig.stand.waveform import Waveform
-from pzd.rig.stand.waveforms import waveforms
+from pzd.record import Array
+from pzd.rig.stand.waveforms import Waveform, waveforms
 from pzd.schema.model import Frozen, safe_name
+
+# --- Voltage and temperature over a test ---
+
+
+class Steps(Frozen):
+    """A voltage that steps through levels, over and over."""
+
+    kind: Literal["steps"]
+    """A stepped voltage."""
+    voltages_V: tuple[float, ...] = Field(min_length=2)
+    """The levels, one after the other."""
+    dwell_s: float = Field(default=1.0, gt=0.0)
+    """Time from one step to the next."""
+    rise_s: float = Field(default=0.002, gt=0.0)
+    """Time that the supply takes from one level to the next, linearly; shorter than dwell_s."""
+
+    @model_validator(mode="after")
+    def _rises_in_time(self) -> Steps:
+        if self.rise_s >= self.dwell_s:
+            raise ValueError("rise_s must be shorter than dwell_s")
+        return self
+
+    def name(self, unit: str) -> str:
+        """Return the name of the programme in names of records: `steps-0-150V`."""
+        return f"steps-{'-'.join(f'{level:g}' for level in self.voltages_V)}{unit}"
+
+    def at(self, time: Array, duration: float) -> Array:
+        """Compute the voltage (n,) at times (n,) [s]; the first level before 0."""
+        levels = np.array(self.voltages_V)
+        number = np.maximum(np.floor(time / self.dwell_s), 0.0).astype(int)
+        now, last = levels[number % levels.size], levels[np.maximum(number - 1, 0) % levels.size]
+        share = np.clip((time - number * self.dwell_s) / self.rise_s, 0.0, 1.0)
+        return np.asarray(last + (now - last) * share)
+
+
+class Ramp(Frozen):
+    """A voltage that rises or falls evenly over the whole test."""
+
+    kind: Literal["ramp"]
+    """A ramped voltage."""
+    start_voltage_V: float
+    """Voltage at the beginning, and before."""
+    end_voltage_V: float
+    """Voltage at the end."""
+
+    def name(self, unit: str) -> str:
+        """Return the name of the programme in names of records: `ramp-0-150V`."""
+        return f"ramp-{self.start_voltage_V:g}-{self.end_voltage_V:g}{unit}"
+
+    def at(self, time: Array, duration: float) -> Array:
+        """Compute the voltage (n,) at times (n,) of a test of this duration [s]."""
+        return np.interp(time, [0.0, duration], [self.start_voltage_V, self.end_voltage_V])
+
+
+class Warming(Frozen):
+    """A damper that the work done warms, as one lump.
+
+    Equation: C_h dT/dt = F v - G (T - T_ambient)           Source: heat balance
+    """
+
+    kind: Literal["warming"]
+    """A temperature that rises with the work done."""
+    start_degC: float = Field(gt=-273.15)
+    """Temperature when the recording begins."""
+    ambient_degC: float | None = Field(default=None, gt=-273.15)
+    """Temperature of the surroundings; by default the same."""
+    heat_capacity_J_per_K: float = Field(default=1900.0, gt=0.0)
+    """C_h; 1900 J/K is 3 kg of steel and 0.3 l of oil."""
+    loss_W_per_K: float = Field(default=3.0, ge=0.0)
+    """G, by convection and through the clamps."""
+
+    def name(self) -> str:
+        """Return the name of the programme in names of records: `warming-22degC`."""
+        return f"warming-{self.start_degC:g}degC"
+
+
+Voltage = float | Annotated[Steps | Ramp, Field(discriminator="kind")]
+"""Voltage over a test: one constant number, or a programme."""
+Temperature = float | Warming
+"""Temperature over a test: one constant number, or warming."""
+
+
+def voltage_over(programme: Voltage, time: Array, duration: float) -> Array:
+    """Compute the voltage (n,) of a programme at times (n,) of a test of this duration [s]."""
+    return np.full(time.size, programme) if isinstance(programme, float | int) else programme.at(time, duration)
+
+
+# --- Tests ---
 
 if TYPE_CHECKING:
     WaveformBlock = Waveform
@@ -48,6 +136,9 @@ class StandTest(Frozen):
         return self
 
 
+# --- Fixture and sensors ---
+
+
 class StandFixture(Frozen):
     """What stands between the damper and the sensors of the virtual stand."""
 
@@ -69,8 +160,8 @@ class ChannelNoise(Frozen):
 
     @property
     def absolute(self) -> float:
-        """Standard deviation in the unit of the channel, 0 where it is a share."""
-        return 0.0
+        """Standard deviation in the unit of the channel, which only the channel's own block can give; else 0."""
+        return next((float(size) for name, size in self if name.startswith("sd_")), 0.0)
 
     @model_validator(mode="after")
     def _one_size(self) -> ChannelNoise:
@@ -85,22 +176,12 @@ class ForceNoise(ChannelNoise):
     sd_N: float = Field(default=0.0, ge=0.0)
     """Standard deviation."""
 
-    @property
-    def absolute(self) -> float:
-        """Standard deviation [N]."""
-        return self.sd_N
-
 
 class DisplacementNoise(ChannelNoise):
     """Noise of the displacement."""
 
     sd_m: float = Field(default=0.0, ge=0.0)
     """Standard deviation."""
-
-    @property
-    def absolute(self) -> float:
-        """Standard deviation [m]."""
-        return self.sd_m
 
 
 class VoltageNoise(ChannelNoise):
@@ -109,22 +190,12 @@ class VoltageNoise(ChannelNoise):
     sd_voltage_V: float = Field(default=0.0, ge=0.0)
     """Standard deviation."""
 
-    @property
-    def absolute(self) -> float:
-        """Standard deviation [V]."""
-        return self.sd_voltage_V
-
 
 class TemperatureNoise(ChannelNoise):
     """Noise of the recorded temperature."""
 
     sd_degC: float = Field(default=0.0, ge=0.0)
     """Standard deviation."""
-
-    @property
-    def absolute(self) -> float:
-        """Standard deviation [K]."""
-        return self.sd_degC
 
 
 class Noise(Frozen):
@@ -162,6 +233,9 @@ class Jitter(Frozen):
     """Of an offset of the force, as a share of the record's largest force."""
     delay_s: float = Field(default=0.0, ge=0.0)
     """Of a delay of the force behind the displacement."""
+
+
+# --- The stand, and its plan of records ---
 
 
 @dataclass(frozen=True)
@@ -224,7 +298,7 @@ class VirtualEntry(Frozen):
             yield f"{field} is missing: {reason}"
 
     def plan(self, control: Control | None = None) -> tuple[PlannedRecord, ...]:
-        """Every record that the stand is going to take, in order, with its name.
+        """Return every record that the stand is going to take, in order, with its name.
 
         Parameters
         ----------
@@ -242,25 +316,18 @@ class VirtualEntry(Frozen):
     def _name(
         self, test: StandTest, voltage: Voltage | None, temperature: Temperature | None, number: int, unit: str
     ) -> str:
-        parts = [self.setting or "", test.waveform.name, _voltage_name(voltage, unit), _temperature_name(temperature)]
-        parts += [str(number)] if test.repeats > 1 else []
+        parts = [self.setting or "", test.waveform.name]
+        if voltage is not None:
+            parts.append(f"{voltage:g}{unit}" if isinstance(voltage, float | int) else voltage.name(unit))
+        if temperature is not None:
+            parts.append(f"{temperature:g}degC" if isinstance(temperature, float | int) else temperature.name())
+        if test.repeats > 1:
+            parts.append(str(number))
         return safe_name("-".join(part for part in parts if part))
 
 
-def _voltage_name(voltage: Voltage | None, unit: str) -> str:
-    if voltage is None:
-        return ""
-    return f"{voltage:g}{unit}" if isinstance(voltage, float | int) else voltage.name(unit)
-
-
-def _temperature_name(temperature: Temperature | None) -> str:
-    if temperature is None:
-        return ""
-    return f"{temperature:g}degC" if isinstance(temperature, float | int) else temperature.name()
-
-
 def _needs_voltage(damper: Damper) -> str | None:
-    """Why a damper cannot be tested without a voltage, None where it can."""
+    """Return why a damper cannot be tested without a voltage, None where it can."""
     if len({row.voltage_V for row in damper.base}) > 1:
         return "the damper has base rows at several voltages"
     for name, values in damper.effects.items():
@@ -270,7 +337,7 @@ def _needs_voltage(damper: Damper) -> str | None:
 
 
 def _needs_temperature(damper: Damper) -> str | None:
-    """Why a damper cannot be tested without a temperature, None where it can."""
+    """Return why a damper cannot be tested without a temperature, None where it can."""
     if len({row.temperature_degC for row in damper.base}) > 1:
         return "the damper has base rows at several temperatures"
     material = [name for name in damper.effects if known()[name].place == "material"]

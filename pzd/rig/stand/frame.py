@@ -1,4 +1,4 @@
-"""Force of a damper behind a frame that gives: the damper is extended less than the actuator moves."""
+"""Force of a damper in a compliant frame: the damper is extended less than the actuator moves."""
 
 from __future__ import annotations
 
@@ -25,16 +25,18 @@ from pzd.record import Array
 
 TOLERANCE = 1e-7
 """Admissible error of one piece of the path, as a share of the force; steps are so short that few pieces reach it."""
-_ROUNDS = 12
-_SETTLED = 1e-10  # change of a force in a round, as a share of the largest force
+_MOST_ITERATIONS = 12
+"""Each takes the error of the last times the ratio of the parallel stiffness to that of the frame, which is small."""
+_CONVERGED = 1e-10
+"""Change of a force in an iteration that ends it, as a share of the largest force: far below `TOLERANCE`."""
 
 
 def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None) -> Array:
-    """Force that the channel records, the motion being that of the actuator.
+    """Compute the force that the channel records, the motion being that of the actuator.
 
     The frame and the oil spring are springs in series, so the element is solved exactly with
-    1 / k' = 1 / k + 1 / k_frame. Forces beside it are found by rounds, since they act at the damper's
-    own extension, and so is the rest of a stroke law that bends. The frame has no mass: its resonance
+    1 / k' = 1 / k + 1 / k_frame. Parallel forces are found by iteration, since they act at the damper's
+    own extension, and so is the rest of a nonlinear stroke law. The frame has no mass: its resonance
     is left out, so a fluid_inertia takes the acceleration of the actuator, and a friction the speed
     behind the element's force alone.
 
@@ -44,7 +46,7 @@ def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None
     ----------
     damper : the damper
     motion : (n,) of the actuator, with voltage and temperature
-    frame_stiffness : k_frame [N/m]; None where the frame does not give
+    frame_stiffness : k_frame [N/m]; None for a rigid frame
 
     Returns
     -------
@@ -65,11 +67,11 @@ def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None
     force = integrated_force(rows, motion, steps, 0.0, TOLERANCE)
     parallel = parallel_rows(damper, effective)
     if parallel is not None or not all(stroke_straight(row_of(row)) for row in own):
-        force = _by_rounds(motion, steps, own, rows, parallel, force, frame_stiffness)
+        force = _iterated(motion, steps, own, rows, parallel, force, frame_stiffness)
     return recorded(sensors_of(damper), motion.time, force)
 
 
-def _by_rounds(
+def _iterated(
     motion: Motion,
     steps: Array,
     own: Array,
@@ -78,7 +80,7 @@ def _by_rounds(
     element: Array,
     frame_stiffness: float,
 ) -> Array:
-    """(n,) force of the element and of what stands beside it, in rounds from that of the element alone.
+    """Force (n,) of the element and the parallel effects, iterated from that of the element alone.
 
     Parameters
     ----------
@@ -92,7 +94,7 @@ def _by_rounds(
     velocity = motion.velocity - np.gradient(element, motion.time) / frame_stiffness
     bent = not all(stroke_straight(row_of(row)) for row in own)
     more, bend = np.zeros(element.size), np.zeros(element.size)
-    for _ in range(_ROUNDS):
+    for _ in range(_MOST_ITERATIONS):
         total, last = element + more, (more, bend)
         if parallel is not None:
             at = motion.displacement - total / frame_stiffness
@@ -100,7 +102,7 @@ def _by_rounds(
         if bent:
             bend = deflections(element, rows) - deflections(element, own) - element / frame_stiffness
         change = max(np.max(np.abs(more - last[0])), frame_stiffness * np.max(np.abs(bend - last[1])))
-        if change <= _SETTLED * np.max(np.abs(total)):
+        if change <= _CONVERGED * np.max(np.abs(total)):
             break
         behind = replace(motion, displacement=motion.displacement - more / frame_stiffness + bend)
         element = integrated_force(rows, behind, steps, 0.0, TOLERANCE)

@@ -1,8 +1,8 @@
-"""The virtual test stand: a damper, a campaign of tests, and what the data logger would have recorded.
+"""The virtual test stand: a damper, a campaign of tests, and the records of the data logger.
 
-The truth comes from the continuous waveform at 16 times the sampling rate or more. A test starts
-from rest before its recording begins and goes on until the damper has forgotten how it started, so
-a periodic motion gives a periodic force from the first sample on.
+The true force is computed from the continuous waveform at 16 times the sampling rate or more. A test starts from rest
+before its recording begins, early enough for the transient to die out, so a periodic motion gives a periodic force from
+the first sample on. Then the warming of the damper, then the sensors: delay, gain, offset, noise and resolution.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import hashlib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,20 +19,17 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.quantities import Control
 from pzd.record import Array, Record
-from pzd.rig.stand.config import ChannelNoise, PlannedRecord, StandTest, VirtualEntry
+from pzd.rig.stand.config import ChannelNoise, PlannedRecord, StandTest, VirtualEntry, Warming, voltage_over
 from pzd.rig.stand.frame import force_in_frame
-from pzd.rig.stand.programmes import Warming, voltage_over
-from pzd.rig.stand.waveform import started
-from pzd.signals.cycles import cycles
-from pzd.signals.kinematics import Kinematics, kinematics
+from pzd.rig.stand.waveforms import started
+from pzd.signals.kinematics import Kinematics
 from pzd.signals.noise import recursion
 
-# ----------------------------------------------------------------------------------------------------
-# What the sensors make of the truth: gain, offset, noise and resolution, each drawn by the record's name.
+# --- Sensors ---
 
 
 def draw_for(seed: int, *names: str) -> np.random.Generator:
-    """Random numbers that depend on the seed and these names alone, whatever else is drawn.
+    """Return a generator that depends on the seed and these names alone, whatever else is drawn.
 
     Parameters
     ----------
@@ -46,7 +42,7 @@ def draw_for(seed: int, *names: str) -> np.random.Generator:
 
 
 def coloured(count: int, rho: float, draw: np.random.Generator) -> Array:
-    """Stationary Gaussian noise of unit variance.
+    """Draw stationary Gaussian noise of unit variance.
 
     Equation: e_i = rho e_(i-1) + sqrt(1 - rho^2) g_i, e_0 = g_0      Source: AR(1)
 
@@ -66,35 +62,34 @@ def coloured(count: int, rho: float, draw: np.random.Generator) -> Array:
 
 
 def sensed(truth: Array, noise: ChannelNoise, resolution: float, draw: np.random.Generator) -> Array:
-    """A channel with its noise, rounded to what it can show.
+    """Add the noise of a channel to its true values, and round them to its resolution.
 
     Parameters
     ----------
-    truth : (n,) what is there
+    truth : (n,)
     noise : size and colour of the noise
     resolution : smallest step; 0 for none
     draw : where the numbers come from
 
     Returns
     -------
-    (n,) what is recorded
+    (n,) as recorded
     """
     size = noise.absolute + noise.share_of_peak * float(np.max(np.abs(truth)))
     shown = truth + size * coloured(truth.size, noise.rho, draw) if size > 0.0 else truth
     return np.round(shown / resolution) * resolution if resolution > 0.0 else shown
 
 
-# ----------------------------------------------------------------------------------------------------
-# How a damper warms with the work done on it, and what the warmth does to its force.
+# --- Warming ---
 
-
-_ROUNDS = 20
-_SETTLED = 1e-6
-"""Change of the temperature in a round that ends the search [K]."""
+_MOST_ITERATIONS = 20
+"""Warming is slow and softens the damper by little, so that a few suffice."""
+_CONVERGED = 1e-6
+"""Change of the temperature in an iteration that ends it [K]: a millionth of what a thermocouple tells apart."""
 
 
 def temperature_over(warming: Warming, time: Array, displacement: Array, force: Array) -> Array:
-    """Temperature of the damper; constant before time 0.
+    """Integrate the temperature of the damper from time 0 on; it is constant before.
 
     Equation: C_h dT/dt = F v - G (T - T_ambient)           Source: heat balance of one lump
 
@@ -113,48 +108,48 @@ def temperature_over(warming: Warming, time: Array, displacement: Array, force: 
     step = float((time[-1] - time[0]) / (time.size - 1))
     rate = warming.loss_W_per_K * step / warming.heat_capacity_J_per_K
     decay = math.exp(-rate)
-    kept = -math.expm1(-rate) / rate if rate > 0.0 else 1.0
+    # Share of the heat of a step that is still there at its end, exact for a constant power.
+    remaining = -math.expm1(-rate) / rate if rate > 0.0 else 1.0
     work = 0.5 * (force[1:] + force[:-1]) * np.diff(displacement)
     first = max(int(np.searchsorted(time, -0.5 * step)), 0)
-    above = np.concatenate(([warming.start_degC - ambient], kept * work[first:] / warming.heat_capacity_J_per_K))
+    above = np.concatenate(([warming.start_degC - ambient], remaining * work[first:] / warming.heat_capacity_J_per_K))
     return ambient + np.concatenate((np.full(first, above[0]), recursion(decay, above)))
 
 
 def warmed(
     warming: Warming, time: Array, displacement: Array, force_at: Callable[[Array], Array]
 ) -> tuple[Array, Array]:
-    """Force and temperature of a damper that warms, each computed from the other until they agree.
+    """Compute force and temperature of a damper that warms, each from the other until they agree.
 
     Parameters
     ----------
     warming : the heat balance
     time : (n,) at equal steps [s]
     displacement : (n,) [m]
-    force_at : gives the force (n,) [N] at a temperature (n,) [degC]
+    force_at : force (n,) [N] at a temperature (n,) [degC]
 
     Returns
     -------
     (n,) force [N] and (n,) temperature [degC]
     """
     temperature = np.full(time.size, warming.start_degC)
-    for _ in range(_ROUNDS):
+    for _ in range(_MOST_ITERATIONS):
         force = force_at(temperature)
         last, temperature = temperature, temperature_over(warming, time, displacement, force)
-        if np.max(np.abs(temperature - last)) <= _SETTLED:
+        if np.max(np.abs(temperature - last)) <= _CONVERGED:
             break
     return force, temperature
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Campaign of tests ---
 
 ForceLaw = Callable[[Damper, Motion, float | None], Array]
-"""Gives the force (n,) [N] of a damper in a motion of the actuator, behind a frame of this stiffness [N/m]."""
+"""Force (n,) [N] of a damper in a motion of the actuator, behind a frame of this stiffness [N/m]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
-    """One record as the data logger has it, and the truth behind it; every array is (n,)."""
+class StandRecord:
+    """One test as the data logger records it, and the truth behind it; every array is (n,)."""
 
     name: str
     setting: str | None
@@ -168,104 +163,83 @@ class Taken:
     true_force: Array
     """Force in the cell before the sensor: fixture included, no gain, offset, delay or noise."""
 
+    def as_record(self, clean: Kinematics) -> Record:
+        """Return the record, with velocity and acceleration derived from the recorded displacement."""
+        return Record(
+            self.name,
+            self.setting,
+            self.time,
+            self.displacement,
+            clean.velocity,
+            clean.acceleration,
+            self.force,
+            self.voltage,
+            self.temperature,
+        )
 
-def records(
-    entry: VirtualEntry, seed: int, folder: Path = Path(), control: Control | None = None
-) -> tuple[Record, ...]:
-    """What the stand records, with velocity and acceleration derived as for measured files.
+
+def run_campaign(
+    entry: VirtualEntry,
+    seed: int,
+    folder: Path = Path(),
+    control: Control | None = None,
+    law: ForceLaw = force_in_frame,
+) -> Iterator[StandRecord]:
+    """Record every test of a campaign, one after the other.
 
     Parameters
     ----------
     entry : the stand
-    seed : of every draw; a record's draws depend on the seed and its own name alone
+    seed : of every draw; the draws of a record depend on the seed and its own name alone
     folder : of the config, for motions that are read
     control : the control signal, whose unit stands in the names
-
-    Returns
-    -------
-    one record a test, voltage and temperature
+    law : computes the force; another law puts another damper into the stand
 
     Raises
     ------
     ConfigError : when the file of a motion is missing
     DataError : when the file of a motion cannot be read
     """
-    found = []
-    for taken in take(entry, seed, folder, control):
-        clean = kinematics(taken.time, taken.displacement, cycles(taken.time, taken.displacement))
-        found.append(record_of(taken, clean))
-    return tuple(found)
+    return map(recorder(entry, seed, folder, law), entry.plan(control))
 
 
-def record_of(taken: Taken, clean: Kinematics) -> Record:
-    """The record of a test, its velocity and acceleration derived from the recorded displacement."""
-    return Record(
-        taken.name,
-        taken.setting,
-        taken.time,
-        taken.displacement,
-        clean.velocity,
-        clean.acceleration,
-        taken.force,
-        taken.voltage,
-        taken.temperature,
-    )
-
-
-def take(
-    entry: VirtualEntry,
-    seed: int,
-    folder: Path = Path(),
-    control: Control | None = None,
-    law: ForceLaw = force_in_frame,
-) -> Iterator[Taken]:
-    """Run the campaign, one record after the other.
-
-    Parameters
-    ----------
-    entry : the stand
-    seed : of every draw
-    folder : of the config, for motions that are read
-    control : the control signal, whose unit stands in the names
-    law : gives the force; another law puts another damper into the stand
-    """
-    return map(taker(entry, seed, folder, law), entry.plan(control))
-
-
-def taker(
+def recorder(
     entry: VirtualEntry, seed: int, folder: Path = Path(), law: ForceLaw = force_in_frame
-) -> Callable[[PlannedRecord], Taken]:
-    """What takes one planned record, in any order; it keeps the motion of the test that it took last.
+) -> Callable[[PlannedRecord], StandRecord]:
+    """Return what records one planned test, in any order; it remembers the motion of the last one.
 
     Parameters
     ----------
-    entry, seed, folder, law : as for `take`
+    entry, seed, folder, law : as for `run_campaign`
     """
-    drive: _Drive | None = None
+    last: _Drive | None = None
 
-    def taken(planned: PlannedRecord) -> Taken:
-        nonlocal drive
-        if drive is None or drive.test is not planned.test:
-            drive = _drive(entry, planned.test, seed, folder)
-        return _taken(entry, planned, drive, seed, law)
+    def record(planned: PlannedRecord) -> StandRecord:
+        nonlocal last
+        if last is None or last.test is not planned.test:
+            last = _drive(entry, planned.test, seed, folder)
+        return _record(entry, planned, last, seed, law)
 
-    return taken
+    return record
 
 
 @dataclass(frozen=True, eq=False)
 class _Drive:
-    """The motion of the actuator in one test, at the fine rate, lead-in included."""
+    """Motion of the actuator in one test, at the fine rate, lead-in included."""
 
     test: StandTest
     motion: Motion
     lead: int
     """Fine samples before the recording begins."""
     duration: float
+    """Of the recording [s]."""
 
 
 def _drive(entry: VirtualEntry, test: StandTest, seed: int, folder: Path) -> _Drive:
-    waveform = test.waveform
-    count = round(_duration(test, folder) * entry.rate_Hz)
+    waveform, duration = test.waveform, test.duration_s
+    if duration is None:
+        duration = (test.cycles or waveform.usual_cycles) * waveform.cycle(folder)
+    count = round(duration * entry.rate_Hz)
     fine = entry.rate_Hz * entry.oversampling
     lead = math.ceil(waveform.settling_time * entry.rate_Hz) * entry.oversampling
     time = np.arange(-lead, count * entry.oversampling + 1) / fine
@@ -273,37 +247,38 @@ def _drive(entry: VirtualEntry, test: StandTest, seed: int, folder: Path) -> _Dr
     return _Drive(test, Motion(time, *started(course, lead / fine)(time)), lead, count / entry.rate_Hz)
 
 
-def _duration(test: StandTest, folder: Path) -> float:
-    if test.duration_s is not None:
-        return test.duration_s
-    return (test.cycles or test.waveform.usual_cycles) * test.waveform.cycle(folder)
-
-
-def _taken(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, seed: int, law: ForceLaw) -> Taken:
+def _record(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, seed: int, law: ForceLaw) -> StandRecord:
     motion, force = _truth(entry, planned, drive, law)
     force += entry.fixture.tare_N + entry.fixture.mass_kg * motion.acceleration
-    draw = partial(draw_for, seed, planned.name)
-    sampled = slice(drive.lead, None, entry.oversampling)
-    late = _sensed_force(entry, motion.time, force, sampled, draw("jitter"))
-    truth = _sampled(motion, sampled)
+    rows = slice(drive.lead, None, entry.oversampling)
+    channels = (motion.displacement, motion.velocity, motion.acceleration, motion.voltage, motion.temperature)
+    truth = Motion(motion.time[rows], *(None if one is None else one[rows] for one in channels))  # type: ignore[arg-type]  # the first three are never None
     noise, resolution = entry.noise, entry.resolution
-    return Taken(
+
+    def channel(name: str, values: Array, of_channel: ChannelNoise, step: float) -> Array:
+        return sensed(values, of_channel, step, draw_for(seed, planned.name, name))
+
+    delayed = _through_cell(entry, motion.time, force, rows, draw_for(seed, planned.name, "jitter"))
+    voltage, temperature = truth.voltage, truth.temperature
+    if voltage is not None:
+        voltage = channel("voltage", voltage, noise.voltage, resolution.voltage_V)
+    if temperature is not None:
+        temperature = channel("temperature", temperature, noise.temperature, resolution.temperature_degC)
+    return StandRecord(
         planned.name,
         entry.setting,
         truth.time,
-        sensed(truth.displacement, noise.displacement, resolution.displacement_m, draw("displacement")),
-        sensed(late, noise.force, resolution.force_N, draw("force")),
-        None if truth.voltage is None else sensed(truth.voltage, noise.voltage, resolution.voltage_V, draw("voltage")),
-        None
-        if truth.temperature is None
-        else sensed(truth.temperature, noise.temperature, resolution.temperature_degC, draw("temperature")),
+        channel("displacement", truth.displacement, noise.displacement, resolution.displacement_m),
+        channel("force", delayed, noise.force, resolution.force_N),
+        voltage,
+        temperature,
         truth,
-        force[sampled],
+        force[rows],
     )
 
 
 def _truth(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, law: ForceLaw) -> tuple[Motion, Array]:
-    """Motion, voltage, temperature and force of the damper at the fine rate."""
+    """Motion with voltage and temperature, and force of the damper, at the fine rate."""
     motion, stiffness = drive.motion, entry.fixture.stiffness_N_per_m
     if planned.voltage is not None:
         motion = replace(motion, voltage=voltage_over(planned.voltage, motion.time, drive.duration))
@@ -311,8 +286,6 @@ def _truth(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, law: Forc
         if planned.temperature is not None:
             motion = replace(motion, temperature=np.full(motion.time.size, planned.temperature))
         return motion, law(entry.damper, motion, stiffness)
-    # Imported where a damper warms: most do not.
-
     force, temperature = warmed(
         planned.temperature,
         motion.time,
@@ -322,15 +295,10 @@ def _truth(entry: VirtualEntry, planned: PlannedRecord, drive: _Drive, law: Forc
     return replace(motion, temperature=temperature), force
 
 
-def _sampled(motion: Motion, sampled: slice) -> Motion:
-    channels = (motion.displacement, motion.velocity, motion.acceleration, motion.voltage, motion.temperature)
-    return Motion(motion.time[sampled], *(None if one is None else one[sampled] for one in channels))  # type: ignore[arg-type]  # the first three are never None
-
-
-def _sensed_force(entry: VirtualEntry, time: Array, force: Array, sampled: slice, draw: np.random.Generator) -> Array:
-    """The force with the delay, gain and offset of this test."""
-    gain, offset, delay = draw.standard_normal(3)
-    late = entry.force_delay_s + entry.jitter.delay_s * delay
-    shown = force[sampled] if late == 0.0 else np.interp(time[sampled] - late, time, force)
+def _through_cell(entry: VirtualEntry, time: Array, force: Array, rows: slice, draw: np.random.Generator) -> Array:
+    """Force with the delay, gain and offset of this test."""
+    gain, offset, jitter = draw.standard_normal(3)
+    delay = entry.force_delay_s + entry.jitter.delay_s * jitter
+    shown = force[rows] if delay == 0.0 else np.interp(time[rows] - delay, time, force)
     peak = float(np.max(np.abs(shown)))
     return np.asarray(shown * (1.0 + entry.jitter.gain * gain) + entry.jitter.offset_of_peak * peak * offset)

@@ -1,9 +1,9 @@
 """Formats of rig files, one file each: `KIND`, `SUFFIXES`, `NEEDS`, `OPTIONS`, `holds(path, start)` and `tables`.
 
-`NEEDS` is the library that the format is read with, None where pzd itself needs it anyway; it is imported inside
-`tables`. `OPTIONS` are the keys of `ALL_OPTIONS` that mean something for the format; others are refused. A format of
-loose cells (a workbook) has `rows(path)` too, from which `pzd init` sees the layout. Delimited text alone has `read`
-instead of `tables`: it parses the columns that are asked for and no other.
+`NEEDS` is the library that reads the format, None where pzd itself needs it anyway; it is imported inside `tables`.
+`OPTIONS` are the keys of `ALL_OPTIONS` that apply to the format; others are refused. A format of loose cells (a
+workbook) has `rows(path)` too, from which `pzd init` guesses the layout. Delimited text alone has `read` instead of
+`tables`: it parses only the columns that are asked for.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from pzd.rig.files.sheet import FileTable, Sheet, Wanted, sheet_of
 from pzd.schema.errors import ConfigError, DataError, FilesError, UserError, at
 
 TEXT = "text"
-"""The format of files that no other format knows by their content or their ending."""
+"""Format of files that no other format recognises by their content or their ending."""
 ALL_OPTIONS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding", "table")
-"""Keys of an entry about how a file is written."""
+"""Keys of an entry about the dialect of a file."""
 START = 4096
 """Bytes from the start of a file by which its format is known."""
 
 
 @lru_cache(maxsize=1)
 def formats() -> dict[str, ModuleType]:
-    """Every format by its name, as found in this folder."""
+    """Return every format of this folder by its name."""
     return {found.name: import_module(f"{__name__}.{found.name}") for found in pkgutil.iter_modules(__path__)}
 
 
 def format_of(path: Path, name: str | None, place: str) -> str:
-    """The name of a file's format: the one that the config says, else by content, else by its ending, else text.
+    """Return the name of a file's format: by the config, else by content, else by its ending, else text.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def format_of(path: Path, name: str | None, place: str) -> str:
     """
     if name is not None and name not in formats():
         raise ConfigError(f"{place}.format: no such format; there are {', '.join(formats())} (got {name!r})")
-    found = name or _known(path)
+    found = name or _recognised(path)
     library = formats()[found].NEEDS
     if library is not None and find_spec(library) is None:
         raise ConfigError(
@@ -64,7 +64,7 @@ def format_of(path: Path, name: str | None, place: str) -> str:
 
 
 def read_sheet(path: Path, entry: FilesEntry, wanted: Wanted, place: str) -> Sheet:
-    """The wanted columns of a file of any format.
+    """Read the wanted columns of a file of any format.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def read_sheet(path: Path, entry: FilesEntry, wanted: Wanted, place: str) -> She
 
     Raises
     ------
-    ConfigError : when no format has the name that the config says, or its library is not installed
+    ConfigError : when no format has the name in the config, its library is not installed, or an option does not apply
     DataError : when the file is damaged or holds no such table
     FilesError : when the file cannot be read
     """
@@ -92,7 +92,7 @@ def read_sheet(path: Path, entry: FilesEntry, wanted: Wanted, place: str) -> She
 
 
 def tables_in(path: Path, entry: FilesEntry, module: ModuleType) -> list[FileTable]:
-    """The tables of a file of one format.
+    """Read the tables of a file of one format.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def tables_in(path: Path, entry: FilesEntry, module: ModuleType) -> list[FileTab
 
 
 def rows_in(path: Path, module: ModuleType) -> dict[str, list[list[str]]] | None:
-    """The cells of every sheet of a file of loose cells, row by row; None for a format of named columns.
+    """Read the cells of every sheet of a file of loose cells, row by row; None for a format of named columns.
 
     Raises
     ------
@@ -116,9 +116,9 @@ def rows_in(path: Path, module: ModuleType) -> dict[str, list[list[str]]] | None
 
 
 def _by_library(path: Path, module: ModuleType, read: Callable[[], Any]) -> Any:
-    """What a format's library makes of a file; a damaged one makes these libraries raise anything."""
+    """Read a file by a format's library; a damaged file makes these libraries raise anything."""
     try:
-        with redirect_stdout(StringIO()):  # where a library prints what it stumbles over
+        with redirect_stdout(StringIO()):  # some libraries print what they stumble over
             return read()
     except UserError:
         raise
@@ -127,8 +127,8 @@ def _by_library(path: Path, module: ModuleType, read: Callable[[], Any]) -> Any:
         raise DataError(f"{at(path)}: {module.KIND} that cannot be read ({why})") from error
 
 
-def _known(path: Path) -> str:
-    """The format that knows a file's content, else its ending, else text."""
+def _recognised(path: Path) -> str:
+    """Return the format of a file by its content, else by its ending, else text."""
     try:
         with path.open("rb") as file:
             start = file.read(START)

@@ -1,6 +1,6 @@
 """Excel workbooks: every sheet is a table; `skip`, `header` and `units_row` as for text.
 
-Of a formula the value is read that Excel last computed.
+Of a formula, the value that Excel last computed is read.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ OPTIONS = ("skip", "header", "units_row", "table")
 
 
 def holds(path: Path, start: bytes) -> bool:
-    """Whether a file is of this format by how it begins and what it holds."""
+    """Whether a file is of this format, by its first bytes and what it holds."""
     if not start.startswith(b"PK\x03\x04"):
         return False
     try:
@@ -32,18 +32,18 @@ def holds(path: Path, start: bytes) -> bool:
 
 
 def rows(path: Path) -> dict[str, list[list[str]]]:
-    """The cells of every sheet as texts, row by row."""
+    """Read the cells of every sheet as texts, row by row."""
     return {name: [["" if v is None else spelled(v) for v in row] for row in found] for name, found in _cells(path)}
 
 
 def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
-    """Every sheet that has rows below its header."""
+    """Read every sheet that has rows below its header."""
     found = (_table(name, cells, entry) for name, cells in _cells(path))
     return [table for table in found if table is not None]
 
 
 def _table(name: str, cells: list[list[Any]], entry: FilesEntry) -> FileTable | None:
-    """One sheet; None where nothing stands below its header."""
+    """Make the table of one sheet; None where nothing stands below its header."""
     above = (entry.header is None) + entry.units_row
     heads, body = cells[entry.skip : entry.skip + above], cells[entry.skip + above :]
     named = list(entry.header) if entry.header is not None else heads[0] if heads else []
@@ -62,7 +62,7 @@ def _table(name: str, cells: list[list[Any]], entry: FilesEntry) -> FileTable | 
 
 
 def _cells(path: Path) -> list[tuple[str, list[list[Any]]]]:
-    """Name and cells of every sheet, rows of one width, without the empty rows at the end."""
+    """Read name and cells of every sheet, rows of one width, without the empty rows at the end."""
     from openpyxl import load_workbook
 
     with path.open("rb") as file:  # given a path, openpyxl looks at its ending

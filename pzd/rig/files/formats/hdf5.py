@@ -20,12 +20,12 @@ MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
 def holds(path: Path, start: bytes) -> bool:
-    """Whether a file is of this format by how it begins; MATLAB puts 512 bytes of its own in front."""
+    """Whether a file is of this format, by its first bytes; MATLAB puts 512 bytes of its own in front."""
     return MAGIC in (start[:8], start[512:520], start[1024:1032], start[2048:2056])
 
 
 def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
-    """The tables of the groups."""
+    """Read the tables of the groups."""
     import h5py
 
     with h5py.File(path, "r") as file:
@@ -33,7 +33,7 @@ def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
 
 
 def _tree(group: Any) -> dict[str, Any]:
-    """A group as a structure; what MATLAB keeps for itself begins with a sharp."""
+    """Read a group as a structure, without what MATLAB keeps for itself, which begins with a sharp."""
     found: dict[str, Any] = {}
     for name, item in group.items():
         if name.startswith("#"):
@@ -47,7 +47,7 @@ def _tree(group: Any) -> dict[str, Any]:
 
 
 def _value(item: Any) -> Any:
-    """The samples, number or text of one data set; None for anything else."""
+    """Read the samples, number or text of one data set; None for anything else."""
     kind = _text(item.attrs.get("MATLAB_class", ""))
     if item.dtype.names:
         return {name: item[name] for name in item.dtype.names} if item.ndim == 1 else None

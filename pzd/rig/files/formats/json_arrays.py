@@ -20,7 +20,7 @@ OPTIONS = ("table",)
 
 
 def holds(path: Path, start: bytes) -> bool:
-    """Whether a file is of this format by how it begins, and all of it JSON."""
+    """Whether a file is of this format, by its first bytes and as all of it is JSON."""
     if not start.removeprefix(b"\xef\xbb\xbf").lstrip().startswith((b"{", b"[")):
         return False
     try:
@@ -31,7 +31,7 @@ def holds(path: Path, start: bytes) -> bool:
 
 
 def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
-    """The tables of the objects."""
+    """Read the tables of the objects."""
     try:
         read = json.loads(path.read_bytes(), parse_constant=_no_number, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
@@ -46,7 +46,7 @@ def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
 
 
 class _TwiceError(Exception):
-    """A key that stands twice in one object, of which a parser would keep the last."""
+    """A key that stands twice in one object; a parser would keep the last."""
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -59,5 +59,5 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _no_number(word: str) -> Any:
-    """NaN counts as an empty cell; an infinity as the cell that it is."""
+    """Read NaN as an empty cell, and an infinity as it is, to be refused with its place."""
     return None if word == "NaN" else float(word.replace("Infinity", "inf"))

@@ -19,12 +19,12 @@ OPTIONS = ("table",)
 
 
 def holds(path: Path, start: bytes) -> bool:
-    """Whether a file is of this format by how it begins."""
+    """Whether a file is of this format, by its first bytes."""
     return start.startswith(b"MATLAB 5.0")
 
 
 def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
-    """The tables of the variables and structures.
+    """Read the tables of the variables and structures.
 
     Raises
     ------

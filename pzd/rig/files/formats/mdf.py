@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.sheet import Cells, FileTable, equal_lengths
+from pzd.rig.files.sheet import Cells, FileTable, tables_by_length
 
 KIND = "an MDF file"
 SUFFIXES = (".mf4", ".mdf")
@@ -23,12 +23,12 @@ TIME_MASTER = 1
 
 
 def holds(path: Path, start: bytes) -> bool:
-    """Whether a file is of this format by how it begins."""
+    """Whether a file is of this format, by its first bytes."""
     return start.startswith((b"MDF     ", b"UnFinMF "))
 
 
 def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
-    """The tables of the channel groups, in physical values."""
+    """Read the tables of the channel groups, in physical values."""
     found = []
     with path.open("rb") as opened, _opened(opened) as file:
         for number, group in enumerate(file.groups):
@@ -42,12 +42,12 @@ def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
             if plain:
                 clock = None if master is None else group.channels[master]
                 name = getattr(group.channel_group, "acq_name", "") or f"group {number + 1}"
-                found += equal_lengths(name, _columns(clock, plain))
+                found += tables_by_length(name, _columns(clock, plain))
     return found
 
 
 def _columns(master: Any, signals: Sequence[Any]) -> dict[str, tuple[Cells, str]]:
-    """The signals of one group and their clock, invalid samples empty; signals of one name are numbered."""
+    """Make columns of the signals of one group and their clock, invalid samples empty; equal names are numbered."""
     clock = CLOCK if master is None else master.name.strip() or CLOCK
     unit = "s" if getattr(master, "sync_type", TIME_MASTER) == TIME_MASTER else str(master.unit or "-")
     columns: dict[str, tuple[Cells, str]] = {clock: (np.asarray(signals[0].timestamps, dtype=np.float64), unit)}
@@ -63,7 +63,7 @@ def _columns(master: Any, signals: Sequence[Any]) -> dict[str, tuple[Cells, str]
 
 
 def _opened(file: BinaryIO) -> Any:
-    """The file as the library sees it; one that it could not open is closed, as its destructor would fail aloud."""
+    """Open a file by the library; close it where that fails, as the destructor would print an error."""
     from asammdf import MDF
 
     try:

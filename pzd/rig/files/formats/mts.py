@@ -1,6 +1,6 @@
 """Text of servo-hydraulic stands by MTS: blocks of a line `Data Acquisition`, headers, units and rows, tab between.
 
-Every block is a table, so one with other channels (peaks and valleys) is left out. The first line says the decimal
+Every block is a table, so one with other channels (peaks and valleys) is left out. The first line holds the decimal
 sign: `MTS793|MPT|DEU|1|2|,|.|:|...`.
 """
 
@@ -26,28 +26,28 @@ Block = tuple[tuple[str, ...], tuple[Cells, ...], tuple[str, ...], NDArray[np.in
 """Headers, columns, units, line of every row, and line of the headers."""
 SIGNATURE = "MTS793|"
 BEGINS = "Data Acquisition"
-"""How the line above each block begins."""
+"""Beginning of the line above each block."""
 DECIMAL = 5
-"""Which field of the first line is the decimal sign."""
+"""Index of the decimal sign among the fields of the first line."""
 MOST_ABOVE = 20
 """Lines between the beginning of a block and its first row, at most."""
 
 
 def holds(path: Path, start: bytes) -> bool:
-    """Whether a file is of this format by how it begins."""
+    """Whether a file is of this format, by its first bytes."""
     return start.removeprefix(b"\xef\xbb\xbf").startswith(SIGNATURE.encode())
 
 
 def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
-    """One table a block.
+    """Read one table from each block.
 
     Raises
     ------
     DataError : when a block has no headers and units above its rows, or rows differ in their number of fields
     """
     lines = text_of(path, entry.encoding).split("\n")
-    told = lines[0].split("|")
-    decimal = told[DECIMAL] if len(told) > DECIMAL and told[DECIMAL] in (".", ",") else entry.decimal
+    signature = lines[0].split("|")
+    decimal = next((sign for sign in signature[DECIMAL : DECIMAL + 1] if sign in (".", ",")), entry.decimal)
     begins = [number for number, line in enumerate(lines) if line.startswith(BEGINS)]
     blocks = [
         _block(path, lines, first, last, decimal) for first, last in zip(begins, [*begins[1:], len(lines)], strict=True)
@@ -60,7 +60,7 @@ def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
 
 
 def _block(path: Path, lines: list[str], begin: int, end: int, decimal: str) -> Block | None:
-    """One block; None where it has no rows."""
+    """Read one block; None where it has no rows."""
     first = next(
         (n for n in range(begin + 1, min(end, begin + MOST_ABOVE)) if _numbers(lines[n], decimal) is not None), None
     )
@@ -85,7 +85,7 @@ def _block(path: Path, lines: list[str], begin: int, end: int, decimal: str) -> 
 
 
 def _numbers(line: str, decimal: str) -> Array | None:
-    """The numbers of a row; None where it holds anything else."""
+    """Read the numbers of a row; None where it holds anything else."""
     cells = line.rstrip("\t").replace(decimal, ".").split("\t")
     try:
         return np.array([number(cell) for cell in cells])

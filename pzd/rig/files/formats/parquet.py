@@ -14,12 +14,12 @@ OPTIONS = ()
 
 
 def holds(path: Path, start: bytes) -> bool:
-    """Whether a file is of this format by how it begins."""
+    """Whether a file is of this format, by its first bytes."""
     return start.startswith(b"PAR1")
 
 
 def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
-    """The one table of the file."""
+    """Read the one table of the file."""
     from pyarrow import parquet
 
     table = parquet.read_table(path)
@@ -34,7 +34,7 @@ def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
 
 
 def _plain(kind: object) -> bool:
-    """Whether a column holds numbers and nothing else."""
+    """Whether a column holds numbers only."""
     from pyarrow import types
 
     return bool(types.is_floating(kind) or types.is_integer(kind) or types.is_boolean(kind))

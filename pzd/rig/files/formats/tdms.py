@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.sheet import Cells, FileTable, cells_of, equal_lengths
+from pzd.rig.files.sheet import Cells, FileTable, cells_of, tables_by_length
 from pzd.schema.errors import DataError, at
 
 KIND = "a TDMS file"
@@ -21,12 +21,12 @@ CLOCK = "time"
 
 
 def holds(path: Path, start: bytes) -> bool:
-    """Whether a file is of this format by how it begins."""
+    """Whether a file is of this format, by its first bytes."""
     return start.startswith(b"TDSm")
 
 
 def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
-    """The tables of the groups.
+    """Read the tables of the groups.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def tables(path: Path, entry: FilesEntry) -> list[FileTable]:
 
 
 def _group(name: str, channels: Sequence[Any]) -> list[FileTable]:
-    """The tables of one group: waveforms of one clock stand in one table, with what has no clock of its own."""
+    """Make the tables of one group: one for the waveforms of each clock, with what has no clock of its own."""
     filled = [channel for channel in channels if len(channel)]
     clocks = list(dict.fromkeys(filter(None, map(_clock, filled))))
     if any(channel.name.strip() == CLOCK for channel in filled):
@@ -53,17 +53,17 @@ def _group(name: str, channels: Sequence[Any]) -> list[FileTable]:
         if clock is not None:
             _, start, step, length = clock
             columns[CLOCK] = (np.asarray(start + step * np.arange(length), dtype=np.float64), "s")
-        found += equal_lengths(f"{name} clock {number + 1}" if len(clocks) > 1 else name, columns)
+        found += tables_by_length(f"{name} clock {number + 1}" if len(clocks) > 1 else name, columns)
     return found
 
 
 def _clock(channel: Any) -> tuple[str, float, float, int] | None:
-    """When a waveform began, the offset of its first sample and the step of its clock [s], and its length."""
-    said = channel.properties
-    if "wf_increment" not in said:
+    """Return the start of a waveform, the offset of its first sample and the step of its clock [s], and its length."""
+    properties = channel.properties
+    if "wf_increment" not in properties:
         return None
-    begun = str(said.get("wf_start_time", ""))
-    return begun, float(said.get("wf_start_offset", 0.0)), float(said["wf_increment"]), len(channel)
+    begun = str(properties.get("wf_start_time", ""))
+    return begun, float(properties.get("wf_start_offset", 0.0)), float(properties["wf_increment"]), len(channel)
 
 
 def _unit(channel: Any) -> str:

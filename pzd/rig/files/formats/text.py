@@ -1,7 +1,7 @@
 """Delimited text: CSV and the exports of loggers, with a preamble, any separator and decimal sign.
 
-pandas reads a trailing comma or `0,001;1,5` wrongly without a word, so the number of fields
-in every line is checked first and the separator is known before a number is parsed.
+pandas silently misreads a trailing comma or `0,001;1,5`, so the number of fields in every line is checked first and the
+separator is known before a number is parsed.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,21 +19,8 @@ from numpy.typing import NDArray
 
 from pzd.record import Array
 from pzd.rig.config import FilesEntry
-from pzd.rig.files.dialect import (
-    BLANKS,
-    MOST_FAULTS,
-    after_lines,
-    field_counts,
-    fields_of,
-    hint,
-    refuse_another_header,
-    separator_of,
-    stands_again,
-    text_of,
-    uneven_lines,
-    without_blank_end,
-)
-from pzd.rig.files.sheet import ReadingStep, Sheet, Wanted
+from pzd.rig.files.dialect import BLANKS, SEPARATORS, after_lines, fields_of, text_of
+from pzd.rig.files.sheet import MOST_FAULTS, ReadingStep, Sheet, Wanted, listed_faults
 from pzd.schema.errors import DataError, at, counted
 
 if TYPE_CHECKING:
@@ -44,8 +31,193 @@ SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
 NEEDS = None
 OPTIONS = ("separator", "decimal", "skip", "header", "units_row", "comment", "encoding")
 
-_INSIDE = "\x1e"
-"""Stands for a separator inside an event, which no logger quotes."""
+_EVENT_SEPARATOR = "\x1e"
+"""Replaces a separator inside an event, which no logger quotes."""
+_UNQUOTED = "\x1f"
+"""Separator of lines that were taken out of their quotes."""
+_GROUPED = re.compile(r"[+-]?\d{1,3}(?:(?:\.\d{3})+,\d*|(?:,\d{3})+\.\d*|(?:[' ]\d{3})+(?:[.,]\d*)?)")
+"""A number whose thousands are grouped: 1.129,9 or 1,129.9 or 1'129.9."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """A text file taken apart."""
+
+    heads: list[list[str]]
+    """Fields of the header line and the row of units, as far as the file has them."""
+    body: str
+    """The data lines, fields separated by `separator`, nothing quoted."""
+    numbers: NDArray[np.int64]
+    """(rows,) line in the file of every data row."""
+    fields: NDArray[np.int64]
+    """(rows,) number of fields of every data row."""
+    separator: str
+
+
+def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
+    """Read the wanted columns of a text file, the number of fields in every line checked.
+
+    Parameters
+    ----------
+    path : the file
+    entry : how it is to be read
+    wanted : the columns to read
+
+    Raises
+    ------
+    DataError : when it is no text, has no header or no data rows, or lines differ in their number of fields
+    """
+    text = text_of(path, entry.encoding)
+    below = text[after_lines(text, entry.skip) :]
+    quoted = entry.comment is not None or '"' in text
+    lines = _unquoted_lines(entry, wanted, below) if quoted else _plain_lines(entry, wanted, below)
+    heads, body, numbers = lines.heads, lines.body, lines.numbers
+    header = list(entry.header) if entry.header is not None else (heads[0] if heads else [])
+    header_line = None
+    if entry.header is None:
+        header_line = int(numbers[0]) - len(heads) if numbers.size else entry.skip + 1
+    if not any(header):
+        raise DataError(
+            f"{at(path, entry.skip + 1)}: no header line; say skip: N where N lines stand above it, or "
+            f"header: [...] where there is none (got skip: {entry.skip})"
+        )
+    if numbers.size == 0:
+        raise DataError(f"{at(path, header_line)}: no data rows below the header")
+    uneven = lines.fields != len(header)
+    if entry.split is not None and entry.split.event == header[-1]:
+        body, uneven = _with_loose_events(lines, len(header))
+    if uneven.any():
+        if entry.header is None:
+            rows = [row for row, line in enumerate(body.split("\n")) if fields_of(line, lines.separator) == header]
+            _refuse_repeated_header(path, numbers, rows)
+        raise DataError(_uneven_faults(path, lines, np.flatnonzero(uneven), len(header)))
+    units = tuple(heads[-1]) if entry.units_row else None
+    if units is not None and len(units) != len(header):
+        raise DataError(f"{at(path, int(numbers[0]) - 1)}: {len(units)} units for {len(header)} columns")
+    table = _Table(path, tuple(header), body, numbers, lines.separator, entry.decimal)
+    dated = [i for i, head in enumerate(header) if "%S" in head or (units is not None and "%S" in units[i])]
+    values, faults = table.numbers([i for i, head in enumerate(header) if head in wanted.numbers and i not in dated])
+    texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
+    steps = tuple(_steps(entry, header, wanted, numbers))
+    return Sheet(path, table.header, header_line, units, int(numbers.size), numbers, values, texts, faults, steps=steps)
+
+
+def _plain_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
+    """Take apart a file without quotes and comments, quickly: its body is parsed as it stands."""
+    text = text.rstrip("\n")
+    while text and not text[text.rfind("\n") + 1 :].strip():
+        text = text[: max(text.rfind("\n"), 0)]
+    above = (entry.header is None) + entry.units_row
+    start = after_lines(text, above)
+    top, body = text[:start].split("\n")[:above], text[start:]
+    first = top[0] if top else text[: after_lines(text, 1)].rstrip("\n")
+    separator = entry.separator or _separator_of(first, wanted.known, entry.decimal)
+    fields = _field_counts(body, separator) if body else np.empty(0, dtype=np.int64)
+    numbers = np.arange(fields.size) + entry.skip + above + 1
+    return _Lines([fields_of(line, separator) for line in top], body, numbers, fields, separator)
+
+
+def _unquoted_lines(entry: FilesEntry, wanted: Wanted, text: str) -> _Lines:
+    """Take apart a file with quotes or comments, by the csv module, and put it together without them."""
+    numbered = [
+        (number, line)
+        for number, line in enumerate(text.split("\n"), start=entry.skip + 1)
+        if entry.comment is None or not line.lstrip().startswith(entry.comment)
+    ]
+    while numbered and not numbered[-1][1].strip():
+        numbered.pop()
+    first = numbered[0][1] if numbered else ""
+    separator = entry.separator or _separator_of(first, wanted.known, entry.decimal)
+    if separator == BLANKS:
+        rows = [line.split() for _, line in numbered]
+    else:
+        rows = [next(csv.reader([line], delimiter=separator, skipinitialspace=True), []) for _, line in numbered]
+    above = (entry.header is None) + entry.units_row
+    return _Lines(
+        [[cell.strip() for cell in row] for row in rows[:above]],
+        "\n".join(_UNQUOTED.join(cell.replace(_UNQUOTED, " ") for cell in row) for row in rows[above:]),
+        np.array([number for number, _ in numbered[above:]], dtype=np.int64),
+        np.array([len(row) for row in rows[above:]], dtype=np.int64),
+        _UNQUOTED,
+    )
+
+
+def _separator_of(line: str, known: Collection[str], decimal: str) -> str:
+    """Return the separator that shows most of the known headers, then most fields."""
+    possible = [s for s in SEPARATORS if s != decimal]
+    return max(possible, key=lambda s: (len(set(known) & set(fields_of(line, s))), line.count(s)))
+
+
+def _field_counts(body: str, separator: str) -> NDArray[np.int64]:
+    """Count the fields of every line."""
+    if separator == BLANKS or not separator.isascii():
+        return np.array([len(fields_of(line, separator)) for line in body.split("\n")], dtype=np.int64)
+    codes = np.frombuffer(body.encode("utf-8"), dtype=np.uint8)
+    ends = np.append(np.flatnonzero(codes == ord("\n")), codes.size)
+    before = np.searchsorted(np.flatnonzero(codes == ord(separator)), ends)
+    result: NDArray[np.int64] = np.diff(np.concatenate(([0], before))) + 1
+    return result
+
+
+def _with_loose_events(lines: _Lines, width: int) -> tuple[str, NDArray[np.bool_]]:
+    """Allow a last column of events to be left out, or to hold separators that nothing quotes.
+
+    Returns
+    -------
+    the body with such separators marked, and (rows,) which rows are uneven all the same
+    """
+    uneven = (lines.fields != width) & (lines.fields != width - 1)
+    longer = np.flatnonzero(lines.fields > width)
+    if not longer.size:
+        return lines.body, uneven
+    rows = lines.body.split("\n")
+    for row in longer.tolist():
+        cells = rows[row].split(None if lines.separator == BLANKS else lines.separator)
+        event = cells[width - 1 :]
+        if all(re.search("[A-Za-z]", cell) for cell in event):
+            rows[row] = lines.separator.join([*cells[: width - 1], _EVENT_SEPARATOR.join(event)])
+            uneven[row] = False
+    return "\n".join(rows), uneven
+
+
+def _refuse_repeated_header(path: Path, numbers: NDArray[np.int64], rows: Sequence[int]) -> None:
+    """Refuse a file whose header stands again in some rows: a logger that was started again wrote on."""
+    if rows:
+        more = {1: "", 2: " and once more below"}.get(len(rows), f" and {len(rows) - 1} more times below")
+        raise DataError(
+            f"{at(path, int(numbers[rows[0]]))}: the header stands here again{more}: another recording begins; write "
+            "each into a file of its own"
+        )
+
+
+def _uneven_faults(path: Path, lines: _Lines, rows: NDArray[np.int64], width: int) -> list[str]:
+    """Describe rows with more or fewer fields than the header."""
+    separator = "" if lines.separator == _UNQUOTED else f" (separator {lines.separator!r})"
+    shown = [
+        f"{at(path, int(lines.numbers[r]))}: {lines.fields[r]} fields where the header has {width}{separator}"
+        for r in rows[:MOST_FAULTS]
+    ]
+    if rows.size <= MOST_FAULTS:
+        return shown
+    most = rows.size > lines.fields.size // 2
+    advice = "; if the header stands further down, say skip: lines above it" if most else ""
+    return [*shown, f"{at(path)}: and {rows.size - MOST_FAULTS} more such lines{advice}"]
+
+
+def _steps(entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[np.int64]) -> Iterator[ReadingStep]:
+    """Report what is read of a file, and the lines and columns that are left out."""
+    if entry.skip:
+        yield ReadingStep("left out", None, f"{counted(entry.skip, 'line')} above the header", "")
+    dropped = int(lines[-1] - lines[0]) + 1 - lines.size
+    if dropped:
+        yield ReadingStep("left out", None, f"{counted(dropped, 'line')} that begin with {entry.comment!r}", "")
+    yield ReadingStep("read", None, f"lines {lines[0]} to {lines[-1]}", f"{lines.size} rows")
+    unread = [head for head in header if head not in wanted.numbers | wanted.texts]
+    if unread:
+        yield ReadingStep("left out", None, f"columns {', '.join(unread)}", "")
+
+
+# --- Cells ---
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,30 +227,31 @@ class _Table:
     path: Path
     header: tuple[str, ...]
     body: str
-    """The data lines, fields separated by `separator`, nothing quoted."""
     lines: NDArray[np.int64]
-    """Line in the file of every data row."""
     separator: str
     decimal: str
 
     def numbers(self, columns: list[int]) -> tuple[dict[int, Array], dict[int, list[str]]]:
-        """Columns (rows,) of numbers, an empty cell NaN; and the faults of those that hold other cells."""
+        """Parse columns (rows,) of numbers, an empty cell NaN; those with other cells come back as faults."""
         try:
             frame = self._parsed(columns, "float64")
-            values = {column: frame[column].to_numpy() for column in columns}
-            faults: dict[int, list[str]] = {}
         except (ValueError, OverflowError):
-            self._refuse_repeated_header(columns)
-            read = {column: self._cell_by_cell(column) for column in columns}
-            values = {column: cells for column, cells in read.items() if not isinstance(cells, list)}
-            faults = {column: cells for column, cells in read.items() if isinstance(cells, list)}
-        infinite = {column: self._infinite(column, cells) for column, cells in values.items()}
-        return values, faults | {column: found for column, found in infinite.items() if found}
+            again = [row for row, cell in enumerate(self.texts(columns[0])) if cell == self.header[columns[0]]]
+            if all(self.texts(c)[row] == self.header[c] for row in again[:1] for c in columns):
+                _refuse_repeated_header(self.path, self.lines, again)
+            return self._cell_by_cell(columns)
+        values = {column: frame[column].to_numpy() for column in columns}
+        infinite = {
+            column: [(int(row), "a finite number is needed (got inf)") for row in np.flatnonzero(np.isinf(cells))]
+            for column, cells in values.items()
+        }
+        return values, {column: self._faults(column, bad) for column, bad in infinite.items() if bad}
 
     def texts(self, column: int) -> list[str]:
-        """The cells of one column, stripped; empty where a line ends before it."""
+        """Return the cells of one column, stripped; empty where a line ends before it."""
         cells = self._parsed([column], "str")[column].fillna("").tolist()
-        return [cell.replace(_INSIDE, "," if self.separator == "\x1f" else self.separator).strip() for cell in cells]
+        separator = "," if self.separator == _UNQUOTED else self.separator
+        return [cell.replace(_EVENT_SEPARATOR, separator).strip() for cell in cells]
 
     def _parsed(self, columns: list[int], kind: str) -> pd.DataFrame:
         import pandas as pd
@@ -99,175 +272,35 @@ class _Table:
             engine="c",
         )
 
-    def _refuse_repeated_header(self, columns: list[int]) -> None:
-        """Say so where the header stands among the data: a logger that was started again wrote on."""
-        again = [row for row, cell in enumerate(self.texts(columns[0])) if cell == self.header[columns[0]]]
-        again = again if all(self.texts(c)[row] == self.header[c] for row in again[:1] for c in columns) else []
-        if again:
-            raise DataError(stands_again(self.path, int(self.lines[again[0]]), len(again)))
+    def _cell_by_cell(self, columns: list[int]) -> tuple[dict[int, Array], dict[int, list[str]]]:
+        """Parse the slow way, which knows the place of every bad cell."""
+        found: dict[int, Array] = {}
+        faults: dict[int, list[str]] = {}
+        for column in columns:
+            cells = self.texts(column)
+            values = np.full(len(cells), np.nan)
+            bad: list[int] = []
+            for row, cell in enumerate(cells):
+                try:
+                    values[row] = _number(cell, self.decimal)
+                except ValueError:
+                    bad.append(row)
+            if bad:
+                advice = _advice([cells[row] for row in bad])
+                wrong = [(row, f"a number is needed (got {cells[row]!r}){advice}") for row in bad]
+                faults[column] = self._faults(column, wrong)
+            else:
+                found[column] = values
+        return found, faults
 
-    def _cell_by_cell(self, column: int) -> Array | list[str]:
-        """The slow way, which knows the place of every bad cell; the faults where there are such."""
-        cells = self.texts(column)
-        values = np.full(len(cells), np.nan)
-        bad: list[int] = []
-        for row, cell in enumerate(cells):
-            try:
-                values[row] = _number(cell, self.decimal)
-            except ValueError:
-                bad.append(row)
-        if bad:
-            advice = hint([cells[row] for row in bad])
-            return self._listed(column, bad, [f"a number is needed (got {cells[row]!r}){advice}" for row in bad])
-        return values
-
-    def _infinite(self, column: int, values: Array) -> list[str]:
-        bad = [int(row) for row in np.flatnonzero(np.isinf(values))]
-        return self._listed(column, bad, ["a finite number is needed (got inf)"] * len(bad))
-
-    def _listed(self, column: int, rows: list[int], messages: list[str]) -> list[str]:
-        name = self.header[column]
-        shown = [f"{at(self.path, int(self.lines[r]))}: {name}: {m}" for r, m in zip(rows, messages, strict=True)][
-            :MOST_FAULTS
-        ]
-        return shown + (
-            [f"{at(self.path)}: {name}: and {len(rows) - MOST_FAULTS} more"] if len(rows) > len(shown) else []
-        )
-
-
-def read(path: Path, entry: FilesEntry, wanted: Wanted) -> Sheet:
-    """Read the wanted columns of a text file, the number of fields in every line checked.
-
-    Parameters
-    ----------
-    path : the file
-    entry : how it is to be read
-    wanted : the columns to read
-
-    Raises
-    ------
-    DataError : when it is no text, has no header or no data rows, or lines differ in their number of fields
-    """
-    text = text_of(path, entry.encoding)
-    skipped = after_lines(text, entry.skip)
-    if entry.comment is None and '"' not in text:
-        return _plain(path, entry, wanted, without_blank_end(text[skipped:]))
-    return _quoted(path, entry, wanted, text[skipped:])
-
-
-def _plain(path: Path, entry: FilesEntry, wanted: Wanted, text: str) -> Sheet:
-    """A file without quotes and comments: its body is parsed as it stands."""
-    above = (entry.header is None) + entry.units_row
-    start = after_lines(text, above)
-    top = text[:start].split("\n")[:above]
-    first = top[0] if top else text[: after_lines(text, 1)].rstrip("\n")
-    separator = entry.separator or separator_of(first, wanted.known, entry.decimal)
-    body = text[start:]
-    count = body.count("\n") + 1 if body else 0
-    lines = np.arange(count) + entry.skip + above + 1
-    heads = [fields_of(line, separator) for line in top]
-    fields = field_counts(body, separator) if body else np.empty(0, dtype=np.int64)
-    return _sheet(path, entry, wanted, heads, body, lines, fields, separator)
-
-
-def _quoted(path: Path, entry: FilesEntry, wanted: Wanted, text: str) -> Sheet:
-    """A file with quotes or comments: taken apart by the csv module and put together without them."""
-    numbered = [
-        (number, line)
-        for number, line in enumerate(text.split("\n"), start=entry.skip + 1)
-        if entry.comment is None or not line.lstrip().startswith(entry.comment)
-    ]
-    while numbered and not numbered[-1][1].strip():
-        numbered.pop()
-    first = numbered[0][1] if numbered else ""
-    separator = entry.separator or separator_of(first, wanted.known, entry.decimal)
-    if separator == BLANKS:
-        rows = [line.split() for _, line in numbered]
-    else:
-        rows = [next(csv.reader([line], delimiter=separator, skipinitialspace=True), []) for _, line in numbered]
-    above = (entry.header is None) + entry.units_row
-    body = "\n".join("\x1f".join(cell.replace("\x1f", " ") for cell in row) for row in rows[above:])
-    lines = np.array([number for number, _ in numbered[above:]], dtype=np.int64)
-    fields = np.array([len(row) for row in rows[above:]], dtype=np.int64)
-    heads = [[cell.strip() for cell in row] for row in rows[:above]]
-    return _sheet(path, entry, wanted, heads, body, lines, fields, "\x1f")
-
-
-def _sheet(
-    path: Path,
-    entry: FilesEntry,
-    wanted: Wanted,
-    heads: list[list[str]],
-    body: str,
-    lines: NDArray[np.int64],
-    fields: NDArray[np.int64],
-    separator: str,
-) -> Sheet:
-    header = list(entry.header) if entry.header is not None else (heads[0] if heads else [])
-    header_line = None if entry.header is not None else int(lines[0]) - len(heads) if lines.size else entry.skip + 1
-    if not any(header):
-        raise DataError(
-            f"{at(path, entry.skip + 1)}: no header line; say skip: N where N lines stand above it, or "
-            f"header: [...] where there is none (got skip: {entry.skip})"
-        )
-    if lines.size == 0:
-        raise DataError(f"{at(path, header_line)}: no data rows below the header")
-    uneven = fields != len(header)
-    if entry.split is not None and entry.split.event == header[-1]:
-        body, uneven = _with_loose_events(body, fields, len(header), separator)
-    if uneven.any():
-        if entry.header is None:
-            refuse_another_header(path, header, body, lines, separator)
-        raise DataError(uneven_lines(path, lines, fields, np.flatnonzero(uneven), len(header), separator))
-    units = tuple(heads[-1]) if entry.units_row else None
-    if units is not None and len(units) != len(header):
-        raise DataError(f"{at(path, int(lines[0]) - 1)}: {len(units)} units for {len(header)} columns")
-    table = _Table(path, tuple(header), body, lines, separator, entry.decimal)
-    dated = [i for i, head in enumerate(header) if "%S" in head or (units is not None and "%S" in units[i])]
-    numbers, faults = table.numbers([i for i, head in enumerate(header) if head in wanted.numbers and i not in dated])
-    texts = {i: table.texts(i) for i, head in enumerate(header) if head in wanted.texts or i in dated}
-    steps = tuple(_steps(entry, header, wanted, lines))
-    return Sheet(path, tuple(header), header_line, units, int(lines.size), lines, numbers, texts, faults, steps=steps)
-
-
-def _steps(entry: FilesEntry, header: list[str], wanted: Wanted, lines: NDArray[np.int64]) -> Iterator[ReadingStep]:
-    """What is read of a file, and the lines and columns that are left out."""
-    if entry.skip:
-        yield ReadingStep("left out", None, f"{counted(entry.skip, 'line')} above the header", "")
-    dropped = int(lines[-1] - lines[0]) + 1 - lines.size
-    if dropped:
-        yield ReadingStep("left out", None, f"{counted(dropped, 'line')} that begin with {entry.comment!r}", "")
-    yield ReadingStep("read", None, f"lines {lines[0]} to {lines[-1]}", f"{lines.size} rows")
-    unread = [head for head in header if head not in wanted.numbers | wanted.texts]
-    if unread:
-        yield ReadingStep("left out", None, f"columns {', '.join(unread)}", "")
-
-
-def _with_loose_events(
-    body: str, fields: NDArray[np.int64], width: int, separator: str
-) -> tuple[str, NDArray[np.bool_]]:
-    """Rows whose last column is that of events: it may be left out, or hold separators that nothing quotes.
-
-    Returns
-    -------
-    the body with such separators marked, and (rows,) which rows are uneven all the same
-    """
-    uneven = (fields != width) & (fields != width - 1)
-    longer = np.flatnonzero(fields > width)
-    if not longer.size:
-        return body, uneven
-    rows = body.split("\n")
-    for row in longer.tolist():
-        cells = rows[row].split(None if separator == BLANKS else separator)
-        event = cells[width - 1 :]
-        if all(re.search("[A-Za-z]", cell) for cell in event):
-            rows[row] = separator.join([*cells[: width - 1], _INSIDE.join(event)])
-            uneven[row] = False
-    return "\n".join(rows), uneven
+    def _faults(self, column: int, bad: Sequence[tuple[int, str]]) -> list[str]:
+        """List bad cells, by row and what is wrong."""
+        places = [(at(self.path, int(self.lines[row])), message) for row, message in bad]
+        return listed_faults(self.path, self.header[column], places)
 
 
 def _number(cell: str, decimal: str) -> float:
-    """The number in a cell, NaN where it is empty; infinities and NaN are no numbers."""
+    """Return the number in a cell, NaN where it is empty; infinities and NaN are no numbers."""
     if not cell:
         return float("nan")
     if "_" in cell or (decimal == "," and "." in cell):
@@ -276,3 +309,10 @@ def _number(cell: str, decimal: str) -> float:
     if not np.isfinite(value):
         raise ValueError(cell)
     return value
+
+
+def _advice(cells: Sequence[str]) -> str:
+    """Return what to do about cells that are no numbers, where they tell it by themselves."""
+    if any(_GROUPED.fullmatch(cell) for cell in cells):
+        return "; write the file without grouping thousands"
+    return "; for decimal commas say decimal: ','" if any("," in cell for cell in cells) else ""

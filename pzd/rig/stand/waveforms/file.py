@@ -1,4 +1,4 @@
-"""A motion from a file: the cubic spline through its samples, whose derivatives are exact for the spline."""
+"""Motion from a file: the cubic spline through its samples, with exact derivatives."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import Field
 
 from pzd.quantities import DISPLACEMENT, TIME, Control
 from pzd.record import Array
-from pzd.rig.stand.waveform import Course, Waveform
+from pzd.rig.stand.waveforms import Course, Waveform
 from pzd.schema.csvfile import read_columns
 from pzd.schema.errors import ConfigError, DataError, at
 
@@ -26,16 +26,16 @@ class FileMotion(Waveform):
     """The CSV file; a relative path counts from the config. Between its samples the motion is a cubic spline."""
 
     def own_name(self) -> str:
-        """The file's stem."""
+        """Return the stem of the file."""
         return Path(self.path).stem
 
     def cycle(self, folder: Path) -> float:
-        """The length of the file."""
+        """Return the length of the file."""
         time, _ = _read(folder / self.path)
         return float(time[-1] - time[0])
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
-        """The spline; before the file begins, a smooth approach from rest, and rest after it has ended."""
+        """Return the spline; before the file begins, a smooth approach from rest, and rest after it has ended."""
         from scipy.interpolate import CubicSpline
 
         time, displacement = _read(folder / self.path)
@@ -54,7 +54,7 @@ class FileMotion(Waveform):
 
 
 def _approach(time: Array, x: float, v: float, a: float, lead: float) -> tuple[Array, Array, Array]:
-    """A quintic from rest half-way back along the first speed into x, v, a at time 0."""
+    """Compute a quintic from rest half-way back along the first speed into x, v, a at time 0."""
     start = x - 0.5 * v * lead
     r = time / lead + 1.0
     rows = [[1.0, 1.0, 1.0], [3.0, 4.0, 5.0], [6.0, 12.0, 20.0]]

@@ -1,4 +1,4 @@
-"""Band-limited random motion: lines of equal density with random phases."""
+"""Band-limited random motion: spectral lines with random phases whose density falls as f^-slope."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from pzd.rig.stand.waveform import Course, Lines
+from pzd.rig.stand.waveforms import Course, Lines
 from pzd.signals.harmonics import FourierSum
 
 
@@ -23,11 +23,11 @@ class Random(Lines):
     """The density of the displacement falls as f^-slope: 0 white, 2 white in speed."""
 
     def own_name(self) -> str:
-        """`random-0.5-10Hz-0.005m`."""
+        """Return the name made of its parameters: `random-0.5-10Hz-0.005m`."""
         return f"random-{self.low_Hz:g}-{self.high_Hz:g}Hz-{self.rms_m:g}m"
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
-        """Lines with random phases, scaled to the r.m.s. asked for."""
+        """Return lines with random phases, scaled to the r.m.s. asked for."""
         first, last = int(np.ceil(self.low_Hz * self.period_s)), int(self.high_Hz * self.period_s)
         line = np.arange(first, last + 1)
         amplitude = (line / first) ** (-0.5 * self.slope)

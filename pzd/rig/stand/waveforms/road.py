@@ -1,4 +1,4 @@
-"""The deflection of a suspension on a road of ISO 8608, which is what a damper sees of it.
+"""Deflection of a suspension, and so of its damper, on a road of ISO 8608.
 
 Equation: X(f) = Xi(f) r^2 / (1 - r^2 + 2 i zeta r), r = f / f_body
 Source: a body on one spring and one damper over a moving base, deflection = body - road up to sign;
@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from pzd.record import Array
-from pzd.rig.stand.waveform import Course, Lines
+from pzd.rig.stand.waveforms import Course, Lines
 from pzd.signals.harmonics import FourierSum
 from pzd.signals.iso8608 import classes, profile
 
@@ -47,20 +47,20 @@ class RoadMotion(Lines):
         return name
 
     def own_name(self) -> str:
-        """`road-C-72km_per_h`."""
+        """Return the name made of its parameters: `road-C-72km_per_h`."""
         return f"road-{self.road_class}-{self.vehicle_speed_km_per_h:g}km_per_h"
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
-        """The deflection on a road drawn from its class."""
+        """Return the deflection on a road drawn from its class."""
         speed = self.vehicle_speed_km_per_h / 3.6
         band = (self.low_Hz / speed, self.high_Hz / speed)
         road = profile(classes()[self.road_class], speed * self.period_s, draw, band)
-        passed = self._passed(np.arange(road.coefficients.size) / self.period_s)
+        passed = self._transfer(np.arange(road.coefficients.size) / self.period_s)
         motion = FourierSum(self.period_s, road.coefficients * passed)
         return motion if self.peak_m is None else _scaled(motion, self.peak_m)
 
-    def _passed(self, frequency: Array) -> Array:
-        """Deflection over height of the road, complex."""
+    def _transfer(self, frequency: Array) -> Array:
+        """Complex transfer function from height of the road to deflection."""
         if self.body_frequency_Hz is None:
             return np.ones(frequency.size)
         r = frequency / self.body_frequency_Hz

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from pzd.rig.stand.waveform import Course, Waveform, two_turns
+from pzd.rig.stand.waveforms import Course, Waveform, two_cycles
 from pzd.signals.harmonics import FourierSum
 
 
@@ -23,20 +23,20 @@ class Sine(Waveform):
     """Amplitude, half the stroke."""
 
     def own_name(self) -> str:
-        """`sine-2Hz-0.03m`."""
+        """Return the name made of its parameters: `sine-2Hz-0.03m`."""
         return f"sine-{self.frequency_Hz:g}Hz-{self.amplitude_m:g}m"
 
     def cycle(self, folder: Path) -> float:
-        """1 / f."""
+        """Return 1 / f."""
         return 1.0 / self.frequency_Hz
 
     @property
     def settling_time(self) -> float:
         """Two cycles, or a second."""
-        return two_turns(self.frequency_Hz)
+        return two_cycles(self.frequency_Hz)
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
-        """The sine."""
+        """Return the sine."""
         return FourierSum(1.0 / self.frequency_Hz, np.array([0.0, -1j * self.amplitude_m]))
 
 

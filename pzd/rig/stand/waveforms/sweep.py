@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from pzd.record import Array
-from pzd.rig.stand.waveform import Course, Waveform, two_turns
+from pzd.rig.stand.waveforms import Course, Waveform, two_cycles
 
 
 class Sweep(Waveform):
@@ -44,21 +44,21 @@ class Sweep(Waveform):
         return self
 
     def own_name(self) -> str:
-        """`sweep-0.5-8Hz-0.01m`."""
+        """Return the name made of its parameters: `sweep-0.5-8Hz-0.01m`."""
         return f"sweep-{self.low_Hz:g}-{self.high_Hz:g}Hz-{self.amplitude_m:g}m"
 
     def cycle(self, folder: Path) -> float:
-        """The period that holds a whole number of turns."""
+        """Return the period that holds a whole number of turns."""
         mean = 0.5 * (self.low_Hz + self.high_Hz)
         return max(round(mean * self.period_s), 1) / mean
 
     @property
     def settling_time(self) -> float:
-        """Two turns at the lowest frequency, or a second."""
-        return two_turns(self.low_Hz)
+        """Two cycles at the lowest frequency, or a second."""
+        return two_cycles(self.low_Hz)
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
-        """The sweep."""
+        """Return the sweep."""
         rate = 2.0 * math.pi / self.cycle(folder)
         mean, swing = math.pi * (self.low_Hz + self.high_Hz), math.pi * (self.high_Hz - self.low_Hz)
         top = self.amplitude_m if self.amplitude_at_high_m is None else self.amplitude_at_high_m

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from pzd.record import Array
-from pzd.rig.stand.waveform import Course, Waveform, two_turns
+from pzd.rig.stand.waveforms import Course, Waveform, two_cycles
 from pzd.signals.harmonics import FourierSum
 
 
@@ -37,20 +37,20 @@ class Tones(Waveform):
         return self
 
     def own_name(self) -> str:
-        """`tones-1-2.7Hz-0.02m`, the amplitude that of the first."""
+        """Return the name made of its parameters: `tones-1-2.7Hz-0.02m`, the amplitude that of the first."""
         return f"tones-{'-'.join(f'{f:g}' for f in self.frequencies_Hz)}Hz-{self.amplitudes_m[0]:g}m"
 
     def cycle(self, folder: Path) -> float:
-        """One turn of the lowest tone."""
+        """Return one cycle of the lowest tone."""
         return 1.0 / min(self.frequencies_Hz)
 
     @property
     def settling_time(self) -> float:
-        """Two turns of the lowest tone, or a second."""
-        return two_turns(min(self.frequencies_Hz))
+        """Two cycles of the lowest tone, or a second."""
+        return two_cycles(min(self.frequencies_Hz))
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
-        """The sum of the sines, each exactly."""
+        """Return the sum of the sines, each exactly."""
         tones = [
             FourierSum(1.0 / frequency, np.array([0.0, -1j * amplitude]))
             for frequency, amplitude in zip(self.frequencies_Hz, self.amplitudes_m, strict=True)

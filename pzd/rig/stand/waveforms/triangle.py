@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from pzd.rig.stand.waveform import Course, Waveform, two_turns
+from pzd.rig.stand.waveforms import Course, Waveform, two_cycles
 from pzd.signals.harmonics import FourierSum
 
 _SMALLEST = 1e-10
@@ -35,20 +35,20 @@ class Triangle(Waveform):
     """Bandwidth of the actuator (-3 dB), which rounds the corners."""
 
     def own_name(self) -> str:
-        """`triangle-1Hz-0.02m`."""
+        """Return the name made of its parameters: `triangle-1Hz-0.02m`."""
         return f"triangle-{self.frequency_Hz:g}Hz-{self.amplitude_m:g}m"
 
     def cycle(self, folder: Path) -> float:
-        """1 / f."""
+        """Return 1 / f."""
         return 1.0 / self.frequency_Hz
 
     @property
     def settling_time(self) -> float:
         """Two cycles, or a second."""
-        return two_turns(self.frequency_Hz)
+        return two_cycles(self.frequency_Hz)
 
     def course(self, draw: np.random.Generator, folder: Path) -> Course:
-        """The sum of the harmonics that the actuator passes."""
+        """Return the sum of the harmonics that the actuator passes."""
         highest = self.bandwidth_Hz * math.sqrt(2.0 * math.log(1.0 / _SMALLEST) / math.log(2.0))
         harmonic = np.arange(1, max(int(highest / self.frequency_Hz), 1) + 1, 2)
         passed = np.exp(-0.5 * math.log(2.0) * (harmonic * self.frequency_Hz / self.bandwidth_Hz) ** 2)

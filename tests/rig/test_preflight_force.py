@@ -8,18 +8,20 @@ import pytest
 from pzd.damper.element import element_force
 from pzd.record import Array, Record
 from pzd.rig.config import Limits
-from pzd.rig.preflight import Measured, checks, delay
-from pzd.rig.reference_fit import Piece, ReferenceFit
+from pzd.rig.preflight import PreflightRecord, force
+from pzd.rig.preflight.force import ReferenceFit, Section, delay
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
 
 TIME = np.arange(8000) * 1e-3
 
 
-def measured(x: Array, force: Array) -> Measured:
+def measured(x: Array, recorded: Array) -> PreflightRecord:
     run = cycles(TIME, x)
     clean = kinematics(TIME, x, run)
-    return Measured(Record("a", None, TIME, x, clean.velocity, clean.acceleration, force), run, clean, Limits())
+    return PreflightRecord(
+        Record("a", None, TIME, x, clean.velocity, clean.acceleration, recorded), run, clean, Limits()
+    )
 
 
 def random_motion(rng: np.random.Generator) -> Array:
@@ -37,8 +39,8 @@ def test_a_rigid_damper_with_sigmoid_friction_is_not_late(
     x = random_motion(rng) if motion == "random" else 0.01 * np.sin(2.0 * np.pi * float(motion[0]) * TIME)
     v = np.gradient(x, TIME)
     for noise in (0.0, 5.0):
-        force = 900.0 * v + 200.0 * np.tanh(v / rounded_at) + noise * rng.standard_normal(TIME.size)
-        assert checks()["delay"].check(measured(x, force)) == []
+        damping = 900.0 * v + 200.0 * np.tanh(v / rounded_at) + noise * rng.standard_normal(TIME.size)
+        assert list(delay(measured(x, damping))) == []
 
 
 def test_delays_are_looked_for_only_where_the_element_leaves_something(
@@ -47,14 +49,14 @@ def test_delays_are_looked_for_only_where_the_element_leaves_something(
     x = 0.01 * np.sin(2.0 * np.pi * 2.0 * TIME)
     other = 500.0 * rng.standard_normal(TIME.size)
     asked: list[int] = []
-    search = delay.fitted
+    search = force.fit_element
 
-    def counted(part: Piece, forces: Array) -> ReferenceFit:
+    def counted(section: Section, forces: Array) -> ReferenceFit:
         asked.append(len(forces))
-        return search(part, forces)
+        return search(section, forces)
 
-    monkeypatch.setattr(delay, "fitted", counted)
-    assert delay.check(measured(x, element_force(x, 1e-3, 300.0, 2500.0, 2e5))) == []
-    assert asked == []
-    delay.check(measured(x, other))
-    assert asked == [delay.TRIES]
+    monkeypatch.setattr(force, "fit_element", counted)
+    assert list(delay(measured(x, element_force(x, 1e-3, 300.0, 2500.0, 2e5)))) == []
+    assert asked == [1]  # the undelayed fit alone
+    list(delay(measured(x, other)))
+    assert asked == [1, 1, 31]

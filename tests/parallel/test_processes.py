@@ -26,7 +26,7 @@ def test_results_stand_in_order_for_any_number_of_processes(jobs: int, count: in
 
 
 @pytest.mark.parametrize("jobs", [1, 3])
-def test_each_that_is_made_is_told_in_order_where_it_was_asked_for(jobs: int) -> None:
+def test_each_that_is_made_is_reported_in_order_where_it_was_asked_for(jobs: int) -> None:
     told: list[tuple[int, int]] = []
     parallel_map(lambda number: number**2, range(5), jobs, lambda square: told.append((square, os.getpid())))
     assert told == [(number**2, os.getpid()) for number in range(5)]
@@ -72,7 +72,7 @@ def runs(process: int) -> bool:
 
 
 @pytest.mark.parametrize("failing", [0, 1])
-def test_what_fails_in_another_process_is_told_as_if_it_failed_here(failing: int) -> None:
+def test_what_fails_in_another_process_is_reported_as_if_it_failed_here(failing: int) -> None:
     def refuse(number: int) -> int:
         if number == failing:
             raise DataError([f"data/{number}.csv:3: wrong", "and more"])

@@ -1,0 +1,91 @@
+"""Checks of signs and units: work done by the damper on the rig, and magnitudes that no damper has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pzd.artefacts import Finding
+from pzd.rig.preflight import PreflightRecord
+from pzd.signals.smoothing import work, work_of_chance
+
+
+def sign(test: PreflightRecord) -> Iterator[Finding]:
+    """Find cycles with negative work, or a record whose steady force outweighs its loops."""
+    record = test.record
+    if work(record.displacement, record.force) < -work_of_chance(record.displacement, record.force):
+        yield Finding(
+            check="sign",
+            where="the whole record",
+            size=work(record.displacement, record.force),
+            unit="J",
+            follows="a steady force over the net displacement outweighs the loops: take the tare out",
+        )
+        return
+    if test.cycles is None:
+        return
+    number = test.cycles.number(record.time)
+    # Each cycle is closed: left open, a small stroke's noise keeps its ends apart, and the force would do work there.
+    cycles = [number == k for k in range(test.cycles.count)]
+    works = np.array([work(record.displacement[rows], record.force[rows], closed=True) for rows in cycles])
+    negative = np.flatnonzero(works < -work_of_chance(record.displacement, record.force, cycles=1.0))
+    if negative.size:
+        first = test.cycles.start + float(negative[0]) * test.cycles.period
+        yield Finding(
+            check="sign",
+            where=f"{negative.size} of {test.cycles.count} cycles, the first at {first:.4g} s",
+            size=float(works.min()),
+            unit="J",
+            follows="the damper does work on the rig there: check the cell, or leave these cycles out",
+        )
+
+
+# --- Units: one read wrongly is most often off by 1000 ---
+
+LEAST_STROKE = 2e-4
+"""A smaller stroke [m] is more likely a wrong unit than a test."""
+FORCES = (2.0, 5e5)
+"""Peak forces [N] outside this range are more likely a wrong unit."""
+SPEEDS = (5e-4, 5.0)
+"""Peak speeds [m/s] outside this range are more likely a wrong unit of time."""
+SHORT_STROKE = 0.05
+"""Dampers of vehicles move no further [m]"""
+VEHICLE_FORCE = 5e4
+"""and give no larger forces [N]; those of bridges and buildings move further."""
+TEMPERATURES = (-60.0, 150.0)
+"""Outside this range [degC] seals and oil of a damper fail: kelvin or degrees Fahrenheit are likelier."""
+CONTROLS = {"V": 1e4, "A": 1e2}
+"""Largest control signal by its unit: piezo valves take up to 1 kV, electrorheological ones 5 kV, coils some A."""
+HINTS = {"degC": "degC, degF or K", "V": "V or mV", "A": "A or mA"}
+"""What may have been mixed up, by unit; else a unit of the motion or the force."""
+
+
+def scale(test: PreflightRecord) -> Iterator[Finding]:
+    """Find strokes, forces, speeds, temperatures and control signals that look like a unit read wrongly."""
+    record, control = test.record, test.control
+    stroke = float(np.ptp(record.displacement))
+    forces = (FORCES[0], VEHICLE_FORCE) if stroke < SHORT_STROKE else FORCES
+    sizes = [
+        ("stroke", stroke, (LEAST_STROKE, np.inf), "m"),
+        ("peak force", float(np.abs(record.force).max()), forces, "N"),
+        ("peak speed", float(np.abs(test.clean.velocity).max()), SPEEDS, "m/s"),
+    ]
+    temperature, voltage = record.median_temperature(), record.median_voltage()
+    if temperature is not None:
+        sizes.append(("temperature", temperature, TEMPERATURES, "degC"))
+    if voltage is not None and control.unit in CONTROLS:
+        sizes.append((control.name, abs(voltage), (0.0, CONTROLS[control.unit]), control.unit))
+    for what, size, (low, high), unit in sizes:
+        if not low <= size <= high:
+            hint = HINTS.get(unit, "mm or m, N or kN, s or ms")
+            yield Finding(
+                check="scale",
+                where=f"{what} of the whole record",
+                size=size,
+                unit=unit,
+                follows=f"{low:g} to {high:g} {unit} is usual: check the units ({hint})",
+            )
+
+
+CHECKS = (sign, scale)
