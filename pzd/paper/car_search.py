@@ -47,7 +47,7 @@ from pzd.simulate.ride.model import (
     vehicle,
     workspace,
 )
-from pzd.simulate.road.profile import Profile
+from pzd.simulate.roads import Profile
 from pzd.simulate.vehicle.car import HalfCar
 from pzd.simulate.vehicle.suspension import suspension
 

@@ -17,7 +17,7 @@ from pzd.simulate.policies import TieBreak, policies
 from pzd.simulate.policies.best_found import BestFound
 from pzd.simulate.policies.clipped_lqr import ClippedLqr
 from pzd.simulate.policies.comfort_predictive import ComfortPredictive
-from pzd.simulate.policies.skyhook_add import SkyhookAdd
+from pzd.simulate.policies.skyhook import SkyhookAdd
 from pzd.simulate.roads import Road, roads
 from pzd.simulate.roads.sine import Sine
 from pzd.simulate.vehicle.car import HalfCar

@@ -15,7 +15,7 @@ from pzd.simulate.config import SimulateConfig
 if TYPE_CHECKING:
     from pzd.simulate.ride.outcome import Outcome
     from pzd.simulate.ride.riding import Held
-    from pzd.simulate.road.profile import Profile
+    from pzd.simulate.roads import Profile
     from pzd.simulate.study.gathering import RideRows
     from pzd.simulate.study.plan import Case
 

@@ -33,7 +33,7 @@ from pzd.simulate.ride.model import (
 )
 from pzd.simulate.ride.riding import Held, control_spec_of
 from pzd.simulate.ride.stepper import choose_side
-from pzd.simulate.road.profile import Profile
+from pzd.simulate.roads import Profile
 from pzd.simulate.study.plan import Case
 
 

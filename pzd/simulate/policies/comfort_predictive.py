@@ -60,9 +60,11 @@ class ComfortPredictive(Frozen):
         return self
 
 
-POLICY = Policy(
-    "comfort_predictive",
-    "of many voltages ahead, tried on a model of car and dampers, those with the least weighted acceleration",
-    "predict",
-    controlled=True,
+POLICIES = (
+    Policy(
+        "comfort_predictive",
+        "of many voltages ahead, tried on a model of car and dampers, those with the least weighted acceleration",
+        "predict",
+        controlled=True,
+    ),
 )

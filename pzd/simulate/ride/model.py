@@ -28,7 +28,7 @@ from pzd.damper.regimes import spring_force
 from pzd.force_table.lookup import Lookup, bracket
 from pzd.record import Array
 from pzd.schema.errors import DataError
-from pzd.simulate.road.profile import Profile
+from pzd.simulate.roads import Profile
 from pzd.simulate.vehicle.car import HalfCar
 
 # ----------------------------------------------------------------------------------------------------

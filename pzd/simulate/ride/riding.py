@@ -46,7 +46,7 @@ from pzd.simulate.ride.model import (
 )
 from pzd.simulate.ride.outcome import Outcome, SpilledRows, longest_piece
 from pzd.simulate.ride.stepper import STAGES
-from pzd.simulate.road.profile import Profile
+from pzd.simulate.roads import Profile
 from pzd.simulate.study.plan import Case
 from pzd.simulate.vehicle.car import HalfCar
 

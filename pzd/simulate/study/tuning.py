@@ -17,7 +17,7 @@ from pzd.simulate.policies import policies
 from pzd.simulate.ride.model import DynamicDamper, TableArrays
 from pzd.simulate.ride.outcome import PIECE_S, VOLTAGES, MeanSquare, Outcome, event_of
 from pzd.simulate.ride.riding import Held, RideFound, Take, ride_case
-from pzd.simulate.road.profile import Profile
+from pzd.simulate.roads import Profile
 from pzd.simulate.study.plan import Case
 
 # ----------------------------------------------------------------------------------------------------
