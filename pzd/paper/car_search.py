@@ -35,12 +35,7 @@ from pzd.simulate.policies import TieBreak
 from pzd.simulate.ride.energy import harmonic_response
 from pzd.simulate.ride.equations import body_acceleration
 from pzd.simulate.ride.model import (
-    DEFLECTION,
-    FORCE,
-    HIGH,
-    LOW,
-    RATE,
-    SPRINGS,
+    Axle,
     RoadCoefficients,
     Vehicle,
     road_coefficients,
@@ -133,7 +128,7 @@ def _peak(
         if n >= settle:
             a = 0.0
             for i in range(2):
-                a += car.comfort[i] * (workspace[SPRINGS, i] + workspace[FORCE, i])
+                a += car.comfort[i] * (workspace[Axle.SPRINGS, i] + workspace[Axle.FORCE, i])
             peak = max(peak, abs(a))
         for stage in range(1, 4):
             part = step if stage == 3 else 0.5 * step
@@ -160,14 +155,20 @@ def _rates(
     """Fill the derivative of the body's state; the end of the segment that `largest` takes is chosen where it is -1."""
     suspension(time, x, car, road, workspace)
     for i in range(2):
-        workspace[LOW, i], workspace[HIGH, i] = coefficient_bounds(workspace[RATE, i], bounds[0], bounds[1])
-    a0 = spring_acceleration(car, workspace[DEFLECTION])
+        workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = coefficient_bounds(
+            workspace[Axle.RATE, i], bounds[0], bounds[1]
+        )
+    a0 = spring_acceleration(car, workspace[Axle.DEFLECTION])
     if tie == LARGEST and end < 0:
-        end = farther_end(a0, car.comfort, workspace[LOW], workspace[HIGH])
-    least_acceleration_forces(a0, car.comfort, workspace[LOW], workspace[HIGH], tie, end, workspace[FORCE])
+        end = farther_end(a0, car.comfort, workspace[Axle.LOW], workspace[Axle.HIGH])
+    least_acceleration_forces(
+        a0, car.comfort, workspace[Axle.LOW], workspace[Axle.HIGH], tie, end, workspace[Axle.FORCE]
+    )
     rates[0], rates[1] = x[2], x[3]
     rates[2], rates[3] = body_acceleration(
-        car, workspace[SPRINGS, 0] + workspace[FORCE, 0], workspace[SPRINGS, 1] + workspace[FORCE, 1]
+        car,
+        workspace[Axle.SPRINGS, 0] + workspace[Axle.FORCE, 0],
+        workspace[Axle.SPRINGS, 1] + workspace[Axle.FORCE, 1],
     )
     return end
 

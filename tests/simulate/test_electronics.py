@@ -12,14 +12,8 @@ from pydantic import ValidationError
 from pzd.simulate.config import CarBlock, SensorNoise, Sensors, SimulateConfig, Supply
 from pzd.simulate.control.sensing import Electronics, electronics_of, sense, supplied, with_noise
 from pzd.simulate.ride.model import (
-    BODY,
-    COMFORT,
-    DEFLECTION,
-    HEAVE,
-    HEAVE_RATE,
-    PITCH,
-    PITCH_RATE,
-    RATE,
+    Axle,
+    State,
     at_rest,
     vehicle,
     workspace,
@@ -56,9 +50,9 @@ def seen_of(known: Electronics, acts: int) -> np.ndarray:
     rows = []
     y, room = at_rest(CAR), workspace()
     for n in range(acts):
-        y[HEAVE], room[DEFLECTION, 0] = float(n), -float(n)
+        y[State.HEAVE], room[Axle.DEFLECTION, 0] = float(n), -float(n)
         age = sense(y, CAR, room, known)
-        rows.append((known.state[HEAVE], known.workspace[DEFLECTION, 0], age / PERIOD))
+        rows.append((known.state[State.HEAVE], known.workspace[Axle.DEFLECTION, 0], age / PERIOD))
     return np.array(rows)
 
 
@@ -79,10 +73,10 @@ def test_noise_has_the_deviation_of_each_sensor_and_is_white(rng) -> None:
     for _ in range(acts):
         sense(y, CAR, room, known)
         state, seen = known.state, known.workspace
-        rows.append([*seen[DEFLECTION], *seen[RATE], *state[:4], seen[BODY, 0]])
-        assert seen[COMFORT, 0] == seen[BODY, 0]
-        height = state[HEAVE] + CAR.arms[1] * state[PITCH] - seen[DEFLECTION, 1]
-        rise = state[HEAVE_RATE] + CAR.arms[1] * state[PITCH_RATE] - seen[RATE, 1]
+        rows.append([*seen[Axle.DEFLECTION], *seen[Axle.RATE], *state[:4], seen[Axle.BODY, 0]])
+        assert seen[Axle.COMFORT, 0] == seen[Axle.BODY, 0]
+        height = state[State.HEAVE] + CAR.arms[1] * state[State.PITCH] - seen[Axle.DEFLECTION, 1]
+        rise = state[State.HEAVE_RATE] + CAR.arms[1] * state[State.PITCH_RATE] - seen[Axle.RATE, 1]
         assert known.road_off[:, 1] == pytest.approx([height, rise], abs=1e-15)
     errors = np.array(rows)
     given = [NOISE[name] for name in NOISE]

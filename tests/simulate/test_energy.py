@@ -12,12 +12,10 @@ from pzd.simulate.ride.energy import oil_energy
 from pzd.simulate.ride.equations import motion
 from pzd.simulate.ride.loop import set_control
 from pzd.simulate.ride.model import (
-    BEHIND,
-    OIL_DEFLECTION,
-    OIL_WORK,
-    SET,
-    SINCE,
+    Axle,
+    Command,
     RideModel,
+    State,
     at_rest,
     control,
     effective_voltage,
@@ -43,7 +41,9 @@ def model_of(ride, monkeypatch) -> RideModel:
 
 def stiffness(model: RideModel, acts, axle: int, time: float) -> float:
     """k of the oil spring [N/m] at the effective voltage of an axle."""
-    voltage = effective_voltage(model.damper, acts[SET, axle], acts[BEHIND:, axle], time - acts[SINCE, 0])
+    voltage = effective_voltage(
+        model.damper, acts[Command.SET, axle], acts[Command.BEHIND :, axle], time - acts[Command.SINCE, 0]
+    )
     return row_at(model.damper.voltages, model.damper.rows, voltage)[K]
 
 
@@ -59,15 +59,15 @@ def test_the_work_of_the_valve_is_half_the_square_of_the_deflection_over_the_sti
         time = n * STEP
         if n == BEFORE:
             set_control(time, y, model, None, None, acts, room, stages[STAGES])
-            gained = oil_energy(time, y, model, acts, room) - y[OIL_WORK]
+            gained = oil_energy(time, y, model, acts, room) - y[State.OIL_WORK]
         motion(time, y, model, acts, room, stages[0])
-        before = [(0.5 * room[OIL_DEFLECTION, i] ** 2, stiffness(model, acts, i, time)) for i in range(2)]
+        before = [(0.5 * room[Axle.OIL_DEFLECTION, i] ** 2, stiffness(model, acts, i, time)) for i in range(2)]
         advance(time, STEP, y, model, acts, room, 1e-11, STEP, stages, end)
         motion(time + STEP, y, model, acts, room, stages[0])
         for i, (was, k) in enumerate(before):
-            now = 0.5 * room[OIL_DEFLECTION, i] ** 2
+            now = 0.5 * room[Axle.OIL_DEFLECTION, i] ** 2
             work += model.car.dampers[i] * 0.5 * (was + now) * (stiffness(model, acts, i, time + STEP) - k)
-    last = oil_energy((BEFORE + AFTER) * STEP, y, model, acts, room) - y[OIL_WORK]
-    assert acts[SET, 0] == 150.0
+    last = oil_energy((BEFORE + AFTER) * STEP, y, model, acts, room) - y[State.OIL_WORK]
+    assert acts[Command.SET, 0] == 150.0
     assert abs(work) > 0.05
     assert last - gained == pytest.approx(work, rel=1e-4)

@@ -28,12 +28,9 @@ from pzd.simulate.policies import policies
 from pzd.simulate.ride.equations import motion
 from pzd.simulate.ride.loop import set_control
 from pzd.simulate.ride.model import (
-    COMFORT,
-    CONTACT,
-    OIL_1,
-    WHEEL_1,
-    WHEEL_RATE_2,
+    Axle,
     RideModel,
+    State,
     at_rest,
     control,
     dynamic_damper_of,
@@ -125,14 +122,16 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
     predicted(predicting.car, plan, state, levels[0, candidate], levels[1, candidate], plan.hold_heights[0], HELD, 1e9)
     after, _ = model_of(damper, "passive", float(plan.candidates[candidate]), **given)
     ahead(after, y, acts, room, 1.5, 0.02)
-    assert np.max(np.abs(state[:OIL_1] - y[:OIL_1]) / peak[:OIL_1]) < motion_off
+    assert np.max(np.abs(state[: State.OIL_1] - y[: State.OIL_1]) / peak[: State.OIL_1]) < motion_off
     if car:
-        wheels = slice(WHEEL_1, WHEEL_RATE_2 + 1)
+        wheels = slice(State.WHEEL_1, State.WHEEL_RATE_2 + 1)
         assert np.max(np.abs(state[WHEELS : WHEELS + 4] - y[wheels]) / peak[wheels]) < 5.0 * motion_off
-        assert state[LOAD_1 : LOAD_2 + 1] == pytest.approx(-room[CONTACT], abs=0.01 * max(predicting.car.static_load))
+        assert state[LOAD_1 : LOAD_2 + 1] == pytest.approx(
+            -room[Axle.CONTACT], abs=0.01 * max(predicting.car.static_load)
+        )
         return
     a_K = predicting.car.comfort[0] * state[LOAD_1] + predicting.car.comfort[1] * state[LOAD_2]
-    assert a_K == pytest.approx(room[COMFORT, 0], abs=a_K_off)
+    assert a_K == pytest.approx(room[Axle.COMFORT, 0], abs=a_K_off)
 
 
 def test_an_oil_far_faster_than_the_step_is_quasi_static_with_an_error_in_proportion_to_its_time(

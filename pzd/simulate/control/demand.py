@@ -9,24 +9,14 @@ from pzd.force_table.lookup import table_range
 from pzd.record import Array
 from pzd.simulate.policies import TieBreak
 from pzd.simulate.ride.model import (
-    BODY,
     BY_COEFFICIENTS,
     BY_TABLE,
-    DEFLECTION,
-    FORCE,
-    HARD,
-    HEAVE,
-    HEAVE_RATE,
-    HIGH,
-    LOW,
     MINIMISE,
-    PITCH,
-    PITCH_RATE,
-    RATE,
-    SIDED_RATE,
     SWITCH,
-    TIE_END,
+    Axle,
+    Command,
     ControlSpec,
+    State,
     TableArrays,
     Vehicle,
 )
@@ -243,9 +233,14 @@ def bounds_of(
 @inlined
 def feedback_force(gains: Array, y: Array, workspace: Array) -> float:
     """What a policy makes of what it senses at one axle: gains (8,) on `SENSED`; a force [N], or what switches."""
-    force = gains[4] * y[HEAVE] + gains[5] * y[PITCH] + gains[6] * y[HEAVE_RATE] + gains[7] * y[PITCH_RATE]
+    force = (
+        gains[4] * y[State.HEAVE]
+        + gains[5] * y[State.PITCH]
+        + gains[6] * y[State.HEAVE_RATE]
+        + gains[7] * y[State.PITCH_RATE]
+    )
     for i in range(2):
-        force += gains[i] * workspace[DEFLECTION, i] + gains[2 + i] * workspace[RATE, i]
+        force += gains[i] * workspace[Axle.DEFLECTION, i] + gains[2 + i] * workspace[Axle.RATE, i]
     return float(force)
 
 
@@ -266,17 +261,17 @@ def choose_hardness(control_spec: ControlSpec, car: Vehicle, y: Array, control: 
     """Fill whether each damper is to be hard, by the workspace as the motion left it."""
     for i in range(2):
         signal = feedback_force(control_spec.gains[i], y, workspace)
-        acceleration = workspace[BODY, 0] + car.arms[i] * workspace[BODY, 1]
-        hard = is_hard(workspace[RATE, i], signal, acceleration, control_spec.crossover)
-        control[HARD, i] = 1.0 if hard else 0.0
+        acceleration = workspace[Axle.BODY, 0] + car.arms[i] * workspace[Axle.BODY, 1]
+        hard = is_hard(workspace[Axle.RATE, i], signal, acceleration, control_spec.crossover)
+        control[Command.HARD, i] = 1.0 if hard else 0.0
 
 
 @inlined
 def wanted_force(control_spec: ControlSpec, axle: int, y: Array, control: Array, workspace: Array) -> float:
     """What a feedback or a switch asks of one axle within the workspace's bounds [N]."""
-    low, high = workspace[LOW, axle], workspace[HIGH, axle]
+    low, high = workspace[Axle.LOW, axle], workspace[Axle.HIGH, axle]
     if control_spec.aim == SWITCH:
-        return switched_force(control[HARD, axle] > 0.0, workspace[SIDED_RATE, axle], low, high)
+        return switched_force(control[Command.HARD, axle] > 0.0, workspace[Axle.SIDED_RATE, axle], low, high)
     return float(min(max(feedback_force(control_spec.gains[axle], y, workspace), low), high))
 
 
@@ -284,20 +279,20 @@ def wanted_force(control_spec: ControlSpec, axle: int, y: Array, control: Array,
 def demand(control_spec: ControlSpec, car: Vehicle, y: Array, control: Array, workspace: Array) -> None:
     """Fill the workspace's forces with what the policy asks of both axles within the workspace's bounds [N]."""
     if control_spec.aim == MINIMISE and control_spec.tie == LEAST_LOAD:
-        springs = (car.stiffness[0] * workspace[DEFLECTION, 0], car.stiffness[1] * workspace[DEFLECTION, 1])
-        least_load_forces(springs, car.comfort, workspace[LOW], workspace[HIGH], workspace[FORCE])
+        springs = (car.stiffness[0] * workspace[Axle.DEFLECTION, 0], car.stiffness[1] * workspace[Axle.DEFLECTION, 1])
+        least_load_forces(springs, car.comfort, workspace[Axle.LOW], workspace[Axle.HIGH], workspace[Axle.FORCE])
         return
     if control_spec.aim == MINIMISE:
-        a0 = spring_acceleration(car, workspace[DEFLECTION])
+        a0 = spring_acceleration(car, workspace[Axle.DEFLECTION])
         least_acceleration_forces(
             a0,
             car.comfort,
-            workspace[LOW],
-            workspace[HIGH],
+            workspace[Axle.LOW],
+            workspace[Axle.HIGH],
             control_spec.tie,
-            int(control[TIE_END, 1]),
-            workspace[FORCE],
+            int(control[Command.TIE_END, 1]),
+            workspace[Axle.FORCE],
         )
         return
     for i in range(2):
-        workspace[FORCE, i] = wanted_force(control_spec, i, y, control, workspace)
+        workspace[Axle.FORCE, i] = wanted_force(control_spec, i, y, control, workspace)

@@ -10,17 +10,11 @@ import numpy as np
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.config import SensorNoise, Sensors, Supply
+from pzd.simulate.policies import SENSED
 from pzd.simulate.ride.model import (
-    BODY,
-    COMFORT,
-    DEFLECTION,
-    HEAVE,
-    HEAVE_RATE,
-    PITCH,
-    PITCH_RATE,
-    RATE,
-    SENSED,
     WORKSPACE_ROWS,
+    Axle,
+    State,
     Vehicle,
 )
 
@@ -198,18 +192,18 @@ def _sample(y: Array, car: Vehicle, workspace: Array, electronics: Electronics, 
     for row in range(WORKSPACE_ROWS):
         copy_into(workspace[row], room[row])
     height, angle = deviations[_HEAVE] * drawn[_HEAVE], deviations[_PITCH] * drawn[_PITCH]
-    seen[HEAVE] += height
-    seen[PITCH] += angle
+    seen[State.HEAVE] += height
+    seen[State.PITCH] += angle
     rate, turning = deviations[_HEAVE_RATE] * drawn[_HEAVE_RATE], deviations[_PITCH_RATE] * drawn[_PITCH_RATE]
-    seen[HEAVE_RATE] += rate
-    seen[PITCH_RATE] += turning
-    room[BODY, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
-    room[COMFORT, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
+    seen[State.HEAVE_RATE] += rate
+    seen[State.PITCH_RATE] += turning
+    room[Axle.BODY, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
+    room[Axle.COMFORT, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
     for i in range(2):
         deflection = deviations[_DEFLECTION + i] * drawn[_DEFLECTION + i]
-        room[DEFLECTION, i] += deflection
+        room[Axle.DEFLECTION, i] += deflection
         lengthening = deviations[_RATE + i] * drawn[_RATE + i]
-        room[RATE, i] += lengthening
+        room[Axle.RATE, i] += lengthening
         electronics.roads_off[slot, HEIGHT_OFF, i] = height + car.arms[i] * angle - deflection
         electronics.roads_off[slot, RISE_OFF, i] = rate + car.arms[i] * turning - lengthening
 

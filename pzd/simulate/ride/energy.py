@@ -14,22 +14,12 @@ from pzd.damper.compiled.rows import row_at
 from pzd.damper.regimes import spring_energy
 from pzd.record import Array, Complex
 from pzd.simulate.ride.model import (
-    BEHIND,
-    DEFLECTION,
-    DISSIPATED,
     DYNAMIC,
-    HEAVE_RATE,
-    OIL_1,
-    PARALLEL_WORK,
-    PITCH_RATE,
-    ROAD_WORK,
-    SET,
-    SINCE,
     STATES,
-    TYRE_LOSS,
-    WHEEL_1,
-    WHEEL_RATE_1,
+    Axle,
+    Command,
     RideModel,
+    State,
     effective_voltage,
 )
 from pzd.simulate.ride.outcome import Outcome
@@ -61,14 +51,14 @@ def stored_energy(time: float, y: Array, model: RideModel, workspace: Array) -> 
     """
     car = model.car
     suspension(time, y, car, model.road_coefficients, workspace)
-    energy = 0.5 * car.mass * y[HEAVE_RATE] ** 2 + 0.5 * car.inertia * y[PITCH_RATE] ** 2
+    energy = 0.5 * car.mass * y[State.HEAVE_RATE] ** 2 + 0.5 * car.inertia * y[State.PITCH_RATE] ** 2
     for i in range(2):
-        energy += 0.5 * car.stiffness[i] * workspace[DEFLECTION, i] ** 2
+        energy += 0.5 * car.stiffness[i] * workspace[Axle.DEFLECTION, i] ** 2
         if car.wheels:
             road = model.road_coefficients
             height, _, _ = road_at(road, car.speed * time - road.behind[i])
-            energy += 0.5 * car.unsprung[i] * y[WHEEL_RATE_1 + i] ** 2
-            energy += tyre_energy(car.static_load[i], car.tyre_stiffness[i], height - y[WHEEL_1 + i])
+            energy += 0.5 * car.unsprung[i] * y[State.WHEEL_RATE_1 + i] ** 2
+            energy += tyre_energy(car.static_load[i], car.tyre_stiffness[i], height - y[State.WHEEL_1 + i])
     return float(energy)
 
 
@@ -89,9 +79,13 @@ def oil_energy(time: float, y: Array, model: RideModel, control: Array, workspac
         return energy
     suspension(time, y, car, model.road_coefficients, workspace)
     for i in range(2):
-        voltage = effective_voltage(damper, control[SET, i], control[BEHIND:, i], time - control[SINCE, 0])
+        voltage = effective_voltage(
+            damper, control[Command.SET, i], control[Command.BEHIND :, i], time - control[Command.SINCE, 0]
+        )
         row = row_at(damper.voltages, damper.rows, voltage)
-        energy += car.dampers[i] * spring_energy(car.ratio[i] * workspace[DEFLECTION, i] - y[OIL_1 + i], row, row[K])
+        energy += car.dampers[i] * spring_energy(
+            car.ratio[i] * workspace[Axle.DEFLECTION, i] - y[State.OIL_1 + i], row, row[K]
+        )
     return energy
 
 
@@ -110,8 +104,8 @@ def balance_error(change: float, oil_change: float, y: Array) -> float:
     -------
     share; zero for a ride in which nothing moves
     """
-    lost = y[DISSIPATED] + (y[TYRE_LOSS] if y.size > TYRE_LOSS else 0.0)
-    left = change + oil_change + y[PARALLEL_WORK] + lost - y[ROAD_WORK]
+    lost = y[State.DISSIPATED] + (y[State.TYRE_LOSS] if y.size > State.TYRE_LOSS else 0.0)
+    left = change + oil_change + y[State.PARALLEL_WORK] + lost - y[State.ROAD_WORK]
     return float(left / max(lost, NOTHING)) if abs(left) > NOTHING else 0.0
 
 
@@ -188,8 +182,8 @@ def ride_exactly(
     comfort = forces @ car.force_to_comfort()
     energy = np.zeros(STATES)
     lost = _integral(A, damping * v.T @ v, step, x)
-    energy[DISSIPATED] = lost[-1]
-    energy[ROAD_WORK] = _integral(A, -0.5 * (load.T @ rise + rise.T @ load), step, x)[-1]
+    energy[State.DISSIPATED] = lost[-1]
+    energy[State.ROAD_WORK] = _integral(A, -0.5 * (load.T @ rise + rise.T @ load), step, x)[-1]
     stored = _stored(car, u)
     change = float(x[-1] @ stored @ x[-1] - x[0] @ stored @ x[0])
     too_fast = np.abs(rate) * np.array(car.motion_ratios) > reach * (1.0 + 1e-9)

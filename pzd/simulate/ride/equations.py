@@ -8,43 +8,13 @@ from pzd.force_table.lookup import table_force
 from pzd.record import Array
 from pzd.simulate.control.demand import bounds_of, demand, one_sided, spring_acceleration, wanted_force
 from pzd.simulate.ride.model import (
-    ACCELERATION,
-    BEHIND,
-    BODY,
-    COMFORT,
-    CONTACT,
-    DEFLECTION,
-    DISSIPATED,
     DYNAMIC,
-    ELASTIC,
-    FLOW,
-    FORCE,
-    HEAVE,
-    HEAVE_RATE,
-    HIGH,
-    INERTANCE,
-    LIFT,
-    LOW,
     MINIMISE,
-    OIL_1,
-    OIL_DEFLECTION,
-    OIL_FORCE,
-    OIL_WORK,
-    PARALLEL_WORK,
-    PITCH,
-    PITCH_RATE,
-    RATE,
-    REBOUND_PUSH,
-    ROAD_RISE,
-    ROAD_WORK,
-    RUBBING,
-    SET,
-    SIDE,
-    SIDED_RATE,
-    SINCE,
-    SPRINGS,
     TABLE,
+    Axle,
+    Command,
     RideModel,
+    State,
     TableArrays,
     Vehicle,
     effective_voltage,
@@ -102,25 +72,25 @@ def accelerate(car: Vehicle, control: Array, workspace: Array) -> None:
     control, workspace : see `ride_model`; forces and accelerations are filled
     """
     w0, w1, cross = car.mobility
-    s0, s1 = workspace[SPRINGS, 0], workspace[SPRINGS, 1]
-    lift0, lift1 = workspace[LIFT, 0], workspace[LIFT, 1]
+    s0, s1 = workspace[Axle.SPRINGS, 0], workspace[Axle.SPRINGS, 1]
+    lift0, lift1 = workspace[Axle.LIFT, 0], workspace[Axle.LIFT, 1]
     determinant = w0 * w1 - cross * cross
-    workspace[ACCELERATION, 0] = workspace[ACCELERATION, 1] = 0.0
-    if control[SIDE, 0] == 0.0 and control[SIDE, 1] == 0.0:
-        workspace[FORCE, 0] = -(w1 * lift0 - cross * lift1) / determinant - s0
-        workspace[FORCE, 1] = -(w0 * lift1 - cross * lift0) / determinant - s1
+    workspace[Axle.ACCELERATION, 0] = workspace[Axle.ACCELERATION, 1] = 0.0
+    if control[Command.SIDE, 0] == 0.0 and control[Command.SIDE, 1] == 0.0:
+        workspace[Axle.FORCE, 0] = -(w1 * lift0 - cross * lift1) / determinant - s0
+        workspace[Axle.FORCE, 1] = -(w0 * lift1 - cross * lift0) / determinant - s1
         return
-    if control[SIDE, 0] == 0.0 or control[SIDE, 1] == 0.0:
-        _accelerate_one(car, 1 if control[SIDE, 0] == 0.0 else 0, workspace)
+    if control[Command.SIDE, 0] == 0.0 or control[Command.SIDE, 1] == 0.0:
+        _accelerate_one(car, 1 if control[Command.SIDE, 0] == 0.0 else 0, workspace)
         return
-    pull0 = -w0 * (s0 + workspace[FORCE, 0]) - cross * (s1 + workspace[FORCE, 1]) - lift0
-    pull1 = -cross * (s0 + workspace[FORCE, 0]) - w1 * (s1 + workspace[FORCE, 1]) - lift1
-    a, b = 1.0 + w0 * workspace[INERTANCE, 0], cross * workspace[INERTANCE, 1]
-    c, d = cross * workspace[INERTANCE, 0], 1.0 + w1 * workspace[INERTANCE, 1]
-    workspace[ACCELERATION, 0] = (pull0 * d - b * pull1) / (a * d - b * c)
-    workspace[ACCELERATION, 1] = (a * pull1 - c * pull0) / (a * d - b * c)
+    pull0 = -w0 * (s0 + workspace[Axle.FORCE, 0]) - cross * (s1 + workspace[Axle.FORCE, 1]) - lift0
+    pull1 = -cross * (s0 + workspace[Axle.FORCE, 0]) - w1 * (s1 + workspace[Axle.FORCE, 1]) - lift1
+    a, b = 1.0 + w0 * workspace[Axle.INERTANCE, 0], cross * workspace[Axle.INERTANCE, 1]
+    c, d = cross * workspace[Axle.INERTANCE, 0], 1.0 + w1 * workspace[Axle.INERTANCE, 1]
+    workspace[Axle.ACCELERATION, 0] = (pull0 * d - b * pull1) / (a * d - b * c)
+    workspace[Axle.ACCELERATION, 1] = (a * pull1 - c * pull0) / (a * d - b * c)
     for i in range(2):
-        workspace[FORCE, i] += workspace[INERTANCE, i] * workspace[ACCELERATION, i]
+        workspace[Axle.FORCE, i] += workspace[Axle.INERTANCE, i] * workspace[Axle.ACCELERATION, i]
 
 
 @inlined
@@ -128,12 +98,14 @@ def _accelerate_one(car: Vehicle, free: int, workspace: Array) -> None:
     """The same where one axle is free and the other sticks."""
     stuck, cross = 1 - free, car.mobility[2]
     freed = car.mobility[free] - cross * cross / car.mobility[stuck]
-    pull = cross / car.mobility[stuck] * workspace[LIFT, stuck] - workspace[LIFT, free]
-    pull -= freed * (workspace[SPRINGS, free] + workspace[FORCE, free])
-    workspace[ACCELERATION, free] = pull / (1.0 + freed * workspace[INERTANCE, free])
-    workspace[FORCE, free] += workspace[INERTANCE, free] * workspace[ACCELERATION, free]
-    other = workspace[SPRINGS, free] + workspace[FORCE, free]
-    workspace[FORCE, stuck] = holding_force(car, stuck, workspace[SPRINGS, stuck], workspace[LIFT, stuck], other)
+    pull = cross / car.mobility[stuck] * workspace[Axle.LIFT, stuck] - workspace[Axle.LIFT, free]
+    pull -= freed * (workspace[Axle.SPRINGS, free] + workspace[Axle.FORCE, free])
+    workspace[Axle.ACCELERATION, free] = pull / (1.0 + freed * workspace[Axle.INERTANCE, free])
+    workspace[Axle.FORCE, free] += workspace[Axle.INERTANCE, free] * workspace[Axle.ACCELERATION, free]
+    other = workspace[Axle.SPRINGS, free] + workspace[Axle.FORCE, free]
+    workspace[Axle.FORCE, stuck] = holding_force(
+        car, stuck, workspace[Axle.SPRINGS, stuck], workspace[Axle.LIFT, stuck], other
+    )
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -156,18 +128,20 @@ def quasistatic_forces(y: Array, model: RideModel, control: Array, workspace: Ar
     """Fill the workspace's forces for axles that slip; one that sticks is left to what holds it."""
     control_spec = model.control_spec
     for i in range(2):
-        velocity = workspace[RATE, i]
-        if control_spec.jumps and control[SIDE, i] != 0.0:
-            velocity = one_sided(velocity, control[SIDE, i])
-        workspace[SIDED_RATE, i] = velocity
+        velocity = workspace[Axle.RATE, i]
+        if control_spec.jumps and control[Command.SIDE, i] != 0.0:
+            velocity = one_sided(velocity, control[Command.SIDE, i])
+        workspace[Axle.SIDED_RATE, i] = velocity
         if control_spec.fidelity == TABLE:
-            workspace[FORCE, i] = tabled(model.car, model.grid, i, control[SET, i], velocity)
+            workspace[Axle.FORCE, i] = tabled(model.car, model.grid, i, control[Command.SET, i], velocity)
         else:
-            workspace[LOW, i], workspace[HIGH, i] = bounds_of(control_spec, model.car, model.grid, i, velocity)
+            workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = bounds_of(
+                control_spec, model.car, model.grid, i, velocity
+            )
     if control_spec.fidelity == TABLE:
         return
-    if control_spec.jumps and control[SIDE, 0] * control[SIDE, 1] == 0.0:
-        if control[SIDE, 0] != control[SIDE, 1]:
+    if control_spec.jumps and control[Command.SIDE, 0] * control[Command.SIDE, 1] == 0.0:
+        if control[Command.SIDE, 0] != control[Command.SIDE, 1]:
             _force_outside_sticking(y, model, control, workspace)
         return
     demand(control_spec, model.car, y, control, workspace)
@@ -177,16 +151,18 @@ def quasistatic_forces(y: Array, model: RideModel, control: Array, workspace: Ar
 def _force_outside_sticking(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Fill the force of the free axle where the other sticks: the policy knows that the stuck one answers."""
     control_spec, car = model.control_spec, model.car
-    stuck = 0 if control[SIDE, 0] == 0.0 else 1
+    stuck = 0 if control[Command.SIDE, 0] == 0.0 else 1
     free = 1 - stuck
     if control_spec.aim == MINIMISE:
-        alone = holding_force(car, stuck, workspace[SPRINGS, stuck], workspace[LIFT, stuck], workspace[SPRINGS, free])
-        a0 = spring_acceleration(car, workspace[DEFLECTION]) + car.comfort[stuck] * alone
+        alone = holding_force(
+            car, stuck, workspace[Axle.SPRINGS, stuck], workspace[Axle.LIFT, stuck], workspace[Axle.SPRINGS, free]
+        )
+        a0 = spring_acceleration(car, workspace[Axle.DEFLECTION]) + car.comfort[stuck] * alone
         slope = car.comfort[free] + car.comfort[stuck] * holding_share(car, stuck)
         wanted = -a0 / slope if slope != 0.0 else 0.0
-        workspace[FORCE, free] = min(max(wanted, workspace[LOW, free]), workspace[HIGH, free])
+        workspace[Axle.FORCE, free] = min(max(wanted, workspace[Axle.LOW, free]), workspace[Axle.HIGH, free])
     else:
-        workspace[FORCE, free] = wanted_force(control_spec, free, y, control, workspace)
+        workspace[Axle.FORCE, free] = wanted_force(control_spec, free, y, control, workspace)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -205,30 +181,32 @@ def body_acceleration(car: Vehicle, load0: float, load1: float) -> tuple[float, 
 def dynamic_forces(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Fill the workspace's forces from where the oil has flowed to."""
     car, damper = model.car, model.damper
-    elapsed = time - control[SINCE, 0]
+    elapsed = time - control[Command.SINCE, 0]
     for i in range(2):
         ratio, n = car.ratio[i], car.dampers[i]
-        voltage = effective_voltage(damper, control[SET, i], control[BEHIND:, i], elapsed)
+        voltage = effective_voltage(damper, control[Command.SET, i], control[Command.BEHIND :, i], elapsed)
         row = row_at(damper.voltages, damper.rows, voltage)
-        e = ratio * workspace[DEFLECTION, i] - y[OIL_1 + i]
-        workspace[OIL_DEFLECTION, i] = e
-        workspace[OIL_FORCE, i], workspace[FLOW, i] = flowing(e, row, abs(workspace[FLOW, i]))
+        e = ratio * workspace[Axle.DEFLECTION, i] - y[State.OIL_1 + i]
+        workspace[Axle.OIL_DEFLECTION, i] = e
+        workspace[Axle.OIL_FORCE, i], workspace[Axle.FLOW, i] = flowing(e, row, abs(workspace[Axle.FLOW, i]))
         if damper.alone:
-            workspace[FORCE, i] = n * ratio * workspace[OIL_FORCE, i]
+            workspace[Axle.FORCE, i] = n * ratio * workspace[Axle.OIL_FORCE, i]
             continue
-        speed = workspace[RATE, i]
-        if model.control_spec.jumps and control[SIDE, i] != 0.0:
-            speed = one_sided(speed, control[SIDE, i])
+        speed = workspace[Axle.RATE, i]
+        if model.control_spec.jumps and control[Command.SIDE, i] != 0.0:
+            speed = one_sided(speed, control[Command.SIDE, i])
         parallel = damper.scratch
         parallel_at(damper, voltage, parallel)
-        workspace[ELASTIC, i] = elastic_force(ratio * workspace[DEFLECTION, i], parallel)
-        workspace[RUBBING, i] = rubbing_force(ratio * speed, parallel)
-        workspace[INERTANCE, i] = n * ratio * ratio * inertance(parallel)
+        workspace[Axle.ELASTIC, i] = elastic_force(ratio * workspace[Axle.DEFLECTION, i], parallel)
+        workspace[Axle.RUBBING, i] = rubbing_force(ratio * speed, parallel)
+        workspace[Axle.INERTANCE, i] = n * ratio * ratio * inertance(parallel)
         if damper.slips:
-            stored, slipped = slipping_forces(damper, i, ratio * workspace[DEFLECTION, i], ratio * speed, parallel)
-            workspace[ELASTIC, i] += stored
-            workspace[RUBBING, i] += slipped
-        workspace[FORCE, i] = n * ratio * (workspace[OIL_FORCE, i] + workspace[ELASTIC, i] + workspace[RUBBING, i])
+            stored, slipped = slipping_forces(damper, i, ratio * workspace[Axle.DEFLECTION, i], ratio * speed, parallel)
+            workspace[Axle.ELASTIC, i] += stored
+            workspace[Axle.RUBBING, i] += slipped
+        workspace[Axle.FORCE, i] = (
+            n * ratio * (workspace[Axle.OIL_FORCE, i] + workspace[Axle.ELASTIC, i] + workspace[Axle.RUBBING, i])
+        )
 
 
 @compiled
@@ -236,9 +214,11 @@ def remember_step(time: float, model: RideModel, control: Array, workspace: Arra
     """Bring what remembers beside the elements to the end of a step [s] in which no axle turned round; see `motion`."""
     damper = model.damper
     for i in range(2):
-        voltage = effective_voltage(damper, control[SET, i], control[BEHIND:, i], time - control[SINCE, 0])
+        voltage = effective_voltage(
+            damper, control[Command.SET, i], control[Command.BEHIND :, i], time - control[Command.SINCE, 0]
+        )
         parallel_at(damper, voltage, damper.scratch)
-        remember(damper, i, model.car.ratio[i] * workspace[DEFLECTION, i], damper.scratch)
+        remember(damper, i, model.car.ratio[i] * workspace[Axle.DEFLECTION, i], damper.scratch)
 
 
 @compiled
@@ -246,7 +226,7 @@ def relax_oil(time: float, y: Array, model: RideModel, workspace: Array) -> None
     """Let the oil of every damper flow to where its spring bears nothing, as it does while the car stands."""
     suspension(time, y, model.car, model.road_coefficients, workspace)
     for i in range(2):
-        y[OIL_1 + i] = model.car.ratio[i] * workspace[DEFLECTION, i]
+        y[State.OIL_1 + i] = model.car.ratio[i] * workspace[Axle.DEFLECTION, i]
 
 
 @compiled
@@ -264,26 +244,32 @@ def motion(time: float, y: Array, model: RideModel, control: Array, workspace: A
     """
     car = model.car
     suspension(time, y, car, model.road_coefficients, workspace)
-    if control[SIDE, 0] * control[SIDE, 1] == 0.0:
+    if control[Command.SIDE, 0] * control[Command.SIDE, 1] == 0.0:
         _try_sides(time, y, model, control, workspace)
     _act(time, y, model, control, workspace)
-    load0, load1 = workspace[SPRINGS, 0] + workspace[FORCE, 0], workspace[SPRINGS, 1] + workspace[FORCE, 1]
-    workspace[BODY, 0], workspace[BODY, 1] = body_acceleration(car, load0, load1)
-    workspace[COMFORT, 0] = car.comfort[0] * load0 + car.comfort[1] * load1
-    dy[HEAVE], dy[PITCH] = y[HEAVE_RATE], y[PITCH_RATE]
-    dy[HEAVE_RATE], dy[PITCH_RATE] = workspace[BODY, 0], workspace[BODY, 1]
-    for n in range(OIL_1, dy.size):
+    load0, load1 = (
+        workspace[Axle.SPRINGS, 0] + workspace[Axle.FORCE, 0],
+        workspace[Axle.SPRINGS, 1] + workspace[Axle.FORCE, 1],
+    )
+    workspace[Axle.BODY, 0], workspace[Axle.BODY, 1] = body_acceleration(car, load0, load1)
+    workspace[Axle.COMFORT, 0] = car.comfort[0] * load0 + car.comfort[1] * load1
+    dy[State.HEAVE], dy[State.PITCH] = y[State.HEAVE_RATE], y[State.PITCH_RATE]
+    dy[State.HEAVE_RATE], dy[State.PITCH_RATE] = workspace[Axle.BODY, 0], workspace[Axle.BODY, 1]
+    for n in range(State.OIL_1, dy.size):
         dy[n] = 0.0
     if car.wheels:
         move_wheels(y, car, (load0, load1), workspace, dy)
     else:
-        workspace[CONTACT, 0], workspace[CONTACT, 1] = -load0, -load1
-    dy[ROAD_WORK] = workspace[CONTACT, 0] * workspace[ROAD_RISE, 0] + workspace[CONTACT, 1] * workspace[ROAD_RISE, 1]
+        workspace[Axle.CONTACT, 0], workspace[Axle.CONTACT, 1] = -load0, -load1
+    dy[State.ROAD_WORK] = (
+        workspace[Axle.CONTACT, 0] * workspace[Axle.ROAD_RISE, 0]
+        + workspace[Axle.CONTACT, 1] * workspace[Axle.ROAD_RISE, 1]
+    )
     for i in range(2):
         if model.control_spec.fidelity == DYNAMIC:
             _book_damper(model, workspace, i, dy)
         else:
-            dy[DISSIPATED] += workspace[FORCE, i] * workspace[RATE, i]
+            dy[State.DISSIPATED] += workspace[Axle.FORCE, i] * workspace[Axle.RATE, i]
 
 
 @inlined
@@ -300,20 +286,22 @@ def _act(time: float, y: Array, model: RideModel, control: Array, workspace: Arr
 def _try_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
     """Fill how each sticking axle would be pushed away from V = 0, were it to slip to the one or the other side."""
     for i in range(2):
-        if control[SIDE, i] == 0.0:
+        if control[Command.SIDE, i] == 0.0:
             for n in range(2):
-                control[SIDE, i] = 1.0 - 2.0 * n
+                control[Command.SIDE, i] = 1.0 - 2.0 * n
                 _act(time, y, model, control, workspace)
-                workspace[REBOUND_PUSH + n, i] = control[SIDE, i] * workspace[ACCELERATION, i]
-            control[SIDE, i] = 0.0
+                workspace[Axle.REBOUND_PUSH + n, i] = control[Command.SIDE, i] * workspace[Axle.ACCELERATION, i]
+            control[Command.SIDE, i] = 0.0
 
 
 @inlined
 def _book_damper(model: RideModel, workspace: Array, axle: int, dy: Array) -> None:
     """Book the powers of the dampers of one axle, and the motion of its oil."""
-    n, speed = model.car.dampers[axle], model.car.ratio[axle] * workspace[RATE, axle]
-    inertia = workspace[INERTANCE, axle] * workspace[ACCELERATION, axle] * workspace[RATE, axle]
-    dy[OIL_1 + axle] = workspace[FLOW, axle]
-    dy[DISSIPATED] += n * (workspace[OIL_FORCE, axle] * workspace[FLOW, axle] + workspace[RUBBING, axle] * speed)
-    dy[OIL_WORK] += n * workspace[OIL_FORCE, axle] * (speed - workspace[FLOW, axle])
-    dy[PARALLEL_WORK] += n * speed * workspace[ELASTIC, axle] + inertia
+    n, speed = model.car.dampers[axle], model.car.ratio[axle] * workspace[Axle.RATE, axle]
+    inertia = workspace[Axle.INERTANCE, axle] * workspace[Axle.ACCELERATION, axle] * workspace[Axle.RATE, axle]
+    dy[State.OIL_1 + axle] = workspace[Axle.FLOW, axle]
+    dy[State.DISSIPATED] += n * (
+        workspace[Axle.OIL_FORCE, axle] * workspace[Axle.FLOW, axle] + workspace[Axle.RUBBING, axle] * speed
+    )
+    dy[State.OIL_WORK] += n * workspace[Axle.OIL_FORCE, axle] * (speed - workspace[Axle.FLOW, axle])
+    dy[State.PARALLEL_WORK] += n * speed * workspace[Axle.ELASTIC, axle] + inertia

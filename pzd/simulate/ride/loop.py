@@ -14,29 +14,16 @@ from pzd.simulate.control.prediction.plant import Predictor
 from pzd.simulate.control.sensing import Electronics, sense, supplied
 from pzd.simulate.ride.equations import motion
 from pzd.simulate.ride.model import (
-    ASKED,
-    BEHIND,
-    COMFORT,
-    CONTACT,
-    DEFLECTION,
-    DISSIPATED,
-    FORCE,
-    HIGH,
     IDEAL,
-    LOW,
     MINIMISE,
-    RATE,
     SCHEDULE,
-    SET,
-    SIDE,
-    SIDED_RATE,
-    SINCE,
-    SPRINGS,
     SWITCH,
-    TIE_END,
     VOLTAGE,
+    Axle,
+    Command,
     ControlSpec,
     RideModel,
+    State,
     place,
 )
 from pzd.simulate.ride.stepper import STAGES, advance, choose_side
@@ -59,7 +46,7 @@ def _acts_at_once(control_spec: ControlSpec) -> bool:
 @inlined
 def _stays(control_spec: ControlSpec, control: Array) -> bool:
     """Whether the voltage of a policy that holds one is set already."""
-    set_already = control[SET, 0] == control_spec.voltage and control[SET, 1] == control_spec.voltage
+    set_already = control[Command.SET, 0] == control_spec.voltage and control[Command.SET, 1] == control_spec.voltage
     return control_spec.aim == VOLTAGE and set_already
 
 
@@ -68,13 +55,15 @@ def _choose_ends(y: Array, model: RideModel, control: Array, workspace: Array) -
     """Fill the bounds of both axles, and what stays as it is until the controller acts again."""
     control_spec, car = model.control_spec, model.car
     for i in range(2):
-        workspace[LOW, i], workspace[HIGH, i] = bounds_of(control_spec, car, model.grid, i, workspace[RATE, i])
-        workspace[SIDED_RATE, i] = workspace[RATE, i]
+        workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = bounds_of(
+            control_spec, car, model.grid, i, workspace[Axle.RATE, i]
+        )
+        workspace[Axle.SIDED_RATE, i] = workspace[Axle.RATE, i]
     if control_spec.aim == SWITCH:
         choose_hardness(control_spec, car, y, control, workspace)
     if control_spec.aim == MINIMISE and control_spec.tie == LARGEST:
-        a0 = spring_acceleration(car, workspace[DEFLECTION])
-        control[TIE_END, 1] = farther_end(a0, car.comfort, workspace[LOW], workspace[HIGH])
+        a0 = spring_acceleration(car, workspace[Axle.DEFLECTION])
+        control[Command.TIE_END, 1] = farther_end(a0, car.comfort, workspace[Axle.LOW], workspace[Axle.HIGH])
 
 
 @compiled
@@ -121,9 +110,9 @@ def set_control(
             demand(control_spec, car, seen, control, room)
         for i in range(2):
             _set_voltage(time, model, electronics, control, i, _wanted_voltage(time, model, control, room, i))
-    control[SINCE, 0] = time
+    control[Command.SINCE, 0] = time
     for i in range(2):
-        if control[SIDE, i] == 0.0:
+        if control[Command.SIDE, i] == 0.0:
             choose_side(i, time, y, model, control, workspace, scratch)
 
 
@@ -144,8 +133,10 @@ def _wanted_voltage(time: float, model: RideModel, control: Array, workspace: Ar
         return model.control_spec.voltage
     if aim == SCHEDULE:
         return scheduled(time, model, axle)
-    control[ASKED, axle] = workspace[FORCE, axle]
-    return _voltage_for(model, axle, workspace[FORCE, axle], workspace[RATE, axle], control[SET, axle])
+    control[Command.ASKED, axle] = workspace[Axle.FORCE, axle]
+    return _voltage_for(
+        model, axle, workspace[Axle.FORCE, axle], workspace[Axle.RATE, axle], control[Command.SET, axle]
+    )
 
 
 @inlined
@@ -175,9 +166,14 @@ def _set_voltage(
     voltage = asked
     if electronics is not None:
         voltages = model.grid.voltages
-        voltage = supplied(asked, control[SET, axle], voltages[0], voltages[-1], electronics)
-    keep_voltage(control[SET, axle], time - control[SINCE, 0], control[BEHIND:, axle], model.damper.drive)
-    control[SET, axle] = voltage
+        voltage = supplied(asked, control[Command.SET, axle], voltages[0], voltages[-1], electronics)
+    keep_voltage(
+        control[Command.SET, axle],
+        time - control[Command.SINCE, 0],
+        control[Command.BEHIND :, axle],
+        model.damper.drive,
+    )
+    control[Command.SET, axle] = voltage
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -200,12 +196,12 @@ def beyond_reach(model: RideModel, control: Array, workspace: Array) -> bool:
     grid, car = model.grid, model.car
     last = grid.reach.size - 1
     for i in range(2):
-        n, share = place(grid.voltages, control[SET, i])
+        n, share = place(grid.voltages, control[Command.SET, i])
         reach = grid.reach[n] + share * (grid.reach[min(n + 1, last)] - grid.reach[n])
         if model.control_spec.fidelity == IDEAL:
             for n in range(last + 1):
                 reach = max(reach, grid.reach[n])
-        if abs(car.ratio[i] * workspace[RATE, i]) > reach * (1.0 + 1e-9):
+        if abs(car.ratio[i] * workspace[Axle.RATE, i]) > reach * (1.0 + 1e-9):
             return True
     return False
 
@@ -213,23 +209,23 @@ def beyond_reach(model: RideModel, control: Array, workspace: Array) -> bool:
 @inlined
 def _note(time: float, y: Array, model: RideModel, control: Array, workspace: Array, row: Array) -> None:
     """Fill one row of the history."""
-    row[0], row[1], row[2], row[3] = time, y[0], y[1], workspace[COMFORT, 0]
+    row[0], row[1], row[2], row[3] = time, y[0], y[1], workspace[Axle.COMFORT, 0]
     for i in range(2):
-        row[4 + 6 * i] = workspace[DEFLECTION, i]
-        row[5 + 6 * i] = workspace[RATE, i]
-        row[6 + 6 * i] = workspace[SPRINGS, i]
-        row[7 + 6 * i] = workspace[FORCE, i]
-        row[8 + 6 * i] = workspace[FORCE, i] if model.control_spec.fidelity == IDEAL else control[ASKED, i]
-        row[9 + 6 * i] = control[SET, i]
+        row[4 + 6 * i] = workspace[Axle.DEFLECTION, i]
+        row[5 + 6 * i] = workspace[Axle.RATE, i]
+        row[6 + 6 * i] = workspace[Axle.SPRINGS, i]
+        row[7 + 6 * i] = workspace[Axle.FORCE, i]
+        row[8 + 6 * i] = workspace[Axle.FORCE, i] if model.control_spec.fidelity == IDEAL else control[Command.ASKED, i]
+        row[9 + 6 * i] = control[Command.SET, i]
 
 
 @inlined
 def _keep(y: Array, workspace: Array, row: Array) -> None:
     """Fill one row of the course."""
-    row[A_K], row[LOST] = workspace[COMFORT, 0], y[DISSIPATED]
+    row[A_K], row[LOST] = workspace[Axle.COMFORT, 0], y[State.DISSIPATED]
     for i in range(2):
-        row[LOAD_1 + i] = -workspace[CONTACT, i]
-    row[TRAVEL] = max(abs(workspace[DEFLECTION, 0]), abs(workspace[DEFLECTION, 1]))
+        row[LOAD_1 + i] = -workspace[Axle.CONTACT, i]
+    row[TRAVEL] = max(abs(workspace[Axle.DEFLECTION, 0]), abs(workspace[Axle.DEFLECTION, 1]))
 
 
 @compiled
@@ -282,7 +278,7 @@ def ride(
         motion(time, y, model, control, workspace, stages[0])
         _keep(y, workspace, course[n - first])
         tally[STEPS_DONE] = n
-        if math.isnan(workspace[COMFORT, 0]):
+        if math.isnan(workspace[Axle.COMFORT, 0]):
             return
         if beyond_reach(model, control, workspace):
             tally[OUTSIDE] += 1.0
@@ -299,6 +295,6 @@ def _start(y: Array, model: RideModel, control: Array, workspace: Array, scratch
     """Find to which side each axle sets off, or that it sticks."""
     motion(0.0, y, model, control, workspace, scratch)
     for i in range(2):
-        control[SIDE, i] = 1.0 if workspace[RATE, i] >= 0.0 else -1.0
-        if model.control_spec.jumps and workspace[RATE, i] == 0.0:
+        control[Command.SIDE, i] = 1.0 if workspace[Axle.RATE, i] >= 0.0 else -1.0
+        if model.control_spec.jumps and workspace[Axle.RATE, i] == 0.0:
             choose_side(i, 0.0, y, model, control, workspace, scratch)

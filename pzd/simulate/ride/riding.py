@@ -15,6 +15,7 @@ from pzd.simulate.control.demand import LEAST_LOAD, TIE_BREAKS
 from pzd.simulate.control.prediction.planning import predictor_of
 from pzd.simulate.control.prediction.plant import Predictor
 from pzd.simulate.control.sensing import Electronics, electronics_of, with_noise
+from pzd.simulate.policies import SENSED
 from pzd.simulate.ride.energy import balance_error, oil_energy, ride_exactly, stored_energy
 from pzd.simulate.ride.equations import relax_oil
 from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALLIES, ride
@@ -25,10 +26,8 @@ from pzd.simulate.ride.model import (
     FEEDBACK,
     IDEAL,
     MINIMISE,
-    OIL_WORK,
     PREDICT,
     SCHEDULE,
-    SENSED,
     SWITCH,
     TABLE,
     UNBOUNDED,
@@ -36,6 +35,7 @@ from pzd.simulate.ride.model import (
     ControlSpec,
     DynamicDamper,
     RideModel,
+    State,
     TableArrays,
     at_rest,
     control,
@@ -264,7 +264,7 @@ def ride_of_model(
             spilled.add(history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
     ended, moves = clock.steps * clock.step, model.control_spec.aim != VOLTAGE
     change = stored_energy(ended, y, model, scratch) - before
-    oil_change = y[OIL_WORK] if moves else oil_energy(ended, y, model, acts, scratch)  # none at the start
+    oil_change = y[State.OIL_WORK] if moves else oil_energy(ended, y, model, acts, scratch)  # none at the start
     return Outcome(
         history=history if spilled is None else spilled,
         course=course if take is None else np.zeros((0, COURSE_COLUMNS)),

@@ -15,19 +15,12 @@ from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.ride.equations import motion, remember_step
 from pzd.simulate.ride.model import (
-    COMPRESSION_PUSH,
     DYNAMIC,
-    ENERGIES,
-    HEAVE_RATE,
-    OIL_1,
-    OIL_2,
-    PITCH_RATE,
-    RATE,
-    REBOUND_PUSH,
-    SIDE,
     STATES,
-    WHEEL_RATE_1,
+    Axle,
+    Command,
     RideModel,
+    State,
 )
 
 # ----------------------------------------------------------------------------------------------------
@@ -104,7 +97,7 @@ def trial(
     largest embedded error, as a share of |y| + `SCALES`, that of the oil of `SCALES` alone
     """
     for i in range(1, STAGES):
-        _reach(i, dt, 0, y.size if i == STAGES - 1 else ENERGIES, y, stages, end)
+        _reach(i, dt, 0, y.size if i == STAGES - 1 else State.DISSIPATED, y, stages, end)
         if model.car.wheels:
             _reach(i, dt, STATES, y.size, y, stages, end)
         motion(time + TIMES[i] * dt, end, model, control, workspace, stages[i])
@@ -113,7 +106,7 @@ def trial(
         error = 0.0
         for i in range(STAGES):
             error += ERROR_WEIGHTS[i] * stages[i, n]
-        size = SCALES[n] if OIL_1 <= n <= OIL_2 else SCALES[n] + abs(y[n])
+        size = SCALES[n] if State.OIL_1 <= n <= State.OIL_2 else SCALES[n] + abs(y[n])
         share = abs(dt * error) / size
         if not share < math.inf:  # a stage of too long a step overflowed
             return math.inf
@@ -127,26 +120,26 @@ def choose_side(
 ) -> None:
     """Stop the suspension of an axle that is at V = 0, and let it slip to whichever side its forces push it."""
     car = model.car
-    impulse = workspace[RATE, axle] / car.mobility[axle]
-    y[HEAVE_RATE] -= impulse / car.mass
-    y[PITCH_RATE] -= impulse * car.arms[axle] / car.inertia
+    impulse = workspace[Axle.RATE, axle] / car.mobility[axle]
+    y[State.HEAVE_RATE] -= impulse / car.mass
+    y[State.PITCH_RATE] -= impulse * car.arms[axle] / car.inertia
     if car.wheels:
-        y[WHEEL_RATE_1 + axle] += impulse / car.unsprung[axle]
-    control[SIDE, axle] = 0.0
+        y[State.WHEEL_RATE_1 + axle] += impulse / car.unsprung[axle]
+    control[Command.SIDE, axle] = 0.0
     motion(time, y, model, control, workspace, dy)
-    if workspace[REBOUND_PUSH, axle] > 0.0:
-        control[SIDE, axle] = 1.0
-    elif workspace[COMPRESSION_PUSH, axle] > 0.0:
-        control[SIDE, axle] = -1.0
+    if workspace[Axle.REBOUND_PUSH, axle] > 0.0:
+        control[Command.SIDE, axle] = 1.0
+    elif workspace[Axle.COMPRESSION_PUSH, axle] > 0.0:
+        control[Command.SIDE, axle] = -1.0
 
 
 @inlined
 def beyond(control: Array, workspace: Array, axle: int) -> float:
     """How far an axle has left its side of V = 0 or its stick, as a share of what is let pass; not above 0 before."""
-    side = control[SIDE, axle]
+    side = control[Command.SIDE, axle]
     if side == 0.0:
-        return float(max(workspace[REBOUND_PUSH, axle], workspace[COMPRESSION_PUSH, axle]) / _PUSHED)
-    return float(-side * workspace[RATE, axle] / _CROSSED - 1.0)
+        return float(max(workspace[Axle.REBOUND_PUSH, axle], workspace[Axle.COMPRESSION_PUSH, axle]) / _PUSHED)
+    return float(-side * workspace[Axle.RATE, axle] / _CROSSED - 1.0)
 
 
 @inlined

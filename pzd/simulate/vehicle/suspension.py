@@ -7,22 +7,9 @@ import math
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.ride.model import (
-    CONTACT,
-    DEFLECTION,
-    HEAVE,
-    HEAVE_RATE,
-    LIFT,
-    PITCH,
-    PITCH_RATE,
-    RATE,
-    RISE,
-    ROAD_RISE,
-    SPRINGS,
-    TYRE_LOSS,
-    TYRE_POWER,
-    WHEEL_1,
-    WHEEL_RATE_1,
+    Axle,
     RoadCoefficients,
+    State,
     Vehicle,
 )
 
@@ -77,10 +64,10 @@ def press(y: Array, car: Vehicle, axle: int, height: float, workspace: Array) ->
     workspace : see `ride_model`; filled
     """
     static, stiffness = car.static_load[axle], car.tyre_stiffness[axle]
-    squeeze, rate = height - y[WHEEL_1 + axle], workspace[ROAD_RISE, axle] - y[WHEEL_RATE_1 + axle]
+    squeeze, rate = height - y[State.WHEEL_1 + axle], workspace[Axle.ROAD_RISE, axle] - y[State.WHEEL_RATE_1 + axle]
     contact = contact_force(static, stiffness, car.tyre_damping[axle], squeeze, rate)
-    workspace[CONTACT, axle] = contact
-    workspace[TYRE_POWER, axle] = (contact - tyre_spring_force(static, stiffness, squeeze)) * rate
+    workspace[Axle.CONTACT, axle] = contact
+    workspace[Axle.TYRE_POWER, axle] = (contact - tyre_spring_force(static, stiffness, squeeze)) * rate
 
 
 @inlined
@@ -97,10 +84,10 @@ def move_wheels(y: Array, car: Vehicle, loads: tuple[float, float], workspace: A
     workspace : see `ride_model`
     dy : filled
     """
-    dy[TYRE_LOSS] = workspace[TYRE_POWER, 0] + workspace[TYRE_POWER, 1]
+    dy[State.TYRE_LOSS] = workspace[Axle.TYRE_POWER, 0] + workspace[Axle.TYRE_POWER, 1]
     for i in range(2):
-        dy[WHEEL_1 + i] = y[WHEEL_RATE_1 + i]
-        dy[WHEEL_RATE_1 + i] = (loads[i] + workspace[CONTACT, i]) / car.unsprung[i]
+        dy[State.WHEEL_1 + i] = y[State.WHEEL_RATE_1 + i]
+        dy[State.WHEEL_RATE_1 + i] = (loads[i] + workspace[Axle.CONTACT, i]) / car.unsprung[i]
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -179,13 +166,13 @@ def suspension(time: float, y: Array, car: Vehicle, road_coefficients: RoadCoeff
     """
     for i in range(2):
         height, slope, curvature = road_at(road_coefficients, car.speed * time - road_coefficients.behind[i])
-        workspace[ROAD_RISE, i] = slope * car.speed
-        workspace[RISE, i] = slope * car.speed
-        workspace[LIFT, i] = curvature * car.speed * car.speed
+        workspace[Axle.ROAD_RISE, i] = slope * car.speed
+        workspace[Axle.RISE, i] = slope * car.speed
+        workspace[Axle.LIFT, i] = curvature * car.speed * car.speed
         if car.wheels:
             press(y, car, i, height, workspace)
-            height, workspace[RISE, i] = y[WHEEL_1 + i], y[WHEEL_RATE_1 + i]
-            workspace[LIFT, i] = workspace[CONTACT, i] / car.unsprung[i]
-        workspace[DEFLECTION, i] = y[HEAVE] + car.arms[i] * y[PITCH] - height
-        workspace[RATE, i] = y[HEAVE_RATE] + car.arms[i] * y[PITCH_RATE] - workspace[RISE, i]
-        workspace[SPRINGS, i] = car.stiffness[i] * workspace[DEFLECTION, i]
+            height, workspace[Axle.RISE, i] = y[State.WHEEL_1 + i], y[State.WHEEL_RATE_1 + i]
+            workspace[Axle.LIFT, i] = workspace[Axle.CONTACT, i] / car.unsprung[i]
+        workspace[Axle.DEFLECTION, i] = y[State.HEAVE] + car.arms[i] * y[State.PITCH] - height
+        workspace[Axle.RATE, i] = y[State.HEAVE_RATE] + car.arms[i] * y[State.PITCH_RATE] - workspace[Axle.RISE, i]
+        workspace[Axle.SPRINGS, i] = car.stiffness[i] * workspace[Axle.DEFLECTION, i]

@@ -25,17 +25,11 @@ from pzd.simulate.control.prediction.plant import (
 from pzd.simulate.control.prediction.road import EXPECTED, fill_forecast, fill_known, height_met, learn, unforeseen
 from pzd.simulate.control.sensing import Electronics, copy_into
 from pzd.simulate.ride.model import (
-    BEHIND,
-    COMFORT,
-    CONTACT,
-    FLOW,
-    OIL_1,
-    OIL_DEFLECTION,
-    SET,
-    SINCE,
-    WHEEL_1,
+    Axle,
+    Command,
     DynamicDamper,
     RideModel,
+    State,
     Vehicle,
 )
 
@@ -101,11 +95,11 @@ def observe(
     workspace : as `motion` left it, or as the sensors gave it
     """
     number = int(plan.felt[OBSERVATIONS])
-    felt = workspace[COMFORT, 0]
+    felt = workspace[Axle.COMFORT, 0]
     weigh(plan.felt, 0, plan.felt[ACCELERATION], felt, plan.modes[OBSERVED], plan.residues)
     plan.felt[ACCELERATION] = felt
     for i in range(2):
-        load = workspace[CONTACT, i]
+        load = workspace[Axle.CONTACT, i]
         plan.met[i, 0] = plan.met[i, 1]
         plan.met[i, 1] = height_met(sampled, i, model, plan, electronics)
         plan.felt[MEAN_LOAD_1 + i] += (1.0 - plan.forgotten) * (load * load - plan.felt[MEAN_LOAD_1 + i])
@@ -177,16 +171,16 @@ def choose(
 def _fill_now(y: Array, model: RideModel, plan: Predictor, workspace: Array) -> None:
     """Fill the state of the plant by that of the ride."""
     now, felt = plan.states[NOW], plan.felt
-    for n in range(OIL_1):
+    for n in range(State.OIL_1):
         now[n] = y[n]
     for i in range(2):
-        now[OIL_1 + i] = workspace[OIL_DEFLECTION, i]
-        now[OIL_1 + 2 + i] = workspace[FLOW, i]
+        now[State.OIL_1 + i] = workspace[Axle.OIL_DEFLECTION, i]
+        now[State.OIL_1 + 2 + i] = workspace[Axle.FLOW, i]
     for n in range(2 * MODES):
         now[BODY_AND_OIL + n] = felt[n]
     if model.car.wheels:
         for n in range(4):
-            now[WHEELS + n] = y[WHEEL_1 + n]
+            now[WHEELS + n] = y[State.WHEEL_1 + n]
 
 
 @compiled
@@ -267,8 +261,8 @@ def _fill_levels(time: float, damper: DynamicDamper, plan: Predictor, control: A
     hold = plan.hold_steps * plan.steps[HELD]
     for axle in range(2):
         now, behind = plan.kept[0, axle], plan.kept[1, axle]
-        copy_into(control[BEHIND:, axle], now)
-        keep_voltage(control[SET, axle], time - control[SINCE, 0], now, damper.drive)
+        copy_into(control[Command.BEHIND :, axle], now)
+        keep_voltage(control[Command.SET, axle], time - control[Command.SINCE, 0], now, damper.drive)
         for i in range(plan.candidates.size):
             _follow(plan, damper, plan.candidates[i], plan.steps[HELD], now, plan.hold_levels[axle, i])
             for j in range(plan.tails.size):
