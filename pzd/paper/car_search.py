@@ -32,8 +32,8 @@ from pzd.simulate.control.demand import (
     spring_acceleration,
 )
 from pzd.simulate.policies import TieBreak
-from pzd.simulate.ride.energy import harmonic_response
 from pzd.simulate.ride.equations import body_acceleration
+from pzd.simulate.ride.linear import harmonic_response
 from pzd.simulate.ride.model import (
     Axle,
     RoadCoefficients,

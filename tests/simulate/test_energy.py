@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from pzd.damper.compiled.kernels import K
 from pzd.damper.compiled.rows import row_at
 from pzd.simulate.ride import riding
-from pzd.simulate.ride.energy import oil_energy
-from pzd.simulate.ride.equations import motion
+from pzd.simulate.ride.equations import motion, oil_energy
 from pzd.simulate.ride.loop import set_control
 from pzd.simulate.ride.model import (
     Axle,
@@ -21,7 +19,7 @@ from pzd.simulate.ride.model import (
     effective_voltage,
     workspace,
 )
-from pzd.simulate.ride.stepper import STAGES, advance
+from pzd.simulate.ride.stepper import STAGES, advance, integrator_of
 
 STEP = 2e-5
 BEFORE, AFTER = 20_000, 1_000
@@ -53,7 +51,8 @@ def test_the_work_of_the_valve_is_half_the_square_of_the_deflection_over_the_sti
     """W = integral e^2 / 2 dk in small steps is what the oil springs gain beyond what motion puts into them."""
     model = model_of(ride, monkeypatch)
     y, acts, room = at_rest(model.car), control(0.0), workspace()
-    stages, end = np.zeros((STAGES + 1, y.size)), np.zeros(y.size)
+    integrator = integrator_of(1e-11, y.size)
+    stages = integrator.stages
     work = gained = 0.0
     for n in range(BEFORE + AFTER):
         time = n * STEP
@@ -62,7 +61,7 @@ def test_the_work_of_the_valve_is_half_the_square_of_the_deflection_over_the_sti
             gained = oil_energy(time, y, model, acts, room) - y[State.OIL_WORK]
         motion(time, y, model, acts, room, stages[0])
         before = [(0.5 * room[Axle.OIL_DEFLECTION, i] ** 2, stiffness(model, acts, i, time)) for i in range(2)]
-        advance(time, STEP, y, model, acts, room, 1e-11, STEP, stages, end)
+        advance(time, STEP, y, model, acts, room, integrator, STEP)
         motion(time + STEP, y, model, acts, room, stages[0])
         for i, (was, k) in enumerate(before):
             now = 0.5 * room[Axle.OIL_DEFLECTION, i] ** 2

@@ -21,9 +21,9 @@ from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
 from pzd.signals.criterion import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
-from pzd.simulate.control.prediction.choice import NOW, choose
-from pzd.simulate.control.prediction.planning import predictor_of
-from pzd.simulate.control.prediction.plant import HELD, LOAD_1, LOAD_2, WHEELS, Predictor, oil_after, predicted
+from pzd.simulate.control.prediction.choice import choose
+from pzd.simulate.control.prediction.plant import oil_after, predicted
+from pzd.simulate.control.prediction.predictor import HELD, LOAD_1, LOAD_2, NOW, WHEELS, Predictor, predictor_of
 from pzd.simulate.policies import policies
 from pzd.simulate.ride.equations import motion
 from pzd.simulate.ride.loop import set_control
@@ -40,7 +40,7 @@ from pzd.simulate.ride.model import (
     workspace,
 )
 from pzd.simulate.ride.riding import Held, control_spec_of
-from pzd.simulate.ride.stepper import STAGES, advance
+from pzd.simulate.ride.stepper import advance, integrator_of
 from pzd.simulate.roads import Way
 from pzd.simulate.stage import simulate
 from pzd.simulate.study.plan import Case
@@ -85,10 +85,10 @@ def model_of(damper: Damper, policy: str, voltage: float, **given: object) -> tu
 def ahead(model: RideModel, y, acts, room, start: float, seconds: float) -> np.ndarray:
     """Bring a ride forward by the integrator of the loop, its voltage set once at the start; the largest motion."""
     peak = np.abs(y)
-    scratch, stages, end = np.zeros_like(y), np.zeros((STAGES + 1, y.size)), np.zeros_like(y)
+    scratch, integrator = np.zeros_like(y), integrator_of(1e-9, y.size)
     set_control(start, y, model, None, None, acts, room, scratch)
     for n in range(round(seconds / STEP)):
-        advance(start + n * STEP, STEP, y, model, acts, room, 1e-9, STEP, stages, end)
+        advance(start + n * STEP, STEP, y, model, acts, room, integrator, STEP)
         peak = np.maximum(peak, np.abs(y))
     motion(start + seconds, y, model, acts, room, scratch)
     return peak
@@ -108,7 +108,7 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
     In the steps of the policy, where the oil may stick or slip up to a step late, and in an eighth of them, where about
     a sixth of the error is left: it comes of the step, and of no equation.
     """
-    monkeypatch.setattr("pzd.simulate.control.prediction.planning.HOLD_STEP", step)
+    monkeypatch.setattr("pzd.simulate.control.prediction.predictor.HOLD_STEP", step)
     for name, values in EFFECTS[effects].items():
         damper = damper.with_effect(name, values)
     road = [{"kind": "iso8608", "road_class": "C", "seed": 1}]
@@ -118,8 +118,17 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
     peak = ahead(before, y, acts, room, 0.0, 1.5)
     predicting, plan = model_of(damper, "comfort_predictive", 75.0, **given)
     choose(1.5, 0.0, y, predicting, plan, acts, room)
-    state, levels = np.array(plan.states[NOW]), plan.hold_levels
-    predicted(predicting.car, plan, state, levels[0, candidate], levels[1, candidate], plan.hold_heights[0], HELD, 1e9)
+    state, levels = np.array(plan.workspace.states[NOW]), plan.workspace.hold_levels
+    predicted(
+        predicting.car,
+        plan,
+        state,
+        levels[0, candidate],
+        levels[1, candidate],
+        plan.workspace.hold_heights[0],
+        HELD,
+        1e9,
+    )
     after, _ = model_of(damper, "passive", float(plan.candidates[candidate]), **given)
     ahead(after, y, acts, room, 1.5, 0.02)
     assert np.max(np.abs(state[: State.OIL_1] - y[: State.OIL_1]) / peak[: State.OIL_1]) < motion_off
@@ -148,7 +157,7 @@ def test_an_oil_far_faster_than_the_step_is_quasi_static_with_an_error_in_propor
         e, flow = (T0 + C * 0.2) / k, 0.2
         for n in range(20):
             middle = 0.2 + a * h * (n + 0.5)
-            e, flow = oil_after(plan, HELD, 0, e, middle, flow, h)
+            e, flow = oil_after(plan.damper, HELD, 0, e, middle, flow, h)
         time = np.arange(2001) * 1e-5
         resolved = element_force(0.2 * time + 0.5 * a * time**2, 1e-5, T0, C, k, T0 + C * 0.2, 0.2 + a * time)
         lags.append((T0 + C * middle - k * e, T0 + C * (0.2 + a * 0.02) - resolved[-1], C * a * relaxation))

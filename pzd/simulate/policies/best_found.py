@@ -34,8 +34,8 @@ class BestFound(Frozen):
 POLICIES = (
     Policy(
         "best_found",
-        "the most comfortable of all policies and of the schedules of voltage that a search tried, within a bound on the "
-        "wheel load",
+        "the most comfortable of all policies and of the schedules of voltage that a search tried, within a bound on "
+        "the wheel load",
         "schedule",
         tuned="schedule",
     ),

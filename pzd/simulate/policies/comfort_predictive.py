@@ -14,8 +14,8 @@ than comfort brings.
 The plant has the state of the oil, the lag of the valve, the adopted effects and the wheels
 (`pzd.simulate.control.prediction.plant`). Body, wheels, oil, acceleration and the road under each axle are sensed exactly, or
 as `simulate.sensors` gives them: then the height of the road is that of body less suspension, joined to its rise by a
-steady Kalman filter (`pzd.simulate.control.prediction.road`). The road ahead is known, or forecast from what has passed
-under the front axle (`pzd.simulate.control.prediction.road`); the rear axle meets it (a1 + a2) / speed later. What the
+steady Kalman filter (`pzd.simulate.control.prediction.forecast`). The road ahead is known, or forecast from what has passed
+under the front axle (`pzd.simulate.control.prediction.forecast`); the rear axle meets it (a1 + a2) / speed later. What the
 forecasts missed of late may come again: the ride is tried with it added and subtracted, and a choice must beat the best
 voltage held on by `margin`, times the share of the road's motion that was not foreseen.
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pzd.compiled import compiled, inlined
+from pzd.damper.compiled.kernels import K
 from pzd.damper.compiled.rows import row_at
+from pzd.damper.regimes import spring_energy
 from pzd.force_table.lookup import table_force
 from pzd.record import Array
 from pzd.simulate.control.demand import bounds_of, demand, one_sided, spring_acceleration, wanted_force
@@ -26,7 +28,7 @@ from pzd.simulate.ride.model import (
     rubbing_force,
     slipping_forces,
 )
-from pzd.simulate.vehicle.suspension import move_wheels, suspension
+from pzd.simulate.vehicle.suspension import move_wheels, road_at, suspension, tyre_energy
 
 # ----------------------------------------------------------------------------------------------------
 # Acceleration of the suspensions, and what holds an axle that sticks at V = 0.
@@ -305,3 +307,88 @@ def _book_damper(model: RideModel, workspace: Array, axle: int, dy: Array) -> No
     )
     dy[State.OIL_WORK] += n * workspace[Axle.OIL_FORCE, axle] * (speed - workspace[Axle.FLOW, axle])
     dy[State.PARALLEL_WORK] += n * speed * workspace[Axle.ELASTIC, axle] + inertia
+
+
+# --- The energy balance: every term is integrated by itself, so what is left is the error ---
+#
+# What the valve puts into an oil stiffness while the voltage moves is the rest of that stiffness's own balance, stored
+# less put in by motion; where no voltage moves that rest is an error too.
+
+_NOTHING = 1e-12
+"""Work that counts as nothing [J]: a ride on a level road."""
+
+
+@compiled
+def stored_energy(time: float, y: Array, model: RideModel, workspace: Array) -> float:
+    """Return the energy of body and springs, and of wheels and tyres where wheels have mass.
+
+    Equation: E = m (dz/dt)^2 / 2 + J (dphi/dt)^2 / 2 + sum k_i U_i^2 / 2 + sum m_i (dzeta_i/dt)^2 / 2 + sum E_tyre
+
+    Parameters
+    ----------
+    time : [s]
+    y : (n,) state
+    model, workspace : see `ride_model`
+
+    Returns
+    -------
+    energy [J]
+    """
+    car = model.car
+    suspension(time, y, car, model.road_coefficients, workspace)
+    energy = 0.5 * car.mass * y[State.HEAVE_RATE] ** 2 + 0.5 * car.inertia * y[State.PITCH_RATE] ** 2
+    for i in range(2):
+        energy += 0.5 * car.stiffness[i] * workspace[Axle.DEFLECTION, i] ** 2
+        if car.wheels:
+            road = model.road_coefficients
+            height, _, _ = road_at(road, car.speed * time - road.behind[i])
+            energy += 0.5 * car.unsprung[i] * y[State.WHEEL_RATE_1 + i] ** 2
+            energy += tyre_energy(car.static_load[i], car.tyre_stiffness[i], height - y[State.WHEEL_1 + i])
+    return float(energy)
+
+
+@compiled
+def oil_energy(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> float:
+    """Return the energy of the oil stiffnesses of all dampers [J].
+
+    Equation: E = sum n_i k integral s de, e = r_i U_i - y_i
+
+    Parameters
+    ----------
+    time : [s]
+    y : (n,) state
+    model, control, workspace : see `ride_model`
+    """
+    car, damper, energy = model.car, model.damper, 0.0
+    if model.control_spec.fidelity != DYNAMIC:
+        return energy
+    suspension(time, y, car, model.road_coefficients, workspace)
+    for i in range(2):
+        voltage = effective_voltage(
+            damper, control[Command.SET, i], control[Command.BEHIND :, i], time - control[Command.SINCE, 0]
+        )
+        row = row_at(damper.voltages, damper.rows, voltage)
+        energy += car.dampers[i] * spring_energy(
+            car.ratio[i] * workspace[Axle.DEFLECTION, i] - y[State.OIL_1 + i], row, row[K]
+        )
+    return energy
+
+
+def balance_error(change: float, oil_change: float, y: Array) -> float:
+    """Return what the energy balance leaves open, as a share of the dissipated energy.
+
+    Equation: (change of stored energy + put into the oil + dissipated - road work) / dissipated, in dampers and tyres
+
+    Parameters
+    ----------
+    change : of the stored energy over the ride [J], see `stored_energy`
+    oil_change : of what the oil stiffnesses store [J], where no voltage moved; else what was put into them
+    y : (n,) state at its end; the work on what stands beside the elements counts as stored
+
+    Returns
+    -------
+    share; zero for a ride in which nothing moves
+    """
+    lost = y[State.DISSIPATED] + (y[State.TYRE_LOSS] if y.size > State.TYRE_LOSS else 0.0)
+    left = change + oil_change + y[State.PARALLEL_WORK] + lost - y[State.ROAD_WORK]
+    return float(left / max(lost, _NOTHING)) if abs(left) > _NOTHING else 0.0

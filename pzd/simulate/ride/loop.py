@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from pzd.compiled import compiled, inlined
 from pzd.damper.compiled.kernels import keep_voltage
@@ -10,7 +13,7 @@ from pzd.force_table.lookup import table_voltage
 from pzd.record import Array
 from pzd.simulate.control.demand import LARGEST, bounds_of, choose_hardness, demand, farther_end, spring_acceleration
 from pzd.simulate.control.prediction.choice import predict
-from pzd.simulate.control.prediction.plant import Predictor
+from pzd.simulate.control.prediction.predictor import Predictor
 from pzd.simulate.control.sensing import Electronics, sense, supplied
 from pzd.simulate.ride.equations import motion
 from pzd.simulate.ride.model import (
@@ -26,7 +29,7 @@ from pzd.simulate.ride.model import (
     State,
     place,
 )
-from pzd.simulate.ride.stepper import STAGES, advance, choose_side
+from pzd.simulate.ride.stepper import STAGES, Integrator, advance, choose_side
 
 # ----------------------------------------------------------------------------------------------------
 # The controller, once in a control period: what it asks of each axle, and the voltage that is set there.
@@ -179,15 +182,43 @@ def _set_voltage(
 # ----------------------------------------------------------------------------------------------------
 
 
-OUTSIDE, STEPS_DONE, NEXT_PIECE = range(3)
-"""Steps beyond what the rig reached, steps done, and length of the piece of a step to try next [s]."""
-TALLIES = 3
 A_K, LOAD_1, LOAD_2, TRAVEL, LOST = range(5)
 """What is kept of every step: acceleration at K [m/s2], what each axle takes off the road's static load [N], S + T
 where the wheels have no mass, larger deflection of the two suspensions [m], energy dissipated so far [J]."""
 COURSE_COLUMNS = 5
 COLUMNS = 16
 """time, z, phi, a_K, and per axle deflection, rate, spring, damper and demanded force, voltage."""
+OUTSIDE, STEPS_DONE, NEXT_PIECE = range(3)
+"""Places in `Records.tally`."""
+
+
+class Clock(NamedTuple):
+    """Steps of a ride."""
+
+    step: float
+    """Of integration [s]."""
+    steps: int
+    """In the whole ride."""
+    per_control: int
+    """Steps between two acts of the controller."""
+    per_output: int
+    """Steps between two rows of the history."""
+
+
+class Records(NamedTuple):
+    """What is written down of a piece of a ride."""
+
+    course: Array
+    """(n, COURSE_COLUMNS) of every step, see `A_K`."""
+    history: Array
+    """(m, COLUMNS) of every step that is a multiple of `Clock.per_output`."""
+    tally: Array
+    """(3,) steps beyond what the rig reached, steps done, and length of the piece of a step to try next [s]."""
+
+
+def records_of(rows: int, per_output: int) -> Records:
+    """Return empty records for pieces of so many steps."""
+    return Records(np.zeros((rows, COURSE_COLUMNS)), np.zeros((-(-rows // per_output), COLUMNS)), np.zeros(3))
 
 
 @inlined
@@ -238,55 +269,45 @@ def ride(
     workspace: Array,
     first: int,
     last: int,
-    steps: int,
-    h: float,
-    tolerance: float,
-    per_control: int,
-    per_output: int,
-    course: Array,
-    history: Array,
-    tally: Array,
-    stages: Array,
-    end: Array,
+    clock: Clock,
+    integrator: Integrator,
+    records: Records,
 ) -> None:
     """Ride on, from one step to another; from step 0 on at rest.
 
     Parameters
     ----------
     y : (n,) state; changed in place
-    model : see `ride_model`
+    model : what stays the same
     plan, electronics : see `set_control`; the noise of as many acts as are due
-    control, workspace : see `ride_model`
+    control : see `Command`; changed in place
+    workspace : see `Axle`
     first, last : steps to be kept, the last one not
-    steps, h : number and length of the steps of integration in the whole ride [s]
-    tolerance : see `advance`
-    per_control, per_output : steps between two acts of the controller, and between two rows of the history
-    course : (last - first, COURSE_COLUMNS) what is kept of these steps, filled
-    history : (m, COLUMNS) a row for each of these steps that is a multiple of `per_output`, filled
-    tally : (TALLIES,) filled; fewer steps are done where the table ends
-    stages, end : room to work in, see `advance`
+    clock : steps of the whole ride
+    integrator : see `advance`
+    records : filled; fewer steps are done where the table ends
     """
-    scratch = stages[STAGES]
+    h, tally, scratch = clock.step, records.tally, integrator.stages[STAGES]
     if first == 0:
         tally[NEXT_PIECE] = h
         _start(y, model, control, workspace, scratch)
     dt, noted = tally[NEXT_PIECE], 0
     for n in range(first, last):
         time = n * h
-        if n % per_control == 0:
+        if n % clock.per_control == 0:
             set_control(time, y, model, plan, electronics, control, workspace, scratch)
-        motion(time, y, model, control, workspace, stages[0])
-        _keep(y, workspace, course[n - first])
+        motion(time, y, model, control, workspace, integrator.stages[0])
+        _keep(y, workspace, records.course[n - first])
         tally[STEPS_DONE] = n
         if math.isnan(workspace[Axle.COMFORT, 0]):
             return
         if beyond_reach(model, control, workspace):
             tally[OUTSIDE] += 1.0
-        if n % per_output == 0:
-            _note(time, y, model, control, workspace, history[noted])
+        if n % clock.per_output == 0:
+            _note(time, y, model, control, workspace, records.history[noted])
             noted += 1
-        if n < steps:
-            dt = advance(time, h, y, model, control, workspace, tolerance, min(dt, h), stages, end)
+        if n < clock.steps:
+            dt = advance(time, h, y, model, control, workspace, integrator, min(dt, h))
     tally[NEXT_PIECE] = dt
 
 

@@ -12,13 +12,12 @@ from pzd.schema.errors import DataError
 from pzd.simulate.compiled_ahead import wait
 from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.control.demand import LEAST_LOAD, TIE_BREAKS
-from pzd.simulate.control.prediction.planning import predictor_of
-from pzd.simulate.control.prediction.plant import Predictor
+from pzd.simulate.control.prediction.predictor import Predictor, predictor_of
 from pzd.simulate.control.sensing import Electronics, electronics_of, with_noise
 from pzd.simulate.policies import SENSED
-from pzd.simulate.ride.energy import balance_error, oil_energy, ride_exactly, stored_energy
-from pzd.simulate.ride.equations import relax_oil
-from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALLIES, ride
+from pzd.simulate.ride.equations import balance_error, oil_energy, relax_oil, stored_energy
+from pzd.simulate.ride.linear import ride_exactly
+from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, Clock, records_of, ride
 from pzd.simulate.ride.model import (
     BY_COEFFICIENTS,
     BY_TABLE,
@@ -32,6 +31,7 @@ from pzd.simulate.ride.model import (
     TABLE,
     UNBOUNDED,
     VOLTAGE,
+    Axle,
     ControlSpec,
     DynamicDamper,
     RideModel,
@@ -45,7 +45,7 @@ from pzd.simulate.ride.model import (
     workspace,
 )
 from pzd.simulate.ride.outcome import Outcome, SpilledRows, longest_piece
-from pzd.simulate.ride.stepper import STAGES
+from pzd.simulate.ride.stepper import integrator_of
 from pzd.simulate.roads import Profile
 from pzd.simulate.study.plan import Case
 from pzd.simulate.vehicle.car import HalfCar
@@ -64,25 +64,15 @@ _AIMS = {
 }
 
 
-@dataclass(frozen=True)
-class Clock:
-    """Steps of a ride."""
-
-    step: float
-    steps: int
-    per_control: int
-    per_output: int
-
-    @classmethod
-    def of(cls, config: SimulateConfig) -> Clock:
-        """The clock of a config."""
-        h = config.integration_step_s
-        return cls(
-            h,
-            round(config.duration_s / h),
-            round(config.control_period_s / h),
-            round(1.0 / (config.output_rate_Hz * h)),
-        )
+def clock_of(config: SimulateConfig) -> Clock:
+    """Return the steps of a ride."""
+    h = config.integration_step_s
+    return Clock(
+        h,
+        round(config.duration_s / h),
+        round(config.control_period_s / h),
+        round(1.0 / (config.output_rate_Hz * h)),
+    )
 
 
 @dataclass(frozen=True)
@@ -177,7 +167,7 @@ def ride_case(
     DataError : when the ride needs the table where it ends
     """
     wait()
-    car, clock, held = config.car.car(), Clock.of(config), held or Held.of(config, grid)
+    car, clock, held = config.car.car(), clock_of(config), held or Held.of(config, grid)
     speed = config.vehicle_speed_km_per_h * KM_PER_H
     linear = take is None and case.fidelity == "ideal" and case.policy.aim == "damping" and not car.wheels_have_mass
     if linear and profile.smooth:
@@ -224,52 +214,32 @@ def ride_of_model(
     """Ride from rest on a level start, and balance the energies; see `ride_case`."""
     acts, scratch, y = control(model.control_spec.voltage), workspace(), at_rest(model.car)
     count = clock.steps + 1
-    course = np.zeros((count if take is None else min(longest_piece(clock.step), count), COURSE_COLUMNS))
-    history = np.zeros((-(-len(course) // clock.per_output), COLUMNS))
+    rows = count if take is None else min(longest_piece(clock.step), count)
+    records, integrator = records_of(rows, clock.per_output), integrator_of(tolerance, y.size)
     spilled = None if take is None else SpilledRows(COLUMNS)
-    tally = np.zeros(TALLIES)
     relax_oil(0.0, y, model, scratch)
     before = stored_energy(0.0, y, model, scratch)
-    stages, end = np.zeros((STAGES + 1, y.size)), np.zeros(y.size)
     rng = np.random.default_rng(0 if electronics is None else electronics.seed)
-    for first in range(0, count, len(course)):
-        last = min(first + len(course), count)
+    for first in range(0, count, rows):
+        last = min(first + rows, count)
         if electronics is not None:
             acts_due = -(-last // clock.per_control) - -(-first // clock.per_control)
             electronics = with_noise(electronics, rng, acts_due)
-        ride(
-            y,
-            model,
-            plan,
-            electronics,
-            acts,
-            scratch,
-            first,
-            last,
-            clock.steps,
-            clock.step,
-            tolerance,
-            clock.per_control,
-            clock.per_output,
-            course,
-            history,
-            tally,
-            stages,
-            end,
-        )
-        if tally[STEPS_DONE] < last - 1 or not np.all(np.isfinite(y)):
-            raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(scratch[1])))))
+        ride(y, model, plan, electronics, acts, scratch, first, last, clock, integrator, records)
+        done = records.tally[STEPS_DONE]
+        if done < last - 1 or not np.all(np.isfinite(y)):
+            raise DataError(_lost(name, done * clock.step, ends, float(np.max(np.abs(scratch[Axle.RATE])))))
         if take is not None and spilled is not None:
-            take(first, course[: last - first])
-            spilled.add(history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
+            take(first, records.course[: last - first])
+            spilled.add(records.history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
     ended, moves = clock.steps * clock.step, model.control_spec.aim != VOLTAGE
     change = stored_energy(ended, y, model, scratch) - before
     oil_change = y[State.OIL_WORK] if moves else oil_energy(ended, y, model, acts, scratch)  # none at the start
     return Outcome(
-        history=history if spilled is None else spilled,
-        course=course if take is None else np.zeros((0, COURSE_COLUMNS)),
+        history=records.history if spilled is None else spilled,
+        course=records.course if take is None else np.zeros((0, COURSE_COLUMNS)),
         step=clock.step,
-        outside=float(tally[OUTSIDE] / (clock.steps + 1)),
+        outside=float(records.tally[OUTSIDE] / (clock.steps + 1)),
         energy_error=balance_error(change, oil_change, y),
     )
 

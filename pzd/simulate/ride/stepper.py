@@ -8,6 +8,7 @@ embedded error shortens the step as often as the tolerance asks.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -66,21 +67,37 @@ _INSIDE = 1e-3  # of a bracket: no guess is closer to its ends
 _HALVED = 4  # every so many guesses the bracket is halved, so that it shrinks whatever the law
 
 
+class Integrator(NamedTuple):
+    """Tolerance of the integration, and arrays to work in."""
+
+    tolerance: float
+    """Largest local error of a step as a share of the motion; infinite for a fixed step."""
+    stages: Array
+    """(STAGES + 1, n) derivatives: the first is that at the start of a step; the last is for what is not kept."""
+    end: Array
+    """(n,) state at the end of a step that is tried."""
+
+
+def integrator_of(tolerance: float, states: int) -> Integrator:
+    """Return the integrator of a state of so many numbers."""
+    return Integrator(tolerance, np.zeros((STAGES + 1, states)), np.zeros(states))
+
+
 @inlined
-def _reach(i: int, dt: float, first: int, last: int, y: Array, stages: Array, end: Array) -> None:
+def _reach(i: int, dt: float, first: int, last: int, y: Array, integrator: Integrator) -> None:
     """Fill a part of the state at which a stage stands; no motion depends on the energies before the last one."""
     for n in range(first, last):
         change = 0.0
         for j in range(i):
-            change += STAGE_WEIGHTS[i, j] * stages[j, n]
-        end[n] = y[n] + dt * change
+            change += STAGE_WEIGHTS[i, j] * integrator.stages[j, n]
+        integrator.end[n] = y[n] + dt * change
 
 
 @inlined
 def trial(
-    time: float, dt: float, y: Array, model: RideModel, control: Array, workspace: Array, stages: Array, end: Array
+    time: float, dt: float, y: Array, model: RideModel, control: Array, workspace: Array, integrator: Integrator
 ) -> float:
-    """Fill `end` with the state after dt; the workspace is left as it is there.
+    """Fill the end of the integrator with the state after dt; the workspace is left as it is there.
 
     Source: Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2
 
@@ -89,23 +106,22 @@ def trial(
     time, dt : [s]
     y : (n,) state
     model, control, workspace : see `ride_model`
-    stages : (STAGES, n) derivatives; the first is that at the start, the others are filled, the last is that at the end
-    end : (n,) filled
+    integrator : its first stage is the derivative at the start; the others, the last at the end, and `end` are filled
 
     Returns
     -------
     largest embedded error, as a share of |y| + `SCALES`, that of the oil of `SCALES` alone
     """
     for i in range(1, STAGES):
-        _reach(i, dt, 0, y.size if i == STAGES - 1 else State.DISSIPATED, y, stages, end)
+        _reach(i, dt, 0, y.size if i == STAGES - 1 else State.DISSIPATED, y, integrator)
         if model.car.wheels:
-            _reach(i, dt, STATES, y.size, y, stages, end)
-        motion(time + TIMES[i] * dt, end, model, control, workspace, stages[i])
+            _reach(i, dt, STATES, y.size, y, integrator)
+        motion(time + TIMES[i] * dt, integrator.end, model, control, workspace, integrator.stages[i])
     worst = 0.0
     for n in range(y.size):
         error = 0.0
         for i in range(STAGES):
-            error += ERROR_WEIGHTS[i] * stages[i, n]
+            error += ERROR_WEIGHTS[i] * integrator.stages[i, n]
         size = SCALES[n] if State.OIL_1 <= n <= State.OIL_2 else SCALES[n] + abs(y[n])
         share = abs(dt * error) / size
         if not share < math.inf:  # a stage of too long a step overflowed
@@ -178,8 +194,7 @@ def cut(
     model: RideModel,
     control: Array,
     workspace: Array,
-    stages: Array,
-    end: Array,
+    integrator: Integrator,
 ) -> tuple[float, float]:
     """Cut a piece of a step right behind a moment at which an axle leaves its side or its stick.
 
@@ -188,7 +203,7 @@ def cut(
     time, longest : start and length of the piece, at the end of which they have changed [s]
     sharp : how closely the moment is found where `farthest` jumps there [s]
     before : `farthest` at the start, below 0
-    y, model, control, workspace, stages, end : see `advance`
+    y, model, control, workspace, integrator : see `advance`
 
     Returns
     -------
@@ -197,7 +212,7 @@ def cut(
     shortest, behind, moved, number = 0.0, farthest(model, control, workspace), 0, 0
     while longest - shortest > sharp:
         dt = guess(number, shortest, longest, before, behind)
-        worst = trial(time, dt, y, model, control, workspace, stages, end)
+        worst = trial(time, dt, y, model, control, workspace, integrator)
         now = farthest(model, control, workspace)
         if 0.0 < now <= 1.0:
             return dt, worst
@@ -208,7 +223,7 @@ def cut(
             behind *= 0.5 if moved < 0 else 1.0
             shortest, before, moved = dt, min(now, -_AIM), -1
         number += 1
-    return longest, trial(time, longest, y, model, control, workspace, stages, end)
+    return longest, trial(time, longest, y, model, control, workspace, integrator)
 
 
 @compiled
@@ -219,10 +234,8 @@ def advance(
     model: RideModel,
     control: Array,
     workspace: Array,
-    tolerance: float,
+    integrator: Integrator,
     first: float,
-    stages: Array,
-    end: Array,
 ) -> float:
     """Carry the state through one step of integration.
 
@@ -231,29 +244,28 @@ def advance(
     time, h : start and length of the step [s]
     y : (n,) state; changed in place
     model, control, workspace : see `ride_model`; the workspace as `motion` left it at the start
-    tolerance : largest local error as a share of the motion; infinite for a fixed step
+    integrator : its first stage is the derivative at the start
     first : length of the first piece to try [s]
-    stages : (STAGES + 1, n) the first is the derivative at the start; the others are room to work in
-    end : (n,) room to work in
 
     Returns
     -------
     length of the piece to try next [s]
     """
     done, dt, cuts = 0.0, first, 0
+    tolerance, stages = integrator.tolerance, integrator.stages
     before = min(farthest(model, control, workspace), -_AIM)
     while done < h * (1.0 - 1e-12):
         dt = tried = min(dt, h - done)
-        worst = trial(time + done, dt, y, model, control, workspace, stages, end)
+        worst = trial(time + done, dt, y, model, control, workspace, integrator)
         if cuts < _MOST_CUTS and farthest(model, control, workspace) > 0.0:
-            dt, worst = cut(time + done, dt, _SHARP * h, before, y, model, control, workspace, stages, end)
+            dt, worst = cut(time + done, dt, _SHARP * h, before, y, model, control, workspace, integrator)
             cuts += 1
         growth = 0.9 * (tolerance / max(worst, 1e-3 * tolerance)) ** 0.2 if tolerance < math.inf else 5.0
         if worst > tolerance and dt > _SMALLEST * h:
             dt *= max(growth, 0.1)
             continue
         for n in range(y.size):
-            y[n] = end[n]
+            y[n] = integrator.end[n]
         done += dt
         if not worst < math.inf:  # the shortest piece overflowed, too: the ride is lost, see `ride`
             return h

@@ -42,7 +42,7 @@ from pzd.simulate.ride.outcome import (
     summary_row,
     wheel_rows,
 )
-from pzd.simulate.ride.riding import Clock, Held, Take
+from pzd.simulate.ride.riding import Held, Take, clock_of
 from pzd.simulate.roads.sine import Sine
 from pzd.simulate.study.plan import Case
 
@@ -223,7 +223,7 @@ class Gathering:
         """
         if event_of(case.road, self._config) is not None:
             return ridden(case, None)
-        clock = Clock.of(self._config)
+        clock = clock_of(self._config)
         window = settled(self._config.settle_s, clock.step, clock.steps)
         if clock.steps < longest_piece(clock.step) or case.policy.tuned == "schedule":
             held, outcome = ridden(case, None)

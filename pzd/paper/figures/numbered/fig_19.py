@@ -30,7 +30,7 @@ from pzd.paper.published import LARGE_GAP, SMALL_GAP, published
 from pzd.report.ride_comfort import rated
 from pzd.schema.errors import ConfigError
 from pzd.simulate.control.demand import TIE_BREAKS
-from pzd.simulate.ride.energy import harmonic_response
+from pzd.simulate.ride.linear import harmonic_response
 
 # ----------------------------------------------------------------------------------------------------
 # The controlled peaks of every plausible car under every tie-break.

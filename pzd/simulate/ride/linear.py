@@ -1,120 +1,18 @@
-"""The energy balance of a ride: every term is integrated by itself, so what is left is the error.
+"""The car with constant damping on a sine: linear, so that its steady vibration and its ride are exact.
 
-What the valve puts into an oil spring while the voltage moves is the rest of that spring's own balance, stored less
-put in by motion; where no voltage moves that rest is an error too.
+The state is x = (z, phi, dz, dphi, sin wt, cos wt): the road is part of it, evaluated exactly at any step. One matrix
+exponential carries it over a step, another gives the energies of a step as quadratic forms of its start.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from pzd.compiled import compiled
-from pzd.damper.compiled.kernels import K
-from pzd.damper.compiled.rows import row_at
-from pzd.damper.regimes import spring_energy
 from pzd.record import Array, Complex
-from pzd.simulate.ride.model import (
-    DYNAMIC,
-    STATES,
-    Axle,
-    Command,
-    RideModel,
-    State,
-    effective_voltage,
-)
+from pzd.simulate.ride.equations import balance_error
+from pzd.simulate.ride.model import STATES, State
 from pzd.simulate.ride.outcome import Outcome
 from pzd.simulate.vehicle.car import HalfCar
-from pzd.simulate.vehicle.suspension import road_at, suspension, tyre_energy
-
-# ----------------------------------------------------------------------------------------------------
-
-
-NOTHING = 1e-12
-"""Work that counts as nothing [J]: a ride on a level road."""
-
-
-@compiled
-def stored_energy(time: float, y: Array, model: RideModel, workspace: Array) -> float:
-    """Energy of body and springs, and of wheels and tyres where wheels have mass.
-
-    Equation: E = m (dz/dt)^2 / 2 + J (dphi/dt)^2 / 2 + sum k_i U_i^2 / 2 + sum m_i (dzeta_i/dt)^2 / 2 + sum E_tyre
-
-    Parameters
-    ----------
-    time : [s]
-    y : (n,) state
-    model, workspace : see `ride_model`
-
-    Returns
-    -------
-    energy [J]
-    """
-    car = model.car
-    suspension(time, y, car, model.road_coefficients, workspace)
-    energy = 0.5 * car.mass * y[State.HEAVE_RATE] ** 2 + 0.5 * car.inertia * y[State.PITCH_RATE] ** 2
-    for i in range(2):
-        energy += 0.5 * car.stiffness[i] * workspace[Axle.DEFLECTION, i] ** 2
-        if car.wheels:
-            road = model.road_coefficients
-            height, _, _ = road_at(road, car.speed * time - road.behind[i])
-            energy += 0.5 * car.unsprung[i] * y[State.WHEEL_RATE_1 + i] ** 2
-            energy += tyre_energy(car.static_load[i], car.tyre_stiffness[i], height - y[State.WHEEL_1 + i])
-    return float(energy)
-
-
-@compiled
-def oil_energy(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> float:
-    """Energy of the oil springs of all dampers [J].
-
-    Equation: E = sum n_i k integral s de, e = r_i U_i - y_i
-
-    Parameters
-    ----------
-    time : [s]
-    y : (n,) state
-    model, control, workspace : see `ride_model`
-    """
-    car, damper, energy = model.car, model.damper, 0.0
-    if model.control_spec.fidelity != DYNAMIC:
-        return energy
-    suspension(time, y, car, model.road_coefficients, workspace)
-    for i in range(2):
-        voltage = effective_voltage(
-            damper, control[Command.SET, i], control[Command.BEHIND :, i], time - control[Command.SINCE, 0]
-        )
-        row = row_at(damper.voltages, damper.rows, voltage)
-        energy += car.dampers[i] * spring_energy(
-            car.ratio[i] * workspace[Axle.DEFLECTION, i] - y[State.OIL_1 + i], row, row[K]
-        )
-    return energy
-
-
-def balance_error(change: float, oil_change: float, y: Array) -> float:
-    """What the energy balance leaves open, as a share of the dissipated energy.
-
-    Equation: (change of stored energy + put into the oil + dissipated - road work) / dissipated, in dampers and tyres
-
-    Parameters
-    ----------
-    change : of the stored energy over the ride [J], see `stored_energy`
-    oil_change : of what the oil springs store [J], where no voltage moved; else what was put into them
-    y : (n,) state at its end; the work on what stands beside the elements counts as stored
-
-    Returns
-    -------
-    share; zero for a ride in which nothing moves
-    """
-    lost = y[State.DISSIPATED] + (y[State.TYRE_LOSS] if y.size > State.TYRE_LOSS else 0.0)
-    left = change + oil_change + y[State.PARALLEL_WORK] + lost - y[State.ROAD_WORK]
-    return float(left / max(lost, NOTHING)) if abs(left) > NOTHING else 0.0
-
-
-# ----------------------------------------------------------------------------------------------------
-# The car with constant damping on a sine: linear, so everything about it is exact.
-#
-# The state is x = (z, phi, dz, dphi, sin wt, cos wt): the road is part of it, evaluated exactly at any
-# step. One matrix exponential carries it over a step, another gives the energies of a step as
-# quadratic forms of its start.
 
 
 def harmonic_response(
