@@ -22,8 +22,7 @@ from pzd.simulate.roads import Road, roads
 from pzd.simulate.roads.sine import Sine
 from pzd.simulate.vehicle.car import HalfCar
 
-# ----------------------------------------------------------------------------------------------------
-# The `sensors` and the `supply` of the `simulate` block: what the controller sees, and what becomes of its voltage.
+# --- `sensors` and `supply`: what the controller sees, and what becomes of the voltage that it asks for ---
 
 
 class SensorNoise(Frozen):
@@ -78,9 +77,7 @@ class Supply(Frozen):
         return self
 
 
-# ----------------------------------------------------------------------------------------------------
-# The `car` of the `simulate` block: one of the library, and whatever is to be different from it.
-
+# --- `car`: one of the library, and whatever is to be different from it ---
 
 Pair = tuple[float, float]
 
@@ -161,7 +158,7 @@ class CarBlock(Frozen):
         return self
 
     def car(self) -> HalfCar:
-        """The car of the library with what the config changes; it keeps its name only where that is nothing."""
+        """Return the car of the library with what the config changes; it keeps its name only where that is nothing."""
         known = cars()[self.model]
         built = HalfCar(
             name=known.name,
@@ -183,8 +180,7 @@ def _first(given: float | None, known: float) -> float:
     return known if given is None else given
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- The whole block ---
 
 Fidelity = Literal["ideal", "table", "dynamic"]
 
@@ -362,7 +358,7 @@ class SimulateConfig(Frozen):
         return policy == (self.controlled or (names[0] if len(names) == 1 else DEFAULT_CONTROLLED))
 
     def own_block(self, policy: str) -> Frozen:
-        """The parameters of a policy's own; an empty block where it has none."""
+        """Return the parameters of a policy's own; an empty block where it has none."""
         found = getattr(self, policy, None)
         return found if isinstance(found, Frozen) else Frozen()
 

@@ -1,4 +1,7 @@
-"""Compiles the kernels of the ride by riding: `python -m pzd.simulate.precompile`, see `compiled_ahead`."""
+"""Compiles the kernels of the ride by riding: `python -m pzd.simulate.precompile`, see `compiled_ahead`.
+
+A module of its own, since what it imports must not be imported by the commands that start it.
+"""
 
 from __future__ import annotations
 

@@ -29,9 +29,8 @@ BEFORE, AFTER = 20_000, 1_000
 def model_of(ride, monkeypatch) -> RideModel:
     """What a ride at 150 V on a random road knows."""
     known = []
-    original = riding.ride_of_model
-
-    monkeypatch.setattr(riding, "ride_of_model", lambda model, *rest: known.append(model) or original(model, *rest))
+    original = riding.ride
+    monkeypatch.setattr(riding, "ride", lambda y, model, *rest: known.append(model) or original(y, model, *rest))
     road = {"kind": "iso8608", "road_class": "C", "seed": 1}
     ride("passive", "dynamic", roads=[road], passive_voltage_V=150.0, duration_s=0.5, settle_s=0.1)
     return known[0]

@@ -39,7 +39,7 @@ from pzd.simulate.ride.model import (
     vehicle,
     workspace,
 )
-from pzd.simulate.ride.riding import Held, control_spec_of
+from pzd.simulate.ride.riding import FixedValues, control_spec_of
 from pzd.simulate.ride.stepper import advance, integrator_of
 from pzd.simulate.roads import Way
 from pzd.simulate.stage import simulate
@@ -75,7 +75,7 @@ def model_of(damper: Damper, policy: str, voltage: float, **given: object) -> tu
     model = RideModel(
         vehicle(car, speed),
         road_coefficients(case.road.profile(Way(speed, speed * config.duration_s, 1, Path())), car.wheelbase),
-        control_spec_of(config, case, car, dynamic, Held(voltage, 0.0)),
+        control_spec_of(config, case, car, dynamic, FixedValues(voltage, 0.0)),
         grid,
         dynamic,
     )

@@ -24,7 +24,7 @@ from pzd.simulate.ride.model import (
     vehicle,
     workspace,
 )
-from pzd.simulate.ride.riding import Held, control_spec_of
+from pzd.simulate.ride.riding import FixedValues, control_spec_of
 from pzd.simulate.ride.stepper import choose_side
 from pzd.simulate.roads import Profile
 from pzd.simulate.study.plan import Case
@@ -64,7 +64,7 @@ def test_an_axle_is_stopped_by_an_impulse_between_body_and_wheel(damper, table, 
     model = RideModel(
         vehicle(car, 25.0),
         road_coefficients(Profile(), car.wheelbase),
-        control_spec_of(config, case, car, dynamic, Held(0.0, 0.0)),
+        control_spec_of(config, case, car, dynamic, FixedValues(0.0, 0.0)),
         grid,
         dynamic,
     )

@@ -70,7 +70,7 @@ class Electronics(NamedTuple):
 def electronics_of(
     sensors: Sensors, supply: Supply, period: float, states: int, arms: tuple[float, float]
 ) -> Electronics | None:
-    """Sensors and supply as numbers; None where both are perfect.
+    """Return sensors and supply as numbers; None where both are perfect.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def electronics_of(
 
 
 def road_gain(noise: SensorNoise, arm: float, step: float) -> float:
-    """Share of a new height of the road that is believed, beside the last one and the rise since then.
+    """Return the gain of a new height of the road against the last one and the rise since then.
 
     Equation: K = (s sqrt(s^2 + 4) - s^2) / 2, s = h sigma_rise / sigma_height
     Source: steady Kalman filter of a height whose rate is measured; Bar-Shalom, Li and Kirubarajan 2001, sec. 5.2
@@ -128,7 +128,7 @@ def road_gain(noise: SensorNoise, arm: float, step: float) -> float:
 
 
 def _deviations(noise: SensorNoise) -> Array:
-    """By channel: deflection 1, 2, its rate 1, 2, z, phi, dz, dphi, acceleration."""
+    """Return the deviations by channel: deflection 1, 2, its rate 1, 2, z, phi, dz, dphi, acceleration."""
     return np.array(
         [
             noise.deflection_m,
@@ -145,7 +145,7 @@ def _deviations(noise: SensorNoise) -> Array:
 
 
 def with_noise(electronics: Electronics, rng: np.random.Generator, acts: int) -> Electronics:
-    """With the noise of so many acts to come; the same numbers come whatever number of them is drawn at a time."""
+    """Draw the noise of so many acts to come; the numbers are the same whatever number of them is drawn at a time."""
     electronics.counts[NEXT_NOISE] = 0.0
     return electronics._replace(noise=rng.standard_normal((acts, CHANNELS)))
 
@@ -159,7 +159,7 @@ def copy_into(origin: Array, target: Array) -> None:
 
 @compiled
 def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) -> float:
-    """Take a sample where it is time, and fill what the controller sees; how old that is [s].
+    """Take a sample where it is time, fill what the controller sees, and return how old that is [s].
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def _sample(y: Array, car: Vehicle, workspace: Array, electronics: Electronics, 
 
 @compiled
 def supplied(asked: float, was: float, low: float, high: float, electronics: Electronics) -> float:
-    """The voltage that the supply sets [V].
+    """Return the voltage that the supply sets [V].
 
     Equation: towards the nearest U of the values that can be set, as far as abs(U - U_0) <= slew h and
     abs(U abs(U) - U_0 abs(U_0)) <= 2 P h / C, the energy C U^2 / 2 that a power P moves in a control period h
@@ -233,5 +233,5 @@ def supplied(asked: float, was: float, low: float, high: float, electronics: Ele
 
 @compiled
 def _root(energy: float) -> float:
-    """U of U abs(U)."""
+    """Return U of U abs(U)."""
     return math.copysign(math.sqrt(abs(energy)), energy)

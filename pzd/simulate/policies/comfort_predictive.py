@@ -12,12 +12,12 @@ that was met. So one weight serves roads of any height, and loads that leave tho
 than comfort brings.
 
 The plant has the state of the oil, the lag of the valve, the adopted effects and the wheels
-(`pzd.simulate.control.prediction.plant`). Body, wheels, oil, acceleration and the road under each axle are sensed exactly, or
-as `simulate.sensors` gives them: then the height of the road is that of body less suspension, joined to its rise by a
-steady Kalman filter (`pzd.simulate.control.prediction.forecast`). The road ahead is known, or forecast from what has passed
-under the front axle (`pzd.simulate.control.prediction.forecast`); the rear axle meets it (a1 + a2) / speed later. What the
-forecasts missed of late may come again: the ride is tried with it added and subtracted, and a choice must beat the best
-voltage held on by `margin`, times the share of the road's motion that was not foreseen.
+(`plant` of `pzd.simulate.control.prediction`). Body, wheels, oil, acceleration and the road under each axle are sensed
+exactly, or as `simulate.sensors` gives them: then the height of the road is that of body less suspension, joined to its
+rise by a steady Kalman filter (`forecast`, in the same folder). The road ahead is known, or forecast from what has
+passed under the front axle (`forecast`); the rear axle meets it (a1 + a2) / speed later. What the forecasts missed of
+late may come again: the ride is tried with it added and subtracted, and a choice must beat the best voltage held on by
+`margin`, times the share of the road's motion that was not foreseen.
 
 Source: rollout of base policies, those that hold a voltage: Bertsekas 2017, Dynamic Programming and Optimal Control I,
 section 6.4; cost and road are ours.

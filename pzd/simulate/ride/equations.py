@@ -30,13 +30,12 @@ from pzd.simulate.ride.model import (
 )
 from pzd.simulate.vehicle.suspension import move_wheels, road_at, suspension, tyre_energy
 
-# ----------------------------------------------------------------------------------------------------
-# Acceleration of the suspensions, and what holds an axle that sticks at V = 0.
+# --- Acceleration of the suspensions, and the force that holds an axle that sticks at V = 0 ---
 
 
 @inlined
 def holding_force(car: Vehicle, axle: int, load: float, lift: float, other: float) -> float:
-    """Damper force that keeps the deflection of an axle still, dV_i/dt = 0.
+    """Return the damper force that keeps the deflection of an axle still, dV_i/dt = 0.
 
     Equation: T_i = -(d2xi_i/dt2 + W_ij (S_j + T_j)) / W_ii - S_i, W = H^T M^-1 H     Source: from eq. (6)
 
@@ -57,13 +56,13 @@ def holding_force(car: Vehicle, axle: int, load: float, lift: float, other: floa
 
 @inlined
 def holding_share(car: Vehicle, axle: int) -> float:
-    """How much the holding force of an axle changes with the other axle's force: dT_i/dT_j."""
+    """Return how much the holding force of an axle changes with the other axle's force: dT_i/dT_j."""
     return -car.mobility[2] / car.mobility[axle]
 
 
 @inlined
 def accelerate(car: Vehicle, control: Array, workspace: Array) -> None:
-    """Fill dV/dt of both axles, and complete the damper forces by what holds a sticking axle and by inertia.
+    """Fill dV/dt of both axles, and complete the damper forces by inertia and by what holds a sticking axle.
 
     Equation: dV/dt = -W (S + T + mu dV/dt) - d2xi/dt2, W = H^T M^-1 H, dV_i/dt = 0 where it sticks
                                                                          Source: from eq. (6)
@@ -97,7 +96,7 @@ def accelerate(car: Vehicle, control: Array, workspace: Array) -> None:
 
 @inlined
 def _accelerate_one(car: Vehicle, free: int, workspace: Array) -> None:
-    """The same where one axle is free and the other sticks."""
+    """Do the same as `accelerate` where one axle is free and the other sticks."""
     stuck, cross = 1 - free, car.mobility[2]
     freed = car.mobility[free] - cross * cross / car.mobility[stuck]
     pull = cross / car.mobility[stuck] * workspace[Axle.LIFT, stuck] - workspace[Axle.LIFT, free]
@@ -110,13 +109,12 @@ def _accelerate_one(car: Vehicle, free: int, workspace: Array) -> None:
     )
 
 
-# ----------------------------------------------------------------------------------------------------
-# Damper forces without dynamics of their own: the demand at once (`ideal`), or the table (`table`).
+# --- Damper forces without dynamics of their own: the demand at once (`ideal`), or the table (`table`) ---
 
 
 @compiled
 def tabled(car: Vehicle, grid: TableArrays, axle: int, voltage: float, velocity: float) -> float:
-    """Force of an axle [N] whose dampers stand at a voltage [V], at a suspension speed [m/s].
+    """Return the force of an axle [N] whose dampers stand at a voltage [V], at a suspension speed [m/s].
 
     Equation: T = n r F(U, r V)      Source: virtual work, r the motion ratio and n the number of dampers
     """
@@ -167,12 +165,12 @@ def _force_outside_sticking(y: Array, model: RideModel, control: Array, workspac
         workspace[Axle.FORCE, free] = wanted_force(control_spec, free, y, control, workspace)
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Damper forces by the dynamics of the damper (`dynamic`), and the derivative of the state ---
 
 
 @inlined
 def body_acceleration(car: Vehicle, load0: float, load1: float) -> tuple[float, float]:
-    """Acceleration of z [m/s2] and phi [rad/s2] under the forces S + T of the axles [N].
+    """Return the acceleration of z [m/s2] and phi [rad/s2] under the forces S + T of the axles [N].
 
     Equation: M d2X/dt2 + H (S + T) = 0              Source: Makowski and Knap 2021, eq. (6)
     """
@@ -225,7 +223,7 @@ def remember_step(time: float, model: RideModel, control: Array, workspace: Arra
 
 @compiled
 def relax_oil(time: float, y: Array, model: RideModel, workspace: Array) -> None:
-    """Let the oil of every damper flow to where its spring bears nothing, as it does while the car stands."""
+    """Let the oil of every damper flow to where its stiffness bears nothing, as it does while the car stands."""
     suspension(time, y, model.car, model.road_coefficients, workspace)
     for i in range(2):
         y[State.OIL_1 + i] = model.car.ratio[i] * workspace[Axle.DEFLECTION, i]
@@ -269,7 +267,7 @@ def motion(time: float, y: Array, model: RideModel, control: Array, workspace: A
     )
     for i in range(2):
         if model.control_spec.fidelity == DYNAMIC:
-            _book_damper(model, workspace, i, dy)
+            _add_damper_power(model, workspace, i, dy)
         else:
             dy[State.DISSIPATED] += workspace[Axle.FORCE, i] * workspace[Axle.RATE, i]
 
@@ -297,8 +295,8 @@ def _try_sides(time: float, y: Array, model: RideModel, control: Array, workspac
 
 
 @inlined
-def _book_damper(model: RideModel, workspace: Array, axle: int, dy: Array) -> None:
-    """Book the powers of the dampers of one axle, and the motion of its oil."""
+def _add_damper_power(model: RideModel, workspace: Array, axle: int, dy: Array) -> None:
+    """Add the powers of the dampers of one axle to the derivative of the energies, and fill the flow of its oil."""
     n, speed = model.car.dampers[axle], model.car.ratio[axle] * workspace[Axle.RATE, axle]
     inertia = workspace[Axle.INERTANCE, axle] * workspace[Axle.ACCELERATION, axle] * workspace[Axle.RATE, axle]
     dy[State.OIL_1 + axle] = workspace[Axle.FLOW, axle]

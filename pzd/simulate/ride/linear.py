@@ -10,15 +10,17 @@ import numpy as np
 
 from pzd.record import Array, Complex
 from pzd.simulate.ride.equations import balance_error
+from pzd.simulate.ride.loop import Clock
 from pzd.simulate.ride.model import STATES, State
 from pzd.simulate.ride.outcome import Outcome
+from pzd.simulate.roads import Profile
 from pzd.simulate.vehicle.car import HalfCar
 
 
 def harmonic_response(
     car: HalfCar, damping: float, frequency: float, amplitude: float, vehicle_speed: float
 ) -> tuple[Complex, complex]:
-    """Steady vibration of body and point K with constant damping on a sine.
+    """Return the steady vibration of body and point K with constant damping on a sine.
 
     Equation: (K - w^2 M + i w C) X = H (k + i w c) xi, xi_2 = xi_1 exp(-i w (a1 + a2) / V)
                                                                       Source: eq. (6) with T_i = c V_i
@@ -35,6 +37,12 @@ def harmonic_response(
     -------
     (2,) complex amplitudes of z [m] and phi [rad], and that of a_K [m/s2]; the road under axle 1 is
     the imaginary part of A exp(i w t)
+
+    >>> from pzd.simulate.cars import cars
+    >>> car = cars()["makowski2021"]
+    >>> _, a_K = harmonic_response(car, damping=4500.0, frequency=2.25, amplitude=0.02, vehicle_speed=25.0)
+    >>> round(abs(a_K), 2)
+    2.27
     """
     w = 2.0 * np.pi * frequency
     H = car.force_directions()
@@ -45,15 +53,7 @@ def harmonic_response(
 
 
 def ride_exactly(
-    car: HalfCar,
-    damping: float,
-    frequency: float,
-    amplitude: float,
-    vehicle_speed: float,
-    step: float,
-    steps: int,
-    per_output: int,
-    reach: float,
+    car: HalfCar, damping: float, road: Profile, vehicle_speed: float, clock: Clock, reach: float
 ) -> Outcome:
     """Ride a sine from rest with constant damping, exactly.
 
@@ -61,18 +61,19 @@ def ride_exactly(
     ----------
     car : the half-car
     damping : c of each axle [N s/m]
-    frequency, amplitude : of the sine [Hz], [m]
+    road : a sine
     vehicle_speed : [m/s]
-    step, steps : length [s] and number of the steps at which the exact solution is taken
-    per_output : steps between two rows of the history
+    clock : steps at which the exact solution is taken
     reach : largest damper speed of the rig [m/s]
 
     Returns
     -------
     the ride
     """
-    w = 2.0 * np.pi * frequency
-    u, v, rise = _suspension_rows(car, w, amplitude, vehicle_speed)
+    step, steps = clock.step, clock.steps
+    # the angular frequency by way of that in Hz: the bytes of the history depend on how it is rounded
+    w = 2.0 * np.pi * (road.wavenumber * vehicle_speed / (2.0 * np.pi))
+    u, v, rise = _suspension_rows(car, w, road.amplitude, vehicle_speed)
     load = np.array(car.stiffnesses)[:, None] * u + damping * v
     A = _system(car, w, load)
     x = _states(A, step, steps)
@@ -92,7 +93,7 @@ def ride_exactly(
         damper = damping * rate[:, i]
         columns += [deflection[:, i], rate[:, i], springs[:, i], damper, damper, voltage]
     return Outcome(
-        history=np.stack(columns, axis=1)[::per_output],
+        history=np.stack(columns, axis=1)[:: clock.per_output],
         course=np.column_stack([comfort, forces, np.max(np.abs(deflection), axis=1), lost]),
         step=step,
         outside=float(np.mean(np.any(too_fast, axis=1))),
@@ -101,7 +102,7 @@ def ride_exactly(
 
 
 def _suspension_rows(car: HalfCar, w: float, amplitude: float, speed: float) -> tuple[Array, Array, Array]:
-    """Rows (2, 6) that give deflection, its rate and the road's speed from the state x."""
+    """Return rows (2, 6) that give deflection, its rate and the road's speed from the state x."""
     H = car.force_directions()
     late = w * np.array([0.0, car.wheelbase / speed])
     sine, cosine = amplitude * np.cos(late), -amplitude * np.sin(late)
@@ -120,7 +121,7 @@ def _system(car: HalfCar, w: float, load: Array) -> Array:
 
 
 def _states(A: Array, step: float, steps: int) -> Array:
-    """(steps + 1, 6) states from rest, doubled block by block."""
+    """Return the (steps + 1, 6) states from rest, doubled block by block."""
     from scipy.linalg import expm
 
     x = np.zeros((1, 6))
@@ -133,7 +134,7 @@ def _states(A: Array, step: float, steps: int) -> Array:
 
 
 def _integral(A: Array, Q: Array, step: float, x: Array) -> Array:
-    """(n + 1,) integral of x^T Q x from the first to every one of the states (n + 1, 6), exactly.
+    """Integrate x^T Q x from the first to every one of the states (n + 1, 6), exactly.
 
     Source: Van Loan 1978, IEEE Trans. Automatic Control 23(3)
     """

@@ -1,4 +1,4 @@
-"""The ride as one compiled loop: the controller by its clock, the integration by its step, the records beside."""
+"""The ride as one compiled loop: the controller by its clock, the integration by its step, and the records."""
 
 from __future__ import annotations
 
@@ -31,9 +31,7 @@ from pzd.simulate.ride.model import (
 )
 from pzd.simulate.ride.stepper import STAGES, Integrator, advance, choose_side
 
-# ----------------------------------------------------------------------------------------------------
-# The controller, once in a control period: what it asks of each axle, and the voltage that is set there.
-
+# --- The controller, once in a control period: what it asks of each axle, and the voltage that is set there ---
 
 _SAME_PLACE = 1e-9
 """Of an interval of a schedule: the clock meets its beginning but for rounding."""
@@ -41,14 +39,14 @@ _SAME_PLACE = 1e-9
 
 @inlined
 def _acts_at_once(control_spec: ControlSpec) -> bool:
-    """Whether nothing is left to the clock: `ideal` forces are, but for the choice between two that lie apart."""
+    """Tell whether nothing is left to the clock: `ideal` forces act at once, except a choice between two."""
     chooses = control_spec.aim == SWITCH or (control_spec.aim == MINIMISE and control_spec.tie == LARGEST)
     return control_spec.fidelity == IDEAL and not chooses
 
 
 @inlined
 def _stays(control_spec: ControlSpec, control: Array) -> bool:
-    """Whether the voltage of a policy that holds one is set already."""
+    """Tell whether the voltage of a policy that holds one is set already."""
     set_already = control[Command.SET, 0] == control_spec.voltage and control[Command.SET, 1] == control_spec.voltage
     return control_spec.aim == VOLTAGE and set_already
 
@@ -121,7 +119,7 @@ def set_control(
 
 @inlined
 def scheduled(time: float, model: RideModel, axle: int) -> float:
-    """The voltage [V] that a schedule has for an axle at a time [s], by where axle 1 is in the harmonic of the road."""
+    """Return the scheduled voltage of an axle [V] at a time [s], by where axle 1 is in the harmonic of the road."""
     count = model.control_spec.schedule.shape[1]
     turns = model.road_coefficients.wavenumber * model.car.speed * time / (2.0 * math.pi)
     place = min(int((turns - math.floor(turns)) * count + _SAME_PLACE), count - 1)
@@ -130,7 +128,7 @@ def scheduled(time: float, model: RideModel, axle: int) -> float:
 
 @inlined
 def _wanted_voltage(time: float, model: RideModel, control: Array, workspace: Array, axle: int) -> float:
-    """The voltage that the policy asks of an axle [V]; a force that it asks is noted."""
+    """Return the voltage that the policy asks of an axle [V]; a force that it asks is noted."""
     aim = model.control_spec.aim
     if aim == VOLTAGE:
         return model.control_spec.voltage
@@ -144,7 +142,7 @@ def _wanted_voltage(time: float, model: RideModel, control: Array, workspace: Ar
 
 @inlined
 def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, otherwise: float) -> float:
-    """The voltage that gives a force of the axle within its bounds; a rounding beyond them is let pass."""
+    """Look up the voltage that gives a force of the axle within its bounds; a rounding beyond them is let pass."""
     grid, car = model.grid, model.car
     ratio = car.ratio[axle]
     alone = force / (car.dampers[axle] * ratio)
@@ -179,8 +177,7 @@ def _set_voltage(
     control[Command.SET, axle] = voltage
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- The ride, and what is recorded of it ---
 
 A_K, LOAD_1, LOAD_2, TRAVEL, LOST = range(5)
 """What is kept of every step: acceleration at K [m/s2], what each axle takes off the road's static load [N], S + T
@@ -223,7 +220,7 @@ def records_of(rows: int, per_output: int) -> Records:
 
 @inlined
 def beyond_reach(model: RideModel, control: Array, workspace: Array) -> bool:
-    """Whether a damper moves faster than the rig did at its voltage; `ideal` has none, so at the best one."""
+    """Tell whether a damper moves faster than the rig did at its voltage; `ideal` has none, so at the best one."""
     grid, car = model.grid, model.car
     last = grid.reach.size - 1
     for i in range(2):

@@ -24,11 +24,9 @@ from pzd.simulate.ride.model import (
     State,
 )
 
-# ----------------------------------------------------------------------------------------------------
-# The coefficients of Dormand and Prince's pair of order 5(4), the last stage being the first of the next step.
+# --- Coefficients of the pair of order 5(4), the last stage being the first of the next step ---
 #
 # Source: Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2
-
 
 STAGES = 7
 """Number of stages."""
@@ -50,12 +48,11 @@ ERROR_WEIGHTS = np.array([-71 / 57600, 0.0, 71 / 16695, -71 / 1920, 17253 / 3392
 """(STAGES,) difference between the orders 5 and 4."""
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- One step ---
 
 SCALES = np.array([1e-2, 1e-2, 1e-1, 1e-1, 1e-3, 1e-3, 10.0, 10.0, 10.0, 10.0, 1e-2, 1e-2, 1e-1, 1e-1, 10.0])
 """A motion of ordinary size, below which the error is absolute; that of the oil always is, which flows much farther
-than its spring is deflected: m, rad, m/s, rad/s, m, J; wheels: m, m/s, J."""
+than its stiffness is deflected: m, rad, m/s, rad/s, m, J; wheels: m, m/s, J."""
 
 _CROSSED = 1e-9  # m/s on the other side of zero: the moment lies between this speed and twice as much
 _PUSHED = 1e-6  # m/s2: an axle that sticks slips between no push and this one
@@ -151,7 +148,7 @@ def choose_side(
 
 @inlined
 def beyond(control: Array, workspace: Array, axle: int) -> float:
-    """How far an axle has left its side of V = 0 or its stick, as a share of what is let pass; not above 0 before."""
+    """Return how far an axle has left its side of V = 0 or its stick, as a share of what is let pass."""
     side = control[Command.SIDE, axle]
     if side == 0.0:
         return float(max(workspace[Axle.REBOUND_PUSH, axle], workspace[Axle.COMPRESSION_PUSH, axle]) / _PUSHED)
@@ -160,7 +157,7 @@ def beyond(control: Array, workspace: Array, axle: int) -> float:
 
 @inlined
 def farthest(model: RideModel, control: Array, workspace: Array) -> float:
-    """The larger `beyond` of both axles; -1 where the force does not jump at V = 0."""
+    """Return the larger `beyond` of both axles; -1 where the force does not jump at V = 0."""
     if not model.control_spec.jumps:
         return -1.0
     return max(beyond(control, workspace, 0), beyond(control, workspace, 1))
@@ -168,7 +165,7 @@ def farthest(model: RideModel, control: Array, workspace: Array) -> float:
 
 @inlined
 def guess(number: int, shortest: float, longest: float, before: float, behind: float) -> float:
-    """Where in a bracket the moment may lie at which an axle leaves its side or its stick.
+    """Guess where in a bracket the moment lies at which an axle leaves its side or its stick.
 
     Source: false position; Dowell and Jarratt 1971, BIT 11 (Illinois), with a halving now and then
 
@@ -286,7 +283,7 @@ def advance(
 
 @inlined
 def _choose_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array) -> bool:
-    """Let every axle that is beyond its side slip to the other one or stick; whether there was one."""
+    """Let every axle that is beyond its side slip to the other one or stick, and tell whether there was one."""
     turned = False
     for i in range(2):
         if beyond(control, workspace, i) > 0.0:

@@ -55,13 +55,13 @@ class Iso8608(Road):
 
     @override
     def profile(self, way: Way) -> Profile:
-        """The road as far as the ride goes."""
+        """Draw the road as far as the ride goes."""
         return _drawn(self, way)
 
 
 @lru_cache(maxsize=_REMEMBERED)
 def _drawn(road: Iso8608, way: Way) -> Profile:
-    """The road as far as a ride goes.
+    """Draw the road as far as a ride goes, from one piece fading into the next.
 
     Equation: xi = cos(r) xi_k + sin(r) xi_(k+1), r from 0 to pi/2 over half a piece; cos2 + sin2 = 1 keeps the
     spectrum
@@ -83,7 +83,7 @@ def _drawn(road: Iso8608, way: Way) -> Profile:
 
 
 def _piece(road: Iso8608, seed: list[int], knots: int) -> Array:
-    """(knots,) heights of one piece [m], of a draw of its own."""
+    """Draw (knots,) heights of one piece [m]."""
     band = (_BAND_FROM, 1.0 / road.shortest_wave_m)
     heights = profile(classes()[road.road_class], _PIECE, np.random.default_rng(seed), band)
     return heights(_PIECE / knots * np.arange(knots, dtype=np.float64))[0]

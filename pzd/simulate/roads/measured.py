@@ -32,7 +32,7 @@ class MeasuredRoad(Road):
 
     @abstractmethod
     def heights(self, path: Path, key: str) -> tuple[Array, Array]:
-        """(n,) places along the road, rising, and heights there [m]; the key is that of the road, for errors."""
+        """Read (n,) places along the road, rising, and heights there [m]; the key is that of the road, for errors."""
 
     @override
     def own_name(self) -> str:
@@ -102,8 +102,8 @@ def _numbers(line: str) -> tuple[float, float] | None:
 
 # --- OpenCRG: heights of a road on a grid along a reference line (u) and across it (v) ---
 #
-# Source: ASAM OpenCRG 1.2, file format; plain-text data `LRFI` (fields of 10 characters) and `LDFI` (of 20), in lines of
-# 80, each cross section on lines of its own. Binary data, files that include others and modifiers are refused.
+# Source: ASAM OpenCRG 1.2, file format; plain-text data `LRFI` (fields of 10 characters) and `LDFI` (of 20), in lines
+# of 80, each cross section on lines of its own. Binary data, files that include others and modifiers are refused.
 
 
 class OpenCrg(MeasuredRoad):
@@ -198,7 +198,7 @@ def read_grid(path: Path) -> CrgGrid:
 
 
 def _head(path: Path, lines: list[str]) -> tuple[_Head, int]:
-    """What stands before the data, and the index of their first line."""
+    """Read what stands before the data, and the index of their first line."""
     head, section = _Head(), ""
     for number, line in enumerate(lines, 1):
         text = line.strip()
@@ -222,7 +222,7 @@ def _head(path: Path, lines: list[str]) -> tuple[_Head, int]:
 
 
 def _records(path: Path, lines: list[str], first: int, head: _Head) -> Array:
-    """(n, c) numbers of every cross section."""
+    """Read (n, c) numbers of every cross section."""
     width, count = _WIDTHS[head.form], len(head.channels)
     a_line = _LINE // width
     each = math.ceil(count / a_line)
@@ -256,7 +256,7 @@ def _number(path: Path, line: int, text: str) -> float:
 
 
 def _place(path: Path, head: _Head, name: str) -> float:
-    """Place v of a long section [m], that it says itself or that follows from its number."""
+    """Return the place v of a long section [m], that it says itself or that follows from its number."""
     said = re.match(r"long section\s+at\s+v\s*=\s*([-+]?\d*\.?\d+(?:e[-+]?\d+)?)", name)
     if said:
         return float(said[1])
@@ -268,7 +268,7 @@ def _place(path: Path, head: _Head, name: str) -> float:
 
 
 def _channel(records: Array, head: _Head, name: str) -> Array:
-    """(n,) of a channel of the reference line; 0 where it has none."""
+    """Return (n,) of a channel of the reference line; 0 where it has none."""
     for n, channel in enumerate(head.channels):
         if channel.startswith("reference line") and name in channel:
             return np.asarray(records[:, n])

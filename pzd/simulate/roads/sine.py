@@ -73,7 +73,7 @@ class SweptSine(Road):
         return through(self.height(spacing / way.vehicle_speed * np.arange(knots, dtype=np.float64)), spacing)
 
     def height(self, time: Array) -> Array:
-        """(n,) height under axle 1 [m] at (n,) times [s] from 0 on."""
+        """Return the (n,) height under axle 1 [m] at (n,) times [s] from 0 on."""
         ratio = self.high_Hz / self.low_Hz
         last = self.amplitude_m / ratio if self.amplitude_at_high_m is None else self.amplitude_at_high_m
         ways, along = np.divmod(time / self.sweep_s, 1.0)

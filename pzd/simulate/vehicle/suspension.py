@@ -1,4 +1,8 @@
-"""Wheels with mass: the force between tyre and road, which never pulls, and what the tyre stores and loses."""
+"""Suspension and tyre: deflections by the body and the road beneath, and the contact force, which never pulls.
+
+The road is a harmonic and a spline, evaluated where the step is; wheels with mass stand on tyres that store and lose
+energy.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +17,12 @@ from pzd.simulate.ride.model import (
     Vehicle,
 )
 
-# ----------------------------------------------------------------------------------------------------
+# --- Tyre of a wheel with mass ---
 
 
 @inlined
 def contact_force(static: float, stiffness: float, damping: float, squeeze: float, rate: float) -> float:
-    """Force between wheel and road beyond that at rest [N]: the wheel leaves the road where it would pull.
+    """Return the force between wheel and road beyond that at rest [N]: the wheel leaves the road where it would pull.
 
     Equation: N - N_0 = max(k_t s + c_t ds/dt, -N_0), s = xi - zeta
     Source: a spring and a damper beside each other on the weight that they carry, which press alone
@@ -34,13 +38,13 @@ def contact_force(static: float, stiffness: float, damping: float, squeeze: floa
 
 @inlined
 def tyre_spring_force(static: float, stiffness: float, squeeze: float) -> float:
-    """What of the contact force the spring of the tyre holds, beyond that at rest [N]: it does not pull either."""
+    """Return the share of the contact force that the spring of the tyre bears [N]: it does not pull either."""
     return max(stiffness * squeeze, -static)
 
 
 @inlined
 def tyre_energy(static: float, stiffness: float, squeeze: float) -> float:
-    """Energy of the tyre's spring and of the weight on it, beyond that at rest [J].
+    """Return the energy of the tyre's spring and of the weight on it, beyond that at rest [J].
 
     Equation: E = integral of max(k_t s, -N_0) ds
     """
@@ -90,9 +94,7 @@ def move_wheels(y: Array, car: Vehicle, loads: tuple[float, float], workspace: A
         dy[State.WHEEL_RATE_1 + i] = (loads[i] + workspace[Axle.CONTACT, i]) / car.unsprung[i]
 
 
-# ----------------------------------------------------------------------------------------------------
-# Deflection of the suspensions and its derivatives from the body and the road, evaluated where the step is.
-
+# --- The road, and the deflection of the suspensions with its derivatives ---
 
 NEEDED = 6
 """Coefficients that act in one cell."""
@@ -100,7 +102,7 @@ NEEDED = 6
 
 @inlined
 def spline_at(coefficients: Array, place: float) -> tuple[float, float, float]:
-    """Value of a spline, its derivative and its second derivative; held before the first and behind the last knot.
+    """Evaluate a spline, its derivative and its second derivative; held before the first and behind the last knot.
 
     Equation: s = sum c_j B(p - j), B the basis spline of degree 5 over whole numbers, as a polynomial in the cell
     Source: de Boor 2001, A Practical Guide to Splines, ch. IX and X
@@ -136,7 +138,7 @@ def spline_at(coefficients: Array, place: float) -> tuple[float, float, float]:
 
 @compiled
 def road_at(road_coefficients: RoadCoefficients, distance: float) -> tuple[float, float, float]:
-    """Height [m] of the road at a distance [m], its slope [-] and its curvature [1/m]."""
+    """Return the height [m] of the road at a distance [m], its slope [-] and its curvature [1/m]."""
     height = slope = curvature = 0.0
     if road_coefficients.amplitude != 0.0:
         phase = road_coefficients.wavenumber * distance
