@@ -11,13 +11,7 @@ from pydantic import ValidationError
 
 from pzd.simulate.config import CarBlock, SensorNoise, Sensors, SimulateConfig, Supply
 from pzd.simulate.control.sensing import Electronics, electronics_of, sense, supplied, with_noise
-from pzd.simulate.ride.model import (
-    Axle,
-    State,
-    at_rest,
-    vehicle,
-    workspace,
-)
+from pzd.simulate.ride.model import Axle, State, at_rest, vehicle, workspace
 
 SHORT = {"duration_s": 2.0, "settle_s": 1.0, "output_rate_Hz": 1000.0}
 PERIOD = 1e-3

@@ -9,16 +9,7 @@ from pzd.damper.compiled.rows import row_at
 from pzd.simulate.ride import riding
 from pzd.simulate.ride.equations import motion, oil_energy
 from pzd.simulate.ride.loop import set_control
-from pzd.simulate.ride.model import (
-    Axle,
-    Command,
-    RideModel,
-    State,
-    at_rest,
-    control,
-    effective_voltage,
-    workspace,
-)
+from pzd.simulate.ride.model import Axle, Command, RideModel, State, at_rest, control, effective_voltage, workspace
 from pzd.simulate.ride.stepper import STAGES, advance, integrator_of
 
 STEP = 2e-5

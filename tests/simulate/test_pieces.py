@@ -13,6 +13,7 @@ from simulate_dampers import table_of
 from pzd.artefacts import Diagnosed, Rides
 from pzd.damper.model import Damper
 from pzd.quantities import Control
+from pzd.simulate import roads
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.ride import outcome
 from pzd.simulate.roads import through

@@ -11,12 +11,7 @@ from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.config import SensorNoise, Sensors, Supply
 from pzd.simulate.policies import SENSED
-from pzd.simulate.ride.model import (
-    WORKSPACE_ROWS,
-    Axle,
-    State,
-    Vehicle,
-)
+from pzd.simulate.ride.model import WORKSPACE_ROWS, Axle, State, Vehicle
 
 CHANNELS = SENSED + 1
 """Those of a feedback policy, then the acceleration of the body."""

@@ -15,14 +15,7 @@ import numpy as np
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.ride.equations import motion, remember_step
-from pzd.simulate.ride.model import (
-    DYNAMIC,
-    STATES,
-    Axle,
-    Command,
-    RideModel,
-    State,
-)
+from pzd.simulate.ride.model import DYNAMIC, STATES, Axle, Command, RideModel, State
 
 # --- Coefficients of the pair of order 5(4), the last stage being the first of the next step ---
 #

@@ -298,7 +298,7 @@ class Setup:
         return self._rated(outcome, steps * h - _SHORT_PERIODS * period)
 
     def _rated(self, outcome: Outcome, after: float) -> tuple[float, float]:
-        """Return discomfort of a ride after a time [s] by the measure of `best_found` [m/s2], and its larger load [N]."""
+        """Return discomfort by the measure of `best_found` [m/s2] and larger load [N] of a ride after a time [s]."""
         first = round(after / outcome.step)
         a_K = outcome.comfort
         judged = weighted(a_K, 1.0 / outcome.step) if self.config.best_found.measure == "a_w" else a_K

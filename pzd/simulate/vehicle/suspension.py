@@ -10,12 +10,7 @@ import math
 
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
-from pzd.simulate.ride.model import (
-    Axle,
-    RoadCoefficients,
-    State,
-    Vehicle,
-)
+from pzd.simulate.ride.model import Axle, RoadCoefficients, State, Vehicle
 
 # --- Tyre of a wheel with mass ---
 

@@ -11,13 +11,7 @@ import math
 from pzd.compiled import compiled, inlined
 from pzd.damper.compiled.kernels import effective_voltage_after, keep_voltage
 from pzd.record import Array
-from pzd.simulate.control.prediction.forecast import (
-    fill_forecast,
-    fill_known,
-    learn,
-    observed_height,
-    unforeseen,
-)
+from pzd.simulate.control.prediction.forecast import fill_forecast, fill_known, learn, observed_height, unforeseen
 from pzd.simulate.control.prediction.plant import predicted, weigh
 from pzd.simulate.control.prediction.predictor import (
     ACCELERATION,
