@@ -9,7 +9,7 @@ from pzd.damper.compiled.rows import row_at
 from pzd.simulate.ride import riding
 from pzd.simulate.ride.equations import motion, oil_energy
 from pzd.simulate.ride.loop import set_control
-from pzd.simulate.ride.model import Axle, Command, RideModel, State, at_rest, control, effective_voltage, workspace
+from pzd.simulate.ride.model import Axle, Command, RideModel, State, at_rest, effective_voltage, ride_of
 from pzd.simulate.ride.stepper import STAGES, advance, integrator_of
 
 STEP = 2e-5
@@ -20,8 +20,8 @@ BEFORE, AFTER = 20_000, 1_000
 def model_of(ride, monkeypatch) -> RideModel:
     """What a ride at 150 V on a random road knows."""
     known = []
-    original = riding.ride
-    monkeypatch.setattr(riding, "ride", lambda y, model, *rest: known.append(model) or original(y, model, *rest))
+    original = riding.ride_steps
+    monkeypatch.setattr(riding, "ride_steps", lambda y, of, *rest: known.append(of.model) or original(y, of, *rest))
     road = {"kind": "iso8608", "road_class": "C", "seed": 1}
     ride("passive", "dynamic", roads=[road], passive_voltage_V=150.0, duration_s=0.5, settle_s=0.1)
     return known[0]
@@ -40,23 +40,25 @@ def test_the_work_of_the_valve_is_half_the_square_of_the_deflection_over_the_sti
 ) -> None:
     """W = integral e^2 / 2 dk in small steps is what the oil springs gain beyond what motion puts into them."""
     model = model_of(ride, monkeypatch)
-    y, acts, room = at_rest(model.car), control(0.0), workspace()
+    y, going = at_rest(model.car), ride_of(model)
+    acts, room = going.control, going.workspace
+    acts[Command.SET] = acts[Command.BEHIND :] = 0.0
     integrator = integrator_of(1e-11, y.size)
     stages = integrator.stages
     work = gained = 0.0
     for n in range(BEFORE + AFTER):
         time = n * STEP
         if n == BEFORE:
-            set_control(time, y, model, None, None, acts, room, stages[STAGES])
-            gained = oil_energy(time, y, model, acts, room) - y[State.OIL_WORK]
-        motion(time, y, model, acts, room, stages[0])
+            set_control(time, y, going, None, None, stages[STAGES])
+            gained = oil_energy(time, y, going) - y[State.OIL_WORK]
+        motion(time, y, going, stages[0])
         before = [(0.5 * room[Axle.OIL_DEFLECTION, i] ** 2, stiffness(model, acts, i, time)) for i in range(2)]
-        advance(time, STEP, y, model, acts, room, integrator, STEP)
-        motion(time + STEP, y, model, acts, room, stages[0])
+        advance(time, STEP, y, going, integrator, STEP)
+        motion(time + STEP, y, going, stages[0])
         for i, (was, k) in enumerate(before):
             now = 0.5 * room[Axle.OIL_DEFLECTION, i] ** 2
             work += model.car.dampers[i] * 0.5 * (was + now) * (stiffness(model, acts, i, time + STEP) - k)
-    last = oil_energy((BEFORE + AFTER) * STEP, y, model, acts, room) - y[State.OIL_WORK]
+    last = oil_energy((BEFORE + AFTER) * STEP, y, going) - y[State.OIL_WORK]
     assert acts[Command.SET, 0] == 150.0
     assert abs(work) > 0.05
     assert last - gained == pytest.approx(work, rel=1e-4)

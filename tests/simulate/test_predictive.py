@@ -29,15 +29,15 @@ from pzd.simulate.ride.equations import motion
 from pzd.simulate.ride.loop import set_control
 from pzd.simulate.ride.model import (
     Axle,
+    Ride,
     RideModel,
     State,
     at_rest,
-    control,
     dynamic_damper_of,
     grid_of,
+    ride_of,
     road_coefficients,
     vehicle,
-    workspace,
 )
 from pzd.simulate.ride.riding import FixedValues, control_spec_of
 from pzd.simulate.ride.stepper import advance, integrator_of
@@ -82,15 +82,15 @@ def model_of(damper: Damper, policy: str, voltage: float, **given: object) -> tu
     return model, predictor_of(config.comfort_predictive, config.control_period_s, dynamic, car, speed, grid.voltages)
 
 
-def ahead(model: RideModel, y, acts, room, start: float, seconds: float) -> np.ndarray:
+def ahead(y, ride: Ride, start: float, seconds: float) -> np.ndarray:
     """Bring a ride forward by the integrator of the loop, its voltage set once at the start; the largest motion."""
     peak = np.abs(y)
     scratch, integrator = np.zeros_like(y), integrator_of(1e-9, y.size)
-    set_control(start, y, model, None, None, acts, room, scratch)
+    set_control(start, y, ride, None, None, scratch)
     for n in range(round(seconds / STEP)):
-        advance(start + n * STEP, STEP, y, model, acts, room, integrator, STEP)
+        advance(start + n * STEP, STEP, y, ride, integrator, STEP)
         peak = np.maximum(peak, np.abs(y))
-    motion(start + seconds, y, model, acts, room, scratch)
+    motion(start + seconds, y, ride, scratch)
     return peak
 
 
@@ -113,11 +113,11 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
         damper = damper.with_effect(name, values)
     road = [{"kind": "iso8608", "road_class": "C", "seed": 1}]
     given = {"roads": road, "car": car, "comfort_predictive": {"road": "known", "hold_s": 0.02, "horizon_s": 0.04}}
-    before, room, acts = model_of(damper, "passive", 75.0, **given)[0], workspace(), control(75.0)
-    y = at_rest(before.car)
-    peak = ahead(before, y, acts, room, 0.0, 1.5)
+    before = ride_of(model_of(damper, "passive", 75.0, **given)[0])
+    y, room = at_rest(before.model.car), before.workspace
+    peak = ahead(y, before, 0.0, 1.5)
     predicting, plan = model_of(damper, "comfort_predictive", 75.0, **given)
-    choose(1.5, 0.0, y, predicting, plan, acts, room)
+    choose(1.5, 0.0, y, before._replace(model=predicting), plan)
     state, levels = np.array(plan.workspace.states[NOW]), plan.workspace.hold_levels
     predicted(
         predicting.car,
@@ -130,7 +130,7 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
         1e9,
     )
     after, _ = model_of(damper, "passive", float(plan.candidates[candidate]), **given)
-    ahead(after, y, acts, room, 1.5, 0.02)
+    ahead(y, before._replace(model=after), 1.5, 0.02)
     assert np.max(np.abs(state[: State.OIL_1] - y[: State.OIL_1]) / peak[: State.OIL_1]) < motion_off
     if car:
         wheels = slice(State.WHEEL_1, State.WHEEL_RATE_2 + 1)

@@ -78,7 +78,7 @@ def test_a_forecast_is_never_faster_than_the_road_was(damper, rng, faint) -> Non
     heights = np.where(time > 0.2, 0.02 * np.sin(2.0 * math.pi * 2.25 * (time - 0.2)), 0.0)
     heights += faint * rng.standard_normal(time.size)
     for n, height in enumerate(heights):
-        plan.observed.ride[OBSERVATIONS] = n * plan.settings.every
+        plan.observed.measured[OBSERVATIONS] = n * plan.settings.every
         learn(plan, float(height))
         fastest = max(fastest, abs(height - heights[max(n - 1, 0)]) / period)
         assert np.max(np.abs(plan.forecast.forecasts[n % plan.forecast.skill.shape[1]])) <= fastest * (1.0 + 1e-12)

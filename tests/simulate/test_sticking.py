@@ -17,9 +17,9 @@ from pzd.simulate.ride.model import (
     RideModel,
     State,
     at_rest,
-    control,
     dynamic_damper_of,
     grid_of,
+    ride_of,
     road_coefficients,
     vehicle,
     workspace,
@@ -36,7 +36,7 @@ def test_the_suspensions_accelerate_as_body_and_road_do(rng: np.random.Generator
     """dV/dt = H^T d2X/dt2 - d2xi/dt2 with all forces, zero where an axle sticks; wheels with mass take their part."""
     car = replace(cars()["makowski2021"], unsprung_masses=unsprung)
     for _ in range(20):
-        acts, scratch = control(0.0), workspace()
+        acts, scratch = np.zeros((Command.BEHIND, 2)), workspace()
         acts[Command.SIDE] = sides
         scratch[Axle.SPRINGS], scratch[Axle.FORCE] = rng.normal(size=(2, 2)) * 1000.0
         scratch[Axle.LIFT] = rng.normal(size=2) * 5.0
@@ -68,14 +68,15 @@ def test_an_axle_is_stopped_by_an_impulse_between_body_and_wheel(damper, table, 
         grid,
         dynamic,
     )
-    y, acts, room = at_rest(model.car), control(0.0), workspace()
+    y, ride = at_rest(model.car), ride_of(model)
+    room = ride.workspace
     y[State.HEAVE_RATE], y[State.PITCH_RATE] = 0.3, -0.1
     wheels = car.wheels_have_mass
     if wheels:
         y[State.WHEEL_RATE_1 : State.WHEEL_RATE_1 + 2] = 0.2, -0.4
-    motion(0.0, y, model, acts, room, np.zeros_like(y))
+    motion(0.0, y, ride, np.zeros_like(y))
     before, other = y.copy(), room[Axle.RATE, 0]
-    choose_side(1, 0.0, y, model, acts, room, np.zeros_like(y))
+    choose_side(1, 0.0, y, ride, np.zeros_like(y))
     assert room[Axle.RATE, 1] == pytest.approx(0.0, abs=1e-15)
     assert (room[Axle.RATE, 0] != other) or wheels
     if wheels:

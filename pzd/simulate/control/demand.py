@@ -16,6 +16,7 @@ from pzd.simulate.ride.model import (
     Axle,
     Command,
     ControlSpec,
+    Ride,
     State,
     TableArrays,
     Vehicle,
@@ -253,42 +254,38 @@ def spring_acceleration(car: Vehicle, deflection: Array) -> float:
 
 
 @compiled
-def choose_hardness(control_spec: ControlSpec, car: Vehicle, y: Array, control: Array, workspace: Array) -> None:
+def choose_hardness(y: Array, ride: Ride) -> None:
     """Fill whether each damper is to be hard, by the workspace as the motion left it."""
+    control_spec, car, workspace = ride.model.control_spec, ride.model.car, ride.workspace
     for i in range(2):
         signal = feedback_force(control_spec.gains[i], y, workspace)
         acceleration = workspace[Axle.BODY, 0] + car.arms[i] * workspace[Axle.BODY, 1]
         hard = is_hard(workspace[Axle.RATE, i], signal, acceleration, control_spec.crossover)
-        control[Command.HARD, i] = 1.0 if hard else 0.0
+        ride.control[Command.HARD, i] = 1.0 if hard else 0.0
 
 
 @inlined
-def wanted_force(control_spec: ControlSpec, axle: int, y: Array, control: Array, workspace: Array) -> float:
+def wanted_force(axle: int, y: Array, ride: Ride) -> float:
     """Return what a feedback or a switch asks of one axle within the workspace's bounds [N]."""
+    control_spec, workspace = ride.model.control_spec, ride.workspace
     low, high = workspace[Axle.LOW, axle], workspace[Axle.HIGH, axle]
     if control_spec.aim == SWITCH:
-        return switched_force(control[Command.HARD, axle] > 0.0, workspace[Axle.SIDED_RATE, axle], low, high)
+        return switched_force(ride.control[Command.HARD, axle] > 0.0, workspace[Axle.SIDED_RATE, axle], low, high)
     return float(min(max(feedback_force(control_spec.gains[axle], y, workspace), low), high))
 
 
 @compiled
-def demand(control_spec: ControlSpec, car: Vehicle, y: Array, control: Array, workspace: Array) -> None:
+def demand(y: Array, ride: Ride) -> None:
     """Fill the workspace's forces with what the policy asks of both axles within the workspace's bounds [N]."""
-    if control_spec.aim == MINIMISE and control_spec.tie == LEAST_LOAD:
-        springs = (car.stiffness[0] * workspace[Axle.DEFLECTION, 0], car.stiffness[1] * workspace[Axle.DEFLECTION, 1])
-        least_load_forces(springs, car.comfort, workspace[Axle.LOW], workspace[Axle.HIGH], workspace[Axle.FORCE])
+    control_spec, car, workspace = ride.model.control_spec, ride.model.car, ride.workspace
+    if control_spec.aim != MINIMISE:
+        for i in range(2):
+            workspace[Axle.FORCE, i] = wanted_force(i, y, ride)
         return
-    if control_spec.aim == MINIMISE:
-        a0 = spring_acceleration(car, workspace[Axle.DEFLECTION])
-        least_acceleration_forces(
-            a0,
-            car.comfort,
-            workspace[Axle.LOW],
-            workspace[Axle.HIGH],
-            control_spec.tie,
-            int(control[Command.TIE_END, 1]),
-            workspace[Axle.FORCE],
-        )
-        return
-    for i in range(2):
-        workspace[Axle.FORCE, i] = wanted_force(control_spec, i, y, control, workspace)
+    deflection, low, high = workspace[Axle.DEFLECTION], workspace[Axle.LOW], workspace[Axle.HIGH]
+    if control_spec.tie == LEAST_LOAD:
+        springs = (car.stiffness[0] * deflection[0], car.stiffness[1] * deflection[1])
+        least_load_forces(springs, car.comfort, low, high, workspace[Axle.FORCE])
+    else:
+        a0, end = spring_acceleration(car, deflection), int(ride.control[Command.TIE_END, 1])
+        least_acceleration_forces(a0, car.comfort, low, high, control_spec.tie, end, workspace[Axle.FORCE])

@@ -15,7 +15,7 @@ from pzd.simulate.ride.model import (
     TABLE,
     Axle,
     Command,
-    RideModel,
+    Ride,
     State,
     TableArrays,
     Vehicle,
@@ -70,7 +70,7 @@ def accelerate(car: Vehicle, control: Array, workspace: Array) -> None:
     Parameters
     ----------
     car : the half-car
-    control, workspace : see `ride_model`; forces and accelerations are filled
+    control, workspace : of the ride; forces and accelerations are filled
     """
     w0, w1, cross = car.mobility
     s0, s1 = workspace[Axle.SPRINGS, 0], workspace[Axle.SPRINGS, 1]
@@ -124,8 +124,9 @@ def tabled(car: Vehicle, grid: TableArrays, axle: int, voltage: float, velocity:
 
 
 @inlined
-def quasistatic_forces(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+def quasistatic_forces(y: Array, ride: Ride) -> None:
     """Fill the workspace's forces for axles that slip; one that sticks is left to what holds it."""
+    model, control, workspace = ride
     control_spec = model.control_spec
     for i in range(2):
         velocity = workspace[Axle.RATE, i]
@@ -142,14 +143,15 @@ def quasistatic_forces(y: Array, model: RideModel, control: Array, workspace: Ar
         return
     if control_spec.jumps and control[Command.SIDE, 0] * control[Command.SIDE, 1] == 0.0:
         if control[Command.SIDE, 0] != control[Command.SIDE, 1]:
-            _force_outside_sticking(y, model, control, workspace)
+            _force_outside_sticking(y, ride)
         return
-    demand(control_spec, model.car, y, control, workspace)
+    demand(y, ride)
 
 
 @inlined
-def _force_outside_sticking(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+def _force_outside_sticking(y: Array, ride: Ride) -> None:
     """Fill the force of the free axle where the other sticks: the policy knows that the stuck one answers."""
+    model, control, workspace = ride
     control_spec, car = model.control_spec, model.car
     stuck = 0 if control[Command.SIDE, 0] == 0.0 else 1
     free = 1 - stuck
@@ -162,7 +164,7 @@ def _force_outside_sticking(y: Array, model: RideModel, control: Array, workspac
         wanted = -a0 / slope if slope != 0.0 else 0.0
         workspace[Axle.FORCE, free] = min(max(wanted, workspace[Axle.LOW, free]), workspace[Axle.HIGH, free])
     else:
-        workspace[Axle.FORCE, free] = wanted_force(control_spec, free, y, control, workspace)
+        workspace[Axle.FORCE, free] = wanted_force(free, y, ride)
 
 
 # --- Damper forces by the dynamics of the damper (`dynamic`), and the derivative of the state ---
@@ -178,8 +180,9 @@ def body_acceleration(car: Vehicle, load0: float, load1: float) -> tuple[float, 
 
 
 @inlined
-def dynamic_forces(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+def dynamic_forces(time: float, y: Array, ride: Ride) -> None:
     """Fill the workspace's forces from where the oil has flowed to."""
+    model, control, workspace = ride
     car, damper = model.car, model.damper
     elapsed = time - control[Command.SINCE, 0]
     for i in range(2):
@@ -210,8 +213,9 @@ def dynamic_forces(time: float, y: Array, model: RideModel, control: Array, work
 
 
 @compiled
-def remember_step(time: float, model: RideModel, control: Array, workspace: Array) -> None:
+def remember_step(time: float, ride: Ride) -> None:
     """Bring what remembers beside the elements to the end of a step [s] in which no axle turned round; see `motion`."""
+    model, control, workspace = ride
     damper = model.damper
     for i in range(2):
         voltage = effective_voltage(
@@ -222,31 +226,31 @@ def remember_step(time: float, model: RideModel, control: Array, workspace: Arra
 
 
 @compiled
-def relax_oil(time: float, y: Array, model: RideModel, workspace: Array) -> None:
+def relax_oil(time: float, y: Array, ride: Ride) -> None:
     """Let the oil of every damper flow to where its stiffness bears nothing, as it does while the car stands."""
+    model, workspace = ride.model, ride.workspace
     suspension(time, y, model.car, model.road_coefficients, workspace)
     for i in range(2):
         y[State.OIL_1 + i] = model.car.ratio[i] * workspace[Axle.DEFLECTION, i]
 
 
 @compiled
-def motion(time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array) -> None:
+def motion(time: float, y: Array, ride: Ride, dy: Array) -> None:
     """Fill `dy` with the derivative of the state: eq. (6) of Makowski and Knap 2021, S_i = k_i U_i.
 
     Parameters
     ----------
     time : [s]
     y : (n,) state: `STATES`, or `STATES_WITH_WHEELS`
-    model : what stays the same
-    control : what the controller last set
-    workspace : filled with deflections, forces and accelerations
+    ride : its workspace is filled with deflections, forces and accelerations
     dy : (n,) filled
     """
+    model, control, workspace = ride
     car = model.car
     suspension(time, y, car, model.road_coefficients, workspace)
     if control[Command.SIDE, 0] * control[Command.SIDE, 1] == 0.0:
-        _try_sides(time, y, model, control, workspace)
-    _act(time, y, model, control, workspace)
+        _try_sides(time, y, ride)
+    _act(time, y, ride)
     load0, load1 = (
         workspace[Axle.SPRINGS, 0] + workspace[Axle.FORCE, 0],
         workspace[Axle.SPRINGS, 1] + workspace[Axle.FORCE, 1],
@@ -267,36 +271,39 @@ def motion(time: float, y: Array, model: RideModel, control: Array, workspace: A
     )
     for i in range(2):
         if model.control_spec.fidelity == DYNAMIC:
-            _add_damper_power(model, workspace, i, dy)
+            _add_damper_power(ride, i, dy)
         else:
             dy[State.DISSIPATED] += workspace[Axle.FORCE, i] * workspace[Axle.RATE, i]
 
 
 @inlined
-def _act(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+def _act(time: float, y: Array, ride: Ride) -> None:
     """Fill the damper forces, and dV/dt of both axles."""
+    model, control, workspace = ride
     if model.control_spec.fidelity == DYNAMIC:
-        dynamic_forces(time, y, model, control, workspace)
+        dynamic_forces(time, y, ride)
     else:
-        quasistatic_forces(y, model, control, workspace)
+        quasistatic_forces(y, ride)
     accelerate(model.car, control, workspace)
 
 
 @compiled
-def _try_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+def _try_sides(time: float, y: Array, ride: Ride) -> None:
     """Fill how each sticking axle would be pushed away from V = 0, were it to slip to the one or the other side."""
+    control, workspace = ride.control, ride.workspace
     for i in range(2):
         if control[Command.SIDE, i] == 0.0:
             for n in range(2):
                 control[Command.SIDE, i] = 1.0 - 2.0 * n
-                _act(time, y, model, control, workspace)
+                _act(time, y, ride)
                 workspace[Axle.REBOUND_PUSH + n, i] = control[Command.SIDE, i] * workspace[Axle.ACCELERATION, i]
             control[Command.SIDE, i] = 0.0
 
 
 @inlined
-def _add_damper_power(model: RideModel, workspace: Array, axle: int, dy: Array) -> None:
+def _add_damper_power(ride: Ride, axle: int, dy: Array) -> None:
     """Add the powers of the dampers of one axle to the derivative of the energies, and fill the flow of its oil."""
+    model, workspace = ride.model, ride.workspace
     n, speed = model.car.dampers[axle], model.car.ratio[axle] * workspace[Axle.RATE, axle]
     inertia = workspace[Axle.INERTANCE, axle] * workspace[Axle.ACCELERATION, axle] * workspace[Axle.RATE, axle]
     dy[State.OIL_1 + axle] = workspace[Axle.FLOW, axle]
@@ -317,7 +324,7 @@ _NOTHING = 1e-12
 
 
 @compiled
-def stored_energy(time: float, y: Array, model: RideModel, workspace: Array) -> float:
+def stored_energy(time: float, y: Array, ride: Ride) -> float:
     """Return the energy of body and springs, and of wheels and tyres where wheels have mass.
 
     Equation: E = m (dz/dt)^2 / 2 + J (dphi/dt)^2 / 2 + sum k_i U_i^2 / 2 + sum m_i (dzeta_i/dt)^2 / 2 + sum E_tyre
@@ -326,12 +333,13 @@ def stored_energy(time: float, y: Array, model: RideModel, workspace: Array) -> 
     ----------
     time : [s]
     y : (n,) state
-    model, workspace : see `ride_model`
+    ride : its workspace is changed
 
     Returns
     -------
     energy [J]
     """
+    model, workspace = ride.model, ride.workspace
     car = model.car
     suspension(time, y, car, model.road_coefficients, workspace)
     energy = 0.5 * car.mass * y[State.HEAVE_RATE] ** 2 + 0.5 * car.inertia * y[State.PITCH_RATE] ** 2
@@ -346,7 +354,7 @@ def stored_energy(time: float, y: Array, model: RideModel, workspace: Array) -> 
 
 
 @compiled
-def oil_energy(time: float, y: Array, model: RideModel, control: Array, workspace: Array) -> float:
+def oil_energy(time: float, y: Array, ride: Ride) -> float:
     """Return the energy of the oil stiffnesses of all dampers [J].
 
     Equation: E = sum n_i k integral s de, e = r_i U_i - y_i
@@ -355,8 +363,9 @@ def oil_energy(time: float, y: Array, model: RideModel, control: Array, workspac
     ----------
     time : [s]
     y : (n,) state
-    model, control, workspace : see `ride_model`
+    ride : its workspace is changed
     """
+    model, control, workspace = ride
     car, damper, energy = model.car, model.damper, 0.0
     if model.control_spec.fidelity != DYNAMIC:
         return energy

@@ -25,6 +25,7 @@ from pzd.simulate.ride.model import (
     Axle,
     Command,
     ControlSpec,
+    Ride,
     RideModel,
     State,
     place,
@@ -52,8 +53,9 @@ def _stays(control_spec: ControlSpec, control: Array) -> bool:
 
 
 @inlined
-def _choose_ends(y: Array, model: RideModel, control: Array, workspace: Array) -> None:
+def _choose_ends(y: Array, ride: Ride) -> None:
     """Fill the bounds of both axles, and what stays as it is until the controller acts again."""
+    model, control, workspace = ride
     control_spec, car = model.control_spec, model.car
     for i in range(2):
         workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = bounds_of(
@@ -61,7 +63,7 @@ def _choose_ends(y: Array, model: RideModel, control: Array, workspace: Array) -
         )
         workspace[Axle.SIDED_RATE, i] = workspace[Axle.RATE, i]
     if control_spec.aim == SWITCH:
-        choose_hardness(control_spec, car, y, control, workspace)
+        choose_hardness(y, ride)
     if control_spec.aim == MINIMISE and control_spec.tie == LARGEST:
         a0 = spring_acceleration(car, workspace[Axle.DEFLECTION])
         control[Command.TIE_END, 1] = farther_end(a0, car.comfort, workspace[Axle.LOW], workspace[Axle.HIGH])
@@ -69,14 +71,7 @@ def _choose_ends(y: Array, model: RideModel, control: Array, workspace: Array) -
 
 @compiled
 def set_control(
-    time: float,
-    y: Array,
-    model: RideModel,
-    plan: Predictor | None,
-    electronics: Electronics | None,
-    control: Array,
-    workspace: Array,
-    scratch: Array,
+    time: float, y: Array, ride: Ride, plan: Predictor | None, electronics: Electronics | None, scratch: Array
 ) -> None:
     """Let the controller act once: what it asks of each axle, and the voltage that gives it by the table.
 
@@ -84,37 +79,36 @@ def set_control(
     ----------
     time : [s]
     y : (n,) state
-    model : see `ride_model`
+    ride : its control is changed in place
     plan : of the aim `PREDICT`; without it nothing of the prediction is compiled
     electronics : sensors and supply; without it the controller sees all, and its voltage is set, exactly and at once
-    control, workspace : see `ride_model`; the control is changed in place
     scratch : (n,) to work in
     """
-    control_spec, car = model.control_spec, model.car
+    model, control, control_spec = ride.model, ride.control, ride.model.control_spec
     if _acts_at_once(control_spec) or _stays(control_spec, control):
         return
-    motion(time, y, model, control, workspace, scratch)
+    motion(time, y, ride, scratch)
     if control_spec.fidelity == IDEAL:
-        _choose_ends(y, model, control, workspace)
+        _choose_ends(y, ride)
         return
-    seen, room, age = y, workspace, 0.0
+    seen, view, age = y, ride, 0.0
     if electronics is not None:
-        age = sense(y, car, workspace, electronics)
-        seen, room = electronics.state, electronics.workspace
-    _choose_ends(seen, model, control, room)
+        age = sense(y, model.car, ride.workspace, electronics)
+        seen, view = electronics.state, Ride(model, control, electronics.workspace)
+    _choose_ends(seen, view)
     if plan is not None:
-        predict(time, age, seen, model, plan, electronics, control, room)
+        predict(time, age, seen, view, plan, electronics)
         for i in range(2):
-            _set_voltage(time, model, electronics, control, i, float(plan.candidates[plan.chosen[i]]))
+            _set_voltage(time, ride, electronics, i, float(plan.candidates[plan.chosen[i]]))
     else:
         if control_spec.aim not in (VOLTAGE, SCHEDULE):
-            demand(control_spec, car, seen, control, room)
+            demand(seen, view)
         for i in range(2):
-            _set_voltage(time, model, electronics, control, i, _wanted_voltage(time, model, control, room, i))
+            _set_voltage(time, ride, electronics, i, _wanted_voltage(time, view, i))
     control[Command.SINCE, 0] = time
     for i in range(2):
         if control[Command.SIDE, i] == 0.0:
-            choose_side(i, time, y, model, control, workspace, scratch)
+            choose_side(i, time, y, ride, scratch)
 
 
 @inlined
@@ -127,8 +121,9 @@ def scheduled(time: float, model: RideModel, axle: int) -> float:
 
 
 @inlined
-def _wanted_voltage(time: float, model: RideModel, control: Array, workspace: Array, axle: int) -> float:
+def _wanted_voltage(time: float, ride: Ride, axle: int) -> float:
     """Return the voltage that the policy asks of an axle [V]; a force that it asks is noted."""
+    model, control, workspace = ride
     aim = model.control_spec.aim
     if aim == VOLTAGE:
         return model.control_spec.voltage
@@ -156,17 +151,12 @@ def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, oth
 
 
 @compiled
-def _set_voltage(
-    time: float,
-    model: RideModel,
-    electronics: Electronics | None,
-    control: Array,
-    axle: int,
-    asked: float,
-) -> None:
-    voltage = asked
+def _set_voltage(time: float, ride: Ride, electronics: Electronics | None, axle: int, asked: float) -> None:
+    """Set the voltage of an axle as the supply can, and note what stands behind each drive effect then."""
+    model = ride.model
+    control, voltage = ride.control, asked
     if electronics is not None:
-        voltages = model.grid.voltages
+        voltages = ride.model.grid.voltages
         voltage = supplied(asked, control[Command.SET, axle], voltages[0], voltages[-1], electronics)
     keep_voltage(
         control[Command.SET, axle],
@@ -219,8 +209,9 @@ def records_of(rows: int, per_output: int) -> Records:
 
 
 @inlined
-def beyond_reach(model: RideModel, control: Array, workspace: Array) -> bool:
+def beyond_reach(ride: Ride) -> bool:
     """Tell whether a damper moves faster than the rig did at its voltage; `ideal` has none, so at the best one."""
+    model, control, workspace = ride
     grid, car = model.grid, model.car
     last = grid.reach.size - 1
     for i in range(2):
@@ -235,8 +226,9 @@ def beyond_reach(model: RideModel, control: Array, workspace: Array) -> bool:
 
 
 @inlined
-def _note(time: float, y: Array, model: RideModel, control: Array, workspace: Array, row: Array) -> None:
+def _note(time: float, y: Array, ride: Ride, row: Array) -> None:
     """Fill one row of the history."""
+    model, control, workspace = ride
     row[0], row[1], row[2], row[3] = time, y[0], y[1], workspace[Axle.COMFORT, 0]
     for i in range(2):
         row[4 + 6 * i] = workspace[Axle.DEFLECTION, i]
@@ -257,13 +249,11 @@ def _keep(y: Array, workspace: Array, row: Array) -> None:
 
 
 @compiled
-def ride(
+def ride_steps(
     y: Array,
-    model: RideModel,
+    ride: Ride,
     plan: Predictor | None,
     electronics: Electronics | None,
-    control: Array,
-    workspace: Array,
     first: int,
     last: int,
     clock: Clock,
@@ -275,44 +265,44 @@ def ride(
     Parameters
     ----------
     y : (n,) state; changed in place
-    model : what stays the same
+    ride : its control and its workspace are changed in place
     plan, electronics : see `set_control`; the noise of as many acts as are due
-    control : see `Command`; changed in place
-    workspace : see `Axle`
     first, last : steps to be kept, the last one not
     clock : steps of the whole ride
     integrator : see `advance`
     records : filled; fewer steps are done where the table ends
     """
+    workspace = ride.workspace
     h, tally, scratch = clock.step, records.tally, integrator.stages[STAGES]
     if first == 0:
         tally[NEXT_PIECE] = h
-        _start(y, model, control, workspace, scratch)
+        _start(y, ride, scratch)
     dt, noted = tally[NEXT_PIECE], 0
     for n in range(first, last):
         time = n * h
         if n % clock.per_control == 0:
-            set_control(time, y, model, plan, electronics, control, workspace, scratch)
-        motion(time, y, model, control, workspace, integrator.stages[0])
+            set_control(time, y, ride, plan, electronics, scratch)
+        motion(time, y, ride, integrator.stages[0])
         _keep(y, workspace, records.course[n - first])
         tally[STEPS_DONE] = n
         if math.isnan(workspace[Axle.COMFORT, 0]):
             return
-        if beyond_reach(model, control, workspace):
+        if beyond_reach(ride):
             tally[OUTSIDE] += 1.0
         if n % clock.per_output == 0:
-            _note(time, y, model, control, workspace, records.history[noted])
+            _note(time, y, ride, records.history[noted])
             noted += 1
         if n < clock.steps:
-            dt = advance(time, h, y, model, control, workspace, integrator, min(dt, h))
+            dt = advance(time, h, y, ride, integrator, min(dt, h))
     tally[NEXT_PIECE] = dt
 
 
 @inlined
-def _start(y: Array, model: RideModel, control: Array, workspace: Array, scratch: Array) -> None:
+def _start(y: Array, ride: Ride, scratch: Array) -> None:
     """Find to which side each axle sets off, or that it sticks."""
-    motion(0.0, y, model, control, workspace, scratch)
+    model, control, workspace = ride
+    motion(0.0, y, ride, scratch)
     for i in range(2):
         control[Command.SIDE, i] = 1.0 if workspace[Axle.RATE, i] >= 0.0 else -1.0
         if model.control_spec.jumps and workspace[Axle.RATE, i] == 0.0:
-            choose_side(i, 0.0, y, model, control, workspace, scratch)
+            choose_side(i, 0.0, y, ride, scratch)

@@ -261,6 +261,16 @@ class RideModel(NamedTuple):
     damper: DynamicDamper
 
 
+class Ride(NamedTuple):
+    """A ride under way."""
+
+    model: RideModel
+    control: Array
+    """(BEHIND + d, 2) what the controller last did, see `Command`."""
+    workspace: Array
+    """(WORKSPACE_ROWS, 2) intermediate results, see `Axle`."""
+
+
 def vehicle(car: HalfCar, speed: float) -> Vehicle:
     """Return the car as numbers, at a speed of the vehicle [m/s]."""
     H, D, W = car.force_directions(), car.force_to_comfort(), car.mobility()
@@ -294,12 +304,12 @@ def road_coefficients(profile: Profile, wheelbase: float) -> RoadCoefficients:
     )
 
 
-def control(voltage: float) -> Array:
-    """Return the control before its first act, the valves at rest at a voltage [V]."""
-    table = np.zeros((Command.BEHIND + len(acting("drive")), 2))
-    table[Command.SET] = table[Command.BEHIND :] = voltage
-    table[Command.SIDE] = 1.0
-    return table
+def ride_of(model: RideModel) -> Ride:
+    """Return a ride before its first act, the valves at rest at the voltage of the policy."""
+    control = np.zeros((Command.BEHIND + len(acting("drive")), 2))
+    control[Command.SET] = control[Command.BEHIND :] = model.control_spec.voltage
+    control[Command.SIDE] = 1.0
+    return Ride(model, control, workspace())
 
 
 def at_rest(car: Vehicle) -> Array:

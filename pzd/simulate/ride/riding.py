@@ -17,7 +17,7 @@ from pzd.simulate.control.sensing import electronics_of, with_noise
 from pzd.simulate.policies import SENSED
 from pzd.simulate.ride.equations import balance_error, oil_energy, relax_oil, stored_energy
 from pzd.simulate.ride.linear import ride_exactly
-from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, Clock, records_of, ride
+from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, Clock, records_of, ride_steps
 from pzd.simulate.ride.model import (
     BY_COEFFICIENTS,
     BY_TABLE,
@@ -38,11 +38,10 @@ from pzd.simulate.ride.model import (
     State,
     TableArrays,
     at_rest,
-    control,
+    ride_of,
     road_coefficients,
     rubs,
     vehicle,
-    workspace,
 )
 from pzd.simulate.ride.outcome import Outcome, SpilledRows, longest_piece
 from pzd.simulate.ride.stepper import integrator_of
@@ -176,7 +175,7 @@ def ride_case(
     )
     spec = control_spec_of(config, case, car, damper, fixed)
     model = RideModel(vehicle(car, speed), road_coefficients(profile, car.wheelbase), spec, grid, own)
-    y, acts, scratch = at_rest(model.car), control(spec.voltage), workspace()
+    y, ride = at_rest(model.car), ride_of(model)
     plan = None
     if case.policy.aim == "predict":
         plan = predictor_of(config.comfort_predictive, config.control_period_s, own, car, speed, grid.voltages)
@@ -186,23 +185,23 @@ def ride_case(
     rows = count if sink is None else min(longest_piece(clock.step), count)
     records, integrator = records_of(rows, clock.per_output), integrator_of(config.tolerance, y.size)
     spilled = None if sink is None else SpilledRows(COLUMNS)
-    relax_oil(0.0, y, model, scratch)
-    before = stored_energy(0.0, y, model, scratch)
+    relax_oil(0.0, y, ride)
+    before = stored_energy(0.0, y, ride)
     for first in range(0, count, rows):
         last = min(first + rows, count)
         if electronics is not None:
             acts_due = -(-last // clock.per_control) - -(-first // clock.per_control)
             electronics = with_noise(electronics, rng, acts_due)
-        ride(y, model, plan, electronics, acts, scratch, first, last, clock, integrator, records)
+        ride_steps(y, ride, plan, electronics, first, last, clock, integrator, records)
         done = records.tally[STEPS_DONE]
         if done < last - 1 or not np.all(np.isfinite(y)):
-            raise DataError(_lost(case.name, done * clock.step, ends, float(np.max(np.abs(scratch[Axle.RATE])))))
+            raise DataError(_lost(case.name, done * clock.step, ends, float(np.max(np.abs(ride.workspace[Axle.RATE])))))
         if sink is not None and spilled is not None:
             sink(first, records.course[: last - first])
             spilled.add(records.history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
     ended, moves = clock.steps * clock.step, spec.aim != VOLTAGE
-    change = stored_energy(ended, y, model, scratch) - before
-    oil_change = y[State.OIL_WORK] if moves else oil_energy(ended, y, model, acts, scratch)  # none at the start
+    change = stored_energy(ended, y, ride) - before
+    oil_change = y[State.OIL_WORK] if moves else oil_energy(ended, y, ride)  # none at the start
     return Outcome(
         history=records.history if spilled is None else spilled,
         course=records.course if sink is None else np.zeros((0, COURSE_COLUMNS)),

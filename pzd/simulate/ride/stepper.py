@@ -15,7 +15,7 @@ import numpy as np
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.ride.equations import motion, remember_step
-from pzd.simulate.ride.model import DYNAMIC, STATES, Axle, Command, RideModel, State
+from pzd.simulate.ride.model import DYNAMIC, STATES, Axle, Command, Ride, State
 
 # --- Coefficients of the pair of order 5(4), the last stage being the first of the next step ---
 #
@@ -84,9 +84,7 @@ def _reach(i: int, dt: float, first: int, last: int, y: Array, integrator: Integ
 
 
 @inlined
-def trial(
-    time: float, dt: float, y: Array, model: RideModel, control: Array, workspace: Array, integrator: Integrator
-) -> float:
+def trial(time: float, dt: float, y: Array, ride: Ride, integrator: Integrator) -> float:
     """Fill the end of the integrator with the state after dt; the workspace is left as it is there.
 
     Source: Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2
@@ -95,18 +93,19 @@ def trial(
     ----------
     time, dt : [s]
     y : (n,) state
-    model, control, workspace : see `ride_model`
+    ride : its workspace is filled
     integrator : its first stage is the derivative at the start; the others, the last at the end, and `end` are filled
 
     Returns
     -------
     largest embedded error, as a share of |y| + `SCALES`, that of the oil of `SCALES` alone
     """
+    model = ride.model
     for i in range(1, STAGES):
         _reach(i, dt, 0, y.size if i == STAGES - 1 else State.DISSIPATED, y, integrator)
         if model.car.wheels:
             _reach(i, dt, STATES, y.size, y, integrator)
-        motion(time + TIMES[i] * dt, integrator.end, model, control, workspace, integrator.stages[i])
+        motion(time + TIMES[i] * dt, integrator.end, ride, integrator.stages[i])
     worst = 0.0
     for n in range(y.size):
         error = 0.0
@@ -121,10 +120,9 @@ def trial(
 
 
 @compiled
-def choose_side(
-    axle: int, time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array
-) -> None:
+def choose_side(axle: int, time: float, y: Array, ride: Ride, dy: Array) -> None:
     """Stop the suspension of an axle that is at V = 0, and let it slip to whichever side its forces push it."""
+    model, control, workspace = ride
     car = model.car
     impulse = workspace[Axle.RATE, axle] / car.mobility[axle]
     y[State.HEAVE_RATE] -= impulse / car.mass
@@ -132,7 +130,7 @@ def choose_side(
     if car.wheels:
         y[State.WHEEL_RATE_1 + axle] += impulse / car.unsprung[axle]
     control[Command.SIDE, axle] = 0.0
-    motion(time, y, model, control, workspace, dy)
+    motion(time, y, ride, dy)
     if workspace[Axle.REBOUND_PUSH, axle] > 0.0:
         control[Command.SIDE, axle] = 1.0
     elif workspace[Axle.COMPRESSION_PUSH, axle] > 0.0:
@@ -149,8 +147,9 @@ def beyond(control: Array, workspace: Array, axle: int) -> float:
 
 
 @inlined
-def farthest(model: RideModel, control: Array, workspace: Array) -> float:
+def farthest(ride: Ride) -> float:
     """Return the larger `beyond` of both axles; -1 where the force does not jump at V = 0."""
+    model, control, workspace = ride
     if not model.control_spec.jumps:
         return -1.0
     return max(beyond(control, workspace, 0), beyond(control, workspace, 1))
@@ -176,15 +175,7 @@ def guess(number: int, shortest: float, longest: float, before: float, behind: f
 
 @compiled
 def cut(
-    time: float,
-    longest: float,
-    sharp: float,
-    before: float,
-    y: Array,
-    model: RideModel,
-    control: Array,
-    workspace: Array,
-    integrator: Integrator,
+    time: float, longest: float, sharp: float, before: float, y: Array, ride: Ride, integrator: Integrator
 ) -> tuple[float, float]:
     """Cut a piece of a step right behind a moment at which an axle leaves its side or its stick.
 
@@ -193,17 +184,17 @@ def cut(
     time, longest : start and length of the piece, at the end of which they have changed [s]
     sharp : how closely the moment is found where `farthest` jumps there [s]
     before : `farthest` at the start, below 0
-    y, model, control, workspace, integrator : see `advance`
+    y, ride, integrator : see `advance`
 
     Returns
     -------
     the length that is left [s], and its embedded error, see `trial`
     """
-    shortest, behind, moved, number = 0.0, farthest(model, control, workspace), 0, 0
+    shortest, behind, moved, number = 0.0, farthest(ride), 0, 0
     while longest - shortest > sharp:
         dt = guess(number, shortest, longest, before, behind)
-        worst = trial(time, dt, y, model, control, workspace, integrator)
-        now = farthest(model, control, workspace)
+        worst = trial(time, dt, y, ride, integrator)
+        now = farthest(ride)
         if 0.0 < now <= 1.0:
             return dt, worst
         if now > 0.0:
@@ -213,27 +204,18 @@ def cut(
             behind *= 0.5 if moved < 0 else 1.0
             shortest, before, moved = dt, min(now, -_AIM), -1
         number += 1
-    return longest, trial(time, longest, y, model, control, workspace, integrator)
+    return longest, trial(time, longest, y, ride, integrator)
 
 
 @compiled
-def advance(
-    time: float,
-    h: float,
-    y: Array,
-    model: RideModel,
-    control: Array,
-    workspace: Array,
-    integrator: Integrator,
-    first: float,
-) -> float:
+def advance(time: float, h: float, y: Array, ride: Ride, integrator: Integrator, first: float) -> float:
     """Carry the state through one step of integration.
 
     Parameters
     ----------
     time, h : start and length of the step [s]
     y : (n,) state; changed in place
-    model, control, workspace : see `ride_model`; the workspace as `motion` left it at the start
+    ride : its workspace as `motion` left it at the start
     integrator : its first stage is the derivative at the start
     first : length of the first piece to try [s]
 
@@ -241,14 +223,15 @@ def advance(
     -------
     length of the piece to try next [s]
     """
+    model = ride.model
     done, dt, cuts = 0.0, first, 0
     tolerance, stages = integrator.tolerance, integrator.stages
-    before = min(farthest(model, control, workspace), -_AIM)
+    before = min(farthest(ride), -_AIM)
     while done < h * (1.0 - 1e-12):
         dt = tried = min(dt, h - done)
-        worst = trial(time + done, dt, y, model, control, workspace, integrator)
-        if cuts < _MOST_CUTS and farthest(model, control, workspace) > 0.0:
-            dt, worst = cut(time + done, dt, _SHARP * h, before, y, model, control, workspace, integrator)
+        worst = trial(time + done, dt, y, ride, integrator)
+        if cuts < _MOST_CUTS and farthest(ride) > 0.0:
+            dt, worst = cut(time + done, dt, _SHARP * h, before, y, ride, integrator)
             cuts += 1
         growth = 0.9 * (tolerance / max(worst, 1e-3 * tolerance)) ** 0.2 if tolerance < math.inf else 5.0
         if worst > tolerance and dt > _SMALLEST * h:
@@ -260,13 +243,13 @@ def advance(
         if not worst < math.inf:  # the shortest piece overflowed, too: the ride is lost, see `ride`
             return h
         if model.damper.slips and model.control_spec.fidelity == DYNAMIC:
-            remember_step(time + done, model, control, workspace)
+            remember_step(time + done, ride)
         turned = False
         if model.control_spec.jumps:
-            turned = _choose_sides(time + done, y, model, control, workspace, stages[STAGES])
-            before = min(farthest(model, control, workspace), -_AIM)
+            turned = _choose_sides(time + done, y, ride, stages[STAGES])
+            before = min(farthest(ride), -_AIM)
         if turned:
-            motion(time + done, y, model, control, workspace, stages[0])
+            motion(time + done, y, ride, stages[0])
         else:
             for n in range(y.size):
                 stages[0, n] = stages[STAGES - 1, n]
@@ -275,11 +258,12 @@ def advance(
 
 
 @inlined
-def _choose_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array) -> bool:
+def _choose_sides(time: float, y: Array, ride: Ride, dy: Array) -> bool:
     """Let every axle that is beyond its side slip to the other one or stick, and tell whether there was one."""
+    control, workspace = ride.control, ride.workspace
     turned = False
     for i in range(2):
         if beyond(control, workspace, i) > 0.0:
-            choose_side(i, time, y, model, control, workspace, dy)
+            choose_side(i, time, y, ride, dy)
             turned = True
     return turned

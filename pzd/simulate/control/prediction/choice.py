@@ -36,7 +36,7 @@ from pzd.simulate.control.prediction.predictor import (
     Predictor,
 )
 from pzd.simulate.control.sensing import Electronics, copy_into
-from pzd.simulate.ride.model import Axle, Command, DynamicDamper, RideModel, State, Vehicle
+from pzd.simulate.ride.model import Axle, Command, DynamicDamper, Ride, RideModel, State, Vehicle
 
 _STEEPNESS = 4.0
 """Power with which the weight of a load rises as it leaves that of the best fixed voltage: a tenth more load has
@@ -46,34 +46,31 @@ twice the weight, since it is of mean squares."""
 
 
 @compiled
-def observe(
-    sampled: float, model: RideModel, plan: Predictor, electronics: Electronics | None, workspace: Array
-) -> bool:
+def observe(sampled: float, ride: Ride, plan: Predictor, electronics: Electronics | None) -> bool:
     """Take note of acceleration, loads and road once a control period, and tell whether it is time to choose.
 
     Parameters
     ----------
     sampled : when what the controller sees was [s]
-    model : the ride
+    ride : its workspace as `motion` left it, or as the sensors gave it
     plan : its memory is changed
     electronics : see `set_control`; its noise is in the road under the axles
-    workspace : as `motion` left it, or as the sensors gave it
     """
-    observed, ride, settings = plan.observed, plan.observed.ride, plan.settings
-    number, a_K = int(ride[OBSERVATIONS]), workspace[Axle.COMFORT, 0]
-    weigh(ride, 0, ride[ACCELERATION], a_K, plan.modes[OBSERVED], plan.residues)
-    ride[ACCELERATION] = a_K
+    observed, measured, settings = plan.observed, plan.observed.measured, plan.settings
+    number, a_K = int(measured[OBSERVATIONS]), ride.workspace[Axle.COMFORT, 0]
+    weigh(measured, 0, measured[ACCELERATION], a_K, plan.modes[OBSERVED], plan.residues)
+    measured[ACCELERATION] = a_K
     for i in range(2):
-        load = workspace[Axle.CONTACT, i]
+        load = ride.workspace[Axle.CONTACT, i]
         observed.road[i, 0] = observed.road[i, 1]
-        observed.road[i, 1] = observed_height(sampled, i, model, plan, electronics)
-        ride[MEAN_LOAD_1 + i] += (1.0 - settings.remembered) * (load * load - ride[MEAN_LOAD_1 + i])
-    ride[OBSERVATIONS] = number + 1
+        observed.road[i, 1] = observed_height(sampled, i, ride.model, plan, electronics)
+        measured[MEAN_LOAD_1 + i] += (1.0 - settings.remembered) * (load * load - measured[MEAN_LOAD_1 + i])
+    measured[OBSERVATIONS] = number + 1
     innovations, foreseen = plan.forecast.innovations, settings.observation_s * plan.forecast.speeds[EXPECTED]
     innovations[(number + 1) % innovations.size] = observed.road[0, 1] - observed.road[0, 0] - foreseen
     observed.passed[(number + 1) % observed.passed.size] = observed.road[0, 1]
     if number > 0:
-        ride_fixed(model.car, plan)
+        ride_fixed(ride.model.car, plan)
     return number % settings.every == 0
 
 
@@ -96,25 +93,14 @@ def ride_fixed(car: Vehicle, plan: Predictor) -> None:
 
 
 @compiled
-def predict(
-    time: float,
-    age: float,
-    y: Array,
-    model: RideModel,
-    plan: Predictor,
-    electronics: Electronics | None,
-    control: Array,
-    workspace: Array,
-) -> None:
+def predict(time: float, age: float, y: Array, ride: Ride, plan: Predictor, electronics: Electronics | None) -> None:
     """Observe, and choose anew where it is time; see `choose`."""
-    if observe(time - age, model, plan, electronics, workspace):
-        choose(time, age, y, model, plan, control, workspace)
+    if observe(time - age, ride, plan, electronics):
+        choose(time, age, y, ride, plan)
 
 
 @compiled
-def choose(
-    time: float, age: float, y: Array, model: RideModel, plan: Predictor, control: Array, workspace: Array
-) -> None:
+def choose(time: float, age: float, y: Array, ride: Ride, plan: Predictor) -> None:
     """Choose the voltages with which the ride ahead costs least, and leave them in `Predictor.chosen`.
 
     Equation: (U_1, U_2) = Arg min over U, W in finite sets of J(U for the hold, then W), J of `predicted`
@@ -125,14 +111,14 @@ def choose(
     time : [s]
     age : of state and workspace, by which they lie behind the voltages that are set [s]
     y : (n,) state
-    model : the ride
+    ride : its workspace as `motion` left it, or as the sensors gave it
     plan : its workspace is filled
-    control, workspace : what the controller last set, and the workspace as `motion` left it
     """
+    model = ride.model
     _look_ahead(time - age, model, plan)
     weigh_loads(plan.observed, plan.settings.load_weight, plan.workspace.load_weights)
-    _fill_levels(time, model.damper, plan, control)
-    _fill_now(y, model, plan, workspace)
+    _fill_levels(time, model.damper, plan, ride.control)
+    _fill_now(y, model, plan, ride.workspace)
     held, tails, best = plan.candidates.size, plan.tails.size, math.inf
     if not plan.settings.known:
         best = _best_held_on(model, plan) * (1.0 - plan.settings.margin * unforeseen(plan))
@@ -166,7 +152,7 @@ def weigh_loads(observed: Observed, weight: float, weights: Array) -> None:
             best = n
     load = max(means[best, 1], means[best, 2])
     for i in range(2):
-        rise = observed.ride[MEAN_LOAD_1 + i] / load
+        rise = observed.measured[MEAN_LOAD_1 + i] / load
         weights[i] = weight * means[best, 0] / load * rise**_STEEPNESS
 
 
@@ -180,7 +166,7 @@ def _fill_now(y: Array, model: RideModel, plan: Predictor, workspace: Array) -> 
         now[ELASTIC + i] = workspace[Axle.OIL_DEFLECTION, i]
         now[FLOW + i] = workspace[Axle.FLOW, i]
     for n in range(2 * MODES):
-        now[WEIGHTING + n] = plan.observed.ride[n]
+        now[WEIGHTING + n] = plan.observed.measured[n]
     if model.car.wheels:
         for n in range(4):
             now[WHEELS + n] = y[State.WHEEL_1 + n]
@@ -209,7 +195,7 @@ def _look_ahead(time: float, model: RideModel, plan: Predictor) -> None:
         fill_known(time, car, road, plan.steps[HELD], room.hold_heights[0])
         fill_known(time + hold, car, road, plan.steps[TAIL], room.tail_heights[0])
         return
-    learn(plan, plan.observed.passed[int(plan.observed.ride[OBSERVATIONS]) % plan.observed.passed.size])
+    learn(plan, plan.observed.passed[int(plan.observed.measured[OBSERVATIONS]) % plan.observed.passed.size])
     delay = (road.behind[1] - road.behind[0]) / car.speed
     for course in range(plan.settings.courses):
         fill_forecast(plan, course, 0.0, delay, plan.steps[HELD], room.hold_heights[course])

@@ -79,7 +79,7 @@ def learn(plan: Predictor, height: float) -> None:
 def _score_forecasts(plan: Predictor, speed: float) -> None:
     """Compare what each choice before forecast for now with the speed that came [m/s]."""
     forecasts, skill = plan.forecast.forecasts, plan.forecast.skill
-    number, count = int(plan.observed.ride[OBSERVATIONS]) // plan.settings.every, skill.shape[1]
+    number, count = int(plan.observed.measured[OBSERVATIONS]) // plan.settings.every, skill.shape[1]
     for n in range(count):
         then = forecasts[(number - n - 1) % count, n]
         skill[0, n] = _REMEMBERED * skill[0, n] + then * speed
@@ -91,7 +91,7 @@ def _forecast(plan: Predictor, height: float) -> None:
     """Forecast speeds and heights under axle 1 [m] for the periods to come, and what they may miss."""
     forecast, elimination = plan.forecast, plan.workspace.elimination
     theta, window = elimination[ORDER], elimination[ORDER + 1]
-    period, newest = plan.settings.observation_s * plan.settings.every, int(plan.observed.ride[OBSERVATIONS])
+    period, newest = plan.settings.observation_s * plan.settings.every, int(plan.observed.measured[OBSERVATIONS])
     number, count, top = newest // plan.settings.every, forecast.skill.shape[1], forecast.speeds[TOP_SPEED]
     _solve(forecast.moments, elimination, theta)
     for i in range(ORDER):
@@ -178,7 +178,7 @@ def fill_forecast(plan: Predictor, course: int, start: float, delay: float, h: f
 @inlined
 def _under_the_front(plan: Predictor, course: int, since: float) -> float:
     """Return the height under axle 1 [m] at a time [s] since now, observed or forecast, linear between."""
-    newest, passed, forecast = int(plan.observed.ride[OBSERVATIONS]), plan.observed.passed, plan.forecast
+    newest, passed, forecast = int(plan.observed.measured[OBSERVATIONS]), plan.observed.passed, plan.forecast
     count = passed.size
     if since <= 0.0:
         place = -since / plan.settings.observation_s
@@ -226,7 +226,7 @@ def observed_height(
         speed * slope + electronics.road_off[RISE_OFF, axle],
         electronics.road_gains[axle],
         plan.settings.observation_s,
-        plan.observed.ride[OBSERVATIONS] == 0.0,
+        plan.observed.measured[OBSERVATIONS] == 0.0,
         plan.observed.tracked[axle],
     )
 

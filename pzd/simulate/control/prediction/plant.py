@@ -97,14 +97,7 @@ def parallel_load(x: float, v: float, row: Array) -> float:
 
 @compiled
 def predicted(
-    car: Vehicle,
-    plan: Predictor,
-    state: Array,
-    levels1: Array,
-    levels2: Array,
-    heights: Array,
-    kind: int,
-    most: float,
+    car: Vehicle, plan: Predictor, state: Array, levels1: Array, levels2: Array, heights: Array, kind: int, most: float
 ) -> float:
     """Integrate the plant through as many steps as the road has, and sum the cost of the ride.
 

@@ -65,7 +65,7 @@ OBSERVED, HELD, TAIL = range(3)
 NOW, END, HOLDING = range(3)
 """Rows of `Workspace.states`; from HOLDING on one for each course."""
 ACCELERATION, OBSERVATIONS, MEAN_LOAD_1, MEAN_LOAD_2 = range(2 * MODES, 2 * MODES + 4)
-"""Places in `Observed.ride`, behind the modes of the weighting: the acceleration that was measured last [m/s2], how
+"""Places in `Observed.measured`, behind the modes of the weighting: the acceleration that was measured last [m/s2], how
 often it was, and recent mean squares of the load of each wheel [N2]."""
 HEIGHT, RISE, SAMPLED, HELD_FOR = range(4)
 """Places in `Observed.tracked`: height [m] and rise [m/s] of the last sample, when it was, how long it is held [s]."""
@@ -127,7 +127,7 @@ class DamperLevels(NamedTuple):
 class Observed(NamedTuple):
     """What is remembered of the ride and of the road that was met."""
 
-    ride: Array
+    measured: Array
     """(2 MODES + 4,) modes of the weighting, and what stands behind them, see `ACCELERATION`."""
     road: Array
     """(2, 2) height under both axles at the last observation and now [m]."""
@@ -280,11 +280,11 @@ def predictor_of(
 def _nothing_observed(passed: int, mass: float) -> Observed:
     """Return the memory of a ride on a road that was level so far, its mean squares faint but not 0."""
     faint = FAINT * np.array([1.0, (0.5 * mass) ** 2, (0.5 * mass) ** 2])
-    ride = np.zeros(2 * MODES + 4)
-    ride[[MEAN_LOAD_1, MEAN_LOAD_2]] = faint[1:]
+    measured = np.zeros(2 * MODES + 4)
+    measured[[MEAN_LOAD_1, MEAN_LOAD_2]] = faint[1:]
     levels = np.linspace(0, LEVELS - 1, FIXED).astype(np.intp)
     return Observed(
-        ride=ride,
+        measured=measured,
         road=np.zeros((2, 2)),
         passed=np.zeros(passed),
         tracked=np.zeros((2, 4)),
