@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from dataclasses import replace
 from functools import reduce
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
@@ -159,25 +159,21 @@ class CarBlock(Frozen):
 
     def car(self) -> HalfCar:
         """Return the car of the library with what the config changes; it keeps its name only where that is nothing."""
-        known = cars()[self.model]
-        built = HalfCar(
-            name=known.name,
-            mass=_first(self.mass_kg, known.mass),
-            pitch_inertia=_first(self.pitch_inertia_kgm2, known.pitch_inertia),
-            distances=(_first(self.a1_m, known.distances[0]), _first(self.a2_m, known.distances[1])),
-            stiffnesses=self.spring_stiffness_N_per_m or known.stiffnesses,
-            comfort_point=_first(self.x_K_m, known.comfort_point),
-            motion_ratios=self.motion_ratio or known.motion_ratios,
-            dampers=self.dampers_per_axle or known.dampers,
-            unsprung_masses=self.unsprung_mass_kg or known.unsprung_masses,
-            tyre_stiffnesses=self.tyre_stiffness_N_per_m or known.tyre_stiffnesses,
-            tyre_dampings=self.tyre_damping_Ns_per_m or known.tyre_dampings,
-        )
+        known, (a1, a2) = cars()[self.model], cars()[self.model].distances
+        given: dict[str, Any] = {
+            "mass": self.mass_kg,
+            "pitch_inertia": self.pitch_inertia_kgm2,
+            "distances": (a1 if self.a1_m is None else self.a1_m, a2 if self.a2_m is None else self.a2_m),
+            "stiffnesses": self.spring_stiffness_N_per_m,
+            "comfort_point": self.x_K_m,
+            "motion_ratios": self.motion_ratio,
+            "dampers": self.dampers_per_axle,
+            "unsprung_masses": self.unsprung_mass_kg,
+            "tyre_stiffnesses": self.tyre_stiffness_N_per_m,
+            "tyre_dampings": self.tyre_damping_Ns_per_m,
+        }
+        built = replace(known, **{name: value for name, value in given.items() if value is not None})
         return replace(built, name=self.name or (known.name if built == known else "own"))
-
-
-def _first(given: float | None, known: float) -> float:
-    return known if given is None else given
 
 
 # --- The whole block ---

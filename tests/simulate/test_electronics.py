@@ -71,7 +71,7 @@ def test_noise_has_the_deviation_of_each_sensor_and_is_white(rng) -> None:
         assert seen[Axle.COMFORT, 0] == seen[Axle.BODY, 0]
         height = state[State.HEAVE] + CAR.arms[1] * state[State.PITCH] - seen[Axle.DEFLECTION, 1]
         rise = state[State.HEAVE_RATE] + CAR.arms[1] * state[State.PITCH_RATE] - seen[Axle.RATE, 1]
-        assert known.road_off[:, 1] == pytest.approx([height, rise], abs=1e-15)
+        assert known.road_error[:, 1] == pytest.approx([height, rise], abs=1e-15)
     errors = np.array(rows)
     given = [NOISE[name] for name in NOISE]
     expected = np.array([given[0], given[0], given[1], given[1], *given[2:]])

@@ -23,7 +23,7 @@ from pzd.signals.criterion import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.control.prediction.choice import choose
 from pzd.simulate.control.prediction.plant import oil_after, predicted
-from pzd.simulate.control.prediction.predictor import HELD, LOAD_1, LOAD_2, NOW, WHEELS, Predictor, predictor_of
+from pzd.simulate.control.prediction.predictor import Plant, Predictor, States, Step, predictor_of
 from pzd.simulate.policies import policies
 from pzd.simulate.ride.equations import motion
 from pzd.simulate.ride.loop import set_control
@@ -118,7 +118,7 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
     peak = ahead(y, before, 0.0, 1.5)
     predicting, plan = model_of(damper, "comfort_predictive", 75.0, **given)
     choose(1.5, 0.0, y, before._replace(model=predicting), plan)
-    state, levels = np.array(plan.workspace.states[NOW]), plan.workspace.hold_levels
+    state, levels = np.array(plan.workspace.states[States.NOW]), plan.workspace.hold_levels
     predicted(
         predicting.car,
         plan,
@@ -126,7 +126,7 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
         levels[0, candidate],
         levels[1, candidate],
         plan.workspace.hold_heights[0],
-        HELD,
+        Step.HELD,
         1e9,
     )
     after, _ = model_of(damper, "passive", float(plan.candidates[candidate]), **given)
@@ -134,12 +134,12 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
     assert np.max(np.abs(state[: State.OIL_1] - y[: State.OIL_1]) / peak[: State.OIL_1]) < motion_off
     if car:
         wheels = slice(State.WHEEL_1, State.WHEEL_RATE_2 + 1)
-        assert np.max(np.abs(state[WHEELS : WHEELS + 4] - y[wheels]) / peak[wheels]) < 5.0 * motion_off
-        assert state[LOAD_1 : LOAD_2 + 1] == pytest.approx(
+        assert np.max(np.abs(state[Plant.WHEELS : Plant.WHEELS + 4] - y[wheels]) / peak[wheels]) < 5.0 * motion_off
+        assert state[Plant.LOAD_1 : Plant.LOAD_2 + 1] == pytest.approx(
             -room[Axle.CONTACT], abs=0.01 * max(predicting.car.static_load)
         )
         return
-    a_K = predicting.car.comfort[0] * state[LOAD_1] + predicting.car.comfort[1] * state[LOAD_2]
+    a_K = predicting.car.comfort[0] * state[Plant.LOAD_1] + predicting.car.comfort[1] * state[Plant.LOAD_2]
     assert a_K == pytest.approx(room[Axle.COMFORT, 0], abs=a_K_off)
 
 
@@ -153,11 +153,11 @@ def test_an_oil_far_faster_than_the_step_is_quasi_static_with_an_error_in_propor
     for relaxation in (1e-5, 1e-6, 1e-7):
         rows = tuple(r.model_copy(update={"k_N_per_m": r.C_Ns_per_m / relaxation}) for r in damper.base)
         _, plan = model_of(damper.model_copy(update={"base": rows}), "comfort_predictive", 0.0)
-        h, k = float(plan.steps[HELD]), C / relaxation
+        h, k = float(plan.steps[Step.HELD]), C / relaxation
         e, flow = (T0 + C * 0.2) / k, 0.2
         for n in range(20):
             middle = 0.2 + a * h * (n + 0.5)
-            e, flow = oil_after(plan.damper, HELD, 0, e, middle, flow, h)
+            e, flow = oil_after(plan.damper, Step.HELD, 0, e, middle, flow, h)
         time = np.arange(2001) * 1e-5
         resolved = element_force(0.2 * time + 0.5 * a * time**2, 1e-5, T0, C, k, T0 + C * 0.2, 0.2 + a * time)
         lags.append((T0 + C * middle - k * e, T0 + C * (0.2 + a * 0.02) - resolved[-1], C * a * relaxation))

@@ -13,7 +13,7 @@ from pzd.comfort.weighting import weighted
 from pzd.signals.criterion import rms
 from pzd.simulate.config import KM_PER_H, SensorNoise, SimulateConfig
 from pzd.simulate.control.prediction.forecast import filtered_height, learn
-from pzd.simulate.control.prediction.predictor import OBSERVATIONS, Predictor, predictor_of
+from pzd.simulate.control.prediction.predictor import Memory, Predictor, predictor_of
 from pzd.simulate.control.sensing import road_gain
 from pzd.simulate.ride.model import dynamic_damper_of, grid_of
 
@@ -78,7 +78,7 @@ def test_a_forecast_is_never_faster_than_the_road_was(damper, rng, faint) -> Non
     heights = np.where(time > 0.2, 0.02 * np.sin(2.0 * math.pi * 2.25 * (time - 0.2)), 0.0)
     heights += faint * rng.standard_normal(time.size)
     for n, height in enumerate(heights):
-        plan.observed.measured[OBSERVATIONS] = n * plan.settings.every
+        plan.observed.measured[Memory.OBSERVATIONS] = n * plan.settings.every
         learn(plan, float(height))
         fastest = max(fastest, abs(height - heights[max(n - 1, 0)]) / period)
         assert np.max(np.abs(plan.forecast.forecasts[n % plan.forecast.skill.shape[1]])) <= fastest * (1.0 + 1e-12)

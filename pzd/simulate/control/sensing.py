@@ -15,14 +15,14 @@ from pzd.simulate.ride.model import WORKSPACE_ROWS, Axle, State, Vehicle
 
 CHANNELS = SENSED + 1
 """Those of a feedback policy, then the acceleration of the body."""
-_DEFLECTION, _RATE, _HEAVE, _PITCH, _HEAVE_RATE, _PITCH_RATE, _ACCELERATION = 0, 2, 4, 5, 6, 7, 8
-"""Where each begins; deflection and its rate have a channel an axle."""
+_DEFLECTION, _RATE, _BODY, _ACCELERATION = 0, 2, 4, 8
+"""Where each begins: deflection and its rate have a channel an axle; the body has z, phi, dz, dphi, as in the state."""
 _LEAST_GAIN = 0.02
 """What a rise between two samples misses of the road is forgotten after some fifty of them."""
 ACTS, NEXT_NOISE = range(2)
 """Of `Electronics.counts`."""
-HEIGHT_OFF, RISE_OFF = range(2)
-"""Rows of `Electronics.road_off`."""
+HEIGHT_ERROR, RISE_ERROR = range(2)
+"""Rows of `Electronics.road_error`."""
 
 
 class Electronics(NamedTuple):
@@ -36,22 +36,20 @@ class Electronics(NamedTuple):
     """Control periods."""
     deviations: Array
     """(CHANNELS,) standard deviations of the noise."""
-    seed: int
-    """Of the noise."""
     noise: Array
-    """(n, CHANNELS) numbers of unit variance, a row for each act of the controller to come; see `with_noise`."""
+    """(n, CHANNELS) of the noise, a row for each act of the controller to come, in the units of the channels."""
     counts: Array
     """(2,) acts so far, and the next row of the noise."""
     states: Array
     """(m, n) samples of the state, the latest m in a ring."""
     workspaces: Array
-    """(m, WORKSPACE_ROWS, 2) those of the workspace, see `ride_model`."""
-    roads_off: Array
+    """(m, WORKSPACE_ROWS, 2) those of the workspace, see `Axle`."""
+    road_errors: Array
     """(m, 2, 2) error of the height [m] of the road, body less suspension, and of its rise [m/s], under each axle."""
     state: Array
     """(n,) the sample that the controller sees, and so the two that follow."""
     workspace: Array
-    road_off: Array
+    road_error: Array
     road_gains: Array
     """(2,) share of a new height that is believed beside the rise since the last one, see `road_gain`."""
     step: float
@@ -86,7 +84,6 @@ def electronics_of(
         every,
         delay,
         _deviations(sensors.noise),
-        sensors.seed,
         np.zeros((0, CHANNELS)),
         np.zeros(2),
         np.zeros((slots, states)),
@@ -124,25 +121,16 @@ def road_gain(noise: SensorNoise, arm: float, step: float) -> float:
 
 def _deviations(noise: SensorNoise) -> Array:
     """Return the deviations by channel: deflection 1, 2, its rate 1, 2, z, phi, dz, dphi, acceleration."""
+    body = (noise.heave_m, noise.pitch_rad, noise.heave_rate_m_per_s, noise.pitch_rate_rad_per_s)
     return np.array(
-        [
-            noise.deflection_m,
-            noise.deflection_m,
-            noise.deflection_rate_m_per_s,
-            noise.deflection_rate_m_per_s,
-            noise.heave_m,
-            noise.pitch_rad,
-            noise.heave_rate_m_per_s,
-            noise.pitch_rate_rad_per_s,
-            noise.acceleration_m_per_s2,
-        ]
+        [*2 * [noise.deflection_m], *2 * [noise.deflection_rate_m_per_s], *body, noise.acceleration_m_per_s2]
     )
 
 
 def with_noise(electronics: Electronics, rng: np.random.Generator, acts: int) -> Electronics:
     """Draw the noise of so many acts to come; the numbers are the same whatever number of them is drawn at a time."""
     electronics.counts[NEXT_NOISE] = 0.0
-    return electronics._replace(noise=rng.standard_normal((acts, CHANNELS)))
+    return electronics._replace(noise=rng.standard_normal((acts, CHANNELS)) * electronics.deviations)
 
 
 @inlined
@@ -160,8 +148,8 @@ def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) ->
     ----------
     y : (n,) state
     car : the half-car
-    workspace : as `motion` left it, see `ride_model`
-    electronics : `state`, `workspace` and `road_off` are filled
+    workspace : as `motion` left it, see `Axle`
+    electronics : `state`, `workspace` and `road_error` are filled
     """
     number, every = int(electronics.counts[ACTS]), electronics.every
     slots = electronics.states.shape[0]
@@ -169,8 +157,8 @@ def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) ->
         _sample(y, car, workspace, electronics, (number // every) % slots)
     sample = max(number - electronics.delay, 0) // every
     copy_into(electronics.states[sample % slots], electronics.state)
-    for row in (HEIGHT_OFF, RISE_OFF):
-        copy_into(electronics.roads_off[sample % slots, row], electronics.road_off[row])
+    for row in (HEIGHT_ERROR, RISE_ERROR):
+        copy_into(electronics.road_errors[sample % slots, row], electronics.road_error[row])
     for row in range(WORKSPACE_ROWS):
         copy_into(electronics.workspaces[sample % slots, row], electronics.workspace[row])
     electronics.counts[ACTS] += 1.0
@@ -181,26 +169,20 @@ def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) ->
 @compiled
 def _sample(y: Array, car: Vehicle, workspace: Array, electronics: Electronics, slot: int) -> None:
     """Fill one sample, its noise with it."""
-    drawn, deviations = electronics.noise[int(electronics.counts[NEXT_NOISE])], electronics.deviations
-    seen, room = electronics.states[slot], electronics.workspaces[slot]
+    noise, errors = electronics.noise[int(electronics.counts[NEXT_NOISE])], electronics.road_errors[slot]
+    seen, view = electronics.states[slot], electronics.workspaces[slot]
     copy_into(y, seen)
     for row in range(WORKSPACE_ROWS):
-        copy_into(workspace[row], room[row])
-    height, angle = deviations[_HEAVE] * drawn[_HEAVE], deviations[_PITCH] * drawn[_PITCH]
-    seen[State.HEAVE] += height
-    seen[State.PITCH] += angle
-    rate, turning = deviations[_HEAVE_RATE] * drawn[_HEAVE_RATE], deviations[_PITCH_RATE] * drawn[_PITCH_RATE]
-    seen[State.HEAVE_RATE] += rate
-    seen[State.PITCH_RATE] += turning
-    room[Axle.BODY, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
-    room[Axle.COMFORT, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
+        copy_into(workspace[row], view[row])
+    for n in range(4):
+        seen[State.HEAVE + n] += noise[_BODY + n]
+    view[Axle.BODY, 0] += noise[_ACCELERATION]
+    view[Axle.COMFORT, 0] += noise[_ACCELERATION]
     for i in range(2):
-        deflection = deviations[_DEFLECTION + i] * drawn[_DEFLECTION + i]
-        room[Axle.DEFLECTION, i] += deflection
-        lengthening = deviations[_RATE + i] * drawn[_RATE + i]
-        room[Axle.RATE, i] += lengthening
-        electronics.roads_off[slot, HEIGHT_OFF, i] = height + car.arms[i] * angle - deflection
-        electronics.roads_off[slot, RISE_OFF, i] = rate + car.arms[i] * turning - lengthening
+        view[Axle.DEFLECTION, i] += noise[_DEFLECTION + i]
+        view[Axle.RATE, i] += noise[_RATE + i]
+        errors[HEIGHT_ERROR, i] = noise[_BODY] + car.arms[i] * noise[_BODY + 1] - noise[_DEFLECTION + i]
+        errors[RISE_ERROR, i] = noise[_BODY + 2] + car.arms[i] * noise[_BODY + 3] - noise[_RATE + i]
 
 
 @compiled

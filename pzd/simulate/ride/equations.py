@@ -103,10 +103,9 @@ def _accelerate_one(car: Vehicle, free: int, workspace: Array) -> None:
     pull -= freed * (workspace[Axle.SPRINGS, free] + workspace[Axle.FORCE, free])
     workspace[Axle.ACCELERATION, free] = pull / (1.0 + freed * workspace[Axle.INERTANCE, free])
     workspace[Axle.FORCE, free] += workspace[Axle.INERTANCE, free] * workspace[Axle.ACCELERATION, free]
+    load, lift = workspace[Axle.SPRINGS, stuck], workspace[Axle.LIFT, stuck]
     other = workspace[Axle.SPRINGS, free] + workspace[Axle.FORCE, free]
-    workspace[Axle.FORCE, stuck] = holding_force(
-        car, stuck, workspace[Axle.SPRINGS, stuck], workspace[Axle.LIFT, stuck], other
-    )
+    workspace[Axle.FORCE, stuck] = holding_force(car, stuck, load, lift, other)
 
 
 # --- Damper forces without dynamics of their own: the demand at once (`ideal`), or the table (`table`) ---
@@ -136,9 +135,8 @@ def quasistatic_forces(y: Array, ride: Ride) -> None:
         if control_spec.fidelity == TABLE:
             workspace[Axle.FORCE, i] = tabled(model.car, model.grid, i, control[Command.SET, i], velocity)
         else:
-            workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = bounds_of(
-                control_spec, model.car, model.grid, i, velocity
-            )
+            low_high = bounds_of(control_spec, model.car, model.grid, i, velocity)
+            workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = low_high
     if control_spec.fidelity == TABLE:
         return
     if control_spec.jumps and control[Command.SIDE, 0] * control[Command.SIDE, 1] == 0.0:
@@ -180,14 +178,21 @@ def body_acceleration(car: Vehicle, load0: float, load1: float) -> tuple[float, 
 
 
 @inlined
+def valve_voltage(time: float, ride: Ride, axle: int) -> float:
+    """Return the effective voltage of the dampers of an axle [V] at a time [s]."""
+    control = ride.control
+    elapsed = time - control[Command.SINCE, 0]
+    return effective_voltage(ride.model.damper, control[Command.SET, axle], control[Command.BEHIND :, axle], elapsed)
+
+
+@inlined
 def dynamic_forces(time: float, y: Array, ride: Ride) -> None:
     """Fill the workspace's forces from where the oil has flowed to."""
     model, control, workspace = ride
     car, damper = model.car, model.damper
-    elapsed = time - control[Command.SINCE, 0]
     for i in range(2):
         ratio, n = car.ratio[i], car.dampers[i]
-        voltage = effective_voltage(damper, control[Command.SET, i], control[Command.BEHIND :, i], elapsed)
+        voltage = valve_voltage(time, ride, i)
         row = row_at(damper.voltages, damper.rows, voltage)
         e = ratio * workspace[Axle.DEFLECTION, i] - y[State.OIL_1 + i]
         workspace[Axle.OIL_DEFLECTION, i] = e
@@ -207,21 +212,17 @@ def dynamic_forces(time: float, y: Array, ride: Ride) -> None:
             stored, slipped = slipping_forces(damper, i, ratio * workspace[Axle.DEFLECTION, i], ratio * speed, parallel)
             workspace[Axle.ELASTIC, i] += stored
             workspace[Axle.RUBBING, i] += slipped
-        workspace[Axle.FORCE, i] = (
-            n * ratio * (workspace[Axle.OIL_FORCE, i] + workspace[Axle.ELASTIC, i] + workspace[Axle.RUBBING, i])
-        )
+        total = workspace[Axle.OIL_FORCE, i] + workspace[Axle.ELASTIC, i] + workspace[Axle.RUBBING, i]
+        workspace[Axle.FORCE, i] = n * ratio * total
 
 
 @compiled
 def remember_step(time: float, ride: Ride) -> None:
     """Bring what remembers beside the elements to the end of a step [s] in which no axle turned round; see `motion`."""
-    model, control, workspace = ride
+    model, workspace = ride.model, ride.workspace
     damper = model.damper
     for i in range(2):
-        voltage = effective_voltage(
-            damper, control[Command.SET, i], control[Command.BEHIND :, i], time - control[Command.SINCE, 0]
-        )
-        parallel_at(damper, voltage, damper.scratch)
+        parallel_at(damper, valve_voltage(time, ride, i), damper.scratch)
         remember(damper, i, model.car.ratio[i] * workspace[Axle.DEFLECTION, i], damper.scratch)
 
 
@@ -251,10 +252,8 @@ def motion(time: float, y: Array, ride: Ride, dy: Array) -> None:
     if control[Command.SIDE, 0] * control[Command.SIDE, 1] == 0.0:
         _try_sides(time, y, ride)
     _act(time, y, ride)
-    load0, load1 = (
-        workspace[Axle.SPRINGS, 0] + workspace[Axle.FORCE, 0],
-        workspace[Axle.SPRINGS, 1] + workspace[Axle.FORCE, 1],
-    )
+    load0 = workspace[Axle.SPRINGS, 0] + workspace[Axle.FORCE, 0]
+    load1 = workspace[Axle.SPRINGS, 1] + workspace[Axle.FORCE, 1]
     workspace[Axle.BODY, 0], workspace[Axle.BODY, 1] = body_acceleration(car, load0, load1)
     workspace[Axle.COMFORT, 0] = car.comfort[0] * load0 + car.comfort[1] * load1
     dy[State.HEAVE], dy[State.PITCH] = y[State.HEAVE_RATE], y[State.PITCH_RATE]
@@ -265,10 +264,8 @@ def motion(time: float, y: Array, ride: Ride, dy: Array) -> None:
         move_wheels(y, car, (load0, load1), workspace, dy)
     else:
         workspace[Axle.CONTACT, 0], workspace[Axle.CONTACT, 1] = -load0, -load1
-    dy[State.ROAD_WORK] = (
-        workspace[Axle.CONTACT, 0] * workspace[Axle.ROAD_RISE, 0]
-        + workspace[Axle.CONTACT, 1] * workspace[Axle.ROAD_RISE, 1]
-    )
+    contact, rise = workspace[Axle.CONTACT], workspace[Axle.ROAD_RISE]
+    dy[State.ROAD_WORK] = contact[0] * rise[0] + contact[1] * rise[1]
     for i in range(2):
         if model.control_spec.fidelity == DYNAMIC:
             _add_damper_power(ride, i, dy)
@@ -306,11 +303,10 @@ def _add_damper_power(ride: Ride, axle: int, dy: Array) -> None:
     model, workspace = ride.model, ride.workspace
     n, speed = model.car.dampers[axle], model.car.ratio[axle] * workspace[Axle.RATE, axle]
     inertia = workspace[Axle.INERTANCE, axle] * workspace[Axle.ACCELERATION, axle] * workspace[Axle.RATE, axle]
-    dy[State.OIL_1 + axle] = workspace[Axle.FLOW, axle]
-    dy[State.DISSIPATED] += n * (
-        workspace[Axle.OIL_FORCE, axle] * workspace[Axle.FLOW, axle] + workspace[Axle.RUBBING, axle] * speed
-    )
-    dy[State.OIL_WORK] += n * workspace[Axle.OIL_FORCE, axle] * (speed - workspace[Axle.FLOW, axle])
+    force, flow = workspace[Axle.OIL_FORCE, axle], workspace[Axle.FLOW, axle]
+    dy[State.OIL_1 + axle] = flow
+    dy[State.DISSIPATED] += n * (force * flow + workspace[Axle.RUBBING, axle] * speed)
+    dy[State.OIL_WORK] += n * force * (speed - flow)
     dy[State.PARALLEL_WORK] += n * speed * workspace[Axle.ELASTIC, axle] + inertia
 
 
@@ -365,19 +361,15 @@ def oil_energy(time: float, y: Array, ride: Ride) -> float:
     y : (n,) state
     ride : its workspace is changed
     """
-    model, control, workspace = ride
+    model, workspace = ride.model, ride.workspace
     car, damper, energy = model.car, model.damper, 0.0
     if model.control_spec.fidelity != DYNAMIC:
         return energy
     suspension(time, y, car, model.road_coefficients, workspace)
     for i in range(2):
-        voltage = effective_voltage(
-            damper, control[Command.SET, i], control[Command.BEHIND :, i], time - control[Command.SINCE, 0]
-        )
-        row = row_at(damper.voltages, damper.rows, voltage)
-        energy += car.dampers[i] * spring_energy(
-            car.ratio[i] * workspace[Axle.DEFLECTION, i] - y[State.OIL_1 + i], row, row[K]
-        )
+        row = row_at(damper.voltages, damper.rows, valve_voltage(time, ride, i))
+        e = car.ratio[i] * workspace[Axle.DEFLECTION, i] - y[State.OIL_1 + i]
+        energy += car.dampers[i] * spring_energy(e, row, row[K])
     return energy
 
 

@@ -58,10 +58,8 @@ def _choose_ends(y: Array, ride: Ride) -> None:
     model, control, workspace = ride
     control_spec, car = model.control_spec, model.car
     for i in range(2):
-        workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = bounds_of(
-            control_spec, car, model.grid, i, workspace[Axle.RATE, i]
-        )
-        workspace[Axle.SIDED_RATE, i] = workspace[Axle.RATE, i]
+        velocity = workspace[Axle.SIDED_RATE, i] = workspace[Axle.RATE, i]
+        workspace[Axle.LOW, i], workspace[Axle.HIGH, i] = bounds_of(control_spec, car, model.grid, i, velocity)
     if control_spec.aim == SWITCH:
         choose_hardness(y, ride)
     if control_spec.aim == MINIMISE and control_spec.tie == LARGEST:
@@ -129,10 +127,8 @@ def _wanted_voltage(time: float, ride: Ride, axle: int) -> float:
         return model.control_spec.voltage
     if aim == SCHEDULE:
         return scheduled(time, model, axle)
-    control[Command.ASKED, axle] = workspace[Axle.FORCE, axle]
-    return _voltage_for(
-        model, axle, workspace[Axle.FORCE, axle], workspace[Axle.RATE, axle], control[Command.SET, axle]
-    )
+    control[Command.ASKED, axle] = force = workspace[Axle.FORCE, axle]
+    return _voltage_for(model, axle, force, workspace[Axle.RATE, axle], control[Command.SET, axle])
 
 
 @inlined
@@ -153,17 +149,11 @@ def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, oth
 @compiled
 def _set_voltage(time: float, ride: Ride, electronics: Electronics | None, axle: int, asked: float) -> None:
     """Set the voltage of an axle as the supply can, and note what stands behind each drive effect then."""
-    model = ride.model
-    control, voltage = ride.control, asked
+    control, voltages, before = ride.control, ride.model.grid.voltages, ride.control[Command.SET, axle]
+    elapsed, voltage = time - control[Command.SINCE, 0], asked
     if electronics is not None:
-        voltages = ride.model.grid.voltages
-        voltage = supplied(asked, control[Command.SET, axle], voltages[0], voltages[-1], electronics)
-    keep_voltage(
-        control[Command.SET, axle],
-        time - control[Command.SINCE, 0],
-        control[Command.BEHIND :, axle],
-        model.damper.drive,
-    )
+        voltage = supplied(asked, before, voltages[0], voltages[-1], electronics)
+    keep_voltage(before, elapsed, control[Command.BEHIND :, axle], ride.model.damper.drive)
     control[Command.SET, axle] = voltage
 
 

@@ -60,7 +60,7 @@ def press(y: Array, car: Vehicle, axle: int, height: float, workspace: Array) ->
     car : the half-car
     axle : 0 or 1
     height : of the road under it [m]; its speed stands in the workspace
-    workspace : see `ride_model`; filled
+    workspace : see `Axle`; filled
     """
     static, stiffness = car.static_load[axle], car.tyre_stiffness[axle]
     squeeze, rate = height - y[State.WHEEL_1 + axle], workspace[Axle.ROAD_RISE, axle] - y[State.WHEEL_RATE_1 + axle]
@@ -80,7 +80,7 @@ def move_wheels(y: Array, car: Vehicle, loads: tuple[float, float], workspace: A
     y : state
     car : the half-car
     loads : S + T of both axles [N]
-    workspace : see `ride_model`
+    workspace : see `Axle`
     dy : filled
     """
     dy[State.TYRE_LOSS] = workspace[Axle.TYRE_POWER, 0] + workspace[Axle.TYRE_POWER, 1]
@@ -159,7 +159,7 @@ def suspension(time: float, y: Array, car: Vehicle, road_coefficients: RoadCoeff
     time : [s]
     y : state
     car, road_coefficients : the half-car and its road
-    workspace : see `ride_model`; filled
+    workspace : see `Axle`; filled
     """
     for i in range(2):
         height, slope, curvature = road_at(road_coefficients, car.speed * time - road_coefficients.behind[i])

@@ -14,26 +14,15 @@ from pzd.record import Array
 from pzd.simulate.control.prediction.forecast import fill_forecast, fill_known, learn, observed_height, unforeseen
 from pzd.simulate.control.prediction.plant import predicted, weigh
 from pzd.simulate.control.prediction.predictor import (
-    ACCELERATION,
-    BODY,
-    ELASTIC,
-    END,
-    EXPECTED,
-    FLOW,
-    HELD,
-    HOLDING,
-    MEAN_LOAD_1,
     MODES,
-    NOW,
-    OBSERVATIONS,
-    OBSERVED,
-    TAIL,
-    WEIGHTED,
-    WEIGHTING,
-    WHEELS,
     DamperLevels,
+    Memory,
     Observed,
+    Plant,
     Predictor,
+    Speed,
+    States,
+    Step,
 )
 from pzd.simulate.control.sensing import Electronics, copy_into
 from pzd.simulate.ride.model import Axle, Command, DynamicDamper, Ride, RideModel, State, Vehicle
@@ -57,16 +46,17 @@ def observe(sampled: float, ride: Ride, plan: Predictor, electronics: Electronic
     electronics : see `set_control`; its noise is in the road under the axles
     """
     observed, measured, settings = plan.observed, plan.observed.measured, plan.settings
-    number, a_K = int(measured[OBSERVATIONS]), ride.workspace[Axle.COMFORT, 0]
-    weigh(measured, 0, measured[ACCELERATION], a_K, plan.modes[OBSERVED], plan.residues)
-    measured[ACCELERATION] = a_K
+    number, a_K = int(measured[Memory.OBSERVATIONS]), ride.workspace[Axle.COMFORT, 0]
+    weigh(measured, 0, measured[Memory.ACCELERATION], a_K, plan.modes[Step.OBSERVED], plan.residues)
+    measured[Memory.ACCELERATION] = a_K
     for i in range(2):
         load = ride.workspace[Axle.CONTACT, i]
         observed.road[i, 0] = observed.road[i, 1]
         observed.road[i, 1] = observed_height(sampled, i, ride.model, plan, electronics)
-        measured[MEAN_LOAD_1 + i] += (1.0 - settings.remembered) * (load * load - measured[MEAN_LOAD_1 + i])
-    measured[OBSERVATIONS] = number + 1
-    innovations, foreseen = plan.forecast.innovations, settings.observation_s * plan.forecast.speeds[EXPECTED]
+        change = load * load - measured[Memory.MEAN_LOAD_1 + i]
+        measured[Memory.MEAN_LOAD_1 + i] += (1.0 - settings.remembered) * change
+    measured[Memory.OBSERVATIONS] = number + 1
+    innovations, foreseen = plan.forecast.innovations, settings.observation_s * plan.forecast.speeds[Speed.EXPECTED]
     innovations[(number + 1) % innovations.size] = observed.road[0, 1] - observed.road[0, 0] - foreseen
     observed.passed[(number + 1) % observed.passed.size] = observed.road[0, 1]
     if number > 0:
@@ -83,9 +73,9 @@ def ride_fixed(car: Vehicle, plan: Predictor) -> None:
     observed, means = plan.observed, plan.observed.fixed_means
     for n in range(observed.fixed.shape[0]):
         state, levels = observed.fixed[n], observed.fixed_levels[n]
-        predicted(car, plan, state, levels, levels, observed.road, OBSERVED, math.inf)
+        predicted(car, plan, state, levels, levels, observed.road, Step.OBSERVED, math.inf)
         for i in range(3):
-            square = state[WEIGHTED + i] * state[WEIGHTED + i]
+            square = state[Plant.WEIGHTED + i] * state[Plant.WEIGHTED + i]
             means[n, i] += (1.0 - plan.settings.remembered) * (square - means[n, i])
 
 
@@ -152,24 +142,24 @@ def weigh_loads(observed: Observed, weight: float, weights: Array) -> None:
             best = n
     load = max(means[best, 1], means[best, 2])
     for i in range(2):
-        rise = observed.measured[MEAN_LOAD_1 + i] / load
+        rise = observed.measured[Memory.MEAN_LOAD_1 + i] / load
         weights[i] = weight * means[best, 0] / load * rise**_STEEPNESS
 
 
 @inlined
 def _fill_now(y: Array, model: RideModel, plan: Predictor, workspace: Array) -> None:
     """Fill the state of the plant by that of the ride."""
-    now = plan.workspace.states[NOW]
+    now = plan.workspace.states[States.NOW]
     for n in range(4):
-        now[BODY + n] = y[State.HEAVE + n]
+        now[Plant.BODY + n] = y[State.HEAVE + n]
     for i in range(2):
-        now[ELASTIC + i] = workspace[Axle.OIL_DEFLECTION, i]
-        now[FLOW + i] = workspace[Axle.FLOW, i]
+        now[Plant.ELASTIC + i] = workspace[Axle.OIL_DEFLECTION, i]
+        now[Plant.FLOW + i] = workspace[Axle.FLOW, i]
     for n in range(2 * MODES):
-        now[WEIGHTING + n] = plan.observed.measured[n]
+        now[Plant.WEIGHTING + n] = plan.observed.measured[n]
     if model.car.wheels:
         for n in range(4):
-            now[WHEELS + n] = y[State.WHEEL_1 + n]
+            now[Plant.WHEELS + n] = y[State.WHEEL_1 + n]
 
 
 @compiled
@@ -190,16 +180,16 @@ def _best_held_on(model: RideModel, plan: Predictor) -> float:
 def _look_ahead(time: float, model: RideModel, plan: Predictor) -> None:
     """Fill the road ahead in every course that it may take."""
     car, road, room = model.car, model.road_coefficients, plan.workspace
-    hold = plan.settings.hold_steps * plan.steps[HELD]
+    hold = plan.settings.hold_steps * plan.steps[Step.HELD]
     if plan.settings.known:
-        fill_known(time, car, road, plan.steps[HELD], room.hold_heights[0])
-        fill_known(time + hold, car, road, plan.steps[TAIL], room.tail_heights[0])
+        fill_known(time, car, road, plan.steps[Step.HELD], room.hold_heights[0])
+        fill_known(time + hold, car, road, plan.steps[Step.TAIL], room.tail_heights[0])
         return
-    learn(plan, plan.observed.passed[int(plan.observed.measured[OBSERVATIONS]) % plan.observed.passed.size])
+    learn(plan, plan.observed.passed[int(plan.observed.measured[Memory.OBSERVATIONS]) % plan.observed.passed.size])
     delay = (road.behind[1] - road.behind[0]) / car.speed
     for course in range(plan.settings.courses):
-        fill_forecast(plan, course, 0.0, delay, plan.steps[HELD], room.hold_heights[course])
-        fill_forecast(plan, course, hold, delay, plan.steps[TAIL], room.tail_heights[course])
+        fill_forecast(plan, course, 0.0, delay, plan.steps[Step.HELD], room.hold_heights[course])
+        fill_forecast(plan, course, hold, delay, plan.steps[Step.TAIL], room.tail_heights[course])
 
 
 @inlined
@@ -207,10 +197,10 @@ def _held_cost(model: RideModel, plan: Predictor, i: int, j: int, most: float) -
     """Return the cost of holding a pair of candidates in all courses together; their states are left in `states`."""
     room, cost = plan.workspace, 0.0
     for course in range(plan.settings.courses):
-        state, heights = room.states[HOLDING + course], room.hold_heights[course]
-        copy_into(room.states[NOW], state)
+        state, heights = room.states[States.HOLDING + course], room.hold_heights[course]
+        copy_into(room.states[States.NOW], state)
         one, two = room.hold_levels[0, i], room.hold_levels[1, j]
-        cost += predicted(model.car, plan, state, one, two, heights, HELD, most - cost)
+        cost += predicted(model.car, plan, state, one, two, heights, Step.HELD, most - cost)
     return cost
 
 
@@ -220,28 +210,28 @@ def _tail_cost(model: RideModel, plan: Predictor, a: int, b: int, cost: float, m
     room = plan.workspace
     for course in range(plan.settings.courses):
         if cost < most:
-            state, heights = room.states[END], room.tail_heights[course]
-            copy_into(room.states[HOLDING + course], state)
+            state, heights = room.states[States.END], room.tail_heights[course]
+            copy_into(room.states[States.HOLDING + course], state)
             one, two = room.tail_levels[0, a], room.tail_levels[1, b]
-            cost += predicted(model.car, plan, state, one, two, heights, TAIL, most - cost)
+            cost += predicted(model.car, plan, state, one, two, heights, Step.TAIL, most - cost)
     return cost
 
 
 @compiled
 def _fill_levels(time: float, damper: DynamicDamper, plan: Predictor, control: Array) -> None:
     """Fill the levels of the effective voltage under every candidate, and under every tail behind it."""
-    hold, room = plan.settings.hold_steps * plan.steps[HELD], plan.workspace
+    hold, room = plan.settings.hold_steps * plan.steps[Step.HELD], plan.workspace
     for axle in range(2):
         now, behind = room.drive[0, axle], room.drive[1, axle]
         copy_into(control[Command.BEHIND :, axle], now)
         keep_voltage(control[Command.SET, axle], time - control[Command.SINCE, 0], now, damper.drive)
         for i in range(plan.candidates.size):
-            _follow(plan.damper, damper, plan.candidates[i], plan.steps[HELD], now, room.hold_levels[axle, i])
+            _follow(plan.damper, damper, plan.candidates[i], plan.steps[Step.HELD], now, room.hold_levels[axle, i])
             for j in range(plan.tails.size):
                 copy_into(now, behind)
                 keep_voltage(plan.candidates[i], hold, behind, damper.drive)
                 levels = room.tail_levels[axle, i * plan.tails.size + j]
-                _follow(plan.damper, damper, plan.tails[j], plan.steps[TAIL], behind, levels)
+                _follow(plan.damper, damper, plan.tails[j], plan.steps[Step.TAIL], behind, levels)
 
 
 @inlined

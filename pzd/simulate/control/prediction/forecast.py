@@ -9,22 +9,8 @@ from __future__ import annotations
 
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
-from pzd.simulate.control.prediction.predictor import (
-    EXPECTED,
-    HEIGHT,
-    HELD_FOR,
-    LAST_HEIGHT,
-    MISSED_SQUARES,
-    OBSERVATIONS,
-    ORDER,
-    RISE,
-    SAMPLED,
-    SPEED_SQUARES,
-    TOP_SPEED,
-    Predictor,
-    RoadForecast,
-)
-from pzd.simulate.control.sensing import HEIGHT_OFF, RISE_OFF, Electronics
+from pzd.simulate.control.prediction.predictor import ORDER, Memory, Predictor, RoadForecast, Speed, Track
+from pzd.simulate.control.sensing import HEIGHT_ERROR, RISE_ERROR, Electronics
 from pzd.simulate.ride.model import RideModel, RoadCoefficients, Vehicle
 from pzd.simulate.vehicle.suspension import road_at
 
@@ -60,17 +46,17 @@ def learn(plan: Predictor, height: float) -> None:
     """
     period = plan.settings.observation_s * plan.settings.every
     speeds, moments = plan.forecast.speeds, plan.forecast.moments
-    speed = (height - speeds[LAST_HEIGHT]) / period
+    speed = (height - speeds[Speed.LAST_HEIGHT]) / period
     for i in range(ORDER):
         for j in range(ORDER):
             moments[i, j] = _REMEMBERED * moments[i, j] + speeds[i] * speeds[j]
         moments[i, ORDER] = _REMEMBERED * moments[i, ORDER] + speeds[i] * speed
     for i in range(ORDER - 1, 0, -1):
         speeds[i] = speeds[i - 1]
-    speeds[0], speeds[LAST_HEIGHT] = speed, height
-    speeds[MISSED_SQUARES] = _REMEMBERED * speeds[MISSED_SQUARES] + (speed - speeds[EXPECTED]) ** 2
-    speeds[SPEED_SQUARES] = _REMEMBERED * speeds[SPEED_SQUARES] + speed * speed
-    speeds[TOP_SPEED] = max(_REMEMBERED * speeds[TOP_SPEED], abs(speed))
+    speeds[0], speeds[Speed.LAST_HEIGHT] = speed, height
+    speeds[Speed.MISSED_SQUARES] = _REMEMBERED * speeds[Speed.MISSED_SQUARES] + (speed - speeds[Speed.EXPECTED]) ** 2
+    speeds[Speed.SPEED_SQUARES] = _REMEMBERED * speeds[Speed.SPEED_SQUARES] + speed * speed
+    speeds[Speed.TOP_SPEED] = max(_REMEMBERED * speeds[Speed.TOP_SPEED], abs(speed))
     _score_forecasts(plan, speed)
     _forecast(plan, height)
 
@@ -79,7 +65,7 @@ def learn(plan: Predictor, height: float) -> None:
 def _score_forecasts(plan: Predictor, speed: float) -> None:
     """Compare what each choice before forecast for now with the speed that came [m/s]."""
     forecasts, skill = plan.forecast.forecasts, plan.forecast.skill
-    number, count = int(plan.observed.measured[OBSERVATIONS]) // plan.settings.every, skill.shape[1]
+    number, count = int(plan.observed.measured[Memory.OBSERVATIONS]) // plan.settings.every, skill.shape[1]
     for n in range(count):
         then = forecasts[(number - n - 1) % count, n]
         skill[0, n] = _REMEMBERED * skill[0, n] + then * speed
@@ -91,8 +77,8 @@ def _forecast(plan: Predictor, height: float) -> None:
     """Forecast speeds and heights under axle 1 [m] for the periods to come, and what they may miss."""
     forecast, elimination = plan.forecast, plan.workspace.elimination
     theta, window = elimination[ORDER], elimination[ORDER + 1]
-    period, newest = plan.settings.observation_s * plan.settings.every, int(plan.observed.measured[OBSERVATIONS])
-    number, count, top = newest // plan.settings.every, forecast.skill.shape[1], forecast.speeds[TOP_SPEED]
+    period, newest = plan.settings.observation_s * plan.settings.every, int(plan.observed.measured[Memory.OBSERVATIONS])
+    number, count, top = newest // plan.settings.every, forecast.skill.shape[1], forecast.speeds[Speed.TOP_SPEED]
     _solve(forecast.moments, elimination, theta)
     for i in range(ORDER):
         window[i] = forecast.speeds[i]
@@ -104,7 +90,7 @@ def _forecast(plan: Predictor, height: float) -> None:
         for i in range(ORDER - 1, 0, -1):
             window[i] = window[i - 1]
         window[0] = forecast.forecasts[number % count, n] = following
-    forecast.speeds[EXPECTED] = _trusted(forecast, number, 0)
+    forecast.speeds[Speed.EXPECTED] = _trusted(forecast, number, 0)
     for n in range(count):
         height += period * _trusted(forecast, number, n)
         forecast.heights[n] = height
@@ -151,7 +137,7 @@ def _solve(moments: Array, rows: Array, theta: Array) -> None:
 @inlined
 def unforeseen(plan: Predictor) -> float:
     """Return the share of the mean square of the road's speed that forecasts of one period missed of late."""
-    missed, passed = plan.forecast.speeds[MISSED_SQUARES], plan.forecast.speeds[SPEED_SQUARES]
+    missed, passed = plan.forecast.speeds[Speed.MISSED_SQUARES], plan.forecast.speeds[Speed.SPEED_SQUARES]
     return 0.0 if passed < _STILL else float(min(missed / passed, 1.0))
 
 
@@ -178,7 +164,7 @@ def fill_forecast(plan: Predictor, course: int, start: float, delay: float, h: f
 @inlined
 def _under_the_front(plan: Predictor, course: int, since: float) -> float:
     """Return the height under axle 1 [m] at a time [s] since now, observed or forecast, linear between."""
-    newest, passed, forecast = int(plan.observed.measured[OBSERVATIONS]), plan.observed.passed, plan.forecast
+    newest, passed, forecast = int(plan.observed.measured[Memory.OBSERVATIONS]), plan.observed.passed, plan.forecast
     count = passed.size
     if since <= 0.0:
         place = -since / plan.settings.observation_s
@@ -219,14 +205,14 @@ def observed_height(
     height, slope, _ = road_at(road, speed * sampled - road.behind[axle])
     if electronics is None:
         return height
-    height += electronics.road_off[HEIGHT_OFF, axle]
+    height += electronics.road_error[HEIGHT_ERROR, axle]
     return filtered_height(
         sampled,
         height,
-        speed * slope + electronics.road_off[RISE_OFF, axle],
+        speed * slope + electronics.road_error[RISE_ERROR, axle],
         electronics.road_gains[axle],
         plan.settings.observation_s,
-        plan.observed.measured[OBSERVATIONS] == 0.0,
+        plan.observed.measured[Memory.OBSERVATIONS] == 0.0,
         plan.observed.tracked[axle],
     )
 
@@ -239,14 +225,14 @@ def filtered_height(
 
     Equation: x = x_0 + h (v_0 + v) / 2, then x + K (z - x)      Source: see `pzd.simulate.control.sensing.road_gain`
     """
-    elapsed = sampled - tracked[SAMPLED]
+    elapsed = sampled - tracked[Track.SAMPLED]
     if first:
-        tracked[HEIGHT] = height
+        tracked[Track.HEIGHT] = height
     elif elapsed < 0.5 * period:
-        tracked[HELD_FOR] += period
-        return float(tracked[HEIGHT] + tracked[HELD_FOR] * tracked[RISE])
+        tracked[Track.HELD_FOR] += period
+        return float(tracked[Track.HEIGHT] + tracked[Track.HELD_FOR] * tracked[Track.RISE])
     else:
-        tracked[HEIGHT] += 0.5 * elapsed * (tracked[RISE] + rise)
-        tracked[HEIGHT] += gain * (height - tracked[HEIGHT])
-    tracked[RISE], tracked[SAMPLED], tracked[HELD_FOR] = rise, sampled, 0.0
-    return float(tracked[HEIGHT])
+        tracked[Track.HEIGHT] += 0.5 * elapsed * (tracked[Track.RISE] + rise)
+        tracked[Track.HEIGHT] += gain * (height - tracked[Track.HEIGHT])
+    tracked[Track.RISE], tracked[Track.SAMPLED], tracked[Track.HELD_FOR] = rise, sampled, 0.0
+    return float(tracked[Track.HEIGHT])

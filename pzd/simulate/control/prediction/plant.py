@@ -13,16 +13,7 @@ from pzd.compiled import compiled, inlined
 from pzd.damper.compiled.kernels import K, branch_steady, parallel_force, row_of
 from pzd.damper.regimes import spring_force
 from pzd.record import Array
-from pzd.simulate.control.prediction.predictor import (
-    LOAD_1,
-    LOAD_2,
-    MODES,
-    WEIGHTED,
-    WEIGHTING,
-    WHEELS,
-    DamperLevels,
-    Predictor,
-)
+from pzd.simulate.control.prediction.predictor import MODES, DamperLevels, Plant, Predictor
 from pzd.simulate.ride.equations import body_acceleration
 from pzd.simulate.ride.model import Vehicle
 from pzd.simulate.vehicle.suspension import contact_force
@@ -46,7 +37,7 @@ def oil_after(
     Parameters
     ----------
     damper : the damper by levels
-    kind : of the step, `OBSERVED`, `HELD` or `TAIL`
+    kind : of the step, see `Step`
     level : of the effective voltage in the middle of the step
     e : at the start [m]
     speed : of the rod [m/s]
@@ -111,7 +102,7 @@ def predicted(
     state : (PLANT,) changed in place
     levels1, levels2 : (2 n + 1,) level of the effective voltage of each axle at every half step
     heights : (2, n + 1) of the road under both axles [m]
-    kind : of the step, `OBSERVED`, `HELD` or `TAIL`
+    kind : of the step, see `Step`
     most : the cost beyond which nobody asks for more
 
     Returns
@@ -119,8 +110,8 @@ def predicted(
     cost [m2/s3]; infinite where it goes beyond `most`
     """
     z, phi, dz, dphi, e1, e2, w1, w2 = state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7]
-    g1, g2 = _wheel(car, state[WHEELS], heights[0, 0]), _wheel(car, state[WHEELS + 1], heights[1, 0])
-    dg1, dg2 = state[WHEELS + 2], state[WHEELS + 3]
+    g1, g2 = _wheel(car, state[Plant.WHEELS], heights[0, 0]), _wheel(car, state[Plant.WHEELS + 1], heights[1, 0])
+    dg1, dg2 = state[Plant.WHEELS + 2], state[Plant.WHEELS + 3]
     h, modes, weights = plan.steps[kind], plan.modes[kind], plan.workspace.load_weights
     rise1, rise2 = (heights[0, 1] - heights[0, 0]) / h, (heights[1, 1] - heights[1, 0]) / h
     u1 = z + car.arms[0] * phi - g1
@@ -156,14 +147,19 @@ def predicted(
         dg1, dg2 = dg1 + 0.5 * h * (rise1 + ag1), dg2 + 0.5 * h * (rise2 + ag2)
         before = a_K
         a_K = car.comfort[0] * load1 + car.comfort[1] * load2
-        weighted = weigh(state, WEIGHTING, before, a_K, modes, plan.residues)
+        weighted = weigh(state, Plant.WEIGHTING, before, a_K, modes, plan.residues)
         cost += h * (weighted * weighted + weights[0] * tyre1 * tyre1 + weights[1] * tyre2 * tyre2)
         if cost > most:
             return math.inf
     state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7] = z, phi, dz, dphi, e1, e2, w1, w2
-    state[WEIGHTED], state[LOAD_1], state[LOAD_2] = weighted, tyre1, tyre2
+    state[Plant.WEIGHTED], state[Plant.LOAD_1], state[Plant.LOAD_2] = weighted, tyre1, tyre2
     if car.wheels:
-        state[WHEELS], state[WHEELS + 1], state[WHEELS + 2], state[WHEELS + 3] = g1, g2, dg1, dg2
+        state[Plant.WHEELS], state[Plant.WHEELS + 1], state[Plant.WHEELS + 2], state[Plant.WHEELS + 3] = (
+            g1,
+            g2,
+            dg1,
+            dg2,
+        )
     return cost
 
 

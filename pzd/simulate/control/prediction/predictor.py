@@ -7,6 +7,7 @@ and road, and arrays to work in; `predictor_of` builds them before the first obs
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -48,30 +49,95 @@ ORDER = 8
 MODES = 4
 """Pairs of poles of the weighting Wk."""
 
-# --- Places in the state of the plant, in the memory of the ride and in that of the road ---
+# --- Places in the state of the plant, and in the memory of ride and road ---
 
-BODY, ELASTIC, FLOW = 0, 4, 6
-"""z, phi, dz, dphi; of one damper at each axle the elastic deflection [m]; then the speed of its flow [m/s]."""
-WEIGHTING = 8
-"""Real and imaginary part of every mode of the weighting."""
-WEIGHTED, LOAD_1, LOAD_2 = range(WEIGHTING + 2 * MODES, WEIGHTING + 2 * MODES + 3)
-"""What they come to: weighted acceleration [m/s2] and dynamic load of each wheel [N]."""
-WHEELS = LOAD_2 + 1
-"""Height [m] of the wheels of both axles, then its rate [m/s]; they stay 0 where they have no mass."""
-PLANT = WHEELS + 4
-"""Length of the state of the plant."""
-OBSERVED, HELD, TAIL = range(3)
-"""Steps of the plant: between two observations, while a voltage is held, behind it."""
-NOW, END, HOLDING = range(3)
-"""Rows of `Workspace.states`; from HOLDING on one for each course."""
-ACCELERATION, OBSERVATIONS, MEAN_LOAD_1, MEAN_LOAD_2 = range(2 * MODES, 2 * MODES + 4)
-"""Places in `Observed.measured`, behind the modes of the weighting: the acceleration that was measured last [m/s2], how
-often it was, and recent mean squares of the load of each wheel [N2]."""
-HEIGHT, RISE, SAMPLED, HELD_FOR = range(4)
-"""Places in `Observed.tracked`: height [m] and rise [m/s] of the last sample, when it was, how long it is held [s]."""
-LAST_HEIGHT, EXPECTED, MISSED_SQUARES, SPEED_SQUARES, TOP_SPEED = range(ORDER, ORDER + 5)
-"""Places in `RoadForecast.speeds`, behind the past speeds: height at the last choice [m], speed forecast for the period
-that goes on [m/s], recent squares of the errors of such forecasts, and of the speeds [m2/s2], fastest of late [m/s]."""
+
+class Plant(IntEnum):
+    """Places of the state of the plant (PLANT,), each the first of so many."""
+
+    BODY = 0
+    """z, phi [m], [rad] and their rates dz, dphi [m/s], [rad/s]."""
+    ELASTIC = 4
+    """Elastic deflection of the oil of one damper at each axle [m]."""
+    FLOW = 6
+    """Speed of the flow in one damper at each axle [m/s]."""
+    WEIGHTING = 8
+    """Real and imaginary part of every mode of the weighting."""
+    WEIGHTED = WEIGHTING + 2 * MODES
+    """Weighted acceleration at K [m/s2]."""
+    LOAD_1 = WEIGHTED + 1
+    """Dynamic load of the wheels of axle 1 [N]."""
+    LOAD_2 = WEIGHTED + 2
+    """The same at axle 2 [N]."""
+    WHEELS = WEIGHTED + 3
+    """Height [m] of the wheels of both axles, then its rate [m/s]; they stay 0 where they have no mass."""
+
+
+PLANT = int(Plant.WHEELS) + 4
+
+
+class Step(IntEnum):
+    """Steps of the plant."""
+
+    OBSERVED = 0
+    """Between two observations."""
+    HELD = 1
+    """While a voltage is held."""
+    TAIL = 2
+    """Behind it."""
+
+
+class States(IntEnum):
+    """Rows of `Workspace.states`."""
+
+    NOW = 0
+    """The ride as it is."""
+    END = 1
+    """Behind held voltages and tails."""
+    HOLDING = 2
+    """Behind held voltages, from here on a row for each course of the road."""
+
+
+class Memory(IntEnum):
+    """Places of `Observed.measured`, behind the modes of the weighting."""
+
+    ACCELERATION = 2 * MODES
+    """That was measured last at K [m/s2]."""
+    OBSERVATIONS = 2 * MODES + 1
+    """How many there were."""
+    MEAN_LOAD_1 = 2 * MODES + 2
+    """Recent mean square of the load of the wheels of axle 1 [N2]."""
+    MEAN_LOAD_2 = 2 * MODES + 3
+    """The same at axle 2 [N2]."""
+
+
+class Track(IntEnum):
+    """Places of `Observed.tracked`: the last sample of the road under an axle."""
+
+    HEIGHT = 0
+    """[m]."""
+    RISE = 1
+    """[m/s]."""
+    SAMPLED = 2
+    """When it was taken [s]."""
+    HELD_FOR = 3
+    """How long it is held [s]."""
+
+
+class Speed(IntEnum):
+    """Places of `RoadForecast.speeds`, behind the past speeds of the road."""
+
+    LAST_HEIGHT = ORDER
+    """Of the road at the last choice [m]."""
+    EXPECTED = ORDER + 1
+    """Speed forecast for the period that goes on [m/s]."""
+    MISSED_SQUARES = ORDER + 2
+    """Recent squares of the errors of such forecasts [m2/s2]."""
+    SPEED_SQUARES = ORDER + 3
+    """Recent squares of the speeds [m2/s2]."""
+    TOP_SPEED = ORDER + 4
+    """The fastest of late [m/s]."""
+
 
 # --- The predictor ---
 
@@ -128,13 +194,13 @@ class Observed(NamedTuple):
     """What is remembered of the ride and of the road that was met."""
 
     measured: Array
-    """(2 MODES + 4,) modes of the weighting, and what stands behind them, see `ACCELERATION`."""
+    """(2 MODES + 4,) modes of the weighting, and what stands behind them, see `Memory`."""
     road: Array
     """(2, 2) height under both axles at the last observation and now [m]."""
     passed: Array
-    """(m,) height of the road under axle 1 at the last observations, the newest at `OBSERVATIONS` modulo m [m]."""
+    """(m,) height of the road under axle 1 at the last observations, the newest at their number modulo m [m]."""
     tracked: Array
-    """(2, 4) the road under each axle as the sensors gave it last, see `HEIGHT`."""
+    """(2, 4) the road under each axle as the sensors gave it last, see `Track`."""
     fixed: Array
     """(f, PLANT) where the ride would be, had each of f voltages been held from its start."""
     fixed_levels: Rows
@@ -149,7 +215,7 @@ class RoadForecast(NamedTuple):
     moments: Array
     """(ORDER, ORDER + 1) recent mean products of the road's speeds, and of them with the next one [m2/s2]."""
     speeds: Array
-    """(ORDER + 5,) last mean speeds of the road, the newest first [m/s], and what stands behind, see `LAST_HEIGHT`."""
+    """(ORDER + 5,) last mean speeds of the road, the newest first [m/s], and what stands behind, see `Speed`."""
     forecasts: Array
     """(n, n) speeds that each of the last n choices forecast for the n periods behind it, in turn [m/s]."""
     skill: Array
@@ -188,7 +254,7 @@ class Predictor(NamedTuple):
 
     settings: Settings
     steps: Array
-    """(3,) length of each step of the plant [s]: `OBSERVED`, `HELD`, `TAIL`."""
+    """(3,) length of each step of the plant [s]: see `Step`."""
     candidates: Array
     """(c,) voltages that may be held [V]."""
     tails: Array
@@ -281,7 +347,7 @@ def _nothing_observed(passed: int, mass: float) -> Observed:
     """Return the memory of a ride on a road that was level so far, its mean squares faint but not 0."""
     faint = FAINT * np.array([1.0, (0.5 * mass) ** 2, (0.5 * mass) ** 2])
     measured = np.zeros(2 * MODES + 4)
-    measured[[MEAN_LOAD_1, MEAN_LOAD_2]] = faint[1:]
+    measured[[Memory.MEAN_LOAD_1, Memory.MEAN_LOAD_2]] = faint[1:]
     levels = np.linspace(0, LEVELS - 1, FIXED).astype(np.intp)
     return Observed(
         measured=measured,
