@@ -291,30 +291,20 @@ class SimulateConfig(Frozen):
         if self.settle_s >= self.duration_s:
             raise ValueError("settle_s must be shorter than duration_s")
         for field in ("control_period_s", "duration_s", "settle_s"):
-            self._whole_steps(field, getattr(self, field))
-        periods = self.comfort_predictive.hold_s / self.control_period_s
-        asked = "comfort_predictive" in (self.policies or ())
-        if asked and (abs(periods - round(periods)) > 1e-6 * periods or round(periods) < 1):
-            raise ValueError(
-                f"comfort_predictive.hold_s must be a whole number of control_period_s (got {periods:g} periods)"
-            )
-        self._whole_steps("1 / output_rate_Hz", 1.0 / self.output_rate_Hz)
+            self._whole(field, getattr(self, field), "integration_step_s")
+        if "comfort_predictive" in (self.policies or ()):
+            self._whole("comfort_predictive.hold_s", self.comfort_predictive.hold_s, "control_period_s", least=1)
+        self._whole("1 / output_rate_Hz", 1.0 / self.output_rate_Hz, "integration_step_s")
         self._electronics_consistent()
         return self
 
     def _electronics_consistent(self) -> None:
-        given = [
-            name for name, perfect in (("sensors", Sensors()), ("supply", Supply())) if getattr(self, name) != perfect
-        ]
+        given = "sensors" if self.sensors != Sensors() else "supply" if self.supply != Supply() else None
         if given and set(self.fidelities) == {"ideal"}:
-            raise ValueError(
-                f"{given[0]}: ideal forces need neither sensors nor a supply; ride table or dynamic as well"
-            )
+            raise ValueError(f"{given}: ideal forces need neither sensors nor a supply; ride table or dynamic as well")
         sampled = self.sensors.period_s or self.control_period_s
         for name, time in (("period_s", sampled), ("delay_s", self.sensors.delay_s)):
-            periods = time / self.control_period_s
-            if abs(periods - round(periods)) > 1e-6 * max(periods, 1.0):
-                raise ValueError(f"sensors.{name} must be a whole number of control_period_s (got {periods:g} periods)")
+            self._whole(f"sensors.{name}", time, "control_period_s")
 
     def _policies_fit_the_car(self) -> None:
         for number, name in enumerate(self.policies or ()):
@@ -342,6 +332,11 @@ class SimulateConfig(Frozen):
             raise ValueError(f"controlled: say which one the report is about: {', '.join(names)}")
 
     @property
+    def vehicle_speed(self) -> float:
+        """Speed of the car [m/s]."""
+        return self.vehicle_speed_km_per_h * KM_PER_H
+
+    @property
     def coefficients(self) -> tuple[float, float] | None:
         """c_min and c_max [N s/m] where they bound the forces of `ideal`; None where the table does."""
         if self.c_min_Ns_per_m is None or self.c_max_Ns_per_m is None:
@@ -349,7 +344,7 @@ class SimulateConfig(Frozen):
         return self.c_min_Ns_per_m, self.c_max_Ns_per_m
 
     def is_controlled(self, policy: str) -> bool:
-        """Whether a policy is the controlled one that the report sets beside the others."""
+        """Tell whether a policy is the controlled one that the report sets beside the others."""
         names = [name for name in self.policies or () if policies()[name].controlled]
         return policy == (self.controlled or (names[0] if len(names) == 1 else DEFAULT_CONTROLLED))
 
@@ -358,7 +353,7 @@ class SimulateConfig(Frozen):
         found = getattr(self, policy, None)
         return found if isinstance(found, Frozen) else Frozen()
 
-    def _whole_steps(self, name: str, time: float) -> None:
-        steps = time / self.integration_step_s
-        if abs(steps - round(steps)) > 1e-6 * max(steps, 1.0):
-            raise ValueError(f"{name} must be a whole number of integration_step_s (got {steps:g} steps)")
+    def _whole(self, name: str, time: float, of: str, least: int = 0) -> None:
+        count, unit = time / getattr(self, of), "periods" if of == "control_period_s" else "steps"
+        if abs(count - round(count)) > 1e-6 * max(count, 1.0) or round(count) < least:
+            raise ValueError(f"{name} must be a whole number of {of} (got {count:g} {unit})")

@@ -88,17 +88,15 @@ def profiles_of(simulate: SimulateConfig, seed: int, folder: Path) -> dict[str, 
     ------
     ConfigError : when a file cannot be used, is missing, or is too short for the ride, or the ride ends before an event
     """
-    from pzd.simulate.config import KM_PER_H
     from pzd.simulate.roads import Way
 
-    speed = simulate.vehicle_speed_km_per_h * KM_PER_H
-    profiles: dict[str, Profile] = {}
+    speed = simulate.vehicle_speed
     wrong: list[str] = []
+    profiles: dict[str, Profile] = {}
     for n, road in enumerate(simulate.roads):
         try:
-            profiles[road.name] = road.profile(
-                Way(speed, speed * simulate.duration_s, seed, folder, f"simulate.roads.{n}")
-            )
+            way = Way(speed, speed * simulate.duration_s, seed, folder, f"simulate.roads.{n}")
+            profiles[road.name] = road.profile(way)
         except ConfigError as error:
             wrong += error.messages
     if wrong:

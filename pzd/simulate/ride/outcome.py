@@ -30,7 +30,7 @@ from pzd.record import Array
 from pzd.schema.model import Frozen
 from pzd.signals.criterion import rms
 from pzd.signals.noise import all_pole
-from pzd.simulate.config import KM_PER_H, SimulateConfig
+from pzd.simulate.config import SimulateConfig
 from pzd.simulate.ride.loop import A_K, COLUMNS, LOAD_1, LOAD_2, LOST, TRAVEL
 from pzd.simulate.roads import Road
 
@@ -75,8 +75,7 @@ def event_of(road: Road, config: SimulateConfig) -> Event | None:
     """Return the single event of a road; None on a road that goes on and on."""
     if road.event is None:
         return None
-    begins, ends = road.event
-    speed = config.vehicle_speed_km_per_h * KM_PER_H
+    (begins, ends), speed = road.event, config.vehicle_speed
     return Event(begins / speed, (ends + config.car.car().wheelbase) / speed)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from pzd.record import Array
 from pzd.schema.errors import DataError
 from pzd.simulate.compiled_ahead import wait
-from pzd.simulate.config import KM_PER_H, SimulateConfig
+from pzd.simulate.config import SimulateConfig
 from pzd.simulate.control.demand import LEAST_LOAD, TIE_BREAKS
 from pzd.simulate.control.prediction.predictor import predictor_of
 from pzd.simulate.control.sensing import electronics_of, with_noise
@@ -166,7 +166,7 @@ def ride_case(
     """
     wait()
     car, clock, fixed = config.car.car(), clock_of(config), fixed or FixedValues.of(config, grid)
-    speed = config.vehicle_speed_km_per_h * KM_PER_H
+    speed = config.vehicle_speed
     linear = sink is None and case.fidelity == "ideal" and case.policy.aim == "damping" and not car.wheels_have_mass
     if linear and profile.smooth:
         return ride_exactly(car, fixed.damping, profile, speed, clock, float(np.max(grid.reach)))

@@ -12,7 +12,7 @@ from pzd.comfort.weighting import weighted
 from pzd.force_table.lookup import table_range
 from pzd.record import Array
 from pzd.signals.criterion import rms
-from pzd.simulate.config import KM_PER_H, SimulateConfig
+from pzd.simulate.config import SimulateConfig
 from pzd.simulate.policies import policies
 from pzd.simulate.ride.model import DynamicDamper, TableArrays
 from pzd.simulate.ride.outcome import PIECE_S, VOLTAGES, MeanSquare, Outcome, event_of
@@ -255,58 +255,55 @@ class Setup:
         ridden += [(name, self.ridden(replace(case, policy=policies()[name]))[1]) for name in names]
         rated = [(self._rated(outcome, self.config.settle_s), name, outcome) for name, outcome in ridden]
         (discomfort, _), by, best = min((one for one in rated if one[0][1] <= most_load), key=lambda one: one[0][0])
-        search = ScheduleSearch(
-            lambda voltages: self._short(case, fixed, voltages),
-            float(self.grid.voltages[0]),
-            float(self.grid.voltages[-1]),
-            most_load,
-        )
+        low, high = float(self.grid.voltages[0]), float(self.grid.voltages[-1])
+        search = ScheduleSearch(lambda voltages: self._short(case, fixed, voltages), low, high, most_load)
         best_schedule(search, self._starts(case, best, search), own.evaluations)
-        found = SearchResult(by, most_load, search.tried)
         if search.best is not None:
-            schedule = tuple(tuple(float(u) for u in axle) for axle in search.best[1])
-            by_search = replace(fixed, searched=SearchResult("search", most_load, search.tried, schedule))
+            searched = SearchResult("search", most_load, search.tried, _schedule(search.best[1]))
+            by_search = replace(fixed, searched=searched)
             outcome = self._ride(self.config, case, by_search)
             a, load = self._rated(outcome, self.config.settle_s)
             if a < discomfort and load <= most_load:
                 return by_search, outcome
-        return replace(fixed, searched=found), best
+        return replace(fixed, searched=SearchResult(by, most_load, search.tried)), best
 
     def _starts(self, case: Case, best: Outcome, search: ScheduleSearch) -> list[Array]:
         """Return the starts of the search: the best of the policies, and square waves of voltage."""
-        own, profile = self.config.best_found, self.profiles[case.road.name]
-        speed = self.config.vehicle_speed_km_per_h * KM_PER_H
-        period = 2.0 * math.pi / (profile.wavenumber * speed)
+        own, period = self.config.best_found, self._period(case)
         history = np.asarray(best.history)
         settled = history[history[:, 0] >= self.config.settle_s]
         like = sampled(settled[:, 0], settled[:, VOLTAGES], period, own.intervals // 2)
-        late = self.config.car.car().wheelbase / speed / period
+        late = self.config.car.car().wheelbase / self.config.vehicle_speed / period
         shares = (like - search.low) / max(search.high - search.low, np.finfo(np.float64).tiny)
         return [np.clip(shares, 0.0, 1.0), *square_waves(own.intervals // 2, own.starts, late)]
 
     def _short(self, case: Case, fixed: FixedValues, voltages: Array) -> tuple[float, float]:
         """Return discomfort and load of a schedule, from a ride of a few periods at a lower tolerance."""
-        profile, h = self.profiles[case.road.name], self.config.integration_step_s
-        period = 2.0 * math.pi / (profile.wavenumber * self.config.vehicle_speed_km_per_h * KM_PER_H)
+        h, period = self.config.integration_step_s, self._period(case)
         control = round(self.config.control_period_s / h)
         steps = control * math.ceil((_SHORT_SETTLE + _SHORT_PERIODS * period) / (h * control))
-        config = self.config.model_copy(
-            update={"duration_s": steps * h, "tolerance": max(self.config.tolerance, _SEARCH_TOLERANCE)}
-        )
-        schedule = tuple(tuple(float(u) for u in axle) for axle in voltages)
-        outcome = self._ride(config, case, replace(fixed, searched=SearchResult("search", 0.0, 0, schedule)))
+        config = self._rough().model_copy(update={"duration_s": steps * h})
+        searched = SearchResult("search", 0.0, 0, _schedule(voltages))
+        outcome = self._ride(config, case, replace(fixed, searched=searched))
         return self._rated(outcome, steps * h - _SHORT_PERIODS * period)
+
+    def _period(self, case: Case) -> float:
+        """Return the period of a harmonic road [s]."""
+        return 2.0 * math.pi / (self.profiles[case.road.name].wavenumber * self.config.vehicle_speed)
+
+    def _rough(self) -> SimulateConfig:
+        """Return the config with the tolerance of rides that are only compared."""
+        return self.config.model_copy(update={"tolerance": max(self.config.tolerance, _SEARCH_TOLERANCE)})
 
     def _rated(self, outcome: Outcome, after: float) -> tuple[float, float]:
         """Return discomfort by the measure of `best_found` [m/s2] and larger load [N] of a ride after a time [s]."""
-        first = round(after / outcome.step)
-        a_K = outcome.comfort
+        first, a_K = round(after / outcome.step), outcome.comfort
         judged = weighted(a_K, 1.0 / outcome.step) if self.config.best_found.measure == "a_w" else a_K
         return rms(judged[first:]), max(rms(load) for load in outcome.loads[first:].T)
 
     def _a_w(self, case: Case, fixed: FixedValues) -> float:
         """Return the weighted r.m.s. of a_K of a ride [m/s2], from the settling time or the event on."""
-        rough = self.config.model_copy(update={"tolerance": max(self.config.tolerance, _SEARCH_TOLERANCE)})
+        rough = self._rough()
         event, step = event_of(case.road, self.config), self.config.integration_step_s
         first = round((self.config.settle_s if event is None else event.entry) / step)
         if self.config.duration_s > PIECE_S:
@@ -314,3 +311,7 @@ class Setup:
             self._ride(rough, case, fixed, mean.add)
             return mean.root()
         return rms(weighted(self._ride(rough, case, fixed).comfort, 1.0 / step)[first:])
+
+
+def _schedule(voltages: Array) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(float(u) for u in axle) for axle in voltages)
