@@ -1,4 +1,4 @@
-"""What the valve puts into the oil springs while the voltage moves, which the balance of a ride takes as a rest."""
+"""What the valve puts into the oil stiffnesses while the voltage moves, which the balance of a ride takes as a rest."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def model_of(ride, monkeypatch) -> RideModel:
 
 
 def stiffness(model: RideModel, acts, axle: int, time: float) -> float:
-    """k of the oil spring [N/m] at the effective voltage of an axle."""
+    """k of the oil stiffness [N/m] at the effective voltage of an axle."""
     voltage = effective_voltage(
         model.damper, acts[Command.SET, axle], acts[Command.BEHIND :, axle], time - acts[Command.SINCE, 0]
     )
@@ -38,7 +38,7 @@ def stiffness(model: RideModel, acts, axle: int, time: float) -> float:
 def test_the_work_of_the_valve_is_half_the_square_of_the_deflection_over_the_stiffness_it_adds(
     ride, monkeypatch
 ) -> None:
-    """W = integral e^2 / 2 dk in small steps is what the oil springs gain beyond what motion puts into them."""
+    """W = integral e^2 / 2 dk in small steps is what the oil stiffnesses gain beyond what motion puts into them."""
     model = model_of(ride, monkeypatch)
     y, going = at_rest(model.car), ride_of(model)
     acts, room = going.control, going.workspace

@@ -180,7 +180,7 @@ def test_the_modes_of_the_weighting_are_the_weighting() -> None:
 @pytest.mark.ci
 @pytest.mark.parametrize("road", ["known", "unknown"])
 @pytest.mark.parametrize("kind", [0, 1])
-def test_it_sets_voltages_of_the_table_once_a_hold_and_the_energies_balance(ride, road, kind) -> None:
+def test_predictive_control_sets_voltages_of_the_table_once_a_hold_and_the_energies_balance(ride, road, kind) -> None:
     roads = [{"kind": "sine", "frequency_Hz": 4.5}, {"kind": "iso8608", "road_class": "C", "seed": 1}]
     given = {"roads": roads, "road": kind, "comfort_predictive": {"road": road}}
     outcome = ride("comfort_predictive", "dynamic", **SHORT, **given)
@@ -196,7 +196,7 @@ def test_it_sets_voltages_of_the_table_once_a_hold_and_the_energies_balance(ride
 
 
 @pytest.mark.ci
-def test_on_a_known_sine_it_beats_both_ends_of_the_voltage_without_more_load(ride) -> None:
+def test_on_a_known_sine_predictive_control_beats_both_ends_of_the_voltage_without_more_load(ride) -> None:
     """4.5 Hz, where the softest voltage is the best of those held."""
     given = {**SHORT, "roads": [{"kind": "sine", "frequency_Hz": 4.5}], "comfort_predictive": {"road": "known"}}
     found = {}
@@ -210,7 +210,7 @@ def test_on_a_known_sine_it_beats_both_ends_of_the_voltage_without_more_load(rid
 
 
 @pytest.mark.ci
-def test_on_wheels_with_mass_it_beats_every_held_voltage_on_a_sine_and_a_random_road(ride) -> None:
+def test_on_wheels_with_mass_predictive_control_beats_every_held_voltage_on_a_sine_and_a_random_road(ride) -> None:
     """The road unknown: a_w below that of the best of five held voltages, the larger load at most a tenth above."""
     for road in ({"kind": "sine", "frequency_Hz": 2.25}, {"kind": "iso8608", "road_class": "C", "seed": 1}):
         given = {"roads": [road], "car": WHEELS_ON_TYRES, "duration_s": 8.0, "settle_s": 4.0}
@@ -298,7 +298,7 @@ def test_parameters_that_make_no_sense_are_refused_with_what_would(given, messag
         settings(comfort_predictive=given)
 
 
-def test_it_needs_the_dynamic_damper_and_a_voltage(damper) -> None:
+def test_predictive_control_needs_the_dynamic_damper_and_a_voltage(damper) -> None:
     with pytest.raises(ConfigError, match="add table or dynamic"):
         simulate(settings(fidelities=["ideal", "table"]), Diagnosed.undiagnosed(damper), table_of(damper), 1, Path())
     row = damper.base[0].model_copy(update={"voltage_V": None})

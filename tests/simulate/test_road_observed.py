@@ -44,10 +44,10 @@ def height_error(noise: SensorNoise, gain: float, rng: np.random.Generator) -> f
 def test_no_other_gain_knows_the_height_better(generator_for) -> None:
     """On the same noise; the height alone is off by more than three times as much."""
     gain = road_gain(NOISE, ARM, STEP)
-    best = height_error(NOISE, gain, generator_for("road met"))
+    best = height_error(NOISE, gain, generator_for("road observed"))
     for other in (0.5, 2.0):
-        assert best < height_error(NOISE, other * gain, generator_for("road met"))
-    assert height_error(NOISE, 1.0, generator_for("road met")) > 3.0 * best
+        assert best < height_error(NOISE, other * gain, generator_for("road observed"))
+    assert height_error(NOISE, 1.0, generator_for("road observed")) > 3.0 * best
 
 
 def test_heights_without_noise_are_believed() -> None:

@@ -143,7 +143,7 @@ class Way:
 
 
 class Road(OneOfAKind):
-    """A road under the wheels, told from others by its `kind`."""
+    """A road under the wheels, of a `kind` of its own."""
 
     @property
     def event(self) -> tuple[float, float] | None:

@@ -61,6 +61,13 @@ class MeasuredRoad(Road):
         return through(np.interp(even, place - place[0], height), length / spaces)
 
 
+def _lines(path: Path, encoding: str) -> list[str]:
+    try:
+        return path.read_text(encoding=encoding).splitlines()
+    except OSError as error:
+        raise FilesError(f"{path}: cannot be read ({error.strerror})") from error
+
+
 # --- CSV ---
 
 _HEADER = "distance_m,height_m"
@@ -74,10 +81,7 @@ class RoadFile(MeasuredRoad):
 
     @override
     def heights(self, path: Path, key: str) -> tuple[Array, Array]:
-        try:
-            lines = path.read_text(encoding="utf-8").splitlines()
-        except OSError as error:
-            raise FilesError(f"{path}: cannot be read ({error.strerror})") from error
+        lines = _lines(path, "utf-8")
         if not lines or lines[0].replace(" ", "") != _HEADER:
             raise DataError(f"{path}:1: the header must be {_HEADER} (got {lines[0] if lines else 'nothing'})")
         rows = [_numbers(line) for line in lines[1:]]
@@ -172,10 +176,7 @@ def read_grid(path: Path) -> CrgGrid:
     FilesError : when it cannot be read
     DataError : when it is no plain-text OpenCRG file, or a number in it is none
     """
-    try:
-        lines = path.read_text(encoding="latin-1").splitlines()
-    except OSError as error:
-        raise FilesError(f"{path}: cannot be read ({error.strerror})") from error
+    lines = _lines(path, "latin-1")
     head, first = _head(path, lines)
     if head.form not in _WIDTHS:
         raise DataError(

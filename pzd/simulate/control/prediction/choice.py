@@ -66,7 +66,7 @@ def observe(sampled: float, ride: Ride, plan: Predictor, electronics: Electronic
 
 @compiled
 def ride_fixed(car: Vehicle, plan: Predictor) -> None:
-    """Bring the ride at each fixed voltage to the present, over the road that was met since the last observation.
+    """Bring the ride at each fixed voltage to the present, over the road since the last observation.
 
     They are the measure of how much wheel load comfort may cost.
     """

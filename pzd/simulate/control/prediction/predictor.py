@@ -191,7 +191,7 @@ class DamperLevels(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """What is remembered of the ride and of the road that was met."""
+    """What is remembered of the ride and of the road."""
 
     measured: Array
     """(2 MODES + 4,) modes of the weighting, and what stands behind them, see `Memory`."""
