@@ -1,4 +1,4 @@
-"""The force that the policy asks of each axle, within the box Omega(V)."""
+"""The force that a policy demands of each axle, within the box Omega(V) of admissible forces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The controller's view of a ride, late, sampled and noisy, and the voltage that its supply makes of what it asks."""
+"""Sensors and supply: what the controller sees, late, sampled and noisy, and the voltage that its supply can set."""
 
 from __future__ import annotations
 
@@ -43,13 +43,15 @@ class Electronics(NamedTuple):
     states: Array
     """(m, n) samples of the state, the latest m in a ring."""
     workspaces: Array
-    """(m, WORKSPACE_ROWS, 2) those of the workspace, see `Axle`."""
+    """(m, WORKSPACE_ROWS, 2) samples of the workspace, see `Axle`."""
     road_errors: Array
     """(m, 2, 2) error of the height [m] of the road, body less suspension, and of its rise [m/s], under each axle."""
     state: Array
-    """(n,) the sample that the controller sees, and so the two that follow."""
+    """(n,) state that the controller sees: that of the latest sample which is old enough."""
     workspace: Array
+    """(WORKSPACE_ROWS, 2) the workspace of that sample."""
     road_error: Array
+    """(2, 2) the errors of the road of that sample [m], [m/s]."""
     road_gains: Array
     """(2,) share of a new height that is believed beside the rise since the last one, see `road_gain`."""
     step: float

@@ -8,8 +8,8 @@ followed by each pair out of a few `tails` until `horizon_s`. The pair is set wi
 a_w = Wk a_K, the weighting of ISO 2631-1:1997 with what it remembers; L_i, the dynamic load of each wheel: S_i + T_i,
 or where the wheels have mass the force of the tyre, beyond that at rest; B_i the mean square of L_i of late; A and B
 those of a_w and of the larger load at the fixed voltage with the least A, which ride along on the plant over the road
-that was observed. So one weight serves roads of any height, and loads that leave those of the fixed voltage soon cost more
-than comfort brings.
+that was observed. So one weight serves roads of any height, and loads that leave those of the fixed voltage soon cost
+more than comfort brings.
 
 The plant has the state of the oil, the lag of the valve, the adopted effects and the wheels
 (`plant` of `pzd.simulate.control.prediction`). Body, wheels, oil, acceleration and the road under each axle are sensed

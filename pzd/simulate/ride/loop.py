@@ -183,7 +183,7 @@ class Clock(NamedTuple):
 
 
 class Records(NamedTuple):
-    """What is written down of a piece of a ride."""
+    """Rows that are recorded of a piece of a ride."""
 
     course: Array
     """(n, COURSE_COLUMNS) of every step, see `A_K`."""

@@ -513,7 +513,7 @@ def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -
 
 
 def rubs(dynamic: DynamicDamper) -> bool:
-    """Whether friction beside the element jumps where the speed crosses zero."""
+    """Tell whether friction beside the element jumps where the speed crosses zero."""
     tiny = np.finfo(np.float64).tiny
     return any(parallel_force(0.0, tiny, 0.0, row) != parallel_force(0.0, 0.0, 0.0, row) for row in dynamic.parallel)
 

@@ -51,7 +51,7 @@ _CROSSED = 1e-9  # m/s on the other side of zero: the moment lies between this s
 _PUSHED = 1e-6  # m/s2: an axle that sticks slips between no push and this one
 _SMALLEST = 1e-6  # of the step: what is taken whatever the error
 _SHARP = 1e-13  # of the step: how closely the moment is found at which an axle turns round or sticks, where it jumps
-_MOST_CUTS = 50
+_MOST_CUTS = 50  # in a step: an axle that chatters more goes on in the pieces that the tolerance asks for
 _AIM = 0.5  # of what is let pass: where the moment is looked for
 _INSIDE = 1e-3  # of a bracket: no guess is closer to its ends
 _HALVED = 4  # every so many guesses the bracket is halved, so that it shrinks whatever the law
@@ -240,7 +240,7 @@ def advance(time: float, h: float, y: Array, ride: Ride, integrator: Integrator,
         for n in range(y.size):
             y[n] = integrator.end[n]
         done += dt
-        if not worst < math.inf:  # the shortest piece overflowed, too: the ride is lost, see `ride`
+        if not worst < math.inf:  # the shortest piece overflowed, too: the ride is lost, see `ride_steps`
             return h
         if model.damper.slips and model.control_spec.fidelity == DYNAMIC:
             remember_step(time + done, ride)
