@@ -29,8 +29,8 @@ from pzd.simulate.ride.equations import motion
 from pzd.simulate.ride.loop import set_control
 from pzd.simulate.ride.model import (
     Axle,
-    Ride,
     RideModel,
+    RunningRide,
     State,
     at_rest,
     dynamic_damper_of,
@@ -82,7 +82,7 @@ def model_of(damper: Damper, policy: str, voltage: float, **given: object) -> tu
     return model, predictor_of(config.comfort_predictive, config.control_period_s, dynamic, car, speed, grid.voltages)
 
 
-def ahead(y, ride: Ride, start: float, seconds: float) -> np.ndarray:
+def ahead(y, ride: RunningRide, start: float, seconds: float) -> np.ndarray:
     """Bring a ride forward by the integrator of the loop, its voltage set once at the start; the largest motion."""
     peak = np.abs(y)
     scratch, integrator = np.zeros_like(y), integrator_of(1e-9, y.size)

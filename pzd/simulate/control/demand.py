@@ -16,7 +16,7 @@ from pzd.simulate.ride.model import (
     Axle,
     Command,
     ControlSpec,
-    Ride,
+    RunningRide,
     State,
     TableArrays,
     Vehicle,
@@ -254,7 +254,7 @@ def spring_acceleration(car: Vehicle, deflection: Array) -> float:
 
 
 @compiled
-def choose_hardness(y: Array, ride: Ride) -> None:
+def choose_hardness(y: Array, ride: RunningRide) -> None:
     """Fill whether each damper is to be hard, by the workspace as the motion left it."""
     control_spec, car, workspace = ride.model.control_spec, ride.model.car, ride.workspace
     for i in range(2):
@@ -265,7 +265,7 @@ def choose_hardness(y: Array, ride: Ride) -> None:
 
 
 @inlined
-def wanted_force(axle: int, y: Array, ride: Ride) -> float:
+def wanted_force(axle: int, y: Array, ride: RunningRide) -> float:
     """Return what a feedback or a switch asks of one axle within the workspace's bounds [N]."""
     control_spec, workspace = ride.model.control_spec, ride.workspace
     low, high = workspace[Axle.LOW, axle], workspace[Axle.HIGH, axle]
@@ -275,7 +275,7 @@ def wanted_force(axle: int, y: Array, ride: Ride) -> float:
 
 
 @compiled
-def demand(y: Array, ride: Ride) -> None:
+def demand(y: Array, ride: RunningRide) -> None:
     """Fill the workspace's forces with what the policy asks of both axles within the workspace's bounds [N]."""
     control_spec, car, workspace = ride.model.control_spec, ride.model.car, ride.workspace
     if control_spec.aim != MINIMISE:

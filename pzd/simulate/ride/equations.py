@@ -15,7 +15,7 @@ from pzd.simulate.ride.model import (
     TABLE,
     Axle,
     Command,
-    Ride,
+    RunningRide,
     State,
     TableArrays,
     Vehicle,
@@ -123,7 +123,7 @@ def tabled(car: Vehicle, grid: TableArrays, axle: int, voltage: float, velocity:
 
 
 @inlined
-def quasistatic_forces(y: Array, ride: Ride) -> None:
+def quasistatic_forces(y: Array, ride: RunningRide) -> None:
     """Fill the workspace's forces for axles that slip; one that sticks is left to what holds it."""
     model, control, workspace = ride
     control_spec = model.control_spec
@@ -147,7 +147,7 @@ def quasistatic_forces(y: Array, ride: Ride) -> None:
 
 
 @inlined
-def _force_outside_sticking(y: Array, ride: Ride) -> None:
+def _force_outside_sticking(y: Array, ride: RunningRide) -> None:
     """Fill the force of the free axle where the other sticks: the policy knows that the stuck one answers."""
     model, control, workspace = ride
     control_spec, car = model.control_spec, model.car
@@ -178,7 +178,7 @@ def body_acceleration(car: Vehicle, load0: float, load1: float) -> tuple[float, 
 
 
 @inlined
-def valve_voltage(time: float, ride: Ride, axle: int) -> float:
+def valve_voltage(time: float, ride: RunningRide, axle: int) -> float:
     """Return the effective voltage of the dampers of an axle [V] at a time [s]."""
     control = ride.control
     elapsed = time - control[Command.SINCE, 0]
@@ -186,7 +186,7 @@ def valve_voltage(time: float, ride: Ride, axle: int) -> float:
 
 
 @inlined
-def dynamic_forces(time: float, y: Array, ride: Ride) -> None:
+def dynamic_forces(time: float, y: Array, ride: RunningRide) -> None:
     """Fill the workspace's forces from where the oil has flowed to."""
     model, control, workspace = ride
     car, damper = model.car, model.damper
@@ -217,7 +217,7 @@ def dynamic_forces(time: float, y: Array, ride: Ride) -> None:
 
 
 @compiled
-def remember_step(time: float, ride: Ride) -> None:
+def remember_step(time: float, ride: RunningRide) -> None:
     """Bring what remembers beside the elements to the end of a step [s] in which no axle turned round; see `motion`."""
     model, workspace = ride.model, ride.workspace
     damper = model.damper
@@ -227,7 +227,7 @@ def remember_step(time: float, ride: Ride) -> None:
 
 
 @compiled
-def relax_oil(time: float, y: Array, ride: Ride) -> None:
+def relax_oil(time: float, y: Array, ride: RunningRide) -> None:
     """Let the oil of every damper flow to where its stiffness bears nothing, as it does while the car stands."""
     model, workspace = ride.model, ride.workspace
     suspension(time, y, model.car, model.road_coefficients, workspace)
@@ -236,7 +236,7 @@ def relax_oil(time: float, y: Array, ride: Ride) -> None:
 
 
 @compiled
-def motion(time: float, y: Array, ride: Ride, dy: Array) -> None:
+def motion(time: float, y: Array, ride: RunningRide, dy: Array) -> None:
     """Fill `dy` with the derivative of the state: eq. (6) of Makowski and Knap 2021, S_i = k_i U_i.
 
     Parameters
@@ -274,7 +274,7 @@ def motion(time: float, y: Array, ride: Ride, dy: Array) -> None:
 
 
 @inlined
-def _act(time: float, y: Array, ride: Ride) -> None:
+def _act(time: float, y: Array, ride: RunningRide) -> None:
     """Fill the damper forces, and dV/dt of both axles."""
     model, control, workspace = ride
     if model.control_spec.fidelity == DYNAMIC:
@@ -285,7 +285,7 @@ def _act(time: float, y: Array, ride: Ride) -> None:
 
 
 @compiled
-def _try_sides(time: float, y: Array, ride: Ride) -> None:
+def _try_sides(time: float, y: Array, ride: RunningRide) -> None:
     """Fill how each sticking axle would be pushed away from V = 0, were it to slip to the one or the other side."""
     control, workspace = ride.control, ride.workspace
     for i in range(2):
@@ -298,7 +298,7 @@ def _try_sides(time: float, y: Array, ride: Ride) -> None:
 
 
 @inlined
-def _add_damper_power(ride: Ride, axle: int, dy: Array) -> None:
+def _add_damper_power(ride: RunningRide, axle: int, dy: Array) -> None:
     """Add the powers of the dampers of one axle to the derivative of the energies, and fill the flow of its oil."""
     model, workspace = ride.model, ride.workspace
     n, speed = model.car.dampers[axle], model.car.ratio[axle] * workspace[Axle.RATE, axle]
@@ -320,7 +320,7 @@ _NOTHING = 1e-12
 
 
 @compiled
-def stored_energy(time: float, y: Array, ride: Ride) -> float:
+def stored_energy(time: float, y: Array, ride: RunningRide) -> float:
     """Return the energy of body and springs, and of wheels and tyres where wheels have mass.
 
     Equation: E = m (dz/dt)^2 / 2 + J (dphi/dt)^2 / 2 + sum k_i U_i^2 / 2 + sum m_i (dzeta_i/dt)^2 / 2 + sum E_tyre
@@ -350,7 +350,7 @@ def stored_energy(time: float, y: Array, ride: Ride) -> float:
 
 
 @compiled
-def oil_energy(time: float, y: Array, ride: Ride) -> float:
+def oil_energy(time: float, y: Array, ride: RunningRide) -> float:
     """Return the energy of the oil stiffnesses of all dampers [J].
 
     Equation: E = sum n_i k integral s de, e = r_i U_i - y_i

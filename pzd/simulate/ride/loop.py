@@ -25,8 +25,8 @@ from pzd.simulate.ride.model import (
     Axle,
     Command,
     ControlSpec,
-    Ride,
     RideModel,
+    RunningRide,
     State,
     place,
 )
@@ -53,7 +53,7 @@ def _stays(control_spec: ControlSpec, control: Array) -> bool:
 
 
 @inlined
-def _choose_ends(y: Array, ride: Ride) -> None:
+def _choose_ends(y: Array, ride: RunningRide) -> None:
     """Fill the bounds of both axles, and what stays as it is until the controller acts again."""
     model, control, workspace = ride
     control_spec, car = model.control_spec, model.car
@@ -69,7 +69,7 @@ def _choose_ends(y: Array, ride: Ride) -> None:
 
 @compiled
 def set_control(
-    time: float, y: Array, ride: Ride, plan: Predictor | None, electronics: Electronics | None, scratch: Array
+    time: float, y: Array, ride: RunningRide, plan: Predictor | None, electronics: Electronics | None, scratch: Array
 ) -> None:
     """Let the controller act once: what it asks of each axle, and the voltage that gives it by the table.
 
@@ -92,7 +92,7 @@ def set_control(
     seen, view, age = y, ride, 0.0
     if electronics is not None:
         age = sense(y, model.car, ride.workspace, electronics)
-        seen, view = electronics.state, Ride(model, control, electronics.workspace)
+        seen, view = electronics.state, RunningRide(model, control, electronics.workspace)
     _choose_ends(seen, view)
     if plan is not None:
         predict(time, age, seen, view, plan, electronics)
@@ -119,7 +119,7 @@ def scheduled(time: float, model: RideModel, axle: int) -> float:
 
 
 @inlined
-def _wanted_voltage(time: float, ride: Ride, axle: int) -> float:
+def _wanted_voltage(time: float, ride: RunningRide, axle: int) -> float:
     """Return the voltage that the policy asks of an axle [V]; a force that it asks is noted."""
     model, control, workspace = ride
     aim = model.control_spec.aim
@@ -147,7 +147,7 @@ def _voltage_for(model: RideModel, axle: int, force: float, velocity: float, oth
 
 
 @compiled
-def _set_voltage(time: float, ride: Ride, electronics: Electronics | None, axle: int, asked: float) -> None:
+def _set_voltage(time: float, ride: RunningRide, electronics: Electronics | None, axle: int, asked: float) -> None:
     """Set the voltage of an axle as the supply can, and note what stands behind each drive effect then."""
     control, voltages, before = ride.control, ride.model.grid.voltages, ride.control[Command.SET, axle]
     elapsed, voltage = time - control[Command.SINCE, 0], asked
@@ -199,7 +199,7 @@ def records_of(rows: int, per_output: int) -> Records:
 
 
 @inlined
-def beyond_reach(ride: Ride) -> bool:
+def beyond_reach(ride: RunningRide) -> bool:
     """Tell whether a damper moves faster than the rig did at its voltage; `ideal` has none, so at the best one."""
     model, control, workspace = ride
     grid, car = model.grid, model.car
@@ -216,7 +216,7 @@ def beyond_reach(ride: Ride) -> bool:
 
 
 @inlined
-def _note(time: float, y: Array, ride: Ride, row: Array) -> None:
+def _note(time: float, y: Array, ride: RunningRide, row: Array) -> None:
     """Fill one row of the history."""
     model, control, workspace = ride
     row[0], row[1], row[2], row[3] = time, y[0], y[1], workspace[Axle.COMFORT, 0]
@@ -241,7 +241,7 @@ def _keep(y: Array, workspace: Array, row: Array) -> None:
 @compiled
 def ride_steps(
     y: Array,
-    ride: Ride,
+    ride: RunningRide,
     plan: Predictor | None,
     electronics: Electronics | None,
     first: int,
@@ -288,7 +288,7 @@ def ride_steps(
 
 
 @inlined
-def _start(y: Array, ride: Ride, scratch: Array) -> None:
+def _start(y: Array, ride: RunningRide, scratch: Array) -> None:
     """Find to which side each axle sets off, or that it sticks."""
     model, control, workspace = ride
     motion(0.0, y, ride, scratch)

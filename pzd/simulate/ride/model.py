@@ -261,7 +261,7 @@ class RideModel(NamedTuple):
     damper: DynamicDamper
 
 
-class Ride(NamedTuple):
+class RunningRide(NamedTuple):
     """A ride under way."""
 
     model: RideModel
@@ -304,12 +304,12 @@ def road_coefficients(profile: Profile, wheelbase: float) -> RoadCoefficients:
     )
 
 
-def ride_of(model: RideModel) -> Ride:
+def ride_of(model: RideModel) -> RunningRide:
     """Return a ride before its first act, the valves at rest at the voltage of the policy."""
     control = np.zeros((Command.BEHIND + len(acting("drive")), 2))
     control[Command.SET] = control[Command.BEHIND :] = model.control_spec.voltage
     control[Command.SIDE] = 1.0
-    return Ride(model, control, workspace())
+    return RunningRide(model, control, workspace())
 
 
 def at_rest(car: Vehicle) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.ride.equations import motion, remember_step
-from pzd.simulate.ride.model import DYNAMIC, STATES, Axle, Command, Ride, State
+from pzd.simulate.ride.model import DYNAMIC, STATES, Axle, Command, RunningRide, State
 
 # --- Coefficients of the pair of order 5(4), the last stage being the first of the next step ---
 #
@@ -84,7 +84,7 @@ def _reach(i: int, dt: float, first: int, last: int, y: Array, integrator: Integ
 
 
 @inlined
-def trial(time: float, dt: float, y: Array, ride: Ride, integrator: Integrator) -> float:
+def trial(time: float, dt: float, y: Array, ride: RunningRide, integrator: Integrator) -> float:
     """Fill the end of the integrator with the state after dt; the workspace is left as it is there.
 
     Source: Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2
@@ -120,7 +120,7 @@ def trial(time: float, dt: float, y: Array, ride: Ride, integrator: Integrator) 
 
 
 @compiled
-def choose_side(axle: int, time: float, y: Array, ride: Ride, dy: Array) -> None:
+def choose_side(axle: int, time: float, y: Array, ride: RunningRide, dy: Array) -> None:
     """Stop the suspension of an axle that is at V = 0, and let it slip to whichever side its forces push it."""
     model, control, workspace = ride
     car = model.car
@@ -147,7 +147,7 @@ def beyond(control: Array, workspace: Array, axle: int) -> float:
 
 
 @inlined
-def farthest(ride: Ride) -> float:
+def farthest(ride: RunningRide) -> float:
     """Return the larger `beyond` of both axles; -1 where the force does not jump at V = 0."""
     model, control, workspace = ride
     if not model.control_spec.jumps:
@@ -175,7 +175,7 @@ def guess(number: int, shortest: float, longest: float, before: float, behind: f
 
 @compiled
 def cut(
-    time: float, longest: float, sharp: float, before: float, y: Array, ride: Ride, integrator: Integrator
+    time: float, longest: float, sharp: float, before: float, y: Array, ride: RunningRide, integrator: Integrator
 ) -> tuple[float, float]:
     """Cut a piece of a step right behind a moment at which an axle leaves its side or its stick.
 
@@ -208,7 +208,7 @@ def cut(
 
 
 @compiled
-def advance(time: float, h: float, y: Array, ride: Ride, integrator: Integrator, first: float) -> float:
+def advance(time: float, h: float, y: Array, ride: RunningRide, integrator: Integrator, first: float) -> float:
     """Carry the state through one step of integration.
 
     Parameters
@@ -258,7 +258,7 @@ def advance(time: float, h: float, y: Array, ride: Ride, integrator: Integrator,
 
 
 @inlined
-def _choose_sides(time: float, y: Array, ride: Ride, dy: Array) -> bool:
+def _choose_sides(time: float, y: Array, ride: RunningRide, dy: Array) -> bool:
     """Let every axle that is beyond its side slip to the other one or stick, and tell whether there was one."""
     control, workspace = ride.control, ride.workspace
     turned = False

@@ -25,7 +25,7 @@ from pzd.simulate.control.prediction.predictor import (
     Step,
 )
 from pzd.simulate.control.sensing import Electronics, copy_into
-from pzd.simulate.ride.model import Axle, Command, DynamicDamper, Ride, RideModel, State, Vehicle
+from pzd.simulate.ride.model import Axle, Command, DynamicDamper, RideModel, RunningRide, State, Vehicle
 
 _STEEPNESS = 4.0
 """Power with which the weight of a load rises as it leaves that of the best fixed voltage: a tenth more load has
@@ -35,7 +35,7 @@ twice the weight, since it is of mean squares."""
 
 
 @compiled
-def observe(sampled: float, ride: Ride, plan: Predictor, electronics: Electronics | None) -> bool:
+def observe(sampled: float, ride: RunningRide, plan: Predictor, electronics: Electronics | None) -> bool:
     """Take note of acceleration, loads and road once a control period, and tell whether it is time to choose.
 
     Parameters
@@ -83,14 +83,16 @@ def ride_fixed(car: Vehicle, plan: Predictor) -> None:
 
 
 @compiled
-def predict(time: float, age: float, y: Array, ride: Ride, plan: Predictor, electronics: Electronics | None) -> None:
+def predict(
+    time: float, age: float, y: Array, ride: RunningRide, plan: Predictor, electronics: Electronics | None
+) -> None:
     """Observe, and choose anew where it is time; see `choose`."""
     if observe(time - age, ride, plan, electronics):
         choose(time, age, y, ride, plan)
 
 
 @compiled
-def choose(time: float, age: float, y: Array, ride: Ride, plan: Predictor) -> None:
+def choose(time: float, age: float, y: Array, ride: RunningRide, plan: Predictor) -> None:
     """Choose the voltages with which the ride ahead costs least, and leave them in `Predictor.chosen`.
 
     Equation: (U_1, U_2) = Arg min over U, W in finite sets of J(U for the hold, then W), J of `predicted`
