@@ -295,7 +295,7 @@ def wheel_rows(case: str, outcome: Outcome, window: Window, static: tuple[float,
         )
 
 
-def ride_of(case: str, outcome: Outcome, without: tuple[str, ...]) -> Ride:
+def history_of(case: str, outcome: Outcome, without: tuple[str, ...]) -> Ride:
     """Return the history as the artefact holds it, without the columns that mean nothing in this ride."""
     names = RIDE_COLUMNS + tuple(name.format(axle) for axle in AXLES for name in AXLE_COLUMNS)
     left_out = {name.format(axle) for name in without for axle in AXLES}

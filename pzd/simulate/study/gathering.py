@@ -35,9 +35,9 @@ from pzd.simulate.ride.outcome import (
     Window,
     WindowRows,
     event_of,
+    history_of,
     longest_piece,
     of_event,
-    ride_of,
     settled,
     summary_row,
     wheel_rows,
@@ -255,7 +255,7 @@ class Gathering:
             damping_Ns_per_m=fixed.damping if aim == "damping" else None,
             history=self._config.histories,
         )
-        history, found = ride_of(case.name, outcome, without), tuple(_found_rows(case.name, fixed.searched))
+        history, found = history_of(case.name, outcome, without), tuple(_found_rows(case.name, fixed.searched))
         return RideRows(history, rows.summary, ridden, rows.wheels, rows.weighted, rows.spectrum, found)
 
 
