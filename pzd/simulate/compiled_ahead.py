@@ -1,6 +1,8 @@
-"""Has the kernels of the ride compiled in a process of its own, `pzd.simulate.precompile`, while the stages before run.
+"""Starts a process that compiles the kernels of the ride, `pzd.simulate.precompile`, while the stages before run.
 
-On a new machine this takes as long as all the stages before; a second core does it meanwhile.
+On a new machine this takes as long as all the stages before; a second core does it meanwhile. The two are modules of
+their own because of what they import: this one is imported by every command that rides, and imports neither numba nor
+the ride; the other one imports both and is run in the new process alone.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ LOCK = "ride-compiling.lock"
 
 
 def mark(folder: Path) -> Path:
-    """The file in a folder of kernels that says that those of this copy of pzd are compiled.
+    """Return the file in a folder of kernels that marks those of this copy of pzd as compiled.
 
     Numba keeps them by path and time of their sources, so that those of another copy of the same text are no use.
     """
@@ -32,7 +34,7 @@ def mark(folder: Path) -> Path:
 
 
 def lock(folder: Path) -> FileLock:
-    """One for all threads of a process: the ride that compiles does not wait for itself."""
+    """Return the lock of a folder, one for all threads of a process: what compiles does not wait for itself."""
     from filelock import FileLock
 
     return FileLock(folder / LOCK, thread_local=False, is_singleton=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from dataclasses import replace
 from functools import reduce
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
@@ -17,13 +17,12 @@ from pzd.simulate.policies import TieBreak, policies
 from pzd.simulate.policies.best_found import BestFound
 from pzd.simulate.policies.clipped_lqr import ClippedLqr
 from pzd.simulate.policies.comfort_predictive import ComfortPredictive
-from pzd.simulate.policies.skyhook_add import SkyhookAdd
+from pzd.simulate.policies.skyhook import SkyhookAdd
 from pzd.simulate.roads import Road, roads
 from pzd.simulate.roads.sine import Sine
 from pzd.simulate.vehicle.car import HalfCar
 
-# ----------------------------------------------------------------------------------------------------
-# The `sensors` and the `supply` of the `simulate` block: what the controller sees, and what becomes of its voltage.
+# --- `sensors` and `supply`: what the controller sees, and what becomes of the voltage that it asks for ---
 
 
 class SensorNoise(Frozen):
@@ -78,9 +77,7 @@ class Supply(Frozen):
         return self
 
 
-# ----------------------------------------------------------------------------------------------------
-# The `car` of the `simulate` block: one of the library, and whatever is to be different from it.
-
+# --- `car`: one of the library, and whatever is to be different from it ---
 
 Pair = tuple[float, float]
 
@@ -161,30 +158,25 @@ class CarBlock(Frozen):
         return self
 
     def car(self) -> HalfCar:
-        """The car of the library with what the config changes; it keeps its name only where that is nothing."""
-        known = cars()[self.model]
-        built = HalfCar(
-            name=known.name,
-            mass=_first(self.mass_kg, known.mass),
-            pitch_inertia=_first(self.pitch_inertia_kgm2, known.pitch_inertia),
-            distances=(_first(self.a1_m, known.distances[0]), _first(self.a2_m, known.distances[1])),
-            stiffnesses=self.spring_stiffness_N_per_m or known.stiffnesses,
-            comfort_point=_first(self.x_K_m, known.comfort_point),
-            motion_ratios=self.motion_ratio or known.motion_ratios,
-            dampers=self.dampers_per_axle or known.dampers,
-            unsprung_masses=self.unsprung_mass_kg or known.unsprung_masses,
-            tyre_stiffnesses=self.tyre_stiffness_N_per_m or known.tyre_stiffnesses,
-            tyre_dampings=self.tyre_damping_Ns_per_m or known.tyre_dampings,
-        )
+        """Return the car of the library with what the config changes; it keeps its name only where that is nothing."""
+        known, (a1, a2) = cars()[self.model], cars()[self.model].distances
+        given: dict[str, Any] = {
+            "mass": self.mass_kg,
+            "pitch_inertia": self.pitch_inertia_kgm2,
+            "distances": (a1 if self.a1_m is None else self.a1_m, a2 if self.a2_m is None else self.a2_m),
+            "stiffnesses": self.spring_stiffness_N_per_m,
+            "comfort_point": self.x_K_m,
+            "motion_ratios": self.motion_ratio,
+            "dampers": self.dampers_per_axle,
+            "unsprung_masses": self.unsprung_mass_kg,
+            "tyre_stiffnesses": self.tyre_stiffness_N_per_m,
+            "tyre_dampings": self.tyre_damping_Ns_per_m,
+        }
+        built = replace(known, **{name: value for name, value in given.items() if value is not None})
         return replace(built, name=self.name or (known.name if built == known else "own"))
 
 
-def _first(given: float | None, known: float) -> float:
-    return known if given is None else given
-
-
-# ----------------------------------------------------------------------------------------------------
-
+# --- The whole block ---
 
 Fidelity = Literal["ideal", "table", "dynamic"]
 
@@ -299,30 +291,20 @@ class SimulateConfig(Frozen):
         if self.settle_s >= self.duration_s:
             raise ValueError("settle_s must be shorter than duration_s")
         for field in ("control_period_s", "duration_s", "settle_s"):
-            self._whole_steps(field, getattr(self, field))
-        periods = self.comfort_predictive.hold_s / self.control_period_s
-        asked = "comfort_predictive" in (self.policies or ())
-        if asked and (abs(periods - round(periods)) > 1e-6 * periods or round(periods) < 1):
-            raise ValueError(
-                f"comfort_predictive.hold_s must be a whole number of control_period_s (got {periods:g} periods)"
-            )
-        self._whole_steps("1 / output_rate_Hz", 1.0 / self.output_rate_Hz)
+            self._whole(field, getattr(self, field), "integration_step_s")
+        if "comfort_predictive" in (self.policies or ()):
+            self._whole("comfort_predictive.hold_s", self.comfort_predictive.hold_s, "control_period_s", least=1)
+        self._whole("1 / output_rate_Hz", 1.0 / self.output_rate_Hz, "integration_step_s")
         self._electronics_consistent()
         return self
 
     def _electronics_consistent(self) -> None:
-        given = [
-            name for name, perfect in (("sensors", Sensors()), ("supply", Supply())) if getattr(self, name) != perfect
-        ]
+        given = "sensors" if self.sensors != Sensors() else "supply" if self.supply != Supply() else None
         if given and set(self.fidelities) == {"ideal"}:
-            raise ValueError(
-                f"{given[0]}: ideal forces need neither sensors nor a supply; ride table or dynamic as well"
-            )
+            raise ValueError(f"{given}: ideal forces need neither sensors nor a supply; ride table or dynamic as well")
         sampled = self.sensors.period_s or self.control_period_s
         for name, time in (("period_s", sampled), ("delay_s", self.sensors.delay_s)):
-            periods = time / self.control_period_s
-            if abs(periods - round(periods)) > 1e-6 * max(periods, 1.0):
-                raise ValueError(f"sensors.{name} must be a whole number of control_period_s (got {periods:g} periods)")
+            self._whole(f"sensors.{name}", time, "control_period_s")
 
     def _policies_fit_the_car(self) -> None:
         for number, name in enumerate(self.policies or ()):
@@ -350,6 +332,11 @@ class SimulateConfig(Frozen):
             raise ValueError(f"controlled: say which one the report is about: {', '.join(names)}")
 
     @property
+    def vehicle_speed(self) -> float:
+        """Speed of the car [m/s]."""
+        return self.vehicle_speed_km_per_h * KM_PER_H
+
+    @property
     def coefficients(self) -> tuple[float, float] | None:
         """c_min and c_max [N s/m] where they bound the forces of `ideal`; None where the table does."""
         if self.c_min_Ns_per_m is None or self.c_max_Ns_per_m is None:
@@ -357,16 +344,16 @@ class SimulateConfig(Frozen):
         return self.c_min_Ns_per_m, self.c_max_Ns_per_m
 
     def is_controlled(self, policy: str) -> bool:
-        """Whether a policy is the controlled one that the report sets beside the others."""
+        """Tell whether a policy is the controlled one that the report sets beside the others."""
         names = [name for name in self.policies or () if policies()[name].controlled]
         return policy == (self.controlled or (names[0] if len(names) == 1 else DEFAULT_CONTROLLED))
 
     def own_block(self, policy: str) -> Frozen:
-        """The parameters of a policy's own; an empty block where it has none."""
+        """Return the parameters of a policy's own; an empty block where it has none."""
         found = getattr(self, policy, None)
         return found if isinstance(found, Frozen) else Frozen()
 
-    def _whole_steps(self, name: str, time: float) -> None:
-        steps = time / self.integration_step_s
-        if abs(steps - round(steps)) > 1e-6 * max(steps, 1.0):
-            raise ValueError(f"{name} must be a whole number of integration_step_s (got {steps:g} steps)")
+    def _whole(self, name: str, time: float, of: str, least: int = 0) -> None:
+        count, unit = time / getattr(self, of), "periods" if of == "control_period_s" else "steps"
+        if abs(count - round(count)) > 1e-6 * max(count, 1.0) or round(count) < least:
+            raise ValueError(f"{name} must be a whole number of {of} (got {count:g} {unit})")

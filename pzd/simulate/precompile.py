@@ -1,4 +1,7 @@
-"""Compiles the kernels of the ride by riding: `python -m pzd.simulate.precompile`, see `compiled_ahead`."""
+"""Compiles the kernels of the ride by riding: `python -m pzd.simulate.precompile`, see `compiled_ahead`.
+
+A module of its own, since what it imports must not be imported by the commands that start it.
+"""
 
 from __future__ import annotations
 
@@ -13,24 +16,20 @@ from pzd.simulate.config import SimulateConfig
 
 def _smallest_ride() -> None:
     """Ride half a second on a damper of two voltages, by every fidelity."""
+    from pzd.damper.compose import steady_force
     from pzd.simulate.stage import simulate
 
     rows = tuple(BaseRow(voltage_V=u, T0_N=300.0 + u, C_Ns_per_m=2700.0, k_N_per_m=2e5) for u in (0.0, 100.0))
     damper = Damper(base=rows)
     forces = tuple(
-        ForceRow(temperature_degC=None, voltage_V=r.voltage_V, velocity_m_per_s=v, force_N=_steady(r, v), inside=1)
-        for r in rows
+        ForceRow(temperature_degC=None, voltage_V=u, velocity_m_per_s=v, force_N=force, inside=1)
+        for u in (0.0, 100.0)
         for v in (-1.0, -0.0, 0.0, 1.0)
+        for force in (float(steady_force(damper, u, None, v)),)
     )
     table = Table(forces, (), TableNotes(outside="model", reached_m_per_s=1.0, lost=(), not_monotone=()))
     config = SimulateConfig(duration_s=0.5, settle_s=0.1)
     simulate(config, Diagnosed.undiagnosed(damper), table, 1, Path())
-
-
-def _steady(row: BaseRow, velocity: float) -> float:
-    from math import copysign
-
-    return copysign(row.T0_N + row.C_Ns_per_m * abs(velocity), velocity)
 
 
 def _once(folder: Path) -> None:

@@ -14,8 +14,8 @@ from pzd.simulate.config import SimulateConfig
 
 if TYPE_CHECKING:
     from pzd.simulate.ride.outcome import Outcome
-    from pzd.simulate.ride.riding import Held
-    from pzd.simulate.road.profile import Profile
+    from pzd.simulate.ride.riding import FixedValues
+    from pzd.simulate.roads import Profile
     from pzd.simulate.study.gathering import RideRows
     from pzd.simulate.study.plan import Case
 
@@ -25,12 +25,12 @@ log = logging.getLogger(__name__)
 def simulate(
     simulate: SimulateConfig, diagnosed: Diagnosed, table: Table, seed: int, folder: Path, jobs: int = 1
 ) -> Rides:
-    """Every ride that the config asks for, its summary, and the response of the damper to a step of voltage.
+    """Ride every case of the config, take its numbers, and compute the response of the damper to a step of voltage.
 
     Parameters
     ----------
     simulate : the config's block
-    diagnosed : the damper, and the plain one before diagnose
+    diagnosed : the damper, and that before diagnose
     table : force over voltage and velocity, by which the controller finds its voltage
     seed : of the run, for roads that are drawn
     folder : of the config, for roads that are read
@@ -59,13 +59,13 @@ def simulate(
     for plain in {case.plain for case in planned} | {False}:
         damper = diagnosed.plain if plain else diagnosed.damper
         grid = grid_of(table_of(damper, table) if plain else table, temperature)
-        oil = dynamic_damper_of(damper, temperature, simulate.valve_response_s)
-        check_inertance(oil, simulate.car.car())
-        setups[plain] = Setup(simulate, profiles, grid, oil, table.notes.outside == "error")
+        dynamic = dynamic_damper_of(damper, temperature, simulate.valve_response_s)
+        check_inertance(dynamic, simulate.car.car())
+        setups[plain] = Setup(simulate, profiles, grid, dynamic, table.notes.outside == "error")
 
     gathering = Gathering(simulate, with_voltage)
 
-    def ridden(case: Case) -> RideRows | tuple[Held, Outcome]:
+    def ridden(case: Case) -> RideRows | tuple[FixedValues, Outcome]:
         log.info("simulate: %s", case.name)
         return gathering.of_ride(case, setups[case.plain].ridden)
 
@@ -76,7 +76,7 @@ def simulate(
 
 
 def profiles_of(simulate: SimulateConfig, seed: int, folder: Path) -> dict[str, Profile]:
-    """Every road that the config asks for, by its name.
+    """Return every road that the config asks for, by its name.
 
     Parameters
     ----------
@@ -88,17 +88,15 @@ def profiles_of(simulate: SimulateConfig, seed: int, folder: Path) -> dict[str, 
     ------
     ConfigError : when a file cannot be used, is missing, or is too short for the ride, or the ride ends before an event
     """
-    from pzd.simulate.config import KM_PER_H
     from pzd.simulate.roads import Way
 
-    speed = simulate.vehicle_speed_km_per_h * KM_PER_H
-    profiles: dict[str, Profile] = {}
+    speed = simulate.vehicle_speed
     wrong: list[str] = []
+    profiles: dict[str, Profile] = {}
     for n, road in enumerate(simulate.roads):
         try:
-            profiles[road.name] = road.profile(
-                Way(speed, speed * simulate.duration_s, seed, folder, f"simulate.roads.{n}")
-            )
+            way = Way(speed, speed * simulate.duration_s, seed, folder, f"simulate.roads.{n}")
+            profiles[road.name] = road.profile(way)
         except ConfigError as error:
             wrong += error.messages
     if wrong:

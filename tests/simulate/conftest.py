@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -45,26 +46,31 @@ Rider = Callable[..., Outcome]
 
 @pytest.fixture(scope="session")
 def ride(damper: Damper, table: Table) -> Rider:
-    """Ride one case within the paper's bounds; `generic` takes constant damping through the generic integrator."""
+    """Ride one case within the paper's bounds; `generic` takes constant damping through the generic integrator.
+
+    The last rides are remembered: several tests look at the same one.
+    """
+
+    @lru_cache(maxsize=30)
+    def ridden(policy: str, fidelity: str, road: int, on: str, generic: bool, block: str) -> Outcome:
+        config = SimulateConfig.model_validate_json(block)
+        case = Case(config.roads[road], policies()[policy], fidelity, plain=False)
+        profile = case.road.profile(Way(config.vehicle_speed, config.vehicle_speed * config.duration_s, 1, Path()))
+        if generic:
+            profile = replace(profile, coefficients=np.zeros(6))  # a level spline beside the sine
+        dynamic = dynamic_damper_of(Damper.model_validate_json(on), 22.0, config.valve_response_s)
+        return ride_case(config, case, profile, grid_of(table, None), dynamic, ends=False)
 
     def go(
         policy: str = "comfort",
         fidelity: str = "ideal",
         road: int = 0,
         on: Damper = damper,
-        with_table: Table = table,
         generic: bool = False,
         **given: object,
     ) -> Outcome:
         paper = {} if given.get("bounds") == "table" else {"c_min_Ns_per_m": 750.0, "c_max_Ns_per_m": 45000.0}
-        config = SimulateConfig.model_validate_json(json.dumps({**paper, **given}))
-        case = Case(config.roads[road], policies()[policy], fidelity, plain=False)
-        speed = config.vehicle_speed_km_per_h / 3.6
-        profile = case.road.profile(Way(speed, speed * config.duration_s, 1, Path()))
-        if generic:
-            profile = replace(profile, coefficients=np.zeros(6))  # a level spline beside the sine
-        grid, dynamic = grid_of(with_table, None), dynamic_damper_of(on, 22.0, config.valve_response_s)
-        return ride_case(config, case, profile, grid, dynamic, with_table.notes.outside == "error")
+        return ridden(policy, fidelity, road, on.model_dump_json(), generic, json.dumps({**paper, **given}))
 
     return go
 

@@ -125,6 +125,6 @@ def test_without_room_for_a_search_the_best_policy_is_ridden() -> None:
 @pytest.mark.parametrize(
     "given", [{"roads": [{"kind": "bump"}]}, {"fidelities": ["ideal", "table"]}], ids=["no sine", "not dynamic"]
 )
-def test_it_is_refused_where_nothing_repeats_with_the_road(given) -> None:
+def test_best_found_is_refused_where_nothing_repeats_with_the_road(given) -> None:
     with pytest.raises(ConfigError, match="best_found repeats its voltages with the road"):
         rides(**given)

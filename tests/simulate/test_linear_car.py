@@ -9,7 +9,7 @@ import pytest
 
 from pzd.simulate.cars import cars
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.ride.energy import harmonic_response
+from pzd.simulate.ride.linear import harmonic_response
 
 SPEED = 25.0
 

@@ -13,10 +13,10 @@ from simulate_dampers import table_of
 from pzd.artefacts import Diagnosed, Rides
 from pzd.damper.model import Damper
 from pzd.quantities import Control
+from pzd.simulate import roads
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.ride import outcome
-from pzd.simulate.road import profile
-from pzd.simulate.road.profile import through
+from pzd.simulate.roads import through
 from pzd.simulate.stage import simulate
 
 ROADS = [{"kind": "iso8608", "road_class": "C", "seed": 3}, {"kind": "sine", "frequency_Hz": 2.25}]
@@ -80,6 +80,6 @@ def test_a_ride_five_times_as_long_takes_no_more_memory(damper, tmp_path, monkey
 def test_a_long_road_is_the_same_block_by_block(rng: np.random.Generator, monkeypatch) -> None:
     heights = rng.standard_normal(2500)
     whole = through(heights, 0.5).coefficients
-    monkeypatch.setattr(profile, "_BLOCK", 700)
+    monkeypatch.setattr(roads, "_BLOCK", 700)
     assert through(heights, 0.5).coefficients == pytest.approx(whole, abs=1e-13)
     assert through(heights, 0.5).height(0.5 * np.arange(2500)) == pytest.approx(heights - heights[0], abs=1e-13)

@@ -47,7 +47,7 @@ SENSED_BY_LQR = [0, 1, 6, 7]
 
 def gains_of(car: HalfCar, weights: ClippedLqr) -> np.ndarray:
     """(2, 4) of T on (U_1, U_2, dz, dphi)."""
-    return clipped_lqr.feedback(car, 0.0, weights)[:, SENSED_BY_LQR]
+    return clipped_lqr.regulator_feedback(car, 0.0, weights)[:, SENSED_BY_LQR]
 
 
 # ---------------------------------------------------------------- laws that switch
@@ -82,7 +82,7 @@ def test_hard_is_the_end_of_the_box_farther_from_the_softest_on_either_side() ->
 
 @pytest.mark.parametrize("policy", SWITCHED)
 def test_every_choice_of_a_ride_is_that_of_the_published_law(ride, policy) -> None:
-    """On uncoupled axles: hard where p V > 0, with what is felt under the choice before; p by hand for each law."""
+    """On uncoupled axles: hard where p V > 0, with what is sensed under the choice before; p by hand for each law."""
     crossover = 2.0 * np.pi * 1.3
     history = ride(policy, car=SYMMETRIC, skyhook_add={"crossover_Hz": 1.3}, **SHORT).history
     time, compared = history[:, 0], set()
@@ -99,11 +99,11 @@ def test_every_choice_of_a_ride_is_that_of_the_published_law(ride, policy) -> No
             "skyhook_add": np.where(fast, acceleration, body[1:]),
             "balance": -u[1:],
         }[policy]
-        told = moving[1:] & moving[:-1] & (np.abs(decides) > 1e-6)
+        decided = moving[1:] & moving[:-1] & (np.abs(decides) > 1e-6)
         expected = np.where(decides * v[1:] > 0.0, C_MAX, C_MIN)
-        assert chosen[1:][told] == pytest.approx(expected[told], rel=1e-9)
-        compared |= set(expected[told])
-        assert told.sum() > 2000
+        assert chosen[1:][decided] == pytest.approx(expected[decided], rel=1e-9)
+        compared |= set(expected[decided])
+        assert decided.sum() > 2000
     assert compared == {C_MIN, C_MAX}
 
 
@@ -183,7 +183,7 @@ def test_the_gains_of_a_car_of_two_quarters_are_closed_forms() -> None:
 
 def test_where_only_the_loads_count_the_regulator_cancels_the_springs() -> None:
     car = SimulateConfig().car.car()
-    limit = wheel_load.feedback(car, 0.0, Frozen())[:, SENSED_BY_LQR]
+    limit = wheel_load.wheel_load(car, 0.0, Frozen())[:, SENSED_BY_LQR]
     apart = []
     for weight in (1e2, 1e6, 1e10):
         gains = gains_of(car, ClippedLqr(load_weight=weight))

@@ -21,29 +21,26 @@ from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
 from pzd.signals.criterion import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
-from pzd.simulate.control.prediction.choice import NOW, choose
-from pzd.simulate.control.prediction.planning import predictor_of
-from pzd.simulate.control.prediction.plant import HELD, LOAD_1, LOAD_2, WHEELS, Predictor, oil_after, predicted
+from pzd.simulate.control.prediction.choice import choose
+from pzd.simulate.control.prediction.plant import oil_after, predicted
+from pzd.simulate.control.prediction.predictor import Plant, Predictor, States, Step, predictor_of
 from pzd.simulate.policies import policies
 from pzd.simulate.ride.equations import motion
 from pzd.simulate.ride.loop import set_control
 from pzd.simulate.ride.model import (
-    COMFORT,
-    CONTACT,
-    OIL_1,
-    WHEEL_1,
-    WHEEL_RATE_2,
+    Axle,
     RideModel,
+    RunningRide,
+    State,
     at_rest,
-    control,
     dynamic_damper_of,
     grid_of,
+    ride_of,
     road_coefficients,
     vehicle,
-    workspace,
 )
-from pzd.simulate.ride.riding import Held, control_spec_of
-from pzd.simulate.ride.stepper import STAGES, advance
+from pzd.simulate.ride.riding import FixedValues, control_spec_of
+from pzd.simulate.ride.stepper import advance, integrator_of
 from pzd.simulate.roads import Way
 from pzd.simulate.stage import simulate
 from pzd.simulate.study.plan import Case
@@ -78,22 +75,22 @@ def model_of(damper: Damper, policy: str, voltage: float, **given: object) -> tu
     model = RideModel(
         vehicle(car, speed),
         road_coefficients(case.road.profile(Way(speed, speed * config.duration_s, 1, Path())), car.wheelbase),
-        control_spec_of(config, case, car, dynamic, Held(voltage, 0.0)),
+        control_spec_of(config, case, car, dynamic, FixedValues(voltage, 0.0)),
         grid,
         dynamic,
     )
     return model, predictor_of(config.comfort_predictive, config.control_period_s, dynamic, car, speed, grid.voltages)
 
 
-def ahead(model: RideModel, y, acts, room, start: float, seconds: float) -> np.ndarray:
+def ahead(y, ride: RunningRide, start: float, seconds: float) -> np.ndarray:
     """Bring a ride forward by the integrator of the loop, its voltage set once at the start; the largest motion."""
     peak = np.abs(y)
-    scratch, stages, end = np.zeros_like(y), np.zeros((STAGES + 1, y.size)), np.zeros_like(y)
-    set_control(start, y, model, None, None, acts, room, scratch)
+    scratch, integrator = np.zeros_like(y), integrator_of(1e-9, y.size)
+    set_control(start, y, ride, None, None, scratch)
     for n in range(round(seconds / STEP)):
-        advance(start + n * STEP, STEP, y, model, acts, room, 1e-9, STEP, stages, end)
+        advance(start + n * STEP, STEP, y, ride, integrator, STEP)
         peak = np.maximum(peak, np.abs(y))
-    motion(start + seconds, y, model, acts, room, scratch)
+    motion(start + seconds, y, ride, scratch)
     return peak
 
 
@@ -111,28 +108,39 @@ def test_the_plant_goes_where_the_ride_goes_for_20_ms(
     In the steps of the policy, where the oil may stick or slip up to a step late, and in an eighth of them, where about
     a sixth of the error is left: it comes of the step, and of no equation.
     """
-    monkeypatch.setattr("pzd.simulate.control.prediction.planning.HOLD_STEP", step)
+    monkeypatch.setattr("pzd.simulate.control.prediction.predictor.HOLD_STEP", step)
     for name, values in EFFECTS[effects].items():
         damper = damper.with_effect(name, values)
     road = [{"kind": "iso8608", "road_class": "C", "seed": 1}]
     given = {"roads": road, "car": car, "comfort_predictive": {"road": "known", "hold_s": 0.02, "horizon_s": 0.04}}
-    before, room, acts = model_of(damper, "passive", 75.0, **given)[0], workspace(), control(75.0)
-    y = at_rest(before.car)
-    peak = ahead(before, y, acts, room, 0.0, 1.5)
+    before = ride_of(model_of(damper, "passive", 75.0, **given)[0])
+    y, room = at_rest(before.model.car), before.workspace
+    peak = ahead(y, before, 0.0, 1.5)
     predicting, plan = model_of(damper, "comfort_predictive", 75.0, **given)
-    choose(1.5, 0.0, y, predicting, plan, acts, room)
-    state, levels = np.array(plan.states[NOW]), plan.hold_levels
-    predicted(predicting.car, plan, state, levels[0, candidate], levels[1, candidate], plan.hold_heights[0], HELD, 1e9)
+    choose(1.5, 0.0, y, before._replace(model=predicting), plan)
+    state, levels = np.array(plan.workspace.states[States.NOW]), plan.workspace.hold_levels
+    predicted(
+        predicting.car,
+        plan,
+        state,
+        levels[0, candidate],
+        levels[1, candidate],
+        plan.workspace.hold_heights[0],
+        Step.HELD,
+        1e9,
+    )
     after, _ = model_of(damper, "passive", float(plan.candidates[candidate]), **given)
-    ahead(after, y, acts, room, 1.5, 0.02)
-    assert np.max(np.abs(state[:OIL_1] - y[:OIL_1]) / peak[:OIL_1]) < motion_off
+    ahead(y, before._replace(model=after), 1.5, 0.02)
+    assert np.max(np.abs(state[: State.OIL_1] - y[: State.OIL_1]) / peak[: State.OIL_1]) < motion_off
     if car:
-        wheels = slice(WHEEL_1, WHEEL_RATE_2 + 1)
-        assert np.max(np.abs(state[WHEELS : WHEELS + 4] - y[wheels]) / peak[wheels]) < 5.0 * motion_off
-        assert state[LOAD_1 : LOAD_2 + 1] == pytest.approx(-room[CONTACT], abs=0.01 * max(predicting.car.static_load))
+        wheels = slice(State.WHEEL_1, State.WHEEL_RATE_2 + 1)
+        assert np.max(np.abs(state[Plant.WHEELS : Plant.WHEELS + 4] - y[wheels]) / peak[wheels]) < 5.0 * motion_off
+        assert state[Plant.LOAD_1 : Plant.LOAD_2 + 1] == pytest.approx(
+            -room[Axle.CONTACT], abs=0.01 * max(predicting.car.static_load)
+        )
         return
-    a_K = predicting.car.comfort[0] * state[LOAD_1] + predicting.car.comfort[1] * state[LOAD_2]
-    assert a_K == pytest.approx(room[COMFORT, 0], abs=a_K_off)
+    a_K = predicting.car.comfort[0] * state[Plant.LOAD_1] + predicting.car.comfort[1] * state[Plant.LOAD_2]
+    assert a_K == pytest.approx(room[Axle.COMFORT, 0], abs=a_K_off)
 
 
 def test_an_oil_far_faster_than_the_step_is_quasi_static_with_an_error_in_proportion_to_its_time(
@@ -145,11 +153,11 @@ def test_an_oil_far_faster_than_the_step_is_quasi_static_with_an_error_in_propor
     for relaxation in (1e-5, 1e-6, 1e-7):
         rows = tuple(r.model_copy(update={"k_N_per_m": r.C_Ns_per_m / relaxation}) for r in damper.base)
         _, plan = model_of(damper.model_copy(update={"base": rows}), "comfort_predictive", 0.0)
-        h, k = float(plan.steps[HELD]), C / relaxation
+        h, k = float(plan.steps[Step.HELD]), C / relaxation
         e, flow = (T0 + C * 0.2) / k, 0.2
         for n in range(20):
             middle = 0.2 + a * h * (n + 0.5)
-            e, flow = oil_after(plan, HELD, 0, e, middle, flow, h)
+            e, flow = oil_after(plan.damper, Step.HELD, 0, e, middle, flow, h)
         time = np.arange(2001) * 1e-5
         resolved = element_force(0.2 * time + 0.5 * a * time**2, 1e-5, T0, C, k, T0 + C * 0.2, 0.2 + a * time)
         lags.append((T0 + C * middle - k * e, T0 + C * (0.2 + a * 0.02) - resolved[-1], C * a * relaxation))
@@ -172,7 +180,7 @@ def test_the_modes_of_the_weighting_are_the_weighting() -> None:
 @pytest.mark.ci
 @pytest.mark.parametrize("road", ["known", "unknown"])
 @pytest.mark.parametrize("kind", [0, 1])
-def test_it_sets_voltages_of_the_table_once_a_hold_and_the_energies_balance(ride, road, kind) -> None:
+def test_predictive_control_sets_voltages_of_the_table_once_a_hold_and_the_energies_balance(ride, road, kind) -> None:
     roads = [{"kind": "sine", "frequency_Hz": 4.5}, {"kind": "iso8608", "road_class": "C", "seed": 1}]
     given = {"roads": roads, "road": kind, "comfort_predictive": {"road": road}}
     outcome = ride("comfort_predictive", "dynamic", **SHORT, **given)
@@ -188,7 +196,7 @@ def test_it_sets_voltages_of_the_table_once_a_hold_and_the_energies_balance(ride
 
 
 @pytest.mark.ci
-def test_on_a_known_sine_it_beats_both_ends_of_the_voltage_without_more_load(ride) -> None:
+def test_on_a_known_sine_predictive_control_beats_both_ends_of_the_voltage_without_more_load(ride) -> None:
     """4.5 Hz, where the softest voltage is the best of those held."""
     given = {**SHORT, "roads": [{"kind": "sine", "frequency_Hz": 4.5}], "comfort_predictive": {"road": "known"}}
     found = {}
@@ -202,7 +210,7 @@ def test_on_a_known_sine_it_beats_both_ends_of_the_voltage_without_more_load(rid
 
 
 @pytest.mark.ci
-def test_on_wheels_with_mass_it_beats_every_held_voltage_on_a_sine_and_a_random_road(ride) -> None:
+def test_on_wheels_with_mass_predictive_control_beats_every_held_voltage_on_a_sine_and_a_random_road(ride) -> None:
     """The road unknown: a_w below that of the best of five held voltages, the larger load at most a tenth above."""
     for road in ({"kind": "sine", "frequency_Hz": 2.25}, {"kind": "iso8608", "road_class": "C", "seed": 1}):
         given = {"roads": [road], "car": WHEELS_ON_TYRES, "duration_s": 8.0, "settle_s": 4.0}
@@ -290,7 +298,7 @@ def test_parameters_that_make_no_sense_are_refused_with_what_would(given, messag
         settings(comfort_predictive=given)
 
 
-def test_it_needs_the_dynamic_damper_and_a_voltage(damper) -> None:
+def test_predictive_control_needs_the_dynamic_damper_and_a_voltage(damper) -> None:
     with pytest.raises(ConfigError, match="add table or dynamic"):
         simulate(settings(fidelities=["ideal", "table"]), Diagnosed.undiagnosed(damper), table_of(damper), 1, Path())
     row = damper.base[0].model_copy(update={"voltage_V": None})

@@ -14,8 +14,7 @@ from pzd.schema.errors import ConfigError
 from pzd.signals.iso8608 import classes
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.ride.model import road_coefficients
-from pzd.simulate.road.profile import through
-from pzd.simulate.roads import Way, roads
+from pzd.simulate.roads import Way, roads, through
 from pzd.simulate.vehicle.suspension import road_at
 
 WAY = Way(25.0, 400.0, 1, Path())

@@ -165,7 +165,7 @@ def test_parquet_without_its_library_is_refused_before_anything_is_ridden(
 
 
 @pytest.mark.parametrize(
-    ("spoilt", "told"),
+    ("spoilt", "message"),
     [
         ("gone", "the file is missing"),
         ("words", "is no Parquet file"),
@@ -173,7 +173,7 @@ def test_parquet_without_its_library_is_refused_before_anything_is_ridden(
         ("number", "column z_m must hold finite numbers"),
     ],
 )
-def test_a_spoilt_history_is_refused_with_its_place(damper, tmp_path: Path, spoilt: str, told: str) -> None:
+def test_a_spoilt_history_is_refused_with_its_place(damper, tmp_path: Path, spoilt: str, message: str) -> None:
     pyarrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
     parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
     ride(damper, policies=["comfort"], fidelities=["ideal"], histories="parquet").write(tmp_path, Control())
@@ -187,7 +187,7 @@ def test_a_spoilt_history_is_refused_with_its_place(damper, tmp_path: Path, spoi
         parquet.write_table(pyarrow.table({n: v for n, v in columns.items() if n != "a_K_m_per_s2"}), path)
     else:
         parquet.write_table(pyarrow.table({**columns, "z_m": [None, *columns["z_m"][1:]]}), path)
-    with pytest.raises(DataError, match=f"{path.name}: {told}"):
+    with pytest.raises(DataError, match=f"{path.name}: {message}"):
         Rides.read(tmp_path, Control())
 
 

@@ -12,28 +12,21 @@ from pzd.simulate.config import SimulateConfig
 from pzd.simulate.policies import policies
 from pzd.simulate.ride.equations import accelerate, motion
 from pzd.simulate.ride.model import (
-    ACCELERATION,
-    FORCE,
-    HEAVE_RATE,
-    INERTANCE,
-    LIFT,
-    PITCH_RATE,
-    RATE,
-    SIDE,
-    SPRINGS,
-    WHEEL_RATE_1,
+    Axle,
+    Command,
     RideModel,
+    State,
     at_rest,
-    control,
     dynamic_damper_of,
     grid_of,
+    ride_of,
     road_coefficients,
     vehicle,
     workspace,
 )
-from pzd.simulate.ride.riding import Held, control_spec_of
+from pzd.simulate.ride.riding import FixedValues, control_spec_of
 from pzd.simulate.ride.stepper import choose_side
-from pzd.simulate.road.profile import Profile
+from pzd.simulate.roads import Profile
 from pzd.simulate.study.plan import Case
 
 
@@ -43,23 +36,23 @@ def test_the_suspensions_accelerate_as_body_and_road_do(rng: np.random.Generator
     """dV/dt = H^T d2X/dt2 - d2xi/dt2 with all forces, zero where an axle sticks; wheels with mass take their part."""
     car = replace(cars()["makowski2021"], unsprung_masses=unsprung)
     for _ in range(20):
-        acts, scratch = control(0.0), workspace()
-        acts[SIDE] = sides
-        scratch[SPRINGS], scratch[FORCE] = rng.normal(size=(2, 2)) * 1000.0
-        scratch[LIFT] = rng.normal(size=2) * 5.0
-        scratch[INERTANCE] = rng.uniform(0.0, 50.0, 2)
-        before = scratch[FORCE].copy()
+        acts, scratch = np.zeros((Command.BEHIND, 2)), workspace()
+        acts[Command.SIDE] = sides
+        scratch[Axle.SPRINGS], scratch[Axle.FORCE] = rng.normal(size=(2, 2)) * 1000.0
+        scratch[Axle.LIFT] = rng.normal(size=2) * 5.0
+        scratch[Axle.INERTANCE] = rng.uniform(0.0, 50.0, 2)
+        before = scratch[Axle.FORCE].copy()
         accelerate(vehicle(car, 25.0), acts, scratch)
-        body = car.acceleration(scratch[SPRINGS] + scratch[FORCE])
-        wheels = (scratch[SPRINGS] + scratch[FORCE]) / np.where(np.array(unsprung) > 0.0, unsprung, np.inf)
-        expected = car.force_directions().T @ body - scratch[LIFT] - wheels
-        assert scratch[ACCELERATION] == pytest.approx(expected, abs=1e-10)
+        body = car.acceleration(scratch[Axle.SPRINGS] + scratch[Axle.FORCE])
+        wheels = (scratch[Axle.SPRINGS] + scratch[Axle.FORCE]) / np.where(np.array(unsprung) > 0.0, unsprung, np.inf)
+        expected = car.force_directions().T @ body - scratch[Axle.LIFT] - wheels
+        assert scratch[Axle.ACCELERATION] == pytest.approx(expected, abs=1e-10)
         for i, side in enumerate(sides):
             if side == 0.0:
-                assert scratch[ACCELERATION, i] == 0.0
+                assert scratch[Axle.ACCELERATION, i] == 0.0
             else:
-                inertia = scratch[INERTANCE, i] * scratch[ACCELERATION, i]
-                assert scratch[FORCE, i] == pytest.approx(before[i] + inertia, abs=1e-9)
+                inertia = scratch[Axle.INERTANCE, i] * scratch[Axle.ACCELERATION, i]
+                assert scratch[Axle.FORCE, i] == pytest.approx(before[i] + inertia, abs=1e-9)
 
 
 @pytest.mark.parametrize("unsprung", [(0.0, 0.0), (90.0, 70.0)])
@@ -71,22 +64,23 @@ def test_an_axle_is_stopped_by_an_impulse_between_body_and_wheel(damper, table, 
     model = RideModel(
         vehicle(car, 25.0),
         road_coefficients(Profile(), car.wheelbase),
-        control_spec_of(config, case, car, dynamic, Held(0.0, 0.0)),
+        control_spec_of(config, case, car, dynamic, FixedValues(0.0, 0.0)),
         grid,
         dynamic,
     )
-    y, acts, room = at_rest(model.car), control(0.0), workspace()
-    y[HEAVE_RATE], y[PITCH_RATE] = 0.3, -0.1
+    y, ride = at_rest(model.car), ride_of(model)
+    room = ride.workspace
+    y[State.HEAVE_RATE], y[State.PITCH_RATE] = 0.3, -0.1
     wheels = car.wheels_have_mass
     if wheels:
-        y[WHEEL_RATE_1 : WHEEL_RATE_1 + 2] = 0.2, -0.4
-    motion(0.0, y, model, acts, room, np.zeros_like(y))
-    before, other = y.copy(), room[RATE, 0]
-    choose_side(1, 0.0, y, model, acts, room, np.zeros_like(y))
-    assert room[RATE, 1] == pytest.approx(0.0, abs=1e-15)
-    assert (room[RATE, 0] != other) or wheels
+        y[State.WHEEL_RATE_1 : State.WHEEL_RATE_1 + 2] = 0.2, -0.4
+    motion(0.0, y, ride, np.zeros_like(y))
+    before, other = y.copy(), room[Axle.RATE, 0]
+    choose_side(1, 0.0, y, ride, np.zeros_like(y))
+    assert room[Axle.RATE, 1] == pytest.approx(0.0, abs=1e-15)
+    assert (room[Axle.RATE, 0] != other) or wheels
     if wheels:
-        given = unsprung[1] * (y - before)[WHEEL_RATE_1 + 1]
-        assert car.mass * (y - before)[HEAVE_RATE] == pytest.approx(-given)
-        assert car.pitch_inertia * (y - before)[PITCH_RATE] == pytest.approx(-given * car.distances[1])
-        assert y[WHEEL_RATE_1] == before[WHEEL_RATE_1]
+        given = unsprung[1] * (y - before)[State.WHEEL_RATE_1 + 1]
+        assert car.mass * (y - before)[State.HEAVE_RATE] == pytest.approx(-given)
+        assert car.pitch_inertia * (y - before)[State.PITCH_RATE] == pytest.approx(-given * car.distances[1])
+        assert y[State.WHEEL_RATE_1] == before[State.WHEEL_RATE_1]

@@ -12,7 +12,7 @@ from simulate_dampers import damper_after_table_2, table_of
 from pzd.artefacts import Diagnosed, Rides
 from pzd.simulate.cars import cars
 from pzd.simulate.config import SimulateConfig
-from pzd.simulate.ride.energy import harmonic_response
+from pzd.simulate.ride.linear import harmonic_response
 from pzd.simulate.stage import simulate
 from pzd.simulate.vehicle.car import GRAVITY
 
@@ -48,7 +48,7 @@ def test_at_constant_damping_the_contact_force_is_its_closed_form(frequency: flo
         assert row.pulling == pytest.approx(share, abs=2e-3)
 
 
-def test_wheels_that_pull_on_the_road_are_told() -> None:
+def test_wheels_that_pull_on_the_road_are_reported() -> None:
     """The paper's bounds at 4.5 Hz: a suspension that is hard for a moment presses and pulls by more than the car."""
     found = rides(4.5, policies=["comfort"], fidelities=["ideal"], c_min_Ns_per_m=750, c_max_Ns_per_m=45000)
     worst = min(found.wheels, key=lambda row: row.min_contact_force_N)

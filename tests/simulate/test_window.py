@@ -129,9 +129,9 @@ def test_a_w_on_a_sine_is_its_closed_form() -> None:
 def test_a_slow_sine_is_taken_apart_by_its_harmonics_where_a_whole_period_is_there(frequency, method) -> None:
     time = np.arange(16001) / 1000.0
     ride = np.sin(2.0 * np.pi * frequency * time) + 0.5 * np.sin(4.0 * np.pi * frequency * time)
-    felt = vibration("case", "K", ride, 0.001, Window(8000, 16000), frequency)
-    assert {row.method for row in felt.spectrum} == {method}
-    assert sum(row.rms_m_per_s2**2 for row in felt.spectrum) < 2.0
+    found = vibration("case", "K", ride, 0.001, Window(8000, 16000), frequency)
+    assert {row.method for row in found.spectrum} == {method}
+    assert sum(row.rms_m_per_s2**2 for row in found.spectrum) < 2.0
 
 
 def test_the_dissipated_energy_is_that_of_the_settled_part() -> None:

@@ -11,6 +11,6 @@ from pzd.simulate.vehicle.car import HalfCar
 
 @cache
 def cars() -> dict[str, HalfCar]:
-    """Every car by name."""
+    """Find every car, by name."""
     found = [importlib.import_module(f"{__name__}.{info.name}").CAR for info in pkgutil.iter_modules(__path__)]
     return {car.name: car for car in found}

@@ -1,4 +1,4 @@
-"""The force that the policy asks of each axle, within the box Omega(V)."""
+"""The force that a policy demands of each axle, within the box Omega(V) of admissible forces."""
 
 from __future__ import annotations
 
@@ -9,35 +9,25 @@ from pzd.force_table.lookup import table_range
 from pzd.record import Array
 from pzd.simulate.policies import TieBreak
 from pzd.simulate.ride.model import (
-    BODY,
     BY_COEFFICIENTS,
     BY_TABLE,
-    DEFLECTION,
-    FORCE,
-    HARD,
-    HEAVE,
-    HEAVE_RATE,
-    HIGH,
-    LOW,
     MINIMISE,
-    PITCH,
-    PITCH_RATE,
-    RATE,
-    SIDED_RATE,
     SWITCH,
-    TIE_END,
+    Axle,
+    Command,
     ControlSpec,
+    RunningRide,
+    State,
     TableArrays,
     Vehicle,
 )
 
-# ----------------------------------------------------------------------------------------------------
-# The box Omega(V) of admissible forces, equation (11) of the paper, by either of its two bounds.
+# --- The box Omega(V) of admissible forces, equation (11) of the paper, by either of its two bounds ---
 
 
 @inlined
 def coefficient_bounds(velocity: float, c_min: float, c_max: float) -> tuple[float, float]:
-    """Lowest and highest force between two damping coefficients.
+    """Return the lowest and the highest force between two damping coefficients.
 
     Equation: T_i in [c_min V_i, c_max V_i]      Source: Makowski and Knap 2021, eq. (11) and section 5
 
@@ -59,7 +49,7 @@ def coefficient_bounds(velocity: float, c_min: float, c_max: float) -> tuple[flo
 def table_bounds(
     velocity: float, motion_ratio: float, dampers: float, speeds: Array, rebound: Array, compression: Array
 ) -> tuple[float, float]:
-    """Lowest and highest force that the table has between its lowest and highest voltage.
+    """Return the lowest and the highest force of the table between its lowest and highest voltage.
 
     Equation: T_i in {n r F(U, r V_i): U_min <= U <= U_max}      Source: Makowski and Knap 2021, eq. (11)
 
@@ -78,13 +68,12 @@ def table_bounds(
     return dampers * motion_ratio * low, dampers * motion_ratio * high
 
 
-# ----------------------------------------------------------------------------------------------------
-# Laws that switch each damper between its hardest and its softest state.
+# --- Laws that switch each damper between its hardest and its softest state ---
 
 
 @inlined
 def is_hard(rate: float, signal: float, acceleration: float, crossover: float) -> bool:
-    """Whether a switched damper is to be hard.
+    """Decide whether a switched damper is to be hard.
 
     Equation: hard where p V > 0, else soft; p = s where |a| <= w_c |s|, else p = a
     Source: Savaresi and Spelta 2007, J. Dyn. Sys. Meas. Control 129(4), with s = dz_i/dt: a damper that pulls the body
@@ -103,17 +92,15 @@ def is_hard(rate: float, signal: float, acceleration: float, crossover: float) -
 
 @inlined
 def switched_force(hard: bool, rate: float, low: float, high: float) -> float:
-    """The end of the box Omega(V) that is a hard or a soft damper at a speed [N]; the sign bit of 0 picks the side."""
+    """Return the end of the box Omega(V) that is a hard or a soft damper [N]; the sign bit of 0 picks the side."""
     return high if hard == (math.copysign(1.0, rate) > 0.0) else low
 
 
-# ----------------------------------------------------------------------------------------------------
-# The forces within reach that make |a_K| smallest, equations (10) and (12) of the paper.
+# --- The admissible forces that make |a_K| smallest, equations (10) and (12) of the paper ---
 #
 # a_K = a_0 + D^T T is a plane over the box of the admissible forces, so the smallest |a_K| is where
 # a_K = 0 cuts the box - a whole segment of minimisers - or a corner where it does not. Equation (12)
 # says nothing about the segment: the tie-break picks its point.
-
 
 Pair = tuple[float, float]
 
@@ -181,7 +168,7 @@ def least_load_forces(springs: Pair, D: Pair, low: Array, high: Array, forces: A
 
 @compiled
 def farther_end(a0: float, D: Pair, low: Array, high: Array) -> int:
-    """End of the segment of minimisers (0 or 1) with the larger Euclidean norm."""
+    """Return the end of the segment of minimisers (0 or 1) with the larger Euclidean norm."""
     if D[0] == 0.0 and D[1] == 0.0:
         return 0
     i, first, last = _segment(a0, D, low, high)
@@ -193,7 +180,7 @@ def farther_end(a0: float, D: Pair, low: Array, high: Array) -> int:
 
 @compiled
 def _share(a0: float, D: Pair, low: Array, high: Array) -> float:
-    """Share of the range of D^T T over the box at which a_K = 0: 0 or 1 where it is out of reach."""
+    """Return the share of the range of D^T T over the box at which a_K = 0: 0 or 1 where there is none."""
     least, most = 0.0, 0.0
     for i in range(2):
         least += min(D[i] * low[i], D[i] * high[i])
@@ -207,7 +194,7 @@ def _share(a0: float, D: Pair, low: Array, high: Array) -> float:
 
 @compiled
 def _segment(a0: float, D: Pair, low: Array, high: Array) -> tuple[int, float, float]:
-    """The damper i with the smaller |D|, and its forces at both ends of the segment a_K = 0."""
+    """Return the damper i with the smaller |D|, and its forces at both ends of the segment a_K = 0."""
     i = 0 if abs(D[0]) <= abs(D[1]) else 1
     j = 1 - i
     first, last = low[i], high[i]
@@ -219,12 +206,12 @@ def _segment(a0: float, D: Pair, low: Array, high: Array) -> tuple[int, float, f
     return i, first, last
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- The demand of a policy ---
 
 
 @inlined
 def one_sided(velocity: float, side: float) -> float:
-    """The velocity held on the side of zero that an axle is on (+1, -1); the sign bit of 0 carries the side."""
+    """Hold a velocity on the side of zero that an axle is on (+1, -1); the sign bit of 0 carries the side."""
     return math.copysign(max(side * velocity, 0.0), side)
 
 
@@ -232,7 +219,7 @@ def one_sided(velocity: float, side: float) -> float:
 def bounds_of(
     control_spec: ControlSpec, car: Vehicle, grid: TableArrays, axle: int, velocity: float
 ) -> tuple[float, float]:
-    """Lowest and highest force of an axle [N] at a suspension speed [m/s]."""
+    """Return the lowest and the highest force of an axle [N] at a suspension speed [m/s]."""
     if control_spec.bounds == BY_COEFFICIENTS:
         return coefficient_bounds(velocity, control_spec.c_min, control_spec.c_max)
     if control_spec.bounds == BY_TABLE:
@@ -242,16 +229,21 @@ def bounds_of(
 
 @inlined
 def feedback_force(gains: Array, y: Array, workspace: Array) -> float:
-    """What a policy makes of what it senses at one axle: gains (8,) on `SENSED`; a force [N], or what switches."""
-    force = gains[4] * y[HEAVE] + gains[5] * y[PITCH] + gains[6] * y[HEAVE_RATE] + gains[7] * y[PITCH_RATE]
+    """Apply the gains (SENSED,) of one axle to what is sensed: a force [N], or the signal that switches."""
+    force = (
+        gains[4] * y[State.HEAVE]
+        + gains[5] * y[State.PITCH]
+        + gains[6] * y[State.HEAVE_RATE]
+        + gains[7] * y[State.PITCH_RATE]
+    )
     for i in range(2):
-        force += gains[i] * workspace[DEFLECTION, i] + gains[2 + i] * workspace[RATE, i]
+        force += gains[i] * workspace[Axle.DEFLECTION, i] + gains[2 + i] * workspace[Axle.RATE, i]
     return float(force)
 
 
 @compiled
 def spring_acceleration(car: Vehicle, deflection: Array) -> float:
-    """Acceleration at K by the springs alone [m/s2].
+    """Return the acceleration at K by the springs alone [m/s2].
 
     Equation: a_0 = D^T S, S_i = k_i U_i      Source: Makowski and Knap 2021, eq. (9)
     """
@@ -262,42 +254,38 @@ def spring_acceleration(car: Vehicle, deflection: Array) -> float:
 
 
 @compiled
-def choose_hardness(control_spec: ControlSpec, car: Vehicle, y: Array, control: Array, workspace: Array) -> None:
+def choose_hardness(y: Array, ride: RunningRide) -> None:
     """Fill whether each damper is to be hard, by the workspace as the motion left it."""
+    control_spec, car, workspace = ride.model.control_spec, ride.model.car, ride.workspace
     for i in range(2):
         signal = feedback_force(control_spec.gains[i], y, workspace)
-        acceleration = workspace[BODY, 0] + car.arms[i] * workspace[BODY, 1]
-        hard = is_hard(workspace[RATE, i], signal, acceleration, control_spec.crossover)
-        control[HARD, i] = 1.0 if hard else 0.0
+        acceleration = workspace[Axle.BODY, 0] + car.arms[i] * workspace[Axle.BODY, 1]
+        hard = is_hard(workspace[Axle.RATE, i], signal, acceleration, control_spec.crossover)
+        ride.control[Command.HARD, i] = 1.0 if hard else 0.0
 
 
 @inlined
-def wanted_force(control_spec: ControlSpec, axle: int, y: Array, control: Array, workspace: Array) -> float:
-    """What a feedback or a switch asks of one axle within the workspace's bounds [N]."""
-    low, high = workspace[LOW, axle], workspace[HIGH, axle]
+def wanted_force(axle: int, y: Array, ride: RunningRide) -> float:
+    """Return what a feedback or a switch asks of one axle within the workspace's bounds [N]."""
+    control_spec, workspace = ride.model.control_spec, ride.workspace
+    low, high = workspace[Axle.LOW, axle], workspace[Axle.HIGH, axle]
     if control_spec.aim == SWITCH:
-        return switched_force(control[HARD, axle] > 0.0, workspace[SIDED_RATE, axle], low, high)
+        return switched_force(ride.control[Command.HARD, axle] > 0.0, workspace[Axle.SIDED_RATE, axle], low, high)
     return float(min(max(feedback_force(control_spec.gains[axle], y, workspace), low), high))
 
 
 @compiled
-def demand(control_spec: ControlSpec, car: Vehicle, y: Array, control: Array, workspace: Array) -> None:
+def demand(y: Array, ride: RunningRide) -> None:
     """Fill the workspace's forces with what the policy asks of both axles within the workspace's bounds [N]."""
-    if control_spec.aim == MINIMISE and control_spec.tie == LEAST_LOAD:
-        springs = (car.stiffness[0] * workspace[DEFLECTION, 0], car.stiffness[1] * workspace[DEFLECTION, 1])
-        least_load_forces(springs, car.comfort, workspace[LOW], workspace[HIGH], workspace[FORCE])
+    control_spec, car, workspace = ride.model.control_spec, ride.model.car, ride.workspace
+    if control_spec.aim != MINIMISE:
+        for i in range(2):
+            workspace[Axle.FORCE, i] = wanted_force(i, y, ride)
         return
-    if control_spec.aim == MINIMISE:
-        a0 = spring_acceleration(car, workspace[DEFLECTION])
-        least_acceleration_forces(
-            a0,
-            car.comfort,
-            workspace[LOW],
-            workspace[HIGH],
-            control_spec.tie,
-            int(control[TIE_END, 1]),
-            workspace[FORCE],
-        )
-        return
-    for i in range(2):
-        workspace[FORCE, i] = wanted_force(control_spec, i, y, control, workspace)
+    deflection, low, high = workspace[Axle.DEFLECTION], workspace[Axle.LOW], workspace[Axle.HIGH]
+    if control_spec.tie == LEAST_LOAD:
+        springs = (car.stiffness[0] * deflection[0], car.stiffness[1] * deflection[1])
+        least_load_forces(springs, car.comfort, low, high, workspace[Axle.FORCE])
+    else:
+        a0, end = spring_acceleration(car, deflection), int(ride.control[Command.TIE_END, 1])
+        least_acceleration_forces(a0, car.comfort, low, high, control_spec.tie, end, workspace[Axle.FORCE])

@@ -1,4 +1,4 @@
-"""The controller's view of a ride, late, sampled and noisy, and the voltage that its supply makes of what it asks."""
+"""Sensors and supply: what the controller sees, late, sampled and noisy, and the voltage that its supply can set."""
 
 from __future__ import annotations
 
@@ -10,30 +10,19 @@ import numpy as np
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.config import SensorNoise, Sensors, Supply
-from pzd.simulate.ride.model import (
-    BODY,
-    COMFORT,
-    DEFLECTION,
-    HEAVE,
-    HEAVE_RATE,
-    PITCH,
-    PITCH_RATE,
-    RATE,
-    SENSED,
-    WORKSPACE_ROWS,
-    Vehicle,
-)
+from pzd.simulate.policies import SENSED
+from pzd.simulate.ride.model import WORKSPACE_ROWS, Axle, State, Vehicle
 
 CHANNELS = SENSED + 1
 """Those of a feedback policy, then the acceleration of the body."""
-_DEFLECTION, _RATE, _HEAVE, _PITCH, _HEAVE_RATE, _PITCH_RATE, _ACCELERATION = 0, 2, 4, 5, 6, 7, 8
-"""Where each begins; deflection and its rate have a channel an axle."""
+_DEFLECTION, _RATE, _BODY, _ACCELERATION = 0, 2, 4, 8
+"""Where each begins: deflection and its rate have a channel an axle; the body has z, phi, dz, dphi, as in the state."""
 _LEAST_GAIN = 0.02
 """What a rise between two samples misses of the road is forgotten after some fifty of them."""
 ACTS, NEXT_NOISE = range(2)
 """Of `Electronics.counts`."""
-HEIGHT_OFF, RISE_OFF = range(2)
-"""Rows of `Electronics.road_off`."""
+HEIGHT_ERROR, RISE_ERROR = range(2)
+"""Rows of `Electronics.road_error`."""
 
 
 class Electronics(NamedTuple):
@@ -47,22 +36,22 @@ class Electronics(NamedTuple):
     """Control periods."""
     deviations: Array
     """(CHANNELS,) standard deviations of the noise."""
-    seed: int
-    """Of the noise."""
     noise: Array
-    """(n, CHANNELS) numbers of unit variance, a row for each act of the controller to come; see `with_noise`."""
+    """(n, CHANNELS) of the noise, a row for each act of the controller to come, in the units of the channels."""
     counts: Array
     """(2,) acts so far, and the next row of the noise."""
     states: Array
     """(m, n) samples of the state, the latest m in a ring."""
     workspaces: Array
-    """(m, WORKSPACE_ROWS, 2) those of the workspace, see `ride_model`."""
-    roads_off: Array
+    """(m, WORKSPACE_ROWS, 2) samples of the workspace, see `Axle`."""
+    road_errors: Array
     """(m, 2, 2) error of the height [m] of the road, body less suspension, and of its rise [m/s], under each axle."""
     state: Array
-    """(n,) the sample that the controller sees, and so the two that follow."""
+    """(n,) state that the controller sees: that of the latest sample which is old enough."""
     workspace: Array
-    road_off: Array
+    """(WORKSPACE_ROWS, 2) the workspace of that sample."""
+    road_error: Array
+    """(2, 2) the errors of the road of that sample [m], [m/s]."""
     road_gains: Array
     """(2,) share of a new height that is believed beside the rise since the last one, see `road_gain`."""
     step: float
@@ -76,7 +65,7 @@ class Electronics(NamedTuple):
 def electronics_of(
     sensors: Sensors, supply: Supply, period: float, states: int, arms: tuple[float, float]
 ) -> Electronics | None:
-    """Sensors and supply as numbers; None where both are perfect.
+    """Return sensors and supply as numbers; None where both are perfect.
 
     Parameters
     ----------
@@ -97,7 +86,6 @@ def electronics_of(
         every,
         delay,
         _deviations(sensors.noise),
-        sensors.seed,
         np.zeros((0, CHANNELS)),
         np.zeros(2),
         np.zeros((slots, states)),
@@ -114,7 +102,7 @@ def electronics_of(
 
 
 def road_gain(noise: SensorNoise, arm: float, step: float) -> float:
-    """Share of a new height of the road that is believed, beside the last one and the rise since then.
+    """Return the gain of a new height of the road against the last one and the rise since then.
 
     Equation: K = (s sqrt(s^2 + 4) - s^2) / 2, s = h sigma_rise / sigma_height
     Source: steady Kalman filter of a height whose rate is measured; Bar-Shalom, Li and Kirubarajan 2001, sec. 5.2
@@ -134,26 +122,17 @@ def road_gain(noise: SensorNoise, arm: float, step: float) -> float:
 
 
 def _deviations(noise: SensorNoise) -> Array:
-    """By channel: deflection 1, 2, its rate 1, 2, z, phi, dz, dphi, acceleration."""
+    """Return the deviations by channel: deflection 1, 2, its rate 1, 2, z, phi, dz, dphi, acceleration."""
+    body = (noise.heave_m, noise.pitch_rad, noise.heave_rate_m_per_s, noise.pitch_rate_rad_per_s)
     return np.array(
-        [
-            noise.deflection_m,
-            noise.deflection_m,
-            noise.deflection_rate_m_per_s,
-            noise.deflection_rate_m_per_s,
-            noise.heave_m,
-            noise.pitch_rad,
-            noise.heave_rate_m_per_s,
-            noise.pitch_rate_rad_per_s,
-            noise.acceleration_m_per_s2,
-        ]
+        [*2 * [noise.deflection_m], *2 * [noise.deflection_rate_m_per_s], *body, noise.acceleration_m_per_s2]
     )
 
 
 def with_noise(electronics: Electronics, rng: np.random.Generator, acts: int) -> Electronics:
-    """With the noise of so many acts to come; the same numbers come whatever number of them is drawn at a time."""
+    """Draw the noise of so many acts to come; the numbers are the same whatever number of them is drawn at a time."""
     electronics.counts[NEXT_NOISE] = 0.0
-    return electronics._replace(noise=rng.standard_normal((acts, CHANNELS)))
+    return electronics._replace(noise=rng.standard_normal((acts, CHANNELS)) * electronics.deviations)
 
 
 @inlined
@@ -165,14 +144,14 @@ def copy_into(origin: Array, target: Array) -> None:
 
 @compiled
 def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) -> float:
-    """Take a sample where it is time, and fill what the controller sees; how old that is [s].
+    """Take a sample where it is time, fill what the controller sees, and return how old that is [s].
 
     Parameters
     ----------
     y : (n,) state
     car : the half-car
-    workspace : as `motion` left it, see `ride_model`
-    electronics : `state`, `workspace` and `road_off` are filled
+    workspace : as `motion` left it, see `Axle`
+    electronics : `state`, `workspace` and `road_error` are filled
     """
     number, every = int(electronics.counts[ACTS]), electronics.every
     slots = electronics.states.shape[0]
@@ -180,8 +159,8 @@ def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) ->
         _sample(y, car, workspace, electronics, (number // every) % slots)
     sample = max(number - electronics.delay, 0) // every
     copy_into(electronics.states[sample % slots], electronics.state)
-    for row in (HEIGHT_OFF, RISE_OFF):
-        copy_into(electronics.roads_off[sample % slots, row], electronics.road_off[row])
+    for row in (HEIGHT_ERROR, RISE_ERROR):
+        copy_into(electronics.road_errors[sample % slots, row], electronics.road_error[row])
     for row in range(WORKSPACE_ROWS):
         copy_into(electronics.workspaces[sample % slots, row], electronics.workspace[row])
     electronics.counts[ACTS] += 1.0
@@ -192,31 +171,25 @@ def sense(y: Array, car: Vehicle, workspace: Array, electronics: Electronics) ->
 @compiled
 def _sample(y: Array, car: Vehicle, workspace: Array, electronics: Electronics, slot: int) -> None:
     """Fill one sample, its noise with it."""
-    drawn, deviations = electronics.noise[int(electronics.counts[NEXT_NOISE])], electronics.deviations
-    seen, room = electronics.states[slot], electronics.workspaces[slot]
+    noise, errors = electronics.noise[int(electronics.counts[NEXT_NOISE])], electronics.road_errors[slot]
+    seen, view = electronics.states[slot], electronics.workspaces[slot]
     copy_into(y, seen)
     for row in range(WORKSPACE_ROWS):
-        copy_into(workspace[row], room[row])
-    height, angle = deviations[_HEAVE] * drawn[_HEAVE], deviations[_PITCH] * drawn[_PITCH]
-    seen[HEAVE] += height
-    seen[PITCH] += angle
-    rate, turning = deviations[_HEAVE_RATE] * drawn[_HEAVE_RATE], deviations[_PITCH_RATE] * drawn[_PITCH_RATE]
-    seen[HEAVE_RATE] += rate
-    seen[PITCH_RATE] += turning
-    room[BODY, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
-    room[COMFORT, 0] += deviations[_ACCELERATION] * drawn[_ACCELERATION]
+        copy_into(workspace[row], view[row])
+    for n in range(4):
+        seen[State.HEAVE + n] += noise[_BODY + n]
+    view[Axle.BODY, 0] += noise[_ACCELERATION]
+    view[Axle.COMFORT, 0] += noise[_ACCELERATION]
     for i in range(2):
-        deflection = deviations[_DEFLECTION + i] * drawn[_DEFLECTION + i]
-        room[DEFLECTION, i] += deflection
-        lengthening = deviations[_RATE + i] * drawn[_RATE + i]
-        room[RATE, i] += lengthening
-        electronics.roads_off[slot, HEIGHT_OFF, i] = height + car.arms[i] * angle - deflection
-        electronics.roads_off[slot, RISE_OFF, i] = rate + car.arms[i] * turning - lengthening
+        view[Axle.DEFLECTION, i] += noise[_DEFLECTION + i]
+        view[Axle.RATE, i] += noise[_RATE + i]
+        errors[HEIGHT_ERROR, i] = noise[_BODY] + car.arms[i] * noise[_BODY + 1] - noise[_DEFLECTION + i]
+        errors[RISE_ERROR, i] = noise[_BODY + 2] + car.arms[i] * noise[_BODY + 3] - noise[_RATE + i]
 
 
 @compiled
 def supplied(asked: float, was: float, low: float, high: float, electronics: Electronics) -> float:
-    """The voltage that the supply sets [V].
+    """Return the voltage that the supply sets [V].
 
     Equation: towards the nearest U of the values that can be set, as far as abs(U - U_0) <= slew h and
     abs(U abs(U) - U_0 abs(U_0)) <= 2 P h / C, the energy C U^2 / 2 that a power P moves in a control period h
@@ -239,5 +212,5 @@ def supplied(asked: float, was: float, low: float, high: float, electronics: Ele
 
 @compiled
 def _root(energy: float) -> float:
-    """U of U abs(U)."""
+    """Return U of U abs(U)."""
     return math.copysign(math.sqrt(abs(energy)), energy)

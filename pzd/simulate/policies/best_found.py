@@ -31,10 +31,12 @@ class BestFound(Frozen):
     """Short rides that the search may take, for each road."""
 
 
-POLICY = Policy(
-    "best_found",
-    "the most comfortable of all policies and of the schedules of voltage that a search tried, within a bound on the "
-    "wheel load",
-    "schedule",
-    tuned="schedule",
+POLICIES = (
+    Policy(
+        "best_found",
+        "the most comfortable of all policies and of the schedules of voltage that a search tried, within a bound on "
+        "the wheel load",
+        "schedule",
+        tuned="schedule",
+    ),
 )

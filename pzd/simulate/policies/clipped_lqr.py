@@ -21,7 +21,7 @@ from pydantic import Field
 
 from pzd.record import Array
 from pzd.schema.model import Frozen
-from pzd.simulate.policies import Policy
+from pzd.simulate.policies import BODY_RATES, DEFLECTIONS, SENSED, Policy
 from pzd.simulate.vehicle.car import GRAVITY, HalfCar
 
 
@@ -34,8 +34,8 @@ class ClippedLqr(Frozen):
     """Weight of the deflections. w^4 beside no loads lets a body on one axle swing at w rad/s: by default 0.9 Hz."""
 
 
-def feedback(car: HalfCar, damping: float, own: Frozen) -> Array:
-    """T = -G x of the regulator with the weights of its block.
+def regulator_feedback(car: HalfCar, damping: float, own: Frozen) -> Array:
+    """Return the gains of T = -G x, the regulator with the weights of its block.
 
     Equation: G = R^-1 (B^T P + N^T), P of A^T P + P A - (P B + N) R^-1 (B^T P + N^T) + Q = 0
     Source: Anderson and Moore 1990, Optimal Control: Linear Quadratic Methods, section 3.4
@@ -44,13 +44,13 @@ def feedback(car: HalfCar, damping: float, own: Frozen) -> Array:
 
     A, B, Q, R, N = regulator(car, ClippedLqr.model_validate(own))
     P = solve_continuous_are(A, B, Q, R, s=N)
-    gains = np.zeros((2, 8))
-    gains[:, [0, 1, 6, 7]] = -np.linalg.solve(R, B.T @ P + N.T)
+    gains = np.zeros((2, SENSED))
+    gains[:, DEFLECTIONS], gains[:, BODY_RATES] = np.split(-np.linalg.solve(R, B.T @ P + N.T), 2, axis=1)
     return gains
 
 
 def regulator(car: HalfCar, weights: ClippedLqr) -> tuple[Array, Array, Array, Array, Array]:
-    """The car and the integrand of J as matrices.
+    """Return the car and the integrand of J as matrices.
 
     Equation: dx/dt = A x + B T, dJ/dt = x^T Q x + T^T R T + 2 x^T N T
 
@@ -76,10 +76,12 @@ def regulator(car: HalfCar, weights: ClippedLqr) -> tuple[Array, Array, Array, A
     return A, B, Q, R, N
 
 
-POLICY = Policy(
-    "clipped_lqr",
-    "the forces of the linear quadratic regulator of the car, as far as the dampers can give them",
-    "feedback",
-    controlled=True,
-    feedback=feedback,
+POLICIES = (
+    Policy(
+        "clipped_lqr",
+        "the forces of the linear quadratic regulator of the car, as far as the dampers can give them",
+        "feedback",
+        controlled=True,
+        feedback=regulator_feedback,
+    ),
 )

@@ -8,16 +8,16 @@ followed by each pair out of a few `tails` until `horizon_s`. The pair is set wi
 a_w = Wk a_K, the weighting of ISO 2631-1:1997 with what it remembers; L_i, the dynamic load of each wheel: S_i + T_i,
 or where the wheels have mass the force of the tyre, beyond that at rest; B_i the mean square of L_i of late; A and B
 those of a_w and of the larger load at the fixed voltage with the least A, which ride along on the plant over the road
-that was met. So one weight serves roads of any height, and loads that leave those of the fixed voltage soon cost more
-than comfort brings.
+that was observed. So one weight serves roads of any height, and loads that leave those of the fixed voltage soon cost
+more than comfort brings.
 
 The plant has the state of the oil, the lag of the valve, the adopted effects and the wheels
-(`pzd.simulate.control.prediction.plant`). Body, wheels, oil, acceleration and the road under each axle are sensed exactly, or
-as `simulate.sensors` gives them: then the height of the road is that of body less suspension, joined to its rise by a
-steady Kalman filter (`pzd.simulate.control.prediction.road`). The road ahead is known, or forecast from what has passed
-under the front axle (`pzd.simulate.control.prediction.road`); the rear axle meets it (a1 + a2) / speed later. What the
-forecasts missed of late may come again: the ride is tried with it added and subtracted, and a choice must beat the best
-voltage held on by `margin`, times the share of the road's motion that was not foreseen.
+(`plant` of `pzd.simulate.control.prediction`). Body, wheels, oil, acceleration and the road under each axle are sensed
+exactly, or as `simulate.sensors` gives them: then the height of the road is that of body less suspension, joined to its
+rise by a steady Kalman filter (`forecast`, in the same folder). The road ahead is known, or forecast from what has
+passed under the front axle (`forecast`); the rear axle meets it (a1 + a2) / speed later. What the forecasts missed of
+late may come again: the ride is tried with it added and subtracted, and a choice must beat the best voltage held on by
+`margin`, times the share of the road's motion that was not foreseen.
 
 Source: rollout of base policies, those that hold a voltage: Bertsekas 2017, Dynamic Programming and Optimal Control I,
 section 6.4; cost and road are ours.
@@ -60,9 +60,11 @@ class ComfortPredictive(Frozen):
         return self
 
 
-POLICY = Policy(
-    "comfort_predictive",
-    "of many voltages ahead, tried on a model of car and dampers, those with the least weighted acceleration",
-    "predict",
-    controlled=True,
+POLICIES = (
+    Policy(
+        "comfort_predictive",
+        "of many voltages ahead, tried on a model of car and dampers, those with the least weighted acceleration",
+        "predict",
+        controlled=True,
+    ),
 )

@@ -6,26 +6,30 @@ import numpy as np
 
 from pzd.record import Array
 from pzd.schema.model import Frozen
-from pzd.simulate.policies import Policy
+from pzd.simulate.policies import BODY_RATES, RATES, SENSED, Policy
 from pzd.simulate.vehicle.car import HalfCar
 
 
-def feedback(car: HalfCar, damping: float, own: Frozen) -> Array:
-    """T_i = -c times the velocity of wheel i, dzeta_i/dt = H^T dX/dt - V_i: T presses the wheel upwards.
+def groundhook(car: HalfCar, damping: float, own: Frozen) -> Array:
+    """Return the gains of T_i = -c times the velocity of wheel i, dzeta_i/dt = H^T dX/dt - V_i.
+
+    T presses the wheel upwards.
 
     Source: Valasek, Novak, Sika and Vaculin 1997, Vehicle System Dynamics 27(5-6)
     """
-    gains = np.zeros((2, 8))
-    gains[:, 2:4] = damping * np.eye(2)
-    gains[:, 6:8] = -damping * car.force_directions().T
+    gains = np.zeros((2, SENSED))
+    gains[:, RATES] = damping * np.eye(2)
+    gains[:, BODY_RATES] = -damping * car.force_directions().T
     return gains
 
 
-POLICY = Policy(
-    "groundhook",
-    "the force of a damper between wheel and ground, where it is within reach",
-    "feedback",
-    fits="wheels with mass",
-    controlled=True,
-    feedback=feedback,
+POLICIES = (
+    Policy(
+        "groundhook",
+        "the force of a damper between wheel and ground, where it is within reach",
+        "feedback",
+        fits="wheels with mass",
+        controlled=True,
+        feedback=groundhook,
+    ),
 )

@@ -1,8 +1,9 @@
-"""What the compiled loop knows: car, road, table, oil and law as named tuples of numbers, and the state."""
+"""The ride as arrays and named tuples: the layout of the state, and car, road, table, damper and law as numbers."""
 
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -28,27 +29,323 @@ from pzd.damper.regimes import spring_force
 from pzd.force_table.lookup import Lookup, bracket
 from pzd.record import Array
 from pzd.schema.errors import DataError
-from pzd.simulate.road.profile import Profile
+from pzd.simulate.roads import Profile
 from pzd.simulate.vehicle.car import HalfCar
 
-# ----------------------------------------------------------------------------------------------------
-# The damper with its own dynamics in the car: valve, oil spring, flow, and the forces beside the element.
+# --- State, workspace and control: which place of an array holds what ---
 
 
-_TINY = 1e-300  # m/s: a speed that only carries its sign
+class State(IntEnum):
+    """Places of the state (n,): the body, the oil of one damper at each axle, energies, and wheels with mass."""
+
+    HEAVE = 0
+    """z, height of the centre of gravity above rest [m]."""
+    PITCH = 1
+    """phi [rad]."""
+    HEAVE_RATE = 2
+    """dz/dt [m/s]."""
+    PITCH_RATE = 3
+    """dphi/dt [rad/s]."""
+    OIL_1 = 4
+    """y, how far the oil of one damper at axle 1 has flowed [m]."""
+    OIL_2 = 5
+    """The same at axle 2 [m]."""
+    DISSIPATED = 6
+    """Energy lost in the dampers [J]; this and the three that follow are each integrated by themselves."""
+    ROAD_WORK = 7
+    """Energy given by the road [J]."""
+    OIL_WORK = 8
+    """Energy put into the oil stiffnesses by motion [J]."""
+    PARALLEL_WORK = 9
+    """Energy put into what is elastic or inert beside the elements [J]."""
+    WHEEL_1 = 10
+    """Height of the wheels of axle 1 above where they stand at rest [m]; from here on only where wheels have mass."""
+    WHEEL_2 = 11
+    """The same at axle 2 [m]."""
+    WHEEL_RATE_1 = 12
+    """Speed of the wheels of axle 1 [m/s]."""
+    WHEEL_RATE_2 = 13
+    """The same at axle 2 [m/s]."""
+    TYRE_LOSS = 14
+    """Energy lost in the tyres [J]."""
+
+
+STATES, STATES_WITH_WHEELS = int(State.WHEEL_1), len(State)
+"""Length of the state of a car whose wheels have no mass, or have mass."""
+
+
+class Axle(IntEnum):
+    """Rows of the workspace (WORKSPACE_ROWS, 2), a column an axle: intermediate results of the equations of motion."""
+
+    DEFLECTION = 0
+    """U of the suspension [m]."""
+    RATE = 1
+    """V = dU/dt [m/s]."""
+    RISE = 2
+    """Speed of the wheel: that of the road where wheels have no mass [m/s]."""
+    LIFT = 3
+    """Acceleration of the wheel without S + T: that of the road where wheels have no mass [m/s2]."""
+    SPRINGS = 4
+    """Spring force S [N]."""
+    FORCE = 5
+    """Damper force T [N]."""
+    ACCELERATION = 6
+    """dV/dt [m/s2]."""
+    INERTANCE = 7
+    """Mass that the dampers add [kg]."""
+    OIL_DEFLECTION = 8
+    """Elastic deflection x - y of the oil of one damper [m]."""
+    OIL_FORCE = 9
+    """Force of the element of one damper [N]."""
+    FLOW = 10
+    """Speed dy/dt of the flow in one damper [m/s]."""
+    ELASTIC = 11
+    """Elastic force beside the element of one damper [N]."""
+    RUBBING = 12
+    """Friction beside the element of one damper [N]."""
+    SIDED_RATE = 13
+    """V held on its side of zero [m/s]."""
+    LOW = 14
+    """Lowest admissible force [N]."""
+    HIGH = 15
+    """Highest admissible force [N]."""
+    BODY = 16
+    """Acceleration of z [m/s2] and of phi [rad/s2], not of an axle each."""
+    COMFORT = 17
+    """Acceleration at K, in the first column [m/s2]."""
+    REBOUND_PUSH = 18
+    """Of an axle that sticks: dV/dt away from V = 0, were it to slip towards rebound [m/s2]."""
+    COMPRESSION_PUSH = 19
+    """The same towards compression [m/s2]."""
+    ROAD_RISE = 20
+    """Speed of the road under the axle [m/s]."""
+    CONTACT = 21
+    """Force between wheel and road beyond that at rest [N]."""
+    TYRE_POWER = 22
+    """Power lost in the tyres [W]."""
+
+
+WORKSPACE_ROWS = len(Axle)
+
+
+class Command(IntEnum):
+    """Rows of the control (BEHIND + d, 2), a column an axle: what the controller last did."""
+
+    ASKED = 0
+    """Force asked [N]."""
+    SET = 1
+    """Voltage set [V]."""
+    SIDE = 2
+    """Side of V = 0 that the axle is on: +1 rebound, -1 compression, 0 sticking."""
+    SINCE = 3
+    """When the voltage was set, in the first column [s]."""
+    TIE_END = 3
+    """End of the segment of minimisers that the tie-break `largest` takes, in the second column of the same row."""
+    HARD = 4
+    """Whether a switched damper is hard (1) or soft (0)."""
+    BEHIND = 5
+    """From here on the voltages behind the d drive effects, in the order in which they act, when it was set [V]."""
+
+
+IDEAL, TABLE, DYNAMIC = range(3)
+"""How a demanded force comes about."""
+UNBOUNDED, BY_COEFFICIENTS, BY_TABLE = range(3)
+"""What bounds a demanded force."""
+FEEDBACK, SWITCH, MINIMISE, VOLTAGE, PREDICT, SCHEDULE = range(6)
+"""What the policy asks for."""
+
+
+# --- Car, road, table and law as numbers ---
+
+Two = tuple[float, float]
+"""Of axle 1, then axle 2."""
+
+
+class Vehicle(NamedTuple):
+    """The half-car as numbers; see `HalfCar`."""
+
+    mass: float
+    """Body mass m [kg]."""
+    inertia: float
+    """J_y [kg m2]."""
+    arms: Two
+    """Second row of H: -a1, a2 [m]."""
+    stiffness: Two
+    """k_1, k_2 [N/m]."""
+    comfort: Two
+    """D of eq. (9) [1/kg]."""
+    mobility: tuple[float, float, float]
+    """W11, W22 and W12 of W, see `HalfCar.mobility` [1/kg]."""
+    ratio: Two
+    """Motion ratio r, damper extension over suspension deflection [-]."""
+    dampers: Two
+    """Number n of dampers at each axle [-]."""
+    speed: float
+    """Of the vehicle [m/s]."""
+    wheels: bool
+    """Whether the wheels have mass; what follows counts only then."""
+    unsprung: Two
+    """m_1, m_2 [kg]."""
+    tyre_stiffness: Two
+    """k_t1, k_t2 [N/m]."""
+    tyre_damping: Two
+    """c_t1, c_t2 [N s/m]."""
+    static_load: Two
+    """N_10, N_20 [N]."""
+
+
+class RoadCoefficients(NamedTuple):
+    """The road as numbers; see `Profile`."""
+
+    amplitude: float
+    """Of the harmonic [m]."""
+    wavenumber: float
+    """Of the harmonic [rad/m]."""
+    spacing: float
+    """Of the knots of the spline [m]."""
+    behind: Two
+    """How far each axle follows the first [m]."""
+    coefficients: Array
+    """(n + 4,) of the spline over n knots [m]; none where the harmonic is the whole road."""
+
+
+class TableArrays(NamedTuple):
+    """The table at the temperature of the ride; see `pzd.force_table.lookup.Lookup`."""
+
+    voltages: Array
+    """(m,) rising [V]."""
+    speeds: Array
+    """(n,) rising [m/s]."""
+    rebound: Array
+    """(m, n) force of one damper in rebound [N]."""
+    compression: Array
+    """(m, n) force of one damper in compression [N]."""
+    reach: Array
+    """(m,) fastest speed of the rig at each voltage [m/s]."""
+
+
+class ControlSpec(NamedTuple):
+    """Policy, bounds and fidelity as numbers."""
+
+    fidelity: int
+    """`IDEAL`, `TABLE` or `DYNAMIC`."""
+    aim: int
+    """`FEEDBACK` to `SCHEDULE`."""
+    bounds: int
+    """`UNBOUNDED`, `BY_COEFFICIENTS` or `BY_TABLE`."""
+    tie: int
+    """See `pzd.simulate.control.demand.TIE_BREAKS`."""
+    c_min: float
+    """Least damping coefficient of an axle, of `BY_COEFFICIENTS` [N s/m]."""
+    c_max: float
+    """Largest damping coefficient of an axle, of `BY_COEFFICIENTS` [N s/m]."""
+    voltage: float
+    """Of the aim `VOLTAGE` [V], and where the valves stand at the start."""
+    jumps: bool
+    """Whether the force jumps where the suspension speed crosses zero, so that an axle can stick."""
+    crossover: float
+    """Of the aim `SWITCH` [rad/s]."""
+    gains: Array
+    """(2, SENSED) of the aims `FEEDBACK` and `SWITCH`, see `pzd.simulate.policies`."""
+    schedule: Array
+    """(2, n) of the aim `SCHEDULE`, over a period of the harmonic of the road [V]."""
+
+
+class RideModel(NamedTuple):
+    """All that stays the same during a ride."""
+
+    car: Vehicle
+    road_coefficients: RoadCoefficients
+    control_spec: ControlSpec
+    grid: TableArrays
+    damper: DynamicDamper
+
+
+class RunningRide(NamedTuple):
+    """A ride under way."""
+
+    model: RideModel
+    control: Array
+    """(BEHIND + d, 2) what the controller last did, see `Command`."""
+    workspace: Array
+    """(WORKSPACE_ROWS, 2) intermediate results, see `Axle`."""
+
+
+def vehicle(car: HalfCar, speed: float) -> Vehicle:
+    """Return the car as numbers, at a speed of the vehicle [m/s]."""
+    H, D, W = car.force_directions(), car.force_to_comfort(), car.mobility()
+    one, two = car.static_loads()
+    return Vehicle(
+        float(car.mass),
+        float(car.pitch_inertia),
+        (float(H[1, 0]), float(H[1, 1])),
+        (float(car.stiffnesses[0]), float(car.stiffnesses[1])),
+        (float(D[0]), float(D[1])),
+        (float(W[0, 0]), float(W[1, 1]), float(W[0, 1])),
+        (float(car.motion_ratios[0]), float(car.motion_ratios[1])),
+        (float(car.dampers[0]), float(car.dampers[1])),
+        float(speed),
+        car.wheels_have_mass,
+        (float(car.unsprung_masses[0]), float(car.unsprung_masses[1])),
+        (float(car.tyre_stiffnesses[0]), float(car.tyre_stiffnesses[1])),
+        (float(car.tyre_dampings[0]), float(car.tyre_dampings[1])),
+        (float(one), float(two)),
+    )
+
+
+def road_coefficients(profile: Profile, wheelbase: float) -> RoadCoefficients:
+    """Return the road as numbers; axle 2 follows by the wheelbase [m]."""
+    return RoadCoefficients(
+        float(profile.amplitude),
+        float(profile.wavenumber),
+        float(profile.spacing),
+        (0.0, float(wheelbase)),
+        np.ascontiguousarray(profile.coefficients),
+    )
+
+
+def ride_of(model: RideModel) -> RunningRide:
+    """Return a ride before its first act, the valves at rest at the voltage of the policy."""
+    control = np.zeros((Command.BEHIND + len(acting("drive")), 2))
+    control[Command.SET] = control[Command.BEHIND :] = model.control_spec.voltage
+    control[Command.SIDE] = 1.0
+    return RunningRide(model, control, workspace())
+
+
+def at_rest(car: Vehicle) -> Array:
+    """Return the state of a car that stands on a level road."""
+    return np.zeros(STATES_WITH_WHEELS if car.wheels else STATES)
+
+
+def workspace() -> Array:
+    """Return an empty workspace, see `Axle`."""
+    return np.zeros((WORKSPACE_ROWS, 2))
+
+
+# --- The damper with its own dynamics: valve, oil stiffness, flow, and the forces beside the element ---
+
+_TINY = 1e-300
+"""A speed that only carries its sign [m/s]."""
 
 
 class DynamicDamper(NamedTuple):
-    """One damper: parameter rows over the effective voltage, linear between; see `pzd.damper.compose.Nodes`."""
+    """One damper at one temperature, its parameters linear over the effective voltage and held beyond.
+
+    See `pzd.damper.compose.Nodes`; the memory is that of one damper at each axle.
+    """
 
     voltages: Array
+    """(m,) nodes, rising [V]."""
     rows: Array
+    """(m, r) parameters of stroke, element and flow at each node, SI."""
     parallel: Array
+    """(m, p) parameters of the parallel effects at each node, SI."""
     drive: Array
+    """(d,) parameters of the drive effects, SI."""
     alone: bool
-    """Whether nothing stands beside the element."""
+    """Whether no effect acts beside the element."""
     scratch: Array
-    """A row of parallel effects to work in."""
+    """(p,) a row of parallel effects to work in."""
     slips: bool
     """Whether a branch beside the element remembers which way the rod went."""
     memory: Array
@@ -58,7 +355,7 @@ class DynamicDamper(NamedTuple):
 
 @inlined
 def place(nodes: Array, value: float) -> tuple[int, float]:
-    """Interval of rising nodes that holds a value, and the share of it that lies below; held beyond the ends."""
+    """Return the interval of rising nodes that holds a value, and the share of it below; held beyond the ends."""
     if nodes.size == 1 or value <= nodes[0]:
         return 0, 0.0
     if value >= nodes[-1]:
@@ -79,7 +376,7 @@ def parallel_at(damper: DynamicDamper, voltage: float, row: Array) -> None:
 
 @compiled
 def effective_voltage(damper: DynamicDamper, voltage: float, kept: Array, elapsed: float) -> float:
-    """Voltage as the valve feels it [V], a time after the voltage was set.
+    """Return the effective voltage at the valve [V], a time after the voltage was set.
 
     Parameters
     ----------
@@ -94,7 +391,7 @@ def effective_voltage(damper: DynamicDamper, voltage: float, kept: Array, elapse
 
 @inlined
 def flowing(e: float, row: Row, guess: float) -> tuple[float, float]:
-    """Force of the oil spring [N] at its elastic deflection [m], and the speed at which the oil flows [m/s].
+    """Return the force of the oil stiffness [N] at an elastic deflection [m], and the speed of the flow [m/s].
 
     Equation: F = k e, |F| = flow curve (|dy/dt|)      Source: Makowski and Knap 2021, eq. (1) to (3)
     """
@@ -105,14 +402,14 @@ def flowing(e: float, row: Row, guess: float) -> tuple[float, float]:
 
 @inlined
 def rubbing_force(v: float, row: Array) -> float:
-    """Friction beside the element [N] at a speed [m/s]; the sign bit of 0 picks the side."""
+    """Return the friction beside the element [N] at a speed [m/s]; the sign bit of 0 picks the side."""
     moving = math.copysign(_TINY, v) if v == 0.0 else v
     return float(parallel_force(0.0, moving, 0.0, row) - parallel_force(0.0, 0.0, 0.0, row))
 
 
 @inlined
 def elastic_force(x: float, row: Array) -> float:
-    """Force beside the element [N] at an extension [m] from where the car stands: it gives its work back.
+    """Return the elastic force beside the element [N] at an extension [m] from where the car stands.
 
     A force that is there at rest is carried by the static balance and left out.
     """
@@ -121,13 +418,13 @@ def elastic_force(x: float, row: Array) -> float:
 
 @inlined
 def inertance(row: Array) -> float:
-    """Force beside the element for each acceleration [kg]."""
+    """Return the force beside the element for each acceleration [kg]."""
     return float(parallel_force(0.0, 0.0, 1.0, row) - parallel_force(0.0, 0.0, 0.0, row))
 
 
 @inlined
 def slipping_forces(damper: DynamicDamper, axle: int, x: float, v: float, row: Array) -> tuple[float, float]:
-    """Force [N] of the branches beside the element: the part whose work is stored, and the part that slips.
+    """Split the force of the branches beside the element [N]: the part whose work is stored, and that which slips.
 
     Parameters
     ----------
@@ -151,216 +448,20 @@ def remember(damper: DynamicDamper, axle: int, x: float, row: Array) -> None:
     memory[0] = x
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-HEAVE, PITCH, HEAVE_RATE, PITCH_RATE, OIL_1, OIL_2, DISSIPATED, ROAD_WORK, OIL_WORK, PARALLEL_WORK = range(10)
-"""The state: the body, the flow y of the oil in one damper of each axle [m], and the energies, each by itself: lost in
-the dampers, given by the road, put into the oil springs by motion and into what is elastic beside the elements [J]."""
-STATES = 10
-ENERGIES = DISSIPATED
-"""The first of them."""
-WHEEL_1, WHEEL_2, WHEEL_RATE_1, WHEEL_RATE_2, TYRE_LOSS = range(STATES, STATES + 5)
-"""The state goes on so where the wheels have mass: their height above where they stand at rest [m], its rate [m/s], and
-the energy lost in the tyres [J]."""
-STATES_WITH_WHEELS = STATES + 5
-IDEAL, TABLE, DYNAMIC = range(3)
-"""How a demanded force comes about."""
-UNBOUNDED, BY_COEFFICIENTS, BY_TABLE = range(3)
-"""What bounds a demanded force."""
-FEEDBACK, SWITCH, MINIMISE, VOLTAGE, PREDICT, SCHEDULE = range(6)
-"""What the policy asks for."""
-SENSED = 8
-"""Deflection 1, 2, its rate 1, 2, z, phi, dz, dphi: what a feedback policy reads."""
-
-
-(
-    DEFLECTION,
-    RATE,
-    RISE,
-    LIFT,
-    SPRINGS,
-    FORCE,
-    ACCELERATION,
-    INERTANCE,
-    OIL_DEFLECTION,
-    OIL_FORCE,
-    FLOW,
-    ELASTIC,
-    RUBBING,
-    SIDED_RATE,
-    LOW,
-    HIGH,
-    BODY,
-    COMFORT,
-    REBOUND_PUSH,
-    COMPRESSION_PUSH,
-    ROAD_RISE,
-    CONTACT,
-    TYRE_POWER,
-) = range(23)
-WORKSPACE_ROWS = 23
-"""Rows of the workspace (WORKSPACE_ROWS, 2), a column an axle: intermediate results of the equations of motion.
-
-Deflection U [m], its rate V [m/s], speed of the wheel and its acceleration without S + T (those of the road where the
-wheels have no mass), spring force S and damper force T [N], dV/dt, mass that the dampers add [kg]; of one damper:
-elastic deflection of the oil [m], force of the oil spring [N], flow [m/s], elastic and rubbing force beside the
-element [N]; speed on its side of zero, lowest and highest force; acceleration of z and phi; acceleration at K (first
-column); of an axle that sticks, dV/dt away from V = 0, were it to slip to either side; speed of the road [m/s]; force
-between wheel and road beyond that at rest [N]; power lost in the tyre [W]."""
-ASKED, SET, SIDE, SINCE, HARD, BEHIND = range(6)
-TIE_END = SINCE
-"""Rows of the control (BEHIND + d, 2), a column an axle: force asked [N], voltage set [V]; side of V = 0 (+1 rebound,
--1 compression, 0 sticking); when the voltage was set [s] (first column), and the end of the segment of minimisers
-that `largest` takes (TIE_END, second column); whether a damper is to be hard (1) or soft (0); from BEHIND on the
-voltages behind the d drive effects, in the order in which they act, when the voltage was set [V]."""
-
-Two = tuple[float, float]
-
-
-class Vehicle(NamedTuple):
-    """The half-car; see `HalfCar`."""
-
-    mass: float
-    inertia: float
-    arms: Two
-    """Second row of H: -a1, a2 [m]."""
-    stiffness: Two
-    comfort: Two
-    """D of eq. (9) [1/kg]."""
-    mobility: tuple[float, float, float]
-    """W11, W22 and W12 of W, see `HalfCar.mobility` [1/kg]."""
-    ratio: Two
-    dampers: Two
-    speed: float
-    wheels: bool
-    """Whether the wheels have mass; what follows counts only then."""
-    unsprung: Two
-    tyre_stiffness: Two
-    tyre_damping: Two
-    static_load: Two
-    """N_10, N_20 [N]."""
-
-
-class RoadCoefficients(NamedTuple):
-    """The road; see `Profile`."""
-
-    amplitude: float
-    wavenumber: float
-    spacing: float
-    behind: Two
-    """How far each axle follows the first [m]."""
-    coefficients: Array
-
-
-class TableArrays(NamedTuple):
-    """The table at the temperature of the ride; see `pzd.force_table.lookup.Lookup`."""
-
-    voltages: Array
-    speeds: Array
-    rebound: Array
-    compression: Array
-    reach: Array
-
-
-class ControlSpec(NamedTuple):
-    """Policy, bounds and fidelity as numbers."""
-
-    fidelity: int
-    aim: int
-    bounds: int
-    tie: int
-    c_min: float
-    c_max: float
-    voltage: float
-    """Of the aim `VOLTAGE` [V], and where the valves stand at the start."""
-    jumps: bool
-    """Whether the force jumps where the suspension speed crosses zero, so that an axle can stick."""
-    crossover: float
-    """Of the aim `SWITCH` [rad/s]."""
-    gains: Array
-    """(2, SENSED) of the aims `FEEDBACK` and `SWITCH`."""
-    schedule: Array
-    """(2, n) of the aim `SCHEDULE`, over a period of the harmonic of the road [V]."""
-
-
-class RideModel(NamedTuple):
-    """All that stays the same during a ride."""
-
-    car: Vehicle
-    road_coefficients: RoadCoefficients
-    control_spec: ControlSpec
-    grid: TableArrays
-    damper: DynamicDamper
-
-
-def vehicle(car: HalfCar, speed: float) -> Vehicle:
-    """The car as numbers; speed of the vehicle in m/s."""
-    H, D, W = car.force_directions(), car.force_to_comfort(), car.mobility()
-    one, two = car.static_loads()
-    return Vehicle(
-        float(car.mass),
-        float(car.pitch_inertia),
-        (float(H[1, 0]), float(H[1, 1])),
-        (float(car.stiffnesses[0]), float(car.stiffnesses[1])),
-        (float(D[0]), float(D[1])),
-        (float(W[0, 0]), float(W[1, 1]), float(W[0, 1])),
-        (float(car.motion_ratios[0]), float(car.motion_ratios[1])),
-        (float(car.dampers[0]), float(car.dampers[1])),
-        float(speed),
-        car.wheels_have_mass,
-        (float(car.unsprung_masses[0]), float(car.unsprung_masses[1])),
-        (float(car.tyre_stiffnesses[0]), float(car.tyre_stiffnesses[1])),
-        (float(car.tyre_dampings[0]), float(car.tyre_dampings[1])),
-        (float(one), float(two)),
-    )
-
-
-def road_coefficients(profile: Profile, wheelbase: float) -> RoadCoefficients:
-    """The road as numbers; axle 2 follows by the wheelbase [m]."""
-    return RoadCoefficients(
-        float(profile.amplitude),
-        float(profile.wavenumber),
-        float(profile.spacing),
-        (0.0, float(wheelbase)),
-        np.ascontiguousarray(profile.coefficients),
-    )
-
-
-def control(voltage: float) -> Array:
-    """The controller before its first act, the valves at rest at a voltage [V]."""
-    table = np.zeros((BEHIND + len(acting("drive")), 2))
-    table[SET] = table[BEHIND:] = voltage
-    table[SIDE] = 1.0
-    return table
-
-
-def at_rest(car: Vehicle) -> Array:
-    """The state of a car that stands on a level road."""
-    return np.zeros(STATES_WITH_WHEELS if car.wheels else STATES)
-
-
-def workspace() -> Array:
-    """Empty room to work in."""
-    return np.zeros((WORKSPACE_ROWS, 2))
-
-
-# ----------------------------------------------------------------------------------------------------
-# The damper of a ride as arrays: its table, and its nodes with the lag of the valve.
-
+# --- Table and damper as arrays ---
 
 LEAST_RELAXATION = 1e-5
-"""An oil spring that relaxes faster than this [s] is rigid for a car, and is taken as this fast."""
+"""An oil stiffness that relaxes faster than this [s] is rigid for a car, and is taken as this fast."""
 
 
 def grid_of(table: Table, temperature: float | None) -> TableArrays:
-    """The table at one temperature [degC], as the compiled loop reads it."""
+    """Return the table at one temperature [degC], as the compiled loop reads it."""
     lookup = Lookup.of(table, temperature)
     return TableArrays(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.reach)
 
 
 def table_of(damper: Damper, table: Table) -> Table:
-    """The table that another damper would have at the same nodes: what the plain one promises.
+    """Return the table that another damper would have at the same nodes, such as that before diagnose.
 
     Parameters
     ----------
@@ -390,7 +491,7 @@ def table_of(damper: Damper, table: Table) -> Table:
 
 
 def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -> DynamicDamper:
-    """The damper at one temperature, as the compiled loop reads it.
+    """Return the damper at one temperature, as the compiled loop reads it.
 
     Parameters
     ----------
@@ -407,12 +508,12 @@ def dynamic_damper_of(damper: Damper, temperature: float | None, valve: float) -
     parallel = np.ascontiguousarray(nodes.parallel)
     remembers = any_slips(parallel)
     alone = not (remembers or any(_is_parallel(row) for row in parallel))
-    room, memory = np.zeros(parallel.shape[1]), np.zeros((2, 1 + BRANCHES))
-    return DynamicDamper(nodes.voltages, rows, parallel, drive, alone, room, remembers, memory)
+    scratch, memory = np.zeros(parallel.shape[1]), np.zeros((2, 1 + BRANCHES))
+    return DynamicDamper(nodes.voltages, rows, parallel, drive, alone, scratch, remembers, memory)
 
 
 def rubs(dynamic: DynamicDamper) -> bool:
-    """Whether friction beside the element jumps where the speed crosses zero."""
+    """Tell whether friction beside the element jumps where the speed crosses zero."""
     tiny = np.finfo(np.float64).tiny
     return any(parallel_force(0.0, tiny, 0.0, row) != parallel_force(0.0, 0.0, 0.0, row) for row in dynamic.parallel)
 

@@ -1,12 +1,14 @@
-"""What a ride comes to: its history, and the numbers taken from every step in its window."""
+"""What a ride comes to: its history, the window in which it is judged, and the numbers taken from every step in it."""
 
 from __future__ import annotations
 
 import math
+import operator
 import tempfile
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from typing_extensions import override
@@ -25,23 +27,25 @@ from pzd.artefacts import (
 from pzd.comfort.iso2631_1997 import INTEGRATION_TIME_S
 from pzd.comfort.weighting import MEMORY_S, weighted
 from pzd.record import Array
+from pzd.schema.model import Frozen
 from pzd.signals.criterion import rms
 from pzd.signals.noise import all_pole
-from pzd.simulate.config import KM_PER_H, SimulateConfig
+from pzd.simulate.config import SimulateConfig
 from pzd.simulate.ride.loop import A_K, COLUMNS, LOAD_1, LOAD_2, LOST, TRAVEL
 from pzd.simulate.roads import Road
 
-# ----------------------------------------------------------------------------------------------------
-# The part of a ride in which its numbers are taken: settled motion, or a single event until it has died away.
+Row = TypeVar("Row", bound=Frozen)
 
+# --- The part of a ride in which its numbers are taken: settled motion, or an event until it has died away ---
 
 DIED_AWAY = 0.01
 """A motion has died away where the acceleration stays below this share of its peak."""
 FALLS = 0.9
 """A motion falls no further where its peak in a second is above this share of that in the second before. An
 identified damper is elastic below its friction, and nothing else in this car damps: the body goes on
-swinging on the oil springs."""
+swinging on the oil stiffnesses."""
 _SECOND = 1.0
+"""Length of the intervals whose peaks are compared [s]."""
 
 
 @dataclass(frozen=True)
@@ -68,21 +72,20 @@ class Event:
 
 
 def event_of(road: Road, config: SimulateConfig) -> Event | None:
-    """The single event of a road; None on a road that goes on and on."""
+    """Return the single event of a road; None on a road that goes on and on."""
     if road.event is None:
         return None
-    begins, ends = road.event
-    speed = config.vehicle_speed_km_per_h * KM_PER_H
+    (begins, ends), speed = road.event, config.vehicle_speed
     return Event(begins / speed, (ends + config.car.car().wheelbase) / speed)
 
 
 def settled(settle: float, step: float, steps: int) -> Window:
-    """From the settling time [s] to the end of a ride of so many steps [s]."""
+    """Return the window from the settling time [s] to the end of a ride, by length [s] and number of its steps."""
     return Window(round(settle / step), steps)
 
 
 def of_event(event: Event, step: float, accelerations: Sequence[Array]) -> tuple[Window, tuple[Ending, ...]]:
-    """From the entry of axle 1 until the motion has died away in every ride over the same event.
+    """Return the window from the entry of axle 1 until the motion has died away in every ride over the same event.
 
     One window for all, since an r.m.s. over a longer window is smaller: rides are compared over the same time.
 
@@ -102,7 +105,7 @@ def of_event(event: Event, step: float, accelerations: Sequence[Array]) -> tuple
 
 
 def _end(acceleration: Array, event: Event, step: float) -> tuple[int, Ending]:
-    """The step at which the motion has died away, a whole number of seconds behind the event, and how it ends."""
+    """Find the step at which the motion has died away, a whole number of seconds behind the event, and how it ends."""
     size = np.abs(acceleration)
     peak, second = float(np.max(size)), round(_SECOND / step)
     start, before = round(event.exit / step), np.inf
@@ -116,62 +119,7 @@ def _end(acceleration: Array, event: Event, step: float) -> tuple[int, Ending]:
     return size.size - 1, "ride over before the motion died away"
 
 
-# ----------------------------------------------------------------------------------------------------
-# The history of a long ride in a file: what a ride keeps in memory does not grow with its length.
-
-
-class SpilledRows:
-    """Rows of a history in a nameless file in the folder for temporary files, gone with this object."""
-
-    def __init__(self, columns: int) -> None:
-        """Begin a history of so many columns."""
-        self._file = tempfile.TemporaryFile(prefix="pzd-ride-")  # noqa: SIM115  # it lives as long as the rows
-        weakref.finalize(self, self._file.close)
-        self._columns, self._rows = columns, 0
-
-    def add(self, rows: Array) -> None:
-        """Add (m, columns) rows behind those so far."""
-        self._file.write(np.ascontiguousarray(rows).tobytes())
-        self._file.flush()
-        self._rows += len(rows)
-
-    def column(self, number: int) -> Array:
-        """(n,) one column, mapped from the file: pages that nobody reads take no memory."""
-        if self._rows == 0:
-            return np.zeros(0)
-        return np.memmap(self._file, np.float64, "r", shape=(self._rows, self._columns))[:, number]
-
-
-class SpilledColumns(Mapping[str, Array]):
-    """Named columns of such rows, each mapped anew when it is asked for."""
-
-    def __init__(self, rows: SpilledRows, numbers: Mapping[str, int]) -> None:
-        """Take the rows, and the number of each column."""
-        self._rows, self._numbers = rows, numbers
-
-    @override
-    def __getitem__(self, name: str) -> Array:
-        return self._rows.column(self._numbers[name])
-
-    @override
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._numbers)
-
-    @override
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-
-def columns_of(history: Array | SpilledRows, names: Sequence[str], left_out: set[str]) -> Mapping[str, Array]:
-    """The columns of a history by their names, but for those left out."""
-    numbers = {name: n for n, name in enumerate(names) if name not in left_out}
-    if isinstance(history, SpilledRows):
-        return SpilledColumns(history, numbers)
-    return {name: np.ascontiguousarray(history[:, n]) for name, n in numbers.items()}
-
-
-# ----------------------------------------------------------------------------------------------------
-
+# --- The history and the course of a ride ---
 
 POINT = "K"
 """The point of the car at which comfort is judged."""
@@ -212,8 +160,64 @@ class Outcome:
         return self.course[:, LOAD_1 : LOAD_2 + 1]
 
 
+class SpilledRows:
+    """Rows of the history of a long ride in a nameless temporary file, gone with this object.
+
+    What a ride keeps in memory does not grow with its length.
+    """
+
+    def __init__(self, columns: int) -> None:
+        """Begin a history of so many columns."""
+        self._file = tempfile.TemporaryFile(prefix="pzd-ride-")  # noqa: SIM115  # it lives as long as the rows
+        weakref.finalize(self, self._file.close)
+        self._columns, self._rows = columns, 0
+
+    def add(self, rows: Array) -> None:
+        """Add (m, columns) rows behind those so far."""
+        self._file.write(np.ascontiguousarray(rows).tobytes())
+        self._file.flush()
+        self._rows += len(rows)
+
+    def column(self, number: int) -> Array:
+        """Return one column (n,), mapped from the file: pages that nobody reads take no memory."""
+        if self._rows == 0:
+            return np.zeros(0)
+        return np.memmap(self._file, np.float64, "r", shape=(self._rows, self._columns))[:, number]
+
+
+class SpilledColumns(Mapping[str, Array]):
+    """Named columns of such rows, each mapped anew when it is read, so that nothing stays in memory."""
+
+    def __init__(self, rows: SpilledRows, numbers: Mapping[str, int]) -> None:
+        """Take the rows, and the number of each column."""
+        self._rows, self._numbers = rows, numbers
+
+    @override
+    def __getitem__(self, name: str) -> Array:
+        return self._rows.column(self._numbers[name])
+
+    @override
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._numbers)
+
+    @override
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+
+def columns_of(history: Array | SpilledRows, names: Sequence[str], left_out: set[str]) -> Mapping[str, Array]:
+    """Return the columns of a history by their names, but for those left out."""
+    numbers = {name: n for n, name in enumerate(names) if name not in left_out}
+    if isinstance(history, SpilledRows):
+        return SpilledColumns(history, numbers)
+    return {name: np.ascontiguousarray(history[:, n]) for name, n in numbers.items()}
+
+
+# --- The numbers of a ride in its window ---
+
+
 def low_passed_jerk(acceleration: Array, step: float) -> Array:
-    """Jerk behind a low-pass of 80 Hz (Butterworth, fourth order).
+    """Return the jerk behind a low-pass of 80 Hz (Butterworth, fourth order).
 
     Parameters
     ----------
@@ -234,7 +238,7 @@ def low_passed_jerk(acceleration: Array, step: float) -> Array:
 
 
 def _low_passed(values: Array, warped: float, damping: float) -> Array:
-    """(n,) values behind one pair of poles, at rest before the first.
+    """Filter (n,) values by one pair of poles, at rest before the first.
 
     Equation: H = W^2 / (s^2 + d W s + W^2), s = (1 - 1/z) / (1 + 1/z)      Source: bilinear transform, prewarped
     """
@@ -246,7 +250,7 @@ def _low_passed(values: Array, warped: float, damping: float) -> Array:
 
 
 def summary_row(case: str, road: str, policy: str, fidelity: str, outcome: Outcome, window: Window) -> SummaryRow:
-    """The ride in one line."""
+    """Return the numbers of a ride that the summary has."""
     within = outcome.course[window.steps]
     lost = within[:, LOST]
     return SummaryRow(
@@ -267,7 +271,7 @@ def summary_row(case: str, road: str, policy: str, fidelity: str, outcome: Outco
 
 
 def wheel_rows(case: str, outcome: Outcome, window: Window, static: tuple[float, float]) -> Iterator[WheelRow]:
-    """The force between wheels and road, an axle a row.
+    """Return the force between wheels and road, an axle a row.
 
     Equation: N_i = N_i0 - (S_i + T_i), N_i0 the static load        Source: balance of the massless wheel;
     where the wheels have mass N_i is the force of the tyre, see `pzd.simulate.vehicle.suspension`
@@ -291,30 +295,37 @@ def wheel_rows(case: str, outcome: Outcome, window: Window, static: tuple[float,
         )
 
 
-def ride_of(case: str, outcome: Outcome, without: tuple[str, ...]) -> Ride:
-    """The history as the artefact holds it; columns that mean nothing in this ride are left out."""
+def history_of(case: str, outcome: Outcome, without: tuple[str, ...]) -> Ride:
+    """Return the history as the artefact holds it, without the columns that mean nothing in this ride."""
     names = RIDE_COLUMNS + tuple(name.format(axle) for axle in AXLES for name in AXLE_COLUMNS)
     left_out = {name.format(axle) for name in without for axle in AXLES}
     return Ride(case, columns_of(outcome.history, names, left_out))
 
 
-# ----------------------------------------------------------------------------------------------------
-# A long ride, judged piece by piece as it goes: what is kept of its steps does not grow with its length.
-
+# --- A long ride, judged piece by piece: what is kept of its steps does not grow with its length ---
 
 PIECE_S = 120.0
 """Longest piece of a ride [s]: twelve waves of the lowest third-octave band. A shorter ride is one piece."""
 
-Rows = tuple[SummaryRow, Sequence[WheelRow], WeightedRow, Sequence[SpectrumRow], Sequence[SpectrumRow]]
-"""Of one piece; the spectrum as components of the road's frequency, where it has one, and in third-octave bands."""
+
+class WindowRows(NamedTuple):
+    """The numbers of a ride, or of a piece of it, in a window."""
+
+    summary: SummaryRow
+    wheels: tuple[WheelRow, ...]
+    weighted: WeightedRow
+    spectrum: tuple[SpectrumRow, ...]
+    """As harmonics of the road where these carry the motion, else in third-octave bands."""
+    bands: tuple[SpectrumRow, ...]
+    """In third-octave bands."""
 
 
 def longest_piece(step: float) -> int:
-    """Rows of the longest piece at a step of integration [s]."""
+    """Return the steps of the longest piece, by their length [s]."""
     return max(round(PIECE_S / step), 1)
 
 
-class Remembered:
+class Overlap:
     """The end of the pieces so far, as long as the weighting remembers."""
 
     def __init__(self, step: float) -> None:
@@ -323,35 +334,35 @@ class Remembered:
         self._rows = np.zeros((0, 0))
 
     def with_piece(self, first: int, rows: Array) -> tuple[Array, int]:
-        """Rows (m, c) of the steps from `first` on behind those before them, and the step of the first of all."""
+        """Return rows (m, c) of the steps from `first` on behind those before, and the step of the first of all."""
         course = np.vstack([self._rows, rows]) if first > 0 else np.array(rows)
         self._rows = course[-min(self._steps, len(course)) :].copy()
         return course, first + len(rows) - len(course)
 
 
 class MeanSquare:
-    """The weighted r.m.s. of the acceleration at K, from a step on."""
+    """The weighted r.m.s. of the acceleration at K from a step on, taken piece by piece."""
 
     def __init__(self, first: int, step: float) -> None:
         """Begin a ride that counts from a step on; length of a step [s]."""
-        self._first, self._step, self._before = first, step, Remembered(step)
+        self._first, self._step, self._before = first, step, Overlap(step)
         self._sum, self._count = 0.0, 0
 
-    def take(self, first: int, rows: Array) -> None:
+    def add(self, first: int, rows: Array) -> None:
         """Add (m, COURSE_COLUMNS) rows, of the steps from `first` on."""
         course, start = self._before.with_piece(first, rows)
-        felt = weighted(course[:, A_K], 1.0 / self._step)[max(self._first, first) - start :]
-        self._sum, self._count = self._sum + float(felt @ felt), self._count + felt.size
+        history = weighted(course[:, A_K], 1.0 / self._step)[max(self._first, first) - start :]
+        self._sum, self._count = self._sum + float(history @ history), self._count + history.size
 
     def root(self) -> float:
-        """The r.m.s. [m/s2]."""
+        """Return the r.m.s. [m/s2]."""
         return math.sqrt(self._sum / max(self._count, 1))
 
 
 class Pieces:
-    """The pieces of one ride, each taken with as much before it as the weighting remembers."""
+    """The numbers of a long ride, taken piece by piece, each with as much before it as the weighting remembers."""
 
-    def __init__(self, settled: int, step: float, judge: Callable[[Outcome, Window, int], Rows]) -> None:
+    def __init__(self, settled: int, step: float, judge: Callable[[Outcome, Window, int], WindowRows]) -> None:
         """Begin a ride.
 
         Parameters
@@ -361,12 +372,12 @@ class Pieces:
         judge : (piece, its window, steps before it over which a running r.m.s. may reach) -> its rows
         """
         self._settled, self._step, self._judge = settled, step, judge
-        self._before = Remembered(step)
+        self._before = Overlap(step)
         self._count = 0
-        self._rows: Rows | None = None
+        self._rows: WindowRows | None = None
         self._lost: tuple[float, float] = (math.nan, math.nan)
 
-    def take(self, first: int, rows: Array) -> None:
+    def add(self, first: int, rows: Array) -> None:
         """Judge (m, COURSE_COLUMNS) rows, of the steps from `first` on; they may be changed afterwards."""
         course, start = self._before.with_piece(first, rows)
         window = Window(max(self._settled, first) - start, len(course) - 1)
@@ -375,25 +386,24 @@ class Pieces:
             self._lost = (float(lost[0]) if self._rows is None else self._lost[0], float(lost[-1]))
             lead = min(round(INTEGRATION_TIME_S / self._step), max(first, self._settled) - self._settled)
             piece = Outcome(np.zeros((0, COLUMNS)), course, self._step, outside=0.0, energy_error=0.0)
-            rows_of_piece, count = self._judge(piece, window, lead), window.last - window.first + 1
-            self._rows = rows_of_piece if self._rows is None else _both(self._rows, self._count, rows_of_piece, count)
+            found, count = self._judge(piece, window, lead), window.last - window.first + 1
+            self._rows = found if self._rows is None else _joined(self._rows, self._count, found, count)
             self._count += count
 
-    def joined(self, outcome: Outcome) -> Rows:
-        """The rows of the whole ride; the outcome has its energy balance."""
+    def joined(self, outcome: Outcome) -> WindowRows:
+        """Return the rows of the whole ride; the outcome has its energy balance."""
         if self._rows is None:
             raise ValueError("no step of the ride lies behind the settling time")
-        summary, wheels, felt, spectrum, bands = self._rows
         whole = {
             "dissipated_J": self._lost[1] - self._lost[0],
             "energy_error": outcome.energy_error,
             "outside_table": outcome.outside,
         }
-        return summary.model_copy(update=whole), wheels, felt, spectrum, bands
+        return self._rows._replace(summary=self._rows.summary.model_copy(update=whole))
 
 
-def _both(one: Rows, n: int, other: Rows, m: int) -> Rows:
-    """The rows of two pieces of n and m steps as one.
+def _joined(one: WindowRows, n: int, other: WindowRows, m: int) -> WindowRows:
+    """Join the rows of two pieces of n and m steps.
 
     Equation: r.m.s. = sqrt((n r_1^2 + m r_2^2) / (n + m)); VDV = (VDV_1^4 + VDV_2^4)^(1/4)
     """
@@ -401,39 +411,40 @@ def _both(one: Rows, n: int, other: Rows, m: int) -> Rows:
     def mean_square(a: float, b: float) -> float:
         return math.sqrt((n * a * a + m * b * b) / (n + m))
 
-    def joined(rows: Sequence[SpectrumRow], others: Sequence[SpectrumRow]) -> tuple[SpectrumRow, ...]:
-        return tuple(
-            a.model_copy(update={"rms_m_per_s2": mean_square(a.rms_m_per_s2, b.rms_m_per_s2)})
-            for a, b in zip(rows, others, strict=True)
-        )
+    def share(a: float, b: float) -> float:
+        return (n * a + m * b) / (n + m)
 
-    loads = tuple(
-        a.model_copy(
-            update={
-                "rms_dynamic_load_N": mean_square(a.rms_dynamic_load_N, b.rms_dynamic_load_N),
-                "min_contact_force_N": min(a.min_contact_force_N, b.min_contact_force_N),
-                "pulling": (n * a.pulling + m * b.pulling) / (n + m),
-            }
-        )
-        for a, b in zip(one[1], other[1], strict=True)
+    def dose(a: float, b: float) -> float:
+        return float((a**4 + b**4) ** 0.25)
+
+    def row(a: Row, b: Row, **rules: Callable[[float, float], float]) -> Row:
+        return a.model_copy(update={name: rule(getattr(a, name), getattr(b, name)) for name, rule in rules.items()})
+
+    def spectrum(rows: Sequence[SpectrumRow], others: Sequence[SpectrumRow]) -> tuple[SpectrumRow, ...]:
+        return tuple(row(a, b, rms_m_per_s2=mean_square) for a, b in zip(rows, others, strict=True))
+
+    wheels = tuple(
+        row(a, b, rms_dynamic_load_N=mean_square, min_contact_force_N=min, pulling=share)
+        for a, b in zip(one.wheels, other.wheels, strict=True)
     )
-    summary = one[0].model_copy(
-        update={
-            "peak_abs_aK_m_per_s2": max(one[0].peak_abs_aK_m_per_s2, other[0].peak_abs_aK_m_per_s2),
-            "rms_aK_m_per_s2": mean_square(one[0].rms_aK_m_per_s2, other[0].rms_aK_m_per_s2),
-            "rms_jerk_m_per_s3": mean_square(one[0].rms_jerk_m_per_s3, other[0].rms_jerk_m_per_s3),
-            "peak_deflection_m": max(one[0].peak_deflection_m, other[0].peak_deflection_m),
-            "rms_wheel_load_N": max(row.rms_dynamic_load_N for row in loads),
-        }
+    summary = row(
+        one.summary,
+        other.summary,
+        peak_abs_aK_m_per_s2=max,
+        rms_aK_m_per_s2=mean_square,
+        rms_jerk_m_per_s3=mean_square,
+        peak_deflection_m=max,
+    ).model_copy(update={"rms_wheel_load_N": max(wheel.rms_dynamic_load_N for wheel in wheels)})
+    weighted_row = row(
+        one.weighted,
+        other.weighted,
+        duration_s=operator.add,
+        a_w_m_per_s2=mean_square,
+        peak_m_per_s2=max,
+        MTVV_m_per_s2=max,
+        VDV_m_per_s1_75=dose,
     )
-    felt = one[2].model_copy(
-        update={
-            "duration_s": one[2].duration_s + other[2].duration_s,
-            "a_w_m_per_s2": mean_square(one[2].a_w_m_per_s2, other[2].a_w_m_per_s2),
-            "peak_m_per_s2": max(one[2].peak_m_per_s2, other[2].peak_m_per_s2),
-            "MTVV_m_per_s2": max(one[2].MTVV_m_per_s2, other[2].MTVV_m_per_s2),
-            "VDV_m_per_s1_75": (one[2].VDV_m_per_s1_75 ** 4 + other[2].VDV_m_per_s1_75 ** 4) ** 0.25,
-        }
-    )
-    bands = joined(one[4], other[4])
-    return summary, loads, felt, joined(one[3], other[3]) if one[3][0].method == other[3][0].method else bands, bands
+    bands = spectrum(one.bands, other.bands)
+    # a piece whose motion does not repeat with the road turns the whole ride into bands
+    same = one.spectrum[0].method == other.spectrum[0].method
+    return WindowRows(summary, wheels, weighted_row, spectrum(one.spectrum, other.spectrum) if same else bands, bands)

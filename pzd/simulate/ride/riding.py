@@ -1,4 +1,4 @@
-"""One ride: the car, its road, the law and the damper put together, ridden, and its energies balanced."""
+"""One ride: car, road, policy and damper put together, ridden, and the energies balanced."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from pzd.record import Array
 from pzd.schema.errors import DataError
 from pzd.simulate.compiled_ahead import wait
-from pzd.simulate.config import KM_PER_H, SimulateConfig
+from pzd.simulate.config import SimulateConfig
 from pzd.simulate.control.demand import LEAST_LOAD, TIE_BREAKS
-from pzd.simulate.control.prediction.planning import predictor_of
-from pzd.simulate.control.prediction.plant import Predictor
-from pzd.simulate.control.sensing import Electronics, electronics_of, with_noise
-from pzd.simulate.ride.energy import balance_error, oil_energy, ride_exactly, stored_energy
-from pzd.simulate.ride.equations import relax_oil
-from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, TALLIES, ride
+from pzd.simulate.control.prediction.predictor import predictor_of
+from pzd.simulate.control.sensing import electronics_of, with_noise
+from pzd.simulate.policies import SENSED
+from pzd.simulate.ride.equations import balance_error, oil_energy, relax_oil, stored_energy
+from pzd.simulate.ride.linear import ride_exactly
+from pzd.simulate.ride.loop import COLUMNS, COURSE_COLUMNS, OUTSIDE, STEPS_DONE, Clock, records_of, ride_steps
 from pzd.simulate.ride.model import (
     BY_COEFFICIENTS,
     BY_TABLE,
@@ -25,33 +25,32 @@ from pzd.simulate.ride.model import (
     FEEDBACK,
     IDEAL,
     MINIMISE,
-    OIL_WORK,
     PREDICT,
     SCHEDULE,
-    SENSED,
     SWITCH,
     TABLE,
     UNBOUNDED,
     VOLTAGE,
+    Axle,
     ControlSpec,
     DynamicDamper,
     RideModel,
+    State,
     TableArrays,
     at_rest,
-    control,
+    ride_of,
     road_coefficients,
     rubs,
     vehicle,
-    workspace,
 )
 from pzd.simulate.ride.outcome import Outcome, SpilledRows, longest_piece
-from pzd.simulate.ride.stepper import STAGES
-from pzd.simulate.road.profile import Profile
+from pzd.simulate.ride.stepper import integrator_of
+from pzd.simulate.roads import Profile
 from pzd.simulate.study.plan import Case
 from pzd.simulate.vehicle.car import HalfCar
 
-Take = Callable[[int, Array], None]
-"""Takes the rows of the course from a step on, which are written over afterwards."""
+CourseSink = Callable[[int, Array], None]
+"""Receives the rows of the course from a step on, which are written over afterwards."""
 _FIDELITIES = {"ideal": IDEAL, "table": TABLE, "dynamic": DYNAMIC}
 _AIMS = {
     "damping": FEEDBACK,
@@ -65,29 +64,8 @@ _AIMS = {
 
 
 @dataclass(frozen=True)
-class Clock:
-    """Steps of a ride."""
-
-    step: float
-    steps: int
-    per_control: int
-    per_output: int
-
-    @classmethod
-    def of(cls, config: SimulateConfig) -> Clock:
-        """The clock of a config."""
-        h = config.integration_step_s
-        return cls(
-            h,
-            round(config.duration_s / h),
-            round(config.control_period_s / h),
-            round(1.0 / (config.output_rate_Hz * h)),
-        )
-
-
-@dataclass(frozen=True)
-class RideFound:
-    """The most comfortable ride that was found within a bound on the wheel load."""
+class SearchResult:
+    """The most comfortable ride that a search found within a bound on the wheel load."""
 
     by: str
     """`search`, or the policy that none of the schedules beats."""
@@ -100,26 +78,35 @@ class RideFound:
 
 
 @dataclass(frozen=True)
-class Held:
-    """What a policy may hold constant during a ride."""
+class FixedValues:
+    """What a policy may hold constant during a ride, or repeat with the road."""
 
     voltage: float
     """Of `passive` and the like, and of every valve before the ride [V]."""
     damping: float
     """c of `constant` and the like, per axle [N s/m]."""
-    found: RideFound | None = None
+    searched: SearchResult | None = None
     """What `best_found` came to."""
 
     @classmethod
-    def of(cls, config: SimulateConfig, grid: TableArrays) -> Held:
-        """What the config says; without a word the voltage of the table that is nearest to 0."""
+    def of(cls, config: SimulateConfig, grid: TableArrays) -> FixedValues:
+        """Return those of the config; by default the voltage of the table that is nearest to 0."""
         nearest = float(grid.voltages[np.argmin(np.abs(grid.voltages))])
         voltage = nearest if config.passive_voltage_V is None else config.passive_voltage_V
         return cls(voltage, config.constant_damping_Ns_per_m)
 
 
-def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamper, held: Held) -> ControlSpec:
-    """Policy, bounds and fidelity of a case as numbers."""
+def clock_of(config: SimulateConfig) -> Clock:
+    """Return the steps of a ride."""
+    h = config.integration_step_s
+    per_output = round(1.0 / (config.output_rate_Hz * h))
+    return Clock(h, round(config.duration_s / h), round(config.control_period_s / h), per_output)
+
+
+def control_spec_of(
+    config: SimulateConfig, case: Case, car: HalfCar, damper: DynamicDamper, fixed: FixedValues
+) -> ControlSpec:
+    """Return policy, bounds and fidelity of a case as numbers."""
     policy, fidelity = case.policy, _FIDELITIES[case.fidelity]
     bounds = BY_TABLE
     if fidelity == IDEAL:
@@ -128,21 +115,22 @@ def control_spec_of(config: SimulateConfig, case: Case, car: HalfCar, damper: Dy
             bounds = UNBOUNDED
     gains, crossover, own = np.zeros((2, SENSED)), 0.0, config.own_block(policy.name)
     if policy.feedback is not None:
-        gains = np.ascontiguousarray(policy.feedback(car, held.damping, own))
+        gains = np.ascontiguousarray(policy.feedback(car, fixed.damping, own))
     if policy.switch is not None:
         gains, crossover = policy.switch(car, own)
     jumps = rubs(damper) or damper.slips if fidelity == DYNAMIC else bounds == BY_TABLE
+    searched = fixed.searched.voltages if fixed.searched is not None else ()
     return ControlSpec(
         fidelity,
         _AIMS[policy.aim],
         bounds,
         LEAST_LOAD if policy.tie_break == "least_load" else TIE_BREAKS[policy.tie_break or config.tie_break],
         *(config.coefficients or (0.0, np.inf)),
-        held.voltage,
+        fixed.voltage,
         jumps,
         crossover,
         gains,
-        np.array(held.found.voltages) if held.found is not None and held.found.voltages else np.zeros((2, 1)),
+        np.array(searched) if searched else np.zeros((2, 1)),
     )
 
 
@@ -153,8 +141,8 @@ def ride_case(
     grid: TableArrays,
     damper: DynamicDamper,
     ends: bool,
-    held: Held | None = None,
-    take: Take | None = None,
+    fixed: FixedValues | None = None,
+    sink: CourseSink | None = None,
 ) -> Outcome:
     """Ride one case.
 
@@ -165,8 +153,8 @@ def ride_case(
     profile : the road
     grid, damper : the damper as table and with its dynamics
     ends : whether the table ends where the rig did, so that a ride beyond is refused
-    held : by default what the config says
-    take : takes the course piece by piece, so that the outcome has none; by default it has all of it
+    fixed : what the policy holds constant; by default what the config says
+    sink : receives the course piece by piece, so that the outcome has none; by default it has all of it
 
     Returns
     -------
@@ -177,99 +165,48 @@ def ride_case(
     DataError : when the ride needs the table where it ends
     """
     wait()
-    car, clock, held = config.car.car(), Clock.of(config), held or Held.of(config, grid)
-    speed = config.vehicle_speed_km_per_h * KM_PER_H
-    linear = take is None and case.fidelity == "ideal" and case.policy.aim == "damping" and not car.wheels_have_mass
+    car, clock, fixed = config.car.car(), clock_of(config), fixed or FixedValues.of(config, grid)
+    speed = config.vehicle_speed
+    linear = sink is None and case.fidelity == "ideal" and case.policy.aim == "damping" and not car.wheels_have_mass
     if linear and profile.smooth:
-        frequency = profile.wavenumber * speed / (2.0 * np.pi)
-        return ride_exactly(
-            car,
-            held.damping,
-            frequency,
-            profile.amplitude,
-            speed,
-            clock.step,
-            clock.steps,
-            clock.per_output,
-            float(np.max(grid.reach)),
-        )
-    own = damper._replace(  # rides at the same time work in rooms of their own
+        return ride_exactly(car, fixed.damping, profile, speed, clock, float(np.max(grid.reach)))
+    own = damper._replace(  # rides at the same time each have a memory and a scratch row of their own
         scratch=np.zeros_like(damper.scratch), memory=np.zeros_like(damper.memory)
     )
-    model = RideModel(
-        vehicle(car, speed),
-        road_coefficients(profile, car.wheelbase),
-        control_spec_of(config, case, car, damper, held),
-        grid,
-        own,
-    )
+    spec = control_spec_of(config, case, car, damper, fixed)
+    model = RideModel(vehicle(car, speed), road_coefficients(profile, car.wheelbase), spec, grid, own)
+    y, ride = at_rest(model.car), ride_of(model)
     plan = None
     if case.policy.aim == "predict":
         plan = predictor_of(config.comfort_predictive, config.control_period_s, own, car, speed, grid.voltages)
-    states = at_rest(model.car).size
-    electronics = electronics_of(config.sensors, config.supply, config.control_period_s, states, model.car.arms)
-    return ride_of_model(model, plan, electronics, clock, config.tolerance, case.name, ends, take)
-
-
-def ride_of_model(
-    model: RideModel,
-    plan: Predictor | None,
-    electronics: Electronics | None,
-    clock: Clock,
-    tolerance: float,
-    name: str,
-    ends: bool,
-    take: Take | None = None,
-) -> Outcome:
-    """Ride from rest on a level start, and balance the energies; see `ride_case`."""
-    acts, scratch, y = control(model.control_spec.voltage), workspace(), at_rest(model.car)
+    electronics = electronics_of(config.sensors, config.supply, config.control_period_s, y.size, model.car.arms)
+    rng = np.random.default_rng(config.sensors.seed)
     count = clock.steps + 1
-    course = np.zeros((count if take is None else min(longest_piece(clock.step), count), COURSE_COLUMNS))
-    history = np.zeros((-(-len(course) // clock.per_output), COLUMNS))
-    spilled = None if take is None else SpilledRows(COLUMNS)
-    tally = np.zeros(TALLIES)
-    relax_oil(0.0, y, model, scratch)
-    before = stored_energy(0.0, y, model, scratch)
-    stages, end = np.zeros((STAGES + 1, y.size)), np.zeros(y.size)
-    rng = np.random.default_rng(0 if electronics is None else electronics.seed)
-    for first in range(0, count, len(course)):
-        last = min(first + len(course), count)
+    rows = count if sink is None else min(longest_piece(clock.step), count)
+    records, integrator = records_of(rows, clock.per_output), integrator_of(config.tolerance, y.size)
+    spilled = None if sink is None else SpilledRows(COLUMNS)
+    relax_oil(0.0, y, ride)
+    before = stored_energy(0.0, y, ride)
+    for first in range(0, count, rows):
+        last = min(first + rows, count)
         if electronics is not None:
             acts_due = -(-last // clock.per_control) - -(-first // clock.per_control)
             electronics = with_noise(electronics, rng, acts_due)
-        ride(
-            y,
-            model,
-            plan,
-            electronics,
-            acts,
-            scratch,
-            first,
-            last,
-            clock.steps,
-            clock.step,
-            tolerance,
-            clock.per_control,
-            clock.per_output,
-            course,
-            history,
-            tally,
-            stages,
-            end,
-        )
-        if tally[STEPS_DONE] < last - 1 or not np.all(np.isfinite(y)):
-            raise DataError(_lost(name, tally[STEPS_DONE] * clock.step, ends, float(np.max(np.abs(scratch[1])))))
-        if take is not None and spilled is not None:
-            take(first, course[: last - first])
-            spilled.add(history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
-    ended, moves = clock.steps * clock.step, model.control_spec.aim != VOLTAGE
-    change = stored_energy(ended, y, model, scratch) - before
-    oil_change = y[OIL_WORK] if moves else oil_energy(ended, y, model, acts, scratch)  # none at the start
+        ride_steps(y, ride, plan, electronics, first, last, clock, integrator, records)
+        done = records.tally[STEPS_DONE]
+        if done < last - 1 or not np.all(np.isfinite(y)):
+            raise DataError(_lost(case.name, done * clock.step, ends, float(np.max(np.abs(ride.workspace[Axle.RATE])))))
+        if sink is not None and spilled is not None:
+            sink(first, records.course[: last - first])
+            spilled.add(records.history[: -(-last // clock.per_output) - -(-first // clock.per_output)])
+    ended, moves = clock.steps * clock.step, spec.aim != VOLTAGE
+    change = stored_energy(ended, y, ride) - before
+    oil_change = y[State.OIL_WORK] if moves else oil_energy(ended, y, ride)  # none at the start
     return Outcome(
-        history=history if spilled is None else spilled,
-        course=course if take is None else np.zeros((0, COURSE_COLUMNS)),
+        history=records.history if spilled is None else spilled,
+        course=records.course if sink is None else np.zeros((0, COURSE_COLUMNS)),
         step=clock.step,
-        outside=float(tally[OUTSIDE] / (clock.steps + 1)),
+        outside=float(records.tally[OUTSIDE] / count),
         energy_error=balance_error(change, oil_change, y),
     )
 

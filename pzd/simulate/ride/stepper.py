@@ -8,33 +8,18 @@ embedded error shortens the step as often as the tolerance asks.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 from pzd.simulate.ride.equations import motion, remember_step
-from pzd.simulate.ride.model import (
-    COMPRESSION_PUSH,
-    DYNAMIC,
-    ENERGIES,
-    HEAVE_RATE,
-    OIL_1,
-    OIL_2,
-    PITCH_RATE,
-    RATE,
-    REBOUND_PUSH,
-    SIDE,
-    STATES,
-    WHEEL_RATE_1,
-    RideModel,
-)
+from pzd.simulate.ride.model import DYNAMIC, STATES, Axle, Command, RunningRide, State
 
-# ----------------------------------------------------------------------------------------------------
-# The coefficients of Dormand and Prince's pair of order 5(4), the last stage being the first of the next step.
+# --- Coefficients of the pair of order 5(4), the last stage being the first of the next step ---
 #
 # Source: Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2
-
 
 STAGES = 7
 """Number of stages."""
@@ -56,38 +41,51 @@ ERROR_WEIGHTS = np.array([-71 / 57600, 0.0, 71 / 16695, -71 / 1920, 17253 / 3392
 """(STAGES,) difference between the orders 5 and 4."""
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- One step ---
 
 SCALES = np.array([1e-2, 1e-2, 1e-1, 1e-1, 1e-3, 1e-3, 10.0, 10.0, 10.0, 10.0, 1e-2, 1e-2, 1e-1, 1e-1, 10.0])
 """A motion of ordinary size, below which the error is absolute; that of the oil always is, which flows much farther
-than its spring is deflected: m, rad, m/s, rad/s, m, J; wheels: m, m/s, J."""
+than its stiffness is deflected: m, rad, m/s, rad/s, m, J; wheels: m, m/s, J."""
 
 _CROSSED = 1e-9  # m/s on the other side of zero: the moment lies between this speed and twice as much
 _PUSHED = 1e-6  # m/s2: an axle that sticks slips between no push and this one
 _SMALLEST = 1e-6  # of the step: what is taken whatever the error
 _SHARP = 1e-13  # of the step: how closely the moment is found at which an axle turns round or sticks, where it jumps
-_MOST_CUTS = 50
+_MOST_CUTS = 50  # in a step: an axle that chatters more goes on in the pieces that the tolerance asks for
 _AIM = 0.5  # of what is let pass: where the moment is looked for
 _INSIDE = 1e-3  # of a bracket: no guess is closer to its ends
 _HALVED = 4  # every so many guesses the bracket is halved, so that it shrinks whatever the law
 
 
+class Integrator(NamedTuple):
+    """Tolerance of the integration, and arrays to work in."""
+
+    tolerance: float
+    """Largest local error of a step as a share of the motion; infinite for a fixed step."""
+    stages: Array
+    """(STAGES + 1, n) derivatives: the first is that at the start of a step; the last is for what is not kept."""
+    end: Array
+    """(n,) state at the end of a step that is tried."""
+
+
+def integrator_of(tolerance: float, states: int) -> Integrator:
+    """Return the integrator of a state of so many numbers."""
+    return Integrator(tolerance, np.zeros((STAGES + 1, states)), np.zeros(states))
+
+
 @inlined
-def _reach(i: int, dt: float, first: int, last: int, y: Array, stages: Array, end: Array) -> None:
+def _reach(i: int, dt: float, first: int, last: int, y: Array, integrator: Integrator) -> None:
     """Fill a part of the state at which a stage stands; no motion depends on the energies before the last one."""
     for n in range(first, last):
         change = 0.0
         for j in range(i):
-            change += STAGE_WEIGHTS[i, j] * stages[j, n]
-        end[n] = y[n] + dt * change
+            change += STAGE_WEIGHTS[i, j] * integrator.stages[j, n]
+        integrator.end[n] = y[n] + dt * change
 
 
 @inlined
-def trial(
-    time: float, dt: float, y: Array, model: RideModel, control: Array, workspace: Array, stages: Array, end: Array
-) -> float:
-    """Fill `end` with the state after dt; the workspace is left as it is there.
+def trial(time: float, dt: float, y: Array, ride: RunningRide, integrator: Integrator) -> float:
+    """Fill the end of the integrator with the state after dt; the workspace is left as it is there.
 
     Source: Dormand and Prince 1980, J. Comput. Appl. Math. 6(1), table 2
 
@@ -95,25 +93,25 @@ def trial(
     ----------
     time, dt : [s]
     y : (n,) state
-    model, control, workspace : see `ride_model`
-    stages : (STAGES, n) derivatives; the first is that at the start, the others are filled, the last is that at the end
-    end : (n,) filled
+    ride : its workspace is filled
+    integrator : its first stage is the derivative at the start; the others, the last at the end, and `end` are filled
 
     Returns
     -------
     largest embedded error, as a share of |y| + `SCALES`, that of the oil of `SCALES` alone
     """
+    model = ride.model
     for i in range(1, STAGES):
-        _reach(i, dt, 0, y.size if i == STAGES - 1 else ENERGIES, y, stages, end)
+        _reach(i, dt, 0, y.size if i == STAGES - 1 else State.DISSIPATED, y, integrator)
         if model.car.wheels:
-            _reach(i, dt, STATES, y.size, y, stages, end)
-        motion(time + TIMES[i] * dt, end, model, control, workspace, stages[i])
+            _reach(i, dt, STATES, y.size, y, integrator)
+        motion(time + TIMES[i] * dt, integrator.end, ride, integrator.stages[i])
     worst = 0.0
     for n in range(y.size):
         error = 0.0
         for i in range(STAGES):
-            error += ERROR_WEIGHTS[i] * stages[i, n]
-        size = SCALES[n] if OIL_1 <= n <= OIL_2 else SCALES[n] + abs(y[n])
+            error += ERROR_WEIGHTS[i] * integrator.stages[i, n]
+        size = SCALES[n] if State.OIL_1 <= n <= State.OIL_2 else SCALES[n] + abs(y[n])
         share = abs(dt * error) / size
         if not share < math.inf:  # a stage of too long a step overflowed
             return math.inf
@@ -122,36 +120,36 @@ def trial(
 
 
 @compiled
-def choose_side(
-    axle: int, time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array
-) -> None:
+def choose_side(axle: int, time: float, y: Array, ride: RunningRide, dy: Array) -> None:
     """Stop the suspension of an axle that is at V = 0, and let it slip to whichever side its forces push it."""
+    model, control, workspace = ride
     car = model.car
-    impulse = workspace[RATE, axle] / car.mobility[axle]
-    y[HEAVE_RATE] -= impulse / car.mass
-    y[PITCH_RATE] -= impulse * car.arms[axle] / car.inertia
+    impulse = workspace[Axle.RATE, axle] / car.mobility[axle]
+    y[State.HEAVE_RATE] -= impulse / car.mass
+    y[State.PITCH_RATE] -= impulse * car.arms[axle] / car.inertia
     if car.wheels:
-        y[WHEEL_RATE_1 + axle] += impulse / car.unsprung[axle]
-    control[SIDE, axle] = 0.0
-    motion(time, y, model, control, workspace, dy)
-    if workspace[REBOUND_PUSH, axle] > 0.0:
-        control[SIDE, axle] = 1.0
-    elif workspace[COMPRESSION_PUSH, axle] > 0.0:
-        control[SIDE, axle] = -1.0
+        y[State.WHEEL_RATE_1 + axle] += impulse / car.unsprung[axle]
+    control[Command.SIDE, axle] = 0.0
+    motion(time, y, ride, dy)
+    if workspace[Axle.REBOUND_PUSH, axle] > 0.0:
+        control[Command.SIDE, axle] = 1.0
+    elif workspace[Axle.COMPRESSION_PUSH, axle] > 0.0:
+        control[Command.SIDE, axle] = -1.0
 
 
 @inlined
 def beyond(control: Array, workspace: Array, axle: int) -> float:
-    """How far an axle has left its side of V = 0 or its stick, as a share of what is let pass; not above 0 before."""
-    side = control[SIDE, axle]
+    """Return how far an axle has left its side of V = 0 or its stick, as a share of what is let pass."""
+    side = control[Command.SIDE, axle]
     if side == 0.0:
-        return float(max(workspace[REBOUND_PUSH, axle], workspace[COMPRESSION_PUSH, axle]) / _PUSHED)
-    return float(-side * workspace[RATE, axle] / _CROSSED - 1.0)
+        return float(max(workspace[Axle.REBOUND_PUSH, axle], workspace[Axle.COMPRESSION_PUSH, axle]) / _PUSHED)
+    return float(-side * workspace[Axle.RATE, axle] / _CROSSED - 1.0)
 
 
 @inlined
-def farthest(model: RideModel, control: Array, workspace: Array) -> float:
-    """The larger `beyond` of both axles; -1 where the force does not jump at V = 0."""
+def farthest(ride: RunningRide) -> float:
+    """Return the larger `beyond` of both axles; -1 where the force does not jump at V = 0."""
+    model, control, workspace = ride
     if not model.control_spec.jumps:
         return -1.0
     return max(beyond(control, workspace, 0), beyond(control, workspace, 1))
@@ -159,7 +157,7 @@ def farthest(model: RideModel, control: Array, workspace: Array) -> float:
 
 @inlined
 def guess(number: int, shortest: float, longest: float, before: float, behind: float) -> float:
-    """Where in a bracket the moment may lie at which an axle leaves its side or its stick.
+    """Guess where in a bracket the moment lies at which an axle leaves its side or its stick.
 
     Source: false position; Dowell and Jarratt 1971, BIT 11 (Illinois), with a halving now and then
 
@@ -177,16 +175,7 @@ def guess(number: int, shortest: float, longest: float, before: float, behind: f
 
 @compiled
 def cut(
-    time: float,
-    longest: float,
-    sharp: float,
-    before: float,
-    y: Array,
-    model: RideModel,
-    control: Array,
-    workspace: Array,
-    stages: Array,
-    end: Array,
+    time: float, longest: float, sharp: float, before: float, y: Array, ride: RunningRide, integrator: Integrator
 ) -> tuple[float, float]:
     """Cut a piece of a step right behind a moment at which an axle leaves its side or its stick.
 
@@ -195,17 +184,17 @@ def cut(
     time, longest : start and length of the piece, at the end of which they have changed [s]
     sharp : how closely the moment is found where `farthest` jumps there [s]
     before : `farthest` at the start, below 0
-    y, model, control, workspace, stages, end : see `advance`
+    y, ride, integrator : see `advance`
 
     Returns
     -------
     the length that is left [s], and its embedded error, see `trial`
     """
-    shortest, behind, moved, number = 0.0, farthest(model, control, workspace), 0, 0
+    shortest, behind, moved, number = 0.0, farthest(ride), 0, 0
     while longest - shortest > sharp:
         dt = guess(number, shortest, longest, before, behind)
-        worst = trial(time, dt, y, model, control, workspace, stages, end)
-        now = farthest(model, control, workspace)
+        worst = trial(time, dt, y, ride, integrator)
+        now = farthest(ride)
         if 0.0 < now <= 1.0:
             return dt, worst
         if now > 0.0:
@@ -215,63 +204,52 @@ def cut(
             behind *= 0.5 if moved < 0 else 1.0
             shortest, before, moved = dt, min(now, -_AIM), -1
         number += 1
-    return longest, trial(time, longest, y, model, control, workspace, stages, end)
+    return longest, trial(time, longest, y, ride, integrator)
 
 
 @compiled
-def advance(
-    time: float,
-    h: float,
-    y: Array,
-    model: RideModel,
-    control: Array,
-    workspace: Array,
-    tolerance: float,
-    first: float,
-    stages: Array,
-    end: Array,
-) -> float:
+def advance(time: float, h: float, y: Array, ride: RunningRide, integrator: Integrator, first: float) -> float:
     """Carry the state through one step of integration.
 
     Parameters
     ----------
     time, h : start and length of the step [s]
     y : (n,) state; changed in place
-    model, control, workspace : see `ride_model`; the workspace as `motion` left it at the start
-    tolerance : largest local error as a share of the motion; infinite for a fixed step
+    ride : its workspace as `motion` left it at the start
+    integrator : its first stage is the derivative at the start
     first : length of the first piece to try [s]
-    stages : (STAGES + 1, n) the first is the derivative at the start; the others are room to work in
-    end : (n,) room to work in
 
     Returns
     -------
     length of the piece to try next [s]
     """
+    model = ride.model
     done, dt, cuts = 0.0, first, 0
-    before = min(farthest(model, control, workspace), -_AIM)
+    tolerance, stages = integrator.tolerance, integrator.stages
+    before = min(farthest(ride), -_AIM)
     while done < h * (1.0 - 1e-12):
         dt = tried = min(dt, h - done)
-        worst = trial(time + done, dt, y, model, control, workspace, stages, end)
-        if cuts < _MOST_CUTS and farthest(model, control, workspace) > 0.0:
-            dt, worst = cut(time + done, dt, _SHARP * h, before, y, model, control, workspace, stages, end)
+        worst = trial(time + done, dt, y, ride, integrator)
+        if cuts < _MOST_CUTS and farthest(ride) > 0.0:
+            dt, worst = cut(time + done, dt, _SHARP * h, before, y, ride, integrator)
             cuts += 1
         growth = 0.9 * (tolerance / max(worst, 1e-3 * tolerance)) ** 0.2 if tolerance < math.inf else 5.0
         if worst > tolerance and dt > _SMALLEST * h:
             dt *= max(growth, 0.1)
             continue
         for n in range(y.size):
-            y[n] = end[n]
+            y[n] = integrator.end[n]
         done += dt
-        if not worst < math.inf:  # the shortest piece overflowed, too: the ride is lost, see `ride`
+        if not worst < math.inf:  # the shortest piece overflowed, too: the ride is lost, see `ride_steps`
             return h
         if model.damper.slips and model.control_spec.fidelity == DYNAMIC:
-            remember_step(time + done, model, control, workspace)
+            remember_step(time + done, ride)
         turned = False
         if model.control_spec.jumps:
-            turned = _choose_sides(time + done, y, model, control, workspace, stages[STAGES])
-            before = min(farthest(model, control, workspace), -_AIM)
+            turned = _choose_sides(time + done, y, ride, stages[STAGES])
+            before = min(farthest(ride), -_AIM)
         if turned:
-            motion(time + done, y, model, control, workspace, stages[0])
+            motion(time + done, y, ride, stages[0])
         else:
             for n in range(y.size):
                 stages[0, n] = stages[STAGES - 1, n]
@@ -280,11 +258,12 @@ def advance(
 
 
 @inlined
-def _choose_sides(time: float, y: Array, model: RideModel, control: Array, workspace: Array, dy: Array) -> bool:
-    """Let every axle that is beyond its side slip to the other one or stick; whether there was one."""
+def _choose_sides(time: float, y: Array, ride: RunningRide, dy: Array) -> bool:
+    """Let every axle that is beyond its side slip to the other one or stick, and tell whether there was one."""
+    control, workspace = ride.control, ride.workspace
     turned = False
     for i in range(2):
         if beyond(control, workspace, i) > 0.0:
-            choose_side(i, time, y, model, control, workspace, dy)
+            choose_side(i, time, y, ride, dy)
             turned = True
     return turned

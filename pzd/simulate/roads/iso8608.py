@@ -16,16 +16,13 @@ from typing_extensions import override
 
 from pzd.record import Array
 from pzd.signals.iso8608 import classes, profile
-from pzd.simulate.road.profile import Profile, through
-from pzd.simulate.roads import Road, Way
+from pzd.simulate.roads import END_REACH, Profile, Road, Way, through
 
 _PIECE = 1000.0
 """The road is made of pieces of this length [m], ten times its longest wave, drawn one by one."""
 _BAND_FROM = 0.01
 """Lowest wavenumber [cycles/m]; ISO 8608 begins at 0.011."""
 _KNOTS_A_WAVE = 16
-_MARGIN = 100
-"""Knots behind the ride: the end of a spline is felt through fewer than these."""
 _RUN_IN = 5.0
 """Length over which the road rises out of the level [m]."""
 _REMEMBERED = 4
@@ -58,13 +55,13 @@ class Iso8608(Road):
 
     @override
     def profile(self, way: Way) -> Profile:
-        """The road as far as the ride goes."""
+        """Draw the road as far as the ride goes."""
         return _drawn(self, way)
 
 
 @lru_cache(maxsize=_REMEMBERED)
 def _drawn(road: Iso8608, way: Way) -> Profile:
-    """The road as far as a ride goes.
+    """Draw the road as far as a ride goes, from one piece fading into the next.
 
     Equation: xi = cos(r) xi_k + sin(r) xi_(k+1), r from 0 to pi/2 over half a piece; cos2 + sin2 = 1 keeps the
     spectrum
@@ -72,7 +69,7 @@ def _drawn(road: Iso8608, way: Way) -> Profile:
     seed = [way.seed, crc32(road.name.encode())] if road.seed is None else [road.seed]
     half = math.ceil(0.5 * _KNOTS_A_WAVE * _PIECE / road.shortest_wave_m)
     spacing = 0.5 * _PIECE / half
-    knots = math.ceil(way.distance / spacing) + _MARGIN
+    knots = math.ceil(way.distance / spacing) + END_REACH
     fade = 0.5 * np.pi * np.arange(half) / half
     piece, parts = _piece(road, [*seed, 0], 2 * half), []
     for number in range(1, knots // half + 2):
@@ -86,10 +83,10 @@ def _drawn(road: Iso8608, way: Way) -> Profile:
 
 
 def _piece(road: Iso8608, seed: list[int], knots: int) -> Array:
-    """(knots,) heights of one piece [m], of a draw of its own."""
+    """Draw (knots,) heights of one piece [m]."""
     band = (_BAND_FROM, 1.0 / road.shortest_wave_m)
     heights = profile(classes()[road.road_class], _PIECE, np.random.default_rng(seed), band)
     return heights(_PIECE / knots * np.arange(knots, dtype=np.float64))[0]
 
 
-ROAD = Iso8608
+ROADS = (Iso8608,)

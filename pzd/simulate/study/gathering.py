@@ -32,23 +32,21 @@ from pzd.simulate.ride.outcome import (
     Event,
     Outcome,
     Pieces,
-    Rows,
     Window,
+    WindowRows,
     event_of,
+    history_of,
     longest_piece,
     of_event,
-    ride_of,
     settled,
     summary_row,
     wheel_rows,
 )
-from pzd.simulate.ride.riding import Clock, Held, Take
+from pzd.simulate.ride.riding import CourseSink, FixedValues, SearchResult, clock_of
 from pzd.simulate.roads.sine import Sine
 from pzd.simulate.study.plan import Case
 
-# ----------------------------------------------------------------------------------------------------
-# What the passenger feels of a ride, from every step: weighted measures, and what the vibration is made of.
-
+# --- Weighted measures of a ride, and what its vibration is made of ---
 
 _PERIODIC = 0.98
 """Share of the mean square that the harmonics of the road must carry for the ride to count as periodic."""
@@ -58,7 +56,7 @@ _TONE = 0.999
 
 @dataclass(frozen=True)
 class Vibration:
-    """The weighted measures of a ride, and its components."""
+    """The weighted measures of a ride, and the spectrum of its acceleration."""
 
     weighted: WeightedRow
     spectrum: tuple[SpectrumRow, ...]
@@ -80,7 +78,7 @@ def vibration(
 
     Returns
     -------
-    what the passenger feels
+    the weighted measures in the window, and the spectrum
     """
     rate = 1.0 / step
     history = weighted(acceleration, rate)
@@ -104,7 +102,7 @@ def vibration(
 
 
 def components(acceleration: Array, rate: float, fundamental: float | None) -> tuple[Components, str]:
-    """What an acceleration is made of, and how that was found.
+    """Split an acceleration into harmonics of the road, or into third-octave bands.
 
     Parameters
     ----------
@@ -114,7 +112,7 @@ def components(acceleration: Array, rate: float, fundamental: float | None) -> t
 
     Returns
     -------
-    harmonics of the road where they carry the motion, else third-octave bands; and which
+    harmonics of the road where they carry the motion, else third-octave bands; and which of them, in words
     """
     if fundamental is None or acceleration.size * fundamental < rate:  # less than one period
         return third_octaves(acceleration, rate), "third-octave bands"
@@ -126,8 +124,7 @@ def components(acceleration: Array, rate: float, fundamental: float | None) -> t
     return parts, "a tone at its own frequency" if tone else "harmonic by harmonic"
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Every ride in one artefact ---
 
 _DEMANDED, _VOLTAGE = AXLE_COLUMNS[-2:]
 
@@ -145,61 +142,6 @@ class RideRows:
     found: tuple[FoundRow, ...]
 
 
-def rows_of_ride(
-    config: SimulateConfig, case: Case, held: Held, outcome: Outcome, window: Window, ending: Ending, voltage: bool
-) -> RideRows:
-    """Take the numbers of a ride in its window.
-
-    Parameters
-    ----------
-    config : the block
-    case, held, outcome : what was ridden, what it held constant, and how it went
-    window, ending : in which it is judged, and how its motion ends
-    voltage : whether the rig has a control signal
-    """
-    rows = _in_window(config, case, outcome, window)
-    return _of_rows(config, case, held, outcome, window, ending, voltage, rows)
-
-
-def _in_window(config: SimulateConfig, case: Case, outcome: Outcome, window: Window, lead: int | None = None) -> Rows:
-    """The numbers of a ride, or of a piece of it, in a window."""
-    name = case.name
-    fundamental = case.road.frequency_Hz if isinstance(case.road, Sine) else None
-    felt = vibration(name, POINT, outcome.comfort, outcome.step, window, fundamental, lead or 0)
-    bands = felt.spectrum
-    if lead is not None and fundamental is not None:
-        bands = vibration(name, POINT, outcome.comfort, outcome.step, window, None).spectrum
-    return (
-        summary_row(name, case.road.name, case.policy.name, case.fidelity, outcome, window),
-        tuple(wheel_rows(name, outcome, window, config.car.car().static_loads())),
-        felt.weighted,
-        felt.spectrum,
-        bands,
-    )
-
-
-def _of_rows(
-    config: SimulateConfig,
-    case: Case,
-    held: Held,
-    outcome: Outcome,
-    window: Window,
-    ending: Ending,
-    voltage: bool,
-    rows: Rows,
-) -> RideRows:
-    summary, wheels, felt, spectrum, _ = rows
-    return RideRows(
-        ride_of(case.name, outcome, _left_out(case, voltage)),
-        summary,
-        _ride_row(config, case, held, outcome.step, window, ending, voltage),
-        tuple(wheels),
-        felt,
-        tuple(spectrum),
-        tuple(_found_rows(case.name, held)),
-    )
-
-
 class Gathering:
     """Rides are judged as soon as their window is known, and then forgotten but for their histories.
 
@@ -212,8 +154,8 @@ class Gathering:
         self._config, self._with_voltage = config, with_voltage
 
     def of_ride(
-        self, case: Case, ridden: Callable[[Case, Take | None], tuple[Held, Outcome]]
-    ) -> RideRows | tuple[Held, Outcome]:
+        self, case: Case, ridden: Callable[[Case, CourseSink | None], tuple[FixedValues, Outcome]]
+    ) -> RideRows | tuple[FixedValues, Outcome]:
         """Ride a case, and judge it unless it goes over a single event.
 
         Parameters
@@ -223,23 +165,21 @@ class Gathering:
         """
         if event_of(case.road, self._config) is not None:
             return ridden(case, None)
-        clock = Clock.of(self._config)
+        clock = clock_of(self._config)
         window = settled(self._config.settle_s, clock.step, clock.steps)
         if clock.steps < longest_piece(clock.step) or case.policy.tuned == "schedule":
-            held, outcome = ridden(case, None)
-            return rows_of_ride(self._config, case, held, outcome, window, "end of the ride", self._with_voltage)
-        pieces = Pieces(window.first, clock.step, partial(_in_window, self._config, case))
-        held, outcome = ridden(case, pieces.take)
-        rows = pieces.joined(outcome)
-        return _of_rows(self._config, case, held, outcome, window, "end of the ride", self._with_voltage, rows)
+            return self._rows_of(case, *ridden(case, None), window, "end of the ride")
+        pieces = Pieces(window.first, clock.step, partial(self._in_window, case))
+        fixed, outcome = ridden(case, pieces.add)
+        return self._rows_of(case, fixed, outcome, window, "end of the ride", pieces.joined(outcome))
 
     def all(
         self,
         planned: Sequence[Case],
-        rides: Sequence[RideRows | tuple[Held, Outcome]],
+        rides: Sequence[RideRows | tuple[FixedValues, Outcome]],
         responses: tuple[Response, ...],
     ) -> Rides:
-        """The artefact of the stage.
+        """Return the artefact of the stage.
 
         Parameters
         ----------
@@ -269,20 +209,60 @@ class Gathering:
             tuple(row for one in found for row in one.found),
         )
 
-    def _over_event(self, event: Event, ridden: Sequence[tuple[Case, Held, Outcome]]) -> dict[str, RideRows]:
-        """All rides over the single event of one road, judged over the same time."""
+    def _over_event(self, event: Event, ridden: Sequence[tuple[Case, FixedValues, Outcome]]) -> dict[str, RideRows]:
+        """Judge all rides over the single event of one road, over the same time."""
         window, endings = of_event(event, ridden[0][2].step, [outcome.comfort for _, _, outcome in ridden])
         return {
-            case.name: rows_of_ride(self._config, case, held, outcome, window, ending, self._with_voltage)
-            for (case, held, outcome), ending in zip(ridden, endings, strict=True)
+            case.name: self._rows_of(case, fixed, outcome, window, ending)
+            for (case, fixed, outcome), ending in zip(ridden, endings, strict=True)
         }
 
+    def _in_window(self, case: Case, outcome: Outcome, window: Window, lead: int | None = None) -> WindowRows:
+        """Take the numbers of a ride in a window, or those of a piece of it with a lead before it, see `Pieces`."""
+        name = case.name
+        fundamental = case.road.frequency_Hz if isinstance(case.road, Sine) else None
+        found = vibration(name, POINT, outcome.comfort, outcome.step, window, fundamental, lead or 0)
+        bands = found.spectrum
+        if lead is not None and fundamental is not None:
+            bands = vibration(name, POINT, outcome.comfort, outcome.step, window, None).spectrum
+        return WindowRows(
+            summary_row(name, case.road.name, case.policy.name, case.fidelity, outcome, window),
+            tuple(wheel_rows(name, outcome, window, self._config.car.car().static_loads())),
+            found.weighted,
+            found.spectrum,
+            bands,
+        )
 
-def _found_rows(case: str, held: Held) -> Iterator[FoundRow]:
-    """The best found schedule, an interval a row, or the policy that none beats."""
-    if held.found is None:
+    def _rows_of(
+        self,
+        case: Case,
+        fixed: FixedValues,
+        outcome: Outcome,
+        window: Window,
+        ending: Ending,
+        rows: WindowRows | None = None,
+    ) -> RideRows:
+        """Return a ride as the artefact holds it; its rows are taken in the window where none are given."""
+        rows, aim = rows or self._in_window(case, outcome, window), case.policy.aim
+        without: tuple[str, ...] = (_VOLTAGE,) if case.fidelity == "ideal" or not self._with_voltage else ()
+        without += (_DEMANDED,) if aim in ("voltage", "schedule") else ()
+        ridden = RideRow(
+            case=case.name,
+            from_s=window.first * outcome.step,
+            to_s=window.last * outcome.step,
+            ending=ending,
+            voltage_V=fixed.voltage if aim == "voltage" and self._with_voltage else None,
+            damping_Ns_per_m=fixed.damping if aim == "damping" else None,
+            history=self._config.histories,
+        )
+        history, found = history_of(case.name, outcome, without), tuple(_found_rows(case.name, fixed.searched))
+        return RideRows(history, rows.summary, ridden, rows.wheels, rows.weighted, rows.spectrum, found)
+
+
+def _found_rows(case: str, found: SearchResult | None) -> Iterator[FoundRow]:
+    """Return the best found schedule, an interval a row, or the policy that none beats."""
+    if found is None:
         return
-    found = held.found
     intervals: list[tuple[float | None, ...]] = [(None, None, None)]
     if found.voltages:
         count = len(found.voltages[0])
@@ -297,24 +277,3 @@ def _found_rows(case: str, held: Held) -> Iterator[FoundRow]:
             voltage_1_V=one,
             voltage_2_V=two,
         )
-
-
-def _left_out(case: Case, with_voltage: bool) -> tuple[str, ...]:
-    """Columns of the history that mean nothing in this case."""
-    without = (_VOLTAGE,) if case.fidelity == "ideal" or not with_voltage else ()
-    return without + ((_DEMANDED,) if case.policy.aim in ("voltage", "schedule") else ())
-
-
-def _ride_row(
-    config: SimulateConfig, case: Case, held: Held, step: float, window: Window, ending: Ending, with_voltage: bool
-) -> RideRow:
-    aim = case.policy.aim
-    return RideRow(
-        case=case.name,
-        from_s=window.first * step,
-        to_s=window.last * step,
-        ending=ending,
-        voltage_V=held.voltage if aim == "voltage" and with_voltage else None,
-        damping_Ns_per_m=held.damping if aim == "damping" else None,
-        history=config.histories,
-    )

@@ -12,9 +12,7 @@ from pzd.simulate.policies import Policy, policies
 from pzd.simulate.roads import Road
 from pzd.simulate.roads.sine import Sine
 
-# ----------------------------------------------------------------------------------------------------
-# What the config may ask of a table: a temperature and a voltage that it covers.
-
+# --- What the config may ask of a table: a temperature and a voltage that it covers ---
 
 _SAME_DEGREES = 2.0
 """Temperatures this close are one condition of the rig, see `identify.group` [K]."""
@@ -23,7 +21,7 @@ _SAME_VOLTAGE = 0.02
 
 
 def checked_temperature(config: SimulateConfig, table: Table) -> float | None:
-    """The temperature of the dampers [degC]: the config's, by default the lowest of the table; None without any.
+    """Return the temperature of the dampers [degC]: the config's, by default the lowest of the table.
 
     Raises
     ------
@@ -65,12 +63,11 @@ def _span(known: list[float]) -> str:
     return f"{known[0]:g}" if known[0] == known[-1] else f"{known[0]:g} to {known[-1]:g}"
 
 
-# ----------------------------------------------------------------------------------------------------
-# What a ride assumes where the config does not say it: car, lag of the valve, bounds, sensors and supply.
+# --- What a ride assumes where the config does not say it: car, lag of the valve, bounds, sensors and supply ---
 
 
 def assumed(config: SimulateConfig, effects: Collection[str], with_voltage: bool) -> tuple[str, ...]:
-    """One line an assumption, each with the key that would say it; nothing where the config says all.
+    """Return one line an assumption, each with the key that would say it; nothing where the config says all.
 
     Parameters
     ----------
@@ -117,8 +114,7 @@ def _car(block: CarBlock) -> list[str]:
     return [f"of the car {', '.join(unsaid)} are those of {block.model} (simulate.car)"] if unsaid else []
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- The cases ---
 
 WITH_VOLTAGE = ("constant", "best_constant_c", "passive", "best_fixed_voltage", "comfort")
 WITHOUT_VOLTAGE = ("constant", "passive")
@@ -144,7 +140,7 @@ class Case:
 
 
 def cases(config: SimulateConfig, with_voltage: bool, changed: bool) -> tuple[Case, ...]:
-    """The rides, in the order of roads, policies and fidelities.
+    """Return the rides, in the order of roads, policies and fidelities.
 
     Without a control signal nothing can be asked of the dampers: then constant damping is ridden as
     `ideal` and the dampers as they are (`passive`) by table and dynamically.

@@ -1,7 +1,7 @@
-"""How quickly voltage and force answer a step of voltage while the damper moves at constant speed.
+"""The step response of the damper: voltage and force after a step of voltage at constant speed.
 
 The paper's 9 ms is a time over the whole range, its criterion not stated; a first-order lag needs
-2.3 time constants to 90 %. The force answers later than the valve: the oil spring relaxes with a
+2.3 time constants to 90 %. The force answers later than the valve: the oil stiffness relaxes with a
 time constant of its own, C / k, 6 to 21 ms for the rows of the paper's tables.
 """
 
@@ -34,7 +34,7 @@ _BEFORE, _AFTER = 0.5, 1.0
 
 
 def responses(config: SimulateConfig, damper: Damper, temperature: float | None) -> tuple[Response, ...]:
-    """Response of voltage and force to a step over the whole range of voltage, up and down.
+    """Compute the response of voltage and force to a step over the whole range of voltage, up and down.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _step(damper: Damper, before: float, after: float, speed: float, temperature
 
 
 def _carried(damper: Damper, before: float, after: float, forces: tuple[float, float]) -> str:
-    """What of the step the oil spring carries at once.
+    """Describe the share of the step that the oil stiffness carries at once, if it is worth a word.
 
     Equation: F = k(U) (x - y): the step of k alone moves F by F_1 (k_2 / k_1 - 1), before the oil flows
 
@@ -110,7 +110,7 @@ def _carried(damper: Damper, before: float, after: float, forces: tuple[float, f
 
 
 def _stands_at_rest(damper: Damper, name: str, places: Array) -> bool:
-    """Whether an effect is a force that is there at rest too, at one of (n,) displacements [m]."""
+    """Tell whether an effect is a force that is there at rest too, at one of (n,) displacements [m]."""
     if known()[name].place != "parallel":
         return False
     alone = parallel_rows(damper.model_copy(update={"effects": {name: damper.effects[name]}}), base_voltages(damper))
@@ -119,7 +119,7 @@ def _stands_at_rest(damper: Damper, name: str, places: Array) -> bool:
 
 
 def _voltage_reached(damper: Damper, motion: Motion) -> list[float | None]:
-    """When the effective voltage has gone each share of its way [s]; in closed form where the lag is all there is."""
+    """Return when the effective voltage has gone each share of its way [s]; in closed form for a lag alone."""
     drive = {name for name in damper.effects if known()[name].place == "drive"}
     if drive <= {"valve_lag"}:
         tau = value_of(damper, "valve_lag", "tau")
@@ -132,7 +132,7 @@ def _voltage_reached(damper: Damper, motion: Motion) -> list[float | None]:
 
 
 def _when(time: Array, progress: Array, share: float) -> float | None:
-    """When a signal last comes up to a share of its way; None where it does not stay there."""
+    """Return when a signal last comes up to a share of its way; None where it does not stay there."""
     short = np.flatnonzero(progress < share)
     if short.size == 0:
         return 0.0

@@ -1,4 +1,4 @@
-"""The value with which a ride is most comfortable, of a policy that holds one value: a voltage, or a damping."""
+"""Searches for the most comfortable ride: over one voltage or damping that is held, or over schedules of voltage."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from pzd.comfort.weighting import weighted
 from pzd.force_table.lookup import table_range
 from pzd.record import Array
 from pzd.signals.criterion import rms
-from pzd.simulate.config import KM_PER_H, SimulateConfig
+from pzd.simulate.config import SimulateConfig
 from pzd.simulate.policies import policies
 from pzd.simulate.ride.model import DynamicDamper, TableArrays
 from pzd.simulate.ride.outcome import PIECE_S, VOLTAGES, MeanSquare, Outcome, event_of
-from pzd.simulate.ride.riding import Held, RideFound, Take, ride_case
-from pzd.simulate.road.profile import Profile
+from pzd.simulate.ride.riding import CourseSink, FixedValues, SearchResult, ride_case
+from pzd.simulate.roads import Profile
 from pzd.simulate.study.plan import Case
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- One value that is held ---
 
 _FIRST = 5
 """Values tried first, evenly spaced."""
@@ -32,7 +31,7 @@ _SLOW = 0.1
 
 
 def best_value(discomfort: Callable[[float], float], low: float, high: float) -> float:
-    """The value in a range with the least discomfort: the best of a few, and the minimum between its neighbours.
+    """Find the value in a range with the least discomfort: the best of a few, then the minimum between its neighbours.
 
     Parameters
     ----------
@@ -56,7 +55,7 @@ def best_value(discomfort: Callable[[float], float], low: float, high: float) ->
 
 
 def damping_range(grid: TableArrays, bounds: tuple[float, float] | None) -> tuple[float, float]:
-    """Least and largest damping coefficient that the dampers can stand for [N s/m].
+    """Return the least and the largest damping coefficient that the dampers can stand for [N s/m].
 
     Parameters
     ----------
@@ -72,9 +71,7 @@ def damping_range(grid: TableArrays, bounds: tuple[float, float] | None) -> tupl
     return softest / fast, hardest / (_SLOW * fast)
 
 
-# ----------------------------------------------------------------------------------------------------
-# The schedule of voltages with which a periodic ride is most comfortable, within a bound on the wheel load.
-
+# --- The schedule of voltages with which a periodic ride is most comfortable, within a bound on the wheel load ---
 
 _FIRST_STEP = 0.3
 """Of the search, as a share of the range of voltage."""
@@ -91,7 +88,7 @@ Rate = Callable[[Array], tuple[float, float]]
 
 @dataclass
 class ScheduleSearch:
-    """What was tried so far, and the best of it within the bound."""
+    """Schedules tried so far, and the best of them within the bound."""
 
     rate: Rate
     low: float
@@ -103,7 +100,7 @@ class ScheduleSearch:
     kept: dict[bytes, tuple[float, float]] = field(default_factory=dict)
 
     def rated(self, shares: Array) -> tuple[float, float]:
-        """Discomfort and load of a schedule (2, n), as shares of the range of voltage; each is ridden once."""
+        """Return discomfort and load of a schedule (2, n) of shares of the range of voltage; each is ridden once."""
         within = np.clip(shares, 0.0, 1.0)
         key = within.tobytes()
         if key not in self.kept:
@@ -146,7 +143,7 @@ class ScheduleSearch:
 
 
 def square_waves(intervals: int, starts: int, late: float) -> list[Array]:
-    """Schedules that are hard for a quarter of the period and soft for the next, each with its own lead.
+    """Return schedules that are hard for a quarter of the period and soft for the next, each with its own lead.
 
     Parameters
     ----------
@@ -187,7 +184,7 @@ def best_schedule(search: ScheduleSearch, starts: Sequence[Array], evaluations: 
 
 
 def sampled(time: Array, voltages: Array, period: float, intervals: int) -> Array:
-    """Mean voltage of each interval of a half period of the road, whichever half.
+    """Average the voltages of a ride over the intervals of a half period of the road, whichever half.
 
     Parameters
     ----------
@@ -205,9 +202,7 @@ def sampled(time: Array, voltages: Array, period: float, intervals: int) -> Arra
     return np.array([np.bincount(place, weights=axle, minlength=intervals) / count for axle in voltages.T])
 
 
-# ----------------------------------------------------------------------------------------------------
-# What all rides on one damper share, and one of them ridden: with the best value where its policy holds one.
-
+# --- Ride a case on one damper, with the best value where its policy holds one ---
 
 _SHORT_SETTLE, _SHORT_PERIODS = 2.5, 3.0
 """A schedule is tried for so long before its window [s], and for so many periods in it: what the start leaves is then
@@ -218,106 +213,105 @@ _SEARCH_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """Config, roads and damper."""
+    """What all rides on one damper share: config, roads and damper."""
 
     config: SimulateConfig
     profiles: Mapping[str, Profile]
     """By the name of the road."""
     grid: TableArrays
-    oil: DynamicDamper
+    damper: DynamicDamper
     ends: bool
     """Whether the table ends where the rig did."""
 
-    def ridden(self, case: Case, take: Take | None = None) -> tuple[Held, Outcome]:
-        """Ride one case; what its policy holds constant stands beside the ride; see `ride_case` for `take`.
+    def ridden(self, case: Case, sink: CourseSink | None = None) -> tuple[FixedValues, Outcome]:
+        """Ride one case, and return what its policy holds constant beside the ride; see `ride_case` for `sink`.
 
         Raises
         ------
         DataError : when the ride needs the table where it ends
         """
-        held = Held.of(self.config, self.grid)
+        fixed = FixedValues.of(self.config, self.grid)
         if case.policy.tuned == "schedule":
             return self._best_found(case)
         if case.policy.tuned == "voltage":
             low, high = float(self.grid.voltages[0]), float(self.grid.voltages[-1])
-            held = replace(held, voltage=best_value(lambda u: self._a_w(case, replace(held, voltage=u)), low, high))
+            fixed = replace(fixed, voltage=best_value(lambda u: self._a_w(case, replace(fixed, voltage=u)), low, high))
         if case.policy.tuned == "damping":
             low, high = (math.log(c) for c in damping_range(self.grid, self.config.coefficients))
-            best = best_value(lambda c: self._a_w(case, replace(held, damping=math.exp(c))), low, high)
-            held = replace(held, damping=math.exp(best))
-        return held, self._ride(self.config, case, held, take)
+            best = best_value(lambda c: self._a_w(case, replace(fixed, damping=math.exp(c))), low, high)
+            fixed = replace(fixed, damping=math.exp(best))
+        return fixed, self._ride(self.config, case, fixed, sink)
 
-    def _ride(self, config: SimulateConfig, case: Case, held: Held, take: Take | None = None) -> Outcome:
-        return ride_case(config, case, self.profiles[case.road.name], self.grid, self.oil, self.ends, held, take)
+    def _ride(self, config: SimulateConfig, case: Case, fixed: FixedValues, sink: CourseSink | None = None) -> Outcome:
+        return ride_case(config, case, self.profiles[case.road.name], self.grid, self.damper, self.ends, fixed, sink)
 
-    def _best_found(self, case: Case) -> tuple[Held, Outcome]:
-        """The most comfortable of the other policies and of the schedules of a search, within the bound on the load."""
+    def _best_found(self, case: Case) -> tuple[FixedValues, Outcome]:
+        """Find the most comfortable of the other policies and of searched schedules, within the bound on the load."""
         own = self.config.best_found
-        held, fixed = self.ridden(replace(case, policy=policies()["best_fixed_voltage"]))
-        most_load = own.most_load * self._rated(fixed, self.config.settle_s)[1]
+        fixed, baseline = self.ridden(replace(case, policy=policies()["best_fixed_voltage"]))
+        most_load = own.most_load * self._rated(baseline, self.config.settle_s)[1]
         names = [name for name in self.config.policies or () if policies()[name].tuned not in ("voltage", "schedule")]
-        ridden = [("best_fixed_voltage", fixed)]
+        ridden = [("best_fixed_voltage", baseline)]
         ridden += [(name, self.ridden(replace(case, policy=policies()[name]))[1]) for name in names]
         rated = [(self._rated(outcome, self.config.settle_s), name, outcome) for name, outcome in ridden]
         (discomfort, _), by, best = min((one for one in rated if one[0][1] <= most_load), key=lambda one: one[0][0])
-        search = ScheduleSearch(
-            lambda voltages: self._short(case, held, voltages),
-            float(self.grid.voltages[0]),
-            float(self.grid.voltages[-1]),
-            most_load,
-        )
+        low, high = float(self.grid.voltages[0]), float(self.grid.voltages[-1])
+        search = ScheduleSearch(lambda voltages: self._short(case, fixed, voltages), low, high, most_load)
         best_schedule(search, self._starts(case, best, search), own.evaluations)
-        found = RideFound(by, most_load, search.tried)
         if search.best is not None:
-            schedule = tuple(tuple(float(u) for u in axle) for axle in search.best[1])
-            by_search = replace(held, found=RideFound("search", most_load, search.tried, schedule))
+            searched = SearchResult("search", most_load, search.tried, _schedule(search.best[1]))
+            by_search = replace(fixed, searched=searched)
             outcome = self._ride(self.config, case, by_search)
             a, load = self._rated(outcome, self.config.settle_s)
             if a < discomfort and load <= most_load:
                 return by_search, outcome
-        return replace(held, found=found), best
+        return replace(fixed, searched=SearchResult(by, most_load, search.tried)), best
 
     def _starts(self, case: Case, best: Outcome, search: ScheduleSearch) -> list[Array]:
-        """Where the search starts: at the best of the policies, and at square waves of voltage."""
-        own, profile = self.config.best_found, self.profiles[case.road.name]
-        speed = self.config.vehicle_speed_km_per_h * KM_PER_H
-        period = 2.0 * math.pi / (profile.wavenumber * speed)
+        """Return the starts of the search: the best of the policies, and square waves of voltage."""
+        own, period = self.config.best_found, self._period(case)
         history = np.asarray(best.history)
         settled = history[history[:, 0] >= self.config.settle_s]
         like = sampled(settled[:, 0], settled[:, VOLTAGES], period, own.intervals // 2)
-        late = self.config.car.car().wheelbase / speed / period
+        late = self.config.car.car().wheelbase / self.config.vehicle_speed / period
         shares = (like - search.low) / max(search.high - search.low, np.finfo(np.float64).tiny)
         return [np.clip(shares, 0.0, 1.0), *square_waves(own.intervals // 2, own.starts, late)]
 
-    def _short(self, case: Case, held: Held, voltages: Array) -> tuple[float, float]:
-        """Discomfort and load of a schedule, from a ride of a few periods at a lower tolerance."""
-        profile, h = self.profiles[case.road.name], self.config.integration_step_s
-        period = 2.0 * math.pi / (profile.wavenumber * self.config.vehicle_speed_km_per_h * KM_PER_H)
+    def _short(self, case: Case, fixed: FixedValues, voltages: Array) -> tuple[float, float]:
+        """Return discomfort and load of a schedule, from a ride of a few periods at a lower tolerance."""
+        h, period = self.config.integration_step_s, self._period(case)
         control = round(self.config.control_period_s / h)
         steps = control * math.ceil((_SHORT_SETTLE + _SHORT_PERIODS * period) / (h * control))
-        config = self.config.model_copy(
-            update={"duration_s": steps * h, "tolerance": max(self.config.tolerance, _SEARCH_TOLERANCE)}
-        )
-        schedule = tuple(tuple(float(u) for u in axle) for axle in voltages)
-        outcome = self._ride(config, case, replace(held, found=RideFound("search", 0.0, 0, schedule)))
+        config = self._rough().model_copy(update={"duration_s": steps * h})
+        searched = SearchResult("search", 0.0, 0, _schedule(voltages))
+        outcome = self._ride(config, case, replace(fixed, searched=searched))
         return self._rated(outcome, steps * h - _SHORT_PERIODS * period)
 
-    def _rated(self, outcome: Outcome, after: float) -> tuple[float, float]:
-        """Discomfort of a ride after a time [s] by the measure of `best_found` [m/s2], and its larger load [N]."""
-        first = round(after / outcome.step)
-        if self.config.best_found.measure == "a_w":
-            felt = weighted(outcome.comfort, 1.0 / outcome.step)
-        else:
-            felt = outcome.comfort
-        return rms(felt[first:]), max(rms(load) for load in outcome.loads[first:].T)
+    def _period(self, case: Case) -> float:
+        """Return the period of a harmonic road [s]."""
+        return 2.0 * math.pi / (self.profiles[case.road.name].wavenumber * self.config.vehicle_speed)
 
-    def _a_w(self, case: Case, held: Held) -> float:
-        """Weighted r.m.s. of the acceleration at K of a ride [m/s2], from the settling time or the event on."""
-        rough = self.config.model_copy(update={"tolerance": max(self.config.tolerance, _SEARCH_TOLERANCE)})
+    def _rough(self) -> SimulateConfig:
+        """Return the config with the tolerance of rides that are only compared."""
+        return self.config.model_copy(update={"tolerance": max(self.config.tolerance, _SEARCH_TOLERANCE)})
+
+    def _rated(self, outcome: Outcome, after: float) -> tuple[float, float]:
+        """Return discomfort by the measure of `best_found` [m/s2] and larger load [N] of a ride after a time [s]."""
+        first, a_K = round(after / outcome.step), outcome.comfort
+        judged = weighted(a_K, 1.0 / outcome.step) if self.config.best_found.measure == "a_w" else a_K
+        return rms(judged[first:]), max(rms(load) for load in outcome.loads[first:].T)
+
+    def _a_w(self, case: Case, fixed: FixedValues) -> float:
+        """Return the weighted r.m.s. of a_K of a ride [m/s2], from the settling time or the event on."""
+        rough = self._rough()
         event, step = event_of(case.road, self.config), self.config.integration_step_s
         first = round((self.config.settle_s if event is None else event.entry) / step)
         if self.config.duration_s > PIECE_S:
             mean = MeanSquare(first, step)
-            self._ride(rough, case, held, mean.take)
+            self._ride(rough, case, fixed, mean.add)
             return mean.root()
-        return rms(weighted(self._ride(rough, case, held).comfort, 1.0 / step)[first:])
+        return rms(weighted(self._ride(rough, case, fixed).comfort, 1.0 / step)[first:])
+
+
+def _schedule(voltages: Array) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(float(u) for u in axle) for axle in voltages)

@@ -1,1 +1,1 @@
-"""."""
+"""The half-car: its equations and modes, and suspension, tyre and road under it."""

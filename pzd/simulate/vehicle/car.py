@@ -1,4 +1,4 @@
-"""The half-car of the paper, equations (5) to (9): body with heave z and pitch phi; its wheels may have mass."""
+"""The half-car of the paper, equations (5) to (9), and its modes: heave z, pitch phi, and wheels that may have mass."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.record import Array, Complex
-
-# ----------------------------------------------------------------------------------------------------
-
 
 GRAVITY = 9.80665
 """Standard acceleration of free fall [m/s2]."""
@@ -52,7 +49,7 @@ class HalfCar:
         return self.distances[0] + self.distances[1]
 
     def body_loads(self) -> tuple[float, float]:
-        """Weight of the body on each axle [N].
+        """Return the weight of the body on each axle [N].
 
         Equation: B_1 = m g a2 / (a1 + a2), B_2 = m g a1 / (a1 + a2)      Source: balance of moments
         """
@@ -60,7 +57,7 @@ class HalfCar:
         return whole * self.distances[1], whole * self.distances[0]
 
     def static_loads(self) -> tuple[float, float]:
-        """Force between road and wheels of each axle at rest [N].
+        """Return the force between road and wheels of each axle at rest [N].
 
         Equation: N_i0 = B_i + m_i g      Source: balance of the wheels
         """
@@ -68,7 +65,7 @@ class HalfCar:
         return one, two
 
     def force_directions(self) -> Array:
-        """Directions in which the suspension forces act on (z, phi).
+        """Return the directions in which the suspension forces act on (z, phi).
 
         Equation: H1 = [1, -a1]^T, H2 = [1, a2]^T        Source: Makowski and Knap 2021, eq. (7)
 
@@ -79,7 +76,7 @@ class HalfCar:
         return np.array([[1.0, 1.0], [-self.distances[0], self.distances[1]]])
 
     def mass_matrix(self) -> Array:
-        """Mass matrix of (z, phi).
+        """Return the mass matrix of (z, phi).
 
         Equation: M = diag(m, J_y)                       Source: Makowski and Knap 2021, eq. (6)
 
@@ -90,7 +87,7 @@ class HalfCar:
         return np.diag([self.mass, self.pitch_inertia])
 
     def force_to_comfort(self) -> Array:
-        """Acceleration at K by each suspension force.
+        """Return the acceleration at K by each suspension force.
 
         Equation: D^T = -G^T M^-1 H, G = [1, x_K]^T      Source: Makowski and Knap 2021, eq. (9)
 
@@ -103,7 +100,7 @@ class HalfCar:
         return d
 
     def mobility(self) -> Array:
-        """How the suspensions accelerate under their own forces.
+        """Return how the suspensions accelerate under their own forces.
 
         Equation: dV/dt = -W (S + T) - (what wheels or road do without them), W = H^T M^-1 H + diag(1 / m_i)
         Source: from eq. (6), and m_i d2zeta_i/dt2 = S_i + T_i + N_i - N_i0 where the wheels have mass
@@ -117,7 +114,7 @@ class HalfCar:
         return W + np.diag(1.0 / np.array(self.unsprung_masses)) if self.wheels_have_mass else W
 
     def acceleration(self, forces: Array) -> Array:
-        """Acceleration of the body under suspension forces.
+        """Return the acceleration of the body under suspension forces.
 
         Equation: M d2X/dt2 + H (S + T) = 0              Source: Makowski and Knap 2021, eq. (6)
 
@@ -132,9 +129,7 @@ class HalfCar:
         return np.asarray(-np.linalg.solve(self.mass_matrix(), self.force_directions() @ forces), dtype=np.float64)
 
 
-# ----------------------------------------------------------------------------------------------------
-# How a car swings: bounce, pitch and the hop of its wheels, with frequencies and damping ratios.
-
+# --- Modes: bounce, pitch and the hop of the wheels, with frequencies and damping ratios ---
 
 _STEPS = 100
 """In so many steps the damping is raised from none, so that each pair of eigenvalues is followed to its mode."""
@@ -142,7 +137,7 @@ _STEPS = 100
 
 @dataclass(frozen=True)
 class Mode:
-    """One way in which a car swings, its wheels on the road."""
+    """A mode of vibration of a car, its wheels on the road."""
 
     name: str
     frequency_Hz: float
@@ -152,7 +147,7 @@ class Mode:
 
 
 def modes(car: HalfCar, damping: float) -> tuple[Mode, ...]:
-    """Frequencies and damping ratios of a car on constant dampers.
+    """Compute frequencies and damping ratios of a car on constant dampers.
 
     Equation: (K - w^2 M) q = 0; (l^2 M + l C + K) q = 0, w_d^2 = l1 l2, D = -(l1 + l2) / (2 w_d)
     Source: eq. (6) with T_i = c V_i, q = (z, phi) and, where the wheels have mass, their heights
@@ -166,6 +161,10 @@ def modes(car: HalfCar, damping: float) -> tuple[Mode, ...]:
     -------
     bounce and pitch, and the hop of the wheels of both axles where they have mass. Bounce is the motion of the body
     with more of its kinetic energy in heave, and wheels hop at the axle that has more of it
+
+    >>> from pzd.simulate.cars import cars
+    >>> [(mode.name, round(mode.frequency_Hz, 2)) for mode in modes(cars()["makowski2021"], damping=4500.0)]
+    [('bounce', 1.33), ('pitch', 1.73)]
     """
     from scipy.linalg import eigh
 
@@ -182,7 +181,7 @@ _ORDER = ("bounce", "pitch", "wheel hop, axle 1", "wheel hop, axle 2")
 
 
 def matrices(car: HalfCar, damping: float) -> tuple[Array, Array, Array]:
-    """Mass, stiffness and damping matrix of (z, phi), and of the heights of the wheels where they have mass.
+    """Return mass, stiffness and damping matrix of (z, phi), and of the heights of wheels that have mass.
 
     Parameters
     ----------
@@ -204,7 +203,7 @@ def matrices(car: HalfCar, damping: float) -> tuple[Array, Array, Array]:
 
 
 def _names(car: HalfCar, energy: Array) -> list[str]:
-    """Names of the modes by the kinetic energy (n, n) of each coordinate in each, a column a mode."""
+    """Name the modes by the kinetic energy (n, n) of each coordinate in each, a column a mode."""
     body = np.argsort(energy[2:].sum(axis=0), kind="stable")[:2]
     names = ["wheel hop"] * energy.shape[1]
     bounce = body[np.argmax(energy[0, body])]
@@ -219,7 +218,7 @@ def _names(car: HalfCar, energy: Array) -> list[str]:
 
 
 def _followed(M: Array, K: Array, C: Array, undamped: Array) -> Complex:
-    """(n, 2) eigenvalues of each mode, followed from its undamped frequency [rad/s] on."""
+    """Follow the (n, 2) eigenvalues of each mode from its undamped frequency [rad/s] on."""
     from scipy.optimize import linear_sum_assignment
 
     n = len(M)

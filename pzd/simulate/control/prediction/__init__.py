@@ -1,1 +1,1 @@
-"""How a ride goes on, for a policy that tries voltages before it sets one: plant, road ahead, choice."""
+"""The predictive controller: its memory, its plant, its forecast of the road, and its choice of voltages."""

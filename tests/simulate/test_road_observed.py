@@ -12,9 +12,8 @@ from simulate_dampers import table_of
 from pzd.comfort.weighting import weighted
 from pzd.signals.criterion import rms
 from pzd.simulate.config import KM_PER_H, SensorNoise, SimulateConfig
-from pzd.simulate.control.prediction.planning import predictor_of
-from pzd.simulate.control.prediction.plant import OBSERVATIONS, Predictor
-from pzd.simulate.control.prediction.road import filtered_height, learn
+from pzd.simulate.control.prediction.forecast import filtered_height, learn
+from pzd.simulate.control.prediction.predictor import Memory, Predictor, predictor_of
 from pzd.simulate.control.sensing import road_gain
 from pzd.simulate.ride.model import dynamic_damper_of, grid_of
 
@@ -45,10 +44,10 @@ def height_error(noise: SensorNoise, gain: float, rng: np.random.Generator) -> f
 def test_no_other_gain_knows_the_height_better(generator_for) -> None:
     """On the same noise; the height alone is off by more than three times as much."""
     gain = road_gain(NOISE, ARM, STEP)
-    best = height_error(NOISE, gain, generator_for("road met"))
+    best = height_error(NOISE, gain, generator_for("road observed"))
     for other in (0.5, 2.0):
-        assert best < height_error(NOISE, other * gain, generator_for("road met"))
-    assert height_error(NOISE, 1.0, generator_for("road met")) > 3.0 * best
+        assert best < height_error(NOISE, other * gain, generator_for("road observed"))
+    assert height_error(NOISE, 1.0, generator_for("road observed")) > 3.0 * best
 
 
 def test_heights_without_noise_are_believed() -> None:
@@ -73,19 +72,19 @@ def predictor(damper) -> Predictor:
 def test_a_forecast_is_never_faster_than_the_road_was(damper, rng, faint) -> None:
     """A sine behind a level stretch, heights with so much noise: what fits noise alone may not run away from it."""
     plan = predictor(damper)
-    period = plan.observation_s * plan.every
+    period = plan.settings.observation_s * plan.settings.every
     fastest, furthest = 0.0, 0.0
     time = period * np.arange(400)
     heights = np.where(time > 0.2, 0.02 * np.sin(2.0 * math.pi * 2.25 * (time - 0.2)), 0.0)
     heights += faint * rng.standard_normal(time.size)
     for n, height in enumerate(heights):
-        plan.felt[OBSERVATIONS] = n * plan.every
+        plan.observed.measured[Memory.OBSERVATIONS] = n * plan.settings.every
         learn(plan, float(height))
         fastest = max(fastest, abs(height - heights[max(n - 1, 0)]) / period)
-        assert np.max(np.abs(plan.forecasts[n % plan.skill.shape[1]])) <= fastest * (1.0 + 1e-12)
-        furthest = max(furthest, float(np.max(np.abs(np.diff(plan.ahead)))) / period)
+        assert np.max(np.abs(plan.forecast.forecasts[n % plan.forecast.skill.shape[1]])) <= fastest * (1.0 + 1e-12)
+        furthest = max(furthest, float(np.max(np.abs(np.diff(plan.forecast.heights)))) / period)
     assert furthest > 0.1
-    assert np.all(plan.skill[0] / plan.skill[1] > 0.8)  # and it is believed once the sine has come
+    assert np.all(plan.forecast.skill[0] / plan.forecast.skill[1] > 0.8)  # and it is believed once the sine has come
 
 
 @pytest.mark.ci

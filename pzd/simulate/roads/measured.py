@@ -1,4 +1,4 @@
-"""What measured roads have in common: a file of heights, which must reach as far as the ride."""
+"""Measured roads: heights over distance from a CSV file, and a line along a road of an OpenCRG file."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 from abc import abstractmethod
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
@@ -14,11 +15,7 @@ from typing_extensions import override
 
 from pzd.record import Array
 from pzd.schema.errors import ConfigError, DataError, FilesError
-from pzd.simulate.road.profile import Profile, through
-from pzd.simulate.roads import Road, Way
-
-# ----------------------------------------------------------------------------------------------------
-
+from pzd.simulate.roads import Profile, Road, Way, through
 
 _SAME = 1e-9
 """Lengths that differ by less than this share are the same."""
@@ -35,7 +32,7 @@ class MeasuredRoad(Road):
 
     @abstractmethod
     def heights(self, path: Path, key: str) -> tuple[Array, Array]:
-        """(n,) places along the road, rising, and heights there [m]; the key is that of the road, for errors."""
+        """Read (n,) places along the road, rising, and heights there [m]; the key is that of the road, for errors."""
 
     @override
     def own_name(self) -> str:
@@ -64,11 +61,73 @@ class MeasuredRoad(Road):
         return through(np.interp(even, place - place[0], height), length / spaces)
 
 
-# ----------------------------------------------------------------------------------------------------
-# The text form of OpenCRG: heights of a road on a grid along a reference line (u) and across it (v).
+def _lines(path: Path, encoding: str) -> list[str]:
+    try:
+        return path.read_text(encoding=encoding).splitlines()
+    except OSError as error:
+        raise FilesError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+# --- CSV ---
+
+_HEADER = "distance_m,height_m"
+
+
+class RoadFile(MeasuredRoad):
+    """A measured road: a CSV file with the columns distance_m,height_m."""
+
+    kind: Literal["file"] = "file"
+    """A road from a file."""
+
+    @override
+    def heights(self, path: Path, key: str) -> tuple[Array, Array]:
+        lines = _lines(path, "utf-8")
+        if not lines or lines[0].replace(" ", "") != _HEADER:
+            raise DataError(f"{path}:1: the header must be {_HEADER} (got {lines[0] if lines else 'nothing'})")
+        rows = [_numbers(line) for line in lines[1:]]
+        wrong = [
+            f"{path}:{n}: two numbers are needed (got {lines[n - 1]})" for n, row in enumerate(rows, 2) if row is None
+        ]
+        values = np.array([row for row in rows if row is not None]).reshape(-1, 2)
+        if not wrong and (len(values) < 2 or not np.all(np.isfinite(values)) or np.any(np.diff(values[:, 0]) <= 0.0)):
+            wrong.append(f"{path}: the distance must rise from row to row, with finite numbers and two rows or more")
+        if wrong:
+            raise DataError(wrong)
+        return values[:, 0], values[:, 1]
+
+
+def _numbers(line: str) -> tuple[float, float] | None:
+    try:
+        place, height = (float(cell) for cell in line.split(","))
+    except ValueError:
+        return None
+    return place, height
+
+
+# --- OpenCRG: heights of a road on a grid along a reference line (u) and across it (v) ---
 #
-# Source: ASAM OpenCRG 1.2, file format; plain-text data `LRFI` (fields of 10 characters) and `LDFI` (of 20), in lines of
-# 80, each cross section on lines of its own. Binary data, files that include others and modifiers are refused.
+# Source: ASAM OpenCRG 1.2, file format; plain-text data `LRFI` (fields of 10 characters) and `LDFI` (of 20), in lines
+# of 80, each cross section on lines of its own. Binary data, files that include others and modifiers are refused.
+
+
+class OpenCrg(MeasuredRoad):
+    """A line along a road of an OpenCRG file; the bends of its reference line are left out."""
+
+    kind: Literal["opencrg"] = "opencrg"
+    """A road of ASAM OpenCRG."""
+    offset_m: float = 0.0
+    """Place of the line across the road: from the reference line, positive to the left."""
+
+    @override
+    def heights(self, path: Path, key: str) -> tuple[Array, Array]:
+        grid = read_grid(path)
+        low, high = float(grid.across[0]), float(grid.across[-1])
+        if not low <= self.offset_m <= high:
+            raise ConfigError(
+                f"{key}.offset_m: {path} reaches from {low:g} to {high:g} m across the road (got {self.offset_m:g})"
+            )
+        height = np.array([np.interp(self.offset_m, grid.across, row) for row in grid.heights])
+        return grid.increment * np.arange(len(height), dtype=np.float64), height
 
 
 _WIDTHS = {"LRFI": 10, "LDFI": 20}
@@ -117,10 +176,7 @@ def read_grid(path: Path) -> CrgGrid:
     FilesError : when it cannot be read
     DataError : when it is no plain-text OpenCRG file, or a number in it is none
     """
-    try:
-        lines = path.read_text(encoding="latin-1").splitlines()
-    except OSError as error:
-        raise FilesError(f"{path}: cannot be read ({error.strerror})") from error
+    lines = _lines(path, "latin-1")
     head, first = _head(path, lines)
     if head.form not in _WIDTHS:
         raise DataError(
@@ -143,7 +199,7 @@ def read_grid(path: Path) -> CrgGrid:
 
 
 def _head(path: Path, lines: list[str]) -> tuple[_Head, int]:
-    """What stands before the data, and the index of their first line."""
+    """Read what stands before the data, and the index of their first line."""
     head, section = _Head(), ""
     for number, line in enumerate(lines, 1):
         text = line.strip()
@@ -167,7 +223,7 @@ def _head(path: Path, lines: list[str]) -> tuple[_Head, int]:
 
 
 def _records(path: Path, lines: list[str], first: int, head: _Head) -> Array:
-    """(n, c) numbers of every cross section."""
+    """Read (n, c) numbers of every cross section."""
     width, count = _WIDTHS[head.form], len(head.channels)
     a_line = _LINE // width
     each = math.ceil(count / a_line)
@@ -201,7 +257,7 @@ def _number(path: Path, line: int, text: str) -> float:
 
 
 def _place(path: Path, head: _Head, name: str) -> float:
-    """Place v of a long section [m], that it says itself or that follows from its number."""
+    """Return the place v of a long section [m], that it says itself or that follows from its number."""
     said = re.match(r"long section\s+at\s+v\s*=\s*([-+]?\d*\.?\d+(?:e[-+]?\d+)?)", name)
     if said:
         return float(said[1])
@@ -213,8 +269,11 @@ def _place(path: Path, head: _Head, name: str) -> float:
 
 
 def _channel(records: Array, head: _Head, name: str) -> Array:
-    """(n,) of a channel of the reference line; 0 where it has none."""
+    """Return (n,) of a channel of the reference line; 0 where it has none."""
     for n, channel in enumerate(head.channels):
         if channel.startswith("reference line") and name in channel:
             return np.asarray(records[:, n])
     return np.zeros(len(records))
+
+
+ROADS = (RoadFile, OpenCrg)
