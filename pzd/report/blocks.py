@@ -121,6 +121,11 @@ def listed(words: list[str], last: str = "and") -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else ""
 
 
+def spelled(name: str) -> str:
+    """Return the name of an effect or a policy as the page writes it."""
+    return name.replace("_", " ")
+
+
 def sentence(text: str) -> str:
     """Text with a capital at its start and a full stop at its end."""
     text = text.strip()

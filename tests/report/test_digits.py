@@ -15,7 +15,7 @@ from pzd.diagnosis.verdict import weak
 from pzd.force_table.force import lost, not_monotone
 from pzd.quantities import Control
 from pzd.report import blocks
-from pzd.report.context import effect_in_words
+from pzd.report.damper_models import effect_in_words
 from pzd.report.sections.damper import parameter
 from pzd.report.sections.tested import render_characteristics as characteristics_section
 from pzd.schema.errors import supported
@@ -92,7 +92,7 @@ def test_a_static_force_has_the_digits_of_the_forces_that_it_was_read_from(
     found = static(gas)
     tables = dict(characteristics_tables(SimpleNamespace(characteristics=found, control=Control())))
     assert tuple(tables["gas force and friction at mid-stroke"][1][:2]) == printed
-    context = SimpleNamespace(identified=SimpleNamespace(characteristics=found), control=Control(), rig=run.rig)
+    context = SimpleNamespace(tests=SimpleNamespace(characteristics=found), control=Control(), rig=run.rig)
     (section,) = characteristics_section(context, {"characteristics": ()})
     (table,) = (block for block in section.blocks if getattr(block, "header", ("",))[-1] == "how")
     assert tuple(cell.replace("\xa0N", "") for cell in table.rows[0][1:3]) == drawn

@@ -34,7 +34,7 @@ from pzd.identification.tests_over_time import characteristics
 from pzd.quantities import Control
 from pzd.record import conditions
 from pzd.report.config import ReportConfig
-from pzd.report.plots import characteristic, library
+from pzd.report.plots import library
 from pzd.simulate.config import CarBlock, SensorNoise, Sensors, SimulateConfig, Supply
 
 HERE = Path(__file__).parent
@@ -469,7 +469,7 @@ def test_the_curve_of_the_damper_holds_what_is_there_at_rest(run: Any, monkeypat
     curves = []
     monkeypatch.setattr(
         "pzd.report.page.pictures",
-        lambda plots, context, jobs: curves.append(next(iter(characteristic.draw(context)))) or [()] * len(plots),
+        lambda plots, context, jobs: curves.append(next(iter(library()["force"].draw(context)))) or [()] * len(plots),
     )
     for damper in (run.diagnosed.damper, run.diagnosed.damper.with_effect("preload_offset", {"F_0": 90.0})):
         replace(run, diagnosed=replace(run.diagnosed, damper=damper)).told()

@@ -29,7 +29,8 @@ from pzd.report.blocks import (
     sentence,
     unit_of,
 )
-from pzd.report.context import ReportContext, effect_in_words, static_force_at, static_force_in_words
+from pzd.report.context import ReportContext
+from pzd.report.damper_models import effect_in_words
 
 # ----------------------------------------------------------------------------------------------------
 # Settings between tested ones: their force, between which tests it lies, and how far such a line can be trusted.
@@ -239,7 +240,7 @@ NO_FORCE = 1e-6
 def render(context: ReportContext, pictures: Pictures) -> Section:
     """The fourth section."""
     blocks: list[Block] = [Paragraph(_intro(context)), *trade_blocks(context), _damper_parameters(context)]
-    blocks += [_alone(context)] if context.extended or context.fitted_law else []
+    blocks += [_alone(context)] if context.damper.extended or context.damper.fitted_law else []
     blocks += galleries(pictures["damper"])
     blocks += [_force(context)] if context.table.force else []
     blocks += settings_blocks(context)
@@ -259,7 +260,7 @@ def render(context: ReportContext, pictures: Pictures) -> Section:
 def _intro(context: ReportContext) -> str:
     effects = context.diagnosed.damper.effects
     laws = [f"{effect_in_words(name)}, {known()[name].law}" for name in effects]
-    origin = "What belongs to the knee law stands" if context.fitted_law else "What was missing stands"
+    origin = "What belongs to the knee law stands" if context.damper.fitted_law else "What was missing stands"
     beside = f" {origin} beside it: {listed(laws)}." if laws else ""
     return (
         "Dry friction T0, damping C and oil spring k of the Bingham element, with 95 % intervals. These allow for "
@@ -270,16 +271,18 @@ def _intro(context: ReportContext) -> str:
 
 def _damper_parameters(context: ReportContext) -> TextTable:
     """T0, C and k of the damper that everything behind uses."""
-    title = "T0, C and k beside what was missing" if context.extended else "T0, C and k of the Bingham element alone"
-    title = "T0, C and k beside the knee, C the mean bleed of both directions" if context.fitted_law else title
-    rows = tuple(_row(context, row) for row in context.final)
+    title = (
+        "T0, C and k beside what was missing" if context.damper.extended else "T0, C and k of the Bingham element alone"
+    )
+    title = "T0, C and k beside the knee, C the mean bleed of both directions" if context.damper.fitted_law else title
+    rows = tuple(_row(context, row) for row in context.damper.final_parameters)
     return TextTable(title, _damper_header(context), rows).without_empty(*_conditions(context))
 
 
 def _alone(context: ReportContext) -> TextTable:
     """T0, C and k of the simple model: alone they also stand in for what it lacks."""
     title = "The simple model: T0, C and k of the Bingham element alone, standing in for what it lacks"
-    rows = tuple(_row(context, row) for row in context.parameters)
+    rows = tuple(_row(context, row) for row in context.damper.baseline_parameters)
     return TextTable(title, _damper_header(context), rows, folded=True).without_empty(*_conditions(context))
 
 
@@ -324,12 +327,12 @@ def _force(context: ReportContext) -> TextTable:
     speeds = sorted({row.velocity_m_per_s for row in rows})
     at = {(row.velocity_m_per_s, row.voltage_V): row for row in rows}
     chosen = _spread(speeds, context.table.notes.reached_m_per_s)
-    static = {volt: static_force_at(context, volt) for volt in voltages}
+    static = {volt: context.damper.static_force(volt) for volt in voltages}
     cells = tuple((amount(v, "m/s"), *(_cell(at.get((v, volt)), static[volt]) for volt in voltages)) for v in chosen)
     degrees = f" at {amount(first, 'degC')}" if first is not None else ""
     columns = ["force" if volt is None else f"force at {context.voltage(volt)}" for volt in voltages]
     header = ("speed in rebound", *columns)
-    rest = static_force_in_words(context, voltages)
+    rest = context.damper.static_force_in_words(voltages)
     rest = f", with the {rest} at rest that the table (4-table) leaves out" if rest else ""
     return TextTable(f"Force{degrees}{rest}; in brackets the model beyond what the rig reached", header, cells)
 
@@ -386,7 +389,7 @@ def _measures(context: ReportContext) -> TextTable:
             number(m.dynamic_range),
         )
         for m in context.identified.measures
-        if m.setting == context.chosen
+        if m.setting == context.setting
     )
     title = "Every test as an equivalent viscous damper"
     return TextTable(title, conditions + found, rows, folded=True).without_empty(*_conditions(context), "dynamic range")

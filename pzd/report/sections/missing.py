@@ -22,7 +22,8 @@ from pzd.report.blocks import (
     sentence,
     unit_of,
 )
-from pzd.report.context import ReportContext, effect_in_words, effects_in_words
+from pzd.report.context import ReportContext
+from pzd.report.damper_models import effect_in_words, effects_in_words
 
 # ----------------------------------------------------------------------------------------------------
 # Where the simple model fails: measured against simulated, and where the gap lies.
@@ -32,7 +33,7 @@ def render_simple_model(context: ReportContext, pictures: Pictures) -> Section:
     """The second section."""
     element = (
         "The knee law has dry friction T0, and bleed, knee and blow-off of each direction"
-        if context.fitted_law
+        if context.damper.fitted_law
         else "The simple model is the Bingham element of the paper: dry friction T0 and viscous damping C"
     )
     text = f"{element} in series with the oil spring k. {_gap(context.diagnosed.diagnosis.gap)}"
@@ -41,7 +42,7 @@ def render_simple_model(context: ReportContext, pictures: Pictures) -> Section:
     if where:
         rows = tuple((region.region, percent(region.share_of_gap)) for region in where)
         blocks.append(TextTable("Where the gap lies", ("region", "share of the gap"), rows))
-    return Section("model", f"Where the {context.model} fails", tuple(blocks))
+    return Section("model", f"Where the {context.damper.baseline_name} fails", tuple(blocks))
 
 
 def _gap(gap: Gap | None) -> str:
@@ -127,7 +128,7 @@ def verdict(context: ReportContext) -> str:
     diagnosis = context.diagnosed.diagnosis
     adopted = listed(effects_in_words(diagnosis.effects))
     if diagnosis.verdict == "named":
-        text = f"Missing from the {context.model}: {adopted}"
+        text = f"Missing from the {context.damper.baseline_name}: {adopted}"
     elif diagnosis.verdict == "ambiguous" and not diagnosis.effects:
         rivals = listed(effects_in_words(diagnosis.rivals), "or")
         text = f"These tests do not settle whether anything is missing{f'; possible: {rivals}' if rivals else ''}"
@@ -135,8 +136,9 @@ def verdict(context: ReportContext) -> str:
         rivals = listed(effects_in_words(diagnosis.rivals), "or")
         text = f"These tests do not settle what is missing. Best: {adopted or DASH}; also possible: {rivals or DASH}"
     elif diagnosis.verdict == "none":
-        text = f"Nothing is missing: what the {context.model} leaves is within the noise and the scatter between tests"
-    elif context.fitted_law:
+        name = context.damper.baseline_name
+        text = f"Nothing is missing: what the {name} leaves is within the noise and the scatter between tests"
+    elif context.damper.fitted_law:
         text = "The knee law leaves a gap that repeats, and no effect was looked for beside it"
     else:
         found = f"; {adopted} is part of it" if adopted else ""

@@ -21,8 +21,10 @@ from pzd.report.blocks import (
     minutes,
     number,
     percent,
+    spelled,
 )
-from pzd.report.context import REALISTIC, Comparison, ReportContext, name_of, of_road, unbeaten
+from pzd.report.context import ReportContext
+from pzd.report.ride_comfort import REALISTIC, Comparison
 from pzd.simulate.config import Sensors, SimulateConfig
 from pzd.simulate.policies import policies
 from pzd.simulate.vehicle.car import HalfCar, modes
@@ -98,7 +100,7 @@ def _supply(context: ReportContext) -> Iterator[str]:
 
 def trade_off_blocks(context: ReportContext, pictures: Pictures) -> Iterator[Block]:
     """Words, pictures and a table; nothing where fewer than two policies control."""
-    shown = {road: rows for road in context.roads if (rows := of_road(context, road))}
+    shown = {road: rows for road in context.rated.roads if (rows := context.rated.trade_off(road))}
     if not shown:
         return
     yield Paragraph(
@@ -121,7 +123,7 @@ def trade_off_blocks(context: ReportContext, pictures: Pictures) -> Iterator[Blo
 
 
 def _names(context: ReportContext, rows: tuple[SummaryRow, ...]) -> str:
-    return listed([name_of(row.policy) for row in unbeaten(context, rows)])
+    return listed([spelled(row.policy) for row in context.rated.pareto_front(rows)])
 
 
 def _best_found(context: ReportContext, road: str, rows: tuple[SummaryRow, ...]) -> str:
@@ -131,19 +133,19 @@ def _best_found(context: ReportContext, road: str, rows: tuple[SummaryRow, ...])
     if best is None:
         return ""
     found = next(row for row in context.rides.found if row.case == best.case)
-    by = f"a schedule, after {found.evaluations} rides" if found.found_by == "search" else name_of(found.found_by)
-    told = f"{road}: a_w {amount(context.a_w(best), 'm/s2')}, by {by}"
+    by = f"a schedule, after {found.evaluations} rides" if found.found_by == "search" else spelled(found.found_by)
+    told = f"{road}: a_w {amount(context.rated.a_w(best), 'm/s2')}, by {by}"
     mine = next((row for row in rows if context.simulate.is_controlled(row.policy)), None)
-    if fixed is None or mine is None or context.a_w(best) >= context.a_w(fixed):
+    if fixed is None or mine is None or context.rated.a_w(best) >= context.rated.a_w(fixed):
         return told
-    way = (context.a_w(fixed) - context.a_w(mine)) / (context.a_w(fixed) - context.a_w(best))
+    way = (context.rated.a_w(fixed) - context.rated.a_w(mine)) / (context.rated.a_w(fixed) - context.rated.a_w(best))
     if way <= 0.0:
-        return f"{told}; {name_of(mine.policy)} is no better than the best fixed voltage"
-    return f"{told}; {name_of(mine.policy)} goes {percent(way)} of the way to it from the best fixed voltage"
+        return f"{told}; {spelled(mine.policy)} is no better than the best fixed voltage"
+    return f"{told}; {spelled(mine.policy)} goes {percent(way)} of the way to it from the best fixed voltage"
 
 
 def _table(context: ReportContext, roads: tuple[str, ...]) -> TextTable:
-    ridden = {row.fidelity for road in roads for row in context.cases(road)}
+    ridden = {row.fidelity for road in roads for row in context.rated.over(road)}
     fidelities = [name for name in reversed(REALISTIC) if name in ridden]
     header = ("road", "policy", *(f"a_w, {name}" for name in fidelities), *(f"load, {name}" for name in fidelities))
     rows = tuple(_row(context, road, policy, fidelities) for road in roads for policy in _policies(context, road))
@@ -151,16 +153,16 @@ def _table(context: ReportContext, roads: tuple[str, ...]) -> TextTable:
 
 
 def _policies(context: ReportContext, road: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(row.policy for row in context.cases(road)))
+    return tuple(dict.fromkeys(row.policy for row in context.rated.over(road)))
 
 
 def _row(context: ReportContext, road: str, policy: str, fidelities: list[str]) -> tuple[str, ...]:
-    found = {row.fidelity: row for row in context.cases(road) if row.policy == policy}
+    found = {row.fidelity: row for row in context.rated.over(road) if row.policy == policy}
     ridden = [found.get(name) for name in fidelities]
     return (
         road,
-        name_of(policy),
-        *(amount(None if row is None else context.a_w(row), "m/s2") for row in ridden),
+        spelled(policy),
+        *(amount(None if row is None else context.rated.a_w(row), "m/s2") for row in ridden),
         *(amount(None if row is None else row.rms_wheel_load_N, "N") for row in ridden),
     )
 
@@ -219,8 +221,8 @@ def _tyres(car: HalfCar) -> tuple[float, float]:
 
 def _windows(context: ReportContext) -> Iterator[str]:
     """In which part of a ride its numbers are taken."""
-    spans = {ride.row.road: ride.ridden for ride in context.rated if ride.of_event}
-    if any(not ride.of_event for ride in context.rated):
+    spans = {ride.row.road: ride.ridden for ride in context.rated.rides if ride.of_event}
+    if any(not ride.of_event for ride in context.rated.rides):
         other = " over the other roads" if spans else ""
         yield f"The first {amount(context.simulate.settle_s, 's')} of each ride{other} are left out."
     for road, span in spans.items():
@@ -232,7 +234,7 @@ def _windows(context: ReportContext) -> Iterator[str]:
 
 def _compared(context: ReportContext) -> Iterator[Block]:
     """The controlled policy beside every other at the same fidelity."""
-    found = [one for road in context.roads for one in context.comparisons(road)]
+    found = [one for road in context.rated.roads for one in context.rated.comparisons(road)]
     if not found:
         return
     policy = found[0].controlled.policy
@@ -250,10 +252,10 @@ def _comparison_row(context: ReportContext, one: Comparison, other: SummaryRow) 
     return (
         mine.road,
         mine.fidelity,
-        context.policy(other),
-        amount(context.a_w(mine), "m/s2"),
-        amount(context.a_w(other), "m/s2"),
-        change(context.a_w(other), context.a_w(mine)),
+        context.rated.policy_label(other),
+        amount(context.rated.a_w(mine), "m/s2"),
+        amount(context.rated.a_w(other), "m/s2"),
+        change(context.rated.a_w(other), context.rated.a_w(mine)),
         change(other.rms_wheel_load_N, mine.rms_wheel_load_N),
         change(other.peak_deflection_m, mine.peak_deflection_m),
     )
@@ -270,7 +272,7 @@ def change(before: float, after: float) -> str:
 
 
 def _all(context: ReportContext) -> list[SummaryRow]:
-    return [row for road in context.roads for row in context.cases(road)]
+    return [row for road in context.rated.roads for row in context.rated.over(road)]
 
 
 def _accelerations(context: ReportContext) -> TextTable:
@@ -278,10 +280,10 @@ def _accelerations(context: ReportContext) -> TextTable:
     rows = tuple(
         (
             row.road,
-            context.dampers(row),
+            context.rated.label(row),
             amount(row.peak_abs_aK_m_per_s2, "m/s2"),
             amount(row.rms_aK_m_per_s2, "m/s2"),
-            *(amount(context.value(row.case, name), unit) for name, unit in _WEIGHTED),
+            *(amount(context.rated.value(row.case, name), unit) for name, unit in _WEIGHTED),
             _weighted_values(context, row),
         )
         for row in _all(context)
@@ -295,7 +297,7 @@ _WEIGHTED = (("a_w", "m/s2"), ("MTVV", "m/s2"), ("VDV", "m/s^1.75"), ("crest_fac
 
 
 def _weighted_values(context: ReportContext, row: SummaryRow) -> str:
-    a_w = context.value(row.case, "a_w")
+    a_w = context.rated.value(row.case, "a_w")
     return DASH if a_w is None else " to ".join(reaction.text for reaction in iso2631_1997.reactions(a_w))
 
 
@@ -305,8 +307,8 @@ def _exposures(context: ReportContext) -> Iterator[TextTable]:
     rows = tuple(
         (
             row.road,
-            context.dampers(row),
-            *(minutes(context.value(row.case, f"exposure_time_{boundary}")) for boundary in iso2631_1978.FACTORS),
+            context.rated.label(row),
+            *(minutes(context.rated.value(row.case, f"exposure_time_{boundary}")) for boundary in iso2631_1978.FACTORS),
             _status(context, row.case),
         )
         for row in _all(context)
@@ -320,7 +322,7 @@ def _exposures(context: ReportContext) -> Iterator[TextTable]:
 
 
 def _status(context: ReportContext, case: str) -> str:
-    row = context.measures.get((case, COMFORT_TIME))
+    row = context.rated.measures.get((case, COMFORT_TIME))
     return "" if row is None else row.status.removeprefix(f"{iso2631_1978.TRUST}; ")
 
 
@@ -329,7 +331,7 @@ def _suspension(context: ReportContext) -> TextTable:
     rows = tuple(
         (
             row.road,
-            context.dampers(row),
+            context.rated.label(row),
             f"{number(1000.0 * row.peak_deflection_m)} mm",
             amount(row.rms_wheel_load_N, "N"),
             amount(row.rms_jerk_m_per_s3, "m/s3"),
@@ -354,7 +356,7 @@ def _wheels(context: ReportContext) -> TextTable:
     rows = tuple(
         (
             row.road,
-            context.dampers(row),
+            context.rated.label(row),
             *(amount(wheel.min_contact_force_N, "N") for wheel in wheels),
             *(percent(wheel.pulling) for wheel in wheels),
         )
@@ -388,10 +390,10 @@ def _daily(context: ReportContext) -> Iterator[TextTable]:
     rows = tuple(
         (
             row.road,
-            context.dampers(row),
-            amount(context.value(row.case, "A(8)"), "m/s2"),
-            amount(context.value(row.case, "VDV_day"), "m/s^1.75"),
-            *(amount(context.value(row.case, f"time_to_{name}_value"), "h") for name in ("action", "limit")),
+            context.rated.label(row),
+            amount(context.rated.value(row.case, "A(8)"), "m/s2"),
+            amount(context.rated.value(row.case, "VDV_day"), "m/s^1.75"),
+            *(amount(context.rated.value(row.case, f"time_to_{name}_value"), "h") for name in ("action", "limit")),
         )
         for row in _all(context)
     )
@@ -401,14 +403,14 @@ def _daily(context: ReportContext) -> Iterator[TextTable]:
 
 
 def _worth(context: ReportContext) -> TextTable:
-    pairs = [(row, other) for row in _all(context) if (other := context.without(row)) is not None]
+    pairs = [(row, other) for row in _all(context) if (other := context.rated.on_baseline(row)) is not None]
     rows = tuple(
         (
             row.road,
-            context.dampers(row),
+            context.rated.label(row),
             *(amount(each.peak_abs_aK_m_per_s2, "m/s2") for each in (other, row)),
-            *(amount(context.value(each.case, "a_w"), "m/s2") for each in (other, row)),
-            *(minutes(context.value(each.case, COMFORT_TIME)) for each in (other, row)),
+            *(amount(context.rated.value(each.case, "a_w"), "m/s2") for each in (other, row)),
+            *(minutes(context.rated.value(each.case, COMFORT_TIME)) for each in (other, row)),
         )
         for row, other in pairs
     )
@@ -417,7 +419,7 @@ def _worth(context: ReportContext) -> TextTable:
 
 
 def _beyond(context: ReportContext) -> Iterator[str]:
-    for ride in context.rated:
+    for ride in context.rated.rides:
         found = ride.evaluation.beyond
         if found and iso2631_1997.EDITION in context.config.editions:
             yield f"{ride.row.case}: {'; '.join(found)}"

@@ -23,7 +23,7 @@ from pzd.report.blocks import (
     galleries,
     number,
 )
-from pzd.report.context import ReportContext, characteristics_of
+from pzd.report.context import ReportContext
 from pzd.schema.errors import counted
 
 # ----------------------------------------------------------------------------------------------------
@@ -52,14 +52,14 @@ def render(context: ReportContext) -> Section:
 
 
 def _summary(context: ReportContext) -> str:
-    records = context.records
+    records = context.tests.records
     if not records:
         return "No record belongs to this setting."
     stroke = max(float(np.ptp(r.displacement)) for r in records)
     speed = max(float(np.abs(r.velocity).max()) for r in records)
     force = max(float(np.abs(r.force).max()) for r in records)
     seconds = sum(float(r.time[-1] - r.time[0]) for r in records)
-    where = f" of the setting {context.chosen}" if context.chosen else ""
+    where = f" of the setting {context.setting}" if context.setting else ""
     parts = [
         f"{counted(len(records), 'record')}{where}, {number(seconds)} s in all",
         f"stroke up to {number(1000.0 * stroke)} mm, speed up to {number(speed)} m/s, force up to {amount(force, 'N')}",
@@ -73,14 +73,17 @@ def _summary(context: ReportContext) -> str:
 def _conditions(context: ReportContext) -> list[str]:
     found = []
     volts = [
-        v for r in context.records if r.voltage is not None for v in (float(r.voltage.min()), float(r.voltage.max()))
+        v
+        for r in context.tests.records
+        if r.voltage is not None
+        for v in (float(r.voltage.min()), float(r.voltage.max()))
     ]
     if volts:
         span = number(min(volts)), number(max(volts))
         found.append(f"{context.control.name} {_span(*span)} {context.control.unit}")
     degrees = [
         float(t)
-        for r in context.records
+        for r in context.tests.records
         if r.temperature is not None
         for t in (r.temperature.min(), r.temperature.max())
     ]
@@ -107,7 +110,7 @@ def _records(context: ReportContext) -> TextTable:
         "top force",
         "findings",
     )
-    pairs = [(context.entries[r.name], r) for r in context.records if r.name in context.entries]
+    pairs = [(context.tests.entries[r.name], r) for r in context.tests.records if r.name in context.tests.entries]
     rows = tuple(_row(context, entry, record) for entry, record in pairs)
     return TextTable("Records", header, rows, folded=len(rows) > _FOLD).without_empty(
         context.control.name, "temperature"
@@ -149,7 +152,7 @@ _PAPER_RESPONSE_MS = 9
 
 def render_characteristics(context: ReportContext, pictures: Pictures) -> Iterator[Section]:
     """The second section, where there are such tests."""
-    found = characteristics_of(context)
+    found = context.tests.characteristics
     if not (found.peak_velocity or found.steps or found.warm_up or found.as_it_stands):
         return
     blocks: list[Block] = [Paragraph(_intro(context)), *galleries(pictures["characteristics"])]
@@ -169,7 +172,7 @@ def _intro(context: ReportContext) -> str:
         "the continuous-velocity plot (CVP) is the force over speed through the average settled cycle of one test. "
         "Forces are as recorded, with the gas force in them."
     )
-    tests, records = len(characteristics_of(context).peak_velocity), len(context.rig.records)
+    tests, records = len(context.tests.characteristics.peak_velocity), len(context.rig.records)
     found = f"{counted(tests, 'such test')} in {counted(records, 'record')}"
     return f"{text} Found by their motion: {found}." if tests else text
 
@@ -180,16 +183,16 @@ def _places(context: ReportContext, *more: str) -> tuple[str, ...]:
 
 
 def _settings(context: ReportContext) -> tuple[str, ...]:
-    return ("setting",) if len({row.setting for row in characteristics_of(context).peak_velocity}) > 1 else ()
+    return ("setting",) if len({row.setting for row in context.tests.characteristics.peak_velocity}) > 1 else ()
 
 
 def _control(context: ReportContext) -> tuple[str, ...]:
-    controlled = any(row.voltage_V is not None for row in characteristics_of(context).peak_velocity)
+    controlled = any(row.voltage_V is not None for row in context.tests.characteristics.peak_velocity)
     return (context.control.name,) if controlled else ()
 
 
 def _degrees(context: ReportContext) -> tuple[str, ...]:
-    known = any(row.temperature_degC is not None for row in characteristics_of(context).peak_velocity)
+    known = any(row.temperature_degC is not None for row in context.tests.characteristics.peak_velocity)
     return ("temperature",) if known else ()
 
 
@@ -200,7 +203,7 @@ def _place(context: ReportContext, setting: str | None, voltage: float | None, t
 
 
 def _force_at_speed(context: ReportContext) -> TextTable:
-    rows = tuple(_characteristics_row(context, row) for row in characteristics_of(context).peak_velocity)
+    rows = tuple(_characteristics_row(context, row) for row in context.tests.characteristics.peak_velocity)
     header = ("speed", *_places(context), "rebound", "compression", "test", "record")
     return TextTable("Force at the peak speed of each test", header, rows, folded=len(rows) > _FOLD)
 
@@ -219,7 +222,7 @@ def _characteristics_row(context: ReportContext, row: PeakVelocityRow) -> tuple[
 
 
 def _gas_and_friction(context: ReportContext) -> TextTable:
-    found = characteristics_of(context)
+    found = context.tests.characteristics
     rows = tuple(
         (
             *(_place(context, row.setting, row.voltage_V, row.temperature_degC) or ["all tests"]),
@@ -244,7 +247,7 @@ def _steps(context: ReportContext) -> TextTable:
             row.status,
             f"{row.record}, {amount(row.time_s, 's', 4)}",
         )
-        for row in characteristics_of(context).steps
+        for row in context.tests.characteristics.steps
     )
     header = ("step", "speed", "force", "to 63 %", "to 90 %", "status", "where")
     title = f"Measured response to steps of the {context.control.name}"
@@ -263,7 +266,7 @@ def _warm_up(context: ReportContext) -> TextTable:
             _course(one.first.compression_force_N, one.last.compression_force_N, "N"),
             one.first.record,
         )
-        for one in courses(characteristics_of(context).warm_up)
+        for one in courses(context.tests.characteristics.warm_up)
     )
     header = (*_settings(context), *_control(context), "speed", "cycles", "temperature", "rebound", "compression")
     title = f"Warm-up: force at the peak speed from the first {AVERAGED} cycles to the last"
@@ -284,7 +287,7 @@ def _as_it_stands(context: ReportContext) -> TextTable:
             f"{number(1000.0 * row.stroke_m)} mm",
             amount(row.duration_s, "s"),
         )
-        for row in characteristics_of(context).as_it_stands
+        for row in context.tests.characteristics.as_it_stands
     )
     where = ("setting", context.control.name, "temperature")
     extremes = ("largest force", "smallest force", "largest velocity", "smallest velocity")
@@ -302,11 +305,11 @@ def _milliseconds(time: float | None) -> str:
 
 
 def _beside_the_paper(context: ReportContext) -> str:
-    times = [row.to_90_percent_s for row in characteristics_of(context).steps if row.to_90_percent_s is not None]
+    times = [row.to_90_percent_s for row in context.tests.characteristics.steps if row.to_90_percent_s is not None]
     ours = "No step gave a time."
     if times:
         low, high = (amount(1000.0 * end(times), "ms") for end in (min, max))
-        ours = f"Of {len(characteristics_of(context).steps)} steps {len(times)} gave a time: {low} to {high} to 90 %."
+        ours = f"Of {len(context.tests.characteristics.steps)} steps {len(times)} gave a time: {low} to {high} to 90 %."
     return (
         f"{ours} Times count from the middle of the step of the recorded {context.control.name}. The paper (Makowski "
         f"and Knap 2021) states {_PAPER_RESPONSE_MS} ms for its damper, over the whole range of force."

@@ -35,9 +35,14 @@ def render(context: ReportContext) -> Section:
 
 
 def _cares(context: ReportContext) -> Iterator[str]:
-    weak = [row for row in context.final if isinstance(row, ParameterRow) and row.status.startswith("weak")]
+    weak = [
+        row
+        for row in context.damper.final_parameters
+        if isinstance(row, ParameterRow) and row.status.startswith("weak")
+    ]
     if weak:
-        yield f"{len(weak)} of {len(context.final)} conditions hold a parameter that the data determine weakly"
+        total = len(context.damper.final_parameters)
+        yield f"{len(weak)} of {total} conditions hold a parameter that the data determine weakly"
     if context.diagnosed.diagnosis.verdict == "unexplained":
         carry = "rides carry" if context.ridden else "table carries"
         yield f"part of the measured force is repeatable and not explained; the {carry} that gap"
