@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -139,16 +140,24 @@ def legend_lines(labels: int) -> int:
     return -(-labels // _LEGEND_COLUMNS)
 
 
-def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> list[tuple[Picture, ...]]:
-    """Draw and encode the panels of each plot, `jobs` plots at the same time."""
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw in the style of the report, with matplotlib loaded once for all processes that part within."""
     import matplotlib as mpl
     import matplotlib.backends.backend_svg
-    import matplotlib.figure  # once, before the processes part
+    import matplotlib.figure
+
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
+        yield
+
+
+def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> list[tuple[Picture, ...]]:
+    """Draw and encode the panels of each plot, `jobs` plots at the same time."""
 
     def drawn(plot: Plot) -> tuple[Picture, ...]:
         return tuple(encoded(panel) for panel in plot.draw(context))
 
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
+    with styled():
         return parallel_map(drawn, plots, jobs)
 
 

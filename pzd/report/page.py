@@ -87,12 +87,9 @@ def _confidence(context: ReportContext) -> Card:
 def _gap(gap: Gap | None) -> str:
     if gap is None:
         return "The gap could not be measured."
-    moved = (
-        f"stays {number(gap.before)}"
-        if gap.after == gap.before
-        else f"goes from {number(gap.before)} to {number(gap.after)}"
-    )
-    return f"The gap W_s on held-out data {moved}; noise alone is {number(gap.noise_floor)}."
+    before, after = number(gap.before), number(gap.after)
+    course = f"stays {before}" if gap.after == gap.before else f"goes from {before} to {after}"
+    return f"The gap W_s on held-out data {course}; noise alone is {number(gap.noise_floor)}."
 
 
 def _next(context: ReportContext) -> Card:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,6 +30,10 @@ _FEWEST_CONTROLLED = 2
 """With fewer policies that control there is no trade-off to choose from; a `Comparison` says what the one is worth."""
 _RUN_UP_S = 3.0
 """Within this time the weighting has forgotten how the ride began."""
+
+
+Measure = tuple[str, float | None, str, str]
+"""Name, value, unit and status of a comfort row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,11 +221,11 @@ class RatedRides:
 
 def assess(ride: RatedRide, config: ReportConfig) -> tuple[ComfortRow, ...]:
     """Return every comfort row of one ride."""
-    parts: dict[str, Callable[[], Iterator[tuple[str, float | None, str, str]]]] = {
-        UNWEIGHTED: lambda: _unweighted(ride),
-        iso2631_1997.EDITION: lambda: _edition_1997(ride, config),
-        iso2631_1978.EDITION: lambda: _edition_1978(ride),
-        directive.EDITION: lambda: _directive(ride, config),
+    measures = {
+        UNWEIGHTED: _unweighted(ride),
+        iso2631_1997.EDITION: _edition_1997(ride, config),
+        iso2631_1978.EDITION: _edition_1978(ride),
+        directive.EDITION: _directive(ride, config),
     }
     return tuple(
         ComfortRow(
@@ -234,18 +238,18 @@ def assess(ride: RatedRide, config: ReportConfig) -> tuple[ComfortRow, ...]:
             status=status,
         )
         for edition in (UNWEIGHTED, *config.editions)
-        for measure, value, unit, status in parts[edition]()
+        for measure, value, unit, status in measures[edition]
     )
 
 
-def _unweighted(ride: RatedRide) -> Iterator[tuple[str, float | None, str, str]]:
+def _unweighted(ride: RatedRide) -> Iterator[Measure]:
     yield "peak", ride.row.peak_abs_aK_m_per_s2, "m/s2", "computed from every step"
     yield "rms", ride.row.rms_aK_m_per_s2, "m/s2", "computed from every step"
 
 
-def _edition_1997(ride: RatedRide, config: ReportConfig) -> Iterator[tuple[str, float | None, str, str]]:
+def _edition_1997(ride: RatedRide, config: ReportConfig) -> Iterator[Measure]:
     found = ride.evaluation
-    trust = f"verified{_span(ride)}"
+    trust = f"verified{_window(ride)}"
     beyond = "; ".join(found.beyond)
     more = f"{trust}; to be read beside a_w: {beyond}" if beyond else f"{trust}; a_w suffices"
     yield "a_w", found.a_w, "m/s2", trust
@@ -261,7 +265,7 @@ def _edition_1997(ride: RatedRide, config: ReportConfig) -> Iterator[tuple[str, 
         yield "health_guidance_zone", found.a_w, "m/s2", _zone(found.a_w, config.health_guidance_zone)
 
 
-def _span(ride: RatedRide) -> str:
+def _window(ride: RatedRide) -> str:
     """Return what is to be known about the window of a ride."""
     start, end = ride.ridden.from_s, ride.ridden.to_s
     if ride.of_event:
@@ -279,7 +283,7 @@ def _zone(a_w: float, name: str) -> str:
     return f"not verified: sources disagree on the zone; {place} {name} m/s2, for 8 h a day"
 
 
-def _edition_1978(ride: RatedRide) -> Iterator[tuple[str, float | None, str, str]]:
+def _edition_1978(ride: RatedRide) -> Iterator[Measure]:
     parts = ride.components
     for boundary in iso2631_1978.FACTORS:
         found = iso2631_1978.shortest(parts, boundary)
@@ -288,7 +292,7 @@ def _edition_1978(ride: RatedRide) -> Iterator[tuple[str, float | None, str, str
         yield f"exposure_time_{boundary}", found.minutes, "min", status
 
 
-def _directive(ride: RatedRide, config: ReportConfig) -> Iterator[tuple[str, float | None, str, str]]:
+def _directive(ride: RatedRide, config: ReportConfig) -> Iterator[Measure]:
     found = ride.evaluation
     hours, note = config.daily_exposure_h, f"verified; {config.daily_exposure_h:g} h a day, vertical direction only"
     daily = directive.daily_exposure(found.a_w, hours)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -68,14 +68,8 @@ class RigTests:
         voltages = {row.voltage_V for row in found.peak_velocity} | {row.voltage_V for row in found.warm_up}
         if voltages <= {None} and not found.steps:
             return found
-        return Characteristics(
-            tuple(row for row in found.peak_velocity if row.setting == self.setting),
-            tuple(row for row in found.continuous_velocity if row.setting == self.setting),
-            tuple(row for row in found.gas_and_friction if row.setting == self.setting),
-            tuple(row for row in found.steps if row.setting == self.setting),
-            tuple(row for row in found.warm_up if row.setting == self.setting),
-            tuple(row for row in found.as_it_stands if row.setting == self.setting),
-        )
+        tables = (getattr(found, table.name) for table in fields(found))
+        return Characteristics(*(tuple(row for row in rows if row.setting == self.setting) for rows in tables))
 
     # --- Conditions of a record ---
 
