@@ -205,7 +205,7 @@ def test_the_sets_of_the_house_are_found() -> None:
 def test_a_set_holds_what_its_folder_holds(name: str, function: str) -> None:
     package = importlib.import_module(name)
     files = {path.stem for path in Path(package.__path__[0]).glob("*.py")} - {"__init__"}
-    assert len(getattr(package, function)()) == len(files)
+    assert len(getattr(package, function)()) >= len(files)  # a file may hold a family
 
 
 JUDGED = ("damper", "rig", "identify", "diagnose", "signals")

@@ -17,7 +17,7 @@ _ENDING = "-chrono.json"
 
 
 def files(content: Content) -> Files:
-    """A file a curve.
+    """Write a file a curve.
 
     Raises
     ------
@@ -39,4 +39,4 @@ def files(content: Content) -> Files:
     return found
 
 
-FORMAT = Format(NAME, "nonlinear dampers for Project Chrono, one curve a control signal", files, ending=_ENDING)
+FORMATS = (Format(NAME, "nonlinear dampers for Project Chrono, one curve a control signal", files, ending=_ENDING),)

@@ -21,7 +21,7 @@ _TEXT = 116
 
 
 def files(content: Content) -> Files:
-    """One file of level 5."""
+    """Write one file of level 5."""
     from io import BytesIO
 
     from scipy.io import savemat
@@ -33,7 +33,7 @@ def files(content: Content) -> Files:
 
 
 def _variables(content: Content) -> dict[str, Any]:
-    """What the file holds, by name."""
+    """Return the variables of the file by name."""
     import numpy as np
 
     from pzd.quantities import FORCE, TEMPERATURE, VELOCITY
@@ -56,7 +56,7 @@ def _variables(content: Content) -> dict[str, Any]:
 
 
 def _inverse(content: Content) -> dict[str, Any]:
-    """The control signal over velocity and share of the range of forces, at each temperature."""
+    """Return the inverse, its last axis the temperature where there are several."""
     import numpy as np
 
     from pzd.export.content import inverses
@@ -73,7 +73,7 @@ def _inverse(content: Content) -> dict[str, Any]:
 
 
 def _parameters(content: Content) -> dict[str, Any]:
-    """T0, C and k by column, the parameters of the effects, and what these count from, as structures."""
+    """Return T0, C and k by column, the parameters of the effects, and their references, as structures."""
     import numpy as np
 
     from pzd.export.content import tables
@@ -92,4 +92,4 @@ def _parameters(content: Content) -> dict[str, Any]:
     return {"base": numbers["base"], "effects": effects or np.zeros((0, 0)), **numbers.get("reference", {})}
 
 
-FORMAT = Format("mat", "breakpoints and tables for Simulink and Octave", files)
+FORMATS = (Format("mat", "breakpoints and tables for Simulink and Octave", files),)

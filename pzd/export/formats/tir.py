@@ -17,7 +17,7 @@ _ENDING = ".dpr"
 
 
 def files(content: Content) -> Files:
-    """A file a curve.
+    """Write a file a curve.
 
     Raises
     ------
@@ -46,4 +46,4 @@ def _text(curve: ForceCurve, origin: str) -> str:
     )
 
 
-FORMAT = Format(NAME, "property files for vehicle dynamics, one curve a control signal", files, ending=_ENDING)
+FORMATS = (Format(NAME, "property files for vehicle dynamics, one curve a control signal", files, ending=_ENDING),)
