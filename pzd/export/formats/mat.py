@@ -15,6 +15,7 @@ from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
+    from pzd.record import Array
 
 _TEXT = 116
 """Bytes of text at the start of a MAT-file of level 5; MATLAB 2023, MAT-file format."""
@@ -62,13 +63,16 @@ def _inverse(content: Content) -> dict[str, Any]:
     from pzd.export.content import inverses
 
     found = inverses(content)
-    several = len(found) > 1
+
+    def over_temperatures(parts: list[Array]) -> Array:
+        return np.stack(parts, axis=-1) if len(parts) > 1 else parts[0]
+
     return {
         "inverse_bp1": content.grid.velocities,
         "inverse_bp2": found[0].shares,
-        "inverse": np.stack([one.signals for one in found], axis=2) if several else found[0].signals,
-        "inverse_low": np.stack([one.low for one in found], axis=1) if several else found[0].low,
-        "inverse_high": np.stack([one.high for one in found], axis=1) if several else found[0].high,
+        "inverse": over_temperatures([one.signals for one in found]),
+        "inverse_low": over_temperatures([one.low for one in found]),
+        "inverse_high": over_temperatures([one.high for one in found]),
     }
 
 
