@@ -27,8 +27,7 @@ from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError
 from pzd.sweep.campaign import SweepRuns
 from pzd.sweep.gather import Results, page, write
-from pzd.sweep.plan import design, tasks
-from pzd.sweep.task import BaseRun, RunResult, check_scatter, scattered
+from pzd.sweep.task import BaseRun, RunResult, check_scatter, design, scattered, tasks
 
 SMALL = """
 rig:
