@@ -140,25 +140,25 @@ def computed_number(run: RunNumbers, name: str, selection: Selection) -> Compute
 def _measure(run: RunNumbers, column: str, selection: Selection) -> Computed:
     wanted = selection.conditions
     rows = [row for row in run.identified.measures if selection.record in (None, row.record)]
-    met = matching(rows, wanted)
-    if not met:
+    matches = matching(rows, wanted)
+    if not matches:
         return Computed(None, f"the rig has no test at {selection.record or wanted}")
-    if open_columns := undecided(rows, met, wanted):
-        return _ambiguous("tests", [row.record for row in met], open_columns, run.control)
-    row, value = met[0], getattr(met[0], column)
+    if open_columns := undecided(rows, matches, wanted):
+        return _ambiguous("tests", [row.record for row in matches], open_columns, run.control)
+    row, value = matches[0], getattr(matches[0], column)
     power = f", {row.work_per_cycle_J * row.frequency_Hz:.0f} W" if row.frequency_Hz is not None else ""
-    repetitions = f"; alike: {', '.join(other.record for other in met[1:])}" if met[1:] else ""
+    repetitions = f"; alike: {', '.join(other.record for other in matches[1:])}" if matches[1:] else ""
     return Computed(value, f"test {row.record}{power}{repetitions}" + ("" if value is not None else ": it has none"))
 
 
 def _parameter(run: RunNumbers, column: str, selection: Selection) -> Computed:
     rows, wanted = run.identified.rows, selection.conditions
-    met = matching(rows, wanted)
-    if not met:
+    matches = matching(rows, wanted)
+    if not matches:
         return Computed(None, f"nothing was identified at {wanted}")
-    if open_columns := undecided(rows, met, wanted):
-        return _ambiguous("conditions", [_label(row, run.control) for row in met], open_columns, run.control)
-    row = met[0]
+    if open_columns := undecided(rows, matches, wanted):
+        return _ambiguous("conditions", [_label(row, run.control) for row in matches], open_columns, run.control)
+    row = matches[0]
     low, high = getattr(row, f"{column}_low95", None), getattr(row, f"{column}_high95", None)
     interval = "" if low is None or high is None else f", 95 % {low:.4g} to {high:.4g}"
     return Computed(getattr(row, column), f"identified at {_label(row, run.control)}{interval}, {row.status}")
@@ -204,13 +204,13 @@ def _comfort(run: RunNumbers, measure: str, selection: Selection) -> Computed:
 
 def _ride(run: RunNumbers, selection: Selection) -> Computed | SummaryRow:
     """Return the one ride that is meant, or why there is none."""
-    met = [row for row in run.rides.summary if _is_ride(run, row, selection)]
-    if len(met) == 1:
-        return met[0]
-    if not met:
+    matches = [row for row in run.rides.summary if _is_ride(run, row, selection)]
+    if len(matches) == 1:
+        return matches[0]
+    if not matches:
         return Computed(None, "the run has no such ride")
-    differing = [name for name in ("road", "policy", "fidelity") if len({getattr(row, name) for row in met}) > 1]
-    return _ambiguous("rides", [row.case for row in met], tuple(differing) or ("case",), run.control)
+    differing = [name for name in ("road", "policy", "fidelity") if len({getattr(row, name) for row in matches}) > 1]
+    return _ambiguous("rides", [row.case for row in matches], tuple(differing) or ("case",), run.control)
 
 
 def _is_ride(run: RunNumbers, row: SummaryRow, selection: Selection) -> bool:
@@ -243,7 +243,7 @@ def _other_fidelities(run: RunNumbers, ride: SummaryRow, values: Mapping[str, fl
 # --- The step of voltage, and inputs ---
 
 
-def _response(run: RunNumbers, column: str, selection: Selection) -> Computed:  # as of the others
+def _response(run: RunNumbers, column: str, selection: Selection) -> Computed:
     signal, _, time = column.partition("_")
     rising = {row.signal: row for row in run.rides.responses if row.to_voltage_V > row.from_voltage_V}
     row = rising.get("force" if signal == "force" else "voltage")
@@ -256,7 +256,7 @@ def _response(run: RunNumbers, column: str, selection: Selection) -> Computed:  
     return Computed(getattr(row, time), f"step from {step}{valve_note}")
 
 
-def _input(run: RunNumbers, name: str, selection: Selection) -> Computed:  # as of the others
+def _input(run: RunNumbers, name: str, selection: Selection) -> Computed:
     if name == "road_amplitude_m":
         amplitudes = {getattr(road, "amplitude_m", None) for road in run.simulate.roads}
         if len(amplitudes) != 1 or None in amplitudes:

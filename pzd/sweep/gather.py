@@ -112,7 +112,7 @@ class Results:
         return tuple(
             SpreadRow(
                 combination=combination,
-                about=about,
+                about=label,
                 measure=measure,
                 draws=values.size,
                 mean=float(values.mean()),
@@ -121,7 +121,7 @@ class Results:
                 median=float(np.median(values)),
                 percent_95=float(np.percentile(values, 95.0)),
             )
-            for combination, about, measure, found in self._measures()
+            for combination, label, measure, found in self._measures()
             for drawn in [found[: self._independent]]
             for values in [drawn[np.isfinite(drawn)]]
             if values.size
@@ -138,9 +138,9 @@ class Results:
             return ()
         return tuple(
             row
-            for combination, about, measure, found in self._measures()
+            for combination, label, measure, found in self._measures()
             if np.isfinite(found).all() and float(np.ptp(found)) > 0.0
-            for row in self._indices_of((combination, about, measure), found)
+            for row in self._indices_of((combination, label, measure), found)
         )
 
     def _indices_of(self, labels: tuple[str, str, str], values: Array) -> list[IndexRow]:
@@ -151,11 +151,11 @@ class Results:
         generator = np.random.default_rng(self.seed)
         again = [_sobol(parts[:, generator.integers(n, size=n)]) for _ in range(RESAMPLES)]
         low, high = np.nanpercentile(again, INTERVAL, axis=0)
-        combination, about, measure = labels
+        combination, label, measure = labels
         return [
             IndexRow(
                 combination=combination,
-                about=about,
+                about=label,
                 measure=measure,
                 quantity=name,
                 first_order=float(found[0, i]),
@@ -187,9 +187,9 @@ class Results:
             )
             by_label = [{_row_label(row): row for row in rows} for rows in runs]
             combination = ", ".join(f"{key} = {value}" for key, value in over)
-            for about, key in names:
-                values = [_number(each.get(about, {}).get(key)) for each in by_label]
-                found.append((combination, about, key, np.array(values)))
+            for label, key in names:
+                values = [_number(each.get(label, {}).get(key)) for each in by_label]
+                found.append((combination, label, key, np.array(values)))
         return found
 
 
@@ -305,12 +305,12 @@ def decisive(results: Results) -> list[str]:
     """Say for every label which quantities decide over the most important measure, and by how much."""
     measure = MEASURES[results.sweep.until][0]
     lines = []
-    for (combination, about), rows in groupby(
+    for (combination, label), rows in groupby(
         (row for row in results.indices if row.measure == measure), key=lambda row: (row.combination, row.about)
     ):
         ordered = sorted(rows, key=lambda row: -row.total_order)
         shares = ", ".join(f"{row.quantity} {row.total_order:.0%} ({_interval(row)})" for row in ordered[:_MOST_NAMED])
-        lines.append(f"{measure} of {_label(combination, about)}: of the variance {shares}")
+        lines.append(f"{measure} of {_label(combination, label)}: of the variance {shares}")
     return lines
 
 
@@ -407,11 +407,11 @@ def _in_words(how: Uniform | Normal | Scatter) -> str:
     return "drawn as uncertain as the tests leave it" if isinstance(how, str) else f"scatters by {how:.3g} of its value"
 
 
-def _label(combination: str, about: str) -> str:
+def _label(combination: str, label: str) -> str:
     """Name what a result belongs to, keys of the config by their last word."""
     pairs = (part.partition(" = ") for part in combination.split(", "))
     short = ", ".join(f"{key.rpartition('.')[2]}{equals}{value}" for key, equals, value in pairs)
-    return ", ".join(part for part in (short, about) if part) or "all"
+    return ", ".join(part for part in (short, label) if part) or "all"
 
 
 def _percent(share: float) -> str:

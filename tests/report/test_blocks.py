@@ -1,4 +1,4 @@
-"""Numbers read as people write them."""
+"""Numbers, times and words as the page writes them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pzd.report.blocks import amount, interval, listed, minutes, number, sentenc
         (float("inf"), "\u2013"),
     ],
 )
-def test_numbers(value: float | None, text: str) -> None:
+def test_a_number_has_three_digits_and_thin_spaces(value: float | None, text: str) -> None:
     assert number(value) == text
 
 
@@ -44,7 +44,9 @@ def test_a_number_keeps_its_unit_and_none_has_none() -> None:
         ((5.0, None, None), "5 (no interval)"),
     ],
 )
-def test_intervals(given: tuple[float | None, ...], text: str) -> None:
+def test_a_number_has_the_digits_that_its_interval_supports_on_the_page(
+    given: tuple[float | None, ...], text: str
+) -> None:
     assert interval(*given) == text
 
 
@@ -59,11 +61,11 @@ def test_intervals(given: tuple[float | None, ...], text: str) -> None:
         (1440.0, "> 24 h"),
     ],
 )
-def test_times(value: float, text: str) -> None:
+def test_a_time_of_exposure_is_written_in_hours_and_minutes(value: float, text: str) -> None:
     assert minutes(value).replace("\u00a0", " ") == text
 
 
-def test_words() -> None:
+def test_words_are_joined_to_an_enumeration_and_a_sentence() -> None:
     assert listed(["a"]) == "a"
     assert listed(["a", "b", "c"], "or") == "a, b or c"
     assert listed([]) == ""
