@@ -93,6 +93,10 @@ def design(sweep: SweepConfig, seed: int) -> Array:
     Returns
     -------
     (runs, d) of the d quantities; (1, 0) without any
+
+    >>> unit = {"uniform": (0.0, 1.0)}
+    >>> design(SweepConfig(drawn={"a": unit, "b": unit}, draws=4), seed=1).shape
+    (16, 2)
     """
     from scipy.stats.qmc import Sobol
 

@@ -362,39 +362,30 @@ def test_a_hypothesis_is_told_in_words_in_a_table_and_in_a_picture(run: Any) -> 
 
 
 @pytest.mark.ci
-def test_what_is_left_is_drawn_over_three_planes_where_it_has_no_name(run: Any) -> None:
-    def planes(of: Any) -> list[str]:
-        tags = Reader(of.told().page).tags
-        alts = [str(attributes["alt"]) for tag, attributes in tags if tag == "img"]
-        return [alt for alt in alts if alt.startswith("Mean of measured minus simulated force over")]
+def test_only_an_unexplained_residual_is_drawn_over_planes_by_frequency_by_distribution_and_by_test(
+    run: Any, read: Reader
+) -> None:
+    begins = ("Mean of measured minus", "R.m.s. of measured minus", "Quantiles of measured minus", "T0, C and k of")
 
-    found = planes(with_hypotheses(run, Hypotheses(sought=True)))
-    assert [alt.split(" over ")[1].split(" at ")[0] for alt in found] == [
+    def alts(page: Reader) -> list[str]:
+        every = (str(picture["alt"]).replace("\u00a0", " ") for picture in page.pictures())
+        return [alt for alt in every if alt.startswith(begins)]
+
+    found = alts(Reader(with_hypotheses(run, Hypotheses(sought=True)).told().page))
+    planes = [alt for alt in found if alt.startswith("Mean of")]
+    assert [alt.split(" over ")[1].split(" at ")[0] for alt in planes] == [
         "displacement and velocity",
         "velocity and force",
         "force and its rate",
     ]
-    assert all("at 0 V, 150 V" in alt.replace("\u00a0", " ") for alt in found)
-    assert planes(run) == []
-
-
-@pytest.mark.ci
-def test_what_is_left_is_drawn_by_frequency_and_by_its_spread_and_tests_alone_over_what_they_differ_in(
-    run: Any,
-) -> None:
-    def told(of: Any) -> list[str]:
-        alts = [str(attributes["alt"]) for tag, attributes in Reader(of.told().page).tags if tag == "img"]
-        begins = ("R.m.s. of measured minus", "Quantiles of measured minus", "T0, C and k of")
-        return [alt.replace("\u00a0", " ") for alt in alts if alt.startswith(begins)]
-
-    found = told(with_hypotheses(run, Hypotheses(sought=True)))
+    assert all("at 0 V, 150 V" in alt for alt in planes)
     assert [alt.partition(";")[0] for alt in found if alt.startswith("R.m.s.")] == [
         "R.m.s. of measured minus simulated force by third octaves at 0 V",
         "R.m.s. of measured minus simulated force by third octaves at 150 V",
     ]
     assert sum(alt.startswith("Quantiles") for alt in found) == 1
     assert any(alt.endswith("each fitted alone, over the order of the files.") for alt in found)
-    assert told(run) == []
+    assert alts(read) == []
 
 
 def test_without_a_hypothesis_the_page_says_that_none_predicts_or_says_nothing(words_only: None, run: Any) -> None:
@@ -447,7 +438,7 @@ def test_a_damper_without_control_and_without_a_car_is_told_without_either(run: 
 
 
 @pytest.mark.ci
-def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any) -> None:
+def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any, read: Reader) -> None:
     """The table leaves it to the static balance; a rig measures it, and the page tells what a rig measures."""
     damper = run.diagnosed.damper.with_effect("preload_offset", {"F_0": 90.0})
     charged = replace(run, diagnosed=replace(run.diagnosed, damper=damper))
@@ -457,7 +448,7 @@ def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any) -> Non
         (row,) = re.findall(r"0\.377 m/s ([\d ]+) N ([\d ]+) N ", text)
         return [float(force.replace(" ", "")) for force in (*ends, *row)]
 
-    without, text = (Reader(each.told().page).text.replace("\xa0", " ") for each in (run, charged))
+    without, text = (page.text.replace("\xa0", " ") for page in (read, Reader(charged.told().page)))
     assert forces(text) == [pytest.approx(force + 90.0, rel=5e-3) for force in forces(without)]
     assert "In rebound at 0.377 m/s and 22 °C; 90 N of it act at rest as well." in text
     told = "ith the 90 N at rest that the table (4-table) leaves out"
