@@ -5,15 +5,6 @@ itself into its stage's folder and reads itself back, checked, with file and lin
 wrong. `control` renames the columns of the control signal.
 """
 
-from pzd.artefacts.characteristics import (
-    AsItStandsRow,
-    Characteristics,
-    ContinuousVelocityRow,
-    GasAndFrictionRow,
-    PeakVelocityRow,
-    StepRow,
-    WarmUpRow,
-)
 from pzd.artefacts.diagnosis import (
     Diagnosed,
     Diagnosis,
@@ -31,10 +22,17 @@ from pzd.artefacts.diagnosis import (
 )
 from pzd.artefacts.identified import (
     FALLBACK,
+    AsItStandsRow,
     AuxiliaryRow,
+    Characteristics,
+    ContinuousVelocityRow,
+    GasAndFrictionRow,
     Identified,
     MeasureRow,
     ParameterRow,
+    PeakVelocityRow,
+    StepRow,
+    WarmUpRow,
     base_of,
     identified_damper,
 )

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from pzd.artefacts import Diagnosis, Hypotheses, HypothesisRow, KeptBack, NextTest, Prediction, Value
-from pzd.artefacts.characteristics import AVERAGED, courses
+from pzd.artefacts.identified import AVERAGED, courses
+from pzd.artefacts.knee import OF_A_DIRECTION, OF_BOTH
 from pzd.artefacts.rig import force_behind
 from pzd.artefacts.table import fastest
 from pzd.quantities import Control
@@ -236,7 +237,7 @@ def _direction(each: DirectionOfCondition) -> list[str]:
         *_knee_place(row.setting, row.voltage_V, row.temperature_degC),
         each.direction,
         *(text if inside or text == "-" else f"({text})" for text, inside in zip(forces, each.inside, strict=True)),
-        *(interval(*bounds) for bounds in each.intervals),
+        *(interval(*each.estimate(name)) for name in (*OF_A_DIRECTION, *OF_BOTH)),
     ]
 
 

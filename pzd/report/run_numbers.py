@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from pzd.artefacts import ComfortRow, Identified, ParameterRow, Rides, SummaryRow
+from pzd.artefacts.csv_rows import Estimate
 from pzd.artefacts.rig import ANY, Conditions, matching, undecided
 from pzd.quantities import Control
 from pzd.simulate.config import SimulateConfig
@@ -173,10 +174,9 @@ def _parameter(run: RunNumbers, column: str, asked: Asked) -> Found:
         return Found(
             None, _undecided("conditions", [_label(row, run.control) for row in met], open_columns, run.control)
         )
-    row, value = met[0], getattr(met[0], column)
-    low, high = getattr(row, f"{column}_low95", None), getattr(row, f"{column}_high95", None)
-    interval = "" if low is None or high is None else f", 95 % {low:.4g} to {high:.4g}"
-    return Found(value, f"identified at {_label(row, run.control)}{interval}, {row.status}")
+    row, estimate = met[0], Estimate.of(met[0], column)
+    interval = "" if estimate.interval is None else ", 95 % {:.4g} to {:.4g}".format(*estimate.interval)
+    return Found(estimate.value, f"identified at {_label(row, run.control)}{interval}, {row.status}")
 
 
 def _label(row: ParameterRow, control: Control) -> str:

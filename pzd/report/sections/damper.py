@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pzd.artefacts import ClickRow, ForceRow, ParameterRow, UnitRow
-from pzd.artefacts.knee import DIRECTIONS, OF_A_DIRECTION, DirectionOfCondition
+from pzd.artefacts.knee import DIRECTIONS, OF_A_DIRECTION, OF_BOTH, DirectionOfCondition
 from pzd.artefacts.table import fastest
 from pzd.damper.confounders import known
 from pzd.damper.model import BaseRow
@@ -138,7 +138,7 @@ def _parameters(context: ReportContext) -> TextTable:
     """Bleed, knee and blow-off of either direction."""
     header = (*_header(context), "direction", "bleed [N s/m]", "knee [N]", "knee [m/s]", "blow-off [N s/m]")
     rows = tuple(
-        (*_direction(context, each), *(interval(*bounds) for bounds in each.intervals[: len(OF_A_DIRECTION)]))
+        (*_direction(context, each), *(interval(*each.estimate(name)) for name in OF_A_DIRECTION))
         for each in context.identified.knees.directions()
     )
     title = "Bleed, knee (with friction, without gas) and blow-off with 95 % intervals"
@@ -151,7 +151,7 @@ def _of_both(context: ReportContext) -> TextTable:
     rows = tuple(
         (
             *_place(context, each.row.setting, each.row.voltage_V, each.row.temperature_degC),
-            *(interval(*bounds) for bounds in each.intervals[len(OF_A_DIRECTION) :]),
+            *(interval(*each.estimate(name)) for name in OF_BOTH),
             each.row.status,
         )
         for each in context.identified.knees.directions()

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.artefacts import PeakVelocityRow, RecordEntry
-from pzd.artefacts.characteristics import AVERAGED, courses
+from pzd.artefacts.identified import AVERAGED, courses
 from pzd.artefacts.rig import force_behind
 from pzd.record import Record
 from pzd.report.blocks import (
