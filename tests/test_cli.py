@@ -21,8 +21,8 @@ from stub_stages import NAMES, NEXT_TEST, UNDETERMINED, project
 
 from pzd.artefacts import Diagnosis, Gap, KeptBack, LeftOut, Prediction, Ranked, Region, Value
 from pzd.cli.app import status
+from pzd.cli.look import diagnosis_lines
 from pzd.cli.output import Output
-from pzd.cli.text_tables import diagnosis_lines
 from pzd.config import load
 from pzd.damper.effects import library
 from pzd.parallel.processes import Progress

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pzd.artefacts import Diagnosed, Identified, ParameterRow, RecordEntry, Rig, Value, extent
-from pzd.cli.text_tables import diagnosis_lines
+from pzd.cli.look import diagnosis_lines
 from pzd.config import load
 from pzd.damper.model import BaseRow, Damper
 from pzd.identification.config import GroupConfig, IdentifyConfig

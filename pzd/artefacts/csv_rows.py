@@ -74,6 +74,13 @@ class ConditionRow(Frozen):
         """Setting, control signal and temperature."""
         return self.setting, self.voltage_V, self.temperature_degC
 
+    def words(self, control: Control, rig: str = "") -> str:
+        """Return the condition in words, with another word for the setting where the rig has none."""
+        parts = [self.setting or rig]
+        parts += [f"{self.voltage_V:.4g} {control.unit}"] if self.voltage_V is not None else []
+        parts += [f"{self.temperature_degC:.4g} degC"] if self.temperature_degC is not None else []
+        return ", ".join(filter(None, parts))
+
 
 class RecordRow(Frozen):
     """A row about one test of a record, at the condition of that test."""

@@ -292,7 +292,7 @@ class Identified:
         rows = read_files(IDENTIFIED, folder, control)
         parameters: tuple[ParameterRow, ...] = rows["rows"]
         conditions = [row.condition for row in parameters]
-        twice = [_name(row, control) for i, row in enumerate(parameters) if conditions[i] in conditions[:i]]
+        twice = [row.words(control, "rig") for i, row in enumerate(parameters) if conditions[i] in conditions[:i]]
         if twice:
             raise DataError(f"{folder / 'parameters.csv'}: two rows of one condition ({each})" for each in twice)
         if faults := _unphysical(parameters, folder / "parameters.csv"):
@@ -302,7 +302,7 @@ class Identified:
     def untrusted(self, control: Control) -> tuple[str, ...]:
         """Return why the result is not to be trusted (exit 4): the rows whose T0 or C is undetermined."""
         return tuple(
-            f"{_name(row, control)}: {row.status}" for row in self.rows if row.T0_N is None or row.C_Ns_per_m is None
+            f"{row.words(control, 'rig')}: {row.status}" for row in self.rows if row.T0_N is None or row.C_Ns_per_m is None
         )
 
 
@@ -322,14 +322,6 @@ def _unphysical(rows: tuple[ParameterRow, ...], path: Path) -> list[str]:
         if (value := getattr(row, name)) is not None and getattr(row, f"{name}_low95") is None
         if (wrong := unphysical(name, value)) is not None
     ]
-
-
-def _name(row: ParameterRow, control: Control) -> str:
-    """Return setting, control signal and temperature of a row, those that it has."""
-    parts = [row.setting or "rig"]
-    parts += [f"{row.voltage_V:.4g} {control.unit}"] if row.voltage_V is not None else []
-    parts += [f"{row.temperature_degC:.4g} degC"] if row.temperature_degC is not None else []
-    return ", ".join(parts)
 
 
 def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:

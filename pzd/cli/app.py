@@ -22,7 +22,7 @@ from pzd.cli.output import DONE, INTERRUPTED, OWN_FAULT, complain, own_fault, si
 from pzd.schema.errors import ConfigError, FilesError, UserError
 
 _USAGE_ERROR: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
-"""The base of what typer says about wrong usage; it is click's own or typer's copy of it."""
+"""Base class of typer's errors of usage: that of click, or typer's copy of it."""
 
 app = typer.Typer(
     name="pzd",
@@ -35,12 +35,9 @@ app = typer.Typer(
 )
 _COMMANDS: tuple[Callable[..., int], ...] = (
     *stages.COMMANDS,
-    *stages.WATCH_COMMANDS,
     *peers.COMMANDS,
     *look.COMMANDS,
     *export.COMMANDS,
-    *export.FIGURE_COMMANDS,
-    *campaigns.SWEEP_COMMANDS,
     *campaigns.COMMANDS,
     *start.COMMANDS,
 )
@@ -130,7 +127,7 @@ def _failed(error: Exception, arguments: Sequence[str]) -> int:
 
 
 def _usage(error: Exception, arguments: Sequence[str]) -> str:
-    """What is wrong with the usage, as one line."""
+    """Return one line about wrong usage, with the nearest command."""
     names = [one.__name__ for one in _COMMANDS]
     given = next((word for word in arguments if word in names), None)
     context = getattr(error, "ctx", None)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import zip_longest
 
 from pzd.comfort.iso2631_1978 import LONGEST_MIN
-from pzd.schema.errors import rounded_as
 
 # ----------------------------------------------------------------------------------------------------
 # Numbers, units and times as people read them.
@@ -20,9 +19,6 @@ DASH = "\u2013"
 TIMES = "\u00d7"
 KEPT = "\u00a0"
 """A space at which no line breaks."""
-
-LOST = 0.005
-"""A value of less than this share of its interval's width does not show in the width's second digit."""
 
 _UNITS = {
     "m/s2": "m/s²",
@@ -65,38 +61,6 @@ def amount(value: float | None, unit: str, digits: int = 3) -> str:
     """A number with its unit; a dash alone where there is none."""
     text, shown = number(value, digits), unit_of(unit)
     return text if text == DASH or not shown else f"{text}{KEPT}{shown}"
-
-
-def amount_as(value: float, other: float, unit: str, digits: int = 3) -> str:
-    """A number with its unit, to the decimal place to which another one is told, from which it was read."""
-    return amount(rounded_as(value, other, digits), unit, digits)
-
-
-def interval(value: float | None, low: float | None, high: float | None) -> str:
-    """A number with its 95 % interval, as many digits as the interval leaves sense in."""
-    if value is None:
-        return DASH
-    if low is None or high is None:
-        return f"{number(value)} (no interval)"
-    if abs(value) < LOST * (high - low):
-        value = 0.0
-    digits = _digits(value, high - low)
-    return f"{number(value, digits)} ({_at(low, value, digits)} to {_at(high, value, digits)})"
-
-
-def _digits(value: float, width: float) -> int:
-    """Significant digits of a value down to the second digit of its interval's width, from 2 to 6."""
-    if value == 0.0 or width <= 0.0:
-        return 3
-    return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(width)) + 2, 2), 6)
-
-
-def _at(bound: float, value: float, digits: int) -> str:
-    """A bound of an interval, to the same decimal place as the value."""
-    if bound == 0.0 or value == 0.0:
-        return number(bound, digits)
-    shift = math.floor(math.log10(abs(bound))) - math.floor(math.log10(abs(value)))
-    return number(bound, max(digits + shift, 1))
 
 
 def percent(share: float | None, digits: int = 2) -> str:
@@ -159,14 +123,6 @@ class TextTable:
     folded: bool = False
     """Whether the reader opens it first."""
     kind: str = field(default="table", init=False)
-
-    def without_empty(self, *columns: str) -> TextTable:
-        """The table less those of the named columns that hold nothing but dashes."""
-        kept = [
-            i for i, name in enumerate(self.header) if name not in columns or any(row[i] != DASH for row in self.rows)
-        ]
-        header, *rows = (tuple(row[i] for i in kept) for row in (self.header, *self.rows))
-        return replace(self, header=header, rows=tuple(rows))
 
     @property
     def numeric(self) -> tuple[bool, ...]:

@@ -172,18 +172,12 @@ def _parameter(run: RunNumbers, column: str, asked: Asked) -> Found:
         return Found(None, f"nothing was identified at {asked.conditions}")
     if open_columns := undecided(run.identified.rows, met, asked.conditions):
         return Found(
-            None, _undecided("conditions", [_label(row, run.control) for row in met], open_columns, run.control)
+            None,
+            _undecided("conditions", [row.words(run.control) or "the rig" for row in met], open_columns, run.control),
         )
     row, estimate = met[0], Estimate.of(met[0], column)
     interval = "" if estimate.interval is None else ", 95 % {:.4g} to {:.4g}".format(*estimate.interval)
-    return Found(estimate.value, f"identified at {_label(row, run.control)}{interval}, {row.status}")
-
-
-def _label(row: ParameterRow, control: Control) -> str:
-    parts = [row.setting] if row.setting else []
-    parts += [f"{row.voltage_V:.4g} {control.unit}"] if row.voltage_V is not None else []
-    parts += [f"{row.temperature_degC:.4g} degC"] if row.temperature_degC is not None else []
-    return ", ".join(parts) or "the rig"
+    return Found(estimate.value, f"identified at {row.words(run.control) or 'the rig'}{interval}, {row.status}")
 
 
 def _undecided(what: str, names: list[str], open_columns: tuple[str, ...], control: Control) -> str:

@@ -19,10 +19,10 @@ from pzd.artefacts import (
     PredictedRow,
     UnitRow,
 )
-from pzd.cli.text_tables import characteristics_tables, knee_tables
 from pzd.damper.model import Damper
-from pzd.pipeline.run_summary import RunSummary
 from pzd.quantities import Control
+from pzd.report import tables
+from pzd.report.columns import TERMINAL
 
 PLACE = {"setting": "gap 0.25 mm", "voltage_V": 0.0, "temperature_degC": 22.0}
 VALUES = {
@@ -140,19 +140,24 @@ def test_the_page_has_the_force_a_psi_and_that_of_the_gas_itself(page: str) -> N
 
 
 def test_the_page_has_the_extremes_of_a_record_that_is_no_test_of_the_trade(page: str) -> None:
-    forces, speeds = ("2\u202f350\u00a0N", "\u2212678\u00a0N"), ("1.23\u00a0m/s", "\u22120.456\u00a0m/s")
-    for cell in ("knock-7", *forces, *speeds, "32.1 mm", "0.654\u00a0s"):
+    ends = ("\u2212678 to 2\u202f350\u00a0N", "\u22120.456 to 1.23\u00a0m/s")
+    for cell in ("knock-7", *ends, "32.1\u00a0mm", "0.654\u00a0s"):
         assert cell in page
 
 
-def test_the_terminal_has_them_too() -> None:
-    shown = Characteristics(as_it_stands=(knock(),))
-    found = RunSummary(Path(), Control(), (), None, (), (), None, (), characteristics=shown, knees=knees())
-    head, row = dict(characteristics_tables(found))["none of these tests, as it stands: extremes of all samples"]
+def terminal(title: str) -> list[tuple[str, ...]]:
+    """Heads and rows of a table of the knee law as the terminal has them."""
+    (found,) = (table for table in tables.knee(knees(), Control()) if table.title.startswith(title))
+    return found.cells(TERMINAL)
+
+
+def test_the_terminal_has_the_extremes_and_the_force_a_psi_too() -> None:
+    (table,) = tables.characteristics(Characteristics(as_it_stands=(knock(),)), Control())
+    head, row = table.cells(TERMINAL)
     assert row[head.index("force [N]")] == "-678 to 2350"
     assert row[head.index("velocity [m/s]")] == "-0.456 to 1.23"
-    (told,) = (rows for title, rows in knee_tables(found) if title.startswith("force a unit"))
-    assert told[1][-5:] == ["100 to 150 psi", "0.131", "0.17 N/psi", "0.23 N/psi", "-1.37 N/psi"]
+    _, row = terminal("Force a unit")
+    assert row[-5:] == ("100 to 150 psi", "0.131", "0.17 N/psi", "0.23 N/psi", "-1.37 N/psi")
 
 
 def test_the_page_does_not_call_a_knee_a_missing_effect(page: str) -> None:
@@ -166,17 +171,15 @@ def test_without_a_knee_law_the_page_says_nothing_of_it(run, tmp_path: Path) -> 
     assert "knee" not in run.told(folder=tmp_path).page
 
 
-def test_the_terminal_has_the_same_table_with_a_dash_where_a_direction_is_straight() -> None:
-    found = RunSummary(Path(), Control(), (), None, (), (), None, (), knees=knees())
-    tables = dict(knee_tables(found))
-    head, rebound, compression = tables["rebound and compression, forces with the gas force at mid-stroke"]
-    assert rebound[head.index("0.131 m/s [N]")] == "-92"
-    assert rebound[head.index("0.262 m/s [N]")] == "(-7)"
+def test_the_terminal_has_the_same_tables_with_a_dash_where_a_direction_is_straight() -> None:
+    head, rebound, _ = terminal("Force at the speeds")
+    assert rebound[head.index("at 0.131 m/s [N]")] == "-92"
+    assert rebound[head.index("at 0.262 m/s [N]")] == "(-7)"
+    head, rebound, compression = terminal("Bleed, knee")
     assert rebound[head.index("knee [m/s]")].startswith("0.085 (")
     assert compression[head.index("knee [N]")] == "-"
-    assert tables["force a click, without the gas"][1][-2:] == ["21.5", "0.4"]
+    assert terminal("Force a click")[1][-2:] == ("21.5", "0.4")
 
 
 def test_a_run_without_a_knee_law_prints_no_table_of_it() -> None:
-    found = RunSummary(Path(), Control(), (), None, (), (), None, ())
-    assert all(not rows for _, rows in knee_tables(found))
+    assert not any(table.lines() for table in tables.knee(Knees(), Control()))
