@@ -301,9 +301,8 @@ class Identified:
 
     def untrusted(self, control: Control) -> tuple[str, ...]:
         """Return why the result is not to be trusted (exit 4): the rows whose T0 or C is undetermined."""
-        return tuple(
-            f"{row.words(control, 'rig')}: {row.status}" for row in self.rows if row.T0_N is None or row.C_Ns_per_m is None
-        )
+        rows = [row for row in self.rows if row.T0_N is None or row.C_Ns_per_m is None]
+        return tuple(f"{row.words(control, 'rig')}: {row.status}" for row in rows)
 
 
 IDENTIFIED: Files = {
