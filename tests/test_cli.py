@@ -19,7 +19,7 @@ import pytest
 import yaml
 from stub_stages import NAMES, NEXT_TEST, UNDETERMINED, project
 
-from pzd.artefacts import Diagnosis, Gap, KeptBack, LeftOut, Prediction, Ranked, Region, Value
+from pzd.artefacts import Diagnosis, Gap, HeldOutTest, HeldOutVoltage, Prediction, Ranked, Region, Value
 from pzd.cli.app import status
 from pzd.cli.look import diagnosis_lines
 from pzd.cli.output import Output
@@ -670,10 +670,10 @@ def test_the_story_tells_what_a_test_between_two_voltages_is_for() -> None:
 def test_the_story_tells_every_kept_back_test_where_it_is_asked_to() -> None:
     kept_back = Prediction(
         hold_out="tests",
-        by=(KeptBack(record="r03", voltage=100.0, W_s_plain=0.012, W_s=0.003, R2_plain=0.9871, R2=0.99675),),
+        by=(HeldOutTest(record="r03", voltage=100.0, W_s_plain=0.012, W_s=0.003, R2_plain=0.9871, R2=0.99675),),
         W_s_plain=0.011,
         W_s=0.004,
-        left_out_voltages=(LeftOut(voltage=50.0, W_s_plain=0.02, W_s=0.01),),
+        left_out_voltages=(HeldOutVoltage(voltage=50.0, W_s_plain=0.02, W_s=0.01),),
     )
     predicted = diagnosis().model_copy(update={"prediction": kept_back})
     whole = "prediction of whole tests kept back: W_s 0.011 plain, 0.004 as handed on"

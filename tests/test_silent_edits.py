@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pzd.artefacts import Diagnosed, Identified, ParameterRow, RecordEntry, Rig, Value, extent
+from pzd.artefacts import Diagnosed, Identified, ParameterRow, RecordEntry, Rig, Value, entry_numbers
 from pzd.cli.look import diagnosis_lines
 from pzd.config import load
 from pzd.damper.model import BaseRow, Damper
@@ -132,7 +132,7 @@ def rig() -> Rig:
     swing, speed, acceleration = 0.02 * np.sin(phase), 0.14 * np.cos(phase), -0.98 * np.sin(phase)
     force = 1e3 * np.cos(phase) + 40.0
     record = Record("r0", None, time, swing, speed, acceleration, force, np.full(time.size, 50.0))
-    return Rig((record,), (RecordEntry(name="r0", setting=None, **extent(record, cycles(time, swing))),))
+    return Rig((record,), (RecordEntry(name="r0", setting=None, **entry_numbers(record, cycles(time, swing))),))
 
 
 def scaled(column: int, factor: float) -> Edit:
@@ -291,7 +291,7 @@ def test_a_value_against_nature_that_was_diagnosed_so_is_read_back(tmp_path: Pat
     told = odd.diagnosis.model_copy(
         update={"parameters": {"gas_spring": {"k_g": stiffness}}, "effects": ("gas_spring",)}
     )
-    found = Diagnosed(told, odd.plain.with_effect("gas_spring", {"k_g": -500.0}), odd.plain, odd.parameters)
+    found = Diagnosed(told, odd.baseline.with_effect("gas_spring", {"k_g": -500.0}), odd.baseline, odd.parameters)
     assert edited(found, tmp_path, "damper.yaml", str)
 
 

@@ -36,7 +36,7 @@ class Gap(Frozen):
     hold_out: Literal["records", "cycles", "segments", "mixed"]
 
 
-class KeptBack(Frozen):
+class HeldOutTest(Frozen):
     """One held-out test, predicted by the baseline and by the adopted damper, each fitted without it."""
 
     record: str
@@ -51,7 +51,7 @@ class KeptBack(Frozen):
     """The same of the adopted damper."""
 
 
-class LeftOut(Frozen):
+class HeldOutVoltage(Frozen):
     """One held-out voltage, predicted by interpolation between its neighbours."""
 
     voltage: float
@@ -64,10 +64,10 @@ class Prediction(Frozen):
 
     hold_out: Literal["tests", "cycles", "segments", "mixed"]
     """Whole tests; halves of one, by cycles or segments, where it is alone at its voltage; or some of either."""
-    by: tuple[KeptBack, ...]
+    by: tuple[HeldOutTest, ...]
     W_s_plain: float
     W_s: float
-    left_out_voltages: tuple[LeftOut, ...]
+    left_out_voltages: tuple[HeldOutVoltage, ...]
     """Every voltage between two others."""
 
 
@@ -276,7 +276,7 @@ HYPOTHESES: Files = {"rows": ("hypotheses.csv", HypothesisRow), "points": ("hypo
 
 # --- `pzd peers`: the adopted damper beside published models, on held-out tests ---
 
-PLAIN, HANDED_ON = "plain", "handed_on"
+BASELINE, ADOPTED = "plain", "handed_on"
 """Names of the baseline and of the adopted damper in the column `model`."""
 
 
@@ -343,24 +343,24 @@ class Diagnosed:
     diagnosis: Diagnosis
     damper: Damper
     """The adopted damper."""
-    plain: Damper
-    """The baseline: the damper before diagnose."""
+    baseline: Damper
+    """The damper before diagnose."""
     parameters: tuple[ParameterRow, ...] = ()
     """T0, C and k of the damper with their intervals; empty where nobody fitted them."""
     hypotheses: Hypotheses = field(default_factory=Hypotheses)
     """Shapes of the residual force where the verdict is `unexplained`; no later stage depends on them."""
 
     @classmethod
-    def undiagnosed(cls, damper: Damper, plain: Damper | None = None) -> Self:
+    def undiagnosed(cls, damper: Damper, baseline: Damper | None = None) -> Self:
         """Return a damper that nobody diagnosed, in the form in which the stages behind diagnose take it."""
         gap = Gap(before=0.0, after=0.0, noise_floor=0.0, standard_error=0.0, held_out=(), hold_out="records")
-        return cls(Diagnosis.without_effects("none", "not diagnosed", gap), damper, plain or damper)
+        return cls(Diagnosis.without_effects("none", "not diagnosed", gap), damper, baseline or damper)
 
     def write(self, folder: Path, control: Control) -> None:
         """Write diagnosis.json, damper.yaml, plain.yaml, parameters.csv, and hypotheses where any was looked for."""
         write_json(folder / "diagnosis.json", self.diagnosis, control)
         write_yaml_model(folder / "damper.yaml", self.damper, control)
-        write_yaml_model(folder / "plain.yaml", self.plain, control)
+        write_yaml_model(folder / "plain.yaml", self.baseline, control)
         write_rows(folder / "parameters.csv", ParameterRow, self.parameters, control)
         self.hypotheses.write(folder, control)
 
@@ -375,8 +375,8 @@ class Diagnosed:
         diagnosis = read_json(folder / "diagnosis.json", Diagnosis, control)
         damper = read_yaml_model(folder / "damper.yaml", Damper, control)
         rows = read_rows(folder / "parameters.csv", ParameterRow, control)
-        plain = read_yaml_model(folder / "plain.yaml", Damper, control)
-        expected = {*diagnosis.effects, *plain.effects}
+        baseline = read_yaml_model(folder / "plain.yaml", Damper, control)
+        expected = {*diagnosis.effects, *baseline.effects}
         if expected != set(damper.effects):
             raise DataError(
                 f"{at(folder / 'damper.yaml')}: effects: must be those of diagnosis.json and plain.yaml, "
@@ -386,7 +386,7 @@ class Diagnosed:
             name: _values(name, diagnosis, damper, control) for name in damper.effects if name in diagnosis.effects
         }
         diagnosis = diagnosis.model_copy(update={"parameters": values, "zero_m": damper.zero_m})
-        return cls(diagnosis, damper, plain, rows, Hypotheses.read(folder, control))
+        return cls(diagnosis, damper, baseline, rows, Hypotheses.read(folder, control))
 
 
 def _values(effect: str, diagnosis: Diagnosis, damper: Damper, control: Control) -> dict[str, Value]:

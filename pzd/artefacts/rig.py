@@ -161,7 +161,7 @@ def _read_record(folder: Path, number: int, entry: RecordEntry, control: Control
     return record
 
 
-def extent(record: Record, run: Cycles | None) -> dict[str, Any]:
+def entry_numbers(record: Record, run: Cycles | None) -> dict[str, Any]:
     """Return the numbers of a record that its entry in records.json holds, by which an edit of either is noticed.
 
     Parameters
@@ -199,7 +199,7 @@ def _rms(channel: Array) -> float:
 def _edits(entry: RecordEntry, record: Record, control: Control) -> dict[str, str]:
     """Return a fault for each number of an entry that its file contradicts after an edit, by its key."""
     faults: dict[str, str] = {}
-    for name, recorded in extent(record, cycles_of(record)).items():
+    for name, recorded in entry_numbers(record, cycles_of(record)).items():
         listed = getattr(entry, name)
         if (listed is None and (recorded is None or name in _MAY_BE_LEFT_OUT)) or _agree(name, listed, recorded):
             continue
@@ -260,7 +260,7 @@ def same_motion(a: float, b: float) -> bool:
     return abs(a - b) <= SAME_MOTION * max(abs(a), abs(b))
 
 
-def force_behind(found: Characteristics, row: GasAndFrictionRow) -> float:
+def slowest_test_force(found: Characteristics, row: GasAndFrictionRow) -> float:
     """Return the largest force of the slowest tests of a condition, which its gas force and friction come from [N].
 
     The two are a mean and half a difference of such forces, so no digit below the last one of these is significant.
@@ -302,7 +302,7 @@ def matching(rows: Sequence[Row], wanted: Conditions, margin: float | None = Non
     return tuple(sorted(found, key=lambda row: abs((row.temperature_degC or 0.0) - (wanted.temperature_degC or 0.0))))
 
 
-def undecided(rows: Sequence[Row], found: Sequence[Row], wanted: Conditions) -> tuple[str, ...]:
+def ambiguous_conditions(rows: Sequence[Row], found: Sequence[Row], wanted: Conditions) -> tuple[str, ...]:
     """Return the conditions that were left open and in which the rows found differ, so that no one of them is meant.
 
     Parameters

@@ -69,7 +69,7 @@ class SettingLeftOutRow(Frozen):
     largest_share_of_peak: float = Field(ge=0.0)
 
 
-def fastest(rows: Sequence[SettingRow]) -> tuple[tuple[SettingRow, SettingRow], ...]:
+def at_largest_speed(rows: Sequence[SettingRow]) -> tuple[tuple[SettingRow, SettingRow], ...]:
     """Return the rows of the largest speed in rebound and in compression, of each setting, temperature and control.
 
     Parameters

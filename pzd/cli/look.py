@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pzd.artefacts import Diagnosis, Hypotheses, HypothesisRow, KeptBack, NextTest, Prediction, Value
+from pzd.artefacts import Diagnosis, HeldOutTest, Hypotheses, HypothesisRow, NextTest, Prediction, Value
 from pzd.artefacts.csv_rows import Estimate
 from pzd.cli.output import CORES, DONE, RUNS, Config, Json, Output, Quiet, Runs, Set, Verbose
 from pzd.quantities import Control
@@ -309,7 +309,7 @@ def _gap(diagnosis: Diagnosis) -> str:
 
 
 def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[str]:
-    def errors(each: Prediction | KeptBack | Any) -> str:
+    def errors(each: Prediction | HeldOutTest | Any) -> str:
         return f"W_s {_number(each.W_s_plain)} plain, {_number(each.W_s)} as handed on"
 
     held_out = {"tests": "whole tests", "mixed": "whole tests, or halves"}.get(found.hold_out, f"{found.hold_out}")

@@ -121,7 +121,7 @@ class ReportContext:
 
             motion = Motion.of(record)
             start = float(record.force[0])
-            before = respond(self.diagnosed.plain, motion, start)
+            before = respond(self.diagnosed.baseline, motion, start)
             after = respond(self.diagnosed.damper, motion, start) if self.extended else before
             self._forces[record.name] = (before, after)
         return self._forces[record.name]
@@ -133,7 +133,7 @@ class ReportContext:
     @property
     def fitted_law(self) -> bool:
         """Whether identify handed on another law than Bingham's."""
-        return any(name in fitted_laws() for name in self.diagnosed.plain.effects)
+        return any(name in fitted_laws() for name in self.diagnosed.baseline.effects)
 
     @property
     def model(self) -> str:
@@ -143,7 +143,7 @@ class ReportContext:
     @property
     def extended(self) -> bool:
         """Whether diagnose changed the damper."""
-        return self.diagnosed.damper != self.diagnosed.plain
+        return self.diagnosed.damper != self.diagnosed.baseline
 
     @cached_property
     def shown(self) -> tuple[Record, ...]:

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from pzd.artefacts import ComfortRow, Identified, ParameterRow, Rides, SummaryRow
+from pzd.artefacts import ComfortRow, Identified, Rides, SummaryRow
 from pzd.artefacts.csv_rows import Estimate
-from pzd.artefacts.rig import ANY, Conditions, matching, undecided
+from pzd.artefacts.rig import ANY, Conditions, ambiguous_conditions, matching
 from pzd.quantities import Control
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.roads.sine import Sine
@@ -158,7 +158,7 @@ def _measure(run: RunNumbers, column: str, asked: Asked) -> Found:
     met = matching(rows, asked.conditions)
     if not met:
         return Found(None, f"the rig has no test at {asked.record or asked.conditions}")
-    if open_columns := undecided(rows, met, asked.conditions):
+    if open_columns := ambiguous_conditions(rows, met, asked.conditions):
         return Found(None, _undecided("tests", [row.record for row in met], open_columns, run.control))
     row, value = met[0], getattr(met[0], column)
     power = f", {row.work_per_cycle_J * row.frequency_Hz:.0f} W" if row.frequency_Hz is not None else ""
@@ -170,7 +170,7 @@ def _parameter(run: RunNumbers, column: str, asked: Asked) -> Found:
     met = matching(run.identified.rows, asked.conditions)
     if not met:
         return Found(None, f"nothing was identified at {asked.conditions}")
-    if open_columns := undecided(run.identified.rows, met, asked.conditions):
+    if open_columns := ambiguous_conditions(run.identified.rows, met, asked.conditions):
         return Found(
             None,
             _undecided("conditions", [row.words(run.control) or "the rig" for row in met], open_columns, run.control),

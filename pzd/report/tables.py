@@ -21,8 +21,8 @@ from pzd.artefacts.csv_rows import Estimate
 from pzd.artefacts.diagnosis import PeerComparison, PeerParameterRow, PeerRow
 from pzd.artefacts.identified import AVERAGED, courses
 from pzd.artefacts.knee import DIRECTIONS
-from pzd.artefacts.rig import force_behind
-from pzd.artefacts.table import fastest
+from pzd.artefacts.rig import slowest_test_force
+from pzd.artefacts.table import at_largest_speed
 from pzd.damper.effect import Effect
 from pzd.damper.model import BaseRow
 from pzd.quantities import Control
@@ -123,8 +123,8 @@ def gas_and_friction(found: Characteristics, control: Control) -> Table:
         "Static force at mid-stroke: mean of both directions (gas) and half their difference (friction)",
         (
             *conditions(control),
-            Column("gas_force_N", "gas force", "N", lambda r: Difference(r.gas_force_N, force_behind(found, r))),
-            Column("friction_N", "friction", "N", lambda r: Difference(r.friction_N, force_behind(found, r))),
+            Column("gas_force_N", "gas force", "N", lambda r: Difference(r.gas_force_N, slowest_test_force(found, r))),
+            Column("friction_N", "friction", "N", lambda r: Difference(r.friction_N, slowest_test_force(found, r))),
             Column("velocity_m_per_s", "slowest speed", "m/s"),
             Column("method", "how"),
         ),
@@ -420,7 +420,7 @@ def interpolated_settings(rows: Sequence[SettingRow], control: Control) -> Table
             Column("compression_force_N", "compression", "N", lambda pair: pair[1].force_N + pair[1].static_force_N),
             Column("between", "interpolated between", value=lambda pair: _neighbours(pair[0])),
         ),
-        fastest(rows),
+        at_largest_speed(rows),
     )
 
 

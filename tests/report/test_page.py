@@ -437,7 +437,7 @@ def test_a_damper_without_control_and_without_a_car_is_told_without_either(run: 
         rides=Rides(),
     )
     diagnosis = bare.diagnosed.diagnosis.model_copy(update={"where": (), "prediction": None, "next_test": None})
-    bare = replace(bare, diagnosed=replace(bare.diagnosed, diagnosis=diagnosis, damper=plain, plain=plain))
+    bare = replace(bare, diagnosed=replace(bare.diagnosed, diagnosis=diagnosis, damper=plain, baseline=plain))
     read = Reader(bare.told().page)
     assert read.sections() == [name for name in ORDER if name != "passenger"]
     said = " ".join([read.text, *(picture["alt"] or "" for picture in read.pictures())])

@@ -100,7 +100,7 @@ def knock() -> AsItStandsRow:
 
 def with_knee(run: Any) -> Any:
     """The run on a damper with the knee law, handed on as it was fitted."""
-    damper = Damper(base=run.diagnosed.plain.base).with_effect(
+    damper = Damper(base=run.diagnosed.baseline.base).with_effect(
         "knee", {"beta": 0.4, "F_reb": 900.0, "C_reb": 600.0, "F_comp": 700.0, "C_comp": 500.0}
     )
     diagnosis = run.diagnosed.diagnosis.without_effects("unexplained", "the knee law is handed on", gap=None)
@@ -108,7 +108,7 @@ def with_knee(run: Any) -> Any:
     return replace(
         run,
         identified=replace(run.identified, knees=knees(), characteristics=shown),
-        diagnosed=replace(run.diagnosed, diagnosis=diagnosis, damper=damper, plain=damper, parameters=()),
+        diagnosed=replace(run.diagnosed, diagnosis=diagnosis, damper=damper, baseline=damper, parameters=()),
     )
 
 
