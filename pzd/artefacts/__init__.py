@@ -1,4 +1,4 @@
-"""What each stage hands on: read this package from the top and you know the pipeline.
+"""Artefacts: what each stage writes and the next ones read; from the top, this package is the pipeline.
 
 rig -> identified -> diagnosed -> table -> rides -> report, one file each. Every artefact writes
 itself into its stage's folder and reads itself back, checked, with file and line of whatever is

@@ -1,4 +1,4 @@
-"""What diagnose hands on: the verdict with its evidence, the adopted damper, hypotheses; and the comparison with peers.
+"""Artefact of diagnose: the verdict with its evidence, the adopted damper, hypotheses; and the comparison with peers.
 
 The models down to `Diagnosis` are diagnosis.json, key by key.
 """

@@ -1,4 +1,4 @@
-"""What identify hands on: the parameters of every condition, and what the tests show without any model."""
+"""Artefact of identify: the parameters of every condition, and what the tests show without any model."""
 
 from __future__ import annotations
 

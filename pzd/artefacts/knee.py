@@ -82,7 +82,7 @@ class KneeRow(ConditionRow):
     """Criterion (4) over the samples that the row was fitted to."""
     rmse_N: float = Field(ge=0.0)
     missed_share: float = Field(ge=0.0)
-    """R.m.s. of what the law misses beyond noise, as a share of peak force; 0 where noise alone may show it."""
+    """R.m.s. residual of the law beyond noise, as a share of peak force; 0 where noise alone explains it."""
     status: str = Field(pattern=r"^(ok|weak: .*)$")
     """`ok`, or `weak: ...` with the parameters and the reason."""
 

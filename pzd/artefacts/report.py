@@ -1,4 +1,4 @@
-"""What report writes: comfort numbers, expected numbers and the page; and the manifest of every stage."""
+"""Artefact of report: comfort numbers, expected numbers and the page; and the manifest of every stage."""
 
 from __future__ import annotations
 

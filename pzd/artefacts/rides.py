@@ -1,4 +1,4 @@
-"""What simulate hands on: the rides of the half-car, their summaries, and the response of the damper to a step."""
+"""Artefact of simulate: the rides of the half-car, their summaries, and the response of the damper to a step."""
 
 from __future__ import annotations
 

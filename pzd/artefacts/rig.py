@@ -1,4 +1,4 @@
-"""What rig hands on: the records in canonical columns, with the findings of the preflight; and how to look tests up."""
+"""Artefact of rig: the records in canonical columns, with the findings of the preflight; and the look-up of tests."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class RecordEntry(Frozen):
     force_rms_N: float | None = None
     """R.m.s. of the force about its mean."""
     work_J: float | None = None
-    """Work done on the damper over the record; its sign tells force and displacement of one direction."""
+    """Work done on the damper over the record; below zero where force and displacement have opposite signs."""
     findings: tuple[Finding, ...] = ()
     removed: str | None = None
     """What was subtracted from the force for a known fixture, in words."""

@@ -1,4 +1,4 @@
-"""What table hands on: force over temperature, voltage and velocity, its inverse, and settings between tested ones."""
+"""Artefact of table: force over temperature, voltage and velocity, its inverse, and settings between tested ones."""
 
 from __future__ import annotations
 
@@ -183,7 +183,11 @@ class Neighbours:
 
 
 def numbers_in(setting: str | None) -> tuple[NumberedSetting, ...]:
-    """Return every number in the name of a setting."""
+    """Return every number in the name of a setting.
+
+    >>> numbers_in("gap 0.15 mm")
+    (NumberedSetting(setting='gap 0.15 mm', axis='gap # mm', value=0.15, unit='mm'),)
+    """
     name = setting or ""
     found = []
     for number in _NUMBER.finditer(name):
@@ -206,6 +210,10 @@ def on_axis(axis: str, tested: Sequence[str | None]) -> tuple[NumberedSetting, .
 
 def neighbours(wanted: str, tested: Sequence[str | None]) -> Neighbours:
     """Return the tested settings to either side of a wanted one, on the first axis of its name that has two.
+
+    >>> found = neighbours("gap 0.2 mm", ["gap 0.15 mm", "gap 0.25 mm"])
+    >>> found.lower.setting, found.upper.setting, round(found.share, 3)
+    ('gap 0.15 mm', 'gap 0.25 mm', 0.5)
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ def _end_at_once(_number: int, _frame: FrameType | None) -> None:
 def end_soon_after_interrupt() -> None:
     """From now on, end the program soon after an interrupt, however it takes it."""
     if os.name == "nt":
-        return  # there a pipe cannot be told of signals
+        return  # there no pipe is written to when a signal arrives
     import threading
 
     receive, send = os.pipe()

@@ -1,4 +1,4 @@
-"""Every number is told with the digits that its interval supports, and in the unit of the config."""
+"""Every number has the digits that its interval supports, and the unit of the config."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def row(voltage: float | None, temperature: float | None) -> ParameterRow:
         (0.0, None, "rig, 0 bar: "),
     ],
 )
-def test_an_undetermined_row_is_told_by_the_conditions_that_it_has(
+def test_the_mark_of_an_undetermined_row_names_the_conditions_that_it_has(
     voltage: float | None, temperature: float | None, told: str
 ) -> None:
     (mark,) = Identified((row(voltage, temperature),), ()).untrusted(PRESSURE)
@@ -86,7 +86,7 @@ def test_a_static_force_has_the_digits_of_the_forces_that_it_was_read_from(
     assert tuple(cell.replace("\xa0N", "") for cell in table.cells(PAGE)[1][:2]) == drawn
 
 
-def test_what_was_held_out_is_told_in_words() -> None:
+def test_weak_evidence_says_what_was_held_out() -> None:
     assert weak("records") == ""
     assert "held out were cycles of tests that were also fitted" in weak("cycles")
     assert "mixed" not in weak("mixed")
@@ -102,19 +102,19 @@ def test_what_was_held_out_is_told_in_words() -> None:
         ("mixed", "(2 records, whole or in part)"),
     ],
 )
-def test_the_story_says_of_how_many_records_something_was_held_out(kind: str, told: str) -> None:
+def test_the_line_on_the_gap_says_of_how_many_records_something_was_held_out(kind: str, told: str) -> None:
     gap = Gap.model_validate({**diagnosis().gap.model_dump(), "hold_out": kind})
     lines = diagnosis_lines(diagnosis().model_copy(update={"gap": gap}), Control())
     assert told in lines[2]
 
 
-def test_a_delay_of_either_sign_is_told_without_saying_which_channel_is_late() -> None:
+def test_the_words_for_a_sensor_delay_leave_open_which_channel_is_late() -> None:
     words = effect_in_words("sensor_delay")
     assert "late" not in words
     assert "different instants" in words
 
 
-def test_the_table_is_about_the_control_of_the_config() -> None:
+def test_notes_of_the_force_table_name_the_control_of_the_config() -> None:
     falls = Damper(base=tuple(BaseRow(voltage_V=u, T0_N=100.0 - u, C_Ns_per_m=1e3, k_N_per_m=1e5) for u in (0.0, 50.0)))
     dips = falls.model_copy(update={"base": (*falls.base, BaseRow(voltage_V=90.0, T0_N=300.0, C_Ns_per_m=1e3,
                                                                   k_N_per_m=1e5))})  # fmt: skip
@@ -124,7 +124,7 @@ def test_the_table_is_about_the_control_of_the_config() -> None:
     assert all("from 0 to 50 bar; the lowest pressure that gives the force is taken" in note for note in notes)
 
 
-def test_what_the_table_drops_is_told_with_its_reason() -> None:
+def test_notes_of_the_force_table_give_a_reason_for_each_effect_that_it_leaves_out() -> None:
     row = BaseRow(T0_N=300.0, C_Ns_per_m=1800.0, k_N_per_m=4e5)
     effects = {"preload_offset": {"F_0": 90.0}, "gas_spring": {"k_g": 3e3}, "orifice_quadratic": {"q": 500.0}}
     assert lost(Damper(base=(row,), effects=effects), (None,), np.array([-1.0, -0.0, 0.0, 1.0])) == (

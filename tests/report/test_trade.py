@@ -118,7 +118,7 @@ def page(run, tmp_path_factory: pytest.TempPathFactory) -> str:
     return with_knee(run).told(folder=folder).page
 
 
-def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_direction_in_one_table(page: str) -> None:
+def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_direction(page: str) -> None:
     for cell in (
         "rebound",
         "compression",
@@ -139,7 +139,7 @@ def test_the_page_has_the_force_a_psi_and_that_of_the_gas_itself(page: str) -> N
         assert cell in page
 
 
-def test_the_page_has_the_extremes_of_a_record_that_is_no_test_of_the_trade(page: str) -> None:
+def test_the_page_has_the_extremes_of_a_record_that_is_neither_sine_nor_constant_velocity(page: str) -> None:
     ends = ("\u2212678 to 2\u202f350\u00a0N", "\u22120.456 to 1.23\u00a0m/s")
     for cell in ("knock-7", *ends, "32.1\u00a0mm", "0.654\u00a0s"):
         assert cell in page
@@ -151,7 +151,7 @@ def terminal(title: str) -> list[tuple[str, ...]]:
     return found.cells(TERMINAL)
 
 
-def test_the_terminal_has_the_extremes_and_the_force_a_psi_too() -> None:
+def test_the_terminal_has_the_extremes_of_such_a_record_and_the_force_a_psi() -> None:
     (table,) = tables.characteristics(Characteristics(as_it_stands=(knock(),)), Control())
     head, row = table.cells(TERMINAL)
     assert row[head.index("force [N]")] == "-678 to 2350"
@@ -171,7 +171,7 @@ def test_without_a_knee_law_the_page_says_nothing_of_it(run, tmp_path: Path) -> 
     assert "knee" not in run.told(folder=tmp_path).page
 
 
-def test_the_terminal_has_the_same_tables_with_a_dash_where_a_direction_is_straight() -> None:
+def test_the_terminal_has_a_dash_for_the_knee_of_a_direction_that_has_none() -> None:
     head, rebound, _ = terminal("Force at the speeds")
     assert rebound[head.index("at 0.131 m/s [N]")] == "-92"
     assert rebound[head.index("at 0.262 m/s [N]")] == "(-7)"

@@ -293,7 +293,7 @@ def _measure(
 
 
 def _accelerations(context: ReportContext) -> TextTable:
-    def felt_as(row: SummaryRow) -> str | None:
+    def reaction(row: SummaryRow) -> str | None:
         a_w = context.value(row.case, "a_w")
         return None if a_w is None else " to ".join(reaction.text for reaction in iso2631_1997.reactions(a_w))
 
@@ -303,7 +303,7 @@ def _accelerations(context: ReportContext) -> TextTable:
         Column("peak_abs_aK_m_per_s2", "peak |a_K|", "m/s2"),
         Column("rms_aK_m_per_s2", "r.m.s.", "m/s2"),
         *(_measure(context, name, name.replace("_", " ") if unit == "-" else name, unit) for name, unit in _WEIGHTED),
-        Column("reaction", "likely to be felt as", value=felt_as),
+        Column("reaction", "likely to be felt as", value=reaction),
     )
 
 
