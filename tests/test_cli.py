@@ -501,7 +501,7 @@ def test_compare_sets_runs_side_by_side(typed: Terminal) -> None:
     rows = {re.split(r"  +", line)[0]: re.split(r"  +", line)[1:] for line in typed.out[1:]}
     assert typed.out[0].split() == ["runs/first", "runs/second"]
     assert rows["T0 [N], 1 V, 22 degC"] == ["200 (200 to 200)", "100 (100 to 100)"]
-    assert rows["k [N/m], 1 V, 22 degC"] == ["1e+05", "7e+05"]
+    assert rows["k [N/m], 1 V, 22 degC"] == ["1e+05 (no interval)", "7e+05 (no interval)"]
     assert rows["verdict"] == ["none", "none"]
     assert rows["sine-comfort-ideal: peak |a_K| at K [m/s2]"] == ["200", "100"]
 

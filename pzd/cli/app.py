@@ -13,12 +13,13 @@ import typer
 
 from pzd.cli import campaigns, export, look, peers, stages, start
 from pzd.cli.interrupt import (
+    INTERRUPTED,
     end_at_once_when_interrupted,
     end_soon_after_interrupt,
     raise_when_interrupted,
     say_interrupted,
 )
-from pzd.cli.output import DONE, INTERRUPTED, OWN_FAULT, complain, own_fault, silence
+from pzd.cli.output import DONE, OWN_FAULT, complain, own_fault, silence
 from pzd.schema.errors import ConfigError, FilesError, UserError
 
 _USAGE_ERROR: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")

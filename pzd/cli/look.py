@@ -8,17 +8,25 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pzd.artefacts import Diagnosis, HeldOutTest, Hypotheses, HypothesisRow, NextTest, Prediction, Value
-from pzd.artefacts.csv_rows import Estimate
 from pzd.cli.output import CORES, DONE, RUNS, Config, Json, Output, Quiet, Runs, Set, Verbose
-from pzd.quantities import Control
-from pzd.report import tables
-from pzd.report.columns import TERMINAL, Table, aligned
 from pzd.schema.errors import ConfigError, counted
 
 if TYPE_CHECKING:
-    from pzd.artefacts import IngestRow, RecordEntry
+    from pzd.artefacts import (
+        Diagnosis,
+        HeldOutTest,
+        HeldOutVoltage,
+        Hypotheses,
+        HypothesisRow,
+        IngestRow,
+        NextTest,
+        Prediction,
+        RecordEntry,
+        Value,
+    )
     from pzd.pipeline.run_summary import RunSummary
+    from pzd.quantities import Control
+    from pzd.report.columns import Table
 
 _VERDICTS = {
     "named": "one answer fits, and no other does",
@@ -30,7 +38,6 @@ _MOST = 3
 """How many regions and candidates are listed."""
 _MOST_SHAPES = 2
 """How many shapes of the residual force, each by itself."""
-_number = TERMINAL.amount
 
 PlotFile = Annotated[
     Path | None,
@@ -41,6 +48,14 @@ IsResolved = Annotated[
     typer.Option("--resolved", help="Print every value of the config with its origin instead: line, --set, default."),
 ]
 RunFolders = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Folders of runs, e.g. runs/quickstart.")]
+
+
+def _number(value: float | None, unit: str = "") -> str:
+    """Return a number with its unit as tables of the terminal have it."""
+    from pzd.report.columns import TERMINAL  # here, since `pzd --help` needs neither tables nor numpy
+
+    return TERMINAL.amount(value, unit)
+
 
 # --- pzd check ---
 
@@ -139,6 +154,8 @@ def show(
 
 def _sections(found: RunSummary) -> Iterator[tuple[str, list[str]]]:
     """Yield the titles and lines of what a run found, in the order of the stages."""
+    from pzd.report import tables
+
     for table in (
         *tables.characteristics(found.characteristics, found.control),
         *tables.knee(found.knees, found.control),
@@ -161,6 +178,7 @@ def _titled(table: Table) -> tuple[str, list[str]]:
 def _show_resolved(config: Path, runs: Path, overrides: Sequence[str], output: Output, *, as_json: bool) -> int:
     """Print every value of the config with its origin; nothing needs to have run."""
     from pzd.pipeline.command import opened, resolved
+    from pzd.report.columns import aligned
     from pzd.schema.yamltree import written
 
     found = resolved(opened(config, runs, overrides))
@@ -186,6 +204,7 @@ def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbo
     A stage whose numbers are not those of the run's config as it is today is called stale, with the reason.
     """
     from pzd.pipeline.run_summary import summary_of
+    from pzd.report.columns import aligned
 
     output = Output(quiet=quiet, verbose=verbose)
     found = [summary_of(folder) for folder in runs]
@@ -203,6 +222,9 @@ def compare(runs: RunFolders, as_json: Json = False, quiet: Quiet = False, verbo
 
 def _numbers(run: RunSummary) -> Iterator[tuple[str, str]]:
     """Yield names and values of the numbers of a run that are compared with those of others."""
+    from pzd.report import tables
+    from pzd.report.columns import TERMINAL
+
     parameters = tables.parameters(run.parameters, run.control)
     compared = [column for column in parameters.columns if column.name in ("T0_N", "C_Ns_per_m", "k_N_per_m", "W_s")]
     for row in run.parameters:
@@ -309,7 +331,7 @@ def _gap(diagnosis: Diagnosis) -> str:
 
 
 def _prediction(found: Prediction, unit: str, *, every_test: bool) -> Iterator[str]:
-    def errors(each: Prediction | HeldOutTest | Any) -> str:
+    def errors(each: Prediction | HeldOutTest | HeldOutVoltage) -> str:
         return f"W_s {_number(each.W_s_plain)} plain, {_number(each.W_s)} as handed on"
 
     held_out = {"tests": "whole tests", "mixed": "whole tests, or halves"}.get(found.hold_out, f"{found.hold_out}")
@@ -333,6 +355,8 @@ def _parameters(diagnosis: Diagnosis, effect: str, unit: str) -> str:
 
 def _value(value: Value, unit: str) -> str:
     """Return a parameter with its interval, or one value for each control value."""
+    from pzd.report.columns import TERMINAL
+
     edited = " (edited by hand)" if value.low95 is None and value.high95 is None else ""
     if value.at_voltage_V is not None:
         pairs = zip(value.estimates, value.at_voltage_V, strict=True)
@@ -365,6 +389,9 @@ def _hypotheses(found: Hypotheses) -> Iterator[str]:
 
 def _shape(row: HypothesisRow) -> str:
     """Return a shape with its coefficient, and the share of the gap that it would close."""
+    from pzd.artefacts.csv_rows import Estimate
+    from pzd.report.columns import TERMINAL
+
     more = f" and {_number(row.second_coefficient)} with the cosine" if row.second_coefficient is not None else ""
     value = TERMINAL.interval(Estimate.of(row, "coefficient"))
     at = f", {row.parameter} = {_number(row.parameter_value)} {row.parameter_unit}" if row.parameter else ""

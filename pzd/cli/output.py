@@ -20,7 +20,6 @@ import typer
 DONE = 0
 OWN_FAULT = 1
 UNTRUSTED = 4
-INTERRUPTED = 130
 
 
 if TYPE_CHECKING:

@@ -17,7 +17,6 @@ from pzd.cli.output import (
     Verbose,
     exit_code,
 )
-from pzd.report import tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -68,6 +67,8 @@ def comparison_lines(found: PeerComparison, control: Control) -> Iterator[str]:
     found : the comparison
     control : the control signal, for its name and unit
     """
+    from pzd.report import tables
+
     *compared, parameters = tables.peers(found, control)
     for table in compared:
         yield from (f"{table.title}:", *table.lines("  "), "")

@@ -111,8 +111,10 @@ class Medium:
         """Return a value with its 95 % interval, each to the second digit of the width of the interval."""
         if estimate.value is None:
             return self.dash
-        value, *ends = (self.number(float(text), MOST_DIGITS) for text in estimate.digits())
-        return f"{value} ({' to '.join(ends)})" if ends else f"{value} (no interval)"
+        if estimate.interval is None:
+            return f"{self.amount(estimate.value)} (no interval)"
+        value, low, high = (self.number(float(text), MOST_DIGITS) for text in estimate.digits())
+        return f"{value} ({low} to {high})"
 
 
 def plain_number(value: float, digits: int = 4) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -113,7 +114,15 @@ def with_knee(run: Any) -> Any:
 
 
 @pytest.fixture(scope="module")
-def page(run, tmp_path_factory: pytest.TempPathFactory) -> str:
+def words_only() -> Iterator[None]:
+    """No pictures, which take most of the time of a page: all claims here are about its text."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
+        yield
+
+
+@pytest.fixture(scope="module")
+def page(run, words_only: None, tmp_path_factory: pytest.TempPathFactory) -> str:
     folder = tmp_path_factory.mktemp("page")
     return with_knee(run).told(folder=folder).page
 
@@ -167,7 +176,7 @@ def test_the_page_does_not_call_a_knee_a_missing_effect(page: str) -> None:
     assert "library of effects does not explain" not in page
 
 
-def test_without_a_knee_law_the_page_says_nothing_of_it(run, tmp_path: Path) -> None:
+def test_without_a_knee_law_the_page_says_nothing_of_it(run, words_only: None, tmp_path: Path) -> None:
     assert "knee" not in run.told(folder=tmp_path).page
 
 

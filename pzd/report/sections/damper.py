@@ -11,7 +11,6 @@ from pzd.damper.confounders import known
 from pzd.quantities import VOLTAGE
 from pzd.report import tables
 from pzd.report.blocks import (
-    DASH,
     Block,
     Notes,
     Paragraph,
@@ -22,7 +21,7 @@ from pzd.report.blocks import (
     galleries,
     listed,
 )
-from pzd.report.columns import Column, Span, Table
+from pzd.report.columns import Beyond, Cell, Column, Span, Table
 from pzd.report.context import ReportContext, effect_in_words, static_force_at, static_force_in_words
 
 
@@ -64,10 +63,8 @@ def _intro(context: ReportContext) -> str:
 def _knee_blocks(context: ReportContext) -> Iterator[Block]:
     """Yield the tables of the knee law in the language of the trade; none where the config does not ask for it."""
     found = context.identified.knees
-    if found.rows:
-        for table in (*tables.knee(found, context.control), tables.knee_prediction(found, context.control)):
-            if table.rows:
-                yield table.block()
+    shown = (*tables.knee(found, context.control), tables.knee_prediction(found, context.control))
+    return (table.block() for table in shown if table.rows)
 
 
 def _parameters(context: ReportContext) -> TextTable:
@@ -86,23 +83,30 @@ def _force(context: ReportContext) -> TextTable:
     voltages = sorted({row.voltage_V for row in rows}, key=lambda v: v or 0.0)
     speeds = sorted({row.velocity_m_per_s for row in rows})
     at = {(row.velocity_m_per_s, row.voltage_V): row for row in rows}
-    chosen = _spread(speeds, context.table.notes.reached_m_per_s)
-    static = {volt: static_force_at(context, volt) for volt in voltages}
-    cells = tuple((amount(v, "m/s"), *(_cell(at.get((v, volt)), static[volt]) for volt in voltages)) for v in chosen)
     degrees = f" at {amount(first, 'degC')}" if first is not None else ""
-    columns = ["force" if volt is None else f"force at {context.voltage(volt)}" for volt in voltages]
-    header = ("speed in rebound", *columns)
     rest = static_force_in_words(context, voltages)
     rest = f", with the {rest} at rest that the table (4-table) leaves out" if rest else ""
-    return TextTable(f"Force{degrees}{rest}; in brackets the model beyond what the rig reached", header, cells)
+
+    def column(voltage: float | None) -> Column:
+        static = static_force_at(context, voltage)
+        head = "force" if voltage is None else f"force at {context.voltage(voltage)}"
+        return Column(f"force_at_{voltage}", head, "N", lambda speed: _cell(at.get((speed, voltage)), static))
+
+    return Table(
+        f"Force{degrees}{rest}; in brackets the model beyond what the rig reached",
+        (
+            Column("velocity_m_per_s", "speed in rebound", "m/s", lambda speed: speed),
+            *(column(voltage) for voltage in voltages),
+        ),
+        _spread(speeds, context.table.notes.reached_m_per_s),
+    ).block()
 
 
-def _cell(row: ForceRow | None, static: float) -> str:
+def _cell(row: ForceRow | None, static: float) -> Cell:
     """Return a force of the table, with the force at rest that the table leaves out."""
     if row is None or row.force_N is None:
-        return DASH
-    text = amount(row.force_N + static, "N")
-    return text if row.inside else f"({text})"
+        return None
+    return row.force_N + static if row.inside else Beyond(row.force_N + static)
 
 
 def _spread(speeds: list[float], reached: float) -> list[float]:
