@@ -133,7 +133,7 @@ def gap_cut(found: Diagnosed, clean: Mapping[str, Clean], *, gains_out: bool = F
     held_out = [clean[name] for name in _held_out(found)]
     before, after = (
         sum(_squares(damper, record, gains_out=gains_out) for record in held_out)
-        for damper in (found.plain, found.damper)
+        for damper in (found.baseline, found.damper)
     )
     return 1.0 - after / before
 
@@ -155,7 +155,7 @@ def gap_cut_of_truth(found: Diagnosed, clean: Mapping[str, Clean]) -> float:
         alike = [other.gain for other in fitted.values() if other.voltage == record.voltage]
         error = float(np.mean(alike or [other.gain for other in fitted.values()])) - 1.0
         after += float(np.sum((error * record.force[warm_up(record.motion.displacement) :]) ** 2))
-        before += _squares(found.plain, record, gains_out=False)
+        before += _squares(found.baseline, record, gains_out=False)
     return 1.0 - after / before
 
 

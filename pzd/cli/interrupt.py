@@ -1,4 +1,4 @@
-"""Ends the program within a second of Ctrl-C, also where threads or compiled code would go on for longer.
+"""End the program within a second of Ctrl-C, also where threads or compiled code would go on for longer.
 
 An interrupt reaches Python's main thread alone, and only between two of its instructions; pools of
 threads wait for their work on the way out. Results are written so that a killed run leaves the old or
@@ -10,12 +10,12 @@ from __future__ import annotations
 import os
 import signal
 
-from pzd.cli.output import INTERRUPTED
-
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # before an interrupt is heeded, as little as possible is imported
     from types import FrameType
 
+INTERRUPTED = 130
+"""The exit code, as a shell has it for a program that SIGINT ended."""
 _GRACE_S = 0.4
 """How long the program may take to tidy up; with what it takes to notice, it is gone within a second."""
 _MESSAGE = "interrupted; finished stages stand, the one at work left what was there before"
@@ -54,7 +54,7 @@ def _end_at_once(_number: int, _frame: FrameType | None) -> None:
 def end_soon_after_interrupt() -> None:
     """From now on, end the program soon after an interrupt, however it takes it."""
     if os.name == "nt":
-        return  # there a pipe cannot be told of signals
+        return  # there no pipe is written to when a signal arrives
     import threading
 
     receive, send = os.pipe()

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import zip_longest
 
 from pzd.comfort.iso2631_1978 import LONGEST_MIN
-from pzd.schema.errors import rounded_as
 
 # --- Numbers, units and times as people read them ---
 
@@ -18,9 +17,6 @@ DASH = "\u2013"
 TIMES = "\u00d7"
 NO_BREAK = "\u00a0"
 """A space at which no line breaks."""
-
-_VANISHING = 0.005
-"""A value of less than this share of its interval's width does not show in the width's second digit."""
 
 _UNITS = {
     "m/s2": "m/s²",
@@ -67,42 +63,6 @@ def amount(value: float | None, unit: str, digits: int = 3) -> str:
     """Write a number with its unit; a dash alone where there is none."""
     text, shown = number(value, digits), unit_of(unit)
     return text if text == DASH or not shown else f"{text}{NO_BREAK}{shown}"
-
-
-def amount_as(value: float, other: float, unit: str, digits: int = 3) -> str:
-    """Write a number with its unit, to the last decimal place of the number that it was read from."""
-    return amount(rounded_as(value, other, digits), unit, digits)
-
-
-def interval(value: float | None, low: float | None, high: float | None) -> str:
-    """Write a number with its 95 % interval, to as many digits as the interval supports.
-
-    >>> interval(0.97123, 0.95, 1.02)
-    '0.971 (0.95 to 1.02)'
-    """
-    if value is None:
-        return DASH
-    if low is None or high is None:
-        return f"{number(value)} (no interval)"
-    if abs(value) < _VANISHING * (high - low):
-        value = 0.0
-    digits = _digits(value, high - low)
-    return f"{number(value, digits)} ({_at(low, value, digits)} to {_at(high, value, digits)})"
-
-
-def _digits(value: float, width: float) -> int:
-    """Return the significant digits of a value down to the second digit of its interval's width, from 2 to 6."""
-    if value == 0.0 or width <= 0.0:
-        return 3
-    return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(width)) + 2, 2), 6)
-
-
-def _at(bound: float, value: float, digits: int) -> str:
-    """Write a bound of an interval to the same decimal place as the value."""
-    if bound == 0.0 or value == 0.0:
-        return number(bound, digits)
-    shift = math.floor(math.log10(abs(bound))) - math.floor(math.log10(abs(value)))
-    return number(bound, max(digits + shift, 1))
 
 
 def percent(share: float | None, digits: int = 2) -> str:
@@ -170,14 +130,6 @@ class TextTable:
     folded: bool = False
     """Whether the reader opens it first."""
     kind: str = field(default="table", init=False)
-
-    def without_empty(self, *columns: str) -> TextTable:
-        """Return the table without those of the named columns that hold nothing but dashes."""
-        kept = [
-            i for i, name in enumerate(self.header) if name not in columns or any(row[i] != DASH for row in self.rows)
-        ]
-        header, *rows = (tuple(row[i] for i in kept) for row in (self.header, *self.rows))
-        return replace(self, header=header, rows=tuple(rows))
 
     @property
     def numeric(self) -> tuple[bool, ...]:

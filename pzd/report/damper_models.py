@@ -41,12 +41,12 @@ class DamperModels:
     @property
     def extended(self) -> bool:
         """Whether diagnose changed the damper."""
-        return self.diagnosed.damper != self.diagnosed.plain
+        return self.diagnosed.damper != self.diagnosed.baseline
 
     @property
     def fitted_law(self) -> bool:
         """Whether identify adopted another law than Bingham's."""
-        return any(name in fitted_laws() for name in self.diagnosed.plain.effects)
+        return any(name in fitted_laws() for name in self.diagnosed.baseline.effects)
 
     @property
     def baseline_name(self) -> str:
@@ -63,7 +63,7 @@ class DamperModels:
         if record.name not in self._forces:
             motion = Motion.of(record)
             start = float(record.force[0])
-            baseline = respond(self.diagnosed.plain, motion, start)
+            baseline = respond(self.diagnosed.baseline, motion, start)
             final = respond(self.diagnosed.damper, motion, start) if self.extended else baseline
             self._forces[record.name] = (baseline, final)
         return self._forces[record.name]

@@ -18,8 +18,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from pzd.artefacts import ComfortRow, Identified, ParameterRow, Rides, SummaryRow
-from pzd.artefacts.rig import ANY, Conditions, matching, undecided
+from pzd.artefacts import ComfortRow, Identified, Rides, SummaryRow
+from pzd.artefacts.csv_rows import Estimate
+from pzd.artefacts.rig import ANY, Conditions, ambiguous_conditions, matching
 from pzd.quantities import Control
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.roads.sine import Sine
@@ -143,7 +144,7 @@ def _measure(run: RunNumbers, column: str, selection: Selection) -> Computed:
     matches = matching(rows, wanted)
     if not matches:
         return Computed(None, f"the rig has no test at {selection.record or wanted}")
-    if open_columns := undecided(rows, matches, wanted):
+    if open_columns := ambiguous_conditions(rows, matches, wanted):
         return _ambiguous("tests", [row.record for row in matches], open_columns, run.control)
     row, value = matches[0], getattr(matches[0], column)
     power = f", {row.work_per_cycle_J * row.frequency_Hz:.0f} W" if row.frequency_Hz is not None else ""
@@ -156,19 +157,13 @@ def _parameter(run: RunNumbers, column: str, selection: Selection) -> Computed:
     matches = matching(rows, wanted)
     if not matches:
         return Computed(None, f"nothing was identified at {wanted}")
-    if open_columns := undecided(rows, matches, wanted):
-        return _ambiguous("conditions", [_label(row, run.control) for row in matches], open_columns, run.control)
-    row = matches[0]
-    low, high = getattr(row, f"{column}_low95", None), getattr(row, f"{column}_high95", None)
-    interval = "" if low is None or high is None else f", 95 % {low:.4g} to {high:.4g}"
-    return Computed(getattr(row, column), f"identified at {_label(row, run.control)}{interval}, {row.status}")
-
-
-def _label(row: ParameterRow, control: Control) -> str:
-    parts = [row.setting] if row.setting else []
-    parts += [f"{row.voltage_V:.4g} {control.unit}"] if row.voltage_V is not None else []
-    parts += [f"{row.temperature_degC:.4g} degC"] if row.temperature_degC is not None else []
-    return ", ".join(parts) or "the rig"
+    if open_columns := ambiguous_conditions(rows, matches, wanted):
+        return _ambiguous(
+            "conditions", [row.words(run.control) or "the rig" for row in matches], open_columns, run.control
+        )
+    row, estimate = matches[0], Estimate.of(matches[0], column)
+    interval = "" if estimate.interval is None else ", 95 % {:.4g} to {:.4g}".format(*estimate.interval)
+    return Computed(estimate.value, f"identified at {row.words(run.control) or 'the rig'}{interval}, {row.status}")
 
 
 def _ambiguous(what: str, names: list[str], open_columns: tuple[str, ...], control: Control) -> Computed:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from pzd.artefacts import Artefact, Diagnosed, Identified, Rides
+from pzd.artefacts.csv_rows import Estimate
 from pzd.config import Normal, RunConfig, Scatter, SweepConfig, validated
 from pzd.damper.confounders import known
 from pzd.damper.model import PHYSICAL, BaseRow, Damper
@@ -191,10 +192,7 @@ def scattered(diagnosed: Diagnosed, asked: Mapping[str, Scatter], scores: Mappin
 def _with_base(damper: Damper, diagnosed: Diagnosed, symbol: str, how: Scatter, z: float) -> Damper:
     column = BASE_COLUMNS[symbol]
     low, high = PHYSICAL[column]
-    intervals = {
-        (row.voltage_V, row.temperature_degC): (getattr(row, f"{column}_low95"), getattr(row, f"{column}_high95"))
-        for row in diagnosed.parameters
-    }
+    intervals = {(row.voltage_V, row.temperature_degC): Estimate.of(row, column)[1:] for row in diagnosed.parameters}
 
     def moved(row: BaseRow) -> BaseRow:
         ends = intervals.get((row.voltage_V, row.temperature_degC), (None, None))
@@ -208,19 +206,14 @@ def _with_effect(damper: Damper, diagnosed: Diagnosed, effect: str, name: str, h
     value, parameter = damper.effects[effect][name], known()[effect].parameter(name)
     fitted = diagnosed.diagnosis.parameters.get(effect, {}).get(name)
     values = np.atleast_1d(np.asarray(value, dtype=np.float64))
-    lows, highs = (_per_value(getattr(fitted, end, None), values.size) for end in ("low95", "high95"))
+    intervals = [estimate[1:] for estimate in fitted.estimates] if fitted else [(None, None)] * values.size
     label = f"{effect}.{name}"
     moved = [
         float(np.clip(_moved(x, how, ends, z, label), parameter.low, parameter.high))
-        for x, ends in zip(values.tolist(), zip(lows, highs, strict=True), strict=True)
+        for x, ends in zip(values.tolist(), intervals, strict=True)
     ]
     given = {**damper.effects[effect], name: tuple(moved) if isinstance(value, tuple) else moved[0]}
     return damper.model_copy(update={"effects": {**damper.effects, effect: given}})
-
-
-def _per_value(end: float | tuple[float, ...] | None, count: int) -> list[float | None]:
-    """Return one end of an interval for each of so many values."""
-    return [*end] if isinstance(end, tuple) else [end] * count
 
 
 def _moved(value: float, how: Scatter, ends: tuple[float | None, float | None], z: float, label: str) -> float:

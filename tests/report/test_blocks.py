@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from pzd.report.blocks import amount, interval, listed, minutes, number, sentence
+from pzd.artefacts.csv_rows import Estimate
+from pzd.report.blocks import amount, listed, minutes, number, sentence
+from pzd.report.columns import PAGE, TERMINAL
 
 
 @pytest.mark.parametrize(
@@ -36,18 +38,22 @@ def test_a_number_keeps_its_unit_and_none_has_none() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "text"),
+    ("estimate", "page", "terminal"),
     [
-        ((1510.0, 1490.0, 1530.0), "1\u202f510 (1\u202f490 to 1\u202f530)"),
-        ((0.97123, 0.95, 1.02), "0.971 (0.95 to 1.02)"),
-        ((None, None, None), "\u2013"),
-        ((5.0, None, None), "5 (no interval)"),
+        (Estimate(1510.0, 1490.0, 1530.0), "1\u202f510 (1\u202f490 to 1\u202f530)", "1510 (1490 to 1530)"),
+        (Estimate(0.97123, 0.95, 1.02), "0.971 (0.95 to 1.02)", "0.971 (0.95 to 1.02)"),
+        (Estimate(6.3e-25, 0.0, 12.4), "0 (0 to 12)", "0 (0 to 12)"),
+        (Estimate(301.23456, 300.71, 301.77), "301.2 (300.7 to 301.8)", "301.2 (300.7 to 301.8)"),
+        (Estimate(5.0, 5.0, 5.0), "5 (5 to 5)", "5 (5 to 5)"),
+        (Estimate(None), "\u2013", "-"),
+        (Estimate(5.0), "5 (no interval)", "5 (no interval)"),
     ],
 )
-def test_a_number_has_the_digits_that_its_interval_supports_on_the_page(
-    given: tuple[float | None, ...], text: str
+def test_an_estimate_has_the_digits_that_its_interval_supports_on_the_page_and_in_the_terminal(
+    estimate: Estimate, page: str, terminal: str
 ) -> None:
-    assert interval(*given) == text
+    assert PAGE.interval(estimate) == page
+    assert TERMINAL.interval(estimate) == terminal
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pzd.artefacts import ParameterRow
+from pzd.artefacts.csv_rows import Estimate
 from pzd.damper.model import BaseRow, Damper
 from pzd.paper.figures.canvas import COLOURS, DISPLACEMENT, FORCE, NUMBERS_OF_OTHERS, VELOCITY, key, panels
 from pzd.paper.figures.numbered import Drawing, PaperFigure
@@ -219,12 +220,8 @@ def at_two_temperatures(number: int, voltage: float, in_words: str) -> PaperFigu
 def parameters(row: ParameterRow) -> str:
     """T0, C, k of a row with their 95 % intervals, in words."""
     intervals = [
-        f"{name} {value:.4g} ({low:.4g} to {high:.4g}) {unit}"
-        for name, value, low, high, unit in (
-            ("T0", row.T0_N, row.T0_N_low95, row.T0_N_high95, "N"),
-            ("C", row.C_Ns_per_m, row.C_Ns_per_m_low95, row.C_Ns_per_m_high95, "N s/m"),
-            ("k", row.k_N_per_m, row.k_N_per_m_low95, row.k_N_per_m_high95, "N/m"),
-        )
-        if value is not None and low is not None and high is not None
+        f"{name} {{:.4g}} ({{:.4g}} to {{:.4g}}) {unit}".format(*estimate)
+        for name, column, unit in (("T0", "T0_N", "N"), ("C", "C_Ns_per_m", "N s/m"), ("k", "k_N_per_m", "N/m"))
+        if None not in (estimate := Estimate.of(row, column))
     ]
     return ", ".join(intervals)

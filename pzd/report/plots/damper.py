@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pzd.artefacts import ParameterRow
+from pzd.artefacts.csv_rows import Estimate
 from pzd.damper.model import BaseRow
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS
 from pzd.report.blocks import amount, number, unit_of
@@ -49,10 +50,10 @@ def parameters(context: ReportContext) -> Iterator[Panel]:
 
 def _with_whiskers(row: ParameterRow | BaseRow, column: str) -> tuple[float, float, float]:
     """Return a value and the lengths of its whiskers, in thousands; whiskers of length 0 without an interval."""
+    estimate = Estimate.of(row, column)
     value = float(getattr(row, column))
-    low, high = (getattr(row, f"{column}_{end}", None) for end in ("low95", "high95"))
-    below = max(value - float(low), 0.0) if low is not None else 0.0
-    above = max(float(high) - value, 0.0) if high is not None else 0.0
+    below = max(value - estimate.low95, 0.0) if estimate.low95 is not None else 0.0
+    above = max(estimate.high95 - value, 0.0) if estimate.high95 is not None else 0.0
     return value / 1000.0, below / 1000.0, above / 1000.0
 
 

@@ -15,7 +15,7 @@ from types import ModuleType
 
 import numpy as np
 
-from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig, extent
+from pzd.artefacts import Finding, IngestRow, RecordEntry, Rig, entry_numbers
 from pzd.parallel.processes import parallel_map
 from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
@@ -113,5 +113,5 @@ def _entry(test: Measured, found: tuple[Finding, ...]) -> RecordEntry:
         setting=record.setting,
         findings=found,
         removed=test.removed,
-        **extent(record, test.run),
+        **entry_numbers(record, test.run),
     )
