@@ -83,7 +83,10 @@ class ConditionRow(Frozen):
 
 
 class RecordRow(Frozen):
-    """A row about one test of a record, at the condition of that test."""
+    """A row about one test of a record, at the condition of that test.
+
+    Not a `ConditionRow`, whose fields would stand before `record`: columns of files have the order of the fields.
+    """
 
     record: str
     setting: str | None

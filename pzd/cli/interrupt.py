@@ -19,19 +19,19 @@ INTERRUPTED = 130
 _GRACE_S = 0.4
 """How long the program may take to tidy up; with what it takes to notice, it is gone within a second."""
 _MESSAGE = "interrupted; finished stages stand, the one at work left what was there before"
-_said: list[str] = []
+_printed: list[str] = []
 
 
 def say_interrupted() -> None:
-    """Say what an interrupt leaves behind."""
+    """Print what an interrupt leaves behind."""
     from pzd.cli.output import complain
 
-    _said.append(_MESSAGE)
+    _printed.append(_MESSAGE)
     complain([_MESSAGE])
 
 
 def end_at_once_when_interrupted() -> None:
-    """From now on, an interrupt ends the program in one line: for what runs before and behind a command.
+    """Make an interrupt end the program in one line: for what runs before and behind a command.
 
     Imports cannot be tidied up, and an exception out of them shows a traceback. Where interrupts are ignored, as a
     shell starts what runs in the background, they remain so.
@@ -41,7 +41,7 @@ def end_at_once_when_interrupted() -> None:
 
 
 def raise_when_interrupted() -> None:
-    """From now on, an interrupt raises KeyboardInterrupt, as usual in Python."""
+    """Make an interrupt raise KeyboardInterrupt, as usual in Python."""
     if signal.getsignal(signal.SIGINT) is _end_at_once:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -52,7 +52,7 @@ def _end_at_once(_number: int, _frame: FrameType | None) -> None:
 
 
 def end_soon_after_interrupt() -> None:
-    """From now on, end the program soon after an interrupt, however it takes it."""
+    """Start a thread that ends the program soon after an interrupt, whatever the main thread does with it."""
     if os.name == "nt":
         return  # there no pipe is written to when a signal arrives
     import threading
@@ -69,6 +69,6 @@ def _end(receive: int) -> None:
     while os.read(receive, 1) != bytes([signal.SIGINT]):
         pass
     time.sleep(_GRACE_S)
-    if not _said:
+    if not _printed:
         say_interrupted()
     os._exit(INTERRUPTED)

@@ -79,6 +79,7 @@ def parameters(
 
 
 def _base_value(row: ParameterRow | BaseRow, name: str) -> Estimate:
+    """Return T0, C or k; of a base row, which has no interval to round it by, a friction of nothing is 0."""
     found = Estimate.of(row, name)
     return Estimate(0.0) if isinstance(row, BaseRow) and abs(found.value or 0.0) < NO_FORCE else found
 
@@ -318,7 +319,7 @@ def prediction(found: Prediction, control: Control) -> Table:
             Column("W_s", "W_s, as handed on", value=lambda row: row["W_s"]),
         ),
         [whole, *tests, *voltages],
-        fold=7,
+        fold=7,  # the row of all and six tests
     )
 
 
