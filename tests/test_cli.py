@@ -19,10 +19,10 @@ import pytest
 import yaml
 from stub_stages import NAMES, NEXT_TEST, UNDETERMINED, project
 
-from pzd.artefacts import Diagnosis, Gap, KeptBack, LeftOut, Prediction, Ranked, Region, Value
+from pzd.artefacts import Diagnosis, Gap, HeldOutTest, HeldOutVoltage, Prediction, Ranked, Region, Value
 from pzd.cli.app import status
+from pzd.cli.look import diagnosis_lines
 from pzd.cli.output import Output
-from pzd.cli.text_tables import diagnosis_lines
 from pzd.config import load
 from pzd.damper.effects import library
 from pzd.parallel.processes import Progress
@@ -501,7 +501,7 @@ def test_compare_sets_runs_side_by_side(typed: Terminal) -> None:
     rows = {re.split(r"  +", line)[0]: re.split(r"  +", line)[1:] for line in typed.out[1:]}
     assert typed.out[0].split() == ["runs/first", "runs/second"]
     assert rows["T0 [N], 1 V, 22 degC"] == ["200 (200 to 200)", "100 (100 to 100)"]
-    assert rows["k [N/m], 1 V, 22 degC"] == ["1e+05", "7e+05"]
+    assert rows["k [N/m], 1 V, 22 degC"] == ["1e+05 (no interval)", "7e+05 (no interval)"]
     assert rows["verdict"] == ["none", "none"]
     assert rows["sine-comfort-ideal: peak |a_K| at K [m/s2]"] == ["200", "100"]
 
@@ -670,10 +670,10 @@ def test_the_story_tells_what_a_test_between_two_voltages_is_for() -> None:
 def test_the_story_tells_every_kept_back_test_where_it_is_asked_to() -> None:
     kept_back = Prediction(
         hold_out="tests",
-        by=(KeptBack(record="r03", voltage=100.0, W_s_plain=0.012, W_s=0.003, R2_plain=0.9871, R2=0.99675),),
+        by=(HeldOutTest(record="r03", voltage=100.0, W_s_plain=0.012, W_s=0.003, R2_plain=0.9871, R2=0.99675),),
         W_s_plain=0.011,
         W_s=0.004,
-        left_out_voltages=(LeftOut(voltage=50.0, W_s_plain=0.02, W_s=0.01),),
+        left_out_voltages=(HeldOutVoltage(voltage=50.0, W_s_plain=0.02, W_s=0.01),),
     )
     predicted = diagnosis().model_copy(update={"prediction": kept_back})
     whole = "prediction of whole tests kept back: W_s 0.011 plain, 0.004 as handed on"

@@ -1,28 +1,19 @@
-"""What each stage hands on: read this package from the top and you know the pipeline.
+"""Artefacts: what each stage writes and the next ones read; from the top, this package is the pipeline.
 
 rig -> identified -> diagnosed -> table -> rides -> report, one file each. Every artefact writes
 itself into its stage's folder and reads itself back, checked, with file and line of whatever is
 wrong. `control` renames the columns of the control signal.
 """
 
-from pzd.artefacts.characteristics import (
-    AsItStandsRow,
-    Characteristics,
-    ContinuousVelocityRow,
-    GasAndFrictionRow,
-    PeakVelocityRow,
-    StepRow,
-    WarmUpRow,
-)
 from pzd.artefacts.diagnosis import (
     Diagnosed,
     Diagnosis,
     Gap,
+    HeldOutTest,
+    HeldOutVoltage,
     Hypotheses,
     HypothesisPoint,
     HypothesisRow,
-    KeptBack,
-    LeftOut,
     NextTest,
     Prediction,
     Ranked,
@@ -31,10 +22,17 @@ from pzd.artefacts.diagnosis import (
 )
 from pzd.artefacts.identified import (
     FALLBACK,
+    AsItStandsRow,
     AuxiliaryRow,
+    Characteristics,
+    ContinuousVelocityRow,
+    GasAndFrictionRow,
     Identified,
     MeasureRow,
     ParameterRow,
+    PeakVelocityRow,
+    StepRow,
+    WarmUpRow,
     base_of,
     identified_damper,
 )
@@ -57,76 +55,7 @@ from pzd.artefacts.rides import (
     WeightedRow,
     WheelRow,
 )
-from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig, extent
+from pzd.artefacts.rig import Finding, IngestRow, RecordEntry, Rig, entry_numbers
 from pzd.artefacts.table import ForceRow, InverseRow, SettingLeftOutRow, SettingRow, Table, TableNotes
 
 Artefact = Rig | Identified | Diagnosed | Table | Rides | Report
-
-__all__ = [
-    "AXLES",
-    "AXLE_COLUMNS",
-    "ENERGY_LIMIT",
-    "FALLBACK",
-    "RIDE_COLUMNS",
-    "Artefact",
-    "AsItStandsRow",
-    "AuxiliaryRow",
-    "Characteristics",
-    "ClickRow",
-    "ComfortRow",
-    "ContinuousVelocityRow",
-    "Diagnosed",
-    "Diagnosis",
-    "Ending",
-    "Finding",
-    "ForceRow",
-    "FoundRow",
-    "Gap",
-    "GasAndFrictionRow",
-    "History",
-    "Hypotheses",
-    "HypothesisPoint",
-    "HypothesisRow",
-    "Identified",
-    "IngestRow",
-    "InverseRow",
-    "KeptBack",
-    "KneeForceRow",
-    "KneeRow",
-    "Knees",
-    "LawRow",
-    "LeftOut",
-    "Manifest",
-    "MeasureRow",
-    "NextTest",
-    "ParameterRow",
-    "PeakVelocityRow",
-    "PredictedRow",
-    "Prediction",
-    "Ranked",
-    "RecordEntry",
-    "ReferenceRow",
-    "Region",
-    "Report",
-    "Response",
-    "Ride",
-    "RideRow",
-    "Rides",
-    "Rig",
-    "SettingLeftOutRow",
-    "SettingRow",
-    "SpectrumRow",
-    "StepRow",
-    "SummaryRow",
-    "Table",
-    "TableNotes",
-    "UnitRow",
-    "Value",
-    "WarmUpRow",
-    "WeightedRow",
-    "WheelRow",
-    "base_of",
-    "extent",
-    "identified_damper",
-    "knee_damper",
-]

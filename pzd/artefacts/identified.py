@@ -1,28 +1,208 @@
-"""The Bingham parameters of every condition, and the measures of every test."""
+"""Artefact of identify: the parameters of every condition, and what the tests show without any model."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pzd.artefacts.characteristics import Characteristics
+from pzd.artefacts.csv_rows import ConditionRow, Estimate, Files, RecordRow, read_files, write_files
 from pzd.artefacts.knee import Knees, knee_damper
 from pzd.damper.model import PHYSICAL, BaseRow, Damper, unphysical
 from pzd.quantities import Control
-from pzd.schema.csvfile import read_rows, write_rows
 from pzd.schema.errors import DataError, at
 from pzd.schema.model import Frozen
 
+# --- Characteristics: force over speed, gas force, friction, response, warm-up, without any model ---
 
-class ParameterRow(Frozen):
-    """The Bingham parameters of one condition or voltage node; None where undetermined."""
+Kind = Literal["sine", "constant velocity", "other swing"]
+Method = Literal["slow test", "extrapolated to rest", "at the lowest speed"]
 
+
+class PeakVelocityRow(RecordRow):
+    """One point of the peak-velocity plot (PVP) for each direction: force at the peak speed of one test.
+
+    Rebound is extension: its speed and force are positive, those of compression negative. A force is as recorded,
+    with the gas force in it.
+    """
+
+    kind: Kind
+    """What the motion is, whatever the waveform was called; `other swing`: one smooth stroke each way."""
+    frequency_Hz: float | None
+    """Of a motion that repeats."""
+    amplitude_m: float = Field(gt=0.0)
+    middle_m: float
+    """Middle of the stroke, in the displacement as recorded."""
+    rebound_velocity_m_per_s: float | None = Field(gt=0.0)
+    rebound_force_N: float | None
+    compression_velocity_m_per_s: float | None = Field(lt=0.0)
+    compression_force_N: float | None
+
+    @property
+    def speed(self) -> float:
+        """Magnitude of the peak speed, the mean of both directions where both are there [m/s]."""
+        both = [abs(v) for v in (self.rebound_velocity_m_per_s, self.compression_velocity_m_per_s) if v is not None]
+        return sum(both) / max(len(both), 1)
+
+
+class ContinuousVelocityRow(RecordRow):
+    """One point of the continuous-velocity plot (CVP): the average settled cycle of one test, rebound first."""
+
+    frequency_Hz: float = Field(gt=0.0)
+    amplitude_m: float = Field(gt=0.0)
+    displacement_m: float
+    velocity_m_per_s: float
+    force_N: float
+
+
+class GasAndFrictionRow(ConditionRow):
+    """Static force of one condition at mid-stroke: what the gas pushes with, and what friction holds either way."""
+
+    gas_force_N: float
+    """Mean of rebound and compression."""
+    friction_N: float
+    """Half of their difference."""
+    velocity_m_per_s: float = Field(gt=0.0)
+    """Of the slowest test, from which they are read."""
+    middle_m: float
+    """Middle of the stroke, in the displacement as recorded."""
+    method: Method
+    """`at the lowest speed`: there is only one speed, and its viscous force counts as friction."""
+
+
+class StepRow(Frozen):
+    """How quickly the force followed one step of the control signal."""
+
+    record: str
+    setting: str | None
+    temperature_degC: float | None
+    time_s: float
+    """When the control signal passed the middle of its step."""
+    from_voltage_V: float
+    to_voltage_V: float
+    velocity_m_per_s: float | None
+    """At which the rod moved; None where that was not constant."""
+    from_force_N: float | None
+    to_force_N: float | None
+    to_63_percent_s: float | None
+    to_90_percent_s: float | None
+    status: str
+    """`ok`, or why there are no times."""
+
+
+class WarmUpRow(Frozen):
+    """One cycle of a test that was run for long, or whose temperature changed: its force at the peak speed."""
+
+    record: str
     setting: str | None
     voltage_V: float | None
+    """Of the condition, as in `parameters.csv`."""
+    cycle: int = Field(ge=1)
+    """Running number within the test; a record of several tests begins anew with each."""
+    time_s: float
+    """Middle of the cycle, in the time as recorded."""
     temperature_degC: float | None
+    """Mean over the cycle."""
+    velocity_m_per_s: float = Field(gt=0.0)
+    """Peak speed, the mean of both directions."""
+    rebound_force_N: float
+    compression_force_N: float
+
+
+class AsItStandsRow(RecordRow):
+    """The extremes of a record that is none of the tests above, such as a knock, a transient or a road, as recorded."""
+
+    rebound_force_N: float
+    """The largest force; in rebound forces are positive."""
+    compression_force_N: float
+    """The smallest force."""
+    rebound_velocity_m_per_s: float = Field(ge=0.0)
+    """The largest velocity."""
+    compression_velocity_m_per_s: float = Field(le=0.0)
+    """The smallest velocity."""
+    stroke_m: float = Field(gt=0.0)
+    """From end to end."""
+    duration_s: float = Field(gt=0.0)
+
+
+@dataclass(frozen=True)
+class Course:
+    """From where to where a warm-up goes: means of its first cycles and of its last."""
+
+    first: WarmUpRow
+    """Of the test, with the means of the first cycles in it."""
+    last: WarmUpRow
+    cycles: int
+
+
+AVERAGED = 3
+"""Cycles at either end of a warm-up over which its course is averaged."""
+
+
+def courses(rows: Sequence[WarmUpRow]) -> tuple[Course, ...]:
+    """Return the course of every test of a warm-up.
+
+    Parameters
+    ----------
+    rows : cycle by cycle, test by test
+    """
+    tests: list[list[WarmUpRow]] = []
+    for row in rows:
+        if not tests or row.cycle <= tests[-1][-1].cycle or row.record != tests[-1][-1].record:
+            tests.append([])
+        tests[-1].append(row)
+    return tuple(Course(_mean(mine[:AVERAGED]), _mean(mine[-AVERAGED:]), len(mine)) for mine in tests)
+
+
+def _mean(rows: Sequence[WarmUpRow]) -> WarmUpRow:
+    names = ("time_s", "temperature_degC", "velocity_m_per_s", "rebound_force_N", "compression_force_N")
+    values = {name: [getattr(row, name) for row in rows] for name in names}
+    known = {name: sum(all_of) / len(all_of) for name, all_of in values.items() if None not in all_of}
+    return rows[0].model_copy(update=known)
+
+
+@dataclass(frozen=True)
+class Characteristics:
+    """Force over speed, gas force, friction, response, warm-up as the tests of the rig show them, without any model."""
+
+    peak_velocity: tuple[PeakVelocityRow, ...] = ()
+    continuous_velocity: tuple[ContinuousVelocityRow, ...] = ()
+    gas_and_friction: tuple[GasAndFrictionRow, ...] = ()
+    steps: tuple[StepRow, ...] = ()
+    warm_up: tuple[WarmUpRow, ...] = ()
+    as_it_stands: tuple[AsItStandsRow, ...] = ()
+
+    def write(self, folder: Path, control: Control) -> None:
+        """Write the files named in `CHARACTERISTICS`."""
+        write_files(self, CHARACTERISTICS, folder, control)
+
+    @classmethod
+    def read(cls, folder: Path, control: Control) -> Self:
+        """Read and check them again; a run of an earlier version has none of them, or not the last two."""
+        if not (folder / "pvp.csv").is_file():
+            return cls()
+        return cls(**read_files(CHARACTERISTICS, folder, control, ("warm_up", "as_it_stands")))
+
+
+CHARACTERISTICS: Files = {
+    "peak_velocity": ("pvp.csv", PeakVelocityRow),
+    "continuous_velocity": ("cvp.csv", ContinuousVelocityRow),
+    "gas_and_friction": ("gas_and_friction.csv", GasAndFrictionRow),
+    "steps": ("steps.csv", StepRow),
+    "warm_up": ("warm_up.csv", WarmUpRow),
+    "as_it_stands": ("as_it_stands.csv", AsItStandsRow),
+}
+
+
+# --- Parameters of the conditions, and the damper that has them ---
+
+
+class ParameterRow(ConditionRow):
+    """The Bingham parameters of one condition or voltage node; None where undetermined."""
+
     T0_N: float | None = Field(ge=0.0)
     T0_N_low95: float | None
     T0_N_high95: float | None
@@ -40,9 +220,9 @@ class ParameterRow(Frozen):
 
     @model_validator(mode="after")
     def _inside_its_interval(self) -> ParameterRow:
-        """A value written by hand in another unit than its interval, or without it, is told."""
-        for name in ("T0_N", "C_Ns_per_m", "k_N_per_m"):
-            value, low, high = (getattr(self, f"{name}{end}") for end in ("", "_low95", "_high95"))
+        """Refuse a value that was edited without its interval."""
+        for name in PHYSICAL:
+            value, low, high = Estimate.of(self, name)
             if value is not None and not (low is None or low <= value) & (high is None or value <= high):
                 raise ValueError(
                     f"{name} must lie between {name}_low95 and {name}_high95; change them too, or leave them empty"
@@ -50,15 +230,12 @@ class ParameterRow(Frozen):
         return self
 
 
-class AuxiliaryRow(Frozen):
+class AuxiliaryRow(ConditionRow):
     """What one condition shows beside the Bingham element, F_0 + k_g (x - zero_m): the gas charge of most dampers.
 
     It keeps T0, C and k unbiased and goes no further: which effect it stands for is named by diagnose.
     """
 
-    setting: str | None
-    voltage_V: float | None
-    temperature_degC: float | None
     F_0_N: float
     """Force at `zero_m` beside the element."""
     F_0_N_low95: float
@@ -71,13 +248,9 @@ class AuxiliaryRow(Frozen):
     """Middle of the motion of the condition's tests, in the displacement as recorded."""
 
 
-class MeasureRow(Frozen):
+class MeasureRow(RecordRow):
     """What ties one test to an equivalent viscous damper."""
 
-    record: str
-    setting: str | None
-    voltage_V: float | None
-    temperature_degC: float | None
     frequency_Hz: float | None
     amplitude_m: float
     peak_velocity_m_per_s: float
@@ -109,41 +282,38 @@ class Identified:
 
     def write(self, folder: Path, control: Control) -> None:
         """Write parameters.csv, measures.csv, auxiliary.csv, and the files of the characteristics and the knee law."""
-        write_rows(folder / "parameters.csv", ParameterRow, self.rows, control)
-        write_rows(folder / "measures.csv", MeasureRow, self.measures, control)
-        write_rows(folder / "auxiliary.csv", AuxiliaryRow, self.auxiliary, control)
+        write_files(self, IDENTIFIED, folder, control)
         self.characteristics.write(folder, control)
         self.knees.write(folder, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
         """Read and check them again."""
-        rows = read_rows(folder / "parameters.csv", ParameterRow, control)
-        places = [(row.setting, row.voltage_V, row.temperature_degC) for row in rows]
-        twice = [_condition(row, control) for i, row in enumerate(rows) if places[i] in places[:i]]
+        rows = read_files(IDENTIFIED, folder, control)
+        parameters: tuple[ParameterRow, ...] = rows["rows"]
+        conditions = [row.condition for row in parameters]
+        twice = [row.words(control, "rig") for i, row in enumerate(parameters) if conditions[i] in conditions[:i]]
         if twice:
             raise DataError(f"{folder / 'parameters.csv'}: two rows of one condition ({each})" for each in twice)
-        if faults := _unphysical(rows, folder / "parameters.csv"):
+        if faults := _unphysical(parameters, folder / "parameters.csv"):
             raise DataError(faults)
-        return cls(
-            rows,
-            read_rows(folder / "measures.csv", MeasureRow, control),
-            read_rows(folder / "auxiliary.csv", AuxiliaryRow, control),
-            Characteristics.read(folder, control),
-            Knees.read(folder, control),
-        )
+        return cls(**rows, characteristics=Characteristics.read(folder, control), knees=Knees.read(folder, control))
 
     def untrusted(self, control: Control) -> tuple[str, ...]:
-        """Why the result is not to be trusted (exit 4): the rows whose T0 or C is undetermined."""
-        return tuple(
-            f"{_condition(row, control)}: {row.status}"
-            for row in self.rows
-            if row.T0_N is None or row.C_Ns_per_m is None
-        )
+        """Return why the result is not to be trusted (exit 4): the rows whose T0 or C is undetermined."""
+        rows = [row for row in self.rows if row.T0_N is None or row.C_Ns_per_m is None]
+        return tuple(f"{row.words(control, 'rig')}: {row.status}" for row in rows)
+
+
+IDENTIFIED: Files = {
+    "rows": ("parameters.csv", ParameterRow),
+    "measures": ("measures.csv", MeasureRow),
+    "auxiliary": ("auxiliary.csv", AuxiliaryRow),
+}
 
 
 def _unphysical(rows: tuple[ParameterRow, ...], path: Path) -> list[str]:
-    """Values without an interval that no damper has, each with its line."""
+    """Return a fault for each edited value that no damper has, with its line; fitted ones have an interval."""
     return [
         f"{at(path, line)}: {name}: {wrong} (got {value:g})"
         for line, row in enumerate(rows, start=2)
@@ -153,16 +323,8 @@ def _unphysical(rows: tuple[ParameterRow, ...], path: Path) -> list[str]:
     ]
 
 
-def _condition(row: ParameterRow, control: Control) -> str:
-    """Setting, control signal and temperature of a row, those that it has."""
-    parts = [row.setting or "rig"]
-    parts += [f"{row.voltage_V:.4g} {control.unit}"] if row.voltage_V is not None else []
-    parts += [f"{row.temperature_degC:.4g} degC"] if row.temperature_degC is not None else []
-    return ", ".join(parts)
-
-
 def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:
-    """The plain damper of one setting, from its identified parameters.
+    """Return the baseline of one setting: the damper with its identified parameters and no effect.
 
     A value that the data do not determine is taken from the nearest condition that has it
     (by voltage, then temperature); where no condition has it, from `FALLBACK`.
@@ -178,7 +340,7 @@ def base_of(rows: tuple[ParameterRow, ...], setting: str | None) -> Damper:
 
 
 def identified_damper(found: Identified, setting: str | None) -> Damper:
-    """The damper of one setting that identify hands on, by the law that it was given.
+    """Return the damper of one setting by the law that identify adopted.
 
     Raises
     ------
@@ -207,7 +369,5 @@ def _filled(row: ParameterRow, rows: list[ParameterRow]) -> BaseRow:
     return BaseRow(
         voltage_V=row.voltage_V,
         temperature_degC=row.temperature_degC,
-        T0_N=value("T0_N"),
-        C_Ns_per_m=value("C_Ns_per_m"),
-        k_N_per_m=value("k_N_per_m"),
+        **{name: value(name) for name in FALLBACK},
     )

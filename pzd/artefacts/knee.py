@@ -1,4 +1,4 @@
-"""Bleed, knee and blow-off of a passive damper, how well they predict kept-back tests, and the damper that has them."""
+"""The knee law of a passive damper: bleed, knee, blow-off, gas and friction, held-out prediction, and the damper."""
 
 from __future__ import annotations
 
@@ -10,14 +10,11 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field
 
+from pzd.artefacts.csv_rows import ConditionRow, Estimate, Files, RecordRow, read_files, write_files
 from pzd.damper.fitted_laws.knee import NO_KNEE
 from pzd.damper.model import BaseRow, Damper
 from pzd.quantities import Control
-from pzd.schema.csvfile import read_rows, write_rows
 from pzd.schema.model import Frozen
-
-# ----------------------------------------------------------------------------------------------------
-
 
 LawName = Literal["bingham", "knee"]
 Direction = Literal["rebound", "compression"]
@@ -26,18 +23,14 @@ OF_A_DIRECTION = ("bleed_Ns_per_m", "knee_force_N", "knee_velocity_m_per_s", "bl
 """The columns of a direction, behind its name."""
 OF_BOTH = ("gas_force_N", "friction_N")
 """The columns that both directions share and the trade names with them."""
-Interval = tuple[float | None, float | None, float | None]
 
 
-class KneeRow(Frozen):
+class KneeRow(ConditionRow):
     """The knee law of one condition; a direction without a knee has empty cells, and its bleed goes on.
 
     Forces and speeds of both directions are magnitudes, of the oil and the seal alone; the gas is beside them.
     """
 
-    setting: str | None
-    voltage_V: float | None
-    temperature_degC: float | None
     rebound_bleed_Ns_per_m: float = Field(gt=0.0)
     """Slope up to the knee."""
     rebound_bleed_Ns_per_m_low95: float
@@ -89,22 +82,14 @@ class KneeRow(Frozen):
     """Criterion (4) over the samples that the row was fitted to."""
     rmse_N: float = Field(ge=0.0)
     missed_share: float = Field(ge=0.0)
-    """R.m.s. of what the law misses beyond noise, as a share of peak force; 0 where noise alone may show it."""
+    """R.m.s. residual of the law beyond noise, as a share of peak force; 0 where noise alone explains it."""
     status: str = Field(pattern=r"^(ok|weak: .*)$")
     """`ok`, or `weak: ...` with the parameters and the reason."""
 
-    def interval(self, quantity: str) -> Interval:
-        """A quantity, by its column, with its 95 % interval; None where the direction has no knee."""
-        value, low, high = (getattr(self, f"{quantity}{end}") for end in ("", "_low95", "_high95"))
-        return value, low, high
 
-
-class KneeForceRow(Frozen):
+class KneeForceRow(ConditionRow):
     """Force of the knee law at one of the trade's speeds, as a rig records it: with the gas force at mid-stroke."""
 
-    setting: str | None
-    voltage_V: float | None
-    temperature_degC: float | None
     velocity_m_per_s: float = Field(gt=0.0)
     """Of either direction."""
     rebound_force_N: float
@@ -115,14 +100,12 @@ class KneeForceRow(Frozen):
     """1 where a test was as fast, 0 where the law is the model beyond."""
 
 
-class ClickRow(Frozen):
-    """How much of the force one click makes at one of the trade's speeds, between two neighbouring positions."""
+class ClickRow(ConditionRow):
+    """Force a click at one of the trade's speeds, between two neighbouring positions.
 
-    setting: str | None
-    """With # for the number of the clicker, where that stands in the setting and not in the control signal."""
-    voltage_V: float | None
-    """Of the condition, where the clicker stands in the setting."""
-    temperature_degC: float | None
+    The setting has # for the number of the clicker, where that stands in it and not in the control signal.
+    """
+
     from_click: float
     to_click: float
     velocity_m_per_s: float = Field(gt=0.0)
@@ -131,14 +114,12 @@ class ClickRow(Frozen):
     compression_N_per_click: float
 
 
-class UnitRow(Frozen):
-    """How much of the force one unit of a gas pressure, gap or shim makes at one of the trade's speeds."""
+class UnitRow(ConditionRow):
+    """Force a unit of a gas pressure, gap or shim at one of the trade's speeds.
 
-    setting: str | None
-    """With # for the number, where that stands in the setting and not in the control signal."""
-    voltage_V: float | None
-    """Of the condition, where the number stands in the setting."""
-    temperature_degC: float | None
+    The setting has # for that number, where it stands in it and not in the control signal.
+    """
+
     unit: str
     """Of the number, as it was written: psi, bar, mm, ..."""
     from_value: float
@@ -151,25 +132,21 @@ class UnitRow(Frozen):
     """By how much the gas force itself changes; below zero where the gas pushes the rod out more."""
 
 
-class PredictedRow(Frozen):
-    """One test that was kept back, predicted by both laws, each fitted without it."""
+class PredictedRow(RecordRow):
+    """One held-out test, predicted by both laws, each fitted without it."""
 
-    record: str
-    setting: str | None
-    voltage_V: float | None
-    temperature_degC: float | None
     W_s_bingham: float = Field(ge=0.0)
     """Of one T0 and C, with the same oil spring, gas force and gas spring beside it as the knee has."""
     W_s_knee: float = Field(ge=0.0)
 
 
 class LawRow(Frozen):
-    """The law of one setting that is handed on, and why."""
+    """The law of one setting that identify adopts, and why."""
 
     setting: str | None
     law: LawName
     tests: int = Field(ge=0)
-    """Tests that were kept back in turn."""
+    """Tests that were held out in turn."""
     W_s_bingham: float | None
     """Criterion (4) over all of them."""
     W_s_knee: float | None
@@ -178,7 +155,7 @@ class LawRow(Frozen):
 
 @dataclass(frozen=True)
 class DirectionOfCondition:
-    """What the trade says of one direction of one condition."""
+    """Force at the trade's speeds, and the knee law, of one direction of one condition."""
 
     row: KneeRow
     direction: Direction
@@ -187,17 +164,14 @@ class DirectionOfCondition:
     inside: tuple[bool, ...]
     """(s,) whether a test was as fast."""
 
-    @property
-    def intervals(self) -> tuple[Interval, ...]:
-        """Those of `OF_A_DIRECTION`, then those of `OF_BOTH`."""
-        return tuple(
-            self.row.interval(name) for name in (*(f"{self.direction}_{name}" for name in OF_A_DIRECTION), *OF_BOTH)
-        )
+    def estimate(self, column: str) -> Estimate:
+        """Return one of `OF_A_DIRECTION` or `OF_BOTH` with its 95 % interval; no value where there is no knee."""
+        return Estimate.of(self.row, column if column in OF_BOTH else f"{self.direction}_{column}")
 
 
 @dataclass(frozen=True)
 class Knees:
-    """What identify found of the knee law; empty where the config asks for Bingham alone."""
+    """The knee law of every condition; empty where the config asks for Bingham alone."""
 
     rows: tuple[KneeRow, ...] = ()
     forces: tuple[KneeForceRow, ...] = ()
@@ -207,38 +181,25 @@ class Knees:
     per_unit: tuple[UnitRow, ...] = ()
 
     def write(self, folder: Path, control: Control) -> None:
-        """Write a file for each of the fields, law.csv, knee.csv and so on, where there is anything to write."""
+        """Write the files named in `KNEES` where the config asks for the law."""
         if self.laws:
-            write_rows(folder / "knee.csv", KneeRow, self.rows, control)
-            write_rows(folder / "knee_force.csv", KneeForceRow, self.forces, control)
-            write_rows(folder / "clicks.csv", ClickRow, self.clicks, control)
-            write_rows(folder / "per_unit.csv", UnitRow, self.per_unit, control)
-            write_rows(folder / "kept_back.csv", PredictedRow, self.predicted, control)
-            write_rows(folder / "law.csv", LawRow, self.laws, control)
+            write_files(self, KNEES, folder, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
-        """Read and check them again; where the config asked for Bingham alone there are none."""
+        """Read and check them again; an earlier version wrote all but the force a unit."""
         if not (folder / "law.csv").is_file():
             return cls()
-        per_unit = folder / "per_unit.csv"  # an earlier version wrote the others alone
-        return cls(
-            read_rows(folder / "knee.csv", KneeRow, control),
-            read_rows(folder / "knee_force.csv", KneeForceRow, control),
-            read_rows(folder / "clicks.csv", ClickRow, control),
-            read_rows(folder / "kept_back.csv", PredictedRow, control),
-            read_rows(folder / "law.csv", LawRow, control),
-            read_rows(per_unit, UnitRow, control) if per_unit.is_file() else (),
-        )
+        return cls(**read_files(KNEES, folder, control, ("per_unit",)))
 
     @property
     def speeds(self) -> tuple[float, ...]:
-        """(s,) the trade's speeds at which a force is told, rising [m/s]."""
+        """(s,) the trade's speeds at which a force is given, rising [m/s]."""
         return tuple(sorted({row.velocity_m_per_s for row in self.forces}))
 
     def directions(self) -> tuple[DirectionOfCondition, ...]:
-        """Every direction of every condition, rebound first."""
-        at = {(r.setting, r.voltage_V, r.temperature_degC, r.velocity_m_per_s): r for r in self.forces}
+        """Return every direction of every condition, rebound first."""
+        at = {(*row.condition, row.velocity_m_per_s): row for row in self.forces}
         return tuple(
             DirectionOfCondition(
                 row,
@@ -247,25 +208,31 @@ class Knees:
                 tuple(f is not None and f.inside == 1 for f in here),
             )
             for row in self.rows
-            for here in [[at.get((row.setting, row.voltage_V, row.temperature_degC, v)) for v in self.speeds]]
+            for here in [[at.get((*row.condition, v)) for v in self.speeds]]
             for direction in DIRECTIONS
         )
 
     def law_of(self, setting: str | None) -> LawName:
-        """The law of a setting that is handed on."""
+        """Return the adopted law of a setting."""
         return next((row.law for row in self.laws if row.setting == setting), "bingham")
 
     def of(self, setting: str | None) -> tuple[KneeRow, ...]:
-        """The rows of a setting."""
+        """Return the rows of a setting."""
         return tuple(row for row in self.rows if row.setting == setting)
 
 
-# ----------------------------------------------------------------------------------------------------
-# The damper of one setting that has the knee law, from the rows that identify found.
+KNEES: Files = {
+    "rows": ("knee.csv", KneeRow),
+    "forces": ("knee_force.csv", KneeForceRow),
+    "clicks": ("clicks.csv", ClickRow),
+    "per_unit": ("per_unit.csv", UnitRow),
+    "predicted": ("kept_back.csv", PredictedRow),
+    "laws": ("law.csv", LawRow),
+}
 
 
 def knee_damper(rows: Sequence[KneeRow]) -> Damper:
-    """The damper of one setting with the knee law: a base row a condition, the knee and the gas as effects beside it.
+    """Return the damper of one setting by the knee law: a base row a condition, the knee and the gas as effects.
 
     Gas force and gas spring are left out where the interval of every condition holds zero. Effects know no temperature:
     where a voltage was tested at several, theirs are the mean; T0, C and k are of each.
@@ -274,12 +241,12 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
     ----------
     rows : of one setting, at least one
     """
-    zero = float(np.mean([row.zero_m for row in rows]))
+    displacement_zero = float(np.mean([row.zero_m for row in rows]))
     voltages = sorted({row.voltage_V for row in rows}, key=lambda v: -np.inf if v is None else v)
     parts = [[row for row in rows if row.voltage_V == voltage] for voltage in voltages]
     effects = {
         "knee": [_mean([_knee(row) for row in part]) for part in parts],
-        "preload_offset": [_mean([{"F_0": _gas_force(row, zero)} for row in part]) for part in parts],
+        "preload_offset": [_mean([{"F_0": _gas_force(row, displacement_zero)} for row in part]) for part in parts],
         "gas_spring": [_mean([{"k_g": row.gas_spring_N_per_m} for row in part]) for part in parts],
     }
     shown = {
@@ -299,13 +266,13 @@ def knee_damper(rows: Sequence[KneeRow]) -> Damper:
             )
             for row in rows
         ),
-        effects={name: _by_voltage(values, given) for name, values in effects.items() if shown[name]},
-        zero_m=zero,
+        effects={name: _per_voltage(values, given) for name, values in effects.items() if shown[name]},
+        zero_m=displacement_zero,
     )
 
 
 def _knee(row: KneeRow) -> dict[str, float]:
-    """The parameters of the law `knee`; a direction without one goes on with its bleed."""
+    """Return the parameters of the law `knee`; a direction without one goes on with its bleed."""
     rebound, compression = row.rebound_bleed_Ns_per_m, row.compression_bleed_Ns_per_m
     return {
         "beta": (rebound - compression) / (rebound + compression),
@@ -316,17 +283,17 @@ def _knee(row: KneeRow) -> dict[str, float]:
     }
 
 
-def _gas_force(row: KneeRow, zero: float) -> float:
-    """F_0 at another zero of the displacement [N]."""
-    return row.gas_force_N + row.gas_spring_N_per_m * (zero - row.zero_m)
+def _gas_force(row: KneeRow, displacement_zero: float) -> float:
+    """Return F_0 at another zero of the displacement [N]."""
+    return row.gas_force_N + row.gas_spring_N_per_m * (displacement_zero - row.zero_m)
 
 
 def _mean(values: Sequence[dict[str, float]]) -> dict[str, float]:
     return {name: float(np.mean([each[name] for each in values])) for name in values[0]}
 
 
-def _by_voltage(values: Sequence[dict[str, float]], voltages: Sequence[float]) -> dict[str, float | tuple[float, ...]]:
-    """One number each, or lists beside `at_voltage_V` where there are several voltages."""
+def _per_voltage(values: Sequence[dict[str, float]], voltages: Sequence[float]) -> dict[str, float | tuple[float, ...]]:
+    """Return one number each, or lists beside `at_voltage_V` where there are several voltages."""
     if len(values) == 1:
         return dict(values[0])
     lists = {name: tuple(each[name] for each in values) for name in values[0]}

@@ -1,4 +1,4 @@
-"""The comfort numbers and the page."""
+"""Artefact of report: comfort numbers, expected numbers and the page; and the manifest of every stage."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from typing import ClassVar, Self
 from pzd.quantities import Control
 from pzd.schema.csvfile import read_rows, write_rows
 from pzd.schema.model import Frozen
-
-# ----------------------------------------------------------------------------------------------------
 
 
 class ComfortRow(Frozen):
@@ -70,10 +68,6 @@ class Report:
             (folder / "report.html").read_text(encoding="utf-8"),
             read_rows(reference, ReferenceRow, control) if reference.exists() else None,
         )
-
-
-# ----------------------------------------------------------------------------------------------------
-# What a stage was made from and what it made.
 
 
 class Manifest(Frozen):

@@ -1,4 +1,4 @@
-"""Every ride of the half-car, and its summary."""
+"""Artefact of simulate: the rides of the half-car, their summaries, and the response of the damper to a step."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
+from pzd.artefacts.csv_rows import Files, read_files, write_files
 from pzd.parallel.processes import parallel_map
 from pzd.quantities import Control
 from pzd.record import Array
-from pzd.schema import csvfile
-from pzd.schema.csvfile import read_columns, read_rows, write_columns, write_rows
+from pzd.schema.csvfile import read_columns, read_parquet, write_columns, write_parquet
 from pzd.schema.model import Frozen
 
 RIDE_COLUMNS = ("time_s", "z_m", "phi_rad", "a_K_m_per_s2")
@@ -60,7 +60,7 @@ class SummaryRow(Frozen):
 
 
 class RideRow(Frozen):
-    """The window in which the numbers of a ride are taken, and what was held constant in it."""
+    """The window in which the numbers of a ride are taken, and what its policy held constant."""
 
     case: str
     from_s: float
@@ -79,7 +79,7 @@ class RideRow(Frozen):
 
 
 class WheelRow(Frozen):
-    """The force between the wheels of one axle and the road, in the window of the ride."""
+    """Contact force between the wheels of one axle and the road, in the window of the ride."""
 
     case: str
     axle: int
@@ -178,41 +178,28 @@ class Rides:
             if history[ride.case] == "csv":
                 write_columns(path, ride.columns, control, _RIDE_HEADER)
             else:
-                csvfile.write_parquet(path, ride.columns, control)
+                write_parquet(path, ride.columns, control)
 
         parallel_map(written, self.rides, jobs)
-        write_rows(folder / "summary.csv", SummaryRow, self.summary, control)
-        write_rows(folder / "rides.csv", RideRow, self.ridden, control)
-        write_rows(folder / "wheels.csv", WheelRow, self.wheels, control)
-        write_rows(folder / "weighted.csv", WeightedRow, self.weighted, control)
-        write_rows(folder / "spectrum.csv", SpectrumRow, self.spectrum, control)
-        write_rows(folder / "response.csv", Response, self.responses, control)
+        write_files(self, RIDES, folder, control)
         if self.found:
-            write_rows(folder / "best_found.csv", FoundRow, self.found, control)
+            write_files(self, FOUND, folder, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control, jobs: int = 1) -> Self:
         """Read and check them again, so many at the same time."""
 
         def ride(row: RideRow) -> Ride:
-            read = read_columns if row.history == "csv" else csvfile.read_parquet
+            read = read_columns if row.history == "csv" else read_parquet
             return Ride(row.case, read(folder / f"{row.case}.{row.history}", _RIDE_HEADER, control, _RIDE_OPTIONAL))
 
-        summary = read_rows(folder / "summary.csv", SummaryRow, control)
-        ridden = read_rows(folder / "rides.csv", RideRow, control)
-        return cls(
-            tuple(parallel_map(ride, [row for row in ridden if row.history != "none"], jobs)),
-            summary,
-            ridden,
-            read_rows(folder / "wheels.csv", WheelRow, control),
-            read_rows(folder / "weighted.csv", WeightedRow, control),
-            read_rows(folder / "spectrum.csv", SpectrumRow, control),
-            read_rows(folder / "response.csv", Response, control),
-            read_rows(folder / "best_found.csv", FoundRow, control) if (folder / "best_found.csv").exists() else (),
-        )
+        rows = read_files(RIDES, folder, control)
+        kept = [row for row in rows["ridden"] if row.history != "none"]
+        found = read_files(FOUND, folder, control, optional=FOUND)
+        return cls(tuple(parallel_map(ride, kept, jobs)), **rows, **found)
 
     def untrusted(self, _: Control) -> tuple[str, ...]:
-        """Why the result is not to be trusted (exit 4): rides whose energy balance does not close."""
+        """Return why the result is not to be trusted (exit 4): rides whose energy balance does not close."""
         return tuple(
             f"{row.case}: energy error {row.energy_error:.1e}, above {ENERGY_LIMIT:g}"
             for row in self.summary
@@ -222,3 +209,13 @@ class Rides:
 
 ENERGY_LIMIT = 1e-6
 """Largest error of the energy balance, as a share of the dissipated energy."""
+
+RIDES: Files = {
+    "summary": ("summary.csv", SummaryRow),
+    "ridden": ("rides.csv", RideRow),
+    "wheels": ("wheels.csv", WheelRow),
+    "weighted": ("weighted.csv", WeightedRow),
+    "spectrum": ("spectrum.csv", SpectrumRow),
+    "responses": ("response.csv", Response),
+}
+FOUND: Files = {"found": ("best_found.csv", FoundRow)}

@@ -1,4 +1,4 @@
-"""The rig records in canonical columns, and what the preflight found."""
+"""Artefact of rig: the records in canonical columns, with the findings of the preflight; and the look-up of tests."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 
-from pzd.artefacts.characteristics import Characteristics, GasAndFrictionRow
-from pzd.artefacts.identified import MeasureRow, ParameterRow
+from pzd.artefacts.identified import Characteristics, GasAndFrictionRow, MeasureRow, ParameterRow
 from pzd.parallel.processes import parallel_map
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, TIME, VELOCITY, VOLTAGE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record, clock_fault
@@ -22,15 +21,12 @@ from pzd.schema.yamlfile import read_yaml
 from pzd.signals.cycles import Cycles, cycles_of
 from pzd.signals.smoothing import reversals, work
 
-# ----------------------------------------------------------------------------------------------------
-
-
 INGEST = "ingest.json"
 """What was done to the files of a real rig."""
 
 
 class Finding(Frozen):
-    """One finding of the preflight: never corrected, always said."""
+    """One finding of the preflight: always reported, never corrected."""
 
     check: str
     """Which check found it."""
@@ -66,10 +62,10 @@ class RecordEntry(Frozen):
     force_rms_N: float | None = None
     """R.m.s. of the force about its mean."""
     work_J: float | None = None
-    """Work done on the damper over the record; its sign tells force and displacement of one direction."""
+    """Work done on the damper over the record; below zero where force and displacement have opposite signs."""
     findings: tuple[Finding, ...] = ()
     removed: str | None = None
-    """What a known fixture took out of the force, in words."""
+    """What was subtracted from the force for a known fixture, in words."""
 
 
 class IngestRow(Frozen):
@@ -110,7 +106,7 @@ class Rig:
         parallel_map(written, self.records, jobs)
 
     def as_read(self) -> Self:
-        """The same as `read` makes it of the files: every channel 64 bits wide and in one piece."""
+        """Return the rig as `read` makes it of the files: every channel 64 bits wide and contiguous."""
         return replace(self, records=tuple(_as_read(record) for record in self.records))
 
     @classmethod
@@ -138,7 +134,7 @@ def _channels(record: Record) -> Mapping[str, Array | None]:
 
 
 def _as_read(record: Record) -> Record:
-    """The record itself where its channels are so already, for what is remembered of it goes by the record."""
+    """Return the record itself where its channels are so already, since caches go by the identity of a record."""
     given: list[Any] = [getattr(record, field.name) for field in fields(record)]
     read: list[Any] = [np.ascontiguousarray(v, np.float64) if isinstance(v, np.ndarray) else v for v in given]
     return record if all(a is b for a, b in zip(given, read, strict=True)) else Record(*read)
@@ -157,7 +153,7 @@ def _read_record(folder: Path, number: int, entry: RecordEntry, control: Control
         *(columns[name] for name in header[:5]),
         *(columns.get(name) for name in optional),
     )
-    if faults := _contradictions(entry, record, control):
+    if faults := _edits(entry, record, control):
         document = read_yaml(folder / "records.json", DataError)
         raise DataError(
             f"{document.place((str(number), control.renamed(name)))}: {fault}" for name, fault in faults.items()
@@ -165,8 +161,8 @@ def _read_record(folder: Path, number: int, entry: RecordEntry, control: Control
     return record
 
 
-def extent(record: Record, run: Cycles | None) -> dict[str, Any]:
-    """What an entry of records.json says of the numbers of its file, by which an edit of one of the two is seen.
+def entry_numbers(record: Record, run: Cycles | None) -> dict[str, Any]:
+    """Return the numbers of a record that its entry in records.json holds, by which an edit of either is noticed.
 
     Parameters
     ----------
@@ -187,49 +183,47 @@ def extent(record: Record, run: Cycles | None) -> dict[str, Any]:
 
 
 OTHER_UNIT = 3.0
-"""From this ratio on a channel is in another unit; a pound-force and a newton lie 4.4 apart. A sample that is edited,
-such as a spike that is taken out, moves the r.m.s. by less."""
+"""From this ratio of r.m.s. on a channel is in another unit: a pound-force is 4.4 newtons. Editing a sample, for
+instance to remove a spike, changes the r.m.s. by less."""
 _MEDIANS = ("voltage_V", "temperature_degC")
 _RMS = ("displacement_rms_m", "velocity_rms_m_per_s", "acceleration_rms_m_per_s2", "force_rms_N")
 _MAY_BE_LEFT_OUT = (*_RMS, "work_J")
 SAME_CYCLES = 1.0
-"""A sample that is edited moves either end of a run by no more than part of a cycle."""
+"""Editing a sample moves either end of a run of cycles by no more than part of a cycle."""
 
 
 def _rms(channel: Array) -> float:
     return float(np.std(channel))
 
 
-def _contradictions(entry: RecordEntry, record: Record, control: Control) -> dict[str, str]:
-    """What an entry says otherwise than its file, by its key, after an edit of one of them to another unit or sign."""
+def _edits(entry: RecordEntry, record: Record, control: Control) -> dict[str, str]:
+    """Return a fault for each number of an entry that its file contradicts after an edit, by its key."""
     faults: dict[str, str] = {}
-    for name, holds in extent(record, cycles_of(record)).items():
-        said = getattr(entry, name)
-        if (said is None and (holds is None or name in _MAY_BE_LEFT_OUT)) or _agree(name, said, holds):
+    for name, recorded in entry_numbers(record, cycles_of(record)).items():
+        listed = getattr(entry, name)
+        if (listed is None and (recorded is None or name in _MAY_BE_LEFT_OUT)) or _agree(name, listed, recorded):
             continue
         must = "the median" if name in _MEDIANS else "that"
         faults[name] = (
-            f"{control.renamed(name)} of {entry.name}: must be {must} of its file (got {said}, "
-            f"where {entry.name}.csv has {holds}); one of them was edited: take that back, or change the other too"
+            f"{control.renamed(name)} of {entry.name}: must be {must} of its file (got {listed}, "
+            f"where {entry.name}.csv has {recorded}); one of them was edited: take that back, or change the other too"
         )
     return faults
 
 
-def _agree(name: str, said: float | None, holds: float | None) -> bool:
-    if said is None or holds is None:
+def _agree(name: str, listed: float | None, recorded: float | None) -> bool:
+    if listed is None or recorded is None:
         return False
     if name == "work_J":
-        return said * holds >= 0.0
+        return listed * recorded >= 0.0
     if name == "cycles":
-        return abs(said - holds) <= SAME_CYCLES
+        return abs(listed - recorded) <= SAME_CYCLES
     if name in _RMS:
-        return max(abs(said), abs(holds)) <= OTHER_UNIT * min(abs(said), abs(holds))
-    return bool(np.isclose(said, holds, rtol=1e-3))
+        return max(abs(listed), abs(recorded)) <= OTHER_UNIT * min(abs(listed), abs(recorded))
+    return bool(np.isclose(listed, recorded, rtol=1e-3))
 
 
-# ----------------------------------------------------------------------------------------------------
-# Which test or condition of a rig a few stated numbers mean: the one place that says when two are the same.
-
+# --- Looking up the tests or conditions that a few stated numbers mean ---
 
 SAME_MOTION = 0.05
 """Frequencies, amplitudes and speeds that differ by less, relative, are the same: stands reach what they are set to
@@ -249,12 +243,12 @@ class Conditions:
     amplitude_m: float | None = None
 
     def __str__(self) -> str:
-        """In words."""
+        """Return the conditions in words."""
         units = {"voltage_V": "V", "temperature_degC": "°C", "frequency_Hz": "Hz", "amplitude_m": "m"}
         numbers = [(getattr(self, name), unit) for name, unit in units.items()]
-        said = [self.setting] if self.setting else []
-        said += [f"{value:g} {unit}" for value, unit in numbers if value is not None]
-        return ", ".join(said) or "any condition"
+        words = [self.setting] if self.setting else []
+        words += [f"{value:g} {unit}" for value, unit in numbers if value is not None]
+        return ", ".join(words) or "any condition"
 
 
 ANY = Conditions()
@@ -262,35 +256,34 @@ ANY = Conditions()
 
 
 def same_motion(a: float, b: float) -> bool:
-    """Whether two frequencies, amplitudes or speeds are the same, within `SAME_MOTION` of the larger."""
+    """Return whether two frequencies, amplitudes or speeds are the same, within `SAME_MOTION` of the larger."""
     return abs(a - b) <= SAME_MOTION * max(abs(a), abs(b))
 
 
-def force_behind(found: Characteristics, row: GasAndFrictionRow) -> float:
-    """The largest force of the slowest tests of a condition [N]: gas force and friction were read from them.
+def slowest_test_force(found: Characteristics, row: GasAndFrictionRow) -> float:
+    """Return the largest force of the slowest tests of a condition, which its gas force and friction come from [N].
 
-    The two are a mean and half a difference of such forces, so no digit below the last one of these tells anything.
+    The two are a mean and half a difference of such forces, so no digit below the last one of these is significant.
 
     Parameters
     ----------
     found : with the tests
     row : gas force and friction of a condition
     """
-    condition = (row.setting, row.voltage_V, row.temperature_degC)
-    mine = [r for r in found.peak_velocity if (r.setting, r.voltage_V, r.temperature_degC) == condition]
+    mine = [r for r in found.peak_velocity if r.condition == row.condition]
     slowest = [r for r in mine if same_motion(r.speed, row.velocity_m_per_s)]
     forces = [force for r in slowest for force in (r.rebound_force_N, r.compression_force_N) if force is not None]
     return max(map(abs, forces), default=0.0)
 
 
 def voltage_margin(rows: Sequence[MeasureRow] | Sequence[ParameterRow]) -> float:
-    """How far apart two voltages of a rig may be to count as one: 2 % of the larger of span and magnitude [V]."""
+    """Return how far apart two voltages may be to count as one [V]: 2 % of the larger of span and magnitude."""
     voltages = [0.0, *(row.voltage_V for row in rows if row.voltage_V is not None)]
     return CONSTANT_SHARE * (max(voltages) - min(voltages))
 
 
 def matching(rows: Sequence[Row], wanted: Conditions, margin: float | None = None) -> tuple[Row, ...]:
-    """The tests, or the identified conditions, that meet every stated condition.
+    """Select the tests, or the identified conditions, that meet every stated condition.
 
     A condition of the motion says nothing about rows that hold no motion: those of the identified parameters.
 
@@ -309,8 +302,8 @@ def matching(rows: Sequence[Row], wanted: Conditions, margin: float | None = Non
     return tuple(sorted(found, key=lambda row: abs((row.temperature_degC or 0.0) - (wanted.temperature_degC or 0.0))))
 
 
-def undecided(rows: Sequence[Row], found: Sequence[Row], wanted: Conditions) -> tuple[str, ...]:
-    """The conditions that were left open and in which the rows found differ, so that no one of them is meant.
+def ambiguous_conditions(rows: Sequence[Row], found: Sequence[Row], wanted: Conditions) -> tuple[str, ...]:
+    """Return the conditions that were left open and in which the rows found differ, so that no one of them is meant.
 
     Parameters
     ----------
@@ -330,12 +323,15 @@ def undecided(rows: Sequence[Row], found: Sequence[Row], wanted: Conditions) -> 
 
 
 def _meets(row: MeasureRow | ParameterRow, wanted: Conditions, margin: float) -> bool:
-    still = wanted.setting in (None, row.setting)
-    still = still and _within(row.voltage_V, wanted.voltage_V, margin)
-    still = still and _within(row.temperature_degC, wanted.temperature_degC, SAME_TEMPERATURE)
-    if isinstance(row, MeasureRow):
-        still = still and _moves(row.frequency_Hz, wanted.frequency_Hz) and _moves(row.amplitude_m, wanted.amplitude_m)
-    return still
+    return (
+        wanted.setting in (None, row.setting)
+        and _within(row.voltage_V, wanted.voltage_V, margin)
+        and _within(row.temperature_degC, wanted.temperature_degC, SAME_TEMPERATURE)
+        and (
+            isinstance(row, ParameterRow)
+            or (_moves(row.frequency_Hz, wanted.frequency_Hz) and _moves(row.amplitude_m, wanted.amplitude_m))
+        )
+    )
 
 
 def _within(found: float | None, wanted: float | None, margin: float) -> bool:

@@ -1,4 +1,4 @@
-"""Force over temperature, voltage and velocity, and its inverse."""
+"""Artefact of table: force over temperature, voltage and velocity, its inverse, and settings between tested ones."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
+from pzd.artefacts.csv_rows import Files, read_files, write_files
 from pzd.quantities import Control
-from pzd.schema.csvfile import read_rows, write_rows
 from pzd.schema.model import Frozen
 from pzd.schema.validate import read_json, write_json
-
-# ----------------------------------------------------------------------------------------------------
 
 
 class ForceRow(Frozen):
@@ -57,7 +55,7 @@ class SettingRow(Frozen):
 
 
 class SettingLeftOutRow(Frozen):
-    """How well one tested setting is predicted from its neighbours, as if it had not been tested."""
+    """Prediction error of one tested setting, interpolated from its neighbours as if it had not been tested."""
 
     setting: str
     lower_setting: str
@@ -71,8 +69,8 @@ class SettingLeftOutRow(Frozen):
     largest_share_of_peak: float = Field(ge=0.0)
 
 
-def fastest(rows: Sequence[SettingRow]) -> tuple[tuple[SettingRow, SettingRow], ...]:
-    """The rows of the largest speed in rebound and in compression, of each setting, temperature and control signal.
+def at_largest_speed(rows: Sequence[SettingRow]) -> tuple[tuple[SettingRow, SettingRow], ...]:
+    """Return the rows of the largest speed in rebound and in compression, of each setting, temperature and control.
 
     Parameters
     ----------
@@ -110,44 +108,43 @@ class Table:
     settings: tuple[SettingRow, ...] = ()
     """Of settings between tested ones, where the config asks for some."""
     settings_left_out: tuple[SettingLeftOutRow, ...] = ()
-    """What to think of them, where three settings or more were tested."""
+    """How well such interpolation predicts tested ones, where three settings or more were tested."""
 
     def write(self, folder: Path, control: Control) -> None:
         """Write force.csv, inverse.csv and notes.json; settings.csv and settings_left_out.csv where there are any."""
-        write_rows(folder / "force.csv", ForceRow, self.force, control)
-        write_rows(folder / "inverse.csv", InverseRow, self.inverse, control)
+        write_files(self, FORCES, folder, control)
         write_json(folder / "notes.json", self.notes, control)
         if self.settings:
-            write_rows(folder / "settings.csv", SettingRow, self.settings, control)
-            write_rows(folder / "settings_left_out.csv", SettingLeftOutRow, self.settings_left_out, control)
+            write_files(self, SETTINGS, folder, control)
 
     @classmethod
     def read(cls, folder: Path, control: Control) -> Self:
         """Read and check them again."""
+        notes = read_json(folder / "notes.json", TableNotes, control)
         return cls(
-            read_rows(folder / "force.csv", ForceRow, control),
-            read_rows(folder / "inverse.csv", InverseRow, control),
-            read_json(folder / "notes.json", TableNotes, control),
-            *cls.read_settings(folder, control),
+            **read_files(FORCES, folder, control),
+            notes=notes,
+            **read_files(SETTINGS, folder, control, optional=SETTINGS),
         )
 
     @staticmethod
     def read_settings(folder: Path, control: Control) -> tuple[tuple[SettingRow, ...], tuple[SettingLeftOutRow, ...]]:
-        """The force at settings between tested ones, and how well left-out ones are predicted; none where not asked."""
-        if not (folder / "settings.csv").is_file():
-            return (), ()
-        return (
-            read_rows(folder / "settings.csv", SettingRow, control),
-            read_rows(folder / "settings_left_out.csv", SettingLeftOutRow, control),
-        )
+        """Return `settings` and `settings_left_out`, both empty where the config asks for none."""
+        rows = read_files(SETTINGS, folder, control, optional=SETTINGS)
+        return rows["settings"], rows["settings_left_out"]
 
 
-# ----------------------------------------------------------------------------------------------------
-# Settings whose names hold a number, as `gap 0.15 mm` or `R3 C12`: what varies from one to the next, and by how much.
+FORCES: Files = {"force": ("force.csv", ForceRow), "inverse": ("inverse.csv", InverseRow)}
+SETTINGS: Files = {
+    "settings": ("settings.csv", SettingRow),
+    "settings_left_out": ("settings_left_out.csv", SettingLeftOutRow),
+}
+
+
+# --- Settings on one axis: names that differ by one number alone, as `gap 0.15 mm` and `gap 0.25 mm` ---
 #
-# The number of a clicker, a gap, a shim or a gas pressure stands in the name of a setting; the rest of the name says what
-# it is a number of. Two settings lie on one axis where their names differ by one number alone.
-
+# The number of a clicker, a gap, a shim or a gas pressure stands in the name of a setting; the rest of the name says
+# what it is a number of.
 
 PRESSURES = frozenset({"psi", "bar", "mbar", "Pa", "hPa", "kPa", "MPa"})
 """Units of the gas pressure of a damper, as their symbols are written."""
@@ -180,13 +177,17 @@ class Neighbours:
 
     @property
     def share(self) -> float:
-        """Share of the way from the lower to the upper one."""
+        """Share of the distance from the lower to the upper one."""
         way = self.upper.value - self.lower.value
         return (self.wanted.value - self.lower.value) / way if way > 0.0 else 0.0
 
 
 def numbers_in(setting: str | None) -> tuple[NumberedSetting, ...]:
-    """Every number in the name of a setting; none where it has none."""
+    """Return every number in the name of a setting.
+
+    >>> numbers_in("gap 0.15 mm")
+    (NumberedSetting(setting='gap 0.15 mm', axis='gap # mm', value=0.15, unit='mm'),)
+    """
     name = setting or ""
     found = []
     for number in _NUMBER.finditer(name):
@@ -198,7 +199,7 @@ def numbers_in(setting: str | None) -> tuple[NumberedSetting, ...]:
 
 
 def on_axis(axis: str, tested: Sequence[str | None]) -> tuple[NumberedSetting, ...]:
-    """The tested settings on an axis, by rising number; `gap 0.2 mm` and `gap 0.20 mm` count once."""
+    """Return the tested settings on an axis, by rising number; `gap 0.2 mm` and `gap 0.20 mm` count once."""
     found: dict[float, NumberedSetting] = {}
     for name in sorted({name for name in tested if name is not None}):
         for one in numbers_in(name):
@@ -208,7 +209,11 @@ def on_axis(axis: str, tested: Sequence[str | None]) -> tuple[NumberedSetting, .
 
 
 def neighbours(wanted: str, tested: Sequence[str | None]) -> Neighbours:
-    """The tested settings to either side of a wanted one, on the first axis of its name that has two.
+    """Return the tested settings to either side of a wanted one, on the first axis of its name that has two.
+
+    >>> found = neighbours("gap 0.2 mm", ["gap 0.15 mm", "gap 0.25 mm"])
+    >>> found.lower.setting, found.upper.setting, round(found.share, 3)
+    ('gap 0.15 mm', 'gap 0.25 mm', 0.5)
 
     Parameters
     ----------

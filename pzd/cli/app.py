@@ -13,16 +13,17 @@ import typer
 
 from pzd.cli import campaigns, export, look, peers, stages, start
 from pzd.cli.interrupt import (
+    INTERRUPTED,
     end_at_once_when_interrupted,
     end_soon_after_interrupt,
     raise_when_interrupted,
     say_interrupted,
 )
-from pzd.cli.output import DONE, INTERRUPTED, OWN_FAULT, complain, own_fault, silence
+from pzd.cli.output import DONE, OWN_FAULT, complain, own_fault, silence
 from pzd.schema.errors import ConfigError, FilesError, UserError
 
 _USAGE_ERROR: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
-"""The base of what typer says about wrong usage; it is click's own or typer's copy of it."""
+"""Base class of typer's errors of usage: that of click, or typer's copy of it."""
 
 app = typer.Typer(
     name="pzd",
@@ -35,12 +36,9 @@ app = typer.Typer(
 )
 _COMMANDS: tuple[Callable[..., int], ...] = (
     *stages.COMMANDS,
-    *stages.WATCH_COMMANDS,
     *peers.COMMANDS,
     *look.COMMANDS,
     *export.COMMANDS,
-    *export.FIGURE_COMMANDS,
-    *campaigns.SWEEP_COMMANDS,
     *campaigns.COMMANDS,
     *start.COMMANDS,
 )
@@ -130,7 +128,7 @@ def _failed(error: Exception, arguments: Sequence[str]) -> int:
 
 
 def _usage(error: Exception, arguments: Sequence[str]) -> str:
-    """What is wrong with the usage, as one line."""
+    """Return one line about wrong usage, with the nearest command."""
     names = [one.__name__ for one in _COMMANDS]
     given = next((word for word in arguments if word in names), None)
     context = getattr(error, "ctx", None)

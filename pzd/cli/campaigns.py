@@ -1,4 +1,4 @@
-"""The command that hides effects in virtual rigs and scores what the diagnosis names."""
+"""The commands of many runs: a sweep over values and draws, and the blind benchmark of the diagnosis."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from pzd.cli.output import (
     CORES,
     DONE,
     RUNS,
-    UNTRUSTED,
     Config,
     Force,
     Jobs,
@@ -20,11 +19,8 @@ from pzd.cli.output import (
     Runs,
     Set,
     Verbose,
-    complain,
+    exit_code,
 )
-
-# ----------------------------------------------------------------------------------------------------
-
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,95 +28,9 @@ if TYPE_CHECKING:
     from pzd.blind.config import BlindConfig
     from pzd.blind.hide import BenchmarkSetup
     from pzd.config import RunConfig
-
-FOLDER = "blind"
-"""Where the benchmark lies beside the stages of the run."""
-
-
-def blind(
-    config: Config,
-    runs: Runs = RUNS,
-    overrides: Set = None,
-    force: Force = False,
-    jobs: Jobs = CORES,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-) -> int:
-    """Hide effects in virtual rigs, diagnose them, score the verdicts."""
-    from pzd.blind.benchmark import Benchmark, Methods, folder_of
-    from pzd.blind.summary import write
-    from pzd.parallel.engines import Where
-    from pzd.pipeline.command import opened
-
-    output = Output(quiet=quiet, verbose=verbose)
-    given = opened(config, runs, overrides or ())
-    setup, whole = _setup(given.config), given.config
-    files = folder_of(given.run.folder / FOLDER, setup.blind)
-    methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
-    with given.run.locked("pzd blind"):
-        made_from = _made_from(whole)
-        with given.placed():
-            _entered(setup.blind, made_from, config.parent)
-        where = Where(setup.blind, FOLDER, config.parent, files.folder / "slurm")
-        benchmark = Benchmark(setup, methods, files, made_from, where, output.progress)
-        cases = benchmark.run(jobs, afresh=force)
-        lines = write(cases, files.folder, setup.control, setup.blind)
-    output.say(*lines, f"tables and picture: {files.folder}")
-    complain(f"not to be trusted: case {name} could not be drawn: {why}" for name, why in benchmark.undrawn.items())
-    return UNTRUSTED if benchmark.undrawn else DONE
-
-
-def _setup(config: RunConfig) -> BenchmarkSetup:
-    """What every case starts from.
-
-    Raises
-    ------
-    ConfigError : when the config has no `blind` block, or not one virtual stand
-    """
-    from pzd.blind.hide import BenchmarkSetup
-    from pzd.schema.errors import ConfigError
-
-    if config.blind is None:
-        raise ConfigError("blind: the config has no such block; configs/blind.yaml is an example")
-    if config.rig.virtual is None or len(config.rig.virtual) != 1:
-        raise ConfigError("rig.virtual: pzd blind needs one virtual stand, whose damper the cases start from")
-    return BenchmarkSetup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
-
-
-def _entered(blind: BlindConfig, made_from: str, folder: Path) -> None:
-    """Enter a scored run into the ledger, where the config names one."""
-    from datetime import UTC, datetime
-
-    from pzd.blind.benchmark import ScoredSeed, enter
-
-    if blind.ledger is None or blind.tuning:
-        return
-    day = datetime.now(UTC).date().isoformat()
-    run = ScoredSeed(seed=blind.seed, generator=blind.generator, made_from=made_from, cases=blind.cases, date=day)
-    enter(folder / blind.ledger, run)
-
-
-def _made_from(config: RunConfig) -> str:
-    """Hash of the config's blocks and of the code that a case depends on."""
-    from pzd.parallel.config import HOW
-    from pzd.pipeline.dependencies import code_hash
-
-    of_the_run = {"blind": {"cases", "keep_files", "ledger", "tuned_on", "tuning", *HOW}}
-    blocks = config.model_dump_json(
-        include={"seed", "control", "rig", "identify", "diagnose", "blind"}, exclude=of_the_run
-    )
-    return hashlib.sha256(f"{blocks}{code_hash('pzd.blind.benchmark')}".encode()).hexdigest()[:16]
-
-
-COMMANDS = (blind,)
-
-
-# ----------------------------------------------------------------------------------------------------
-# The command that runs a config many times.
-
-
-if TYPE_CHECKING:
     from pzd.sweep.campaign import SweepRuns
+
+# --- pzd sweep ---
 
 Status = Annotated[bool, typer.Option("--status", help="Print how far it is, and run nothing.")]
 
@@ -158,9 +68,7 @@ def sweep(
         found = campaign.run(jobs, afresh=force)
         output.say(*campaign.gather(found, config.stem))
     failed = sum(outcome.failure is not None for outcome in found)
-    complain(f"not to be trusted: {mark}" for mark in marks)
-    complain([f"not to be trusted: {failed} of {len(found)} runs came to no result"] if failed else [])
-    return UNTRUSTED if marks or failed else DONE
+    return exit_code([*marks, *([f"{failed} of {len(found)} runs came to no result"] if failed else [])])
 
 
 def _status(campaign: SweepRuns) -> list[str]:
@@ -174,4 +82,86 @@ def _status(campaign: SweepRuns) -> list[str]:
     return lines
 
 
-SWEEP_COMMANDS = (sweep,)
+# --- pzd blind ---
+
+FOLDER = "blind"
+"""Where the benchmark lies beside the stages of the run."""
+
+
+def blind(
+    config: Config,
+    runs: Runs = RUNS,
+    overrides: Set = None,
+    force: Force = False,
+    jobs: Jobs = CORES,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> int:
+    """Hide effects in virtual rigs, diagnose them, score the verdicts."""
+    from pzd.blind.benchmark import Benchmark, Methods, folder_of
+    from pzd.blind.summary import write
+    from pzd.parallel.config import Where
+    from pzd.pipeline.command import opened
+
+    output = Output(quiet=quiet, verbose=verbose)
+    given = opened(config, runs, overrides or ())
+    setup, whole = _setup(given.config), given.config
+    places = folder_of(given.run.folder / FOLDER, setup.blind)
+    methods = Methods(whole.identify, whole.diagnose, whole.rig.limits, setup.control, whole.seed)
+    with given.run.locked("pzd blind"):
+        made_from = _made_from(whole)
+        with given.placed():
+            _entered(setup.blind, made_from, config.parent)
+        where = Where(setup.blind, FOLDER, config.parent, places.folder / "slurm")
+        benchmark = Benchmark(setup, methods, places, made_from, where, output.progress)
+        cases = benchmark.run(jobs, afresh=force)
+        tuning, generator = setup.blind.tuning, setup.blind.generator
+        by_campaign = setup.blind.by_campaign
+        lines = write(cases, places.folder, setup.control, tuning=tuning, generator=generator, by_campaign=by_campaign)
+    output.say(*lines, f"tables and picture: {places.folder}")
+    return exit_code(f"case {name} could not be drawn: {why}" for name, why in benchmark.undrawn.items())
+
+
+def _setup(config: RunConfig) -> BenchmarkSetup:
+    """Return the stand, damper and settings that every case starts from.
+
+    Raises
+    ------
+    ConfigError : when the config has no `blind` block, or not one virtual stand
+    """
+    from pzd.blind.hide import BenchmarkSetup
+    from pzd.schema.errors import ConfigError
+
+    if config.blind is None:
+        raise ConfigError("blind: the config has no such block; configs/blind.yaml is an example")
+    if config.rig.virtual is None or len(config.rig.virtual) != 1:
+        raise ConfigError("rig.virtual: pzd blind needs one virtual stand, whose damper the cases start from")
+    return BenchmarkSetup(config.blind, config.rig.virtual[0], config.diagnose.nuisance, config.control.signal())
+
+
+def _entered(blind: BlindConfig, made_from: str, folder: Path) -> None:
+    """Enter a scored run into the ledger, where the config names one."""
+    from datetime import UTC, datetime
+
+    from pzd.blind.benchmark import ScoredSeed, enter
+
+    if blind.ledger is None or blind.tuning:
+        return
+    day = datetime.now(UTC).date().isoformat()
+    run = ScoredSeed(seed=blind.seed, generator=blind.generator, made_from=made_from, cases=blind.cases, date=day)
+    enter(folder / blind.ledger, run)
+
+
+def _made_from(config: RunConfig) -> str:
+    """Return a hash of the config's blocks and of the code that a case depends on."""
+    from pzd.parallel.config import HOW
+    from pzd.pipeline.dependencies import code_hash
+
+    of_the_run = {"blind": {"cases", "keep_files", "ledger", "tuned_on", "tuning", *HOW}}
+    blocks = config.model_dump_json(
+        include={"seed", "control", "rig", "identify", "diagnose", "blind"}, exclude=of_the_run
+    )
+    return hashlib.sha256(f"{blocks}{code_hash('pzd.blind.benchmark')}".encode()).hexdigest()[:16]
+
+
+COMMANDS = (sweep, blind)

@@ -1,4 +1,4 @@
-"""The command that hands the damper of a run to other tools."""
+"""The commands that write a run for others: its damper for other tools, and the figures of the paper."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from typing import Annotated
 import typer
 
 from pzd.cli.output import (
-    DONE,
     RUNS,
-    UNTRUSTED,
     Config,
     Jobs,
     Json,
@@ -21,15 +19,13 @@ from pzd.cli.output import (
     Set,
     Verbose,
     command_line,
-    complain,
+    exit_code,
 )
 from pzd.export.formats import formats
 
-# ----------------------------------------------------------------------------------------------------
-
 
 def _once(given: Sequence[str]) -> list[str]:
-    """The value of --to.
+    """Return the value of --to.
 
     Raises
     ------
@@ -79,15 +75,7 @@ def export(
         output.say_json({"format": form, "files": files, "not_to_be_trusted": written.marks})
     else:
         output.say(*(f"export: {path}" for path in written.files))
-    complain(f"not to be trusted: {mark}" for mark in written.marks)
-    return UNTRUSTED if written.marks else DONE
-
-
-COMMANDS = (export,)
-
-
-# ----------------------------------------------------------------------------------------------------
-# The command that draws the figures of the paper from a run.
+    return exit_code(written.marks)
 
 
 def figures(
@@ -110,8 +98,7 @@ def figures(
     with given.run.locked("pzd figures"):
         given.run.write_extra(FOLDER, figure_set.write)
     output.say(f"figures: {given.run.folder / FOLDER / 'index.html'}")
-    complain(f"not to be trusted: {mark}" for mark in marks)
-    return UNTRUSTED if marks else DONE
+    return exit_code(marks)
 
 
-FIGURE_COMMANDS = (figures,)
+COMMANDS = (export, figures)

@@ -1,4 +1,4 @@
-"""Ends the program within a second of Ctrl-C, also where threads or compiled code would go on for longer.
+"""End the program within a second of Ctrl-C, also where threads or compiled code would go on for longer.
 
 An interrupt reaches Python's main thread alone, and only between two of its instructions; pools of
 threads wait for their work on the way out. Results are written so that a killed run leaves the old or
@@ -10,28 +10,28 @@ from __future__ import annotations
 import os
 import signal
 
-from pzd.cli.output import INTERRUPTED
-
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # before an interrupt is heeded, as little as possible is imported
     from types import FrameType
 
+INTERRUPTED = 130
+"""The exit code, as a shell has it for a program that SIGINT ended."""
 _GRACE_S = 0.4
 """How long the program may take to tidy up; with what it takes to notice, it is gone within a second."""
 _MESSAGE = "interrupted; finished stages stand, the one at work left what was there before"
-_said: list[str] = []
+_printed: list[str] = []
 
 
 def say_interrupted() -> None:
-    """Say what an interrupt leaves behind."""
+    """Print what an interrupt leaves behind."""
     from pzd.cli.output import complain
 
-    _said.append(_MESSAGE)
+    _printed.append(_MESSAGE)
     complain([_MESSAGE])
 
 
 def end_at_once_when_interrupted() -> None:
-    """From now on, an interrupt ends the program in one line: for what runs before and behind a command.
+    """Make an interrupt end the program in one line: for what runs before and behind a command.
 
     Imports cannot be tidied up, and an exception out of them shows a traceback. Where interrupts are ignored, as a
     shell starts what runs in the background, they remain so.
@@ -41,7 +41,7 @@ def end_at_once_when_interrupted() -> None:
 
 
 def raise_when_interrupted() -> None:
-    """From now on, an interrupt raises KeyboardInterrupt, as usual in Python."""
+    """Make an interrupt raise KeyboardInterrupt, as usual in Python."""
     if signal.getsignal(signal.SIGINT) is _end_at_once:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -52,9 +52,9 @@ def _end_at_once(_number: int, _frame: FrameType | None) -> None:
 
 
 def end_soon_after_interrupt() -> None:
-    """From now on, end the program soon after an interrupt, however it takes it."""
+    """Start a thread that ends the program soon after an interrupt, whatever the main thread does with it."""
     if os.name == "nt":
-        return  # there a pipe cannot be told of signals
+        return  # there no pipe is written to when a signal arrives
     import threading
 
     receive, send = os.pipe()
@@ -69,6 +69,6 @@ def _end(receive: int) -> None:
     while os.read(receive, 1) != bytes([signal.SIGINT]):
         pass
     time.sleep(_GRACE_S)
-    if not _said:
+    if not _printed:
         say_interrupted()
     os._exit(INTERRUPTED)

@@ -1,4 +1,4 @@
-"""What the command line prints: lines to stdout, complaints to stderr, progress to a terminal."""
+"""What the command line prints: lines to stdout, complaints to stderr, progress to a terminal; and shared options."""
 
 from __future__ import annotations
 
@@ -15,17 +15,11 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
-# ----------------------------------------------------------------------------------------------------
-# The exit codes that are not errors of the user; those stand with their errors.
-
+# --- Exit codes other than those of errors of the user, which stand with these errors ---
 
 DONE = 0
 OWN_FAULT = 1
 UNTRUSTED = 4
-INTERRUPTED = 130
-
-
-# ----------------------------------------------------------------------------------------------------
 
 
 if TYPE_CHECKING:
@@ -104,6 +98,13 @@ def complain(lines: Iterable[str]) -> None:
         _print(line, sys.stderr)
 
 
+def exit_code(marks: Iterable[str]) -> int:
+    """Complain of every result that is not to be trusted, and return the exit code of the command."""
+    lines = [f"not to be trusted: {mark}" for mark in marks]
+    complain(lines)
+    return UNTRUSTED if lines else DONE
+
+
 def _print(line: str, stream: TextIO) -> None:
     try:
         stream.write(f"{line}\n")
@@ -120,7 +121,7 @@ def silence(stream: TextIO) -> None:
 
 
 def own_fault(error: BaseException) -> str:
-    """One line about an error of ours, its traceback written to a file, and shown where tracebacks are wanted."""
+    """Return one line about an error of ours; write its traceback to a file, and show it with -v."""
     text = "".join(traceback.format_exception(error))
     if logging.getLogger("pzd").isEnabledFor(logging.DEBUG):
         complain(text.splitlines())
@@ -138,9 +139,7 @@ def _filed(text: str) -> str:
     return f"traceback in {Path(name)}; -v shows it"
 
 
-# ----------------------------------------------------------------------------------------------------
-# The options that commands share, each with its help.
-
+# --- Options that commands share, each with its help ---
 
 Config = Annotated[
     Path, typer.Argument(metavar="CONFIG", help="The YAML file that describes the run.", show_default=False)
@@ -159,7 +158,7 @@ Force = Annotated[bool, typer.Option("--force", help="Run the stage even if it i
 
 
 def _jobs(given: str) -> int:
-    """The value of --jobs.
+    """Return the value of --jobs.
 
     Raises
     ------
@@ -182,6 +181,6 @@ RUNS = Path("runs")
 
 
 def command_line(name: str, config: Path, runs: Path, overrides: Sequence[str]) -> str:
-    """What to type for another command on the same config, with the same results folder and values."""
+    """Return what to type for another command on the same config, with the same results folder and values."""
     options = ["--runs", str(runs)] if runs != RUNS else []
     return shlex.join(["pzd", name, str(config), *options, *(word for one in overrides for word in ("--set", one))])

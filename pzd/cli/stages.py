@@ -1,15 +1,14 @@
-"""The commands that run stages: all of them, or as far as one."""
+"""The commands that run stages: all of them, as far as one, or again whenever a file of the config changes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from pzd.cli.look import diagnosis_lines
 from pzd.cli.output import (
     CORES,
-    DONE,
     RUNS,
-    UNTRUSTED,
     Config,
     Force,
     Jobs,
@@ -19,15 +18,15 @@ from pzd.cli.output import (
     Set,
     Verbose,
     complain,
+    exit_code,
 )
 
-# ----------------------------------------------------------------------------------------------------
-
-
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from pzd.runs import Run
 
-_COMMANDS = {
+_SUMMARIES = {
     "run": "Run every stage, from rig records to the comfort report.",
     "synthesise": "Record the tests of the virtual rig of the config.",
     "ingest": "Read the rig files of the config, and check them.",
@@ -46,7 +45,6 @@ def _page(run: Run, **_: bool) -> list[str]:
 
 
 def _diagnosis(run: Run, *, verbose: bool) -> list[str]:
-    from pzd.cli.text_tables import diagnosis_lines
     from pzd.pipeline.run_summary import run_summary
 
     found = run_summary(run)
@@ -56,7 +54,7 @@ def _diagnosis(run: Run, *, verbose: bool) -> list[str]:
 
 
 _AT_THE_END: dict[str, Callable[..., list[str]]] = {"run": _page, "report": _page, "diagnose": _diagnosis}
-"""What a command says once its stages are up to date."""
+"""What a command prints once its stages are up to date."""
 
 
 def _command(name: str, summary: str) -> Callable[..., int]:
@@ -76,23 +74,10 @@ def _command(name: str, summary: str) -> Callable[..., int]:
         marks = execute(given, name, force=force, jobs=jobs, say=output.say, progress=output.progress)
         if name in _AT_THE_END:
             output.say(*_AT_THE_END[name](given.run, verbose=verbose))
-        complain(f"not to be trusted: {mark}" for mark in marks)
-        return UNTRUSTED if marks else DONE
+        return exit_code(marks)
 
     command.__name__, command.__doc__ = name, summary
     return command
-
-
-COMMANDS = tuple(_command(name, summary) for name, summary in _COMMANDS.items())
-
-
-# ----------------------------------------------------------------------------------------------------
-# The command that runs the stages again whenever a file of the config has changed.
-
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 
 def watch(
@@ -105,7 +90,7 @@ def watch(
 ) -> int:
     """Run what is stale, now and whenever the config or a file that it names changes, until Ctrl-C.
 
-    A file that is still being written is waited for; a mistake in the config or in a record is told, and the next
+    A file that is still being written is waited for; a mistake in the config or in a record is printed, and the next
     change awaited.
     """
     import time
@@ -124,7 +109,7 @@ def watch(
 
 
 def _run(config: Path, runs: Path, overrides: Sequence[str], jobs: int, output: Output) -> None:
-    """Bring the run up to date, or tell what is wrong."""
+    """Bring the run up to date, or print what is wrong."""
     from pzd.pipeline.command import execute, opened
     from pzd.pipeline.run_summary import page_of
     from pzd.schema.errors import UserError
@@ -139,4 +124,4 @@ def _run(config: Path, runs: Path, overrides: Sequence[str], jobs: int, output: 
     complain(f"not to be trusted: {mark}" for mark in marks)
 
 
-WATCH_COMMANDS = (watch,)
+COMMANDS = (*(_command(name, summary) for name, summary in _SUMMARIES.items()), watch)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pzd.cli.look import effects_as_data
 from pzd.cli.output import DONE, Json, Output, Verbose
-from pzd.cli.text_tables import aligned
+
+if TYPE_CHECKING:
+    from pzd.damper.effect import Effect
 
 RigFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="Rig files to make a config for.")]
 
@@ -66,21 +68,26 @@ Out = Annotated[
 def effects(propose: Propose = None, out: Out = None, as_json: Json = False, verbose: Verbose = False) -> int:
     """Print the library of effects."""
     from pzd.damper.effects import library
+    from pzd.report import tables
 
     output = Output(quiet=False, verbose=verbose)
     if propose is not None:
         return _propose(propose, out, output)
     if as_json:
-        output.say_json(effects_as_data(library().values()))
+        output.say_json([_effect_as_data(effect) for effect in library().values()])
         return DONE
-    head = ["effect", "place", "parameter", "unit", "from", "to", "off at", "law"]
-    rows = [
-        [effect.name, effect.place, p.name, p.unit, f"{p.low:g}", f"{p.high:g}", f"{p.neutral:g}", effect.law]
-        for effect in library().values()
+    output.say(*tables.effects(library().values()).lines())
+    return DONE
+
+
+def _effect_as_data(effect: Effect) -> dict[str, Any]:
+    """Return an effect as plain data; a limit that there is not is null."""
+    parameters = [
+        {"name": p.name, "unit": p.unit, "meaning": p.meaning}
+        | {end: value if math.isfinite(value := getattr(p, end)) else None for end in ("low", "high", "neutral")}
         for p in effect.parameters
     ]
-    output.say(*aligned([head, *rows]))
-    return DONE
+    return {"name": effect.name, "place": effect.place, "law": effect.law, "parameters": parameters}
 
 
 def _propose(run: Path, out: Path | None, output: Output) -> int:

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from pzd.artefacts import KeptBack, LeftOut, Prediction
+from pzd.artefacts import HeldOutTest, HeldOutVoltage, Prediction
 from pzd.damper.material import by_voltage, with_rows
 from pzd.damper.model import Damper
 from pzd.diagnosis.campaign import Campaign
@@ -299,7 +299,7 @@ class Trials:
                 if simple is not None and handed is not None:
                     name, at = self.campaign.prepared[i].record.name, voltage if controlled else None
                     R2 = {"R2_plain": plain.of([i]).determination, "R2": missed.of([i]).determination}
-                    by.append(KeptBack(record=name, voltage=at, W_s_plain=simple, W_s=handed, **R2))
+                    by.append(HeldOutTest(record=name, voltage=at, W_s_plain=simple, W_s=handed, **R2))
         left_out = [self._left_out(i, between) for i in self.between()]
         return Prediction(
             hold_out=self._hold_out(),
@@ -318,13 +318,13 @@ class Trials:
             return "tests"
         return "segments" if self.campaign.prepared[group[0]].cycles is None else "cycles"
 
-    def _left_out(self, group: int, between: Missed) -> LeftOut | None:
+    def _left_out(self, group: int, between: Missed) -> HeldOutVoltage | None:
         """One voltage predicted from those around it."""
         voltage = self.voltages[group]
         plain, other = (each.of(self.groups[group]).criterion for each in (self.plain_missed_between, between))
         if voltage is None or plain is None or other is None:
             return None
-        return LeftOut(voltage=voltage, W_s_plain=plain, W_s=other)
+        return HeldOutVoltage(voltage=voltage, W_s_plain=plain, W_s=other)
 
     def _without_voltage(self, group: int, fitted: _Refit) -> Missed:
         """What is missed of one voltage, with neither it nor any test fitted of which the voltage moves."""

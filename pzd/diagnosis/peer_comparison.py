@@ -8,8 +8,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from pzd.artefacts import Diagnosed, Identified, KeptBack, Prediction, Rig, base_of
-from pzd.artefacts.diagnosis import HANDED_ON, PLAIN, PeerComparison, PeerParameterRow, PeerRow
+from pzd.artefacts import Diagnosed, HeldOutTest, Identified, Prediction, Rig, base_of
+from pzd.artefacts.diagnosis import ADOPTED, BASELINE, PeerComparison, PeerParameterRow, PeerRow
 from pzd.diagnosis.cross_validation import Folds, Missed, deal
 from pzd.diagnosis.data import Prepared, prepare, whole_records
 from pzd.diagnosis.fit.prediction import counted
@@ -337,8 +337,8 @@ def _filled(tables: _Tables, tests: KeptBackTests, prediction: Prediction) -> Pe
     """The comparison, test by test, then by voltage, in all, and of voltages left out."""
     by_record = _by_record(tests, prediction.by)
     missed = {
-        PLAIN: tests.known({i: each.W_s_plain for i, each in by_record.items()}),
-        HANDED_ON: tests.known({i: each.W_s for i, each in by_record.items()}),
+        BASELINE: tests.known({i: each.W_s_plain for i, each in by_record.items()}),
+        ADOPTED: tests.known({i: each.W_s for i, each in by_record.items()}),
         **{name: tests.missed(peer).of(tuple(by_record)) for name, peer in peers().items()},
     }
     for voltage, group in tests.groups:
@@ -352,8 +352,8 @@ def _filled(tables: _Tables, tests: KeptBackTests, prediction: Prediction) -> Pe
     for number, (voltage, _) in enumerate(tests.groups):
         if voltage in left_out:
             between = {
-                PLAIN: tests.known_between(number, left_out[voltage].W_s_plain),
-                HANDED_ON: tests.known_between(number, left_out[voltage].W_s),
+                BASELINE: tests.known_between(number, left_out[voltage].W_s_plain),
+                ADOPTED: tests.known_between(number, left_out[voltage].W_s),
                 **{name: tests.missed_between(peer, number) for name, peer in peers().items()},
             }
             tables.add("voltage", voltage, None, between)
@@ -362,9 +362,9 @@ def _filled(tables: _Tables, tests: KeptBackTests, prediction: Prediction) -> Pe
     return PeerComparison(tuple(missed), tuple(tables.rows), tuple(tables.parameters), tuple(tests.moving))
 
 
-def _by_record(tests: KeptBackTests, by: Sequence[KeptBack]) -> dict[int, KeptBack]:
+def _by_record(tests: KeptBackTests, by: Sequence[HeldOutTest]) -> dict[int, HeldOutTest]:
     """The figures of diagnosis.json by record, where its voltage stands still; tests of one name come in its order."""
-    waiting: dict[str, list[KeptBack]] = {}
+    waiting: dict[str, list[HeldOutTest]] = {}
     for each in by:
         waiting.setdefault(each.record, []).append(each)
     found = {}

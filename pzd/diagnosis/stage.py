@@ -21,6 +21,7 @@ from pzd.artefacts import (
     base_of,
     identified_damper,
 )
+from pzd.artefacts.csv_rows import Estimate
 from pzd.diagnosis.campaign import Campaign, gap_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import Trials
@@ -108,15 +109,9 @@ def _row(row: KneeRow) -> ParameterRow:
         setting=row.setting,
         voltage_V=row.voltage_V,
         temperature_degC=row.temperature_degC,
-        T0_N=row.friction_N,
-        T0_N_low95=row.friction_N_low95,
-        T0_N_high95=row.friction_N_high95,
-        C_Ns_per_m=0.5 * (row.rebound_bleed_Ns_per_m + row.compression_bleed_Ns_per_m),
-        C_Ns_per_m_low95=None,
-        C_Ns_per_m_high95=None,
-        k_N_per_m=row.k_N_per_m,
-        k_N_per_m_low95=row.k_N_per_m_low95,
-        k_N_per_m_high95=row.k_N_per_m_high95,
+        **Estimate.of(row, "friction_N").columns("T0_N"),
+        **Estimate(0.5 * (row.rebound_bleed_Ns_per_m + row.compression_bleed_Ns_per_m)).columns("C_Ns_per_m"),
+        **Estimate.of(row, "k_N_per_m").columns("k_N_per_m"),
         W_s=row.W_s,
         rmse_N=row.rmse_N,
         status="ok" if row.status == "ok" else "weak: T0, C, k (2-identify/knee.csv says why)",

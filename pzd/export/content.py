@@ -1,4 +1,12 @@
-"""What there is to export: the damper of a run and its table, with what other tools ask about them."""
+"""The damper of a run and its table, in the shapes that formats write: grid, curves, inverse, plain tables.
+
+A format is given a `Content` and takes of it what its tool reads:
+
+    grid, full_grid   the table of force as regular arrays
+    curves            one curve of force over velocity a control signal and temperature
+    inverses          the control signal for a force, over velocity and share of the range of forces
+    tables            the rows of the run by column: force, inverse, base, effects, reference
+"""
 
 from __future__ import annotations
 
@@ -20,23 +28,21 @@ from pzd.schema.model import Frozen, safe_name
 from pzd.simulate.policies import TieBreak
 from pzd.simulate.vehicle.car import HalfCar
 
-# ----------------------------------------------------------------------------------------------------
-
-
 WRITTEN_BY_PZD = re.compile(rb"pzd \S+, config ")
-"""How `Content.origin` begins, which every file holds: what has no such bytes is not from an export."""
+"""Start of `Content.origin`, which every file holds: what has no such bytes is not from an export."""
 NEAR_ZERO = 1e-9
 """Speed that stands for -0 and +0 where a tool wants velocities that rise strictly [m/s].
 
 The jump of dry friction is drawn over twice this speed, less than a ten-millionth of what a rig can resolve.
 """
-_HELD = 1.01
-"""Where a table is held beyond its last speed, it ends in a level piece up to this multiple of that speed."""
+_LEVEL_END = 1.01
+"""A clamped table ends in a level piece up to this multiple of its last speed: tools that extrapolate the last slope
+then hold the force."""
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The table of force as regular arrays, its velocities rising strictly through zero."""
+    """Table of force as regular arrays, its velocities rising strictly through zero."""
 
     temperatures: tuple[float | None, ...]
     """Rising [degC]; a single None where none was recorded."""
@@ -50,14 +56,14 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """The damper of a run, as every format is given it."""
+    """The damper of a run, as it is given to every format."""
 
     name: str
     """Name of the run; files are called after it."""
     version: str
-    """Version of pzd that writes."""
+    """Version of pzd."""
     config: str
-    """File name of the config that the run is of."""
+    """File name of the config."""
     control: Control
     damper: Damper
     """With the adopted effects."""
@@ -67,17 +73,17 @@ class Content:
     car: HalfCar
     """Whose comfort law a control unit follows."""
     tie_break: TieBreak
-    """Which of the forces that make |a_K| smallest."""
+    """Which of the forces that make abs(a_K) smallest a control unit takes."""
     setting: str | None = None
-    """Setting of the damper, where the config says of which one it is."""
+    """Setting of the damper, where the config names one."""
     edited: tuple[str, ...] = ()
-    """Files of the run that somebody edited by hand since it was written."""
+    """Files of the run that were edited by hand since it was written."""
     marks: tuple[str, ...] = ()
     """Why the damper is not to be trusted."""
 
     @property
     def origin(self) -> str:
-        """Where the damper comes from, and what speaks against it: what each header says."""
+        """Where the damper comes from, and what speaks against it: the text of each header."""
         setting = f", setting {' '.join(self.setting.split())}" if self.setting else ""
         by_hand = f", edited by hand: {', '.join(self.edited)}" if self.edited else ""
         marks = f", not to be trusted: {'; '.join(self.marks)}" if self.marks else ""
@@ -90,12 +96,12 @@ class Content:
 
     @property
     def adjustable(self) -> bool:
-        """Whether the table has more than one control signal, so that there is something to interpolate and to set."""
+        """Whether the table has more than one control signal, so that there is one to set."""
         return self.lookups[0].voltages.size > 1
 
     @property
-    def held(self) -> bool:
-        """Whether the force is held beyond the last speed of the table; otherwise it goes on along the last slope."""
+    def clamped(self) -> bool:
+        """Whether the force is held beyond the last speed of the table; otherwise it follows the last slope."""
         return self.table.notes.outside == "clamp"
 
     @property
@@ -113,13 +119,13 @@ class Content:
         """The table as regular arrays."""
         first = self.lookups[0]
         speeds = first.speeds[:-1]
-        speeds = np.concatenate([[NEAR_ZERO], speeds[1:], speeds[-1:] * _HELD if self.held else []])
+        speeds = np.concatenate([[NEAR_ZERO], speeds[1:], speeds[-1:] * _LEVEL_END if self.clamped else []])
         velocities = np.concatenate([-speeds[::-1], speeds])
         forces = [lookup.force(first.voltages[:, np.newaxis], velocities[np.newaxis, :]) for lookup in self.lookups]
         return Grid(self.temperatures, first.voltages, velocities, np.stack(forces))
 
     def full_grid(self, name: str) -> Grid:
-        """The same, for a format that cannot hold an empty cell.
+        """Return the grid for a format that cannot hold an empty cell.
 
         Parameters
         ----------
@@ -138,12 +144,11 @@ class Content:
 
 
 def comment(lines: Sequence[str], mark: str) -> str:
-    """Lines of a comment, each behind its mark."""
+    """Write lines of a comment, each behind its mark."""
     return "".join(f"{mark} {line}".rstrip() + "\n" for line in lines)
 
 
-# ----------------------------------------------------------------------------------------------------
-# The table as curves of force over velocity, one a control signal and temperature.
+# --- Curves of force over velocity ---
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +156,7 @@ class ForceCurve:
     """Force over velocity at one control signal and temperature."""
 
     name: str
-    """Of its file, without the ending: that of the run with what tells the curve from the others."""
+    """Of its file, without the ending: that of the run with what sets the curve apart from the others."""
     condition: str
     """The control signal and the temperature in words; empty where there is neither."""
     velocities: Array
@@ -161,7 +166,7 @@ class ForceCurve:
 
 
 def curves(content: Content, name: str) -> Iterator[ForceCurve]:
-    """Every curve of the table.
+    """Yield the curves of the table, one a control signal and temperature.
 
     Parameters
     ----------
@@ -184,13 +189,12 @@ def curves(content: Content, name: str) -> Iterator[ForceCurve]:
             yield ForceCurve("-".join([content.name, *labels]), ", ".join(words), grid.velocities, force)
 
 
-# ----------------------------------------------------------------------------------------------------
-# The control signal for a force, on a regular grid: over velocity and share of the range of forces there.
+# --- Inverse: the control signal for a force ---
 
 
 @dataclass(frozen=True, eq=False)
 class Inverse:
-    """The inverse at one temperature; every point of it lies within reach."""
+    """Control signal over velocity and share of the range of forces there, at one temperature; all can be reached."""
 
     shares: Array
     """(s,) from 0, the lowest force that the damper gives at a velocity, to 1, the highest."""
@@ -203,21 +207,19 @@ class Inverse:
 
 
 def inverses(content: Content) -> tuple[Inverse, ...]:
-    """The inverse at each temperature of the table."""
+    """Compute the inverse at each temperature of the table."""
     velocities = content.grid.velocities
     shares = np.linspace(0.0, 1.0, content.force_levels)
     found = []
     for lookup in content.lookups:
-        least, most = lookup.range(velocities)
-        low, high = np.where(least <= most, least, np.nan), np.where(least <= most, most, np.nan)
+        lowest, highest = lookup.range(velocities)
+        low, high = (np.where(lowest <= highest, force, np.nan) for force in (lowest, highest))
         wanted = low[:, np.newaxis] + shares * (high - low)[:, np.newaxis]
         found.append(Inverse(shares, low, high, lookup.nearest_voltage_for(wanted, velocities[:, np.newaxis])))
     return tuple(found)
 
 
-# ----------------------------------------------------------------------------------------------------
-# The damper as plain tables: force, inverse, T0, C and k, the parameters of the effects, and what these count from.
-
+# --- Plain tables ---
 
 Cell = float | int | str | None
 
@@ -228,13 +230,13 @@ class EffectRow(Frozen):
     effect: str
     parameter: str
     voltage_V: float | None
-    """At which it holds; None at every one."""
+    """At which it holds; None where it holds at every one."""
     value: float
     unit: str
 
 
 class ReferencePointRow(Frozen):
-    """What the laws of the effects count temperature and displacement from."""
+    """Reference temperature and displacement zero of the laws of the effects."""
 
     reference_temperature_degC: float | None
     """T_ref; None where none was given."""
@@ -252,7 +254,7 @@ class Columns:
 
 
 def tables(content: Content) -> dict[str, Columns]:
-    """The tables of a damper by name; one that would have no row is left out."""
+    """Return the tables of a damper by name, without those that have no row."""
     damper = content.damper
     reference = ReferencePointRow(reference_temperature_degC=damper.reference_temperature_degC, zero_m=damper.zero_m)
     every = {
@@ -266,7 +268,7 @@ def tables(content: Content) -> dict[str, Columns]:
 
 
 def effect_rows(content: Content) -> tuple[EffectRow, ...]:
-    """A row a value of every parameter of the adopted effects."""
+    """Return the parameters of the adopted effects, one row a value."""
     rows = []
     for name, given in content.damper.effects.items():
         nodes = given.get("at_voltage_V")

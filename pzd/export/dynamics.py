@@ -1,4 +1,7 @@
-"""The damper with its dynamics as constants in C: parameters over temperature and control signal, linear between."""
+"""The damper with its dynamics as constants in C: parameters over temperature and control signal, linear between.
+
+`sources/element.c` carries the damper from these constants; what it carries exactly is listed in `CARRIED`.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +23,7 @@ from pzd.export.content import Content
 from pzd.record import Array
 from pzd.schema.errors import ConfigError
 
-# ----------------------------------------------------------------------------------------------------
-# C as text: the sources that stand in `sources/`, and arrays of numbers.
-
+# --- C as text ---
 
 _SOURCES = Path(__file__).with_name("sources")
 _WIDTH = 8
@@ -30,34 +31,34 @@ _WIDTH = 8
 
 
 def source(content: Content, name: str) -> bytes:
-    """A file of `sources/`, behind a line that says where the damper is from."""
+    """Read a file of `sources/` and put the origin of the damper before it."""
     return (head(content) + (_SOURCES / name).read_text(encoding="utf-8")).encode()
 
 
 def head(content: Content) -> str:
-    """The comment that begins every file."""
+    """Return the comment that begins every file."""
     return f"/* {content.origin.replace('*/', '* /')} */\n"
 
 
 def single(value: float) -> str:
-    """A constant of single precision, nine digits of which tell one from the next."""
+    """Write a constant of single precision, to the nine digits that tell one from the next."""
     return f"{_pointed(f'{float(np.float32(value)):.9g}')}f"
 
 
 def double(value: float) -> str:
-    """A constant of double precision."""
+    """Write a constant of double precision."""
     return repr(float(value)).replace("inf", "INFINITY")
 
 
 def array(kind: str, name: str, values: ArrayLike, written: Callable[[float], str]) -> str:
-    """A constant array of any number of axes.
+    """Write a constant array of any number of axes.
 
     Parameters
     ----------
     kind : type in C
     name : in C
     values : numbers
-    written : one number as a constant
+    written : writes one number as a constant
     """
     numbers = np.asarray(values, dtype=np.float64)
     sizes = "".join(f"[{size}]" for size in numbers.shape)
@@ -75,8 +76,7 @@ def _pointed(text: str) -> str:
     return text if any(mark in text for mark in ".en") else f"{text}.0"
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- The damper as constants ---
 
 CARRIED = (
     *("accumulator", "asymmetry", "end_stop", "fluid_inertia", "gas_spring", "lash", "orifice_quadratic"),
@@ -87,10 +87,11 @@ CARRIED = (
 VARIABLES = (
     *("displacement", "velocity", "signal", "temperature", "force", "initial_force", "zero", "time", "acceleration"),
 )
-"""What `sources/model.c` sets and gets, in the order of the value references of an FMU."""
+"""Variables of `sources/model.c`, in the order of the value references of an FMU."""
 OF_THE_RIG = tuple(effect.name for effect in acting("sensor"))
 """Effects of the channels of a rig, which the damper itself does not have."""
 PLAY = ("piezo_hysteresis", "r")
+"""Effect and parameter of the play of the drive, which acts on the control signal and is no column."""
 COLUMNS = tuple(
     (effect, parameter) for effect, parameter in NEUTRAL if effect in CARRIED and (effect, parameter) != PLAY
 )
@@ -112,13 +113,11 @@ class Dynamics:
     reference: float
     """T_ref of the drift, the lowest temperature without one [degC]."""
     depends_on_temperature: bool
-    """Whether the temperature matters."""
     depends_on_acceleration: bool
-    """Whether the acceleration matters."""
 
     @classmethod
     def of(cls, damper: Damper, name: str) -> Dynamics:
-        """The damper, laid out.
+        """Lay out a damper.
 
         Parameters
         ----------
@@ -141,6 +140,7 @@ class Dynamics:
         at_temperatures: list[float | None] = [*known] or [None]
         temperatures, reference = np.array(known or [0.0]), damper.reference_temperature_degC
         signals = nodes_of(damper, at_temperatures[0]).voltages
+        # drift is left out of the rows: element.c applies it at the temperature of each step
         extra = np.broadcast_to(columns_of(damper, COLUMNS, signals), (signals.size, len(COLUMNS)))
         bases = [np.broadcast_to(material(still, signals, T), (signals.size, len(ELEMENT))) for T in at_temperatures]
         return cls(
@@ -155,7 +155,7 @@ class Dynamics:
 
 
 def start_values(content: Content, dynamics: Dynamics) -> Mapping[str, float]:
-    """What the inputs and parameters begin with, by the name in C."""
+    """Return start values of inputs and parameters by their name in C."""
     nearest = float(dynamics.signals[np.argmin(np.abs(dynamics.signals))])
     return {
         "START_SIGNAL": nearest,
@@ -165,7 +165,7 @@ def start_values(content: Content, dynamics: Dynamics) -> Mapping[str, float]:
 
 
 def data_of(content: Content, dynamics: Dynamics) -> tuple[str, str]:
-    """The constants as text, and the token by which an FMU and its description know each other.
+    """Write the constants, and the token by which an FMU and its description know each other.
 
     Parameters
     ----------

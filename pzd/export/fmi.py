@@ -1,4 +1,4 @@
-"""What an FMU says of itself: the model descriptions of FMI 2.0 and 3.0."""
+"""Model descriptions of FMI 2.0 and 3.0, and the shared library of an FMU."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -18,9 +18,6 @@ from pzd.export.content import Content
 from pzd.export.dynamics import OF_THE_RIG, VARIABLES, Dynamics, start_values
 from pzd.quantities import ACCELERATION, DISPLACEMENT, FORCE, TEMPERATURE, TIME, VELOCITY, Quantity
 from pzd.schema.errors import FilesError
-
-# ----------------------------------------------------------------------------------------------------
-
 
 IDENTIFIER = "damper"
 """Name of the model in C, and of the library."""
@@ -52,7 +49,7 @@ class Variable:
 
 
 def variables(content: Content, dynamics: Dynamics) -> tuple[Variable, ...]:
-    """The variables; an input only where the damper has to do with it.
+    """Return the variables; an input only where the force of the damper depends on it.
 
     Parameters
     ----------
@@ -90,7 +87,7 @@ def _parameter(name: str, quantity: Quantity, start: float, meaning: str) -> Var
 
 
 def description(content: Content) -> str:
-    """What the model is, in a line."""
+    """Describe the model in a line."""
     carried = [name for name in content.damper.effects if name not in OF_THE_RIG]
     rig = [name for name in content.damper.effects if name in OF_THE_RIG]
     text = f"Bingham element with oil spring{', ' if carried else ''}{', '.join(carried)}; {content.origin}"
@@ -98,7 +95,7 @@ def description(content: Content) -> str:
 
 
 def fmi2(content: Content, dynamics: Dynamics, token: str, sources: Sequence[str]) -> str:
-    """modelDescription.xml of FMI 2.0.
+    """Write modelDescription.xml of FMI 2.0.
 
     Parameters
     ----------
@@ -109,36 +106,25 @@ def fmi2(content: Content, dynamics: Dynamics, token: str, sources: Sequence[str
     """
     found = variables(content, dynamics)
     output = next(place for place, one in enumerate(found, 1) if one.causality == "output")
-    lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        _open(
-            "fmiModelDescription",
-            {"fmiVersion": "2.0", "modelName": content.name, "guid": token, "description": description(content)}
-            | {"generationTool": content.origin, "variableNamingConvention": "flat"},
-        ),
-        _open("CoSimulation", _abilities("canGetAndSetFMUstate", "canSerializeFMUstate") | {_NO_MEMORY: "true"}),
+    states = ("canGetAndSetFMUstate", "canSerializeFMUstate", "canNotUseMemoryManagementFunctions")
+    cosimulation = (
+        _open("CoSimulation", _abilities(*states)),
         "<SourceFiles>",
         *(_alone("File", {"name": name}) for name in sources),
         "</SourceFiles></CoSimulation>",
-        *_units(found),
-        '<LogCategories><Category name="logStatusError"/></LogCategories>',
-        "<ModelVariables>",
-        *(
-            _open("ScalarVariable", _attributes(one)) + _alone("Real", _number(one)) + "</ScalarVariable>"
-            for one in found
-        ),
-        "</ModelVariables>",
-        "<ModelStructure>",
+    )
+    scalars = (
+        _open("ScalarVariable", _attributes(one)) + _alone("Real", _number(one)) + "</ScalarVariable>" for one in found
+    )
+    structure = (
         f'<Outputs><Unknown index="{output}"/></Outputs>',
         f'<InitialUnknowns><Unknown index="{output}"/></InitialUnknowns>',
-        "</ModelStructure>",
-        "</fmiModelDescription>",
-    ]
-    return "\n".join(lines) + "\n"
+    )
+    return _description_of(content, "2.0", {"guid": token}, (*cosimulation, *_units(found)), scalars, structure)
 
 
 def fmi3(content: Content, dynamics: Dynamics, token: str) -> str:
-    """modelDescription.xml of FMI 3.0.
+    """Write modelDescription.xml of FMI 3.0.
 
     Parameters
     ----------
@@ -149,40 +135,44 @@ def fmi3(content: Content, dynamics: Dynamics, token: str) -> str:
     time = Variable(TIME.name, _reference("time"), "independent", TIME.unit, "simulated time")
     found = (*variables(content, dynamics), time)
     output = next(one.reference for one in found if one.causality == "output")
+    cosimulation = _alone("CoSimulation", _abilities("canGetAndSetFMUState", "canSerializeFMUState"))
+    floats = (_alone("Float64", _attributes(one) | _number(one)) for one in found)
+    structure = (f'<Output valueReference="{output}"/>', f'<InitialUnknown valueReference="{output}"/>')
+    token_of = {"instantiationToken": token}
+    return _description_of(content, "3.0", token_of, (cosimulation, *_units(found)), floats, structure)
+
+
+def _description_of(
+    content: Content,
+    version: str,
+    token: Mapping[str, str],
+    definitions: Iterable[str],
+    variables: Iterable[str],
+    structure: Iterable[str],
+) -> str:
+    """Put a model description together."""
+    head = {"fmiVersion": version, "modelName": content.name, **token, "description": description(content)}
+    head |= {"generationTool": content.origin, "variableNamingConvention": "flat"}
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
-        _open(
-            "fmiModelDescription",
-            {"fmiVersion": "3.0", "modelName": content.name, "instantiationToken": token}
-            | {"description": description(content), "generationTool": content.origin}
-            | {"variableNamingConvention": "flat"},
-        ),
-        _alone("CoSimulation", _abilities("canGetAndSetFMUState", "canSerializeFMUState")),
-        *_units(found),
+        _open("fmiModelDescription", head),
+        *definitions,
         '<LogCategories><Category name="logStatusError"/></LogCategories>',
-        "<ModelVariables>",
-        *(_alone("Float64", _attributes(one) | _number(one)) for one in found),
-        "</ModelVariables>",
-        "<ModelStructure>",
-        f'<Output valueReference="{output}"/>',
-        f'<InitialUnknown valueReference="{output}"/>',
-        "</ModelStructure>",
+        *("<ModelVariables>", *variables, "</ModelVariables>"),
+        *("<ModelStructure>", *structure, "</ModelStructure>"),
         "</fmiModelDescription>",
     ]
     return "\n".join(lines) + "\n"
 
 
 def build_description(sources: Sequence[str]) -> str:
-    """buildDescription.xml of FMI 3.0: how the sources are compiled."""
+    """Write buildDescription.xml of FMI 3.0: how the sources are compiled."""
     files = "".join(_alone("SourceFile", {"name": name}) for name in sources)
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n<fmiBuildDescription fmiVersion="3.0">\n'
         f'<BuildConfiguration modelIdentifier="{IDENTIFIER}"><SourceFileSet language="C99">{files}</SourceFileSet>'
         "</BuildConfiguration>\n</fmiBuildDescription>\n"
     )
-
-
-_NO_MEMORY = "canNotUseMemoryManagementFunctions"
 
 
 def _abilities(*states: str) -> dict[str, str]:
@@ -221,12 +211,11 @@ def _alone(tag: str, attributes: Mapping[str, str]) -> str:
     return f"{_open(tag, attributes)[:-1]}/>"
 
 
-# ----------------------------------------------------------------------------------------------------
-# A shared library from sources in C, the same bytes each time.
-
+# --- The shared library, the same bytes each time ---
 
 log = logging.getLogger(__name__)
 
+# no fused multiply-add, so that every machine rounds alike
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
 _PLATFORMS = {
     ("linux", "x86_64"): ("linux64", "x86_64-linux"),
@@ -238,7 +227,7 @@ _PLATFORMS = {
 
 
 def folders() -> tuple[str | None, str | None]:
-    """Folder of the library in an FMU of FMI 2.0 and of FMI 3.0; None, with a warning, where it will hold none."""
+    """Return the folder of the library in an FMU of FMI 2.0 and of FMI 3.0; None, with a warning, where it has none."""
     machine = (sys.platform, platform.machine())
     found = _PLATFORMS.get(machine, (None, None))
     without = [version for version, folder in zip(("2.0", "3.0"), found, strict=True) if folder is None]
@@ -251,12 +240,12 @@ def folders() -> tuple[str | None, str | None]:
 
 
 def suffix() -> str:
-    """Ending of a shared library on this machine."""
+    """Return the ending of a shared library on this machine."""
     return ".dylib" if sys.platform == "darwin" else ".so"
 
 
 def compiled_library(sources: Mapping[str, bytes], to_compile: Sequence[str]) -> bytes:
-    """The library.
+    """Compile the library.
 
     Parameters
     ----------
@@ -270,6 +259,7 @@ def compiled_library(sources: Mapping[str, bytes], to_compile: Sequence[str]) ->
     compiler = _compiler()
     if compiler is None:
         raise FilesError("there is no C compiler (gcc or cc)")
+    # the id of a build would differ from build to build
     linked = ["-Wl,--build-id=none"] if sys.platform == "linux" else []
     with tempfile.TemporaryDirectory() as place:
         for name, data in sources.items():

@@ -63,7 +63,7 @@ def force_table(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Con
 
     damper = diagnosed.damper
     records = [record for record in rig.records if record.setting == setting]
-    reach = reached(records, temperatures_of(diagnosed.plain), voltages_of(diagnosed.plain))
+    reach = reached(records, temperatures_of(diagnosed.baseline), voltages_of(diagnosed.baseline))
     nodes = grid(table, damper, _temperatures(table, damper, records), reach)
     notes = TableNotes(
         outside=table.outside,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.artefacts import AuxiliaryRow, ParameterRow
+from pzd.artefacts.csv_rows import Estimate
 from pzd.damper.element import element_force
 from pzd.identification.auxiliary import Auxiliary, auxiliary_of, relieved, remainder, rough_values, worth_fitting
 from pzd.identification.config import EvolutionaryConfig, IdentifyConfig
@@ -390,12 +391,8 @@ def _auxiliary_row(labels: tuple[str | None, float | None, float | None], found:
         setting=labels[0],
         voltage_V=labels[1],
         temperature_degC=labels[2],
-        F_0_N=force,
-        F_0_N_low95=force - of_force,
-        F_0_N_high95=force + of_force,
-        k_g_N_per_m=stiffness,
-        k_g_N_per_m_low95=stiffness - of_stiffness,
-        k_g_N_per_m_high95=stiffness + of_stiffness,
+        **Estimate.around(force, of_force).columns("F_0_N"),
+        **Estimate.around(stiffness, of_stiffness).columns("k_g_N_per_m"),
         zero_m=found.middle,
     )
 
@@ -429,15 +426,9 @@ def row_of(
         setting=labels[0],
         voltage_V=labels[1],
         temperature_degC=labels[2],
-        T0_N=friction[0],
-        T0_N_low95=friction[1],
-        T0_N_high95=friction[2],
-        C_Ns_per_m=damping[0],
-        C_Ns_per_m_low95=damping[1],
-        C_Ns_per_m_high95=damping[2],
-        k_N_per_m=stiffness[0],
-        k_N_per_m_low95=stiffness[1],
-        k_N_per_m_high95=stiffness[2],
+        **Estimate(*friction).columns("T0_N"),
+        **Estimate(*damping).columns("C_Ns_per_m"),
+        **Estimate(*stiffness).columns("k_N_per_m"),
         W_s=criterion(residuals, measured),
         rmse_N=rms(residuals),
         status=trust.status,

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pzd.artefacts import AuxiliaryRow, Identified, Knees, ParameterRow, Rig
+from pzd.artefacts.csv_rows import Estimate
 from pzd.identification.config import IdentifyConfig
 from pzd.parallel.processes import Listener, Progress, no_listener, parallel_map
 from pzd.quantities import TEMPERATURE, Control
 from pzd.record import Condition, Record, conditions, merged_voltages
-from pzd.schema.errors import ConfigError, DataError, counted, supported
+from pzd.schema.errors import ConfigError, DataError, counted
 from pzd.signals.cycles import Cycles, cycles_of, remember
 
 Labels = tuple[str | None, float | None, float | None]
@@ -163,8 +164,7 @@ def _constant_rows(
 def _auxiliary_text(row: AuxiliaryRow | None) -> str:
     if row is None:
         return ""
-    force = supported(row.F_0_N, row.F_0_N_low95, row.F_0_N_high95)
-    stiffness = supported(row.k_g_N_per_m, row.k_g_N_per_m_low95, row.k_g_N_per_m_high95)
+    force, stiffness = (Estimate.of(row, name).digits()[0] for name in ("F_0_N", "k_g_N_per_m"))
     return f"; beside the element {force} N and {stiffness} N/m"
 
 
@@ -199,11 +199,7 @@ def _order(labels: Labels) -> tuple[str, float, float]:
 
 
 def _line(row: ParameterRow) -> str:
-    def shown(value: float | None, low: float | None, high: float | None) -> str:
-        if value is None:
-            return "-"
-        return f"{value:.4g}" if low is None or high is None else supported(value, low, high)
-
+    T0, C, k = ((Estimate.of(row, name).digits() or ("-",))[0] for name in ("T0_N", "C_Ns_per_m", "k_N_per_m"))
     place = ", ".join(
         part
         for part in (
@@ -213,8 +209,4 @@ def _line(row: ParameterRow) -> str:
         )
         if part
     )
-    return (
-        f"{place or 'all records'}: T0 = {shown(row.T0_N, row.T0_N_low95, row.T0_N_high95)} N,"
-        f" C = {shown(row.C_Ns_per_m, row.C_Ns_per_m_low95, row.C_Ns_per_m_high95)} N s/m,"
-        f" k = {shown(row.k_N_per_m, row.k_N_per_m_low95, row.k_N_per_m_high95)} N/m, W_s = {row.W_s:.3g}, {row.status}"
-    )
+    return f"{place or 'all records'}: T0 = {T0} N, C = {C} N s/m, k = {k} N/m, W_s = {row.W_s:.3g}, {row.status}"

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from pzd.artefacts import MeasureRow
-from pzd.artefacts.characteristics import AsItStandsRow, Characteristics, StepRow, WarmUpRow
+from pzd.artefacts.identified import AsItStandsRow, Characteristics, StepRow, WarmUpRow
 from pzd.artefacts.rig import SAME_MOTION, same_motion
 from pzd.identification.characteristics import (
     Stroke,

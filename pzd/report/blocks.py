@@ -1,28 +1,22 @@
-"""What a page is made of: sections of paragraphs, lists, tables and pictures, all plain text until rendered."""
+"""Parts of a page: numbers as text, and sections of paragraphs, lists, tables and pictures, plain until rendered."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import zip_longest
 
 from pzd.comfort.iso2631_1978 import LONGEST_MIN
-from pzd.schema.errors import rounded_as
 
-# ----------------------------------------------------------------------------------------------------
-# Numbers, units and times as people read them.
-
+# --- Numbers, units and times as people read them ---
 
 THIN = "\u202f"
 MINUS = "\u2212"
 DASH = "\u2013"
 TIMES = "\u00d7"
-KEPT = "\u00a0"
+NO_BREAK = "\u00a0"
 """A space at which no line breaks."""
-
-LOST = 0.005
-"""A value of less than this share of its interval's width does not show in the width's second digit."""
 
 _UNITS = {
     "m/s2": "m/s²",
@@ -38,12 +32,16 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def unit_of(unit: str) -> str:
-    """A unit as it is printed."""
+    """Return a unit as it is printed."""
     return _UNITS.get(unit, unit)
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number to at most so many significant digits, with thin spaces between thousands; a dash for none."""
+    """Write a number to at most so many significant digits, thin spaces between thousands; a dash for none.
+
+    >>> number(0.0123456), number(22.04)
+    ('0.0123', '22')
+    """
     if value is None or not math.isfinite(value):
         return DASH
     if value == 0.0:
@@ -51,7 +49,7 @@ def number(value: float | None, digits: int = 3) -> str:
     magnitude = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
     if magnitude >= 6 or magnitude < -4:
         power = str(magnitude).translate(_SUPERSCRIPT)
-        return f"{_decimal(value / 10.0**magnitude, digits - 1)}{KEPT}{TIMES}{KEPT}10{power}"
+        return f"{_decimal(value / 10.0**magnitude, digits - 1)}{NO_BREAK}{TIMES}{NO_BREAK}10{power}"
     return _decimal(round(value, digits - 1 - magnitude), max(digits - 1 - magnitude, 0))
 
 
@@ -62,74 +60,47 @@ def _decimal(value: float, places: int) -> str:
 
 
 def amount(value: float | None, unit: str, digits: int = 3) -> str:
-    """A number with its unit; a dash alone where there is none."""
+    """Write a number with its unit; a dash alone where there is none."""
     text, shown = number(value, digits), unit_of(unit)
-    return text if text == DASH or not shown else f"{text}{KEPT}{shown}"
-
-
-def amount_as(value: float, other: float, unit: str, digits: int = 3) -> str:
-    """A number with its unit, to the decimal place to which another one is told, from which it was read."""
-    return amount(rounded_as(value, other, digits), unit, digits)
-
-
-def interval(value: float | None, low: float | None, high: float | None) -> str:
-    """A number with its 95 % interval, as many digits as the interval leaves sense in."""
-    if value is None:
-        return DASH
-    if low is None or high is None:
-        return f"{number(value)} (no interval)"
-    if abs(value) < LOST * (high - low):
-        value = 0.0
-    digits = _digits(value, high - low)
-    return f"{number(value, digits)} ({_at(low, value, digits)} to {_at(high, value, digits)})"
-
-
-def _digits(value: float, width: float) -> int:
-    """Significant digits of a value down to the second digit of its interval's width, from 2 to 6."""
-    if value == 0.0 or width <= 0.0:
-        return 3
-    return min(max(math.floor(math.log10(abs(value))) - math.floor(math.log10(width)) + 2, 2), 6)
-
-
-def _at(bound: float, value: float, digits: int) -> str:
-    """A bound of an interval, to the same decimal place as the value."""
-    if bound == 0.0 or value == 0.0:
-        return number(bound, digits)
-    shift = math.floor(math.log10(abs(bound))) - math.floor(math.log10(abs(value)))
-    return number(bound, max(digits + shift, 1))
+    return text if text == DASH or not shown else f"{text}{NO_BREAK}{shown}"
 
 
 def percent(share: float | None, digits: int = 2) -> str:
-    """A share in percent."""
-    return DASH if share is None else f"{number(100.0 * share, digits)}{KEPT}%"
+    """Write a share in percent."""
+    return DASH if share is None else f"{number(100.0 * share, digits)}{NO_BREAK}%"
 
 
 def minutes(value: float | None) -> str:
-    """A time of exposure in words."""
+    """Write a time of exposure [min]."""
     if value is None:
         return DASH
     if value >= LONGEST_MIN:
-        return f">{KEPT}24{KEPT}h"
+        return f">{NO_BREAK}24{NO_BREAK}h"
     hours, rest = divmod(round(value), 60)
     if not hours:
-        return f"{rest}{KEPT}min"
-    return f"{hours}{KEPT}h{KEPT}{rest}{KEPT}min" if rest else f"{hours}{KEPT}h"
+        return f"{rest}{NO_BREAK}min"
+    return f"{hours}{NO_BREAK}h{NO_BREAK}{rest}{NO_BREAK}min" if rest else f"{hours}{NO_BREAK}h"
 
 
 def listed(words: list[str], last: str = "and") -> str:
-    """Words as an enumeration: `a, b and c`."""
+    """Join words to an enumeration: `a, b and c`."""
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else ""
 
 
+def spelled(name: str) -> str:
+    """Return the name of an effect or a policy as the page writes it."""
+    return name.replace("_", " ")
+
+
 def sentence(text: str) -> str:
-    """Text with a capital at its start and a full stop at its end."""
+    """Return text with a capital at its start and a full stop at its end."""
     text = text.strip()
     if not text:
         return ""
     return text[0].upper() + text[1:] + ("" if text[-1] in ".!?" else ".")
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Sections and their blocks ---
 
 
 @dataclass(frozen=True)
@@ -160,14 +131,6 @@ class TextTable:
     """Whether the reader opens it first."""
     kind: str = field(default="table", init=False)
 
-    def without_empty(self, *columns: str) -> TextTable:
-        """The table less those of the named columns that hold nothing but dashes."""
-        kept = [
-            i for i, name in enumerate(self.header) if name not in columns or any(row[i] != DASH for row in self.rows)
-        ]
-        header, *rows = (tuple(row[i] for i in kept) for row in (self.header, *self.rows))
-        return replace(self, header=header, rows=tuple(rows))
-
     @property
     def numeric(self) -> tuple[bool, ...]:
         """Which columns hold numbers."""
@@ -189,7 +152,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Gallery:
-    """Pictures side by side where there is room."""
+    """Pictures side by side, where there is room."""
 
     pictures: tuple[Picture, ...]
     kind: str = field(default="gallery", init=False)
@@ -216,24 +179,23 @@ class Card:
     detail: str
 
 
-# ----------------------------------------------------------------------------------------------------
-# Pictures as blocks, in rows.
-
+# --- Rows of pictures ---
 
 Pictures = Mapping[str, tuple[tuple[Picture, ...], ...]]
 """By place on the page, then by kind."""
 
 _ROW = 3
+"""Pictures side by side on a wide screen."""
 
 
 def by_turns(kinds: tuple[tuple[Picture, ...], ...]) -> tuple[Gallery, ...]:
-    """Rows of one picture of each kind: the first of all, then the second of all."""
+    """Arrange pictures in rows of one of each kind: the first of all, then the second of all."""
     rows = (tuple(picture for picture in row if picture is not None) for row in zip_longest(*kinds))
     return tuple(Gallery(row) for row in rows if row)
 
 
 def galleries(kinds: tuple[tuple[Picture, ...], ...]) -> tuple[Gallery, ...]:
-    """Rows of up to three: one kind stays together, and a kind goes into the row before it where it fits in whole."""
+    """Arrange pictures in rows of up to three: a kind stays together, and joins the row before where it fits whole."""
     rows: list[tuple[Picture, ...]] = []
     for pictures in kinds:
         if rows and len(rows[-1]) + len(pictures) <= _ROW:

@@ -1,4 +1,4 @@
-"""The `report` block of the config: which standards, and what the page shows."""
+"""The block `report` of the config: standards, expected numbers, and what the page shows."""
 
 from __future__ import annotations
 

@@ -1,12 +1,13 @@
-"""Colours and style of the report's plots, and their encoding as text that is the same at every run."""
+"""Colours, style and layout of plots, and their encoding as text that is the same at every run."""
 
 from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -21,24 +22,31 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Place = Literal["characteristics", "model", "missing", "damper", "passenger", "policies"]
+"""Where on the page a plot stands."""
+PLACES: tuple[Place, ...] = get_args(Place)
 
 MEASURED = "#4d4d4d"
 BASELINE = "#d55e00"
-"""What something better is compared with: the simple model, the gap before, constant damping."""
+"""Of what something better is compared with: the simple model, the gap before, constant damping."""
 FINAL = "#0072b2"
 GRID = "#e3e6ea"
+AXIS = "#9aa5b1"
+MUTED = "#b8c4d0"
+"""Of what stands back: candidates that were not adopted, lines that join dots."""
 INK = "#1f2933"
 BY_FIDELITY = {"ideal": "#56b4e9", "table": "#009e73", "dynamic": "#0072b2"}
-"""Colours of Okabe and Ito (2008), which people with any colour vision tell apart."""
-BY_BASELINE = {
+"""Colours of controlled rides, of Okabe and Ito (2008), which people with any colour vision tell apart."""
+BY_POLICY = {
     "best_fixed_voltage": "#d55e00",
     "best_constant_c": "#cc79a7",
     "passive": "#4d4d4d",
     "constant": "#e69f00",
 }
-"""Likewise, of what a controlled ride is set beside."""
+"""Likewise, of the rides that a controlled one is compared with."""
 MAP = "cividis"
+"""Colour map that reads the same in grey and with any colour vision."""
 _MOST_POINTS = 700
+"""Points of a curve: more do not show at the size of a picture, and make the page heavy."""
 _FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 
 STYLE: Mapping[str, object] = {
@@ -46,7 +54,7 @@ STYLE: Mapping[str, object] = {
     "svg.fonttype": "none",
     "font.family": "DejaVu Sans",
     "font.size": 9.5,
-    "axes.edgecolor": "#9aa5b1",
+    "axes.edgecolor": AXIS,
     "axes.labelcolor": INK,
     "axes.linewidth": 0.8,
     "axes.spines.top": False,
@@ -81,22 +89,26 @@ class Panel:
 
 @dataclass(frozen=True)
 class Plot:
-    """One kind of picture: where on the page it stands, and what draws it (nothing where there is nothing)."""
+    """One kind of picture."""
 
     name: str
     place: Place
     order: int
+    """Among the pictures of its place."""
     draw: Callable[[ReportContext], Iterable[Panel]]
+    """Yields no panel where there is nothing to show."""
 
 
 _WIDTH_IN = 4.5
 _LETTER_IN = 0.078
+"""Width of a letter of a tick label."""
+_LEGEND_COLUMNS = 4
 
 
 def axes(
     height: float = 3.1, labels: Iterable[str] = ("-0.000",), *, key: int = 1, right: float = 0.12
 ) -> tuple[Figure, Axes]:
-    """An empty figure of one axes, of a size in inches that stays readable on a telephone.
+    """Return an empty figure of one axes, of a size that stays readable on a telephone.
 
     Parameters
     ----------
@@ -119,25 +131,38 @@ def axes(
 
 
 def legend(figure: Figure, columns: int = 3) -> None:
-    """What the curves are, above them."""
+    """Write the legend above the axes."""
     figure.legend(loc="upper left", ncols=columns, bbox_to_anchor=(0.02, 1.01), columnspacing=1.3, handlelength=1.6)
 
 
-def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> list[tuple[Picture, ...]]:
-    """Draw and encode what the plots have to show, plot by plot, so many at the same time."""
+def legend_lines(labels: int) -> int:
+    """Return how many lines a legend of `legend(figure, 4)` takes."""
+    return -(-labels // _LEGEND_COLUMNS)
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw in the style of the report, with matplotlib loaded once for all processes that part within."""
     import matplotlib as mpl
     import matplotlib.backends.backend_svg
-    import matplotlib.figure  # once, before the processes part
+    import matplotlib.figure
+
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
+        yield
+
+
+def pictures(plots: Sequence[Plot], context: ReportContext, jobs: int = 1) -> list[tuple[Picture, ...]]:
+    """Draw and encode the panels of each plot, `jobs` plots at the same time."""
 
     def drawn(plot: Plot) -> tuple[Picture, ...]:
         return tuple(encoded(panel) for panel in plot.draw(context))
 
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
+    with styled():
         return parallel_map(drawn, plots, jobs)
 
 
 def encoded(panel: Panel) -> Picture:
-    """A panel as an SVG in a data URI, the same bytes for the same figure."""
+    """Encode a panel as an SVG in a data URI, the same bytes for the same figure."""
     buffer = io.StringIO()
     panel.figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     text = buffer.getvalue()
@@ -147,18 +172,18 @@ def encoded(panel: Panel) -> Picture:
 
 
 def line_of(context: ReportContext, row: SummaryRow) -> tuple[str, bool]:
-    """The colour of a ride, and whether it is controlled."""
-    return BY_BASELINE.get(row.policy, BY_FIDELITY[row.fidelity]), context.simulate.is_controlled(row.policy)
+    """Return the colour of a ride, and whether it is controlled."""
+    return BY_POLICY.get(row.policy, BY_FIDELITY[row.fidelity]), context.simulate.is_controlled(row.policy)
 
 
 def thinned(*columns: Array) -> tuple[Array, ...]:
-    """Every n-th sample of arrays of one length, n so large that a curve has few enough points to be drawn."""
+    """Return every n-th sample of arrays of one length, n so large that a curve has few enough points to be drawn."""
     step = max(int(np.ceil(columns[0].size / _MOST_POINTS)), 1)
     return tuple(column[::step] for column in columns)
 
 
 def shades(count: int) -> list[tuple[float, float, float, float]]:
-    """So many colours from dark blue to ochre, in order of lightness."""
+    """Return `count` colours from dark blue to ochre, in order of lightness."""
     import matplotlib as mpl
 
     return [mpl.colormaps[MAP](place) for place in np.linspace(0.0, 0.75, count)] if count else []

@@ -1,32 +1,27 @@
-"""report.html: all sections in one file that asks nothing of the net and runs no script."""
+"""report.html: the headline and all sections, in one file that asks nothing of the net and runs no script."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 from pzd.artefacts import ForceRow, Gap
-from pzd.report.blocks import Card, Pictures, Section, amount, listed, number, percent, sentence
-from pzd.report.context import (
-    BASELINES,
-    Comparison,
-    ReportContext,
-    effect_in_words,
-    static_force_at,
-    static_force_in_words,
-)
-from pzd.report.drawing import pictures
+from pzd.report.blocks import Card, Pictures, Section, amount, listed, number, percent, sentence, spelled
+from pzd.report.context import ReportContext
+from pzd.report.damper_models import effect_in_words
+from pzd.report.drawing import PLACES, pictures
 from pzd.report.plots import library
+from pzd.report.ride_comfort import UNCONTROLLED, Comparison, RatedRides
 from pzd.report.sections import damper, missing, passenger, tested, trust
 from pzd.report.sections.missing import least_known, rig_test, verdict
 from pzd.report.sections.passenger import change
+from pzd.simulate.study.plan import assumed
 
-# ----------------------------------------------------------------------------------------------------
-# The five lines on top of the page: damper, missing effect, confidence, next test, comfort.
+# --- The headline: damper, missing effect, confidence, next test, comfort ---
 
 
 def cards(context: ReportContext) -> tuple[Card, ...]:
-    """Damper, missing effect, confidence, next test, and comfort if ridden: each a question with its answer."""
-    question = f"What is missing from the {context.model}?"
+    """Answer four questions on the damper, and one on the comfort where it was ridden."""
+    question = f"What is missing from the {context.damper.baseline_name}?"
     missing = Card(question, _missing(context), _meaning(context))
     comfort = (_comfort(context),) if context.ridden else ()
     return _damper(context), missing, _confidence(context), _next(context), *comfort
@@ -43,7 +38,7 @@ def _damper(context: ReportContext) -> Card:
     here = [row for row in rows if row.velocity_m_per_s == speed and row.temperature_degC == first]
     low, high = (end(here, key=lambda row: row.voltage_V or 0.0) for end in (min, max))
     at = f"In rebound at {amount(speed, 'm/s')}" + (f" and {amount(first, 'degC')}" if first is not None else "")
-    rest = static_force_in_words(context, (low.voltage_V, high.voltage_V))
+    rest = context.damper.static_force_in_words((low.voltage_V, high.voltage_V))
     at += f"; {rest} of it act at rest as well." if rest else "."
     if low.voltage_V == high.voltage_V:
         return Card(question, f"It gives {_force(context, low)}", at)
@@ -52,22 +47,22 @@ def _damper(context: ReportContext) -> Card:
 
 
 def _force(context: ReportContext, row: ForceRow) -> str:
-    """As a rig would measure it, with what is there at rest."""
-    return amount((row.force_N or 0.0) + static_force_at(context, row.voltage_V), "N")
+    """Return a force of the table as a rig would measure it, with the static force."""
+    return amount((row.force_N or 0.0) + context.damper.static_force(row.voltage_V), "N")
 
 
 def _missing(context: ReportContext) -> str:
     diagnosis = context.diagnosed.diagnosis
-    names = listed([_name(effect) for effect in diagnosis.effects])
+    names = listed([spelled(effect) for effect in diagnosis.effects])
     if diagnosis.verdict == "named":
         return _capital(names)
     if diagnosis.verdict == "ambiguous" and not diagnosis.effects:
         return "Not settled by these tests"
     if diagnosis.verdict == "ambiguous":
-        return _capital(listed([_name(e) for e in (*diagnosis.effects, *diagnosis.rivals)], "or")) + ": not settled"
+        return _capital(listed([spelled(e) for e in (*diagnosis.effects, *diagnosis.rivals)], "or")) + ": not settled"
     if diagnosis.verdict == "none":
         return "Nothing that these tests can see"
-    if context.fitted_law:
+    if context.damper.fitted_law:
         return "Nothing was looked for"
     return f"Something unexplained, beside {names}" if names else "Something unexplained"
 
@@ -77,10 +72,6 @@ def _meaning(context: ReportContext) -> str:
     if diagnosis.verdict == "named":
         return sentence("; ".join(effect_in_words(effect) for effect in diagnosis.effects))
     return verdict(context)
-
-
-def _name(effect: str) -> str:
-    return effect.replace("_", " ")
 
 
 def _capital(text: str) -> str:
@@ -96,97 +87,89 @@ def _confidence(context: ReportContext) -> Card:
 def _gap(gap: Gap | None) -> str:
     if gap is None:
         return "The gap could not be measured."
-    moved = (
-        f"stays {number(gap.before)}"
-        if gap.after == gap.before
-        else f"goes from {number(gap.before)} to {number(gap.after)}"
-    )
-    return f"The gap W_s on held-out data {moved}; noise alone is {number(gap.noise_floor)}."
+    before, after = number(gap.before), number(gap.after)
+    course = f"stays {before}" if gap.after == gap.before else f"goes from {before} to {after}"
+    return f"The gap W_s on held-out data {course}; noise alone is {number(gap.noise_floor)}."
 
 
 def _next(context: ReportContext) -> Card:
     test = context.diagnosed.diagnosis.next_test
     if test is None:
         return Card("Which test next?", "None is proposed", "")
-    names = listed([_name(effect) for effect in test.separates])
+    names = listed([spelled(effect) for effect in test.separates])
     why = sentence(f"it separates {names}") if names else ""
     return Card("Which test next?", _capital(rig_test(context, test)), sentence(least_known(context, test)) or why)
 
 
 def _comfort(context: ReportContext) -> Card:
+    rated = context.rated
     if not context.controlled:
-        return Card("What does the passenger feel?", _uncontrolled(context), "")
+        return Card("What does the passenger feel?", _comfort_levels(rated), "")
     question = "What does control give the passenger?"
-    found = {road: compared[0] for road in context.roads if (compared := context.comparisons(road))}
+    found = {road: compared[0] for road in rated.roads if (compared := rated.comparisons(road))}
     if not found:
-        return Card(question, "Nothing controls the dampers", _uncontrolled(context))
+        return Card(question, "Nothing controls the dampers", _comfort_levels(rated))
     first = next(iter(found.values()))
     against = first.others[0].policy
-    answer = "; ".join(
-        f"{context.road(road)}: a_w {change(context.a_w(one.others[0]), context.a_w(one.controlled))}"
-        for road, one in found.items()
-    )
-    beside = f"{_capital(_name(first.controlled.policy))} beside {_the(against)}, both {first.controlled.fidelity}"
-    return Card(question, answer, f"{beside}. {_price(context, found)} {_others(context, found)}".strip())
+    answer = "; ".join(f"{rated.road_label(road)}: a_w {_gain(rated, one)}" for road, one in found.items())
+    policy = _capital(spelled(first.controlled.policy))
+    beside = f"{policy} beside {_the(against)}, both {first.controlled.fidelity}"
+    return Card(question, answer, f"{beside}. {_price(rated, found)} {_gain_on_others(rated, found)}".strip())
 
 
-def _uncontrolled(context: ReportContext) -> str:
-    """The comfort of the dampers as they are."""
-    rows = [(road, context.nearest(road)) for road in context.roads]
+def _comfort_levels(rated: RatedRides) -> str:
+    """Return a_w on every road, where no policy is compared with others."""
+    rides = [(road, ride) for road in rated.roads for ride in rated.most_realistic(road)[:1]]
     levels = "; ".join(
-        f"{context.road(road)}: a_w {amount(context.a_w(rides[0]), 'm/s2')}, {context.dampers(rides[0])}"
-        for road, rides in rows
-        if rides
+        f"{rated.road_label(road)}: a_w {amount(rated.a_w(ride), 'm/s2')}, {rated.label(ride)}" for road, ride in rides
     )
     return sentence(levels)
 
 
-def _price(context: ReportContext, found: Mapping[str, Comparison]) -> str:
-    """What it costs in wheel load and travel, beside the same ride."""
+def _gain(rated: RatedRides, one: Comparison, other: int = 0) -> str:
+    """Return the change of a_w by control, compared with one of the others."""
+    return change(rated.a_w(one.others[other]), rated.a_w(one.controlled))
+
+
+def _price(rated: RatedRides, found: Mapping[str, Comparison]) -> str:
+    """Return what control costs in wheel load and travel, compared with the same ride."""
     parts = []
     for road, one in found.items():
         load = change(one.others[0].rms_wheel_load_N, one.controlled.rms_wheel_load_N)
         travel = change(one.others[0].peak_deflection_m, one.controlled.peak_deflection_m)
-        parts.append(f"{context.road(road)}: wheel load {load}, travel {travel}")
+        parts.append(f"{rated.road_label(road)}: wheel load {load}, travel {travel}")
     return f"Its price: {'; '.join(parts)}."
 
 
-def _others(context: ReportContext, found: Mapping[str, Comparison]) -> str:
-    """The same beside each of the other rides at the same fidelity."""
+def _gain_on_others(rated: RatedRides, found: Mapping[str, Comparison]) -> str:
+    """Return the change of a_w compared with each of the other rides at the same fidelity."""
     texts = []
-    for policy in BASELINES:
-        told = [
-            f"{context.road(road)} {change(context.a_w(other), context.a_w(one.controlled))}"
+    for policy in UNCONTROLLED:
+        gains = [
+            f"{rated.road_label(road)} {_gain(rated, one, place)}"
             for road, one in found.items()
-            for other in one.others[1:]
-            if other.policy == policy
+            for place, other in enumerate(one.others)
+            if place > 0 and other.policy == policy
         ]
-        if told:
-            texts.append(f"Beside {_the(policy)} a_w is: {'; '.join(told)}.")
+        if gains:
+            texts.append(f"Beside {_the(policy)} a_w is: {'; '.join(gains)}.")
     return " ".join(texts)
 
 
 def _the(policy: str) -> str:
-    return {"passive": "the passive damper", "constant": "constant c"}.get(policy, f"the {_name(policy)}")
+    return {"passive": "the passive damper", "constant": "constant c"}.get(policy, f"the {spelled(policy)}")
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-_PLACES = ("characteristics", "model", "missing", "damper", "passenger", "policies")
+# --- The page ---
 
 
 def page(context: ReportContext, jobs: int = 1) -> str:
-    """The whole page as text.
+    """Write the whole page as HTML.
 
     Parameters
     ----------
     context : the run
     jobs : pictures drawn at the same time
-
-    Returns
-    -------
-    HTML, the same for the same sections
     """
     drawn = _drawn(context, jobs)
     sections = (
@@ -200,18 +183,26 @@ def page(context: ReportContext, jobs: int = 1) -> str:
         trust.render(context),
         trust.render_provenance(context),
     )
-    return render(_title(context), cards(context), context.assumed if context.ridden else (), sections)
+    return render(_title(context), cards(context), _assumed(context), sections)
 
 
 def _drawn(context: ReportContext, jobs: int) -> Pictures:
     plots = list(library().values())
     drawn = list(zip(plots, pictures(plots, context, jobs), strict=True))
-    return {place: tuple(of_plot for plot, of_plot in drawn if plot.place == place) for place in _PLACES}
+    return {place: tuple(panels for plot, panels in drawn if plot.place == place) for place in PLACES}
+
+
+def _assumed(context: ReportContext) -> tuple[str, ...]:
+    """Return what the rides assume because the config does not say it."""
+    if not context.ridden:
+        return ()
+    damper = context.diagnosed.damper
+    return assumed(context.simulate, damper.effects, all(row.voltage_V is not None for row in damper.base))
 
 
 def _title(context: ReportContext) -> str:
     kind = "Damper and comfort report" if context.ridden else "Damper report"
-    return f"{kind}: {context.chosen}" if context.chosen else kind
+    return f"{kind}: {context.setting}" if context.setting else kind
 
 
 _FOOTER = "Written by pzd. Every number of this page stands in the files of the run beside it, or follows from them."
@@ -224,7 +215,7 @@ def render(
     sections: tuple[Section, ...],
     footer: str = _FOOTER,
 ) -> str:
-    """Fill the template; every text is escaped there."""
+    """Fill the template, which escapes every text."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(

@@ -1,4 +1,4 @@
-"""The page of `pzd check --plot`: every record as it was read, with the findings of the preflight marked in it."""
+"""The page of `pzd check --plot`: every record as read, with the findings of the preflight marked in it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pzd.parallel.processes import parallel_map
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.report.blocks import Block, Gallery, Notes, Paragraph, Section, amount, number
-from pzd.report.drawing import BASELINE, FINAL, MEASURED, STYLE, Panel, axes, encoded
+from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, axes, encoded, styled
 from pzd.report.page import render
 from pzd.schema.errors import counted
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BINS = 400
-"""Parts of a record of each of which the least and the largest sample are drawn, so that no spike is passed over."""
+"""Parts of a record; the smallest and the largest sample of each are drawn, so that no spike is passed over."""
 _LOOP_POINTS = 2500
 """Points of a loop that are drawn."""
 _WHEN = re.compile(r"\b(?:at|after|before|until|from) (-?[\d.]+(?:e[-+]?\d+)?) s\b")
-"""How a finding says when."""
+"""A time in the words of a finding."""
 
 
 def records_page(rig: Rig, control: Control, jobs: int = 1) -> str:
-    """A page with a section for each record: x, v and F over time, F over v, F over x, and the findings.
+    """Write a page with a section for each record: x, v and F over time, F over v, F over x, and the findings.
 
     Parameters
     ----------
@@ -42,12 +42,8 @@ def records_page(rig: Rig, control: Control, jobs: int = 1) -> str:
     -------
     HTML that asks nothing of the net and runs no script
     """
-    import matplotlib as mpl
-    import matplotlib.backends.backend_svg
-    import matplotlib.figure  # once, before the processes part
-
     entries: Mapping[str, RecordEntry] = {entry.name: entry for entry in rig.entries}
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
+    with styled():
         sections = parallel_map(lambda record: _section(record, entries[record.name], control), rig.records, jobs)
     count = sum(len(entry.findings) for entry in rig.entries)
     footer = "Written by pzd check. The records stand as they were read: nothing was corrected."
@@ -56,14 +52,14 @@ def records_page(rig: Rig, control: Control, jobs: int = 1) -> str:
 
 
 def _section(record: Record, entry: RecordEntry, control: Control) -> Section:
-    said = [
+    conditions = [
         amount(entry.voltage_V, control.unit) if entry.voltage_V is not None else "",
         amount(entry.temperature_degC, "degC") if entry.temperature_degC is not None else "",
         f"{number(entry.cycles)} cycles at {amount(entry.rate_Hz, 'Hz', 4)}",
         entry.setting or "",
     ]
     pictures = tuple(encoded(panel) for panel in (_over_time(record, entry.findings), *_loops(record, entry.findings)))
-    blocks: list[Block] = [Paragraph(f"{', '.join(part for part in said if part)}."), Gallery(pictures)]
+    blocks: list[Block] = [Paragraph(f"{', '.join(part for part in conditions if part)}."), Gallery(pictures)]
     if entry.findings:
         lines = (f"{f.check}: {f.where}: {amount(f.size, f.unit)}; {f.follows}" for f in entry.findings)
         blocks.append(Notes(tuple(f"{mark}. {line}" for mark, line in enumerate(lines, 1)), "care"))
@@ -71,12 +67,12 @@ def _section(record: Record, entry: RecordEntry, control: Control) -> Section:
 
 
 def times_of(findings: Sequence[Finding]) -> list[tuple[int, float]]:
-    """When the findings that say a time are, each with its number from 1 [s]."""
+    """Return the times that findings name, each with the number of the finding from 1 [s]."""
     return [(mark, float(when)) for mark, finding in enumerate(findings, 1) for when in _WHEN.findall(finding.where)]
 
 
 def envelope(time: Array, values: Array) -> tuple[Array, Array]:
-    """Time and value of the least and the largest sample of each of many equal parts, in their order.
+    """Return time and value of the smallest and the largest sample of each of many equal parts, in their order.
 
     Parameters
     ----------
@@ -108,14 +104,9 @@ def _over_time(record: Record, findings: Sequence[Finding]) -> Panel:
         for mark, when in times_of(findings):
             ax.axvline(when, color=BASELINE, linewidth=1.2, linestyle="--")
             if ax is plots[0]:
-                ax.annotate(
-                    f"{mark}",
-                    (when, 1.0),
-                    (1, 1),
-                    xycoords=("data", "axes fraction"),
-                    textcoords="offset points",
-                    color=BASELINE,
-                )
+                # 1 point to the right of the line and above the axes
+                coordinates = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
+                ax.annotate(f"{mark}", (when, 1.0), (1, 1), **coordinates, color=BASELINE)
     plots[-1].set_xlabel("time [s]")
     figure.align_ylabels()
     figure.subplots_adjust(left=0.15, right=0.97, top=0.94, bottom=0.12, hspace=0.12)
@@ -136,6 +127,6 @@ def _loops(record: Record, findings: Sequence[Finding]) -> list[Panel]:
         ax.plot(values[marked], record.force[marked] / 1000.0, "o", markersize=8.0, fillstyle="none", color=BASELINE)
         ax.set_xlabel(label)
         ax.set_ylabel("force [kN]")
-        said = "Circles: where findings are." if marked else ""
-        panels.append(Panel(figure, title, f"{title} of {record.name}, all of the record.", said))
+        caption = "Circles: where findings are." if marked else ""
+        panels.append(Panel(figure, title, f"{title} of {record.name}, all of the record.", caption))
     return panels

@@ -1,4 +1,4 @@
-"""Numbers that somebody expects, and what a run gives in their place.
+"""Expected numbers of a file (`report.reference`) beside those that a run computes.
 
 `report.reference: FILE.csv` names a file with one expected number a row. Its columns stand in any order:
 
@@ -19,8 +19,8 @@ arithmetic between other rows, in their units:
     peak-on,soft,150,2,0.03,measures.peak_force_N,2940,N,0.05
     rise,,,,,100 * ([peak-on] / [peak] - 1),94,percent,0.1
 
-Two tests are the same as `pzd.artefacts.rig` says. A number of its own as selector (`59.7`) stands for what the
-run cannot compute; reference.csv says so.
+`pzd.artefacts.rig` says when two tests are the same. A number of its own as selector (`59.7`) stands for what the run
+cannot compute; reference.csv says so.
 """
 
 from __future__ import annotations
@@ -40,17 +40,15 @@ from pzd.artefacts import ReferenceRow
 from pzd.artefacts.rig import Conditions, same_motion
 from pzd.quantities import Control, Quantity
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE
-from pzd.report.run_numbers import PURE, UNITS, Asked, Found, RunNumbers, found_in
+from pzd.report.run_numbers import PURE, UNITS, Computed, RunNumbers, Selection, computed_number
 from pzd.schema.csvfile import read_table
 from pzd.schema.errors import ConfigError, DataError, at
 from pzd.schema.model import Frozen, nearest
 
-# ----------------------------------------------------------------------------------------------------
-# Sums, differences, products and quotients of numbers that stand elsewhere: `100 * ([b] / [a] - 1)`.
-
+# --- Arithmetic between rows: `100 * ([b] / [a] - 1)` ---
 
 _TERM = re.compile(r"\[([^\[\]]+)\]")
-_TWO: Mapping[type[ast.operator], Callable[[float, float], float]] = {
+_OPERATORS: Mapping[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
@@ -59,12 +57,16 @@ _TWO: Mapping[type[ast.operator], Callable[[float, float], float]] = {
 
 
 def terms(text: str) -> tuple[str, ...]:
-    """The ids between brackets, each once, in the order of the text."""
+    """Return the ids between brackets, each once, in the order of the text.
+
+    >>> terms("100 * ([b] / [a] - 1)")
+    ('b', 'a')
+    """
     return tuple(dict.fromkeys(_TERM.findall(text)))
 
 
 def parsed(text: str) -> ast.expr:
-    """The tree of an expression; each id is a name in it, by its place in `terms`.
+    """Parse an expression; each id becomes a name in the tree, numbered by its place in `terms`.
 
     Raises
     ------
@@ -81,12 +83,15 @@ def parsed(text: str) -> ast.expr:
 
 
 def evaluated(text: str, numbers: Mapping[str, float]) -> float:
-    """The value of an expression.
+    """Evaluate an expression.
 
     Parameters
     ----------
     text : + - * / and parentheses between numbers and `[id]`
     numbers : the value of each id
+
+    >>> evaluated("100 * ([b] / [a] - 1)", {"a": 2.0, "b": 3.0})
+    50.0
 
     Raises
     ------
@@ -98,7 +103,7 @@ def evaluated(text: str, numbers: Mapping[str, float]) -> float:
 
 def _is_arithmetic(node: ast.expr, places: set[int]) -> bool:
     if isinstance(node, ast.BinOp):
-        return type(node.op) in _TWO and _is_arithmetic(node.left, places) and _is_arithmetic(node.right, places)
+        return type(node.op) in _OPERATORS and _is_arithmetic(node.left, places) and _is_arithmetic(node.right, places)
     if isinstance(node, ast.UnaryOp):
         return isinstance(node.op, ast.USub) and _is_arithmetic(node.operand, places)
     if isinstance(node, ast.Name):
@@ -108,28 +113,28 @@ def _is_arithmetic(node: ast.expr, places: set[int]) -> bool:
 
 def _value(node: ast.expr, numbers: Mapping[str, float]) -> float:
     if isinstance(node, ast.BinOp):
-        return _TWO[type(node.op)](_value(node.left, numbers), _value(node.right, numbers))
+        return _OPERATORS[type(node.op)](_value(node.left, numbers), _value(node.right, numbers))
     if isinstance(node, ast.UnaryOp):
         return -_value(node.operand, numbers)
     return numbers[node.id] if isinstance(node, ast.Name) else float(ast.literal_eval(node))
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- The file ---
 
 SHIPPED = {"makowski2021": Path(pzd.__file__).parent / "paper" / "published.csv"}
 """Lists of expected numbers that come with the package, by name."""
 _NAME = re.compile(r"[A-Za-z_]+\.[^\[\]\s]+")
+"""A selector that looks like a name of `UNITS`."""
 
 
 class Expected(Frozen):
-    """One expected number, and which number of a run it is expected of."""
+    """One expected number, with the number of a run that it belongs to."""
 
     id: str = Field(min_length=1)
     kind: str = ""
-    """What kind of number it is, e.g. `measured`, `identified`, `claim`: for the reader."""
+    """For the reader: `measured`, `identified`, `claim` or the like."""
     figure_or_table: str = ""
-    """Where it is printed: for the reader."""
+    """For the reader: where it is printed."""
     setting: str | None = None
     voltage_V: float | None = None
     temperature_degC: float | None = None
@@ -141,10 +146,10 @@ class Expected(Frozen):
     policy: str | None = None
     fidelity: str | None = None
     quantity: str = ""
-    """What it is, in words: for the reader."""
+    """For the reader: what it is, in words."""
     selector: str = ""
     value: float | str
-    """A range is text."""
+    """A number, or a range as text."""
     unit: str
     tolerance: float | None = Field(default=None, ge=0.0)
     """Largest difference as a share of the value."""
@@ -152,7 +157,7 @@ class Expected(Frozen):
 
     @field_validator("selector")
     @classmethod
-    def _is_one(cls, selector: str) -> str:
+    def _is_name_or_arithmetic(cls, selector: str) -> str:
         if _NAME.fullmatch(selector) and selector not in UNITS:
             near = nearest(selector, UNITS)
             hint = f"did you mean {near}?" if near else f"there is {', '.join(UNITS)}"
@@ -163,7 +168,7 @@ class Expected(Frozen):
 
     @field_validator("unit")
     @classmethod
-    def _fits(cls, unit: str, info: ValidationInfo) -> str:
+    def _fits_selector(cls, unit: str, info: ValidationInfo) -> str:
         selector = info.data.get("selector", "")
         if selector in UNITS:
             _factor(selector, unit)
@@ -171,29 +176,29 @@ class Expected(Frozen):
 
     @property
     def number(self) -> float:
-        """The value of a row that holds one number.
+        """The value of a row that holds a single number.
 
         Raises
         ------
         ValueError : when it is a range
         """
         if isinstance(self.value, str):
-            raise ValueError(f"{self.id} is no single number (got {self.value})")  # noqa: TRY004  # a wrong id
+            raise ValueError(f"{self.id} is no single number (got {self.value})")  # noqa: TRY004  # the id is wrong, no type is
         return self.value
 
     @property
     def conditions(self) -> Conditions:
-        """Of the test that it is expected of."""
+        """Conditions of the test that it belongs to."""
         return Conditions(self.setting, self.voltage_V, self.temperature_degC, self.frequency_Hz, self.amplitude_m)
 
     @property
-    def asked(self) -> Asked:
-        """Which row of the run it is expected of."""
-        return Asked(self.conditions, self.record, self.case, self.road, self.policy, self.fidelity)
+    def selection(self) -> Selection:
+        """Row of the run that it belongs to."""
+        return Selection(self.conditions, self.record, self.case, self.road, self.policy, self.fidelity)
 
 
 def _factor(selector: str, unit: str) -> float:
-    """How many of the run's units one of `unit` is.
+    """Return how many of the run's units one of `unit` is.
 
     Raises
     ------
@@ -210,7 +215,7 @@ def _factor(selector: str, unit: str) -> float:
 
 
 def same_test(a: Expected, b: Expected) -> bool:
-    """Whether two numbers are expected of one quantity of one test: their conditions differ by less than a match may.
+    """Tell whether two numbers belong to one quantity of one test: their conditions differ by less than a match may.
 
     Voltages count as the same within the share of the larger that `pzd.record` gives a condition.
     """
@@ -226,19 +231,19 @@ def same_test(a: Expected, b: Expected) -> bool:
 
 
 def range_of(row: Expected, expected: Iterable[Expected]) -> tuple[float, float]:
-    """Smallest and largest number that are expected of the test of a row."""
+    """Return the smallest and the largest number expected of the test of a row."""
     values = [other.value for other in (row, *expected) if same_test(row, other)]
     numbers = [value for value in values if not isinstance(value, str)]
     return (min(numbers), max(numbers)) if numbers else (0.0, 0.0)
 
 
 def path_of(reference: str, folder: Path) -> Path:
-    """Where the file that `report.reference` names should stand."""
+    """Return where the file that `report.reference` names should stand."""
     return SHIPPED.get(reference, folder / reference)
 
 
 def file_of(reference: str, folder: Path) -> Path:
-    """The file that `report.reference` names.
+    """Return the file that `report.reference` names.
 
     Parameters
     ----------
@@ -258,7 +263,7 @@ def file_of(reference: str, folder: Path) -> Path:
 
 
 def read_reference(path: Path, control: Control) -> tuple[Expected, ...]:
-    """The expected numbers of a file.
+    """Read the expected numbers of a file.
 
     Raises
     ------
@@ -272,7 +277,7 @@ def read_reference(path: Path, control: Control) -> tuple[Expected, ...]:
 
 
 def _faults(rows: Sequence[tuple[int, Expected]]) -> Iterator[tuple[int, str]]:
-    """What is wrong between rows, with the line of it."""
+    """Yield what is wrong between rows, each with its line."""
     by_id: dict[str, Expected] = {}
     for line, row in rows:
         if row.id in by_id:
@@ -287,59 +292,69 @@ def _faults(rows: Sequence[tuple[int, Expected]]) -> Iterator[tuple[int, str]]:
                 yield line, f"selector: the row must name a number of the run itself (got {term})"
 
 
+# --- Comparison ---
+
+
 def compared(expected: Sequence[Expected], run: RunNumbers) -> tuple[ReferenceRow, ...]:
-    """Every expected number beside that of the run, in the order of its file.
+    """Set every expected number beside that of the run, in the order of its file.
 
     Parameters
     ----------
     expected : the numbers
-    run : what was computed
+    run : the artefacts of the run
     """
+    units = {row.id: row.unit for row in expected}
     direct = {row.id: _direct(row, run) for row in expected if row.selector in UNITS}
     rows = []
     for row in expected:
-        found = direct[row.id] if row.id in direct else _derived(row, direct, {one.id: one.unit for one in expected})
-        rows.append(_compared_row(row, found, _also_expected(row, expected)))
-    met = sum(row.computed is not None for row in rows)
-    logging.getLogger(__name__).info("%d of %d expected numbers are computed", met, len(rows))
+        found = direct[row.id] if row.id in direct else _derived(row, direct, units)
+        rows.append(_reference_row(row, found, _range_note(row, expected)))
+    computed = sum(row.computed is not None for row in rows)
+    logging.getLogger(__name__).info("%d of %d expected numbers are computed", computed, len(rows))
     return tuple(rows)
 
 
-def _direct(row: Expected, run: RunNumbers) -> Found:
-    """A number of the run in the unit in which it is expected."""
-    found = found_in(run, row.selector, row.asked)
+def _direct(row: Expected, run: RunNumbers) -> Computed:
+    """Return a number of the run in the unit in which it is expected."""
+    found = computed_number(run, row.selector, row.selection)
     value = None if found.value is None else found.value / _factor(row.selector, row.unit)
-    return Found(value, found.note)
+    return Computed(value, found.note)
 
 
-def _derived(row: Expected, direct: Mapping[str, Found], units: Mapping[str, str]) -> Found:
-    """What arithmetic between other rows gives."""
+def _derived(row: Expected, direct: Mapping[str, Computed], units: Mapping[str, str]) -> Computed:
+    """Return what arithmetic between other rows gives."""
     names = terms(row.selector)
     if not row.selector:
-        return Found(None, "no selector: the run computes no such number")
+        return Computed(None, "no selector: the run computes no such number")
     if not names:
-        return Found(evaluated(row.selector, {}), "a number of the reference file itself, not computed by the run")
+        return Computed(evaluated(row.selector, {}), "a number of the reference file itself, not computed by the run")
     lacking = [f"{name}: {direct[name].note}" for name in names if direct[name].value is None]
     if lacking:
-        return Found(None, "; ".join(lacking))
+        return Computed(None, "; ".join(lacking))
     numbers = {name: direct[name].value or 0.0 for name in names}
-    terms_text = ", ".join(f"{name} {value:.5g} {units[name]}" for name, value in numbers.items())
+    formula = f"{row.selector} of {', '.join(f'{name} {value:.5g} {units[name]}' for name, value in numbers.items())}"
     try:
-        return Found(evaluated(row.selector, numbers), f"{row.selector} of {terms_text}")
+        return Computed(evaluated(row.selector, numbers), formula)
     except ZeroDivisionError:
-        return Found(None, f"{row.selector} of {terms_text} divides by 0")
+        return Computed(None, f"{formula} divides by 0")
 
 
-def _also_expected(row: Expected, expected: Iterable[Expected]) -> str:
-    """The range of what is expected of the same test, where the file has several numbers for it."""
+def _range_note(row: Expected, expected: Iterable[Expected]) -> str:
+    """Return the range of what is expected of the same test, where the file has several numbers for it."""
     low, high = range_of(row, expected) if row.selector.startswith("measures.") else (0.0, 0.0)
     return f"{low:g} to {high:g} {row.unit} are expected of this test" if low < high else ""
 
 
-def _compared_row(row: Expected, found: Found, also: str) -> ReferenceRow:
+def _reference_row(row: Expected, found: Computed, range_note: str) -> ReferenceRow:
     comparable = found.value is not None and not isinstance(row.value, str) and row.value != 0.0
     ratio = found.value / row.number if found.value is not None and comparable else None
-    parts = (found.note, also, _within(row.tolerance, ratio), f"reference: {row.note}" if row.note else "")
+    within = ""
+    if row.tolerance is not None and ratio is not None:
+        inside = abs(ratio - 1.0) <= row.tolerance
+        within = (
+            f"{'within' if inside else 'NOT within'} the tolerance of {row.tolerance:.3g}: off by {ratio - 1.0:+.3g}"
+        )
+    parts = (found.note, range_note, within, f"reference: {row.note}" if row.note else "")
     return ReferenceRow(
         id=row.id,
         kind=row.kind,
@@ -349,10 +364,3 @@ def _compared_row(row: Expected, found: Found, also: str) -> ReferenceRow:
         ratio=ratio,
         note="; ".join(part for part in parts if part),
     )
-
-
-def _within(tolerance: float | None, ratio: float | None) -> str:
-    if tolerance is None or ratio is None:
-        return ""
-    inside = abs(ratio - 1.0) <= tolerance
-    return f"{'within' if inside else 'NOT within'} the tolerance of {tolerance:.3g}: off by {ratio - 1.0:+.3g}"

@@ -1,26 +1,44 @@
-"""The comfort rows of one ride, in the editions that the config asks for."""
+"""The rides of a run with their comfort: rated by each edition asked for, and compared road by road."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from pzd.artefacts import ComfortRow, RideRow, Rides, SpectrumRow, SummaryRow, WeightedRow
 from pzd.comfort import directive, iso2631_1978, iso2631_1997
 from pzd.comfort.spectrum import Components
+from pzd.quantities import Control
+from pzd.report.blocks import amount, spelled
 from pzd.report.config import ReportConfig
 from pzd.schema.errors import DataError
+from pzd.simulate.config import SimulateConfig
+from pzd.simulate.policies import policies
+from pzd.simulate.roads.sine import Sine
+from pzd.simulate.study.plan import PLAIN_SUFFIX
 
 UNWEIGHTED = "unweighted"
+"""Edition of the rows that follow no standard."""
+REALISTIC = ("dynamic", "table", "ideal")
+"""Fidelities, the one nearest to a real car first."""
+UNCONTROLLED = ("best_fixed_voltage", "best_constant_c", "passive", "constant")
+"""Policies that a controlled one is compared with, the strongest first."""
+_FEWEST_CONTROLLED = 2
+"""With fewer policies that control there is no trade-off to choose from; a `Comparison` says what the one is worth."""
 _RUN_UP_S = 3.0
 """Within this time the weighting has forgotten how the ride began."""
 
 
+Measure = tuple[str, float | None, str, str]
+"""Name, value, unit and status of a comfort row."""
+
+
 @dataclass(frozen=True, eq=False)
 class RatedRide:
-    """One ride as it is rated: all of it taken from every step in its window."""
+    """One ride with its row of each table; every number is taken over all steps of its window."""
 
     row: SummaryRow
     ridden: RideRow
@@ -41,13 +59,13 @@ class RatedRide:
 
     @property
     def components(self) -> Components:
-        """What the unweighted acceleration is made of."""
+        """Frequency components of the unweighted acceleration."""
         levels = np.array([row.rms_m_per_s2 for row in self.spectrum])
         return Components(np.array([row.frequency_Hz for row in self.spectrum]), levels, 1.0)
 
     @property
     def method(self) -> str:
-        """How the components were found."""
+        """How the components were computed."""
         return self.spectrum[0].method
 
     @property
@@ -57,7 +75,7 @@ class RatedRide:
 
 
 def rated(rides: Rides) -> tuple[RatedRide, ...]:
-    """Every ride with its rows of each table, in the order of the summary.
+    """Join the tables of the rides, in the order of the summary.
 
     Raises
     ------
@@ -82,13 +100,132 @@ def rated(rides: Rides) -> tuple[RatedRide, ...]:
     )
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """Rides over one road at one fidelity."""
+
+    controlled: SummaryRow
+    others: tuple[SummaryRow, ...]
+    """Those that do not control, in the order of `UNCONTROLLED`."""
+
+
+@dataclass(frozen=True, eq=False)
+class RatedRides:
+    """All rides of a run, seen road by road."""
+
+    rides: tuple[RatedRide, ...]
+    """In the order of the summary."""
+    comfort: tuple[ComfortRow, ...]
+    simulate: SimulateConfig
+    control: Control
+
+    @cached_property
+    def roads(self) -> tuple[str, ...]:
+        """Names of the roads in the order of the rides."""
+        return tuple(dict.fromkeys(ride.row.road for ride in self.rides))
+
+    def over(self, road: str) -> tuple[SummaryRow, ...]:
+        """Return the rides of the final damper over one road."""
+        rows = (ride.row for ride in self.rides if ride.row.road == road)
+        return tuple(row for row in rows if not row.case.endswith(PLAIN_SUFFIX))
+
+    def on_baseline(self, row: SummaryRow) -> SummaryRow | None:
+        """Return the same ride on the damper before diagnose; None where it was not simulated."""
+        ride = self._by_case.get(f"{row.case}{PLAIN_SUFFIX}")
+        return None if ride is None else ride.row
+
+    # --- Values ---
+
+    @cached_property
+    def measures(self) -> dict[tuple[str, str], ComfortRow]:
+        """Comfort rows by case and measure."""
+        return {(row.case, row.measure): row for row in self.comfort}
+
+    def value(self, case: str, measure: str) -> float | None:
+        """Return a comfort value; None where its edition was not asked for."""
+        row = self.measures.get((case, measure))
+        return None if row is None else row.value
+
+    def a_w(self, row: SummaryRow) -> float:
+        """Return the weighted r.m.s. acceleration of a ride [m/s2]."""
+        return self._by_case[row.case].weighted.a_w_m_per_s2
+
+    @cached_property
+    def _by_case(self) -> dict[str, RatedRide]:
+        return {ride.row.case: ride for ride in self.rides}
+
+    # --- Comparisons ---
+
+    def comparisons(self, road: str) -> tuple[Comparison, ...]:
+        """Compare the controlled policy with the others over a road, one fidelity each, the most realistic first."""
+        found = []
+        for fidelity in REALISTIC:
+            rows = {row.policy: row for row in self.over(road) if row.fidelity == fidelity}
+            controlled = [row for policy, row in rows.items() if self.simulate.is_controlled(policy)]
+            others = tuple(rows[policy] for policy in UNCONTROLLED if policy in rows)
+            if controlled and others:
+                found.append(Comparison(controlled[0], others))
+        return tuple(found)
+
+    def most_realistic(self, road: str) -> tuple[SummaryRow, ...]:
+        """Return the rides over a road at the most realistic fidelity at which it was compared, or ridden at all."""
+        compared = self.comparisons(road)
+        if compared:
+            return (compared[0].controlled, *compared[0].others)
+        best = min((REALISTIC.index(row.fidelity) for row in self.over(road)), default=0)
+        return tuple(row for row in self.over(road) if row.fidelity == REALISTIC[best])
+
+    def trade_off(self, road: str) -> tuple[SummaryRow, ...]:
+        """Return the rides of all policies over a road, the most comfortable first.
+
+        At the most realistic fidelity at which two policies or more control; empty where there is none.
+        """
+        for fidelity in REALISTIC:
+            rows = [row for row in self.over(road) if row.fidelity == fidelity]
+            if sum(policies()[row.policy].controlled for row in rows) >= _FEWEST_CONTROLLED:
+                return tuple(sorted(rows, key=self.a_w))
+        return ()
+
+    def pareto_front(self, rows: Sequence[SummaryRow]) -> tuple[SummaryRow, ...]:
+        """Return the rides than which none has both a lower a_w and a lower wheel load, in the order given."""
+
+        def dominates(one: SummaryRow, other: SummaryRow) -> bool:
+            return self.a_w(one) < self.a_w(other) and one.rms_wheel_load_N < other.rms_wheel_load_N
+
+        return tuple(row for row in rows if not any(dominates(other, row) for other in rows))
+
+    # --- Labels ---
+
+    def road_label(self, name: str) -> str:
+        """Return a road in words: a sine by its frequency, any other by its name."""
+        for road in self.simulate.roads:
+            if road.name == name and isinstance(road, Sine) and road.label is None:
+                return f"{amount(road.frequency_Hz, 'Hz')} sine"
+        return name
+
+    def policy_label(self, row: SummaryRow) -> str:
+        """Return the policy of a ride in words, with what it held constant."""
+        ridden = self._by_case[row.case].ridden
+        name = spelled(row.policy).removesuffix(" c")
+        if ridden.damping_Ns_per_m is not None:
+            return f"{name} c = {amount(ridden.damping_Ns_per_m, 'N s/m', 3)}"
+        return name if ridden.voltage_V is None else f"{name} {amount(ridden.voltage_V, self.control.unit)}"
+
+    def label(self, row: SummaryRow) -> str:
+        """Return policy and fidelity of a ride in words."""
+        return f"{self.policy_label(row)}, {row.fidelity}"
+
+
+# --- Rating of one ride ---
+
+
 def assess(ride: RatedRide, config: ReportConfig) -> tuple[ComfortRow, ...]:
-    """Every comfort row of one ride."""
-    parts: dict[str, Callable[[], Iterator[tuple[str, float | None, str, str]]]] = {
-        UNWEIGHTED: lambda: _unweighted(ride),
-        iso2631_1997.EDITION: lambda: _edition_1997(ride, config),
-        iso2631_1978.EDITION: lambda: _edition_1978(ride),
-        directive.EDITION: lambda: _directive(ride, config),
+    """Return every comfort row of one ride."""
+    measures = {
+        UNWEIGHTED: _unweighted(ride),
+        iso2631_1997.EDITION: _edition_1997(ride, config),
+        iso2631_1978.EDITION: _edition_1978(ride),
+        directive.EDITION: _directive(ride, config),
     }
     return tuple(
         ComfortRow(
@@ -101,18 +238,18 @@ def assess(ride: RatedRide, config: ReportConfig) -> tuple[ComfortRow, ...]:
             status=status,
         )
         for edition in (UNWEIGHTED, *config.editions)
-        for measure, value, unit, status in parts[edition]()
+        for measure, value, unit, status in measures[edition]
     )
 
 
-def _unweighted(ride: RatedRide) -> Iterator[tuple[str, float | None, str, str]]:
+def _unweighted(ride: RatedRide) -> Iterator[Measure]:
     yield "peak", ride.row.peak_abs_aK_m_per_s2, "m/s2", "computed from every step"
     yield "rms", ride.row.rms_aK_m_per_s2, "m/s2", "computed from every step"
 
 
-def _edition_1997(ride: RatedRide, config: ReportConfig) -> Iterator[tuple[str, float | None, str, str]]:
+def _edition_1997(ride: RatedRide, config: ReportConfig) -> Iterator[Measure]:
     found = ride.evaluation
-    trust = f"verified{_span(ride)}"
+    trust = f"verified{_window(ride)}"
     beyond = "; ".join(found.beyond)
     more = f"{trust}; to be read beside a_w: {beyond}" if beyond else f"{trust}; a_w suffices"
     yield "a_w", found.a_w, "m/s2", trust
@@ -128,8 +265,8 @@ def _edition_1997(ride: RatedRide, config: ReportConfig) -> Iterator[tuple[str, 
         yield "health_guidance_zone", found.a_w, "m/s2", _zone(found.a_w, config.health_guidance_zone)
 
 
-def _span(ride: RatedRide) -> str:
-    """What is to be known about the window of a ride."""
+def _window(ride: RatedRide) -> str:
+    """Return what is to be known about the window of a ride."""
     start, end = ride.ridden.from_s, ride.ridden.to_s
     if ride.of_event:
         return f"; over {end - start:.4g} s from the entry of axle 1 on, {ride.ridden.ending}"
@@ -146,7 +283,7 @@ def _zone(a_w: float, name: str) -> str:
     return f"not verified: sources disagree on the zone; {place} {name} m/s2, for 8 h a day"
 
 
-def _edition_1978(ride: RatedRide) -> Iterator[tuple[str, float | None, str, str]]:
+def _edition_1978(ride: RatedRide) -> Iterator[Measure]:
     parts = ride.components
     for boundary in iso2631_1978.FACTORS:
         found = iso2631_1978.shortest(parts, boundary)
@@ -155,7 +292,7 @@ def _edition_1978(ride: RatedRide) -> Iterator[tuple[str, float | None, str, str
         yield f"exposure_time_{boundary}", found.minutes, "min", status
 
 
-def _directive(ride: RatedRide, config: ReportConfig) -> Iterator[tuple[str, float | None, str, str]]:
+def _directive(ride: RatedRide, config: ReportConfig) -> Iterator[Measure]:
     found = ride.evaluation
     hours, note = config.daily_exposure_h, f"verified; {config.daily_exposure_h:g} h a day, vertical direction only"
     daily = directive.daily_exposure(found.a_w, hours)

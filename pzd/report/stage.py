@@ -1,4 +1,4 @@
-"""The report stage: comfort of every ride, and the page."""
+"""The report stage: comfort of every ride, expected numbers, and the page."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ def report(
     folder: Path,
     jobs: int = 1,
 ) -> Report:
-    """Rate every ride by the standards asked for, write one page on the whole run, and compare expected numbers.
+    """Rate every ride by the standards asked for, compare expected numbers, and write one page on the whole run.
 
     Parameters
     ----------
     config : editions, and what the page shows
     simulate : the ride that was driven
-    rig, identified, diagnosed, table, rides : what the stages before made
+    rig, identified, diagnosed, table, rides : artefacts of the stages before
     control : the control signal of the valve
     setting : of the rig's settings, the one in use
     folder : of the config, from which the path of expected numbers counts
@@ -45,19 +45,22 @@ def report(
     ConfigError : when there is no such file of expected numbers
     DataError : when it is at fault, with every place
     """
+    # imported when the stage runs: `pzd check` needs its signature alone
     from pzd.report.context import ReportContext
+    from pzd.report.damper_models import DamperModels
     from pzd.report.page import page
     from pzd.report.reference import compared, file_of, read_reference
-    from pzd.report.ride_comfort import assess, rated
+    from pzd.report.ride_comfort import RatedRides, assess, rated
+    from pzd.report.rig_tests import RigTests, setting_in_use
     from pzd.report.run_numbers import RunNumbers
 
     expected = read_reference(file_of(config.reference, folder), control) if config.reference else None
-    log = logging.getLogger(__name__)
-    finished = rated(rides)
-    comfort = tuple(row for ride in finished for row in assess(ride, config))
-    if finished:
-        log.info("%d comfort values of %d rides", len(comfort), len(finished))
-    found = compared(expected, RunNumbers(identified, rides, comfort, simulate, control)) if expected else None
+    ratings = rated(rides)
+    comfort = tuple(row for ride in ratings for row in assess(ride, config))
+    if ratings:
+        logging.getLogger(__name__).info("%d comfort values of %d rides", len(comfort), len(ratings))
+    reference = compared(expected, RunNumbers(identified, rides, comfort, simulate, control)) if expected else None
+    used = setting_in_use(identified, setting)
     context = ReportContext(
         config=config,
         simulate=simulate,
@@ -66,13 +69,14 @@ def report(
         diagnosed=diagnosed,
         table=table,
         rides=rides,
-        rated=finished,
-        comfort=comfort,
         control=control,
-        setting=setting,
-        expected=found,
+        setting=used,
+        tests=RigTests(rig, identified, control, used, config.records_shown),
+        damper=DamperModels.of(identified, diagnosed, used),
+        rated=RatedRides(ratings, comfort, simulate, control),
+        expected=reference,
     )
-    return Report(comfort=comfort, page=page(context, jobs), reference=found)
+    return Report(comfort=comfort, page=page(context, jobs), reference=reference)
 
 
 def report_without_car(
@@ -86,12 +90,12 @@ def report_without_car(
     folder: Path,
     jobs: int = 1,
 ) -> Report:
-    """Write one page on the damper alone, where `car: false` leaves the rides out; there is no comfort to rate.
+    """Write one page on the damper alone, where the config leaves the car out; there is no comfort to rate.
 
     Parameters
     ----------
     config : what the page shows
-    rig, identified, diagnosed, table : what the stages before made
+    rig, identified, diagnosed, table : artefacts of the stages before
     control : the control signal of the valve
     setting : of the rig's settings, the one in use
     folder : of the config, from which the path of expected numbers counts

@@ -51,13 +51,13 @@ def simulate(
     if simulate.histories == "parquet":
         check_installed("simulate.histories")
     with_voltage = all(row.voltage_V is not None for row in diagnosed.damper.base)
-    planned = cases(simulate, with_voltage, diagnosed.damper != diagnosed.plain)
+    planned = cases(simulate, with_voltage, diagnosed.damper != diagnosed.baseline)
     temperature = checked_temperature(simulate, table)
     checked_voltage(simulate, table)
     profiles = profiles_of(simulate, seed, folder)
     setups = {}
     for plain in {case.plain for case in planned} | {False}:
-        damper = diagnosed.plain if plain else diagnosed.damper
+        damper = diagnosed.baseline if plain else diagnosed.damper
         grid = grid_of(table_of(damper, table) if plain else table, temperature)
         dynamic = dynamic_damper_of(damper, temperature, simulate.valve_response_s)
         check_inertance(dynamic, simulate.car.car())

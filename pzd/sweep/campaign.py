@@ -1,4 +1,4 @@
-"""All runs of a sweep in chunks, each written when it is done, so that one that was stopped goes on where it was."""
+"""All runs of a sweep in chunks, each written when it is done, so that a sweep that was stopped goes on."""
 
 from __future__ import annotations
 
@@ -23,15 +23,14 @@ from pzd.runs import file_hash
 from pzd.schema.errors import ConfigError, DataError
 from pzd.schema.validate import read_json_list, write_json
 from pzd.sweep.gather import Results, decisive, page, write
-from pzd.sweep.plan import Task, tasks
-from pzd.sweep.task import BaseRun, RunResult, check_scatter, config_of, outcomes, shared_stages
+from pzd.sweep.task import BaseRun, RunResult, Task, check_scatter, config_of, outcomes, shared_stages, tasks
 
 FOLDER = "sweep"
-"""Where a sweep lies beside the stages of the run."""
+"""Folder of a sweep, beside the stages of the run."""
 _MADE_FROM = "made_from.sha256"
-_MOST_TOLD = 5
+_MOST_PRINTED = 5
 """Failures that are printed; failed.csv holds all."""
-_HOW = HOW | {"chunk"}
+_EXECUTION_KEYS = HOW | {"chunk"}
 """Keys of the block that change nothing of the results."""
 _AHEAD = 4
 """Chunks that wait at each worker: enough that none is idle, few enough that little is lost when it is stopped."""
@@ -39,17 +38,17 @@ _AHEAD = 4
 
 @dataclass(frozen=True)
 class SweepRuns:
-    """The runs of a sweep, and where what they found is written."""
+    """The runs of a sweep, and the folder of their results."""
 
     base: BaseRun
     sweep: SweepConfig
     tasks: tuple[Task, ...]
     progress: Listener = no_listener
-    """Hears of every chunk that is done."""
+    """Is called with every chunk that is done."""
 
     @classmethod
     def of(cls, base: BaseRun, progress: Listener = no_listener) -> SweepRuns:
-        """The campaign of a config.
+        """Plan the sweep of a config.
 
         Raises
         ------
@@ -64,7 +63,7 @@ class SweepRuns:
 
     @property
     def folder(self) -> Path:
-        """Of the results."""
+        """Folder of the results."""
         return self.base.opened.run.folder / FOLDER
 
     @property
@@ -74,12 +73,12 @@ class SweepRuns:
 
     @cached_property
     def chunks(self) -> tuple[tuple[Task, ...], ...]:
-        """The runs in parts."""
+        """The runs, chunk by chunk."""
         size = self.sweep.chunk
         return tuple(self.tasks[first : first + size] for first in range(0, len(self.tasks), size))
 
     def last_shared_stage(self) -> str | None:
-        """The last stage that is the same in all runs; None where already the records differ.
+        """Return the last stage that is the same in all runs; None where already the records differ.
 
         Raises
         ------
@@ -106,7 +105,7 @@ class SweepRuns:
         return shared[min(len(shared), wanted) - 1] if shared else None
 
     def check(self) -> None:
-        """Check that the damper handed on has what is to scatter: before any run, where all share its diagnosis.
+        """Check that the adopted damper has what is to scatter: before any run, where all share its diagnosis.
 
         Raises
         ------
@@ -117,24 +116,26 @@ class SweepRuns:
             check_scatter(self.sweep.damper, self.base.opened.run.read(Diagnosed))
 
     def gather(self, found: Sequence[RunResult], name: str) -> list[str]:
-        """Write the tables and the page; the lines to print.
+        """Write the tables and the page, and return the lines to print.
 
         Parameters
         ----------
-        found : what came of every run
+        found : result of every run
         name : of the config
         """
         results = Results(self.sweep, self.tasks, tuple(found), self.base.opened.config.seed)
         write(results, self.folder, self.control)
         path = self.folder / "sweep.html"
         path.write_text(page(results, f"Sweep: {name}"), encoding="utf-8", newline="\n")
-        told = [f"{len(self.tasks)} runs, {len(results.failed)} without a result"]
-        told += [f"failed: {row.differs_in}: {row.failure}" for row in results.failed[:_MOST_TOLD]]
-        told += decisive(results)
-        return [*told, f"tables and page: {self.folder}"]
+        lines = [f"{len(self.tasks)} runs, {len(results.failed)} without a result"]
+        lines += [f"failed: {row.differs_in}: {row.failure}" for row in results.failed[:_MOST_PRINTED]]
+        lines += decisive(results)
+        return [*lines, f"tables and page: {self.folder}"]
 
     def run(self, jobs: int, *, afresh: bool = False) -> tuple[RunResult, ...]:
-        """What came of every run, in order; what stands there finished and made from the same is not done again.
+        """Do every run that is not done, and return the results of all in order.
+
+        A chunk that stands there finished, made from the same config, records and code, is not done again.
 
         Parameters
         ----------
@@ -142,27 +143,27 @@ class SweepRuns:
         afresh : whether everything is done again
         """
         self._prepare(afresh=afresh)
-        waiting = [chunk for chunk in self.chunks if self._found(chunk) is None]
+        waiting = [chunk for chunk in self.chunks if self._stored(chunk) is None]
         done = len(self.chunks) - len(waiting)
 
-        def keep(chunk: Sequence[Task], found: Sequence[RunResult]) -> None:
+        def store(chunk: Sequence[Task], found: Sequence[RunResult]) -> None:
             nonlocal done
-            self._keep(chunk, found)
+            self._store(chunk, found)
             done += 1
             self.progress(Progress(done, len(self.chunks), f"chunks of {self.sweep.chunk} runs"))
 
         where = Where(self.sweep, FOLDER, self.base.config.parent, self.folder / "slurm")
-        ChunkedWork((partial(outcomes, self.base.absolute),), keep, _lost, where, _AHEAD).do(waiting, jobs)
-        return tuple(outcome for chunk in self.chunks for outcome in self._found(chunk) or ())
+        ChunkedWork((partial(outcomes, self.base.absolute),), store, _lost, where, _AHEAD).do(waiting, jobs)
+        return tuple(outcome for chunk in self.chunks for outcome in self._stored(chunk) or ())
 
     def finished(self) -> tuple[RunResult, ...]:
-        """What came of the runs that are done."""
+        """Return the results of the runs that are done."""
         if not self._is_of_this_config():
             return ()
-        return tuple(outcome for chunk in self.chunks for outcome in self._found(chunk) or ())
+        return tuple(outcome for chunk in self.chunks for outcome in self._stored(chunk) or ())
 
     def seconds_a_chunk(self) -> float | None:
-        """How long a chunk took, by when the files were written [s]; None with fewer than two."""
+        """Return how long a chunk took, by the times of its files [s]; None with fewer than two."""
         times = sorted(path.stat().st_mtime for path in self._chunks_folder.glob("*.json"))
         return (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else None
 
@@ -173,7 +174,7 @@ class SweepRuns:
     def _path(self, chunk: Sequence[Task]) -> Path:
         return self._chunks_folder / f"{chunk[0].number:06d}-{chunk[-1].number:06d}.json"
 
-    def _found(self, chunk: Sequence[Task]) -> tuple[RunResult, ...] | None:
+    def _stored(self, chunk: Sequence[Task]) -> tuple[RunResult, ...] | None:
         path = self._path(chunk)
         if not path.exists():
             return None
@@ -183,14 +184,14 @@ class SweepRuns:
                 return found
         return None
 
-    def _keep(self, chunk: Sequence[Task], found: Sequence[RunResult]) -> None:
+    def _store(self, chunk: Sequence[Task], found: Sequence[RunResult]) -> None:
         path = self._path(chunk)
-        fresh = path.with_suffix(".new")
+        fresh = path.with_suffix(".new")  # a chunk is there whole or not at all
         write_json(fresh, found, self.control)
         fresh.replace(path)
 
     def _prepare(self, *, afresh: bool) -> None:
-        """Take away what was made from another config, from other records or by other code."""
+        """Remove what was made from another config, from other records or by other code."""
         if afresh or not self._is_of_this_config():
             shutil.rmtree(self._chunks_folder, ignore_errors=True)
         self._chunks_folder.mkdir(parents=True, exist_ok=True)
@@ -201,10 +202,10 @@ class SweepRuns:
         return path.exists() and path.read_text(encoding="utf-8").strip() == self._made_from()
 
     def _made_from(self) -> str:
-        """Hash of all that the results depend on."""
+        """Compute the hash of all that the results depend on."""
         given = self.base.opened
         blocks = given.config.model_dump(mode="json")
-        blocks["sweep"] = {key: value for key, value in blocks["sweep"].items() if key not in _HOW}
+        blocks["sweep"] = {key: value for key, value in blocks["sweep"].items() if key not in _EXECUTION_KEYS}
         files = {
             f"{path.parent.name}/{path.name}": file_hash(path)
             for folder in ("1-rig", "2-identify", "3-diagnose", "4-table")

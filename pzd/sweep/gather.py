@@ -1,10 +1,10 @@
-"""The results of a sweep in one table, how they spread over the draws, and which quantity decides."""
+"""Results of a sweep: all in one table, their spread over the draws, Sobol indices, and the page that shows them."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
@@ -16,22 +16,18 @@ from pzd.config import Normal, Scatter, SweepConfig, Uniform
 from pzd.quantities import Control
 from pzd.record import Array
 from pzd.report.blocks import Block, Card, Gallery, Notes, Paragraph, Section, TextTable, number
-from pzd.report.drawing import BASELINE, FINAL, STYLE, Panel, axes, encoded
+from pzd.report.drawing import BASELINE, FINAL, Panel, axes, encoded, styled
 from pzd.report.page import render
 from pzd.schema.csvfile import write_rows
 from pzd.schema.errors import counted
 from pzd.schema.model import Frozen
 from pzd.schema.yamltree import Scalar
-from pzd.sweep.plan import Task, quantities, with_indices
-from pzd.sweep.task import RunResult
-
-# ----------------------------------------------------------------------------------------------------
-
+from pzd.sweep.task import RunResult, Task, quantities, with_indices
 
 LABELS = ("setting", "voltage_V", "temperature_degC", "case", "road", "policy", "fidelity", "point")
-"""Columns that say what a row is about; all other numbers are measures of it."""
+"""Columns that label a row; all other numbers are measures of it."""
 RESAMPLES = 500
-"""Of the draws, for the intervals of the indices: their ends are then known to a tenth of their width."""
+"""Resamples of the draws for the intervals of the indices: ends are then known to a tenth of their width."""
 INTERVAL = (2.5, 97.5)
 """Percentiles of the resampled indices: a 95 % interval                            Source: Efron 1979"""
 
@@ -41,6 +37,7 @@ class SpreadRow(Frozen):
 
     combination: str
     about: str
+    """Labels of the row."""
     measure: str
     draws: int
     mean: float
@@ -51,7 +48,7 @@ class SpreadRow(Frozen):
 
 
 class IndexRow(Frozen):
-    """How much of the variance of one measure comes from one quantity."""
+    """Sobol indices of one measure and one quantity."""
 
     combination: str
     about: str
@@ -59,17 +56,17 @@ class IndexRow(Frozen):
     quantity: str
     """Its intervals are empty where the draws do not vary with it at all."""
     first_order: float
-    """Share of the variance that goes when the quantity alone is known."""
+    """Share of the variance that vanishes when the quantity alone is known."""
     first_order_low95: float | None
     first_order_high95: float | None
     total_order: float
-    """Share that stays when everything else is known."""
+    """Share that remains when everything else is known."""
     total_order_low95: float | None
     total_order_high95: float | None
 
 
 class FailedRow(Frozen):
-    """A run that came to no result."""
+    """A run without a result."""
 
     task: int
     differs_in: str
@@ -85,15 +82,14 @@ class Results:
     outcomes: tuple[RunResult, ...]
     seed: int = 1
     """Of the resampling."""
-    _by_task: Mapping[int, RunResult] = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        """Sort the outcomes by their run."""
-        object.__setattr__(self, "_by_task", {outcome.task: outcome for outcome in self.outcomes})
+    @cached_property
+    def _by_task(self) -> dict[int, RunResult]:
+        return {outcome.task: outcome for outcome in self.outcomes}
 
     @property
     def failed(self) -> tuple[FailedRow, ...]:
-        """The runs that came to no result."""
+        """The runs without a result."""
         pairs = ((task, self._by_task[task.number].failure) for task in self.tasks)
         return tuple(
             FailedRow(task=task.number, differs_in=task.described, failure=failure)
@@ -102,7 +98,7 @@ class Results:
         )
 
     def rows(self) -> list[dict[str, Scalar]]:
-        """Every row of every run, behind its number and what it differs in."""
+        """Return every row of every run, behind its number and the values it differs in."""
         found = []
         for task in self.tasks:
             own = {"task": task.number, **dict(task.over), **dict(task.drawn)}
@@ -112,11 +108,11 @@ class Results:
 
     @cached_property
     def spread(self) -> tuple[SpreadRow, ...]:
-        """Every measure over the independent draws of each combination."""
+        """Spread of every measure over the independent draws of each combination."""
         return tuple(
             SpreadRow(
                 combination=combination,
-                about=about,
+                about=label,
                 measure=measure,
                 draws=values.size,
                 mean=float(values.mean()),
@@ -125,8 +121,9 @@ class Results:
                 median=float(np.median(values)),
                 percent_95=float(np.percentile(values, 95.0)),
             )
-            for combination, about, measure, found in self._measures()
-            for values in [_known(found[: self._independent])]
+            for combination, label, measure, found in self._measures()
+            for drawn in [found[: self._independent]]
+            for values in [drawn[np.isfinite(drawn)]]
             if values.size
         )
 
@@ -141,9 +138,9 @@ class Results:
             return ()
         return tuple(
             row
-            for combination, about, measure, found in self._measures()
+            for combination, label, measure, found in self._measures()
             if np.isfinite(found).all() and float(np.ptp(found)) > 0.0
-            for row in self._indices_of((combination, about, measure), found)
+            for row in self._indices_of((combination, label, measure), found)
         )
 
     def _indices_of(self, labels: tuple[str, str, str], values: Array) -> list[IndexRow]:
@@ -154,11 +151,11 @@ class Results:
         generator = np.random.default_rng(self.seed)
         again = [_sobol(parts[:, generator.integers(n, size=n)]) for _ in range(RESAMPLES)]
         low, high = np.nanpercentile(again, INTERVAL, axis=0)
-        combination, about, measure = labels
+        combination, label, measure = labels
         return [
             IndexRow(
                 combination=combination,
-                about=about,
+                about=label,
                 measure=measure,
                 quantity=name,
                 first_order=float(found[0, i]),
@@ -173,36 +170,36 @@ class Results:
 
     @property
     def _independent(self) -> int:
-        """Runs of a combination that are independent of each other; the rest serve the indices."""
+        """Number of runs of a combination that are independent of each other; the rest serve the indices."""
         return 2 * self.sweep.draws if with_indices(self.sweep) else self.sweep.draws
 
     def _measures(self) -> list[tuple[str, str, str, Array]]:
-        """Combination, label, measure, and its value in every run; not a number where a run has none."""
+        """Return combination, label, measure, and its value in every run; NaN where a run has none."""
         found = []
         for over, some in groupby(self.tasks, key=lambda task: task.over):
             runs = [self._by_task[task.number].rows for task in some]
             names = dict.fromkeys(
-                (_about(row), key)
+                (_row_label(row), key)
                 for rows in runs
                 for row in rows
                 for key, value in row.items()
-                if _measure(key, value)
+                if _is_measure(key, value)
             )
-            by_label = [{_about(row): row for row in rows} for rows in runs]
+            by_label = [{_row_label(row): row for row in rows} for rows in runs]
             combination = ", ".join(f"{key} = {value}" for key, value in over)
-            for about, key in names:
-                values = [_number(each.get(about, {}).get(key)) for each in by_label]
-                found.append((combination, about, key, np.array(values)))
+            for label, key in names:
+                values = [_number(each.get(label, {}).get(key)) for each in by_label]
+                found.append((combination, label, key, np.array(values)))
         return found
 
 
-def _about(row: Mapping[str, Scalar]) -> str:
+def _row_label(row: Mapping[str, Scalar]) -> str:
     if "case" in row:
         return str(row["case"]) if row.get("point") in (None, "K") else f"{row['case']} {row['point']}"
     return ", ".join(f"{row[key]}" for key in LABELS if row.get(key) is not None)
 
 
-def _measure(key: str, value: Scalar) -> bool:
+def _is_measure(key: str, value: Scalar) -> bool:
     return key not in LABELS and isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -211,7 +208,7 @@ def _number(value: Scalar) -> float:
 
 
 def _sobol(parts: Array) -> Array:
-    """(2, d) first and total order of the d quantities, from (d + 2, n) results of the rows A, B and those mixed."""
+    """Compute (2, d) first and total order of d quantities from (d + 2, n) results of the rows A, B and mixed."""
     from scipy.stats import sobol_indices
 
     with np.errstate(invalid="ignore", divide="ignore"):  # draws that are all alike by chance have no indices
@@ -222,13 +219,8 @@ def _sobol(parts: Array) -> Array:
 
 
 def _between(low: float, high: float, end: float) -> float | None:
-    """An end of an interval; None where the interval is none."""
+    """Return an end of an interval; None where the interval has no width."""
     return float(end) if np.isfinite(low) and low < high else None
-
-
-def _known(values: Array) -> Array:
-    found: Array = values[np.isfinite(values)]
-    return found
 
 
 def write(results: Results, folder: Path, control: Control) -> None:
@@ -267,14 +259,12 @@ def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Mapping[st
 
 
 def _of_one_type(values: Sequence[Scalar]) -> Sequence[Scalar]:
-    """A column as text where some of it is text."""
+    """Return a column as text where some of it is text."""
     mixed = any(isinstance(value, str) for value in values)
     return [None if value is None else str(value) for value in values] if mixed else values
 
 
-# ----------------------------------------------------------------------------------------------------
-# The page of a sweep: how far its results spread, and what decides.
-
+# --- The page ---
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -285,41 +275,42 @@ MEASURES = {
     "diagnose": ("W_s", "gap_after", "confidence"),
     "simulate": ("a_w_m_per_s2", "rms_wheel_load_N", "peak_deflection_m"),
 }
-"""What the page shows, most important first; the files hold all."""
+"""Measures that the page shows, most important first; the files hold all."""
 _MOST_LINES = 24
-"""Of a picture."""
+"""Lines of a picture, and rows of a table that is not folded."""
 _MOST_TORNADOES = 4
+"""Pictures of indices on the page."""
 _MOST_NAMED = 3
+"""Quantities named in a line of the terminal."""
 _FOOTER = "Written by pzd sweep. Every number of this page stands in the files beside it."
 _LONGEST_LABEL = 34
+"""Characters of a label that leave room for the picture."""
 
 
 def page(results: Results, title: str) -> str:
-    """The page as HTML that asks nothing of the net and runs no script.
+    """Write the page as HTML that asks nothing of the net and runs no script.
 
     Parameters
     ----------
     results : of all runs
     title : of the page
     """
-    import matplotlib as mpl
-
     spread, indices = results.spread, results.indices
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # the stubs list every key of rcParams one by one
+    with styled():
         sections = (_spread(results, spread), *_decides(results, indices), *_failed(results))
     return render(title, _cards(results, indices), (), sections, _FOOTER)
 
 
 def decisive(results: Results) -> list[str]:
-    """For every label, in words, which quantity decides over the measure that matters most, and by how much."""
+    """Say for every label which quantities decide over the most important measure, and by how much."""
     measure = MEASURES[results.sweep.until][0]
     lines = []
-    for (combination, about), rows in groupby(
+    for (combination, label), rows in groupby(
         (row for row in results.indices if row.measure == measure), key=lambda row: (row.combination, row.about)
     ):
         ordered = sorted(rows, key=lambda row: -row.total_order)
         shares = ", ".join(f"{row.quantity} {row.total_order:.0%} ({_interval(row)})" for row in ordered[:_MOST_NAMED])
-        lines.append(f"{measure} of {_label(combination, about)}: of the variance {shares}")
+        lines.append(f"{measure} of {_label(combination, label)}: of the variance {shares}")
     return lines
 
 
@@ -345,10 +336,10 @@ def _cards(results: Results, indices: Sequence[IndexRow]) -> tuple[Card, ...]:
 def _spread(results: Results, spread: Sequence[SpreadRow]) -> Section:
     blocks: list[Block] = []
     names = quantities(results.sweep)
-    said = [f"{key}: {', '.join(map(str, values))}" for key, values in results.sweep.over.items()]
-    said += [f"{key}: {_in_words(how)}" for key, how in results.sweep.drawn.items()]
-    said += [f"damper.{name}: {_in_words(how)}" for name, how in results.sweep.damper.items()]
-    blocks.append(Notes(tuple(said)))
+    varied = [f"{key}: {', '.join(map(str, values))}" for key, values in results.sweep.over.items()]
+    varied += [f"{key}: {_in_words(how)}" for key, how in results.sweep.drawn.items()]
+    varied += [f"damper.{name}: {_in_words(how)}" for name, how in results.sweep.damper.items()]
+    blocks.append(Notes(tuple(varied)))
     if names:
         blocks.append(Paragraph("Dots are medians, bars hold nine draws of ten."))
     shown = MEASURES[results.sweep.until]
@@ -381,9 +372,9 @@ def _decides(results: Results, indices: Sequence[IndexRow]) -> tuple[Section, ..
         _tornado([row for row in mine if (row.combination, row.about) == label], measure)
         for label in labels[:_MOST_TORNADOES]
     ]
-    told = "Total order: the share of the variance that stays when everything else is known; bars are 95 % intervals."
+    text = "Total order: the share of the variance that stays when everything else is known; bars are 95 % intervals."
     if len(labels) > _MOST_TORNADOES:
-        told += f" The first {_MOST_TORNADOES} of {len(labels)}; the table holds all."
+        text += f" The first {_MOST_TORNADOES} of {len(labels)}; the table holds all."
     rows = tuple(
         (
             _label(row.combination, row.about),
@@ -397,7 +388,7 @@ def _decides(results: Results, indices: Sequence[IndexRow]) -> tuple[Section, ..
     header = ("of", "quantity", "first order", "total order", "95 % interval")
     table = TextTable(f"Sobol indices of {measure}", header, rows, folded=len(rows) > _MOST_LINES)
     gallery = Gallery(tuple(encoded(panel) for panel in tornadoes))
-    return (Section("decides", "What decides", (Paragraph(told), gallery, table)),)
+    return (Section("decides", "What decides", (Paragraph(text), gallery, table)),)
 
 
 def _failed(results: Results) -> tuple[Section, ...]:
@@ -408,7 +399,7 @@ def _failed(results: Results) -> tuple[Section, ...]:
 
 
 def _in_words(how: Uniform | Normal | Scatter) -> str:
-    """How a quantity is drawn."""
+    """Say how a quantity is drawn."""
     if isinstance(how, Uniform):
         return f"drawn between {how.uniform[0]:g} and {how.uniform[1]:g}"
     if isinstance(how, Normal):
@@ -416,15 +407,15 @@ def _in_words(how: Uniform | Normal | Scatter) -> str:
     return "drawn as uncertain as the tests leave it" if isinstance(how, str) else f"scatters by {how:.3g} of its value"
 
 
-def _label(combination: str, about: str) -> str:
-    """What a result is of, keys of the config by their last word."""
+def _label(combination: str, label: str) -> str:
+    """Name what a result belongs to, keys of the config by their last word."""
     pairs = (part.partition(" = ") for part in combination.split(", "))
     short = ", ".join(f"{key.rpartition('.')[2]}{equals}{value}" for key, equals, value in pairs)
-    return ", ".join(part for part in (short, about) if part) or "all"
+    return ", ".join(part for part in (short, label) if part) or "all"
 
 
 def _percent(share: float) -> str:
-    """A share that chance makes less than none is none."""
+    """Write a share in percent; one that chance makes negative is 0."""
     return f"{max(share, 0.0):.0%}"
 
 

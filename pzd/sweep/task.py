@@ -1,7 +1,12 @@
-"""One run of a sweep: what it differs in is set, what that changes is made anew in memory, its results are rows."""
+"""The runs of a sweep: what each differs in, and one of them done in memory, from the config to rows of results.
+
+Order: every combination of the values under `over`, and in each the same quasi-random draws. A run takes the stages
+that its values leave alone from the base run, and executes the others.
+"""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -11,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from pzd.artefacts import Artefact, Diagnosed, Identified, Rides
-from pzd.config import RunConfig, Scatter, validated
+from pzd.artefacts.csv_rows import Estimate
+from pzd.config import Normal, RunConfig, Scatter, SweepConfig, validated
 from pzd.damper.confounders import known
 from pzd.damper.model import PHYSICAL, BaseRow, Damper
 from pzd.diagnosis.fit.least_squares import LEVEL
@@ -19,19 +25,116 @@ from pzd.parallel.chunks import TRIES
 from pzd.pipeline.command import Opened, opened
 from pzd.pipeline.execution import InMemory, unaffected
 from pzd.pipeline.stages import Stage, stages
+from pzd.record import Array
 from pzd.schema.errors import ConfigError, DataError, UserError
 from pzd.schema.model import Frozen
-from pzd.schema.yamltree import Scalar
-from pzd.sweep.plan import Task
+from pzd.schema.yamltree import Scalar, written
+from pzd.simulate.study.plan import PLAIN_SUFFIX
 
-# ----------------------------------------------------------------------------------------------------
-# A damper of a series, or one of those that the tests leave possible: its parameters moved, at all conditions alike.
-#
-# Equation: p exp(s z) for a scatter of the standard deviation s from damper to damper, p + u z for an uncertainty of the
-# standard error u, z of the standard normal distribution
+# --- Which runs there are ---
+
+LEAST_PROBABILITY = 1e-9
+"""Least probability of a draw: a quasi-random number may be 0, where a normal distribution has no value."""
 
 
-OF_BASE = {"T0": "T0_N", "C": "C_Ns_per_m", "k": "k_N_per_m"}
+@dataclass(frozen=True)
+class Task:
+    """One run of a sweep."""
+
+    number: int
+    """Place in the sweep, from 1."""
+    over: tuple[tuple[str, Scalar], ...]
+    """Keys of the config with their values in this combination."""
+    drawn: tuple[tuple[str, float], ...]
+    """Keys of the config with the values drawn."""
+    damper: tuple[tuple[str, float], ...]
+    """Parameters of the damper, each with how many standard deviations it lies from its value."""
+
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        """Values that this run sets in the config, as `--set` takes them."""
+        return tuple(f"{key}={written(value)}" for key, value in (*self.over, *self.drawn))
+
+    @property
+    def described(self) -> str:
+        """Difference from the base run in words."""
+        scattered = (f"{name} {z:+.3g} sd" for name, z in self.damper)
+        return ", ".join((*self.overrides, *scattered))
+
+
+def quantities(sweep: SweepConfig) -> tuple[str, ...]:
+    """Return the names of what is drawn, in the order of the columns."""
+    return (*sweep.drawn, *(f"damper.{name}" for name in sweep.damper))
+
+
+def with_indices(sweep: SweepConfig) -> bool:
+    """Tell whether there are two quantities or more, so that Sobol indices can say which decides."""
+    return len(quantities(sweep)) > 1
+
+
+def tasks(sweep: SweepConfig, seed: int) -> tuple[Task, ...]:
+    """Return every run of a sweep: combination by combination, and draw by draw.
+
+    Parameters
+    ----------
+    sweep : the config's block
+    seed : of the draws
+    """
+    shares = design(sweep, seed)
+    combinations = itertools.product(*([(key, value) for value in values] for key, values in sweep.over.items()))
+    pairs = itertools.product(combinations, shares)
+    return tuple(_task(sweep, number, over, row) for number, (over, row) in enumerate(pairs, start=1))
+
+
+def design(sweep: SweepConfig, seed: int) -> Array:
+    """Compute the probabilities at which the drawn quantities are taken in one combination.
+
+    Equation: rows A, then B, then for every quantity A with its column taken from B         Source: Saltelli 2010
+
+    Returns
+    -------
+    (runs, d) of the d quantities; (1, 0) without any
+
+    >>> unit = {"uniform": (0.0, 1.0)}
+    >>> design(SweepConfig(drawn={"a": unit, "b": unit}, draws=4), seed=1).shape
+    (16, 2)
+    """
+    from scipy.stats.qmc import Sobol
+
+    count = len(quantities(sweep))
+    if not count:
+        return np.empty((1, 0))
+    generator = np.random.default_rng(seed)
+    if not with_indices(sweep):
+        return _inside(Sobol(count, rng=generator).random(sweep.draws))
+    both = _inside(Sobol(2 * count, rng=generator).random(sweep.draws))
+    a, b = both[:, :count], both[:, count:]
+    mixed = [np.where(np.arange(count) == i, b, a) for i in range(count)]
+    return np.concatenate([a, b, *mixed])
+
+
+def _inside(shares: Array) -> Array:
+    return np.clip(shares, LEAST_PROBABILITY, 1.0 - LEAST_PROBABILITY)
+
+
+def _task(sweep: SweepConfig, number: int, over: tuple[tuple[str, Scalar], ...], shares: Array) -> Task:
+    from scipy.special import ndtri
+
+    drawn, split = [], len(sweep.drawn)
+    for (key, how), share in zip(sweep.drawn.items(), shares[:split].tolist(), strict=True):
+        if isinstance(how, Normal):
+            mean, deviation = how.normal
+            drawn.append((key, float(mean + deviation * ndtri(share))))
+        else:
+            low, high = how.uniform
+            drawn.append((key, low + (high - low) * share))
+    scores = [float(ndtri(share)) for share in shares[split:].tolist()]
+    return Task(number, over, tuple(drawn), tuple(zip(sweep.damper, scores, strict=True)))
+
+
+# --- Scatter of the damper: its parameters moved, at all conditions alike ---
+
+BASE_COLUMNS = {"T0": "T0_N", "C": "C_Ns_per_m", "k": "k_N_per_m"}
 """Columns of the Bingham parameters, by their symbol."""
 
 
@@ -41,17 +144,15 @@ def check_scatter(asked: Mapping[str, Scatter], diagnosed: Diagnosed) -> None:
     Parameters
     ----------
     asked : names as in `sweep.damper`
-    diagnosed : the damper handed on
+    diagnosed : the adopted damper
 
     Raises
     ------
     ConfigError : when it has no such parameter
     DataError : when the tests leave no interval for it
     """
-    there = [
-        *OF_BASE,
-        *(f"{e}.{p}" for e, values in diagnosed.damper.effects.items() for p in values if p[:3] != "at_"),
-    ]
+    effects = diagnosed.damper.effects.items()
+    there = [*BASE_COLUMNS, *(f"{e}.{p}" for e, values in effects for p in values if not p.startswith("at_"))]
     unknown = [name for name in asked if name not in there]
     if unknown:
         raise ConfigError(
@@ -62,7 +163,10 @@ def check_scatter(asked: Mapping[str, Scatter], diagnosed: Diagnosed) -> None:
 
 
 def scattered(diagnosed: Diagnosed, asked: Mapping[str, Scatter], scores: Mapping[str, float]) -> Diagnosed:
-    """The damper handed on with some of its parameters moved.
+    """Move parameters of the adopted damper, as from damper to damper of a series or within their intervals.
+
+    Equation: p exp(s z) for a scatter of standard deviation s, p + u z for an uncertainty of standard error u, z of
+    the standard normal distribution
 
     Parameters
     ----------
@@ -86,12 +190,9 @@ def scattered(diagnosed: Diagnosed, asked: Mapping[str, Scatter], scores: Mappin
 
 
 def _with_base(damper: Damper, diagnosed: Diagnosed, symbol: str, how: Scatter, z: float) -> Damper:
-    column = OF_BASE[symbol]
+    column = BASE_COLUMNS[symbol]
     low, high = PHYSICAL[column]
-    intervals = {
-        (row.voltage_V, row.temperature_degC): (getattr(row, f"{column}_low95"), getattr(row, f"{column}_high95"))
-        for row in diagnosed.parameters
-    }
+    intervals = {(row.voltage_V, row.temperature_degC): Estimate.of(row, column)[1:] for row in diagnosed.parameters}
 
     def moved(row: BaseRow) -> BaseRow:
         ends = intervals.get((row.voltage_V, row.temperature_degC), (None, None))
@@ -103,24 +204,16 @@ def _with_base(damper: Damper, diagnosed: Diagnosed, symbol: str, how: Scatter, 
 
 def _with_effect(damper: Damper, diagnosed: Diagnosed, effect: str, name: str, how: Scatter, z: float) -> Damper:
     value, parameter = damper.effects[effect][name], known()[effect].parameter(name)
-    told = diagnosed.diagnosis.parameters.get(effect, {}).get(name)
+    fitted = diagnosed.diagnosis.parameters.get(effect, {}).get(name)
     values = np.atleast_1d(np.asarray(value, dtype=np.float64))
-    lows, highs = (
-        _listed(told.low95 if told else None, values.size),
-        _listed(told.high95 if told else None, values.size),
-    )
+    intervals = [estimate[1:] for estimate in fitted.estimates] if fitted else [(None, None)] * values.size
     label = f"{effect}.{name}"
     moved = [
         float(np.clip(_moved(x, how, ends, z, label), parameter.low, parameter.high))
-        for x, ends in zip(values.tolist(), zip(lows, highs, strict=True), strict=True)
+        for x, ends in zip(values.tolist(), intervals, strict=True)
     ]
     given = {**damper.effects[effect], name: tuple(moved) if isinstance(value, tuple) else moved[0]}
     return damper.model_copy(update={"effects": {**damper.effects, effect: given}})
-
-
-def _listed(end: float | tuple[float, ...] | None, count: int) -> list[float | None]:
-    """One end of an interval for each of so many values."""
-    return [*end] if isinstance(end, tuple) else [end] * count
 
 
 def _moved(value: float, how: Scatter, ends: tuple[float | None, float | None], z: float, label: str) -> float:
@@ -132,19 +225,15 @@ def _moved(value: float, how: Scatter, ends: tuple[float | None, float | None], 
     return value + z * (high - low) / (2.0 * LEVEL)
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-PLAIN = "-plain"
-"""Ends the name of a ride on the damper before diagnose."""
+# --- One run ---
 
 
 class RunResult(Frozen):
-    """What came of one run."""
+    """Result of one run."""
 
     task: int
     rows: tuple[dict[str, Scalar], ...] = ()
-    """Of the table of results."""
+    """Its rows of the table of results."""
     failure: str | None = None
     """Why there are none."""
 
@@ -159,7 +248,7 @@ class BaseRun:
 
     @property
     def absolute(self) -> BaseRun:
-        """The same for a process that works in another folder."""
+        """With absolute paths, for a process that works in another folder."""
         return replace(self, config=self.config.absolute(), runs=self.runs.absolute())
 
     @property
@@ -175,13 +264,13 @@ def _opened(base: BaseRun) -> Opened:
 
 @cache
 def _read(base: BaseRun, folder: str) -> Artefact:
-    """What stands in a stage's folder of the base run, read once in each process."""
+    """Read the artefact in a folder of the base run, once in each process."""
     (kind,) = (stage.makes for stage in stages(base.opened.config) if stage.folder == folder)
     return base.opened.run.read(kind)
 
 
 def config_of(given: Opened, task: Task) -> RunConfig:
-    """The config of one run.
+    """Return the config of one run.
 
     Raises
     ------
@@ -191,15 +280,15 @@ def config_of(given: Opened, task: Task) -> RunConfig:
 
 
 def shared_stages(given: Opened, some: Sequence[Task]) -> tuple[Stage, ...]:
-    """The stages that make the same in all of some runs as in the base run."""
-    kept = stages(given.config)
+    """Return the stages whose results are those of the base run in all of some runs."""
+    shared = stages(given.config)
     for task in some:
-        kept = kept[: len(unaffected(given.config, config_of(given, task)))]
-    return kept
+        shared = shared[: len(unaffected(given.config, config_of(given, task)))]
+    return shared
 
 
 def outcomes(base: BaseRun, chunk: Sequence[Task]) -> tuple[RunResult, ...]:
-    """What comes of some runs, one after another; one that fails is told, and the others go on."""
+    """Do some runs, one after another; one that fails is reported, and the others go on."""
     return tuple(_outcome(base, task) for task in chunk)
 
 
@@ -210,7 +299,7 @@ def _outcome(base: BaseRun, task: Task) -> RunResult:
             return RunResult(task=task.number, rows=tuple(_rows(base, task)))
         except UserError as error:
             return RunResult(task=task.number, failure="; ".join(error.messages))
-        except Exception as error:  # noqa: BLE001  # whatever it is, it is told, and the other runs go on
+        except Exception as error:  # noqa: BLE001  # whatever it is, it is reported, and the other runs go on
             failure = f"{type(error).__name__}: {error}"
     return RunResult(task=task.number, failure=failure)
 
@@ -221,22 +310,16 @@ def _rows(base: BaseRun, task: Task) -> Iterator[dict[str, Scalar]]:
     sweep = config.sweep
     if sweep is None:
         raise ValueError("a task of a config without a sweep")
-    kept = {stage.name: stage for stage in unaffected(given.config, config)}
-    if task.damper:
-        kept.pop("table", None)
-        kept.pop("simulate", None)
-        kept.pop("report", None)
-    known = {stage.folder: _read(base, stage.folder) for stage in kept.values()}
-    chain = InMemory(config, given.run, stages(config), _silent, artefacts=known)
+    shared = unaffected(given.config, config)
+    if task.damper:  # another damper: what lies behind diagnose is made anew
+        shared = tuple(stage for stage in shared if stage.name not in ("table", "simulate", "report"))
+    read = {stage.folder: _read(base, stage.folder) for stage in shared}
+    chain = InMemory(config, given.run, stages(config), lambda _: None, artefacts=read)
     if sweep.until == "simulate":
         chain.through("diagnose")
         chain.artefacts[Diagnosed.folder] = scattered(chain.of(Diagnosed), sweep.damper, dict(task.damper))
     chain.through(sweep.until)
     yield from ROWS[sweep.until](chain)
-
-
-def _silent(_: str) -> None:
-    """Nobody follows the stages of one run of many."""
 
 
 def _of_identify(chain: InMemory) -> Iterator[dict[str, Scalar]]:
@@ -261,7 +344,7 @@ def _of_simulate(chain: InMemory) -> Iterator[dict[str, Scalar]]:
     rides = chain.of(Rides)
     weighted = {(row.case, row.point): row.a_w_m_per_s2 for row in rides.weighted}
     for row in rides.summary:
-        if not row.case.endswith(PLAIN):
+        if not row.case.endswith(PLAIN_SUFFIX):
             yield {**row.model_dump(), "a_w_m_per_s2": weighted.get((row.case, row.point))}
 
 
@@ -270,4 +353,4 @@ ROWS: Mapping[str, Callable[[InMemory], Iterator[dict[str, Scalar]]]] = {
     "diagnose": _of_diagnose,
     "simulate": _of_simulate,
 }
-"""The rows of a run for the table of results, labels before measures, by the stage whose results are gathered."""
+"""Rows of a run for the table of results, labels before measures, by the stage whose results are gathered."""

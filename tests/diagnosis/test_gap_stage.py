@@ -51,7 +51,7 @@ def test_a_damper_that_misses_nothing_is_handed_on_with_the_verdict_none(rng: np
     gap = found.diagnosis.gap
     assert gap.before == gap.after
     assert gap.before == pytest.approx(gap.noise_floor, rel=0.4)
-    assert found.damper == found.plain == base_of(identify(IdentifyConfig(), Rig(records, ()), 1).rows, None)
+    assert found.damper == found.baseline == base_of(identify(IdentifyConfig(), Rig(records, ()), 1).rows, None)
     # Nothing was adopted, so the plain damper is what predicts.
     assert found.diagnosis.effects == ()
     prediction = found.diagnosis.prediction
@@ -138,7 +138,7 @@ def test_the_same_rig_gives_the_same_diagnosis_and_reads_back(rng: np.random.Gen
     again = Diagnosed.read(tmp_path, Control())
     assert again.diagnosis == first.diagnosis
     assert again.parameters == first.parameters
-    assert [r.voltage_V for r in again.parameters] == [r.voltage_V for r in first.plain.base]
+    assert [r.voltage_V for r in again.parameters] == [r.voltage_V for r in first.baseline.base]
 
 
 def test_every_role_has_every_kind_of_test_over_the_conditions(rng: np.random.Generator) -> None:

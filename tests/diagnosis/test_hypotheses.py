@@ -16,7 +16,7 @@ from whole_diagnosis import all_but, diagnosed
 
 import pzd.diagnosis.hypotheses.summary
 from pzd.artefacts import Diagnosed, Hypotheses, HypothesisRow
-from pzd.cli.text_tables import diagnosis_lines
+from pzd.cli.look import diagnosis_lines
 from pzd.damper.compiled.laws import declared
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import Trials, trials_of

@@ -55,7 +55,7 @@ def test_what_is_said_is_that_nothing_is_known_and_what_to_record(rng: np.random
     assert "(the longest record has 240)" in told.reason
     assert (told.effects, told.rivals, told.ranking, told.where) == ((), (), (), ())
     assert (told.gap, told.confidence, told.prediction) == (None, None, None)
-    assert found.damper == found.plain
+    assert found.damper == found.baseline
     assert len(found.parameters) == 1
     test = told.next_test
     assert test is not None

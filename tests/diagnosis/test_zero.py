@@ -11,7 +11,7 @@ from tests.diagnose.campaign import coloured, damper_of, sines
 from whole_diagnosis import all_but, diagnosed
 
 from pzd.artefacts import Diagnosed, Value
-from pzd.cli.text_tables import diagnosis_lines
+from pzd.cli.look import diagnosis_lines
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion

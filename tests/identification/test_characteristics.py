@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fresh_truths import OVERSAMPLING, RATE, TABLE_2, sine_test
 
-from pzd.artefacts.characteristics import Characteristics, PeakVelocityRow
+from pzd.artefacts.identified import Characteristics, PeakVelocityRow
 from pzd.damper.compose import respond
 from pzd.damper.element import element_force
 from pzd.damper.model import BaseRow, Damper

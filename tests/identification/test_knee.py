@@ -177,7 +177,7 @@ def test_the_damper_with_the_knee_goes_through_diagnose_as_it_was_fitted(
     with_a_knee: Identified, tmp_path: Path
 ) -> None:
     handed = as_fitted(with_a_knee, None, DiagnoseConfig())
-    assert handed.damper == handed.plain == identified_damper(with_a_knee, None)
+    assert handed.damper == handed.baseline == identified_damper(with_a_knee, None)
     assert handed.diagnosis.verdict == "none"
     assert "no effect was looked for" in handed.diagnosis.reason
     handed.write(tmp_path, Control())

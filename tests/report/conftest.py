@@ -16,9 +16,9 @@ from pzd.artefacts import (
     Finding,
     ForceRow,
     Gap,
+    HeldOutTest,
+    HeldOutVoltage,
     Identified,
-    KeptBack,
-    LeftOut,
     MeasureRow,
     ParameterRow,
     Prediction,
@@ -51,13 +51,13 @@ from pzd.simulate.config import SimulateConfig
 from pzd.simulate.ride.outcome import settled
 from pzd.simulate.study.gathering import Vibration, vibration
 
-PLAIN = Damper(
+BASELINE = Damper(
     base=(
         BaseRow(voltage_V=0.0, temperature_degC=22.0, T0_N=474.0, C_Ns_per_m=2260.0, k_N_per_m=263000.0),
         BaseRow(voltage_V=150.0, temperature_degC=22.0, T0_N=760.0, C_Ns_per_m=4000.0, k_N_per_m=280000.0),
     )
 )
-FINAL = PLAIN.with_effect("orifice_quadratic", {"q": 1510.0})
+FINAL = BASELINE.with_effect("orifice_quadratic", {"q": 1510.0})
 SETTLE_S, RATE_HZ, DURATION_S = 4.0, 500.0, 20.0
 VOLTS = Control()
 STEP = StepRow(
@@ -94,10 +94,10 @@ class Run:
         parts = (self.rig, self.identified, self.diagnosed, self.table, self.rides)
         return report(config or ReportConfig(), self.simulate, *parts, self.control, self.setting, folder, jobs)
 
-    def with_diagnosis(self, damper: Damper = PLAIN, **changes: object) -> Run:
+    def with_diagnosis(self, damper: Damper = BASELINE, **changes: object) -> Run:
         """The same run with another verdict."""
         diagnosis = self.diagnosed.diagnosis.model_copy(update=changes)
-        return replace(self, diagnosed=Diagnosed(diagnosis, damper, PLAIN))
+        return replace(self, diagnosed=Diagnosed(diagnosis, damper, BASELINE))
 
     def with_rides(self, made: Sequence[Made]) -> Run:
         """The same run with other rides."""
@@ -162,7 +162,7 @@ def identified() -> Identified:
             rmse_N=88.2,
             status="undetermined: k (the stroke hardly reaches slip)" if i else "ok",
         )
-        for i, base in enumerate(PLAIN.base)
+        for i, base in enumerate(BASELINE.base)
     )
     measures = (
         MeasureRow(
@@ -215,10 +215,10 @@ def diagnosis() -> Diagnosis:
         where=(Region(region="abs(v) > 0.25 m/s, 150 V", share_of_gap=0.71),),
         prediction=Prediction(
             hold_out="tests",
-            by=(KeptBack(record="r03", voltage=150.0, W_s_plain=0.0123, W_s=0.00091),),
+            by=(HeldOutTest(record="r03", voltage=150.0, W_s_plain=0.0123, W_s=0.00091),),
             W_s_plain=0.0124,
             W_s=0.00092,
-            left_out_voltages=(LeftOut(voltage=75.0, W_s_plain=0.0222, W_s=0.0111),),
+            left_out_voltages=(HeldOutVoltage(voltage=75.0, W_s_plain=0.0222, W_s=0.0111),),
         ),
         next_test=NEXT_TEST,
     )
@@ -230,7 +230,7 @@ def diagnosed() -> Diagnosed:
         row.model_copy(update={"T0_N_low95": base.T0_N - 5.0, "T0_N_high95": base.T0_N + 6.0, "status": "ok"})
         for row, base in zip(identified().rows, FINAL.base, strict=True)
     )
-    return Diagnosed(diagnosis(), FINAL, PLAIN, fitted)
+    return Diagnosed(diagnosis(), FINAL, BASELINE, fitted)
 
 
 def table() -> Table:
@@ -258,7 +258,7 @@ class Made:
     row: SummaryRow
     ridden: RideRow
     wheels: tuple[WheelRow, ...]
-    felt: Vibration
+    vibration: Vibration
 
     def rated(self) -> RatedRide:
         """As the report rates it."""
@@ -313,8 +313,8 @@ def made(
         )
         for axle in (1, 2)
     )
-    felt = vibration(case, "K", a, 1.0 / RATE_HZ, settled(settle, 1.0 / RATE_HZ, a.size - 1), fundamental)
-    return Made(Ride(case, {"time_s": time, "a_K_m_per_s2": a}), row, ridden, wheels, felt)
+    measured = vibration(case, "K", a, 1.0 / RATE_HZ, settled(settle, 1.0 / RATE_HZ, a.size - 1), fundamental)
+    return Made(Ride(case, {"time_s": time, "a_K_m_per_s2": a}), row, ridden, wheels, measured)
 
 
 def rides_of(made: Sequence[Made], responses: tuple[Response, ...] = ()) -> Rides:
@@ -324,8 +324,8 @@ def rides_of(made: Sequence[Made], responses: tuple[Response, ...] = ()) -> Ride
         tuple(one.row for one in made),
         tuple(one.ridden for one in made),
         tuple(wheel for one in made for wheel in one.wheels),
-        tuple(one.felt.weighted for one in made),
-        tuple(line for one in made for line in one.felt.spectrum),
+        tuple(one.vibration.weighted for one in made),
+        tuple(line for one in made for line in one.vibration.spectrum),
         responses,
     )
 

@@ -1,23 +1,19 @@
-"""Every number is told with the digits that its interval supports, and in the unit of the config."""
+"""Every number has the digits that its interval supports, and the unit of the config."""
 
 from __future__ import annotations
-
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from pzd.artefacts import Characteristics, Gap, GasAndFrictionRow, Identified, ParameterRow, PeakVelocityRow
-from pzd.cli.text_tables import characteristics_tables, diagnosis_lines, interval
+from pzd.cli.look import diagnosis_lines
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.verdict import weak
 from pzd.force_table.force import lost, not_monotone
 from pzd.quantities import Control
-from pzd.report import blocks
-from pzd.report.context import effect_in_words
-from pzd.report.sections.damper import parameter
-from pzd.report.sections.tested import render_characteristics as characteristics_section
+from pzd.report import tables
+from pzd.report.columns import PAGE, TERMINAL
+from pzd.report.damper_models import effect_in_words
 from pzd.schema.errors import supported
 from tests.test_cli import diagnosis
 
@@ -41,7 +37,7 @@ def row(voltage: float | None, temperature: float | None) -> ParameterRow:
         (0.0, None, "rig, 0 bar: "),
     ],
 )
-def test_an_undetermined_row_is_told_by_the_conditions_that_it_has(
+def test_the_mark_of_an_undetermined_row_names_the_conditions_that_it_has(
     voltage: float | None, temperature: float | None, told: str
 ) -> None:
     (mark,) = Identified((row(voltage, temperature),), ()).untrusted(PRESSURE)
@@ -53,16 +49,12 @@ def test_a_number_has_the_digits_that_its_interval_supports() -> None:
     assert supported(0.123456, 0.11, 0.13) == "0.123"
     assert supported(-0.0001, -3.0, 3.0) == "0"
     assert supported(1.23456e6, 1.2e6, 1.3e6) == "1.23e+06"
-    assert interval(6.3e-25, 0.0, 12.4) == "0 (0 to 12)"
-    assert interval(301.23456, 300.71, 301.77) == "301.2 (300.7 to 301.8)"
-    assert interval(5.0, 5.0, 5.0) == "5 (5 to 5)"
 
 
-def test_a_friction_of_nothing_is_zero_on_the_page() -> None:
-    assert blocks.interval(6.3e-25, 0.0, 12.4) == "0 (0 to 12.4)"
-    assert blocks.interval(6.3, 0.0, 12.4) == "6.3 (0 to 12.4)"
-    assert parameter(6.3e-25) == "0"
-    assert parameter(0.25) == "0.25"
+@pytest.mark.parametrize(("friction", "shown"), [(6.3e-25, "0 (no interval)"), (0.25, "0.25 (no interval)")])
+def test_an_edited_friction_below_what_a_load_cell_shows_is_zero(friction: float, shown: str) -> None:
+    base = BaseRow(T0_N=friction, C_Ns_per_m=1e3, k_N_per_m=1e5)
+    assert tables.parameters([base], Control()).block().rows[0][0] == shown
 
 
 def static(gas: float) -> Characteristics:
@@ -87,18 +79,14 @@ def static(gas: float) -> Characteristics:
      (90.24, ("90.2", "120.3"), ("90", "120"))],
 )  # fmt: skip
 def test_a_static_force_has_the_digits_of_the_forces_that_it_was_read_from(
-    run: Any, gas: float, printed: tuple[str, str], drawn: tuple[str, str]
+    gas: float, printed: tuple[str, str], drawn: tuple[str, str]
 ) -> None:
-    found = static(gas)
-    tables = dict(characteristics_tables(SimpleNamespace(characteristics=found, control=Control())))
-    assert tuple(tables["gas force and friction at mid-stroke"][1][:2]) == printed
-    context = SimpleNamespace(identified=SimpleNamespace(characteristics=found), control=Control(), rig=run.rig)
-    (section,) = characteristics_section(context, {"characteristics": ()})
-    (table,) = (block for block in section.blocks if getattr(block, "header", ("",))[-1] == "how")
-    assert tuple(cell.replace("\xa0N", "") for cell in table.rows[0][1:3]) == drawn
+    table = tables.gas_and_friction(static(gas), Control())
+    assert table.cells(TERMINAL)[1][:2] == printed
+    assert tuple(cell.replace("\xa0N", "") for cell in table.cells(PAGE)[1][:2]) == drawn
 
 
-def test_what_was_held_out_is_told_in_words() -> None:
+def test_weak_evidence_says_what_was_held_out() -> None:
     assert weak("records") == ""
     assert "held out were cycles of tests that were also fitted" in weak("cycles")
     assert "mixed" not in weak("mixed")
@@ -114,19 +102,19 @@ def test_what_was_held_out_is_told_in_words() -> None:
         ("mixed", "(2 records, whole or in part)"),
     ],
 )
-def test_the_story_says_of_how_many_records_something_was_held_out(kind: str, told: str) -> None:
+def test_the_line_on_the_gap_says_of_how_many_records_something_was_held_out(kind: str, told: str) -> None:
     gap = Gap.model_validate({**diagnosis().gap.model_dump(), "hold_out": kind})
     lines = diagnosis_lines(diagnosis().model_copy(update={"gap": gap}), Control())
     assert told in lines[2]
 
 
-def test_a_delay_of_either_sign_is_told_without_saying_which_channel_is_late() -> None:
+def test_the_words_for_a_sensor_delay_leave_open_which_channel_is_late() -> None:
     words = effect_in_words("sensor_delay")
     assert "late" not in words
     assert "different instants" in words
 
 
-def test_the_table_is_about_the_control_of_the_config() -> None:
+def test_notes_of_the_force_table_name_the_control_of_the_config() -> None:
     falls = Damper(base=tuple(BaseRow(voltage_V=u, T0_N=100.0 - u, C_Ns_per_m=1e3, k_N_per_m=1e5) for u in (0.0, 50.0)))
     dips = falls.model_copy(update={"base": (*falls.base, BaseRow(voltage_V=90.0, T0_N=300.0, C_Ns_per_m=1e3,
                                                                   k_N_per_m=1e5))})  # fmt: skip
@@ -136,7 +124,7 @@ def test_the_table_is_about_the_control_of_the_config() -> None:
     assert all("from 0 to 50 bar; the lowest pressure that gives the force is taken" in note for note in notes)
 
 
-def test_what_the_table_drops_is_told_with_its_reason() -> None:
+def test_notes_of_the_force_table_give_a_reason_for_each_effect_that_it_leaves_out() -> None:
     row = BaseRow(T0_N=300.0, C_Ns_per_m=1800.0, k_N_per_m=4e5)
     effects = {"preload_offset": {"F_0": 90.0}, "gas_spring": {"k_g": 3e3}, "orifice_quadratic": {"q": 500.0}}
     assert lost(Damper(base=(row,), effects=effects), (None,), np.array([-1.0, -0.0, 0.0, 1.0])) == (

@@ -34,7 +34,7 @@ from pzd.identification.tests_over_time import characteristics
 from pzd.quantities import Control
 from pzd.record import conditions
 from pzd.report.config import ReportConfig
-from pzd.report.plots import characteristic, library
+from pzd.report.plots import library
 from pzd.simulate.config import CarBlock, SensorNoise, Sensors, SimulateConfig, Supply
 
 HERE = Path(__file__).parent
@@ -93,7 +93,7 @@ def words_only(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
 
 
-def test_the_story_is_told_in_its_order_and_every_tag_is_closed(read: Reader) -> None:
+def test_sections_stand_in_the_order_of_the_stages_and_every_tag_is_closed(read: Reader) -> None:
     assert read.sections() == ORDER
     assert read.open == []
 
@@ -122,21 +122,21 @@ def test_every_picture_says_what_it_shows(read: Reader) -> None:
     assert all(len(picture.get("alt") or "") > 20 for picture in read.pictures())
 
 
-def test_force_over_speed_is_told_as_damper_people_chart_it(read: Reader, run: Any) -> None:
+def test_force_over_speed_stands_as_damper_people_chart_it(read: Reader, run: Any) -> None:
     part = read.text.partition("2 Force over speed, as measured")[2].partition("3 Where the simple model fails")[0]
     assert "Rebound is extension: its speed and force are positive, those of compression negative." in part
     assert "Found by their motion: 4 such tests in 4 records." in part
     for row in run.identified.characteristics.peak_velocity:
         assert f"{row.rebound_force_N:.3g}"[:2] in part.replace("\u2212", "")
         assert row.record in part
-    assert "0 V to 150 V 0.1 m/s 400 to 1 400 N 4.1 ms 12.3 ms ok r09, 1.5 s" in part.replace("\u00a0", " ")
+    assert "0 to 150 V 0.1 m/s 400 to 1 400 N 4.1 ms 12.3 ms ok r09 1.5 s" in part.replace("\u00a0", " ")
     assert "states 9 ms for its damper" in part
     titles = [picture["alt"] for picture in read.pictures()]
     assert any("Force over peak speed of 4 tests, rebound above zero" in (alt or "") for alt in titles)
     assert any("one average settled cycle, one test each for 0" in (alt or "") for alt in titles)
 
 
-def test_a_warm_up_is_told_from_its_first_cycles_to_its_last(run: Any, words_only: None) -> None:
+def test_a_warm_up_stands_from_its_first_cycles_to_its_last(run: Any, words_only: None) -> None:
     setting = run.identified.rows[0].setting
     rows = tuple(
         WarmUpRow(
@@ -158,7 +158,7 @@ def test_a_warm_up_is_told_from_its_first_cycles_to_its_last(run: Any, words_onl
     assert "150 V 0.131 m/s 7 22 to 26 °C 1 800 to 1 400 N -1 000 to -1 000 N r77" in text
 
 
-def test_without_such_tests_there_is_no_such_section(run: Any, words_only: None) -> None:
+def test_without_characteristics_the_page_has_no_section_of_them(run: Any, words_only: None) -> None:
     bare = replace(run.identified, characteristics=Characteristics())
     assert "characteristics" not in Reader(replace(run, identified=bare).told().page).sections()
 
@@ -246,9 +246,9 @@ def test_parameters_edited_by_hand_have_no_interval(run: Any, words_only: None) 
     assert "474 (469 to 480)" not in text
 
 
-def test_the_prediction_of_every_kept_back_test_stands_in_a_table(read: Reader) -> None:
+def test_the_prediction_of_every_held_out_test_stands_in_a_table(read: Reader) -> None:
     _, _, table = read.text.partition("What was kept back from the fit (whole tests)")
-    for cells in (("r03", "150 V", "0.0123", "0.00091"), ("all tests at 75 V", "left out", "0.0222", "0.0111")):
+    for cells in (("r03", "150 V", "0.0123", "0.00091"), ("all tests, left out", "75 V", "0.0222", "0.0111")):
         for cell in cells:
             assert cell in table
 
@@ -287,7 +287,7 @@ def test_the_same_input_gives_the_same_bytes_in_another_process(page: str) -> No
         ({"verdict": "unexplained", "next_test": None, "where": (), "ranking": ()}, "beside orifice quadratic"),
     ],
 )
-def test_every_verdict_is_told(words_only: None, run: Any, changes: dict[str, Any], said: str) -> None:
+def test_every_verdict_has_its_words(words_only: None, run: Any, changes: dict[str, Any], said: str) -> None:
     read = Reader(run.with_diagnosis(**changes).told().page)
     assert said in read.text
     assert read.sections() == ORDER
@@ -362,39 +362,30 @@ def test_a_hypothesis_is_told_in_words_in_a_table_and_in_a_picture(run: Any) -> 
 
 
 @pytest.mark.ci
-def test_what_is_left_is_drawn_over_three_planes_where_it_has_no_name(run: Any) -> None:
-    def planes(of: Any) -> list[str]:
-        tags = Reader(of.told().page).tags
-        alts = [str(attributes["alt"]) for tag, attributes in tags if tag == "img"]
-        return [alt for alt in alts if alt.startswith("Mean of measured minus simulated force over")]
+def test_only_an_unexplained_residual_is_drawn_over_planes_by_frequency_by_distribution_and_by_test(
+    run: Any, read: Reader
+) -> None:
+    begins = ("Mean of measured minus", "R.m.s. of measured minus", "Quantiles of measured minus", "T0, C and k of")
 
-    found = planes(with_hypotheses(run, Hypotheses(sought=True)))
-    assert [alt.split(" over ")[1].split(" at ")[0] for alt in found] == [
+    def alts(page: Reader) -> list[str]:
+        every = (str(picture["alt"]).replace("\u00a0", " ") for picture in page.pictures())
+        return [alt for alt in every if alt.startswith(begins)]
+
+    found = alts(Reader(with_hypotheses(run, Hypotheses(sought=True)).told().page))
+    planes = [alt for alt in found if alt.startswith("Mean of")]
+    assert [alt.split(" over ")[1].split(" at ")[0] for alt in planes] == [
         "displacement and velocity",
         "velocity and force",
         "force and its rate",
     ]
-    assert all("at 0 V, 150 V" in alt.replace("\u00a0", " ") for alt in found)
-    assert planes(run) == []
-
-
-@pytest.mark.ci
-def test_what_is_left_is_drawn_by_frequency_and_by_its_spread_and_tests_alone_over_what_they_differ_in(
-    run: Any,
-) -> None:
-    def told(of: Any) -> list[str]:
-        alts = [str(attributes["alt"]) for tag, attributes in Reader(of.told().page).tags if tag == "img"]
-        begins = ("R.m.s. of measured minus", "Quantiles of measured minus", "T0, C and k of")
-        return [alt.replace("\u00a0", " ") for alt in alts if alt.startswith(begins)]
-
-    found = told(with_hypotheses(run, Hypotheses(sought=True)))
+    assert all("at 0 V, 150 V" in alt for alt in planes)
     assert [alt.partition(";")[0] for alt in found if alt.startswith("R.m.s.")] == [
         "R.m.s. of measured minus simulated force by third octaves at 0 V",
         "R.m.s. of measured minus simulated force by third octaves at 150 V",
     ]
     assert sum(alt.startswith("Quantiles") for alt in found) == 1
     assert any(alt.endswith("each fitted alone, over the order of the files.") for alt in found)
-    assert told(run) == []
+    assert alts(read) == []
 
 
 def test_without_a_hypothesis_the_page_says_that_none_predicts_or_says_nothing(words_only: None, run: Any) -> None:
@@ -437,7 +428,7 @@ def test_a_damper_without_control_and_without_a_car_is_told_without_either(run: 
         rides=Rides(),
     )
     diagnosis = bare.diagnosed.diagnosis.model_copy(update={"where": (), "prediction": None, "next_test": None})
-    bare = replace(bare, diagnosed=replace(bare.diagnosed, diagnosis=diagnosis, damper=plain, plain=plain))
+    bare = replace(bare, diagnosed=replace(bare.diagnosed, diagnosis=diagnosis, damper=plain, baseline=plain))
     read = Reader(bare.told().page)
     assert read.sections() == [name for name in ORDER if name != "passenger"]
     said = " ".join([read.text, *(picture["alt"] or "" for picture in read.pictures())])
@@ -447,7 +438,7 @@ def test_a_damper_without_control_and_without_a_car_is_told_without_either(run: 
 
 
 @pytest.mark.ci
-def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any) -> None:
+def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any, read: Reader) -> None:
     """The table leaves it to the static balance; a rig measures it, and the page tells what a rig measures."""
     damper = run.diagnosed.damper.with_effect("preload_offset", {"F_0": 90.0})
     charged = replace(run, diagnosed=replace(run.diagnosed, damper=damper))
@@ -457,7 +448,7 @@ def test_a_force_that_is_there_at_rest_is_in_the_force_at_speed(run: Any) -> Non
         (row,) = re.findall(r"0\.377 m/s ([\d ]+) N ([\d ]+) N ", text)
         return [float(force.replace(" ", "")) for force in (*ends, *row)]
 
-    without, text = (Reader(each.told().page).text.replace("\xa0", " ") for each in (run, charged))
+    without, text = (page.text.replace("\xa0", " ") for page in (read, Reader(charged.told().page)))
     assert forces(text) == [pytest.approx(force + 90.0, rel=5e-3) for force in forces(without)]
     assert "In rebound at 0.377 m/s and 22 °C; 90 N of it act at rest as well." in text
     told = "ith the 90 N at rest that the table (4-table) leaves out"
@@ -469,7 +460,7 @@ def test_the_curve_of_the_damper_holds_what_is_there_at_rest(run: Any, monkeypat
     curves = []
     monkeypatch.setattr(
         "pzd.report.page.pictures",
-        lambda plots, context, jobs: curves.append(next(iter(characteristic.draw(context)))) or [()] * len(plots),
+        lambda plots, context, jobs: curves.append(next(iter(library()["force"].draw(context)))) or [()] * len(plots),
     )
     for damper in (run.diagnosed.damper, run.diagnosed.damper.with_effect("preload_offset", {"F_0": 90.0})):
         replace(run, diagnosed=replace(run.diagnosed, damper=damper)).told()

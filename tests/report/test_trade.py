@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,10 @@ from pzd.artefacts import (
     PredictedRow,
     UnitRow,
 )
-from pzd.cli.text_tables import characteristics_tables, knee_tables
 from pzd.damper.model import Damper
-from pzd.pipeline.run_summary import RunSummary
 from pzd.quantities import Control
+from pzd.report import tables
+from pzd.report.columns import TERMINAL
 
 PLACE = {"setting": "gap 0.25 mm", "voltage_V": 0.0, "temperature_degC": 22.0}
 VALUES = {
@@ -100,7 +101,7 @@ def knock() -> AsItStandsRow:
 
 def with_knee(run: Any) -> Any:
     """The run on a damper with the knee law, handed on as it was fitted."""
-    damper = Damper(base=run.diagnosed.plain.base).with_effect(
+    damper = Damper(base=run.diagnosed.baseline.base).with_effect(
         "knee", {"beta": 0.4, "F_reb": 900.0, "C_reb": 600.0, "F_comp": 700.0, "C_comp": 500.0}
     )
     diagnosis = run.diagnosed.diagnosis.without_effects("unexplained", "the knee law is handed on", gap=None)
@@ -108,17 +109,25 @@ def with_knee(run: Any) -> Any:
     return replace(
         run,
         identified=replace(run.identified, knees=knees(), characteristics=shown),
-        diagnosed=replace(run.diagnosed, diagnosis=diagnosis, damper=damper, plain=damper, parameters=()),
+        diagnosed=replace(run.diagnosed, diagnosis=diagnosis, damper=damper, baseline=damper, parameters=()),
     )
 
 
 @pytest.fixture(scope="module")
-def page(run, tmp_path_factory: pytest.TempPathFactory) -> str:
+def words_only() -> Iterator[None]:
+    """No pictures, which take most of the time of a page: all claims here are about its text."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("pzd.report.page.pictures", lambda plots, context, jobs: [()] * len(plots))
+        yield
+
+
+@pytest.fixture(scope="module")
+def page(run, words_only: None, tmp_path_factory: pytest.TempPathFactory) -> str:
     folder = tmp_path_factory.mktemp("page")
     return with_knee(run).told(folder=folder).page
 
 
-def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_direction_in_one_table(page: str) -> None:
+def test_the_page_has_force_knee_bleed_blow_off_gas_and_friction_of_each_direction(page: str) -> None:
     for cell in (
         "rebound",
         "compression",
@@ -139,20 +148,25 @@ def test_the_page_has_the_force_a_psi_and_that_of_the_gas_itself(page: str) -> N
         assert cell in page
 
 
-def test_the_page_has_the_extremes_of_a_record_that_is_no_test_of_the_trade(page: str) -> None:
-    forces, speeds = ("2\u202f350\u00a0N", "\u2212678\u00a0N"), ("1.23\u00a0m/s", "\u22120.456\u00a0m/s")
-    for cell in ("knock-7", *forces, *speeds, "32.1 mm", "0.654\u00a0s"):
+def test_the_page_has_the_extremes_of_a_record_that_is_neither_sine_nor_constant_velocity(page: str) -> None:
+    ends = ("\u2212678 to 2\u202f350\u00a0N", "\u22120.456 to 1.23\u00a0m/s")
+    for cell in ("knock-7", *ends, "32.1\u00a0mm", "0.654\u00a0s"):
         assert cell in page
 
 
-def test_the_terminal_has_them_too() -> None:
-    shown = Characteristics(as_it_stands=(knock(),))
-    found = RunSummary(Path(), Control(), (), None, (), (), None, (), characteristics=shown, knees=knees())
-    head, row = dict(characteristics_tables(found))["none of these tests, as it stands: extremes of all samples"]
+def terminal(title: str) -> list[tuple[str, ...]]:
+    """Heads and rows of a table of the knee law as the terminal has them."""
+    (found,) = (table for table in tables.knee(knees(), Control()) if table.title.startswith(title))
+    return found.cells(TERMINAL)
+
+
+def test_the_terminal_has_the_extremes_of_such_a_record_and_the_force_a_psi() -> None:
+    (table,) = tables.characteristics(Characteristics(as_it_stands=(knock(),)), Control())
+    head, row = table.cells(TERMINAL)
     assert row[head.index("force [N]")] == "-678 to 2350"
     assert row[head.index("velocity [m/s]")] == "-0.456 to 1.23"
-    (told,) = (rows for title, rows in knee_tables(found) if title.startswith("force a unit"))
-    assert told[1][-5:] == ["100 to 150 psi", "0.131", "0.17 N/psi", "0.23 N/psi", "-1.37 N/psi"]
+    _, row = terminal("Force a unit")
+    assert row[-5:] == ("100 to 150 psi", "0.131", "0.17 N/psi", "0.23 N/psi", "-1.37 N/psi")
 
 
 def test_the_page_does_not_call_a_knee_a_missing_effect(page: str) -> None:
@@ -162,21 +176,19 @@ def test_the_page_does_not_call_a_knee_a_missing_effect(page: str) -> None:
     assert "library of effects does not explain" not in page
 
 
-def test_without_a_knee_law_the_page_says_nothing_of_it(run, tmp_path: Path) -> None:
+def test_without_a_knee_law_the_page_says_nothing_of_it(run, words_only: None, tmp_path: Path) -> None:
     assert "knee" not in run.told(folder=tmp_path).page
 
 
-def test_the_terminal_has_the_same_table_with_a_dash_where_a_direction_is_straight() -> None:
-    found = RunSummary(Path(), Control(), (), None, (), (), None, (), knees=knees())
-    tables = dict(knee_tables(found))
-    head, rebound, compression = tables["rebound and compression, forces with the gas force at mid-stroke"]
-    assert rebound[head.index("0.131 m/s [N]")] == "-92"
-    assert rebound[head.index("0.262 m/s [N]")] == "(-7)"
+def test_the_terminal_has_a_dash_for_the_knee_of_a_direction_that_has_none() -> None:
+    head, rebound, _ = terminal("Force at the speeds")
+    assert rebound[head.index("at 0.131 m/s [N]")] == "-92"
+    assert rebound[head.index("at 0.262 m/s [N]")] == "(-7)"
+    head, rebound, compression = terminal("Bleed, knee")
     assert rebound[head.index("knee [m/s]")].startswith("0.085 (")
     assert compression[head.index("knee [N]")] == "-"
-    assert tables["force a click, without the gas"][1][-2:] == ["21.5", "0.4"]
+    assert terminal("Force a click")[1][-2:] == ("21.5", "0.4")
 
 
 def test_a_run_without_a_knee_law_prints_no_table_of_it() -> None:
-    found = RunSummary(Path(), Control(), (), None, (), (), None, ())
-    assert all(not rows for _, rows in knee_tables(found))
+    assert not any(table.lines() for table in tables.knee(Knees(), Control()))

@@ -27,8 +27,7 @@ from pzd.quantities import Control
 from pzd.schema.errors import ConfigError, DataError
 from pzd.sweep.campaign import SweepRuns
 from pzd.sweep.gather import Results, page, write
-from pzd.sweep.plan import design, tasks
-from pzd.sweep.task import BaseRun, RunResult, check_scatter, scattered
+from pzd.sweep.task import BaseRun, RunResult, check_scatter, design, scattered, tasks
 
 SMALL = """
 rig:
@@ -154,7 +153,7 @@ def test_a_parameter_scatters_by_its_share_at_every_voltage_alike() -> None:
     assert [row.T0_N for row in moved.damper.base] == pytest.approx([300.0 * math.exp(0.1), 400.0 * math.exp(0.1)])
     assert moved.damper.effects["orifice_quadratic"]["q"] == pytest.approx(2500.0 * math.exp(-0.4))
     assert [row.C_Ns_per_m for row in moved.damper.base] == [2700.0, 2700.0]
-    assert moved.plain == moved.damper
+    assert moved.baseline == moved.damper
 
 
 def test_a_parameter_moves_in_its_interval_by_its_standard_error() -> None:

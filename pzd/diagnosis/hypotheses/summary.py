@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.artefacts import Hypotheses, HypothesisPoint, HypothesisRow
+from pzd.artefacts.csv_rows import Estimate
 from pzd.damper.model import Damper
 from pzd.diagnosis.cross_validation import Trials
 from pzd.diagnosis.fit.least_squares import LEVEL
@@ -65,9 +66,7 @@ def _row(found: PredictingShapes, place: int, residuals: Residuals, control: Con
         place=place,
         shape=shape.name,
         beside=" + ".join(others) or None,
-        coefficient=float(values[0]),
-        coefficient_low95=float(values[0] - LEVEL * errors[0]),
-        coefficient_high95=float(values[0] + LEVEL * errors[0]),
+        **Estimate.around(float(values[0]), float(LEVEL * errors[0])).columns("coefficient"),
         unit=_unit(shape, control),
         second_coefficient=float(values[1]) if values.size > 1 else None,
         parameter=shape.parameter,

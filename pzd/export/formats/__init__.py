@@ -1,4 +1,4 @@
-"""The formats of `pzd export`, one file each: `FORMAT`; every module here is found by itself."""
+"""The formats of `pzd export`: a module declares one or a family in `FORMATS`, and every module is found by itself."""
 
 from __future__ import annotations
 
@@ -12,48 +12,42 @@ from typing import TYPE_CHECKING
 
 from pzd.schema.errors import ConfigError
 
-# ----------------------------------------------------------------------------------------------------
-# What a file of `formats/` declares: what it is called, what it needs, and how it writes a damper.
-
-
 if TYPE_CHECKING:
     from pzd.export.content import Content
 
 Files = Mapping[str, bytes]
-"""What is to be written, by the name of the file."""
+"""Contents by the name of the file."""
 
 
 @dataclass(frozen=True)
 class Format:
-    """One form in which another tool takes a damper."""
+    """A form in which another tool takes a damper."""
 
     name: str
     """As behind `--to`."""
     meaning: str
     """What it is for, in a few words."""
     files: Callable[[Content], Files]
-    """The files; the same bytes for the same damper, and `Content.origin` in each, uncompressed.
+    """Returns the files: the same bytes for the same damper, and `Content.origin` in each, uncompressed.
 
     Raises ConfigError where the format cannot hold the damper.
     """
     needs: str | None = None
     """The library that writes it, an extra; None where pzd itself needs it anyway."""
     ending: str | None = None
-    """Of the files' names, where how many there are depends on the damper; None where there are always the same."""
-
-
-# ----------------------------------------------------------------------------------------------------
+    """Ending of the files' names where their number depends on the damper; None where it does not."""
 
 
 @lru_cache(maxsize=1)
 def formats() -> dict[str, Format]:
-    """Every format by its name."""
-    found = [import_module(f"{__name__}.{info.name}").FORMAT for info in pkgutil.iter_modules(__path__)]
+    """Return every format by its name."""
+    modules = [import_module(f"{__name__}.{info.name}") for info in pkgutil.iter_modules(__path__)]
+    found = [one for module in modules for one in module.FORMATS]
     return {one.name: one for one in sorted(found, key=lambda one: one.name)}
 
 
 def format_of(name: str) -> Format:
-    """The format of a name.
+    """Return the format of a name.
 
     Raises
     ------

@@ -13,7 +13,7 @@ NAME = "c"
 
 
 def files(content: Content) -> Files:
-    """Header and source, and the data that the source includes.
+    """Write header and source, and the data that the source includes.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def files(content: Content) -> Files:
 
 
 def _data(content: Content) -> str:
-    """The table and the car as constants."""
+    """Write the table and the car as constants."""
     import numpy as np
 
     from pzd.export.dynamics import array, head, single
@@ -46,7 +46,7 @@ def _data(content: Content) -> str:
         "TEMPERATURES": len(temperatures),
         "SIGNALS": first.voltages.size,
         "SPEEDS": first.speeds.size - 1,
-        "HELD": int(content.held),
+        "HELD": int(content.clamped),
         **{name.upper(): number for name, number in TIE_BREAKS.items()},
         "TIE_BREAK": TIE_BREAKS[content.tie_break],
     }
@@ -72,4 +72,4 @@ def _data(content: Content) -> str:
     )
 
 
-FORMAT = Format(NAME, "table, inverse and comfort law for a control unit", files)
+FORMATS = (Format(NAME, "table, inverse and comfort law for a control unit", files),)

@@ -21,7 +21,7 @@ _HEADERS = ("element.h", "export.h", "model.h")
 
 
 def files(content: Content) -> Files:
-    """An FMU of each version.
+    """Write an FMU of each version.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def files(content: Content) -> Files:
 
 
 def _archive(members: Mapping[str, bytes], comment: str) -> bytes:
-    """A ZIP archive without times of writing."""
+    """Pack a ZIP archive without times of writing."""
     from io import BytesIO
     from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
@@ -65,4 +65,4 @@ def _archive(members: Mapping[str, bytes], comment: str) -> bytes:
     return written.getvalue()
 
 
-FORMAT = Format(NAME, "the damper with its dynamics for co-simulation, FMI 2.0 and 3.0", files)
+FORMATS = (Format(NAME, "the damper with its dynamics for co-simulation, FMI 2.0 and 3.0", files),)

@@ -15,13 +15,14 @@ from pzd.export.formats import Files, Format
 
 if TYPE_CHECKING:
     from pzd.export.content import Content
+    from pzd.record import Array
 
 _TEXT = 116
 """Bytes of text at the start of a MAT-file of level 5; MATLAB 2023, MAT-file format."""
 
 
 def files(content: Content) -> Files:
-    """One file of level 5."""
+    """Write one file of level 5."""
     from io import BytesIO
 
     from scipy.io import savemat
@@ -33,7 +34,7 @@ def files(content: Content) -> Files:
 
 
 def _variables(content: Content) -> dict[str, Any]:
-    """What the file holds, by name."""
+    """Return the variables of the file by name."""
     import numpy as np
 
     from pzd.quantities import FORCE, TEMPERATURE, VELOCITY
@@ -56,24 +57,27 @@ def _variables(content: Content) -> dict[str, Any]:
 
 
 def _inverse(content: Content) -> dict[str, Any]:
-    """The control signal over velocity and share of the range of forces, at each temperature."""
+    """Return the inverse, its last axis the temperature where there are several."""
     import numpy as np
 
     from pzd.export.content import inverses
 
     found = inverses(content)
-    several = len(found) > 1
+
+    def over_temperatures(parts: list[Array]) -> Array:
+        return np.stack(parts, axis=-1) if len(parts) > 1 else parts[0]
+
     return {
         "inverse_bp1": content.grid.velocities,
         "inverse_bp2": found[0].shares,
-        "inverse": np.stack([one.signals for one in found], axis=2) if several else found[0].signals,
-        "inverse_low": np.stack([one.low for one in found], axis=1) if several else found[0].low,
-        "inverse_high": np.stack([one.high for one in found], axis=1) if several else found[0].high,
+        "inverse": over_temperatures([one.signals for one in found]),
+        "inverse_low": over_temperatures([one.low for one in found]),
+        "inverse_high": over_temperatures([one.high for one in found]),
     }
 
 
 def _parameters(content: Content) -> dict[str, Any]:
-    """T0, C and k by column, the parameters of the effects, and what these count from, as structures."""
+    """Return T0, C and k by column, the parameters of the effects, and their references, as structures."""
     import numpy as np
 
     from pzd.export.content import tables
@@ -92,4 +96,4 @@ def _parameters(content: Content) -> dict[str, Any]:
     return {"base": numbers["base"], "effects": effects or np.zeros((0, 0)), **numbers.get("reference", {})}
 
 
-FORMAT = Format("mat", "breakpoints and tables for Simulink and Octave", files)
+FORMATS = (Format("mat", "breakpoints and tables for Simulink and Octave", files),)

@@ -20,7 +20,7 @@ NAME = "modelica"
 
 
 def files(content: Content) -> Files:
-    """One text file with every table.
+    """Write one text file with every table.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def files(content: Content) -> Files:
 
 
 def _bordered(rows: Array, columns: Array, values: Array) -> Array:
-    """A table behind its arguments: the first column and the first row."""
+    """Return a table with its arguments as first column and first row."""
     import numpy as np
 
     return np.vstack([np.append(0.0, columns), np.column_stack([rows, values])])
@@ -66,4 +66,4 @@ def _table(name: str, cells: Array) -> str:
     return f"double {name}({cells.shape[0]},{cells.shape[1]})\n" + "".join(f"{line}\n" for line in lines)
 
 
-FORMAT = Format(NAME, "text of tables for CombiTable2Ds", files)
+FORMATS = (Format(NAME, "text of tables for CombiTable2Ds", files),)

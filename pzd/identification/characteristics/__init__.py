@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pzd.artefacts.characteristics import ContinuousVelocityRow, GasAndFrictionRow, Kind, Method, PeakVelocityRow
+from pzd.artefacts.identified import ContinuousVelocityRow, GasAndFrictionRow, Kind, Method, PeakVelocityRow
 from pzd.artefacts.rig import same_motion
 from pzd.record import Array, Condition, Record
 from pzd.signals.cycles import cycles_of, settled

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from pzd.artefacts import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, ParameterRow, PredictedRow, UnitRow
+from pzd.artefacts.csv_rows import Estimate
 from pzd.artefacts.identified import FALLBACK
 from pzd.artefacts.knee import DIRECTIONS, LawName, knee_damper
 from pzd.artefacts.table import LENGTHS, PRESSURES, numbers_in
@@ -144,14 +145,14 @@ def _half_widths(tests: Tests, fit: KneeFit, nuisance: NuisanceConfig) -> tuple[
 def _with_interval(name: str, value: float | None, width: float | None) -> dict[str, float | None]:
     """A value and its 95 % interval: in the logarithm for slopes and knees, linear for friction and gas."""
     if value is None or width is None:
-        return {name: None, f"{name}_low95": None, f"{name}_high95": None}
+        return Estimate(None).columns(name)
     if name in ("friction_N", "gas_force_N", "gas_spring_N_per_m"):
         low, high = value - width, value + width
         low = max(low, 0.0) if name == "friction_N" else low
     else:
         ratio = float(np.exp(min(width / value, _WIDEST)))
         low, high = value / ratio, value * ratio
-    return {name: value, f"{name}_low95": low, f"{name}_high95": high}
+    return Estimate(value, low, high).columns(name)
 
 
 _WIDEST = 20.0

@@ -1,1 +1,1 @@
-"""The steps of the story, one file each, in the order in which the page tells them."""
+"""Sections of the page, with their sentences and the tables that no command prints."""

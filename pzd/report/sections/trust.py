@@ -1,4 +1,4 @@
-"""How far to trust it: marks, energy balance, boundaries, and what lies outside of the table."""
+"""How far to trust it, what was expected, and how it was made."""
 
 from __future__ import annotations
 
@@ -6,18 +6,50 @@ from collections.abc import Iterator
 
 from pzd.artefacts import ENERGY_LIMIT, ParameterRow, ReferenceRow
 from pzd.comfort import directive, iso2631_1978, iso2631_1997
-from pzd.report.blocks import DASH, Block, Notes, Paragraph, Section, TextTable, amount, number, percent
+from pzd.report import tables
+from pzd.report.blocks import Block, Notes, Paragraph, Section, amount, number, percent
+from pzd.report.columns import Column, Quantity, Table
 from pzd.report.context import ReportContext
 from pzd.schema.errors import counted
 
-# ----------------------------------------------------------------------------------------------------
-
-
 _MUCH = 0.01
+"""From this share of a ride on, leaving the table or the road is worth a sentence."""
+
+# --- Expected numbers beside those of the run ---
+
+
+def render_expected(context: ReportContext) -> tuple[Section, ...]:
+    """Return the section of the expected numbers; none where the config names no such list."""
+    reference = context.expected
+    if reference is None:
+        return ()
+    met = sum(row.computed is not None for row in reference)
+    text = f"Expected numbers in {context.config.reference}: {len(reference)}, of which the run computes {met}."
+    sheet = Table(
+        "Expected and computed",
+        (
+            Column("id", "number"),
+            Column("expected", "expected", value=_expected, digits=4),
+            Column("computed", "computed", value=lambda row: Quantity(row.computed, row.unit), digits=4),
+            Column("ratio", "ratio", digits=4),
+            Column("note", "note"),
+        ),
+        reference,
+        tables.FOLD,
+    )
+    return (Section("expected", "What was expected", (Paragraph(text), sheet.block())),)
+
+
+def _expected(row: ReferenceRow) -> str | Quantity:
+    """Return the expected number; a range stands as text."""
+    return f"{row.expected} {row.unit}" if isinstance(row.expected, str) else Quantity(row.expected, row.unit)
+
+
+# --- Marks, energy balance, boundaries, and what lies outside of the table ---
 
 
 def render(context: ReportContext) -> Section:
-    """The sixth section."""
+    """Return the section on marks and caveats."""
     ridden = context.ridden
     marks = (*context.identified.untrusted(context.control), *context.rides.untrusted(context.control))
     blocks: list[Block] = []
@@ -30,14 +62,25 @@ def render(context: ReportContext) -> Section:
     cares = tuple(_cares(context))
     if cares:
         blocks += [Paragraph("To be kept in mind:"), Notes(cares, "care")]
-    blocks += [_balance(context)] if ridden else []
+    if ridden:
+        columns = (
+            Column("case", "ride"),
+            Column("energy_error", "energy error / dissipated", digits=2),
+            tables.share("outside_table", "time outside of the rig's range"),
+        )
+        blocks.append(Table("Energy balance and table", columns, context.rides.summary, fold=0).block())
     return Section("trust", "How far to trust it", tuple(blocks))
 
 
 def _cares(context: ReportContext) -> Iterator[str]:
-    weak = [row for row in context.final if isinstance(row, ParameterRow) and row.status.startswith("weak")]
+    weak = [
+        row
+        for row in context.damper.final_parameters
+        if isinstance(row, ParameterRow) and row.status.startswith("weak")
+    ]
     if weak:
-        yield f"{len(weak)} of {len(context.final)} conditions hold a parameter that the data determine weakly"
+        total = len(context.damper.final_parameters)
+        yield f"{len(weak)} of {total} conditions hold a parameter that the data determine weakly"
     if context.diagnosed.diagnosis.verdict == "unexplained":
         carry = "rides carry" if context.ridden else "table carries"
         yield f"part of the measured force is repeatable and not explained; the {carry} that gap"
@@ -82,19 +125,7 @@ def _cares(context: ReportContext) -> Iterator[str]:
         yield "vibration is judged in the vertical direction at point K only, without a seat"
 
 
-def _balance(context: ReportContext) -> TextTable:
-    rows = tuple(
-        (row.case, number(row.energy_error, 2), percent(row.outside_table) if row.outside_table else "0 %")
-        for row in context.rides.summary
-    )
-    return TextTable(
-        "Energy balance and table", ("ride", "energy error / dissipated", "time outside of the rig's range"), rows, True
-    )
-
-
-# ----------------------------------------------------------------------------------------------------
-# How it was made: the stages, the methods, the sources.
-
+# --- How it was made: the stages, the methods, the sources ---
 
 _RIDE = "simulate: the half-car of the paper, equations (5) to (12), with an energy balance (5-simulate)"
 _STAGES = (
@@ -117,7 +148,7 @@ _SIGNS = (
 
 
 def render_provenance(context: ReportContext) -> Section:
-    """The last section."""
+    """Return the section on stages and sources."""
     axes = (
         "temperature, control signal and velocity, and its inverse"
         if context.controlled
@@ -132,31 +163,3 @@ def render_provenance(context: ReportContext) -> Section:
     sources = tuple(f"{edition}: {_SOURCES[edition]}" for edition in context.config.editions)
     standards = (Paragraph("Standards:"), Notes(sources)) if context.ridden else ()
     return Section("made", "How it was made", (Paragraph(_LINE), Notes(stages), *standards, Paragraph(_SIGNS)))
-
-
-# ----------------------------------------------------------------------------------------------------
-# What somebody expected of this damper, and what the run gives in its place.
-
-
-_FOLD = 12
-"""Tables longer than this are folded."""
-
-
-def render_expected(context: ReportContext) -> tuple[Section, ...]:
-    """The section of the expected numbers; none where the config names no such list."""
-    reference = context.expected
-    if reference is None:
-        return ()
-    met = sum(row.computed is not None for row in reference)
-    text = f"Expected numbers in {context.config.reference}: {len(reference)}, of which the run computes {met}."
-    rows = tuple(_row(row) for row in reference)
-    header = ("number", "expected", "computed", "ratio", "note")
-    sheet = TextTable("Expected and computed", header, rows, folded=len(rows) > _FOLD)
-    return (Section("expected", "What was expected", (Paragraph(text), sheet)),)
-
-
-def _row(row: ReferenceRow) -> tuple[str, ...]:
-    expected = row.expected if isinstance(row.expected, str) else number(row.expected, 4)
-    shown = f"{expected} {row.unit}" if isinstance(row.expected, str) else amount(row.expected, row.unit, 4)
-    computed = DASH if row.computed is None else amount(row.computed, row.unit, 4)
-    return row.id, shown, computed, number(row.ratio, 4), row.note

@@ -1,4 +1,4 @@
-"""Pictures of what is left: by frequency, by how it is spread, and each test fitted alone."""
+"""Numbers behind the pictures: the gap of a record, spectra and quantiles of the residual, tests fitted alone."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.record import Array, Record
-from pzd.report.plots.left_quantiles import quantiles
-from pzd.report.plots.left_spectrum import between_cycles, spectra
-from pzd.report.plots.tests_alone import fitted_alone
+from pzd.report.damper_models import DamperModels
+from pzd.report.plots.gap import record_gap
+from pzd.report.plots.residuals import between_cycles, fit_alone, quantiles, spectra
 
 RATE = 500.0
 
@@ -26,19 +26,30 @@ def sine(force: Array, frequency: float = 1.0, name: str = "sine") -> Record:
     return Record(name, None, time, x, v, -(w**2) * x, force, np.zeros(force.size))
 
 
-def seen(*records: Record, left: Array | None = None) -> Any:
-    """A context in which the damper leaves the whole force before diagnose, and `left` of it after."""
+def context_of(*records: Record, baseline: Array | float = 0.0, final: Array | float = 0.0) -> Any:
+    """A context of some records and of the forces that its two dampers give in each of them."""
+    damper = DamperModels(None, ())  # type: ignore[arg-type]  # forces are given, nothing is simulated
+    for record in records:
+        still = np.zeros(record.force.size)
+        damper._forces[record.name] = (still + baseline, still + final)
+    tests = SimpleNamespace(sampled=records, records=records, level=lambda _: 0.0)
+    return SimpleNamespace(tests=tests, damper=damper, identified=SimpleNamespace(measures=()))
 
-    def simulated(record: Record) -> tuple[Array, Array]:
-        return np.zeros(record.force.size), record.force - (record.force if left is None else left)
 
-    return SimpleNamespace(sampled=records, records=records, simulated=simulated, level=lambda _: 0.0)
+def test_a_force_that_differs_only_until_the_motion_has_turned_leaves_no_gap() -> None:
+    time = np.arange(2000) / RATE
+    force = 1000.0 * np.sign(np.cos(2.0 * np.pi * time))
+    begun_elsewhere = np.where(time < 0.1, 0.0, force)
+    record = sine(force)
+    context = context_of(record, baseline=0.9 * force, final=begun_elsewhere)
+    assert record_gap(context, record) == pytest.approx((0.01, 0.0), abs=1e-12)
 
 
-def test_the_bands_hold_the_power_of_what_is_left_where_it_is() -> None:
+def test_the_band_of_a_harmonic_holds_its_power() -> None:
     """A harmonic of 10 N at 3 Hz has 7.07 N in the band about 3 Hz, and half of it after diagnose."""
     force = 10.0 * np.sin(2.0 * np.pi * 3.0 * np.arange(8000) / RATE)
-    middles, before, after, _ = spectra(seen(sine(force), left=0.5 * force), [sine(force)])
+    record = sine(force)
+    middles, before, after, _ = spectra(context_of(record, final=0.5 * force), [record])
     band = int(np.argmax(before))
     assert 2.6 < middles[band] < 3.4
     assert before[band] == pytest.approx(10.0 / np.sqrt(2.0), rel=0.02)
@@ -56,25 +67,23 @@ def test_what_repeats_is_no_noise_and_what_does_not_is_all_noise(rng: np.random.
     assert between_cycles(time, np.cumsum(rng.standard_normal(time.size)), noise) is None
 
 
-def test_noise_lies_on_the_line_and_rare_large_misses_leave_it(rng: np.random.Generator) -> None:
+def test_quantiles_of_noise_lie_on_the_line_and_rare_large_residuals_leave_it(rng: np.random.Generator) -> None:
     noise = rng.standard_normal(20_000)
-    normal, found = quantiles(seen(sine(noise)), 0)
+    normal, found = quantiles(context_of(sine(noise)), 0)
     assert np.max(np.abs(found - normal)) < 0.2
     jumps = np.where(rng.random(noise.size) < 0.02, 10.0, 1.0) * noise
-    normal, found = quantiles(seen(sine(jumps)), 0)
+    normal, found = quantiles(context_of(sine(jumps)), 0)
     assert found[-1] > 1.1 * normal[-1]
     assert found[-10] < 0.8 * normal[-10]
 
 
-def test_each_test_alone_tells_its_own_friction() -> None:
+def test_each_test_fitted_alone_has_its_own_friction() -> None:
     """T0 that rises from test to test by a tenth, as an oil that cools or a stand that drifts would show it."""
     records = []
     for number in range(5):
-        still = sine(np.zeros(3000), name=f"test {number}")
+        still = sine(np.zeros(1500), name=f"test {number}")
         row = BaseRow(T0_N=300.0 * 1.1**number, C_Ns_per_m=2700.0, k_N_per_m=2e5)
         records.append(sine(respond(Damper(base=(row,)), Motion.of(still)), name=still.name))
-    context = seen(*records)
-    context.identified = SimpleNamespace(measures=())
-    found = fitted_alone(context)
+    found = fit_alone(context_of(*records))
     assert [test.over["order of the files"] for test in found] == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert [test.row.T0_N for test in found] == pytest.approx(list(300.0 * 1.1 ** np.arange(5)), rel=0.01)
