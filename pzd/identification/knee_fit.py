@@ -1,4 +1,7 @@
-"""The knee law by least squares: criterion (4) over the tests of a condition, gas force and spring solved inside."""
+"""Least-squares fit of the knee law: criterion (4) over the tests of a condition, gas force and spring profiled out.
+Equation: |F| = T0 + C w up to the speed w_k of the knee, then T0 + C w_k + B (w - w_k); C, w_k and B of each direction
+                                        Source: bleed and blow-off, Dixon 2007; element of eq. (1)-(3) with k
+"""
 
 from __future__ import annotations
 
@@ -14,16 +17,11 @@ from pzd.damper.compose import constant_rows, integrated_force, sampling_steps
 from pzd.damper.fitted_laws.knee import NO_KNEE
 from pzd.damper.motion import Motion
 from pzd.identification.prepared_record import in_motion
-from pzd.identification.trust import VISIBLE
+from pzd.identification.trust import MISFIT_THRESHOLD
 from pzd.record import Array, Mask, Record, mid_stroke
-from pzd.signals.criterion import criterion, rms
+from pzd.signals.measures import criterion, rms
 
-# ----------------------------------------------------------------------------------------------------
-# The knee law as numbers: bleed, knee and blow-off of each direction, and the coordinates in which they are searched.
-#
-# Equation: |F| = T0 + C w up to the speed w_k of the knee, then T0 + C w_k + B (w - w_k); C, w_k and B of each direction
-#                                         Source: bleed and blow-off, Dixon 2007; element of eq. (1)-(3) with k
-
+# --- Knee curve and search coordinates ---
 
 REBOUND, COMPRESSION = 0, 1
 """The directions, in this order wherever there are two of something."""
@@ -62,6 +60,7 @@ class KneeCurve(NamedTuple):
             "F_comp": forces[COMPRESSION],
             "C_comp": self.blow_off[COMPRESSION],
         }
+
 
 
 @dataclass(frozen=True)
@@ -103,21 +102,18 @@ class KneeForm:
         """The curve at a point of the search."""
         return self.curve(np.concatenate([searched[:1] * force, np.exp(searched[1:])]))
 
-
-BINGHAM = KneeForm(alike=True, bent=(False, False))
+BINGHAM_FORM = KneeForm(alike=True, bent=(False, False))
 """One T0 and C."""
 
 
-# ----------------------------------------------------------------------------------------------------
-# Tests as the fit of the knee law sees them: motion, force to be met, and the force that a curve gives.
-
+# --- Data ---
 
 FORCE_TOLERANCE = 1e-6
 """Admissible error of a piece of the path, as a share of the force; between its corners the law is in closed form."""
 
 
 @dataclass(frozen=True, eq=False)
-class Test:
+class KneeRecord:
     """One test, the displacement counted from the middle of all tests concerned."""
 
     __test__ = False
@@ -146,26 +142,27 @@ class Test:
         return integrated_force(rows, self.motion, self.steps, first, FORCE_TOLERANCE)[self.counted]
 
 
+
 @dataclass(frozen=True, eq=False)
-class Tests:
+class KneeData:
     """The tests of one condition, or some of them."""
 
     __test__ = False
 
-    tests: tuple[Test, ...]
+    tests: tuple[KneeRecord, ...]
     middle: float
     """Displacement, as recorded, from which x is counted [m]."""
 
     @classmethod
-    def of(cls, records: Sequence[Record]) -> Tests:
+    def of(cls, records: Sequence[Record]) -> KneeData:
         """The tests, the displacement counted from the middle of their motion."""
         middle = mid_stroke(r.displacement for r in records)
-        found = (Test(r, Motion.of(r).about(middle), sampling_steps(r.time), in_motion(r)) for r in records)
+        found = (KneeRecord(r, Motion.of(r).about(middle), sampling_steps(r.time), in_motion(r)) for r in records)
         return cls(tuple(found), middle)
 
-    def some(self, kept: Sequence[int]) -> Tests:
+    def some(self, kept: Sequence[int]) -> KneeData:
         """Some of the tests, about the same zero."""
-        return Tests(tuple(self.tests[i] for i in kept), self.middle)
+        return KneeData(tuple(self.tests[i] for i in kept), self.middle)
 
     @cached_property
     def measured(self) -> Array:
@@ -197,15 +194,14 @@ class Tests:
         return np.concatenate([t.simulated(curve, gas) for t in self.tests])
 
 
-# ----------------------------------------------------------------------------------------------------
-# Where the fit of the knee law begins: the curve by linear least squares, the knees on a grid, no oil spring.
 
+# --- Start: linear least squares with the knees on a grid ---
 
-KNEES = (0.06, 0.12, 0.2, 0.3, 0.45, 0.65)
+KNEE_GRID = (0.06, 0.12, 0.2, 0.3, 0.45, 0.65)
 """Knee speeds of the grid, as shares of the fastest speed."""
-SAMPLES = 6000
+GRID_SAMPLES = 6000
 """The grid is evaluated on at most so many samples."""
-TURNING = 0.02
+SLOWEST = 0.02
 """Below this share of the fastest speed the oil spring winds up, and the force is not that of the curve."""
 LEAST_SLOPE = 0.02
 """Least slope of a start, as a share of peak force over peak speed."""
@@ -213,7 +209,7 @@ MOST_SLOPE = 50.0
 """Largest slope of a start, likewise."""
 
 
-def start_of(tests: Tests, stiffness: float) -> tuple[KneeCurve, Array]:
+def grid_start(tests: KneeData, stiffness: float) -> tuple[KneeCurve, Array]:
     """The best curve of the grid, and (2,) the gas force and gas spring beside it.
 
     Equation: F = F_0 + k_g x + T0 sign(v) + sum over the directions of C min(|v|, w_k) + B max(|v| - w_k, 0)
@@ -224,29 +220,33 @@ def start_of(tests: Tests, stiffness: float) -> tuple[KneeCurve, Array]:
     stiffness : of the oil spring, which this does not look for [N/m]
     """
     v, fastest = tests.speed, tests.fastest
-    kept = np.flatnonzero(np.abs(v) > TURNING * fastest)
-    kept = kept[:: max(1, kept.size // SAMPLES)]
+    kept = np.flatnonzero(np.abs(v) > SLOWEST * fastest)
+    kept = kept[:: max(1, kept.size // GRID_SAMPLES)]
     v, measured, beside = v[kept], tests.measured[kept], tests.of_gas[kept]
     found: list[tuple[float, KneeCurve, Array]] = []
-    for knees in product((share * fastest for share in KNEES), repeat=2):
-        terms = np.column_stack([beside, np.sign(v), *(t for way in (0, 1) for t in _terms(v, way, knees[way]))])
+    for knees in product((share * fastest for share in KNEE_GRID), repeat=2):
+        terms = np.column_stack(
+            [beside, np.sign(v), *(t for way in (0, 1) for t in _slope_columns(v, way, knees[way]))]
+        )
         size = np.linalg.norm(terms, axis=0)
         size[size == 0.0] = 1.0
         values = np.linalg.lstsq(terms / size, measured, rcond=1e-9)[0] / size
         left = measured - terms @ values
-        found.append((float(left @ left), _curve(values[2:], knees, stiffness, tests), values[:2]))
+        found.append((float(left @ left), _clipped_curve(values[2:], knees, stiffness, tests), values[:2]))
     _, curve, gas = min(found, key=lambda each: each[0])
     return curve, gas
 
 
-def _terms(v: Array, way: int, knee: float) -> tuple[Array, Array]:
+
+def _slope_columns(v: Array, way: int, knee: float) -> tuple[Array, Array]:
     """(N,) force of a slope of one up to the knee of one direction, and of one beyond it."""
     sign = (1.0, -1.0)[way]
     w = np.maximum(sign * v, 0.0)
     return sign * np.minimum(w, knee), sign * np.maximum(w - knee, 0.0)
 
 
-def _curve(values: Array, knees: tuple[float, ...], stiffness: float, tests: Tests) -> KneeCurve:
+
+def _clipped_curve(values: Array, knees: tuple[float, ...], stiffness: float, tests: KneeData) -> KneeCurve:
     """The curve of a linear fit, its values brought to what a damper may have."""
     unit = tests.peak / tests.fastest
     slopes = np.clip(values[1:], LEAST_SLOPE * unit, MOST_SLOPE * unit).tolist()
@@ -259,24 +259,24 @@ def _curve(values: Array, knees: tuple[float, ...], stiffness: float, tests: Tes
     )
 
 
-# ----------------------------------------------------------------------------------------------------
 
+# --- Least squares ---
 
 DIFFERENCE = 1e-5
 """Step of the search coordinates for a slope."""
 EVALUATIONS = 60
 """Most simulations with slopes of one descent."""
-REFIT = 12
+REFIT_EVALUATIONS = 12
 """The same without a test: it begins at the optimum of all tests, and one of them moves that little."""
 TOLERANCE = 1e-5
 """Tolerance of the least squares, relative, on parameters and criterion: far below any interval."""
-GLANCE = 4
+PROBE_EVALUATIONS = 4
 """Evaluations after which a straight line that would do as well as a knee is near it."""
 NEAREST_KNEE = 0.01
 """Least knee speed of the search, as a share of the fastest: below, the oil spring decides on the force."""
-SLOPES = (1e-3, 1e3)
+SLOPE_RANGE = (1e-3, 1e3)
 """Smallest and largest slope of the search, in peak force over peak speed."""
-SPRINGS = (1e-1, 1e5)
+STIFFNESS_RANGE = (1e-1, 1e5)
 """Smallest and largest k of the search, in peak force over the range of displacement."""
 
 
@@ -294,12 +294,13 @@ class KneeFit:
     """(N, p + 2) derivatives of the force by the natural parameters of the form, by F_0 and by k_g."""
     criterion: float
 
-    def predicted(self, tests: Tests) -> Array:
+    def predicted(self, tests: KneeData) -> Array:
         """(N,) force of other tests of the damper [N]."""
         return tests.simulated(self.curve, self.gas) + tests.of_gas @ self.gas
 
 
-def fit_knee(tests: Tests, stiffness: float) -> KneeFit:
+
+def fit_knee(tests: KneeData, stiffness: float) -> KneeFit:
     """The knee law of a condition; a direction has a knee where a straight line would visibly do worse.
 
     Parameters
@@ -307,30 +308,33 @@ def fit_knee(tests: Tests, stiffness: float) -> KneeFit:
     tests : of the condition
     stiffness : of the oil spring where the search begins [N/m]
     """
-    best = descend(tests, KneeForm(), *start_of(tests, stiffness))
+    best = descend(tests, KneeForm(), *grid_start(tests, stiffness))
     for way in best.form.ways:
         bent = tuple(each and other != way for other, each in enumerate(best.form.bent))
         form = KneeForm(bent=(bent[0], bent[1]))
-        straight = descend(tests, form, best.curve, best.gas, GLANCE)
-        if not _bends(tests, best, straight):
+        straight = descend(tests, form, best.curve, best.gas, PROBE_EVALUATIONS)
+        if not _knee_is_visible(tests, best, straight):
             best = descend(tests, form, straight.curve, straight.gas)
     return best
 
 
-def fit_bingham(tests: Tests, start: KneeFit) -> KneeFit:
+
+def fit_bingham(tests: KneeData, start: KneeFit) -> KneeFit:
     """One T0 and C beside the same gas force, gas spring and oil spring: what the knee law is held against."""
     slope = 0.25 * sum((*start.curve.bleed, *start.curve.blow_off))
     begin = start.curve._replace(bleed=(slope, slope))
-    return descend(tests, BINGHAM, begin, start.gas)
+    return descend(tests, BINGHAM_FORM, begin, start.gas)
 
 
-def _bends(tests: Tests, bent: KneeFit, straight: KneeFit) -> bool:
+
+def _knee_is_visible(tests: KneeData, bent: KneeFit, straight: KneeFit) -> bool:
     """Whether the knee takes visibly more off the residual than a straight line."""
     gained = rms(straight.residuals) ** 2 - rms(bent.residuals) ** 2
-    return gained > (VISIBLE * tests.peak) ** 2
+    return gained > (MISFIT_THRESHOLD * tests.peak) ** 2
 
 
-def descend(tests: Tests, form: KneeForm, start: KneeCurve, gas: Array, evaluations: int = EVALUATIONS) -> KneeFit:
+
+def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evaluations: int = EVALUATIONS) -> KneeFit:
     """The optimum reached from a curve, by trust-region least squares within bounds.
 
     Equation: min over the curve of |P (F - F_sim)|^2, P what F_0 and k_g cannot make up
@@ -363,7 +367,7 @@ def descend(tests: Tests, form: KneeForm, start: KneeCurve, gas: Array, evaluati
         steps = DIFFERENCE * np.eye(x.size)
         return without_gas(-np.column_stack([(simulated(x + step) - at) / DIFFERENCE for step in steps])) / norm
 
-    low, high = _bounds(tests, form)
+    low, high = _search_bounds(tests, form)
     begin = np.clip(form.searched(start, peak), low + 1e-6, high - 1e-6)
     found = least_squares(
         residuals,
@@ -380,22 +384,26 @@ def descend(tests: Tests, form: KneeForm, start: KneeCurve, gas: Array, evaluati
     left = tests.measured - tests.simulated(curve, gas)
     beside = np.asarray(np.linalg.lstsq(tests.of_gas, left, rcond=None)[0])
     left = left - tests.of_gas @ beside
-    return KneeFit(form, curve, beside, left, _slopes(tests, form, curve, beside), criterion(left, tests.measured))
+    return KneeFit(
+        form, curve, beside, left, _natural_slopes(tests, form, curve, beside), criterion(left, tests.measured)
+    )
 
 
-def _bounds(tests: Tests, form: KneeForm) -> tuple[Array, Array]:
+
+def _search_bounds(tests: KneeData, form: KneeForm) -> tuple[Array, Array]:
     """(p,) bounds of the search coordinates."""
     unit = tests.peak / tests.fastest
     stroke = 2.0 * max(float(np.max(np.abs(t.motion.displacement))) for t in tests.tests)
-    slope = [np.log(share * unit) for share in SLOPES]
-    spring = [np.log(share * tests.peak / stroke) for share in SPRINGS]
+    slope = [np.log(share * unit) for share in SLOPE_RANGE]
+    spring = [np.log(share * tests.peak / stroke) for share in STIFFNESS_RANGE]
     knee = [np.log(NEAREST_KNEE * tests.fastest), np.log(tests.fastest)]
     bleeds = 1 if form.alike else 2
     pairs = [[0.0, 1.0], *[slope] * bleeds, spring, *[knee, slope] * len(form.ways)]
     return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
 
 
-def _slopes(tests: Tests, form: KneeForm, curve: KneeCurve, gas: Array) -> Array:
+
+def _natural_slopes(tests: KneeData, form: KneeForm, curve: KneeCurve, gas: Array) -> Array:
     """(N, p + 2) derivatives of the force by the natural parameters, F_0 and k_g."""
     natural = form.natural(curve)
     steps = DIFFERENCE * np.where(natural > 0.0, natural, tests.peak)
@@ -405,3 +413,4 @@ def _slopes(tests: Tests, form: KneeForm, curve: KneeCurve, gas: Array) -> Array
         for step, unit in zip(steps, np.eye(natural.size), strict=True)
     ]
     return np.column_stack([*moved, tests.of_gas])
+

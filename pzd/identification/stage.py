@@ -12,7 +12,7 @@ from pzd.parallel.processes import Listener, Progress, no_listener, parallel_map
 from pzd.quantities import TEMPERATURE, Control
 from pzd.record import Condition, Record, conditions, merged_voltages
 from pzd.schema.errors import ConfigError, DataError, counted, supported
-from pzd.signals.cycles import Cycles, cycles_of, remember
+from pzd.signals.cycles import Cycles, cycles_of, remember_cycles
 
 Labels = tuple[str | None, float | None, float | None]
 
@@ -53,7 +53,8 @@ def identify(
     ------
     ConfigError : when `identify.group` makes one condition of all voltages
     """
-    from pzd.identification.tests_over_time import characteristics, measures
+    from pzd.identification.characteristics import characteristics
+    from pzd.identification.strokes_and_loops import measures
 
     refuse_one_condition(identify, rig, control)
     refuse_partly_recorded(rig, control)
@@ -64,9 +65,9 @@ def identify(
     known = list(zip(constant, rows.values(), strict=True))
     rows |= {_labels(row): row for row in _moving_rows(moving, known, list(auxiliary.values()), identify)}
     return Identified(
-        tuple(rows[labels] for labels in sorted(rows, key=_order)),
+        tuple(rows[labels] for labels in sorted(rows, key=_sort_key)),
         measures(rig.records),
-        tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_order)),
+        tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_sort_key)),
         characteristics(constant, moving),
         _knees(identify, known, [r.setting for r in rig.records], control, progress),
     )
@@ -82,9 +83,9 @@ def _knees(
     """The knee law of every condition, where the config asks for it."""
     if config.law == "bingham":
         return Knees()
-    from pzd.identification.knee import knees
+    from pzd.identification.knee import identify_knees
 
-    return knees(known, tuple(dict.fromkeys(settings)), config, control, progress)
+    return identify_knees(known, tuple(dict.fromkeys(settings)), config, control, progress)
 
 
 def refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> None:
@@ -140,7 +141,7 @@ def refuse_partly_recorded(rig: Rig, control: Control) -> None:
 def _constant_rows(
     found: Sequence[Condition], config: IdentifyConfig, seed: int, progress: Listener, jobs: int
 ) -> list[tuple[ParameterRow, AuxiliaryRow | None]]:
-    from pzd.identification.fit import identify_condition
+    from pzd.identification.condition import identify_condition
 
     rows: list[tuple[ParameterRow, AuxiliaryRow | None]] = []
 
@@ -151,9 +152,9 @@ def _constant_rows(
     def collected(made: tuple[ParameterRow, AuxiliaryRow | None, list[Cycles | None]]) -> None:
         row, auxiliary, runs = made
         for record, run in zip(found[len(rows)].records, runs, strict=True):
-            remember(record, run)
+            remember_cycles(record, run)
         rows.append((row, auxiliary))
-        progress(Progress(len(rows), len(found), f"conditions: {_line(row)}{_auxiliary_text(auxiliary)}"))
+        progress(Progress(len(rows), len(found), f"conditions: {_parameter_text(row)}{_auxiliary_text(auxiliary)}"))
 
     samples = sum(record.time.size for condition in found for record in condition.records)
     parallel_map(fitted, range(len(found)), jobs if samples > WORTH_A_PROCESS else 1, collected)
@@ -174,18 +175,18 @@ def _moving_rows(
     auxiliaries: Sequence[AuxiliaryRow],
     config: IdentifyConfig,
 ) -> list[ParameterRow]:
-    from pzd.identification.auxiliary import without
+    from pzd.identification.condition import subtract_auxiliary
     from pzd.identification.moving_voltage import fit_moving
 
     rows = []
     for setting in sorted({r.setting for r in moving}, key=lambda s: s or ""):
         auxiliary = [row for row in auxiliaries if row.setting == setting]
         mine = [(c, row) for c, row in known if c.setting == setting]
-        still = [replace(c, records=tuple(without(r, auxiliary) for r in c.records)) for c, _ in mine]
-        of_setting = [without(r, auxiliary) for r in moving if r.setting == setting]
+        still = [replace(c, records=tuple(subtract_auxiliary(r, auxiliary) for r in c.records)) for c, _ in mine]
+        of_setting = [subtract_auxiliary(r, auxiliary) for r in moving if r.setting == setting]
         for row in fit_moving(of_setting, still, [row for _, row in mine], config):
             rows.append(row)
-            log.info("node from records with moving voltage: %s", _line(row))
+            log.info("node from records with moving voltage: %s", _parameter_text(row))
     return rows
 
 
@@ -193,12 +194,12 @@ def _labels(row: ParameterRow | AuxiliaryRow) -> Labels:
     return row.setting, row.voltage_V, row.temperature_degC
 
 
-def _order(labels: Labels) -> tuple[str, float, float]:
+def _sort_key(labels: Labels) -> tuple[str, float, float]:
     setting, voltage, temperature = labels
     return setting or "", temperature or 0.0, voltage or 0.0
 
 
-def _line(row: ParameterRow) -> str:
+def _parameter_text(row: ParameterRow) -> str:
     def shown(value: float | None, low: float | None, high: float | None) -> str:
         if value is None:
             return "-"

@@ -11,7 +11,7 @@ from pzd.quantities import DISPLACEMENT, Quantity
 from pzd.record import Array, Record, is_constant, voltage_scale
 from pzd.report.context import ReportContext
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, axes, legend, thinned
-from pzd.signals.criterion import criterion
+from pzd.signals.measures import criterion
 
 # ----------------------------------------------------------------------------------------------------
 

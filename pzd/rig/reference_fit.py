@@ -16,7 +16,7 @@ from pzd.damper.element import element_forces
 from pzd.record import Array
 from pzd.rig.preflight import Measured
 from pzd.signals.cycles import Cycles
-from pzd.signals.kinematics import drift_of
+from pzd.signals.kinematics import mean_over_period
 
 MOST_SAMPLES = 800
 RATE = 250.0
@@ -98,7 +98,7 @@ def _beginning(test: Measured) -> Piece:
 
 def _average_cycle(test: Measured, run: Cycles) -> Piece:
     record = test.record
-    steady = test.clean.displacement - drift_of(record.time, test.clean.displacement, run)
+    steady = test.clean.displacement - mean_over_period(record.time, test.clean.displacement, run)
     x, cycle = run.mean(record.time, steady), run.mean(record.time, record.force)
     every = -(-x.size // MOST_SAMPLES)
     spectrum, harmonics = np.fft.rfft(cycle), np.arange(cycle.size // 2 + 1)

@@ -1,4 +1,4 @@
-"""Sums of harmonics with exact derivatives: what roads, triangles and random motions are made of."""
+"""Harmonics: Fourier sums with exact derivatives, and lines of the mains in a channel."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 
 from pzd.record import Array, Complex, Mask
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Fourier sums: roads, triangles, random motions ---
 
 _WHOLE = 1e-7  # a period this close to a whole number of steps is one, in steps
 _BLOCK = 8192  # samples that stay in the cache
@@ -42,7 +41,9 @@ class FourierSum:
         orders = 2j * np.pi / self.period * np.arange(self.coefficients.size)
         sums = np.stack([self.coefficients, self.coefficients * orders, self.coefficients * orders**2])
         steps = _steps_a_period(place, self.period)
-        values = _direct(sums, place / self.period) if steps is None else _fast(sums, place, self.period, steps)
+        values = (
+            _sum_by_horner(sums, place / self.period) if steps is None else _sum_by_fft(sums, place, self.period, steps)
+        )
         return values[0], values[1], values[2]
 
 
@@ -56,12 +57,12 @@ def _steps_a_period(place: Array, period: float) -> int | None:
     return whole if even and whole > 0 and abs(period / step - whole) < _WHOLE else None
 
 
-def _fast(sums: Complex, place: Array, period: float, steps: int) -> Array:
+def _sum_by_fft(sums: Complex, place: Array, period: float, steps: int) -> Array:
     """The sums on an even grid that meets itself again after one period."""
     lines = sums.shape[1]
     shifted = sums * np.exp(2j * np.pi * np.arange(lines) * (place[0] / period))
     if 2 * (lines - 1) >= steps:
-        return _direct(sums, place / period)
+        return _sum_by_horner(sums, place / period)
     spectrum = np.zeros((3, steps // 2 + 1), dtype=np.complex128)
     spectrum[:, :lines] = 0.5 * steps * shifted
     spectrum[:, 0] = steps * shifted[:, 0].real
@@ -69,7 +70,7 @@ def _fast(sums: Complex, place: Array, period: float, steps: int) -> Array:
     return np.stack([np.resize(row, place.size) for row in once])
 
 
-def _direct(sums: Complex, phase: Array) -> Array:
+def _sum_by_horner(sums: Complex, phase: Array) -> Array:
     """The sums at any places, by Horner's rule in exp(2 pi i phase)."""
     result = np.empty((3, phase.size))
     for start in range(0, phase.size, _BLOCK):
@@ -82,19 +83,17 @@ def _direct(sums: Complex, phase: Array) -> Array:
     return result
 
 
-# ----------------------------------------------------------------------------------------------------
-# The mains in a channel: whether a line at 50 or 60 Hz stands out, and the wave that it makes.
-
+# --- Mains hum ---
 
 MAINS = (50.0, 60.0)
 """Of the grids of the world [Hz]."""
-LINES_OFF = 0.2
+MAINS_TOLERANCE = 0.2
 """The mains may be off by this much [Hz]."""
-STANDS_OUT = 3.0
+PROMINENCE = 3.0
 """The line is this many times as large as anything in its neighbourhood."""
 LEAST_RATE = 2.5
 """Sampling rate over the frequency of the mains from which it can be seen."""
-HARMONICS = (1, 3)
+MAINS_ORDERS = (1, 3)
 """Of the mains, as transformers and rectifiers give them."""
 LOW_ORDER = 12.0
 """Harmonics of the motion below this order may stand out by themselves, so that one at the mains' frequency is none."""
@@ -103,7 +102,7 @@ _STEP = 0.01
 phase at either end."""
 
 
-def lines(values: Array, rate: float, frequencies: Sequence[float], cycle: float) -> list[float]:
+def line_amplitudes(values: Array, rate: float, frequencies: Sequence[float], cycle: float) -> list[float]:
     """Amplitudes of lines that stand out of their neighbourhood, which holds harmonics of the motion; else 0.
 
     Parameters
@@ -119,17 +118,17 @@ def lines(values: Array, rate: float, frequencies: Sequence[float], cycle: float
     ramp = np.linspace(values[0], values[-1], values.size)
     spectrum = 2.0 * np.abs(np.fft.rfft((values - ramp) * window)) / window.sum()
     resolution, places = rate / values.size, np.fft.rfftfreq(values.size, 1.0 / rate)
-    return [_standing_out(spectrum, np.abs(places - frequency), resolution, cycle) for frequency in frequencies]
+    return [_prominent_amplitude(spectrum, np.abs(places - frequency), resolution, cycle) for frequency in frequencies]
 
 
-def _standing_out(spectrum: Array, off: Array, resolution: float, cycle: float) -> float:
+def _prominent_amplitude(spectrum: Array, off: Array, resolution: float, cycle: float) -> float:
     """Amplitude of the line in a spectrum, by how far its places are off the line."""
-    wide = max(LINES_OFF, 1.5 * resolution)
+    wide = max(MAINS_TOLERANCE, 1.5 * resolution)
     inside, around = off <= wide, (off > wide + 3.0 * resolution) & (off <= max(5.0, 3.0 * cycle, 20.0 * resolution))
     if not inside.any() or not around.any():
         return 0.0
     amplitude = float(spectrum[inside].max())
-    return amplitude if amplitude > STANDS_OUT * float(spectrum[around].max()) else 0.0
+    return amplitude if amplitude > PROMINENCE * float(spectrum[around].max()) else 0.0
 
 
 def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) -> Array:
@@ -151,20 +150,20 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
     (n,) in the unit of the channel; zero where no line stands out
     """
     wave, rate = np.zeros(values.size), (values.size - 1) / float(time[-1] - time[0])
-    if np.count_nonzero(wanted) <= 2 * len(HARMONICS):
+    if np.count_nonzero(wanted) <= 2 * len(MAINS_ORDERS):
         return wave
     level = values - values[wanted].mean()
-    asked = [m for m in MAINS if rate >= LEAST_RATE * m and not _of_motion(m, cycle, rate / values.size)]
-    for mains, amplitude in zip(asked, lines(values, rate, asked, cycle), strict=True):
+    asked = [m for m in MAINS if rate >= LEAST_RATE * m and not _is_motion_harmonic(m, cycle, rate / values.size)]
+    for mains, amplitude in zip(asked, line_amplitudes(values, rate, asked, cycle), strict=True):
         if amplitude <= least:
             continue
         from scipy.signal import zoom_fft  # it takes 0.7 s to load, and few records hum
 
-        points = 1 + int(np.ceil(2.0 * LINES_OFF * values.size / rate / _STEP))
-        near = np.linspace(mains - LINES_OFF, mains + LINES_OFF, points)
+        points = 1 + int(np.ceil(2.0 * MAINS_TOLERANCE * values.size / rate / _STEP))
+        near = np.linspace(mains - MAINS_TOLERANCE, mains + MAINS_TOLERANCE, points)
         spectrum = zoom_fft(level * np.hanning(level.size), [near[0], near[-1]], m=points, fs=rate, endpoint=True)
         found = near[int(np.argmax(np.abs(spectrum)))]
-        found = float(np.clip(found + _off(found, time, level, wanted), near[0], near[-1]))
+        found = float(np.clip(found + _frequency_correction(found, time, level, wanted), near[0], near[-1]))
         waves = _waves(found, time)
         wave += waves @ np.linalg.lstsq(waves[wanted], level[wanted], rcond=None)[0]
     return wave
@@ -173,22 +172,22 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
 def _waves(frequency: float, time: Array) -> Array:
     """Cosine and sine of each harmonic that the rate can show, (n, 2 times harmonics)."""
     rate = (time.size - 1) / float(time[-1] - time[0])
-    phases = [2.0 * np.pi * h * frequency * time for h in HARMONICS if rate > 2.0 * h * frequency]
+    phases = [2.0 * np.pi * h * frequency * time for h in MAINS_ORDERS if rate > 2.0 * h * frequency]
     return np.column_stack([f(phase) for phase in phases for f in (np.cos, np.sin)])
 
 
-def _off(frequency: float, time: Array, level: Array, wanted: Mask) -> float:
+def _frequency_correction(frequency: float, time: Array, level: Array, wanted: Mask) -> float:
     """How far the least squares lie from a frequency of the grid [Hz]: a step of Gauss and Newton, by all harmonics."""
     waves = _waves(frequency, time)
     sizes = np.linalg.lstsq(waves[wanted], level[wanted], rcond=None)[0]
     cosines, sines = waves[:, ::2], waves[:, 1::2]
-    rising = 2.0 * np.pi * time[:, np.newaxis] * np.array(HARMONICS[: cosines.shape[1]])
+    rising = 2.0 * np.pi * time[:, np.newaxis] * np.array(MAINS_ORDERS[: cosines.shape[1]])
     slope = np.sum(rising * (sizes[1::2] * cosines - sizes[::2] * sines), axis=1)
     more = np.column_stack([waves, slope])
     return float(np.linalg.lstsq(more[wanted], level[wanted], rcond=None)[0][-1])
 
 
-def _of_motion(mains: float, cycle: float, resolution: float) -> bool:
+def _is_motion_harmonic(mains: float, cycle: float, resolution: float) -> bool:
     """Whether a low harmonic of the motion lies where the mains do."""
     order = mains / cycle if cycle > 0.0 else LOW_ORDER
-    return order < LOW_ORDER and abs(order - round(order)) * cycle <= LINES_OFF + 2.0 * resolution
+    return order < LOW_ORDER and abs(order - round(order)) * cycle <= MAINS_TOLERANCE + 2.0 * resolution

@@ -1,4 +1,7 @@
-"""Where a recorded force jumps: what is recorded beside a jump is chance, for it falls anywhere between two samples."""
+"""Jumps of a recorded force, gaps in a record, and steps of a control signal.
+A jump (dry friction at a reversal) falls anywhere between two samples, so that the samples beside it are left to
+chance. Where samples are left out, nothing is differenced across the gap.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,7 @@ import numpy as np
 from pzd.record import Array, Mask
 from pzd.signals.cycles import Cycles
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Jumps of the force ---
 
 SUDDEN = 6.0
 """A sample at which the force bends by so many times its usual scatter lies beside a jump."""
@@ -16,9 +18,9 @@ MOST_SUDDEN = 40
 """Samples beside jumps that are allowed for in one record or average cycle, the largest."""
 MOST_IN_SAMPLES = 150
 """The same in a record that is compared sample by sample: no cycle stands for the others there."""
-BESIDE_REVERSAL = 4
+SAMPLES_PER_REVERSAL = 4
 """Samples beside the jump of a dry friction: two, and at either end one that it reaches through a filter."""
-USUAL = 1.4826
+MAD_TO_SIGMA = 1.4826
 """Standard deviation of Gaussian scatter over its median magnitude."""
 
 
@@ -35,7 +37,7 @@ def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
     """
     bend = np.abs(np.convolve(force, (1.0, -2.0, 1.0), "same"))
     bend[[0, -1]] = 0.0
-    sudden = np.flatnonzero(bend > SUDDEN * USUAL * np.median(bend))
+    sudden = np.flatnonzero(bend > SUDDEN * MAD_TO_SIGMA * np.median(bend))
     largest = sudden[np.argsort(-bend[sudden], kind="stable")][:most]
     found = np.zeros(force.size)
     found[largest] = bend[largest]
@@ -50,7 +52,7 @@ def jumps_in_samples(measured: Array, predicted: Array, reversals: int = 0) -> A
     measured, predicted : (n,) force [N]
     reversals : of the motion; of many, more samples are allowed for
     """
-    most = max(MOST_IN_SAMPLES, BESIDE_REVERSAL * reversals)
+    most = max(MOST_IN_SAMPLES, SAMPLES_PER_REVERSAL * reversals)
     return np.maximum(jumps(measured, most), jumps(predicted, most))
 
 
@@ -63,7 +65,7 @@ def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:
     return found
 
 
-def within_a_sample(measured: Array, predicted: Array) -> Array:
+def jump_timing_error(measured: Array, predicted: Array) -> Array:
     """(n,) what a jump makes of the residual that comes up to one sample earlier or later than predicted [N].
 
     Only where the record jumps as well, by half of what is predicted from one sample to the next: a flank that it
@@ -87,11 +89,10 @@ def _neighbours(force: Array) -> Array:
     return np.stack([padded[:-2], force, padded[2:]])
 
 
-# ----------------------------------------------------------------------------------------------------
-# Where a record parts, of which samples are left out: nothing is differenced across what is missing.
+# --- Gaps ---
 
 
-def parted(values: Array, counted: Mask) -> list[Array]:
+def split_at_gaps(values: Array, counted: Mask) -> list[Array]:
     """Values (m,) or (m, p) at the counted samples of a record, parted where samples between them are left out.
 
     Parameters
@@ -103,7 +104,7 @@ def parted(values: Array, counted: Mask) -> list[Array]:
     return np.split(values, ends)
 
 
-def slope_within(values: Array, counted: Mask) -> Array:
+def gradient_within_stretches(values: Array, counted: Mask) -> Array:
     """(m,) change from sample to sample, by central differences within each stretch; 0 for a sample that stands alone.
 
     Parameters
@@ -111,11 +112,11 @@ def slope_within(values: Array, counted: Mask) -> Array:
     values : (m,) at the samples that count
     counted : (n,) which samples of the record these are
     """
-    parts = parted(values, counted)
+    parts = split_at_gaps(values, counted)
     return np.concatenate([np.gradient(part) if part.size > 1 else np.zeros(part.size) for part in parts])
 
 
-def unbroken(counted: Mask, memory: int) -> Mask:
+def has_predecessors(counted: Mask, memory: int) -> Mask:
     """Which of the counted samples (m,), but for the first few, have as many predecessors in the same stretch.
 
     Parameters
@@ -132,20 +133,15 @@ def unbroken(counted: Mask, memory: int) -> Mask:
     return whole
 
 
-# ----------------------------------------------------------------------------------------------------
-# A control signal between its steps: where noise is all that it differs from a line by, it is that line.
-#
-# Noise of the recorded signal is none of the valve's, and a law that follows it steps in the force wherever the noise
-# turns. A level that is held and a ramp are lines; what is bent stays as it was recorded.
+# --- Steps of a control signal ---# Noise of the recorded signal is not the valve's, and a law that follows it steps in the force wherever the noise# turns. A constant level and a ramp are lines; what is curved stays as recorded.
 
-
-FEWEST = 10
+FEWEST_FOR_LINE = 10
 """Samples from which a stretch is held against a line."""
-BY_NOISE = 1.5
+LINE_TO_NOISE = 1.5
 """A stretch whose r.m.s. about its line is at most so many times the noise of a sample is that line."""
 
 
-def without_noise(values: Array) -> Array:
+def denoised_control(values: Array) -> Array:
     """A signal whose levels and ramps are free of noise.
 
     Parameters
@@ -158,14 +154,14 @@ def without_noise(values: Array) -> Array:
     """
     changes = np.diff(values)
     usual = np.median(changes) if changes.size else 0.0
-    scatter = USUAL * float(np.median(np.abs(changes - usual))) if changes.size else 0.0
+    scatter = MAD_TO_SIGMA * float(np.median(np.abs(changes - usual))) if changes.size else 0.0
     if scatter == 0.0:
         return values
     ends = np.flatnonzero(np.abs(changes - usual) > SUDDEN * scatter) + 1
     found = values.copy()
     for part in np.split(np.arange(values.size), ends):
-        if part.size >= FEWEST:
+        if part.size >= FEWEST_FOR_LINE:
             line = np.polyval(np.polyfit(part - part.mean(), values[part], 1), part - part.mean())
-            if np.sqrt(np.mean((values[part] - line) ** 2)) <= BY_NOISE * scatter / np.sqrt(2.0):
+            if np.sqrt(np.mean((values[part] - line) ** 2)) <= LINE_TO_NOISE * scatter / np.sqrt(2.0):
                 found[part] = line
     return found

@@ -1,9 +1,4 @@
-"""Noise and misfit of a record that does not repeat: a smooth model of its residual is misfit, the rest noise.
-
-Whatever the damper misses is a function of motion, force, voltage and time; a model with many smooth
-functions of them takes it up, and what is left is noise. Whether the model takes up more than noise
-would let it is Fisher's test on the whitened residual.
-"""
+"""Noise of a record: linear recursions, autoregressive models, and pure error between cycles that ought to be equal."""
 
 from __future__ import annotations
 
@@ -15,13 +10,64 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.compiled import compiled
-from pzd.record import Array, Complex, Mask, Record, sliced
-from pzd.signals.criterion import rms
-from pzd.signals.jumps import parted, slope_within, unbroken
+from pzd.record import Array, Complex
 
-# ----------------------------------------------------------------------------------------------------
-# Coloured noise as a short autoregressive model: its spectrum, its variance, and whitening by it.
+# --- Linear recursions: noise of first order, the warming of a lump, filters of any order ---
 
+_NEGLIGIBLE_SHARE = 1e-18
+
+
+def recursion(memory: float, inputs: Array) -> Array:
+    """What a first-order memory makes of its inputs.
+
+    Equation: y_i = m y_(i-1) + u_i, y_(-1) = 0, that is (1 + m B)(1 + m^2 B^2)(1 + m^4 B^4) ... u
+              Source: geometric series of the backward shift B, by doubling
+
+    Parameters
+    ----------
+    memory : m, from 0 to 1
+    inputs : (n,) u
+
+    Returns
+    -------
+    (n,) y
+    """
+    values = np.array(inputs, dtype=np.float64)
+    shift, share = 1, memory
+    while shift < values.size and share > _NEGLIGIBLE_SHARE:
+        values[shift:] += share * values[:-shift]
+        shift, share = 2 * shift, share * share
+    return values
+
+
+def all_pole(coefficients: Array, inputs: Array) -> Array:
+    """What a memory of any order makes of its inputs, column by column.
+
+    Equation: y_i = u_i - a_1 y_(i-1) - a_2 y_(i-2) - ..., at rest before the first
+
+    Parameters
+    ----------
+    coefficients : (order + 1,) 1, a_1, a_2, ...
+    inputs : (n, m) u
+
+    Returns
+    -------
+    (n, m) y
+    """
+    values = np.array(inputs, dtype=np.float64, order="C")
+    _recur(coefficients, values)
+    return values
+
+
+@compiled
+def _recur(coefficients: Array, values: Array) -> None:
+    for i in range(values.shape[0]):
+        for j in range(1, min(coefficients.size, i + 1)):
+            for n in range(values.shape[1]):
+                values[i, n] -= coefficients[j] * values[i - j, n]
+
+
+# --- Coloured noise as a short autoregressive model ---
 
 ORDER_MAX = 12
 """Longest model tried unless said otherwise: two poles each for sensor, amplifier and mains, and as many to spare."""
@@ -31,9 +77,8 @@ WITH_PREDECESSORS = 0.5
 """At least this share of the samples has as many predecessors in its stretch as the model has coefficients.
 
 Reason: the others say nothing of the last coefficients; not tuned."""
-FLOOR = 1e-12
+INNOVATION_FLOOR = 1e-12
 """Innovation variance is never below this share of the variance: rounding is no noise model."""
-
 MORE_WITH_WHITE = 4
 """Coefficients more that coloured noise takes together with white noise. Their sum is no autoregression of any length:
 one of the same length would be too quiet at low frequencies, where a gap is sought, by 28 % where each
@@ -140,7 +185,7 @@ def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autor
         reflection = 2.0 * sum(float(forward @ backward) for forward, backward in errors) / total
         a = np.append(a - reflection * a[::-1], reflection)
         variance *= 1.0 - reflection**2
-        if variance <= FLOOR * whole:
+        if variance <= INNOVATION_FLOOR * whole:
             break
         errors = [((f - reflection * b)[1:], (b - reflection * f)[:-1]) for f, b in errors]
         bic = count * np.log(variance) + order * np.log(count)
@@ -149,19 +194,13 @@ def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autor
     return best
 
 
-# ----------------------------------------------------------------------------------------------------
-# The noise of a record, apart from any model: what differs between cycles that ought to be equal.
-#
-# Adjacent cycles of a periodic test differ by noise alone, whatever the model misses: slow drift
-# cancels, repeatable misfit cancels. The noise is described by a short autoregressive model, and
-# at each harmonic of the test by the scatter of the differences themselves.
-
+# --- Pure error ---
 
 BAND_LIMIT = 0.4
 """Harmonics are judged up to this share of the sampling rate."""
-LOCAL = 16
+LOCAL_HARMONICS = 16
 """Fewest harmonics over which the local level of the noise is averaged."""
-COLOUR = 5.0
+LEAST_COLOUR = 5.0
 """Noise counts as at least so coloured (density at its peak over variance): a short record hides colour."""
 
 
@@ -217,11 +256,14 @@ def pure_error(folded: Array) -> PureError:
     shape = noise.density(np.arange(last + 1) / points) / points
     shape = np.where(shape > 0.0, shape, 1.0)
     own = np.mean(np.abs(steps) ** 2, axis=0) / 2.0 / shape
-    low, high = neighbours(last)
+    low, high = neighbouring_harmonics(last)
     total = np.concatenate([[0.0], np.cumsum(own)])
     local = (total[high + 1] - total[low]) / (high + 1 - low)
-    freedom = _with_shape(
-        np.asarray(_freedom(count) * (high + 1 - low), dtype=np.float64), shape * points, noise, differences.size
+    freedom = _freedom_with_shape(
+        np.asarray(_degrees_of_freedom(count) * (high + 1 - low), dtype=np.float64),
+        shape * points,
+        noise,
+        differences.size,
     )
     return PureError(
         count,
@@ -234,19 +276,19 @@ def pure_error(folded: Array) -> PureError:
     )
 
 
-def neighbours(last: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def neighbouring_harmonics(last: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """First and last harmonic, from 1 on, whose scatter describes the noise at each harmonic from 0 to the last.
 
     Those within a third of its number, and at least `LOCAL` of them where there are so many.
     """
     h = np.arange(last + 1)
-    reach = np.maximum(h // 3, LOCAL // 2)
-    low = np.clip(h - reach, 1, max(last - LOCAL + 1, 1))
-    high = np.clip(np.maximum(h + reach, low + LOCAL - 1), 1, last)
+    reach = np.maximum(h // 3, LOCAL_HARMONICS // 2)
+    low = np.clip(h - reach, 1, max(last - LOCAL_HARMONICS + 1, 1))
+    high = np.clip(np.maximum(h + reach, low + LOCAL_HARMONICS - 1), 1, last)
     return low, high
 
 
-def _freedom(count: int) -> float:
+def _degrees_of_freedom(count: int) -> float:
     """Degrees of freedom of the variance of a complex coefficient from adjacent differences of `count` cycles.
 
     Equation: nu = 4 (n - 1)^2 / (3 n - 4)                          Source: von Neumann 1941
@@ -254,7 +296,7 @@ def _freedom(count: int) -> float:
     return 4.0 * (count - 1) ** 2 / (3.0 * count - 4.0)
 
 
-def _with_shape(freedom: Array, density: Array, noise: Autoregression, samples: int) -> Array:
+def _freedom_with_shape(freedom: Array, density: Array, noise: Autoregression, samples: int) -> Array:
     """Degrees of freedom that also allow for the uncertain shape: few independent samples, little is known.
 
     Equation: 2 / nu = 2 / nu_local + (4 / n_eff) S_h / S_max, n_eff = n var / S_max; S_max at least `COLOUR` var
@@ -263,7 +305,7 @@ def _with_shape(freedom: Array, density: Array, noise: Autoregression, samples: 
     largest = float(density.max())
     if noise.variance <= 0.0 or largest <= 0.0:
         return freedom
-    independent = samples / max(largest / noise.variance, COLOUR)
+    independent = samples / max(largest / noise.variance, LEAST_COLOUR)
     total: Array = 2.0 / (2.0 / freedom + 4.0 / independent * density / largest)
     return total
 
@@ -283,188 +325,3 @@ def repeatable_power(error: PureError) -> Array:
     repeats = np.abs(error.mean) ** 2 - error.single / error.count
     power: Array = weights * (repeats - np.minimum(error.shared, np.maximum(repeats, 0.0)))
     return power
-
-
-# ----------------------------------------------------------------------------------------------------
-# Linear recursions: coloured noise and the warming of a lump are of first order, filters of any.
-
-
-_FORGOTTEN = 1e-18
-
-
-def recursion(memory: float, inputs: Array) -> Array:
-    """What a first-order memory makes of its inputs.
-
-    Equation: y_i = m y_(i-1) + u_i, y_(-1) = 0, that is (1 + m B)(1 + m^2 B^2)(1 + m^4 B^4) ... u
-              Source: geometric series of the backward shift B, by doubling
-
-    Parameters
-    ----------
-    memory : m, from 0 to 1
-    inputs : (n,) u
-
-    Returns
-    -------
-    (n,) y
-    """
-    values = np.array(inputs, dtype=np.float64)
-    shift, share = 1, memory
-    while shift < values.size and share > _FORGOTTEN:
-        values[shift:] += share * values[:-shift]
-        shift, share = 2 * shift, share * share
-    return values
-
-
-def all_pole(coefficients: Array, inputs: Array) -> Array:
-    """What a memory of any order makes of its inputs, column by column.
-
-    Equation: y_i = u_i - a_1 y_(i-1) - a_2 y_(i-2) - ..., at rest before the first
-
-    Parameters
-    ----------
-    coefficients : (order + 1,) 1, a_1, a_2, ...
-    inputs : (n, m) u
-
-    Returns
-    -------
-    (n, m) y
-    """
-    values = np.array(inputs, dtype=np.float64, order="C")
-    _recur(coefficients, values)
-    return values
-
-
-@compiled
-def _recur(coefficients: Array, values: Array) -> None:
-    for i in range(values.shape[0]):
-        for j in range(1, min(coefficients.size, i + 1)):
-            for n in range(values.shape[1]):
-                values[i, n] -= coefficients[j] * values[i - j, n]
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-HATS = 8
-"""Piecewise linear functions over each quantity."""
-ROUNDS = 3
-"""Rounds of fitting the model and the colour of what it leaves."""
-SINGULAR = 1e-9
-"""Combinations of terms smaller than this share of the largest are the same term twice."""
-LAGS = (0.005, 0.02, 0.08)
-"""Time constants with which the force may follow a moving voltage [s]."""
-SAMPLES_PER_TERM = 20
-"""Fewest samples for each term of the model; with fewer nothing is judged."""
-
-QUIETEST = 0.05
-"""No frequency is believed to be quieter than this share of the noise's mean density.
-
-Reason: a filter against aliasing takes nearly all noise away near half the sampling rate, but not from the simulated
-force, whose corners would then count there as misfit; not tuned."""
-
-
-@dataclass(frozen=True, eq=False)
-class SmoothResidual:
-    """A residual parted into what a smooth model of many terms explains, and noise."""
-
-    explained: Array
-    """(m,) [N]."""
-    spread: Array
-    """(m,) variance that noise alone gives to what is explained [N^2]."""
-    noise: Autoregression
-    """What is left."""
-    probability: float
-    """That noise alone lets the model explain so much."""
-
-
-def fit_smooth_residual(residual: Array, record: Record, predicted: Array, counted: Mask) -> SmoothResidual:
-    """The residual of a record that does not repeat, parted into misfit and noise.
-
-    Noise that wanders hides a level or a slow term: of a term that the samples hardly tell no more is explained than
-    they tell, each of p being expected to explain as much as any other.
-
-    Equation: F = ((RSS_0 - RSS) / p) / (RSS / (n - p)) on the whitened residual     Source: Aitken 1935, Fisher
-    Equation: a_i = t / (t + s_i^2) times its estimate, t = sum r^2 / p, s_i its standard error
-                                                                            Source: Hoerl and Kennard 1970
-
-    Parameters
-    ----------
-    residual : (m,) measured less predicted force, the test's nuisances taken off [N]
-    record : the motion, (n,)
-    predicted : (m,) force [N]
-    counted : (n,) which samples of the record these m are; what follows on one left out is not whitened by it
-    """
-    from scipy.special import fdtrc
-
-    terms = _terms(record, predicted, counted)
-    if residual.size < SAMPLES_PER_TERM * terms.shape[1]:
-        nothing = np.zeros(residual.size)
-        return SmoothResidual(nothing, nothing, autoregression([residual - residual.mean()]), 1.0)
-    basis = _orthonormal(terms)
-    explained = basis @ (basis.T @ residual)
-    expected = float(residual @ residual) / basis.shape[1]
-    for _ in range(ROUNDS):
-        noise = autoregression(parted(residual - explained, counted)).with_white(QUIETEST)
-        whole = unbroken(counted, noise.coefficients.size)
-        flat = noise.whitened(residual)[whole]
-        whitened = noise.whitened(basis)[whole]
-        _, sizes, right = np.linalg.svd(np.linalg.qr(whitened, mode="r"))
-        rank = int(np.count_nonzero(sizes > SINGULAR * sizes[0]))
-        taken = right[:rank] @ (whitened.T @ flat) / sizes[:rank]
-        known = sizes[:rank] ** 2 * expected
-        share = known / (known + 1.0) if noise.innovation > 0.0 else np.ones(rank)
-        to_samples = basis @ right[:rank].T * (share / sizes[:rank])
-        explained = to_samples @ taken
-    spread = np.sum(to_samples**2, axis=1) if noise.innovation > 0.0 else np.zeros(residual.size)
-    free = flat.size - rank - noise.coefficients.size
-    over = float(flat @ flat - taken @ taken)
-    # Of the white noise that QUIETEST puts beside coloured noise there may be none: then less is left than expected.
-    scale = max(over / free, 1.0 if noise.coefficients.size else 0.0)
-    ratio = float(taken @ taken) / rank / scale if over > 0.0 else np.inf
-    return SmoothResidual(explained, spread, noise, float(fdtrc(rank, free, ratio)))
-
-
-def _orthonormal(terms: Array) -> Array:
-    """(m, r) orthonormal: all that sums of some (m, p) terms can be, each of them once."""
-    basis, triangle = np.linalg.qr(terms)
-    left, sizes, _ = np.linalg.svd(triangle)
-    return np.asarray(basis @ left[:, sizes > SINGULAR * sizes[0]])
-
-
-def _terms(record: Record, predicted: Array, counted: Mask) -> Array:
-    """(m, p) smooth functions of motion, force, voltage and time, scaled to about one, without repeated columns."""
-    part = sliced(record, counted)
-    v, a = _scaled(part.velocity), _scaled(part.acceleration)
-    rate = _scaled(slope_within(predicted, counted))
-    columns = [
-        _hats(part.velocity),
-        _hats(part.displacement),
-        _hats(predicted),
-        np.column_stack([a, v * np.abs(v), a * np.sign(v), rate, np.abs(rate), _scaled(part.displacement) * v]),
-        _hats(part.time)[:, ::3],
-    ]
-    along = np.column_stack([np.sign(v), v])
-    if record.voltage is not None and part.voltage is not None and np.ptp(part.voltage) > 0.0:
-        columns.append(_hats(part.voltage)[:, ::2] * np.sign(v)[:, None])
-        columns += [_behind(record.voltage, tau * record.rate)[counted][:, None] * along for tau in LAGS]
-    return np.column_stack(columns)
-
-
-def _behind(voltage: Array, samples: float) -> Array:
-    """What a first-order lag of so many samples leaves between the voltage and itself."""
-    from scipy.signal import lfilter
-
-    share = 1.0 - np.exp(-1.0 / samples)
-    lagged, _ = lfilter([share], [1.0, share - 1.0], voltage, zi=[voltage[0] * (1.0 - share)])
-    return _scaled(voltage - lagged)
-
-
-def _scaled(values: Array) -> Array:
-    size = rms(values)
-    return values / size if size > 0.0 else values
-
-
-def _hats(values: Array) -> Array:
-    """(n, HATS) piecewise linear functions with nodes at even quantiles."""
-    nodes = np.unique(np.quantile(values, np.linspace(0.0, 1.0, HATS)))
-    return np.stack([np.interp(values, nodes, unit) for unit in np.eye(nodes.size)], axis=-1)

@@ -9,9 +9,10 @@ import pytest
 from fresh_truths import SENSORS_ALIKE, acceptance_test, published_rows, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
+from pzd.identification.bingham_fit import Objective, evolutionary_search, fit_evolutionary, fit_separable
+from pzd.identification.condition import identify_condition
 from pzd.identification.config import EvolutionaryConfig
-from pzd.identification.fit import fit_evolutionary, fit_separable, identify_condition, search
-from pzd.identification.prepared_record import Objective, trial_of
+from pzd.identification.prepared_record import prepare
 from pzd.record import Condition, Record
 
 NAMES = ("T0_N", "C_Ns_per_m", "k_N_per_m")
@@ -57,7 +58,7 @@ def test_with_noise_errors_stay_within_a_percent_and_intervals_hold_the_truth(
 @pytest.mark.parametrize("draw", range(2))
 def test_both_methods_reach_the_same_optimum(draw, noise, rng: np.random.Generator, seeds) -> None:
     _, records = acceptance_test(rng)
-    objective = Objective((trial_of(with_noise(records[0], rng, noise)),))
+    objective = Objective((prepare(with_noise(records[0], rng, noise)),))
     separable = fit_separable(objective)
     evolutionary = fit_evolutionary(objective, EvolutionaryConfig(), *seeds(1))
     assert evolutionary.criterion == pytest.approx(separable.criterion, rel=1e-6)
@@ -67,24 +68,24 @@ def test_both_methods_reach_the_same_optimum(draw, noise, rng: np.random.Generat
 @pytest.mark.parametrize("draw", range(2))
 def test_the_evolutionary_search_is_near_the_optimum_before_any_polish(draw, rng: np.random.Generator, seeds) -> None:
     _, records = acceptance_test(rng)
-    objective = Objective((trial_of(with_noise(records[0], rng)),))
-    found = search(objective, EvolutionaryConfig(), *seeds(1))
+    objective = Objective((prepare(with_noise(records[0], rng)),))
+    found = evolutionary_search(objective, EvolutionaryConfig(), *seeds(1))
     assert objective.criterion(found) <= 1.05 * fit_separable(objective).criterion
 
 
 def test_the_evolutionary_search_repeats_itself_for_the_same_seed(rng: np.random.Generator) -> None:
     _, records = acceptance_test(rng)
-    objective = Objective((trial_of(records[0]),))
+    objective = Objective((prepare(records[0]),))
     config = EvolutionaryConfig(generations=5)
-    assert search(objective, config, 7) == search(objective, config, 7)
-    assert search(objective, config, 7) != search(objective, config, 8)
+    assert evolutionary_search(objective, config, 7) == evolutionary_search(objective, config, 7)
+    assert evolutionary_search(objective, config, 7) != evolutionary_search(objective, config, 8)
 
 
 @pytest.mark.parametrize("draw", range(3))
 def test_the_optimum_does_not_depend_on_which_start_was_followed(draw, rng: np.random.Generator) -> None:
     truth, records = acceptance_test(rng)
     fitted = row_for([with_noise(records[0], rng)])
-    objective = Objective((trial_of(records[0]),))
+    objective = Objective((prepare(records[0]),))
     assert objective.criterion(truth) < 1e-9
     for name, true in zip(NAMES, truth, strict=True):
         assert getattr(fitted, name) == pytest.approx(true, rel=0.03)

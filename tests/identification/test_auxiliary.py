@@ -11,9 +11,9 @@ import pytest
 from fresh_truths import TABLE_2, moving_test, sine_test, with_noise
 
 from pzd.artefacts import AuxiliaryRow, Identified, ParameterRow, Rig, base_of
+from pzd.identification.bingham_fit import Bingham, fit_separable
+from pzd.identification.condition import fit_with_auxiliary, identify_condition
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.fit import fit_separable, fit_with_auxiliary, identify_condition
-from pzd.identification.prepared_record import Bingham
 from pzd.identification.stage import identify
 from pzd.quantities import Control
 from pzd.record import Condition, Record

@@ -15,8 +15,8 @@ from pzd.damper.compose import respond
 from pzd.damper.element import element_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.identification.prepared_record import Bingham
-from pzd.identification.tests_over_time import characteristics
+from pzd.identification.bingham_fit import Bingham
+from pzd.identification.characteristics import characteristics
 from pzd.quantities import Control
 from pzd.record import Array, Record, conditions
 from pzd.schema.errors import DataError

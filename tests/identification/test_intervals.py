@@ -11,11 +11,12 @@ from campaigns import CYCLES, campaign
 from fresh_truths import SENSORS_ALIKE, TABLE_2, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
+from pzd.identification.bingham_fit import Bingham
+from pzd.identification.condition import fit_with_auxiliary, identify_condition
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.fit import fit_with_auxiliary, identify_condition
 from pzd.identification.intervals import half_widths, uncertainty
-from pzd.identification.prepared_record import Bingham, Part, parts_of
-from pzd.identification.trust import VISIBLE, Misfit, misfit_of
+from pzd.identification.prepared_record import FittedRecord, fitted_records
+from pzd.identification.trust import MISFIT_THRESHOLD, Misfit, misfit_of
 from pzd.record import Array, Condition, Record
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -33,10 +34,12 @@ def held(row: ParameterRow, truth: Bingham) -> int:
     )
 
 
-def parts_for(records: Sequence[Record], config: IdentifyConfig) -> tuple[tuple[Part, ...], Array]:
+def parts_for(records: Sequence[Record], config: IdentifyConfig) -> tuple[tuple[FittedRecord, ...], Array]:
     """The parts of a fit, and its estimate."""
     objective, fit, _ = fit_with_auxiliary(records, config, seed=1)
-    return parts_of(records, objective.trials, (fit.residuals, fit.slopes), config.nuisance), np.array(fit.parameters)
+    return fitted_records(records, objective.trials, (fit.residuals, fit.slopes), config.nuisance), np.array(
+        fit.parameters
+    )
 
 
 def relative_widths(records: Sequence[Record], config: IdentifyConfig) -> Array:
@@ -148,7 +151,7 @@ def test_a_misfit_too_small_to_speak_widens_the_interval(rng: np.random.Generato
     bent = [replace(r, force=r.force + 300.0 * r.velocity * np.abs(r.velocity)) for r in records]
     parts, _ = parts_for(bent, IdentifyConfig())
     misfit = misfit_of(parts)
-    assert 0.0 < misfit.share < VISIBLE
+    assert 0.0 < misfit.share < MISFIT_THRESHOLD
     assert np.all(half_widths(parts, misfit) > 1.05 * half_widths(parts, Misfit(0.0, 0.0)))
 
 

@@ -10,10 +10,11 @@ from campaigns import ROWS, campaign
 from fresh_truths import sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
+from pzd.identification.bingham_fit import Objective, fit_separable
+from pzd.identification.condition import identify_condition
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.fit import fit_separable, identify_condition
-from pzd.identification.prepared_record import Objective, parts_of, trial_of
-from pzd.identification.trust import VISIBLE, Misfit, misfit_of
+from pzd.identification.prepared_record import fitted_records, prepare
+from pzd.identification.trust import MISFIT_THRESHOLD, Misfit, misfit_of
 from pzd.record import Condition, Record
 
 QUICKSTART = ((1.0, 0.01), (1.0, 0.03), (2.0, 0.01), (2.0, 0.03))
@@ -35,9 +36,9 @@ def row_for(records: list[Record]) -> ParameterRow:
 
 def misfit_for(records: tuple[Record, ...]) -> Misfit:
     """What the element alone misses, nothing carried beside it."""
-    objective = Objective(tuple(trial_of(record) for record in records))
+    objective = Objective(tuple(prepare(record) for record in records))
     fit = fit_separable(objective)
-    return misfit_of(parts_of(records, objective.trials, (fit.residuals, fit.slopes), IdentifyConfig().nuisance))
+    return misfit_of(fitted_records(records, objective.trials, (fit.residuals, fit.slopes), IdentifyConfig().nuisance))
 
 
 def test_a_hidden_orifice_makes_the_parameters_the_model_s_and_not_the_damper_s(rng: np.random.Generator) -> None:
@@ -64,7 +65,7 @@ def test_noise_alone_seldom_speaks(rng: np.random.Generator) -> None:
 
 def test_a_misfit_that_the_class_of_the_load_cell_may_cause_does_not_speak(rng: np.random.Generator) -> None:
     small = misfit_for(tuple(sines(hidden=0.1 * ORIFICE, noise=0.0005, rng=rng)))
-    assert 0.0 < small.share < VISIBLE
+    assert 0.0 < small.share < MISFIT_THRESHOLD
     assert not small.is_large
     assert row_for(sines(hidden=0.1 * ORIFICE, noise=0.0005, rng=rng)).status == "ok"
 

@@ -7,9 +7,9 @@ import pytest
 from fresh_truths import TABLE_2, moving_test, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow, Rig
+from pzd.identification.bingham_fit import Bingham
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.moving_voltage import dwelled_levels, nodes_of, weights
-from pzd.identification.prepared_record import Bingham
+from pzd.identification.moving_voltage import dwell_levels, node_weights, voltage_nodes
 from pzd.identification.stage import identify
 from pzd.record import Array, Record
 from pzd.schema.errors import ConfigError
@@ -102,15 +102,15 @@ def test_nodes_too_close_together_are_refused() -> None:
 def test_levels_are_where_the_voltage_dwells() -> None:
     time = np.arange(20000) / 1000.0
     staircase = np.select([time < 5.0, time < 9.0, time < 15.0], [20.0, 60.0, 140.0], 100.0)
-    assert sorted(dwelled_levels(staircase, 3.0)) == [20.0, 60.0, 100.0, 140.0]
-    low, high = sorted(dwelled_levels(ramp(time), 3.0))
+    assert sorted(dwell_levels(staircase, 3.0)) == [20.0, 60.0, 100.0, 140.0]
+    low, high = sorted(dwell_levels(ramp(time), 3.0))
     assert (low, high) == pytest.approx((0.0, 150.0), abs=0.1)
 
 
 def test_two_constant_voltages_are_the_nodes_whatever_moves() -> None:
-    np.testing.assert_array_equal(nodes_of([moving_test(ramp)], [140.0, 20.0], None, 150.0), [20.0, 140.0])
+    np.testing.assert_array_equal(voltage_nodes([moving_test(ramp)], [140.0, 20.0], None, 150.0), [20.0, 140.0])
 
 
 def test_weights_sum_to_one_and_are_held_beyond_the_ends() -> None:
-    shares = weights(np.array([0.0, 50.0, 150.0]), np.array([-10.0, 25.0, 100.0, 200.0]))
+    shares = node_weights(np.array([0.0, 50.0, 150.0]), np.array([-10.0, 25.0, 100.0, 200.0]))
     np.testing.assert_allclose(shares, [[1, 0, 0], [0.5, 0.5, 0], [0, 0.5, 0.5], [0, 0, 1]])

@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from pzd.artefacts import MeasureRow
 from pzd.damper.element import element_force
-from pzd.identification.tests_over_time import measures
+from pzd.identification.strokes_and_loops import measures
 from pzd.record import Array, Record
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics

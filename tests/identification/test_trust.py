@@ -9,10 +9,11 @@ import pytest
 from fresh_truths import SENSORS_ALIKE, TABLE_2, acceptance_test, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
+from pzd.identification.bingham_fit import Bingham, Objective, fit_evolutionary, fit_separable
+from pzd.identification.condition import identify_condition
 from pzd.identification.config import EvolutionaryConfig, IdentifyConfig
-from pzd.identification.fit import fit_evolutionary, fit_separable, identify_condition
-from pzd.identification.prepared_record import Bingham, Objective, trial_of
-from pzd.identification.trust import ParameterEvidence, displacement_noise, trust_of, visible_shares
+from pzd.identification.prepared_record import prepare
+from pzd.identification.trust import ParameterEvidence, displacement_noise, partial_sensitivities, trust_of
 from pzd.record import Condition, Record
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -40,7 +41,7 @@ def test_a_damper_that_never_slips_shows_neither_friction_nor_damping() -> None:
 
 def test_a_tare_of_the_load_cell_is_not_explained_by_an_element_that_never_slips() -> None:
     record = sine_test(Bingham(50.0, 1000.0, 4e5), 2.0, 0.01)
-    tared = Objective((trial_of(replace(record, force=record.force + 600.0)),))
+    tared = Objective((prepare(replace(record, force=record.force + 600.0)),))
     for fit in (fit_separable(tared), fit_evolutionary(tared, EvolutionaryConfig(), seed=1)):
         assert fit.parameters.friction < 0.5 * fit.parameters.stiffness * np.ptp(record.displacement)
     assert row_for(replace(record, force=record.force + 600.0)).status != "ok"
@@ -104,8 +105,8 @@ def test_what_the_sensors_leave_open_is_weak_and_never_undetermined(rng: np.rand
 def test_linearly_dependent_slopes_are_invisible(rng: np.random.Generator) -> None:
     base = rng.standard_normal((100, 2))
     slopes = np.column_stack([base, base @ [1.0, 2.0]])
-    np.testing.assert_allclose(visible_shares(slopes, np.ones(3), 100.0), 0.0, atol=1e-7)
-    assert np.all(visible_shares(base, np.ones(2), 100.0) > 0.5)
+    np.testing.assert_allclose(partial_sensitivities(slopes, np.ones(3), 100.0), 0.0, atol=1e-7)
+    assert np.all(partial_sensitivities(base, np.ones(2), 100.0) > 0.5)
 
 
 def test_undetermined_and_weak_stand_in_one_status() -> None:

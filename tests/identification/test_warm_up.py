@@ -11,7 +11,7 @@ from fresh_truths import TABLE_2, sine_test
 
 from pzd.artefacts.characteristics import Characteristics, WarmUpRow, courses
 from pzd.cli.text_tables import characteristics_tables
-from pzd.identification.tests_over_time import characteristics
+from pzd.identification.characteristics import characteristics
 from pzd.pipeline.run_summary import RunSummary
 from pzd.quantities import Control
 from pzd.record import Record, conditions

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pzd.damper.element import element_force
-from pzd.signals.cycles import POINTS, averaged, cycles, settled
+from pzd.signals.cycles import COMPARED_POINTS, cycles, decimated_means, settled_cycles
 
 SIGMAS = 4.0
 NOT_SEEN = 0.002
@@ -73,7 +73,7 @@ def test_run_lies_in_the_steady_part(tests: list[Test]) -> None:
         assert run is not None
         inside = run.inside(test.time)
         departure = np.abs(test.clean - test.continued)[inside]
-        averaged_noise = test.noise / np.sqrt(max(run.points(test.time) / POINTS, 1.0))
+        averaged_noise = test.noise / np.sqrt(max(run.points(test.time) / COMPARED_POINTS, 1.0))
         seen = NOT_SEEN * np.ptp(test.continued) + 8.0 * averaged_noise
         outside = np.abs(test.time[inside] - 0.5 * (test.begin + test.end)) > 0.5 * test.count * test.period
         # what departs so that it can be told from noise is at most the half of the neighbours compared
@@ -121,7 +121,7 @@ def test_cycle_in_which_the_oil_spring_is_wound_up_is_left_out(rng: np.random.Ge
         force = force_of(test.clean, test.time[1] - test.time[0])
         run = cycles(test.time, test.displacement)
         assert run is not None
-        kept = settled(run, test.time, noisy(force, rng))
+        kept = settled_cycles(run, test.time, noisy(force, rng))
         assert kept.count >= max(run.count - 1, 2)
         left_out += run.count - kept.count
         if run.count > 2:
@@ -141,13 +141,13 @@ def test_force_that_repeats_from_the_first_cycle_on_loses_none(rng: np.random.Ge
         run = cycles(time, test.displacement[cut])
         assert run is not None
         warming = 1.0 - 0.05 * (time - time[0]) / (time[-1] - time[0])
-        assert settled(run, time, force[cut] * warming) == run
+        assert settled_cycles(run, time, force[cut] * warming) == run
 
 
 def test_averages_keep_both_ends_and_a_line_as_it_is() -> None:
     for count in (999, 1000, 1037):
         time = np.arange(count) * 1e-3
-        at, values = averaged(time, 3.0 + 2.0 * time, 0.5, POINTS)
+        at, values = decimated_means(time, 3.0 + 2.0 * time, 0.5, COMPARED_POINTS)
         assert at[0] == time[0]
         assert at[-1] == time[-1]
         assert values == pytest.approx(3.0 + 2.0 * at, abs=1e-12)

@@ -10,7 +10,7 @@ from numpy.random import Generator
 from scipy.signal import lfilter
 
 from pzd.record import Array, Record
-from pzd.signals.noise import fit_smooth_residual
+from pzd.signals.lack_of_fit import fit_smooth_residual
 
 RATE, DURATION, DRAWS = 500.0, 12.0, 80
 SIZE = 20.0

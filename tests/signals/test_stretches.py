@@ -13,7 +13,7 @@ from pzd.diagnosis.data import prepare, split
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.record import Array, Record
-from pzd.signals.stretches import separate_tests, steps
+from pzd.signals.segmentation import separate_tests, steps_between_tests
 
 TRUTH = (400.0, 2500.0, 4e5)
 
@@ -37,7 +37,7 @@ def test_a_step_of_speed_or_amplitude_parts_two_tests(kind: str, rng: Generator)
 @pytest.mark.parametrize("kind", NO_STEPS)
 def test_what_changes_from_cycle_to_cycle_is_one_test(kind: str, rng: Generator) -> None:
     whole = record(NO_STEPS[kind], rng)
-    assert steps(whole.time, whole.displacement) == ()
+    assert steps_between_tests(whole.time, whole.displacement) == ()
     assert separate_tests(whole) == (whole,)
 
 

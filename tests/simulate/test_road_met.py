@@ -10,7 +10,7 @@ import pytest
 from simulate_dampers import table_of
 
 from pzd.comfort.weighting import weighted
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 from pzd.simulate.config import KM_PER_H, SensorNoise, SimulateConfig
 from pzd.simulate.control.prediction.planning import predictor_of
 from pzd.simulate.control.prediction.plant import OBSERVATIONS, Predictor

@@ -13,7 +13,7 @@ from pzd.paper.figures.numbered import Drawing, PaperFigure
 from pzd.paper.figures.sources import Condition, FigureData, Sine, Test
 from pzd.paper.published import LARGE_GAP, TABLES, Loop, loop_of, published, table_damper
 from pzd.record import Array
-from pzd.signals.criterion import criterion
+from pzd.signals.measures import criterion
 
 # ----------------------------------------------------------------------------------------------------
 

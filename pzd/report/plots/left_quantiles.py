@@ -11,7 +11,7 @@ from pzd.report.blocks import number
 from pzd.report.context import ReportContext
 from pzd.report.drawing import BASELINE, FINAL, MEASURED, Panel, Plot, axes, legend
 from pzd.report.gaps import begun
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 
 _POINTS = 120
 """Quantiles that are drawn."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.artefacts import ParameterRow
+from pzd.identification.condition import identify_condition
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.fit import identify_condition
 from pzd.quantities import DAMPING, FRICTION, STIFFNESS
 from pzd.record import Condition, Record, is_constant, voltage_scale
 from pzd.report.blocks import unit_of

@@ -34,7 +34,7 @@ from pzd.rig.files.sniffing import (
 )
 from pzd.schema.errors import DataError, UserError, at
 from pzd.schema.yamltree import written
-from pzd.signals.smoothing import work
+from pzd.signals.measures import work
 
 # ----------------------------------------------------------------------------------------------------
 # Which layout fits a rig file: the file has its columns, and what is read by it is accepted.

@@ -14,7 +14,7 @@ from pzd.record import Array, clock_fault
 from pzd.rig.files.channels import COMPRESSION, Freed, Test
 from pzd.rig.files.layout import Layout
 from pzd.schema.errors import DataError
-from pzd.signals.smoothing import REVERSAL_SHARE, reversals, work, work_of_chance
+from pzd.signals.measures import REVERSAL_SHARE, chance_work, reversals, work
 
 # ----------------------------------------------------------------------------------------------------
 # The work that a test does on the damper: over a whole test it is positive, or a sign is wrong.
@@ -31,7 +31,7 @@ def works_on_the_rig(freed: Freed) -> bool:
     may do it by its noise.
     """
     x, force = freed.displacement, freed.force
-    chance = work_of_chance(x, force)
+    chance = chance_work(x, force)
     return work(x, force) < -chance and work(x, force - force.mean()) < -chance
 
 

@@ -20,7 +20,7 @@ from pzd.parallel.processes import parallel_map
 from pzd.quantities import DISPLACEMENT, FORCE, PRESSURE, TEMPERATURE, Control
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array, Record
 from pzd.rig.config import Limits
-from pzd.signals.cycles import Cycles, remember
+from pzd.signals.cycles import Cycles, remember_cycles
 from pzd.signals.kinematics import Kinematics
 
 
@@ -99,7 +99,7 @@ def examined(tests: Sequence[Callable[[], Measured]], jobs: int, preflight: bool
 
     found = parallel_map(listed, tests, jobs)
     for record, run, _, _ in found:
-        remember(record, run)
+        remember_cycles(record, run)
     entries = tuple(entry for _, _, entry, _ in found)
     for module in checks().values():
         entries = module.compared(entries) if hasattr(module, "compared") else entries

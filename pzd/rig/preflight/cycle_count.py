@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import Measured
-from pzd.signals.smoothing import reversals
+from pzd.signals.measures import reversals
 
 ENOUGH = 3.0
 """Cycles from which their scatter says something about the noise."""

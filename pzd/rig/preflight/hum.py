@@ -7,7 +7,7 @@ import numpy as np
 from pzd.artefacts import Finding
 from pzd.record import Array, is_constant, voltage_scale
 from pzd.rig.preflight import Measured
-from pzd.signals.harmonics import LEAST_RATE, MAINS, lines
+from pzd.signals.harmonics import LEAST_RATE, MAINS, line_amplitudes
 
 SHARE = 0.002
 """Smallest amplitude that is said, as a share of half the range."""
@@ -25,8 +25,8 @@ def check(test: Measured) -> list[Finding]:
         least = SHARE * (0.5 * float(np.ptp(channel.values)) + LABEL_SHARE * (channel.least or 0.0))
         left = _left_by_cycles(test, channel.values)
         wanted = [mains for mains in MAINS if test.record.rate >= LEAST_RATE * mains]
-        whole = lines(channel.values, test.record.rate, wanted, test.run.frequency if test.run else 0.0)
-        beside = lines(left, test.record.rate, wanted, 0.0)
+        whole = line_amplitudes(channel.values, test.record.rate, wanted, test.run.frequency if test.run else 0.0)
+        beside = line_amplitudes(left, test.record.rate, wanted, 0.0)
         for mains, of_whole, of_left in zip(wanted, whole, beside, strict=True):
             amplitude = of_whole or of_left
             if amplitude > least:

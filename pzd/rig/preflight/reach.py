@@ -6,7 +6,7 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import Measured
-from pzd.signals.period import moving
+from pzd.signals.period import moving_range
 
 RESTS = 0.1
 """Share of a record at rest, before and after the motion, that is said."""
@@ -36,7 +36,7 @@ def check(test: Measured) -> list[Finding]:
         for what, value, limit, unit in reached
         if limit is not None and value > (1.0 + MARGIN) * limit
     ]
-    first, last = moving(record.displacement)
+    first, last = moving_range(record.displacement)
     rest = 1.0 - (last - first + 1) / record.time.size
     if rest > RESTS:
         found.append(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import Measured
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 
 GAIN = 0.03
 """Deviation of the ratio of both speeds from one that is said."""

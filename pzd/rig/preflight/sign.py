@@ -6,13 +6,13 @@ import numpy as np
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import Measured
-from pzd.signals.smoothing import work, work_of_chance
+from pzd.signals.measures import chance_work, work
 
 
 def check(test: Measured) -> list[Finding]:
     """Cycles with negative work, and a record whose steady force outweighs its loops."""
     record = test.record
-    if work(record.displacement, record.force) < -work_of_chance(record.displacement, record.force):
+    if work(record.displacement, record.force) < -chance_work(record.displacement, record.force):
         return [
             Finding(
                 check="sign",
@@ -28,7 +28,7 @@ def check(test: Measured) -> list[Finding]:
     # Each cycle is closed: left open, a small stroke's noise keeps its ends apart, and the force would do work there.
     cycles = [number == k for k in range(test.run.count)]
     works = np.array([work(record.displacement[rows], record.force[rows], closed=True) for rows in cycles])
-    negative = np.flatnonzero(works < -work_of_chance(record.displacement, record.force, cycles=1.0))
+    negative = np.flatnonzero(works < -chance_work(record.displacement, record.force, cycles=1.0))
     if negative.size == 0:
         return []
     first = test.run.start + float(negative[0]) * test.run.period

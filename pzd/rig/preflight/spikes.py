@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.artefacts import Finding
-from pzd.record import from_neighbours, glitches
+from pzd.record import deviation_from_median, glitches
 from pzd.rig.preflight import Measured
 from pzd.schema.errors import counted
 
@@ -17,7 +17,7 @@ def check(test: Measured) -> list[Finding]:
     """Samples of a channel that jump away from their neighbours and back."""
     found: list[Finding] = []
     for channel in test.channels():
-        away = from_neighbours(channel.values)
+        away = deviation_from_median(channel.values)
         deviation, rows = np.abs(away), glitches(channel.values, away)
         if channel.least is None:
             rows = rows[(rows >= EDGE) & (rows < deviation.size - EDGE)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pzd.artefacts import Finding
 from pzd.rig.preflight import Measured
-from pzd.signals.stretches import Stretch, steps
+from pzd.signals.segmentation import Segment, steps_between_tests
 
 
 def check(test: Measured) -> list[Finding]:
@@ -18,9 +18,9 @@ def check(test: Measured) -> list[Finding]:
             follows="two tests in one record, identified and diagnosed apart; for two records label each in a column of"
             " its own, and say split: {column: ...}",
         )
-        for old, new in steps(test.record.time, test.clean.displacement)
+        for old, new in steps_between_tests(test.record.time, test.clean.displacement)
     ]
 
 
-def _in_words(stretch: Stretch) -> str:
+def _in_words(stretch: Segment) -> str:
     return f"{1e3 * stretch.amplitude:.3g} mm at {1.0 / stretch.period:.3g} Hz"

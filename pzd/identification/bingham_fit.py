@@ -1,54 +1,186 @@
-"""One condition: the fit by the method named, its intervals, and the row that says what to believe."""
+"""Least-squares fit of T0, C and k to the records of one condition by criterion (4)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.artefacts import AuxiliaryRow, ParameterRow
-from pzd.damper.element import element_force
-from pzd.identification.auxiliary import Auxiliary, auxiliary_of, relieved, remainder, rough_values, worth_fitting
-from pzd.identification.config import EvolutionaryConfig, IdentifyConfig
-from pzd.identification.intervals import half_widths, uncertainty
-from pzd.identification.prepared_record import (
-    LARGEST_PRE_SLIP,
-    Bingham,
-    Fit,
-    Objective,
-    Trial,
-    from_search,
-    parts_of,
-    search_slopes,
-    to_search,
-    trial_of,
-)
-from pzd.identification.trust import (
-    ParameterEvidence,
-    evidence_of,
-    misfit_of,
-    scales_of,
-    stationarity,
-    trust_of,
-    visible_shares,
-)
-from pzd.record import Array, Condition, Record
-from pzd.signals.criterion import criterion, rms
-from pzd.signals.stretches import separate_tests
+from pzd.damper.element import element_force, element_force_sensitivities
+from pzd.identification.config import EvolutionaryConfig
+from pzd.identification.prepared_record import PreparedRecord
+from pzd.record import Array
 
-# ----------------------------------------------------------------------------------------------------
-# Starting values read off the dissipative characteristic, as the paper's first stage does.
+# --- Criterion ---
+
+LARGEST_PRE_SLIP = 0.45
+"""Largest pre-slip deflection T0/k of the search, as a share of the range of displacement."""
+AT_BOUND = 1e-3
+"""A parameter within this share of a bound, in search coordinates, lies at it."""
 
 
-FLANK = 0.3
+class Bingham(NamedTuple):
+    """The three parameters of the element, or one number for each of them."""
+
+    friction: float
+    damping: float
+    stiffness: float
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """What both methods minimise: criterion (4) pooled over the counted samples of the trials."""
+
+    trials: tuple[PreparedRecord, ...]
+    basis: Array | None = None
+    """(N, q) orthonormal forces beside the element whose best multiples are solved inside, by variable projection."""
+
+    @cached_property
+    def measured(self) -> Array:
+        """(N,) measured force at the counted samples, trial by trial [N]."""
+        return np.concatenate([t.force[t.counted] for t in self.trials])
+
+    @cached_property
+    def energy(self) -> float:
+        """Denominator of the criterion [N2]."""
+        return float(self.measured @ self.measured)
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Counted samples of each trial."""
+        return tuple(int(np.count_nonzero(t.counted)) for t in self.trials)
+
+    def simulated(self, parameters: Bingham) -> Array:
+        """(N,) force of the element [N]."""
+        return np.concatenate(
+            [
+                t.met(element_force(t.displacement, t.step, *parameters, float(t.force[0]), every=t.every))
+                for t in self.trials
+            ]
+        )
+
+    def residuals(self, parameters: Bingham) -> Array:
+        """(N,) measured less simulated force, the forces beside the element at their best [N]."""
+        return self._projected(self.measured - self.simulated(parameters))
+
+    def residuals_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
+        """(N,) residuals and (N, 3) what T0, C and k do to the force that nothing beside the element makes up."""
+        simulated, slopes = self.simulated_and_slopes(parameters)
+        return self._projected(self.measured - simulated), self._projected(slopes)
+
+    def simulated_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
+        """(N,) force of the element and (N, 3) its derivatives by T0, C and k."""
+        forces, slopes = [], []
+        for t in self.trials:
+            force, slope = element_force_sensitivities(
+                t.displacement, t.step, *parameters, float(t.force[0]), every=t.every
+            )
+            forces.append(t.met(force))
+            slopes.append(t.met(slope))
+        return np.concatenate(forces), np.concatenate(slopes)
+
+    def _projected(self, values: Array) -> Array:
+        """What of (N,) or (N, p) forces the basis cannot make up.
+
+        Equation: (I - Q Q') r                      Source: Golub and Pereyra 1973, variable projection
+        """
+        return values if self.basis is None else values - self.basis @ (self.basis.T @ values)
+
+    def criterion(self, parameters: Bingham) -> float:
+        """W_s at the parameters."""
+        residuals = self.residuals(parameters)
+        return float(residuals @ residuals) / self.energy
+
+    @cached_property
+    def scales(self) -> tuple[float, float, float]:
+        """Peak force [N], peak speed [m/s] and range of displacement [m] over the trials."""
+        speed = max(float(np.max(np.abs(np.diff(t.displacement)))) / t.step for t in self.trials)
+        stroke = max(float(np.ptp(t.displacement)) for t in self.trials)
+        return float(np.max(np.abs(self.measured))), speed, stroke
+
+    @cached_property
+    def bounds(self) -> tuple[Bingham, Bingham]:
+        """Smallest and largest parameters worth a look, from the data's own scales.
+
+        T0 up to the peak force; C from 1e-4 to 1e2 of peak force over peak speed; k from 0.1 to
+        1e4 of peak force over the range of displacement.
+        """
+        force, speed, stroke = self.scales
+        return (
+            Bingham(0.0, 1e-4 * force / speed, 0.1 * force / stroke),
+            Bingham(force, 1e2 * force / speed, 1e4 * force / stroke),
+        )
+
+    @cached_property
+    def search_bounds(self) -> tuple[Array, Array]:
+        """(3,) bounds of what least squares searches."""
+        low, high = self.bounds
+        return (
+            np.array([0.0, np.log(low.damping), np.log(low.stiffness)]),
+            np.array([LARGEST_PRE_SLIP, np.log(high.damping), np.log(high.stiffness)]),
+        )
+
+    def slips(self, parameters: Bingham) -> bool:
+        """Whether the element slips within every full stroke: else F(0) would act as a free offset for ever."""
+        return parameters.friction <= LARGEST_PRE_SLIP * parameters.stiffness * self.scales[2]
+
+    def at_bounds(self, parameters: Bingham) -> tuple[bool, ...]:
+        """Whether each parameter lies at a bound of the search; a friction of zero does not."""
+        low, high = self.search_bounds
+        x = to_search(parameters, self.scales[2])
+        beyond = x >= high - AT_BOUND * np.abs(high)
+        below = x <= low + AT_BOUND * np.abs(low)
+        return bool(beyond[0]), bool(beyond[1] or below[1]), bool(beyond[2] or below[2])
+
+    def clipped(self, parameters: Bingham) -> Bingham:
+        """The parameters, brought inside the bounds."""
+        stroke = self.scales[2]
+        return from_search(np.clip(to_search(parameters, stroke), *self.search_bounds), stroke)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An optimum of the criterion."""
+
+    parameters: Bingham
+    criterion: float
+    residuals: Array
+    """(N,) measured less simulated force at the counted samples [N]."""
+    slopes: Array
+    """(N, 3) derivatives of the simulated force by T0, C and k."""
+
+
+def to_search(parameters: Bingham, stroke: float) -> Array:
+    """(3,) what least squares searches: pre-slip T0/k as a share of the stroke, the logarithms of C and k."""
+    friction, damping, stiffness = parameters
+    return np.array([friction / (stiffness * stroke), np.log(damping), np.log(stiffness)])
+
+
+def from_search(x: Array, stroke: float) -> Bingham:
+    """The parameters from what least squares searches."""
+    stiffness = float(np.exp(x[2]))
+    return Bingham(float(x[0]) * stiffness * stroke, float(np.exp(x[1])), stiffness)
+
+
+def search_slopes(parameters: Bingham, stroke: float) -> Array:
+    """(3, 3) derivatives of T0, C, k (rows) by what least squares searches (columns)."""
+    friction, damping, stiffness = parameters
+    return np.array([[stiffness * stroke, 0.0, friction], [0.0, damping, 0.0], [0.0, 0.0, stiffness]])
+
+
+# --- Start ---
+
+FLANK_SPEED = 0.3
 """The slip flank is read where the speed falls and still exceeds this share of its peak: there it surely slips."""
-PRE_SLIP = 0.5
+PRE_SLIP_FORCE = 0.5
 """The pre-slip branch is read where abs(F) stays below this share of the force at the foot of the flank."""
 
 
-def graphical_start(trials: Sequence[Trial]) -> Bingham:
+def graphical_start(trials: Sequence[PreparedRecord]) -> Bingham:
     """Starting values of T0, C and k from the characteristic of force over speed.
 
     Equation: abs(F) = T0 + C (abs(v) - tau d abs(v)/dt) on the slip flank; k = dF/dx before slip
@@ -76,7 +208,7 @@ def graphical_start(trials: Sequence[Trial]) -> Bingham:
     return Bingham(friction, float(damping), _pre_slip_slope(trials, friction))
 
 
-def _flank(trials: Sequence[Trial]) -> tuple[Array, Array, Array]:
+def _flank(trials: Sequence[PreparedRecord]) -> tuple[Array, Array, Array]:
     """Speed, its rate of fall, and force along the direction of motion, on the slip flank."""
     parts = []
     for t in trials:
@@ -85,19 +217,19 @@ def _flank(trials: Sequence[Trial]) -> tuple[Array, Array, Array]:
         speed = np.abs(velocity)
         slowing = -np.gradient(speed, step)
         along = t.force * np.sign(velocity)
-        flank = t.counted & (speed > FLANK * np.max(speed)) & (slowing >= 0.0) & (along > 0.0)
+        flank = t.counted & (speed > FLANK_SPEED * np.max(speed)) & (slowing >= 0.0) & (along > 0.0)
         parts.append(np.stack([speed[flank], slowing[flank], along[flank]]))
     speed, slowing, along = np.concatenate(parts, axis=1)
     return speed, slowing, along
 
 
-def _pre_slip_slope(trials: Sequence[Trial], friction: float) -> float:
+def _pre_slip_slope(trials: Sequence[PreparedRecord], friction: float) -> float:
     """Slope of force over displacement where the force passes through zero, pooled over all passages."""
     covariance = variance = 0.0
     for t in trials:
         displacement = t.at_samples(t.displacement)[t.counted]
         force = t.force[t.counted]
-        for part in _runs(np.abs(force) < PRE_SLIP * friction):
+        for part in _runs(np.abs(force) < PRE_SLIP_FORCE * friction):
             dx = displacement[part] - displacement[part].mean()
             covariance += float(dx @ (force[part] - force[part].mean()))
             variance += float(dx @ dx)
@@ -113,22 +245,17 @@ def _runs(inside: NDArray[np.bool_]) -> list[slice]:
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 3]
 
 
-# ----------------------------------------------------------------------------------------------------
-# The separable method: a coarse grid in two parameters, then least squares with exact sensitivities.
-#
-# Scaling T0 and C with k scales the force, F = k f(T0/k, C/k), so on the grid the stiffness follows
-# linearly from the rest and only delta = T0/k and tau = C/k are searched.
+# --- Separable ---
 
-
-GRID = (12, 10)
+DEFLECTION_AND_TIME_GRID = (12, 10)
 """Points of the grid in delta = T0/k and in tau = C/k."""
 GRID_SAMPLES = 10_000
 """The grid is evaluated on at most this many samples, shared out among the trials."""
-DESCENTS = 3
+GRID_DESCENTS = 3
 """How many of the best grid points are followed down."""
 SAME_OPTIMUM = 1e-6
 """Two descents whose criteria differ by less, relative, have reached the same optimum."""
-_REMEMBERED = 2
+_CACHED_POINTS = 2
 """Points whose forces are kept: where a descent stands, and where it has just tried to go."""
 TOLERANCE = 1e-12
 """Tolerance of the least squares, relative, on parameters and criterion."""
@@ -153,20 +280,20 @@ class _Reached(Exception):  # noqa: N818  # nothing went wrong
     """A descent has come to an optimum that is known."""
 
 
-def grid_starts(objective: Objective, count: int = DESCENTS) -> list[Bingham]:
+def grid_starts(objective: Objective, count: int = GRID_DESCENTS) -> list[Bingham]:
     """The best points of the grid, best first.
 
     Equation: k = sum F f / sum f^2 with f = F(T0/k, C/k, 1)      Source: eq. (1)-(3), scaled by k
     """
     _, _, stroke = objective.scales
-    pieces = [_piece(t, GRID_SAMPLES // len(objective.trials)) for t in objective.trials]
+    pieces = [_coarse_record(t, GRID_SAMPLES // len(objective.trials)) for t in objective.trials]
     slowest = max((t.displacement.size - 1) * t.step for t in objective.trials)
-    deltas = np.geomspace(1e-4, LARGEST_PRE_SLIP, GRID[0]) * stroke
-    taus = np.geomspace(min(p[1] for p in pieces), 0.1 * slowest, GRID[1])
+    deltas = np.geomspace(1e-4, LARGEST_PRE_SLIP, DEFLECTION_AND_TIME_GRID[0]) * stroke
+    taus = np.geomspace(min(p[1] for p in pieces), 0.1 * slowest, DEFLECTION_AND_TIME_GRID[1])
     found: list[tuple[float, Bingham]] = []
     for delta in deltas:
         for tau in taus:
-            match, energy = _overlap(pieces, float(delta), float(tau))
+            match, energy = _inner_products(pieces, float(delta), float(tau))
             if match > 0.0:
                 k = match / energy
                 found.append((-match * k, Bingham(float(delta) * k, float(tau) * k, k)))
@@ -207,7 +334,7 @@ def descend(objective: Objective, start: Bingham, known: float | None = None) ->
     def at(x: Array) -> tuple[Fit, Array]:
         key = x.tobytes()
         if key not in memory:
-            if len(memory) == _REMEMBERED:
+            if len(memory) == _CACHED_POINTS:
                 memory.pop(next(iter(memory)))
             fit = _fit_at(objective, from_search(x, stroke))
             memory[key] = fit, reduced(fit)
@@ -246,7 +373,7 @@ def _fit_at(objective: Objective, parameters: Bingham) -> Fit:
     return Fit(parameters, float(residuals @ residuals) / objective.energy, residuals, slopes)
 
 
-def _piece(trial: Trial, samples: int) -> tuple[Array, float, Array, int]:
+def _coarse_record(trial: PreparedRecord, samples: int) -> tuple[Array, float, Array, int]:
     """Coarse displacement, its step, the force, and the first counted sample, of the trial's first part."""
     first = int(np.argmax(trial.counted))
     stop = max(first + samples, 2 * first)
@@ -255,7 +382,7 @@ def _piece(trial: Trial, samples: int) -> tuple[Array, float, Array, int]:
     return displacement, step, trial.force[:stop], first
 
 
-def _overlap(pieces: list[tuple[Array, float, Array, int]], delta: float, tau: float) -> tuple[float, float]:
+def _inner_products(pieces: list[tuple[Array, float, Array, int]], delta: float, tau: float) -> tuple[float, float]:
     """Sums of F f and of f^2 over the pieces."""
     match = energy = 0.0
     for displacement, step, force, first in pieces:
@@ -265,13 +392,11 @@ def _overlap(pieces: list[tuple[Array, float, Array, int]], delta: float, tau: f
     return match, energy
 
 
-# ----------------------------------------------------------------------------------------------------
-# The evolutionary method, for the paper's genetic algorithm: differential evolution, then least squares.
-
+# --- Evolutionary ---
 
 LEAST_FRICTION = 1e-4
 """Smallest friction of the search, as a share of the peak force: its logarithm needs one."""
-OUTSIDE = 10.0
+PENALTY = 10.0
 """What the search sees for a parameter set that the bounds of the other method leave out."""
 LEAST_SPREAD = 1e-8
 """Spread of the criterion over the population at which the search ends in any case; the rest is polish."""
@@ -279,10 +404,10 @@ LEAST_SPREAD = 1e-8
 
 def fit_evolutionary(objective: Objective, config: EvolutionaryConfig, seed: int) -> Fit:
     """The optimum that the evolutionary search finds, brought to the bottom by least squares."""
-    return descend(objective, search(objective, config, seed))
+    return descend(objective, evolutionary_search(objective, config, seed))
 
 
-def search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingham:
+def evolutionary_search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingham:
     """The best member of the last generation of a differential evolution on the criterion.
 
     Equation: minimise W_s over log T0, log C, log k      Source: Makowski and Knap 2021, eq. (4); Storn and Price 1997
@@ -304,7 +429,7 @@ def search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingh
 
     def criterion(logarithms: Array) -> float:
         parameters = Bingham(*(float(p) for p in np.exp(logarithms)))
-        return objective.criterion(parameters) if objective.slips(parameters) else OUTSIDE
+        return objective.criterion(parameters) if objective.slips(parameters) else PENALTY
 
     found = differential_evolution(
         criterion,
@@ -318,137 +443,3 @@ def search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingh
         polish=False,
     )
     return Bingham(*(float(p) for p in np.exp(found.x)))
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-def identify_condition(
-    condition: Condition, config: IdentifyConfig, seed: int
-) -> tuple[ParameterRow, AuxiliaryRow | None]:
-    """The Bingham parameters of one condition, and what its tests show beside the element."""
-    records = [test for record in condition.records for test in separate_tests(record)]
-    objective, fit, auxiliary = fit_with_auxiliary(records, config, seed)
-    parts = parts_of(records, objective.trials, (fit.residuals, fit.slopes), config.nuisance)
-    misfit = misfit_of(parts)
-    noise = uncertainty(fit.slopes, fit.residuals, objective.lengths).half_widths()
-    widths = half_widths(parts, misfit)
-    scales = scales_of(fit.parameters, objective.measured)
-    visible = visible_shares(fit.slopes, scales, objective.energy)
-    cosines = stationarity(fit.slopes, fit.residuals, objective.energy)
-    labels = (condition.setting, condition.voltage, condition.temperature)
-    row = row_of(
-        labels,
-        fit.parameters,
-        widths,
-        evidence_of(
-            objective, fit.parameters, fit.criterion, np.stack([scales, noise, widths, visible, cosines]), misfit
-        ),
-        (objective.measured, fit.residuals),
-    )
-    return row, None if auxiliary is None else _auxiliary_row(labels, auxiliary)
-
-
-def fit_with_auxiliary(
-    records: Sequence[Record], config: IdentifyConfig, seed: int
-) -> tuple[Objective, Fit, Auxiliary | None]:
-    """The optimum over the records; where they show forces beside the element, over what these leave.
-
-    Parameters
-    ----------
-    records : of one condition
-    config : the method, and what the sensors may differ by
-    seed : of the evolutionary search
-
-    Returns
-    -------
-    the data as fitted, the optimum, and what stands beside the element; None where nothing does
-    """
-    whole = Objective(tuple(trial_of(r) for r in records))
-    plain = _optimum(whole, config, seed)
-    if not worth_fitting(whole, plain):
-        return whole, plain, None
-    values = rough_values(whole)
-    objective = relieved(whole, values)
-    fit = _optimum(objective, config, seed)
-    values = values + remainder(objective, fit)
-    objective = relieved(whole, values)
-    fit = descend(objective, fit.parameters)
-    auxiliary = auxiliary_of(records, objective, fit, values, config.nuisance)
-    return (whole, plain, None) if auxiliary is None else (objective, fit, auxiliary)
-
-
-def _optimum(objective: Objective, config: IdentifyConfig, seed: int) -> Fit:
-    if config.method == "evolutionary":
-        return fit_evolutionary(objective, config.evolutionary, seed)
-    return fit_separable(objective)
-
-
-def _auxiliary_row(labels: tuple[str | None, float | None, float | None], found: Auxiliary) -> AuxiliaryRow:
-    (force, stiffness), (of_force, of_stiffness) = found.values.tolist(), found.widths.tolist()
-    return AuxiliaryRow(
-        setting=labels[0],
-        voltage_V=labels[1],
-        temperature_degC=labels[2],
-        F_0_N=force,
-        F_0_N_low95=force - of_force,
-        F_0_N_high95=force + of_force,
-        k_g_N_per_m=stiffness,
-        k_g_N_per_m_low95=stiffness - of_stiffness,
-        k_g_N_per_m_high95=stiffness + of_stiffness,
-        zero_m=found.middle,
-    )
-
-
-def row_of(
-    labels: tuple[str | None, float | None, float | None],
-    parameters: Bingham,
-    widths: Array,
-    evidence: Sequence[ParameterEvidence],
-    fitted: tuple[Array, Array],
-) -> ParameterRow:
-    """The row of one condition or node; what is undetermined has no number.
-
-    Parameters
-    ----------
-    labels : setting, voltage, temperature
-    parameters : the optimum
-    widths : (3,) half widths of the 95 % intervals
-    evidence : on T0, C and k
-    fitted : (N,) measured force and (N,) residuals of the samples that the row was fitted to
-    """
-    trust = trust_of(evidence)
-    friction, damping, stiffness = (
-        _bounds(value, float(width), known, natural)
-        for value, width, known, natural in zip(
-            parameters, widths, trust.determined, ("linear", "log", "log"), strict=True
-        )
-    )
-    measured, residuals = fitted
-    return ParameterRow(
-        setting=labels[0],
-        voltage_V=labels[1],
-        temperature_degC=labels[2],
-        T0_N=friction[0],
-        T0_N_low95=friction[1],
-        T0_N_high95=friction[2],
-        C_Ns_per_m=damping[0],
-        C_Ns_per_m_low95=damping[1],
-        C_Ns_per_m_high95=damping[2],
-        k_N_per_m=stiffness[0],
-        k_N_per_m_low95=stiffness[1],
-        k_N_per_m_high95=stiffness[2],
-        W_s=criterion(residuals, measured),
-        rmse_N=rms(residuals),
-        status=trust.status,
-    )
-
-
-def _bounds(value: float, width: float, known: bool, natural: str) -> tuple[float | None, float | None, float | None]:
-    """Value and 95 % interval: linear and cut at zero for T0, in the logarithm for C and k."""
-    if not known:
-        return None, None, None
-    if natural == "linear":
-        return value, max(value - width, 0.0), value + width
-    ratio = float(np.exp(width / value))
-    return value, value / ratio, value * ratio

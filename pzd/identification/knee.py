@@ -1,4 +1,4 @@
-"""The knee law of a passive damper: fitted, judged, and held to Bingham's on tests kept back."""
+"""The knee law of a passive damper: its rows, the choice between it and Bingham's law, force per click and unit."""
 
 from __future__ import annotations
 
@@ -18,32 +18,100 @@ from pzd.artefacts.table import LENGTHS, PRESSURES, numbers_in
 from pzd.damper.compose import static_force, steady_force
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.intervals import half_widths
-from pzd.identification.knee_fit import REFIT, KneeFit, Tests, descend, fit_bingham, fit_knee
-from pzd.identification.prepared_record import parts_of, trial_of
-from pzd.identification.trust import VISIBLE, WEAK_WIDTH, Misfit, friction_scale, misfit_of
+from pzd.identification.knee_fit import REFIT_EVALUATIONS, KneeData, KneeFit, descend, fit_bingham, fit_knee
+from pzd.identification.prepared_record import fitted_records, prepare
+from pzd.identification.trust import MISFIT_THRESHOLD, WEAK_WIDTH, Misfit, friction_scale, misfit_of
 from pzd.parallel.processes import Listener, Progress
 from pzd.quantities import Control
 from pzd.record import SAME_TEMPERATURE, Array, Condition
 from pzd.schema.errors import ConfigError
-from pzd.signals.criterion import criterion, rms
+from pzd.signals.measures import criterion, rms
 from pzd.signals.nuisance import NuisanceConfig
-from pzd.signals.stretches import separate_tests
+from pzd.signals.segmentation import separate_tests
 
-# ----------------------------------------------------------------------------------------------------
-# The rows of one condition: the knee law with its intervals, and its force at the trade's speeds.
-
-
+log = logging.getLogger(__name__)
 Labels = tuple[str | None, float | None, float | None]
 """Setting, voltage and temperature of a condition."""
 
+
+def identify_knees(
+    conditions: Sequence[tuple[Condition, ParameterRow]],
+    settings: Sequence[str | None],
+    config: IdentifyConfig,
+    control: Control,
+    progress: Listener,
+) -> Knees:
+    """The knee law of every condition, and the law that each setting hands on.
+
+    Parameters
+    ----------
+    conditions : in each of which the control signal stands still, with its Bingham parameters
+    settings : of the rig
+    config : the config's block: which law it asks for, and what the sensors may differ by from test to test
+    control : the control signal, which may be a clicker
+    progress : hears of every condition that is done
+
+    Raises
+    ------
+    ConfigError : when the config asks for the knee law and a setting has no test at a constant control signal
+    """
+    rows: list[KneeRow] = []
+    forces: list[KneeForceRow] = []
+    found = []
+    for number, (condition, bingham) in enumerate(conditions, start=1):
+        tests = KneeData.of([test for record in condition.records for test in separate_tests(record)])
+        labels = (condition.setting, condition.voltage, condition.temperature)
+        fit = fit_knee(tests, bingham.k_N_per_m or FALLBACK["k_N_per_m"])
+        row = knee_row(labels, tests, fit, config.nuisance)
+        rows.append(row)
+        forces += knee_forces(row)
+        found += held_out_predictions(labels, tests, fit, fit_bingham(tests, fit))
+        progress(Progress(number, len(conditions), f"knee law: {_knee_text(row)}"))
+    laws = []
+    for setting in settings:
+        if config.law == "knee" and not any(row.setting == setting for row in rows):
+            of = f" of setting {setting}" if setting else ""
+            raise ConfigError(
+                f"identify.law: needs tests{of} at a constant control signal; in all of them it moves: record some, or "
+                "say bingham (got knee)"
+            )
+        mine = [each for each in found if each[0].setting == setting]
+        law = law_row(config.law, setting, mine, sum(row.setting == setting for row in rows))
+        log.info("identify: law %s%s, %s", law.law, f" of {setting}" if setting else "", law.reason)
+        laws.append(law)
+    return Knees(
+        tuple(rows),
+        tuple(forces),
+        force_per_click(forces, control),
+        tuple(row for row, _ in found),
+        tuple(laws),
+        force_per_unit(forces, control),
+    )
+
+
+def _knee_text(row: KneeRow) -> str:
+    place = ", ".join(str(part) for part in (row.setting, row.voltage_V, row.temperature_degC) if part is not None)
+    knee = {
+        "rebound": (row.rebound_knee_force_N, row.rebound_knee_velocity_m_per_s),
+        "compression": (row.compression_knee_force_N, row.compression_knee_velocity_m_per_s),
+    }
+    told = [
+        f"{way} knee {force:.4g} N at {speed:.3g} m/s" if force is not None else f"no knee in {way}"
+        for way, (force, speed) in knee.items()
+    ]
+    return f"{place or 'all records'}: {', '.join(told)}, W_s = {row.W_s:.3g}"
+
+
+# --- Rows of one condition ---
+
 TRADE_SPEEDS = tuple(float(np.round(np.pi * 0.1 * turns / 60.0, 3)) for turns in (10, 25, 50, 75, 100, 200, 300))
 """Peak speeds of a crank of 100 mm stroke at 10 to 300 revolutions a minute, at which dampers are specified [m/s]."""
-BEYOND = 1.001
+SPEED_ROUNDING = 1.001
 """A test is as fast as a speed within this factor, which its rounding to millimetres a second takes."""
-_NONE = Misfit(0.0, 0.0)
+NO_MISFIT = Misfit(0.0, 0.0)
 
 
-def knee_row(labels: Labels, tests: Tests, fit: KneeFit, nuisance: NuisanceConfig) -> KneeRow:
+def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> KneeRow:
     """The row of one condition.
 
     Parameters
@@ -64,7 +132,7 @@ def knee_row(labels: Labels, tests: Tests, fit: KneeFit, nuisance: NuisanceConfi
             values[f"{direction}_knee_velocity_m_per_s"] = curve.knee_speed[way]
             values[f"{direction}_blow_off_Ns_per_m"] = curve.blow_off[way]
     cells: dict[str, float | None] = {}
-    for name in _quantities():
+    for name in _quantities_with_interval():
         cells |= _with_interval(name, values.get(name), widths.get(name))
     return KneeRow.model_validate(
         {
@@ -86,7 +154,7 @@ def knee_forces(row: KneeRow) -> Iterator[KneeForceRow]:
     rest = float(static_force(damper, voltage))
     for speed in TRADE_SPEEDS:
         rebound, compression = steady_force(damper, voltage, row.temperature_degC, np.array([speed, -speed])) + rest
-        inside = speed <= BEYOND * row.reached_m_per_s
+        inside = speed <= SPEED_ROUNDING * row.reached_m_per_s
         yield KneeForceRow(
             setting=row.setting,
             voltage_V=row.voltage_V,
@@ -101,12 +169,7 @@ def knee_forces(row: KneeRow) -> Iterator[KneeForceRow]:
             return
 
 
-def _quantities() -> list[str]:
-    """The columns that have an interval."""
-    return [name.removesuffix("_low95") for name in KneeRow.model_fields if name.endswith("_low95")]
-
-
-def _half_widths(tests: Tests, fit: KneeFit, nuisance: NuisanceConfig) -> tuple[Misfit, dict[str, float]]:
+def _half_widths(tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> tuple[Misfit, dict[str, float]]:
     """What the law misses, and the half widths of the 95 % intervals by column.
 
     The force of a knee takes the place of its speed: dF/dF_k = (dF/dw_k) / C, and T0 and C act at a constant F_k. Two
@@ -127,18 +190,28 @@ def _half_widths(tests: Tests, fit: KneeFit, nuisance: NuisanceConfig) -> tuple[
         by_force[:, 1 + way] -= slope * curve.knee_speed[way]
         forces[place] = f"{DIRECTIONS[way]}_knee_force_N"
     records = [test.record for test in tests.tests]
-    trials = [trial_of(record) for record in records]
-    misfit = misfit_of(parts_of(records, trials, (fit.residuals, fit.slopes), nuisance))
+    trials = [prepare(record) for record in records]
+    misfit = misfit_of(fitted_records(records, trials, (fit.residuals, fit.slopes), nuisance))
     # Told not to be constant, a part takes the speed of the rod for that of the flow: here no one C stands for it.
     widths, of_force = (
         half_widths(
-            [replace(p, constant=False) for p in parts_of(records, trials, (fit.residuals, s), nuisance)], _NONE
+            [replace(p, constant=False) for p in fitted_records(records, trials, (fit.residuals, s), nuisance)],
+            NO_MISFIT,
         )
         for s in (fit.slopes, by_force)
     )
     return misfit, dict(zip(columns, widths.tolist(), strict=True)) | {
         name: width for name, width in zip(forces, of_force.tolist(), strict=True) if name not in columns
     }
+
+
+WIDEST_LOGARITHM = 20.0
+"""Half width of an interval in the logarithm at most: it then says that nothing is known."""
+
+
+def _quantities_with_interval() -> list[str]:
+    """The columns that have an interval."""
+    return [name.removesuffix("_low95") for name in KneeRow.model_fields if name.endswith("_low95")]
 
 
 def _with_interval(name: str, value: float | None, width: float | None) -> dict[str, float | None]:
@@ -149,19 +222,15 @@ def _with_interval(name: str, value: float | None, width: float | None) -> dict[
         low, high = value - width, value + width
         low = max(low, 0.0) if name == "friction_N" else low
     else:
-        ratio = float(np.exp(min(width / value, _WIDEST)))
+        ratio = float(np.exp(min(width / value, WIDEST_LOGARITHM)))
         low, high = value / ratio, value * ratio
     return {name: value, f"{name}_low95": low, f"{name}_high95": high}
-
-
-_WIDEST = 20.0
-"""Half width of an interval in the logarithm at most: it then says that nothing is known."""
 
 
 _UNITS = ("_Ns_per_m", "_N_per_m", "_m_per_s", "_N")
 
 
-def _words(column: str) -> str:
+def _quantity_name(column: str) -> str:
     """A column as a sentence names it: without its unit."""
     unit = next(unit for unit in _UNITS if column.endswith(unit))
     return column.removesuffix(unit).replace("_", " ")
@@ -172,7 +241,7 @@ def _status(values: Mapping[str, float], widths: Mapping[str, float], misfit: Mi
     least = {"friction_N": friction_scale(values["friction_N"], measured)}
     least["gas_force_N"] = max(abs(values["gas_force_N"]), least["friction_N"])
     wide = [
-        f"{_words(name)} to +-{min(widths[name] / least.get(name, value), 9.99):.0%}"
+        f"{_quantity_name(name)} to +-{min(widths[name] / least.get(name, value), 9.99):.0%}"
         for name, value in values.items()
         if name != "gas_spring_N_per_m" and widths[name] > WEAK_WIDTH * least.get(name, value)
     ]
@@ -184,19 +253,19 @@ def _status(values: Mapping[str, float], widths: Mapping[str, float], misfit: Mi
     return f"weak: {'; '.join([*wide, *missed])}" if wide or missed else "ok"
 
 
-# ----------------------------------------------------------------------------------------------------
-# Which law is handed on: both predict whole tests that were kept back from their fits.
+# --- Choice of the law by held-out tests ---
 
-
-FOLDS = 5
+LAW_FOLDS = 5
 """The tests of a condition are kept back in so many turns, or one by one where they are fewer."""
-ERRORS = 2.0
+SIGNIFICANT_ERRORS = 2.0
 """Standard errors of the mean difference beyond which it is no chance; as in diagnose."""
-FEWEST = 3
+FEWEST_TESTS = 3
 """Tests from which a standard error is worth anything."""
 
 
-def kept_back(labels: Labels, tests: Tests, knee: KneeFit, bingham: KneeFit) -> list[tuple[PredictedRow, Array]]:
+def held_out_predictions(
+    labels: Labels, tests: KneeData, knee: KneeFit, bingham: KneeFit
+) -> list[tuple[PredictedRow, Array]]:
     """Every test of a condition predicted by both laws, each fitted without it; none where the test is alone.
 
     Parameters
@@ -215,20 +284,20 @@ def kept_back(labels: Labels, tests: Tests, knee: KneeFit, bingham: KneeFit) -> 
         return []
     order = np.argsort([float(np.max(np.abs(test.record.velocity))) for test in tests.tests], kind="stable")
     found = {}
-    for fold in range(min(FOLDS, count)):
-        out = order[fold::FOLDS].tolist()
+    for fold in range(min(LAW_FOLDS, count)):
+        out = order[fold::LAW_FOLDS].tolist()
         rest = tests.some([i for i in range(count) if i not in out])
-        fits = [descend(rest, fit.form, fit.curve, fit.gas, REFIT) for fit in (bingham, knee)]
+        fits = [descend(rest, fit.form, fit.curve, fit.gas, REFIT_EVALUATIONS) for fit in (bingham, knee)]
         for i in out:
             one = tests.some([i])
             left = [one.measured - fit.predicted(one) for fit in fits]
-            unseen = np.full(one.measured.size, VISIBLE * one.peak)
+            unseen = np.full(one.measured.size, MISFIT_THRESHOLD * one.peak)
             squares = np.array([float(r @ r) for r in (*left, one.measured, unseen)])
             found[i] = _predicted(labels, one, left), squares
     return [found[i] for i in range(count)]
 
 
-def _predicted(labels: Labels, one: Tests, left: Sequence[Array]) -> PredictedRow:
+def _predicted(labels: Labels, one: KneeData, left: Sequence[Array]) -> PredictedRow:
     return PredictedRow(
         record=one.tests[0].record.name,
         setting=labels[0],
@@ -266,17 +335,15 @@ def law_row(
     told += f", {pooled[0]:.3g} by Bingham's" if pooled else ""
     if asked == "knee":
         return _law(setting, "knee", count, pooled, f"as the config asks for; {told or 'no test could be kept back'}")
-    if count < FEWEST:
-        why = (
-            f"{count} tests could be kept back, and {FEWEST} are needed to choose a law; record several in a condition"
-        )
+    if count < FEWEST_TESTS:
+        why = f"{count} tests could be kept back, and {FEWEST_TESTS} are needed to choose a law; record several in a condition"
         return _law(setting, "bingham", count, pooled, why)
     apart = np.array([row.W_s_bingham - row.W_s_knee for row, _ in found])
     mean, error = float(apart.mean()), float(np.std(apart, ddof=1) / np.sqrt(count))
     visible = squares is not None and float(squares[0] - squares[1]) > float(squares[3])
     measure = f"mean difference {mean:.2g}, its standard error {error:.2g}"
-    measure += "" if visible or mean <= 0.0 else f", less than {VISIBLE:.2%} of peak"
-    law: LawName = "knee" if mean > ERRORS * error and visible else "bingham"
+    measure += "" if visible or mean <= 0.0 else f", less than {MISFIT_THRESHOLD:.2%} of peak"
+    law: LawName = "knee" if mean > SIGNIFICANT_ERRORS * error and visible else "bingham"
     return _law(setting, law, count, pooled, f"{told}; {measure}")
 
 
@@ -285,11 +352,7 @@ def _law(setting: str | None, law: LawName, tests: int, pooled: tuple[float, flo
     return LawRow(setting=setting, law=law, tests=tests, W_s_bingham=bingham, W_s_knee=knee, reason=reason)
 
 
-# ----------------------------------------------------------------------------------------------------
-# Force a click and force a unit: what one position of a clicker, one psi or one mm more makes of the force.
-#
-# At the trade's speeds, the gas apart. The number is the control signal, as in `control: {name: rebound, unit: clicks}`
-# or `{name: gas, unit: psi}`, or one in the name of the setting, as in "R 3 C 12", "gas 150 psi" or "gap 0.2 mm".
+# --- Force per click and per unit ---# From one position of a clicker, one psi or one mm to the next, at the trade's speeds, without the gas. The number is# the control signal, as in `control: {name: rebound, unit: clicks}` or `{name: gas, unit: psi}`, or one in the name of# the setting, as in "R 3 C 12", "gas 150 psi" or "gap 0.2 mm".
 
 
 @dataclass(frozen=True)
@@ -324,7 +387,7 @@ class Rise:
         return self.high - self.low
 
 
-def clicks(forces: Sequence[KneeForceRow], control: Control) -> tuple[ClickRow, ...]:
+def force_per_click(forces: Sequence[KneeForceRow], control: Control) -> tuple[ClickRow, ...]:
     """The force a click between neighbouring positions of every clicker, all other things equal.
 
     Parameters
@@ -348,7 +411,7 @@ def clicks(forces: Sequence[KneeForceRow], control: Control) -> tuple[ClickRow, 
     )
 
 
-def per_unit(forces: Sequence[KneeForceRow], control: Control) -> tuple[UnitRow, ...]:
+def force_per_unit(forces: Sequence[KneeForceRow], control: Control) -> tuple[UnitRow, ...]:
     """The force a unit of a gas pressure, gap or shim between neighbouring values, all other things equal.
 
     Parameters
@@ -376,7 +439,7 @@ def per_unit(forces: Sequence[KneeForceRow], control: Control) -> tuple[UnitRow,
 
 def _rises(forces: Sequence[KneeForceRow], control: Control) -> Iterator[Rise]:
     for axis, rows in _axes(forces, control).items():
-        yield from _of_one(axis, rows)
+        yield from _rises_on_axis(axis, rows)
 
 
 def _axes(forces: Sequence[KneeForceRow], control: Control) -> dict[Axis, list[tuple[float, KneeForceRow]]]:
@@ -392,7 +455,7 @@ def _axes(forces: Sequence[KneeForceRow], control: Control) -> dict[Axis, list[t
     return found
 
 
-def _of_one(axis: Axis, rows: Sequence[tuple[float, KneeForceRow]]) -> Iterator[Rise]:
+def _rises_on_axis(axis: Axis, rows: Sequence[tuple[float, KneeForceRow]]) -> Iterator[Rise]:
     """The rows of one axis: by temperature and speed, from one position to the next."""
     groups: dict[Hashable, list[tuple[float, KneeForceRow]]] = defaultdict(list)
     first: float | None = None
@@ -415,78 +478,3 @@ def _of_one(axis: Axis, rows: Sequence[tuple[float, KneeForceRow]]) -> Iterator[
                     compression[1] - compression[0],
                     after.gas_force_N - before.gas_force_N,
                 )
-
-
-# ----------------------------------------------------------------------------------------------------
-# The knee law of every condition of every setting, held to Bingham's.
-
-
-log = logging.getLogger(__name__)
-
-
-def knees(
-    conditions: Sequence[tuple[Condition, ParameterRow]],
-    settings: Sequence[str | None],
-    config: IdentifyConfig,
-    control: Control,
-    progress: Listener,
-) -> Knees:
-    """The knee law of every condition, and the law that each setting hands on.
-
-    Parameters
-    ----------
-    conditions : in each of which the control signal stands still, with its Bingham parameters
-    settings : of the rig
-    config : the config's block: which law it asks for, and what the sensors may differ by from test to test
-    control : the control signal, which may be a clicker
-    progress : hears of every condition that is done
-
-    Raises
-    ------
-    ConfigError : when the config asks for the knee law and a setting has no test at a constant control signal
-    """
-    rows: list[KneeRow] = []
-    forces: list[KneeForceRow] = []
-    found = []
-    for number, (condition, bingham) in enumerate(conditions, start=1):
-        tests = Tests.of([test for record in condition.records for test in separate_tests(record)])
-        labels = (condition.setting, condition.voltage, condition.temperature)
-        fit = fit_knee(tests, bingham.k_N_per_m or FALLBACK["k_N_per_m"])
-        row = knee_row(labels, tests, fit, config.nuisance)
-        rows.append(row)
-        forces += knee_forces(row)
-        found += kept_back(labels, tests, fit, fit_bingham(tests, fit))
-        progress(Progress(number, len(conditions), f"knee law: {_line(row)}"))
-    laws = []
-    for setting in settings:
-        if config.law == "knee" and not any(row.setting == setting for row in rows):
-            of = f" of setting {setting}" if setting else ""
-            raise ConfigError(
-                f"identify.law: needs tests{of} at a constant control signal; in all of them it moves: record some, or "
-                "say bingham (got knee)"
-            )
-        mine = [each for each in found if each[0].setting == setting]
-        law = law_row(config.law, setting, mine, sum(row.setting == setting for row in rows))
-        log.info("identify: law %s%s, %s", law.law, f" of {setting}" if setting else "", law.reason)
-        laws.append(law)
-    return Knees(
-        tuple(rows),
-        tuple(forces),
-        clicks(forces, control),
-        tuple(row for row, _ in found),
-        tuple(laws),
-        per_unit(forces, control),
-    )
-
-
-def _line(row: KneeRow) -> str:
-    place = ", ".join(str(part) for part in (row.setting, row.voltage_V, row.temperature_degC) if part is not None)
-    knee = {
-        "rebound": (row.rebound_knee_force_N, row.rebound_knee_velocity_m_per_s),
-        "compression": (row.compression_knee_force_N, row.compression_knee_velocity_m_per_s),
-    }
-    told = [
-        f"{way} knee {force:.4g} N at {speed:.3g} m/s" if force is not None else f"no knee in {way}"
-        for way, (force, speed) in knee.items()
-    ]
-    return f"{place or 'all records'}: {', '.join(told)}, W_s = {row.W_s:.3g}"
