@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +70,9 @@ class Record:
 
 def sliced(record: Record, kept: Mask) -> Record:
     """Return the record at the samples where the mask (n,) is set."""
-    channels = {name: values[kept] for name, values in vars(record).items() if isinstance(values, np.ndarray)}
+    channels: dict[str, Any] = {
+        name: values[kept] for name, values in vars(record).items() if isinstance(values, np.ndarray)
+    }
     return replace(record, **channels)
 
 

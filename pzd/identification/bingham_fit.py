@@ -1,11 +1,18 @@
-"""Least-squares fit of T0, C and k to the records of one condition by criterion (4)."""
+"""Least-squares fit of T0, C and k to the records of one condition.
+
+Equation: W_s = sum (F - F_sim)^2 / sum F^2      Source: Makowski and Knap 2021, eq. (4)
+
+The separable method starts from the characteristic and from a coarse grid. Scaling T0 and C with k scales the force,
+F = k f(T0/k, C/k), so the stiffness follows linearly and the grid covers delta = T0/k and tau = C/k only. The
+evolutionary method stands for the paper's genetic algorithm. Both end in least squares with exact sensitivities.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, overload
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +22,16 @@ from pzd.identification.config import EvolutionaryConfig
 from pzd.identification.prepared_record import PreparedRecord
 from pzd.record import Array
 
-# --- Criterion ---
+# --- Criterion and search coordinates ---
 
 LARGEST_PRE_SLIP = 0.45
-"""Largest pre-slip deflection T0/k of the search, as a share of the range of displacement."""
+"""Largest pre-slip deflection T0/k of the search, as a share of the range of displacement: the element still slips."""
 AT_BOUND = 1e-3
 """A parameter within this share of a bound, in search coordinates, lies at it."""
 
 
 class Bingham(NamedTuple):
-    """The three parameters of the element, or one number for each of them."""
+    """Friction T0 [N], damping C [N s/m] and stiffness k [N/m] of the element, or one number for each of them."""
 
     friction: float
     damping: float
@@ -33,16 +40,16 @@ class Bingham(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """What both methods minimise: criterion (4) pooled over the counted samples of the trials."""
+    """Criterion (4) pooled over the counted samples of the records, which both methods minimise."""
 
-    trials: tuple[PreparedRecord, ...]
+    prepared: tuple[PreparedRecord, ...]
     basis: Array | None = None
-    """(N, q) orthonormal forces beside the element whose best multiples are solved inside, by variable projection."""
+    """(N, q) orthonormal forces beside the element that are profiled out, by variable projection."""
 
     @cached_property
     def measured(self) -> Array:
-        """(N,) measured force at the counted samples, trial by trial [N]."""
-        return np.concatenate([t.force[t.counted] for t in self.trials])
+        """Measured force (N,) at the counted samples, record by record [N]."""
+        return np.concatenate([t.force[t.counted] for t in self.prepared])
 
     @cached_property
     def energy(self) -> float:
@@ -51,63 +58,63 @@ class Objective:
 
     @property
     def lengths(self) -> tuple[int, ...]:
-        """Counted samples of each trial."""
-        return tuple(int(np.count_nonzero(t.counted)) for t in self.trials)
+        """Number of counted samples of each record."""
+        return tuple(int(np.count_nonzero(t.counted)) for t in self.prepared)
 
     def simulated(self, parameters: Bingham) -> Array:
-        """(N,) force of the element [N]."""
+        """Compute the force (N,) of the element [N]."""
         return np.concatenate(
             [
-                t.met(element_force(t.displacement, t.step, *parameters, float(t.force[0]), every=t.every))
-                for t in self.trials
+                t.at_counted(element_force(t.displacement, t.step, *parameters, float(t.force[0]), every=t.every))
+                for t in self.prepared
             ]
         )
 
     def residuals(self, parameters: Bingham) -> Array:
-        """(N,) measured less simulated force, the forces beside the element at their best [N]."""
+        """Compute the measured less simulated force (N,), the forces beside the element profiled out [N]."""
         return self._projected(self.measured - self.simulated(parameters))
 
     def residuals_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
-        """(N,) residuals and (N, 3) what T0, C and k do to the force that nothing beside the element makes up."""
+        """Compute the residuals (N,) and the sensitivities (N, 3) to T0, C and k, the basis projected out of both."""
         simulated, slopes = self.simulated_and_slopes(parameters)
         return self._projected(self.measured - simulated), self._projected(slopes)
 
     def simulated_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
-        """(N,) force of the element and (N, 3) its derivatives by T0, C and k."""
+        """Compute the force (N,) of the element and its derivatives (N, 3) by T0, C and k."""
         forces, slopes = [], []
-        for t in self.trials:
+        for t in self.prepared:
             force, slope = element_force_sensitivities(
                 t.displacement, t.step, *parameters, float(t.force[0]), every=t.every
             )
-            forces.append(t.met(force))
-            slopes.append(t.met(slope))
+            forces.append(t.at_counted(force))
+            slopes.append(t.at_counted(slope))
         return np.concatenate(forces), np.concatenate(slopes)
 
     def _projected(self, values: Array) -> Array:
-        """What of (N,) or (N, p) forces the basis cannot make up.
+        """Project the basis out of forces (N,) or (N, p).
 
         Equation: (I - Q Q') r                      Source: Golub and Pereyra 1973, variable projection
         """
         return values if self.basis is None else values - self.basis @ (self.basis.T @ values)
 
     def criterion(self, parameters: Bingham) -> float:
-        """W_s at the parameters."""
+        """Compute W_s at the parameters."""
         residuals = self.residuals(parameters)
         return float(residuals @ residuals) / self.energy
 
     @cached_property
     def scales(self) -> tuple[float, float, float]:
-        """Peak force [N], peak speed [m/s] and range of displacement [m] over the trials."""
-        speed = max(float(np.max(np.abs(np.diff(t.displacement)))) / t.step for t in self.trials)
-        stroke = max(float(np.ptp(t.displacement)) for t in self.trials)
+        """Peak force [N], peak speed [m/s] and range of displacement [m] over the records."""
+        speed = max(float(np.max(np.abs(np.diff(t.displacement)))) / t.step for t in self.prepared)
+        stroke = max(float(np.ptp(t.displacement)) for t in self.prepared)
         return float(np.max(np.abs(self.measured))), speed, stroke
 
     @cached_property
     def bounds(self) -> tuple[Bingham, Bingham]:
-        """Smallest and largest parameters worth a look, from the data's own scales.
+        """Smallest and largest parameters of the search, from the scales of the data.
 
-        T0 up to the peak force; C from 1e-4 to 1e2 of peak force over peak speed; k from 0.1 to
-        1e4 of peak force over the range of displacement.
+        T0 up to the peak force; C from 1e-4 to 1e2 of peak force over peak speed; k from 0.1 to 1e4 of peak force over
+        the range of displacement.
         """
         force, speed, stroke = self.scales
         return (
@@ -117,7 +124,7 @@ class Objective:
 
     @cached_property
     def search_bounds(self) -> tuple[Array, Array]:
-        """(3,) bounds of what least squares searches."""
+        """Bounds (3,) of the search coordinates."""
         low, high = self.bounds
         return (
             np.array([0.0, np.log(low.damping), np.log(low.stiffness)]),
@@ -125,11 +132,11 @@ class Objective:
         )
 
     def slips(self, parameters: Bingham) -> bool:
-        """Whether the element slips within every full stroke: else F(0) would act as a free offset for ever."""
+        """Tell whether the element slips within every full stroke: else F(0) would act as a free offset for ever."""
         return parameters.friction <= LARGEST_PRE_SLIP * parameters.stiffness * self.scales[2]
 
     def at_bounds(self, parameters: Bingham) -> tuple[bool, ...]:
-        """Whether each parameter lies at a bound of the search; a friction of zero does not."""
+        """Tell whether each parameter lies at a bound of the search; a friction of zero does not."""
         low, high = self.search_bounds
         x = to_search(parameters, self.scales[2])
         beyond = x >= high - AT_BOUND * np.abs(high)
@@ -137,7 +144,7 @@ class Objective:
         return bool(beyond[0]), bool(beyond[1] or below[1]), bool(beyond[2] or below[2])
 
     def clipped(self, parameters: Bingham) -> Bingham:
-        """The parameters, brought inside the bounds."""
+        """Return the parameters clipped to the bounds."""
         stroke = self.scales[2]
         return from_search(np.clip(to_search(parameters, stroke), *self.search_bounds), stroke)
 
@@ -155,63 +162,63 @@ class Fit:
 
 
 def to_search(parameters: Bingham, stroke: float) -> Array:
-    """(3,) what least squares searches: pre-slip T0/k as a share of the stroke, the logarithms of C and k."""
+    """Return the search coordinates (3,): pre-slip T0/k as a share of the stroke, logarithms of C and k."""
     friction, damping, stiffness = parameters
     return np.array([friction / (stiffness * stroke), np.log(damping), np.log(stiffness)])
 
 
 def from_search(x: Array, stroke: float) -> Bingham:
-    """The parameters from what least squares searches."""
+    """Return the parameters at search coordinates (3,)."""
     stiffness = float(np.exp(x[2]))
     return Bingham(float(x[0]) * stiffness * stroke, float(np.exp(x[1])), stiffness)
 
 
 def search_slopes(parameters: Bingham, stroke: float) -> Array:
-    """(3, 3) derivatives of T0, C, k (rows) by what least squares searches (columns)."""
+    """Return the derivatives (3, 3) of T0, C, k (rows) by the search coordinates (columns)."""
     friction, damping, stiffness = parameters
     return np.array([[stiffness * stroke, 0.0, friction], [0.0, damping, 0.0], [0.0, 0.0, stiffness]])
 
 
-# --- Start ---
+# --- Start from the characteristic, as in the first stage of the paper ---
 
 FLANK_SPEED = 0.3
-"""The slip flank is read where the speed falls and still exceeds this share of its peak: there it surely slips."""
+"""Least speed of the slip flank, as a share of its peak: where the speed falls and exceeds it, the element slips."""
 PRE_SLIP_FORCE = 0.5
-"""The pre-slip branch is read where abs(F) stays below this share of the force at the foot of the flank."""
+"""Largest force of the pre-slip branch, as a share of T0."""
 
 
-def graphical_start(trials: Sequence[PreparedRecord]) -> Bingham:
-    """Starting values of T0, C and k from the characteristic of force over speed.
+def graphical_start(prepared: Sequence[PreparedRecord]) -> Bingham:
+    """Estimate T0, C and k from the characteristic of force over speed.
 
     Equation: abs(F) = T0 + C (abs(v) - tau d abs(v)/dt) on the slip flank; k = dF/dx before slip
               Source: eq. (1)-(3), to first order in tau = C/k
 
-    T0 is where the slip flank, extended, meets zero piston speed (the force measured there is
-    larger, the oil spring being still loaded, which the term in tau takes off); C is the flank's
-    slope; k the slope of force over displacement where the force passes through zero.
+    T0 is where the slip flank, extrapolated, meets zero piston speed (the measured force is larger there by the load of
+    the oil spring, which the term in tau removes); C is the slope of the flank; k the slope of force over displacement
+    where the force passes through zero.
 
     Parameters
     ----------
-    trials : the records of one condition
+    prepared : records of one condition
 
     Returns
     -------
     T0 [N], C [N s/m], k [N/m], all positive
     """
-    speed, slowing, force = _flank(trials)
+    speed, slowing, force = _flank(prepared)
     peak = max(float(np.max(force, initial=0.0)), np.finfo(float).tiny)
     fastest = max(float(np.max(speed, initial=0.0)), np.finfo(float).tiny)
     terms = np.column_stack([np.ones(speed.size), speed / fastest, slowing / max(np.max(slowing, initial=0.0), 1e-12)])
     intercept, slope, _ = np.linalg.lstsq(terms, force / peak, rcond=1e-3)[0] * peak
     damping = max(slope, 0.05 * peak) / fastest
     friction = float(np.clip(intercept, 0.01 * peak, peak))
-    return Bingham(friction, float(damping), _pre_slip_slope(trials, friction))
+    return Bingham(friction, float(damping), _pre_slip_slope(prepared, friction))
 
 
-def _flank(trials: Sequence[PreparedRecord]) -> tuple[Array, Array, Array]:
-    """Speed, its rate of fall, and force along the direction of motion, on the slip flank."""
+def _flank(prepared: Sequence[PreparedRecord]) -> tuple[Array, Array, Array]:
+    """Return speed, deceleration, and force along the direction of motion, on the slip flank."""
     parts = []
-    for t in trials:
+    for t in prepared:
         velocity = t.at_samples(np.gradient(t.displacement, t.step))
         step = t.step * (t.displacement.size - 1) / (t.force.size - 1)
         speed = np.abs(velocity)
@@ -223,10 +230,10 @@ def _flank(trials: Sequence[PreparedRecord]) -> tuple[Array, Array, Array]:
     return speed, slowing, along
 
 
-def _pre_slip_slope(trials: Sequence[PreparedRecord], friction: float) -> float:
-    """Slope of force over displacement where the force passes through zero, pooled over all passages."""
+def _pre_slip_slope(prepared: Sequence[PreparedRecord], friction: float) -> float:
+    """Return the slope of force over displacement where the force passes through zero, pooled over all passages."""
     covariance = variance = 0.0
-    for t in trials:
+    for t in prepared:
         displacement = t.at_samples(t.displacement)[t.counted]
         force = t.force[t.counted]
         for part in _runs(np.abs(force) < PRE_SLIP_FORCE * friction):
@@ -235,59 +242,60 @@ def _pre_slip_slope(trials: Sequence[PreparedRecord], friction: float) -> float:
             variance += float(dx @ dx)
     if covariance > 0.0:
         return covariance / variance
-    stroke = max(float(np.ptp(t.displacement)) for t in trials)
+    stroke = max(float(np.ptp(t.displacement)) for t in prepared)
     return 20.0 * friction / stroke
 
 
 def _runs(inside: NDArray[np.bool_]) -> list[slice]:
-    """Stretches of at least three samples inside."""
+    """Return the runs of at least three samples inside."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], inside.astype(int), [0]))))
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 3]
 
 
-# --- Separable ---
+# --- Separable method ---
 
 DEFLECTION_AND_TIME_GRID = (12, 10)
 """Points of the grid in delta = T0/k and in tau = C/k."""
 GRID_SAMPLES = 10_000
-"""The grid is evaluated on at most this many samples, shared out among the trials."""
+"""Most samples on which the grid is evaluated, divided among the records."""
 GRID_DESCENTS = 3
-"""How many of the best grid points are followed down."""
+"""Best grid points that are starts."""
 SAME_OPTIMUM = 1e-6
-"""Two descents whose criteria differ by less, relative, have reached the same optimum."""
+"""Relative difference of the criteria of two descents at the same optimum."""
 _CACHED_POINTS = 2
-"""Points whose forces are kept: where a descent stands, and where it has just tried to go."""
+"""Points whose forces are cached: the current one of a descent, and its last trial step."""
 TOLERANCE = 1e-12
-"""Tolerance of the least squares, relative, on parameters and criterion."""
+"""Relative tolerance of the least squares on parameters and criterion."""
 
 
 def fit_separable(objective: Objective) -> Fit:
-    """The global optimum of the criterion, from the graphical starting values and the grid.
+    """Find the global optimum of the criterion from the characteristic and the grid.
 
-    Starts are followed down until the best optimum has been reached twice. A second descent need not end: on one whose
-    criterion has come this close to an optimum that is known, another does not lie by chance.
+    Descents are made until the best optimum has been reached twice. The second need not converge: a criterion so close
+    to that of a known optimum is no coincidence.
     """
-    best = descend(objective, graphical_start(objective.trials))
+    best = descend(objective, graphical_start(objective.prepared))
     for start in grid_starts(objective):
-        fit = descend(objective, start, best.criterion)
-        if fit is None:
+        try:
+            fit = descend(objective, start, best.criterion)
+        except KnownOptimum:
             return best
         best = min(best, fit, key=lambda f: f.criterion)
     return best
 
 
-class _Reached(Exception):  # noqa: N818  # nothing went wrong
-    """A descent has come to an optimum that is known."""
+class KnownOptimum(Exception):  # noqa: N818  # nothing went wrong
+    """A descent has reached an optimum that is known."""
 
 
 def grid_starts(objective: Objective, count: int = GRID_DESCENTS) -> list[Bingham]:
-    """The best points of the grid, best first.
+    """Return the best points of the grid, best first.
 
     Equation: k = sum F f / sum f^2 with f = F(T0/k, C/k, 1)      Source: eq. (1)-(3), scaled by k
     """
     _, _, stroke = objective.scales
-    pieces = [_coarse_record(t, GRID_SAMPLES // len(objective.trials)) for t in objective.trials]
-    slowest = max((t.displacement.size - 1) * t.step for t in objective.trials)
+    pieces = [_coarse_record(t, GRID_SAMPLES // len(objective.prepared)) for t in objective.prepared]
+    slowest = max((t.displacement.size - 1) * t.step for t in objective.prepared)
     deltas = np.geomspace(1e-4, LARGEST_PRE_SLIP, DEFLECTION_AND_TIME_GRID[0]) * stroke
     taus = np.geomspace(min(p[1] for p in pieces), 0.1 * slowest, DEFLECTION_AND_TIME_GRID[1])
     found: list[tuple[float, Bingham]] = []
@@ -300,22 +308,18 @@ def grid_starts(objective: Objective, count: int = GRID_DESCENTS) -> list[Bingha
     return [objective.clipped(start) for _, start in sorted(found)[:count]]
 
 
-@overload
-def descend(objective: Objective, start: Bingham) -> Fit: ...
-@overload
-def descend(objective: Objective, start: Bingham, known: float) -> Fit | None: ...
-def descend(objective: Objective, start: Bingham, known: float | None = None) -> Fit | None:
-    """The optimum reached from a starting point by trust-region least squares within the bounds.
+def descend(objective: Objective, start: Bingham, known: float | None = None) -> Fit:
+    """Find the optimum from a starting point by trust-region least squares within the bounds.
 
     Parameters
     ----------
     objective : what is minimised
-    start : where from
+    start : of the search
     known : criterion of an optimum that is known already
 
-    Returns
-    -------
-    the optimum; None as soon as the known one is reached, which is that much of the way saved
+    Raises
+    ------
+    KnownOptimum : as soon as the criterion reaches the known one, which saves the rest of the way
     """
     from scipy.optimize import least_squares
 
@@ -324,7 +328,10 @@ def descend(objective: Objective, start: Bingham, known: float | None = None) ->
     low, high = objective.search_bounds
 
     def reduced(fit: Fit) -> Array:
-        """(4, 4) triangle whose last column and first three have the products of residuals and slopes."""
+        """Return the triangle (4, 4) with the inner products of slopes and residuals.
+
+        Least squares on four rows takes the same steps as on N rows, and costs next to nothing.
+        """
         together = np.column_stack([fit.slopes @ -search_slopes(fit.parameters, stroke), fit.residuals])
         together /= norm
         return np.asarray(np.linalg.qr(together, mode="r"))
@@ -343,47 +350,44 @@ def descend(objective: Objective, start: Bingham, known: float | None = None) ->
     def residuals_at(x: Array) -> Array:
         fit, triangle = at(x)
         if known is not None and abs(fit.criterion - known) <= SAME_OPTIMUM * known:
-            raise _Reached
+            raise KnownOptimum
         return triangle[:, 3]
 
     def slopes_at(x: Array) -> Array:
         return at(x)[1][:, :3]
 
     inside = np.clip(to_search(start, stroke), low + 1e-9, high - 1e-9)
-    try:
-        found = least_squares(
-            residuals_at,
-            inside,
-            jac=slopes_at,
-            bounds=(low, high),
-            x_scale="jac",
-            xtol=TOLERANCE,
-            ftol=TOLERANCE,
-            gtol=TOLERANCE,
-            max_nfev=100,
-        )
-    except _Reached:
-        return None
+    found = least_squares(
+        residuals_at,
+        inside,
+        jac=slopes_at,
+        bounds=(low, high),
+        x_scale="jac",
+        xtol=TOLERANCE,
+        ftol=TOLERANCE,
+        gtol=TOLERANCE,
+        max_nfev=100,
+    )
     return at(found.x)[0]
 
 
 def _fit_at(objective: Objective, parameters: Bingham) -> Fit:
-    """The parameters as a fit, however good."""
+    """Evaluate residuals and sensitivities at parameters."""
     residuals, slopes = objective.residuals_and_slopes(parameters)
     return Fit(parameters, float(residuals @ residuals) / objective.energy, residuals, slopes)
 
 
-def _coarse_record(trial: PreparedRecord, samples: int) -> tuple[Array, float, Array, int]:
-    """Coarse displacement, its step, the force, and the first counted sample, of the trial's first part."""
-    first = int(np.argmax(trial.counted))
+def _coarse_record(record: PreparedRecord, samples: int) -> tuple[Array, float, Array, int]:
+    """Return displacement at the samples, its step, force, and first counted sample of the first part of a record."""
+    first = int(np.argmax(record.counted))
     stop = max(first + samples, 2 * first)
-    displacement = np.ascontiguousarray(trial.at_samples(trial.displacement)[:stop])
-    step = trial.step * (trial.displacement.size - 1) / (trial.force.size - 1)
-    return displacement, step, trial.force[:stop], first
+    displacement = np.ascontiguousarray(record.at_samples(record.displacement)[:stop])
+    step = record.step * (record.displacement.size - 1) / (record.force.size - 1)
+    return displacement, step, record.force[:stop], first
 
 
 def _inner_products(pieces: list[tuple[Array, float, Array, int]], delta: float, tau: float) -> tuple[float, float]:
-    """Sums of F f and of f^2 over the pieces."""
+    """Return the sums of F f and of f^2 over the records."""
     match = energy = 0.0
     for displacement, step, force, first in pieces:
         shape = element_force(displacement, step, delta, tau, 1.0)[first:]
@@ -392,23 +396,23 @@ def _inner_products(pieces: list[tuple[Array, float, Array, int]], delta: float,
     return match, energy
 
 
-# --- Evolutionary ---
+# --- Evolutionary method ---
 
 LEAST_FRICTION = 1e-4
-"""Smallest friction of the search, as a share of the peak force: its logarithm needs one."""
+"""Least friction of the search, as a share of the peak force, since its logarithm is searched."""
 PENALTY = 10.0
-"""What the search sees for a parameter set that the bounds of the other method leave out."""
+"""Criterion of parameters outside the bounds of the separable method: ten times that of no model at all."""
 LEAST_SPREAD = 1e-8
-"""Spread of the criterion over the population at which the search ends in any case; the rest is polish."""
+"""Spread of the criterion over the population at which the search ends; least squares does the rest."""
 
 
 def fit_evolutionary(objective: Objective, config: EvolutionaryConfig, seed: int) -> Fit:
-    """The optimum that the evolutionary search finds, brought to the bottom by least squares."""
+    """Find the optimum by the evolutionary search, refined by least squares."""
     return descend(objective, evolutionary_search(objective, config, seed))
 
 
 def evolutionary_search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingham:
-    """The best member of the last generation of a differential evolution on the criterion.
+    """Return the best member of the last generation of a differential evolution on the criterion.
 
     Equation: minimise W_s over log T0, log C, log k      Source: Makowski and Knap 2021, eq. (4); Storn and Price 1997
 
@@ -420,7 +424,7 @@ def evolutionary_search(objective: Objective, config: EvolutionaryConfig, seed: 
 
     Returns
     -------
-    parameters, not yet polished
+    parameters, not yet refined by least squares
     """
     from scipy.optimize import Bounds, differential_evolution
 

@@ -1,4 +1,9 @@
-"""Characteristics."""
+"""Characteristics of a damper that its tests show without a model.
+
+The peak-velocity plot (PVP) is the force of each test at its peak speed, the continuous-velocity plot (CVP) the force
+over speed in its average cycle. Gas force and friction are the force at rest; further the response to a step of the
+control signal and the force over a warm-up. Records without any of these get a row of extremes.
+"""
 
 from __future__ import annotations
 
@@ -26,14 +31,12 @@ from pzd.signals.segmentation import separate_tests
 
 
 def characteristics(constant: Sequence[Condition], moving: Sequence[Record]) -> Characteristics:
-    """Peak- and continuous-velocity plots, gas force, friction and warm-up of every condition, the response to steps.
-
-    A record that is none of these is told as it stands.
+    """Derive all characteristics of a rig.
 
     Parameters
     ----------
-    constant : the conditions, in each of which the control signal stands still
-    moving : the records in which it moves
+    constant : conditions, in each of which the control signal is constant
+    moving : records in which it moves
     """
     found = [(condition, [(r, test) for r in condition.records for test in speed_tests(r)]) for condition in constant]
     peaks = tuple(row for condition, tests in found for row in peak_velocity(condition, tests))
@@ -50,11 +53,11 @@ def characteristics(constant: Sequence[Condition], moving: Sequence[Record]) -> 
     )
 
 
-# --- PVP ---
+# --- Peak-velocity plot ---
 
 
 def peak_velocity(condition: Condition, tests: Sequence[tuple[Record, SpeedTest]]) -> tuple[PeakVelocityRow, ...]:
-    """One row for each test of a condition, slowest first.
+    """Return one row for each test of a condition, slowest first.
 
     Parameters
     ----------
@@ -66,6 +69,7 @@ def peak_velocity(condition: Condition, tests: Sequence[tuple[Record, SpeedTest]
 
 
 def _peak_velocity_row(condition: Condition, record: Record, test: SpeedTest) -> PeakVelocityRow:
+    """Return the row of one test."""
     rebound = _mean_of_direction([s for s in test.strokes if s.rebound])
     compression = _mean_of_direction([s for s in test.strokes if not s.rebound])
     return PeakVelocityRow(
@@ -85,23 +89,23 @@ def _peak_velocity_row(condition: Condition, record: Record, test: SpeedTest) ->
 
 
 def _mean_of_direction(strokes: Sequence[Stroke]) -> tuple[float | None, float | None]:
-    """Speed and force of the strokes of one direction; None where there are none."""
+    """Return the mean speed and force of the strokes of one direction; None where there are none."""
     if not strokes:
         return None, None
     speed, force = np.mean([stroke.at_peak() for stroke in strokes], axis=0)
     return float(speed), float(force)
 
 
-# --- CVP ---
+# --- Continuous-velocity plot ---
 
 CYCLE_POINTS = 100
-"""Points of a cycle that are written: a curve looks round, and a file of many tests stays small."""
+"""Points written of a cycle: the curve looks smooth, and the file of many tests stays small."""
 
 
 def continuous_velocity(
     condition: Condition, tests: Sequence[tuple[Record, SpeedTest]]
 ) -> tuple[ContinuousVelocityRow, ...]:
-    """The cycle of every test that repeats, test by test in the order given.
+    """Return the average cycle of every test that repeats, in the order of the tests.
 
     Parameters
     ----------
@@ -134,7 +138,7 @@ def _continuous_velocity_rows(condition: Condition, record: Record, cycle: Cycle
 
 
 def thinned(values: Array) -> Array:
-    """Means of (n,) values over `POINTS` parts as equal as can be; the values themselves where there are no more."""
+    """Return the means of values (n,) over `CYCLE_POINTS` parts as equal as possible; fewer values unchanged."""
     if values.size <= CYCLE_POINTS:
         return values
     size, longer = divmod(values.size, CYCLE_POINTS)
@@ -142,19 +146,22 @@ def thinned(values: Array) -> Array:
     return np.concatenate([part.reshape(-1, length).mean(axis=1) for part, length in ((long, size + 1), (short, size))])
 
 
-# --- Gas force and friction ---
+# --- Gas force and friction: force at mid-stroke as the speed goes to zero ---
+#
+# Equation: F_gas = (F_r + F_c) / 2, F_friction = (F_r - F_c) / 2, both at v -> 0
+# Source: definition; F_r and F_c are the forces in rebound and compression, compression being negative
 
 SLOW_M_PER_S = 0.01
-"""Up to this speed a test counts as static: labs measure gas force and friction at 1 to 10 mm/s."""
+"""Largest speed of a static test [m/s]: labs measure gas force and friction at 1 to 10 mm/s."""
 LEAST_SPEED_RATIO = 1.5
-"""The second speed of a line to rest is at least so many times the first, or the line hangs on noise."""
+"""Least ratio of the two speeds of an extrapolation to rest, which otherwise follows the noise."""
 
 
 def gas_and_friction(rows: Sequence[PeakVelocityRow]) -> tuple[GasAndFrictionRow, ...]:
-    """One row for each condition that has a test in both directions.
+    """Return one row for each condition with a test in both directions, from its slowest test.
 
-    Read from the slowest test. Where that is not static, a line through it and the next speed leads to rest, which
-    leaves out what the damping adds; where there is no other speed the row says so.
+    Where that is not static, a line through it and the next speed is extrapolated to rest, which removes the damping;
+    where there is no other speed the row says so.
 
     Parameters
     ----------
@@ -168,7 +175,7 @@ def gas_and_friction(rows: Sequence[PeakVelocityRow]) -> tuple[GasAndFrictionRow
 
 
 def _gas_and_friction_row(rows: Sequence[PeakVelocityRow]) -> GasAndFrictionRow:
-    """Of the rows of one condition, slowest first."""
+    """Return gas force and friction from the rows of one condition, slowest first."""
     slowest = _same_speed(rows, rows[0])
     speed, gas, friction = _at_one_speed(slowest)
     method: Method = "slow test" if speed <= SLOW_M_PER_S else "at the lowest speed"
@@ -191,32 +198,35 @@ def _gas_and_friction_row(rows: Sequence[PeakVelocityRow]) -> GasAndFrictionRow:
 
 
 def _same_speed(rows: Sequence[PeakVelocityRow], first: PeakVelocityRow) -> list[PeakVelocityRow]:
+    """Return the rows of the speed of the first one."""
     return [row for row in rows if same_motion(row.speed, first.speed)]
 
 
 def _at_one_speed(rows: Sequence[PeakVelocityRow]) -> tuple[float, float, float]:
-    """Speed [m/s], and mean and half difference of rebound and compression [N]."""
+    """Return speed [m/s], and mean and half difference of rebound and compression [N]."""
     rebound = float(np.mean([row.rebound_force_N for row in rows]))
     compression = float(np.mean([row.compression_force_N for row in rows]))
     return float(np.mean([row.speed for row in rows])), 0.5 * (rebound + compression), 0.5 * (rebound - compression)
 
 
-# --- Step response ---
+# --- Response to a step of the control signal ---
+#
+# Only at constant speed does the force change by the step alone; during any other motion a step has no times.
 
 RISE_SHARES = (0.63, 0.9)
-"""Shares of the change of force to which the time is given, as data sheets give them."""
+"""Shares of the change of force to which the time is given, as in data sheets."""
 LONGEST_RISE_S = 0.02
-"""A control signal that takes longer from one level to the next is a ramp: supplies take a few milliseconds."""
+"""Longest step of the control signal [s]; a longer one is a ramp: supplies take a few milliseconds."""
 SETTLED_DRIFT = 0.05
-"""Before a step and at the end of its stroke the force moves by no more than this share of its change."""
+"""Largest drift of the force before a step and at the end of its stroke, as a share of its change."""
 FEWEST_STEP_SAMPLES = 12
-"""Samples of constant speed on either side of a step, at least: three for each quarter that is compared."""
+"""Fewest samples of constant speed on either side of a step: three for each quarter that is compared."""
 STEADY_PART = (0.05, 0.95)
-"""Shares of a stroke of constant speed between which a step and its response must lie."""
+"""Shares of a stroke of constant speed between which a step and its response have to lie."""
 
 
 def step_responses(records: Sequence[Record]) -> tuple[StepRow, ...]:
-    """Every step of the control signal in records in which it moves, in their order.
+    """Return every step of the control signal, in the order of the records.
 
     Parameters
     ----------
@@ -234,14 +244,14 @@ class ControlStep:
     after: int
     """First sample on the new one."""
     time: float
-    """When the signal passes the middle [s]."""
+    """Time at which the signal passes the middle [s]."""
     low: float
     high: float
-    """The old and the new level."""
+    """Old and new level of the signal."""
 
 
 def steps_of(time: Array, voltage: Array) -> Iterator[ControlStep]:
-    """The steps of a signal from one level that it dwells on to another.
+    """Yield the steps of a signal from one level on which it dwells to another.
 
     Parameters
     ----------
@@ -264,6 +274,7 @@ def steps_of(time: Array, voltage: Array) -> Iterator[ControlStep]:
 
 
 def _step_rows(record: Record) -> Iterator[StepRow]:
+    """Yield the rows of one record."""
     if record.voltage is None:
         return
     strokes = strokes_of(record.time, record.displacement, record.force)
@@ -275,7 +286,7 @@ def _step_rows(record: Record) -> Iterator[StepRow]:
 
 
 def _step_row(record: Record, step: ControlStep, strokes: Sequence[Stroke], since: float, until: float) -> StepRow:
-    """One step between the one before it and the one behind it [s]."""
+    """Return the row of one step, between the times of the step before and the one after it [s]."""
     here = [s for s in strokes if s.time[0] <= step.time <= s.time[-1] and s.kind == "constant velocity"]
     forces: tuple[float, float] | None = None
     reached: list[float | None] = [None for _ in RISE_SHARES]
@@ -306,7 +317,7 @@ def _step_row(record: Record, step: ControlStep, strokes: Sequence[Stroke], sinc
 
 
 def _settled_forces(before: Array, after: Array) -> tuple[tuple[float, float] | None, str]:
-    """Force before a step and settled after it [N], or None with the reason."""
+    """Return the force before a step and the settled force after it [N], or None with the reason."""
     if min(before.size, after.size) < FEWEST_STEP_SAMPLES:
         return None, "too little of the stroke lies before or after the step"
     quarters = [np.array_split(values, 4) for values in (before, after)]
@@ -321,9 +332,9 @@ def _settled_forces(before: Array, after: Array) -> tuple[tuple[float, float] | 
 
 
 def _time_to_share(since: Array, progress: Array, share: float) -> float:
-    """When the force comes up to a share of its way: half way between the first and the last time that it does.
+    """Return the time at which the force reaches a share of its change: the middle of its first and last crossing.
 
-    Noise brings the first crossing forward and puts the last one back; without noise both are one.
+    Noise brings the first crossing forward and delays the last one; without noise both are one.
     """
     over = np.flatnonzero(progress >= share)
     under = np.flatnonzero(progress[: over[-1]] < share)
@@ -333,31 +344,31 @@ def _time_to_share(since: Array, progress: Array, share: float) -> float:
 
 
 def _crossing_time(since: Array, progress: Array, share: float, last: int) -> float:
-    """When the share is passed between a sample and the next [s]; the first sample where it is passed before."""
+    """Return the time of the crossing after a sample [s]; the first sample where the share is passed before."""
     if last < 0:
         return float(since[0])
     way = (share - progress[last]) / (progress[last + 1] - progress[last])
     return float(since[last] + way * (since[last + 1] - since[last]))
 
 
-# --- Warm-up ---
+# --- Warm-up: force of every cycle of a long test, over time and temperature ---
 
 MANY_CYCLES = 30
-"""So many cycles of one motion are run to warm a damper up: a test of force over speed has ten or fewer."""
+"""Fewest cycles of a warm-up: a test of force over speed has ten or fewer."""
 LEAST_WARMING_K = 2.0
-"""A test of fewer cycles counts where its temperature changes by more than this, by which conditions are told apart."""
+"""Change of temperature above which a shorter test is a warm-up [K]: that of two conditions."""
 FEWEST_CYCLES = 6
-"""Cycles of which a course can be seen: three at its beginning, three at its end."""
+"""Fewest cycles of such a shorter test: three at its beginning, three at its end."""
 EQUAL_SPEED_SHARE = 0.8
-"""Share of the whole strokes that must have one peak speed: the others are starts and stops."""
+"""Least share of the strokes that have one peak speed: the others are starts and stops."""
 
 
 def warm_up_rows(condition: Condition) -> tuple[WarmUpRow, ...]:
-    """One row for each cycle of the condition's tests of one motion that are many cycles long or change in temperature.
+    """Return one row for each cycle of the tests that are many cycles long or change in temperature.
 
     Parameters
     ----------
-    condition : its records, in which the control signal stands still
+    condition : of constant control signal
     """
     return tuple(
         row
@@ -368,6 +379,7 @@ def warm_up_rows(condition: Condition) -> tuple[WarmUpRow, ...]:
 
 
 def _warm_up_rows(condition: Condition, name: str, part: Record) -> Iterator[WarmUpRow]:
+    """Yield the rows of one test."""
     strokes = strokes_of(part.time, part.displacement, part.force)
     if len(strokes) < 2 * (FEWEST_CYCLES if _temperature_change(part) > LEAST_WARMING_K else MANY_CYCLES):
         return
@@ -393,7 +405,7 @@ def _warm_up_rows(condition: Condition, name: str, part: Record) -> Iterator[War
 
 
 def _temperature_change(part: Record) -> float:
-    """How far the temperature moves from the first tenth of a test to the last [K]; 0 where none was recorded."""
+    """Return the change of temperature from the first tenth of a test to the last [K]; 0 where none was recorded."""
     if part.temperature is None:
         return 0.0
     tenth = max(part.temperature.size // 10, 1)
@@ -401,7 +413,7 @@ def _temperature_change(part: Record) -> float:
 
 
 def _cycles_of_one_speed(strokes: Sequence[Stroke]) -> list[tuple[Stroke, Stroke]]:
-    """Strokes of one peak speed in pairs, one each way; none where there is no such speed."""
+    """Return the strokes of one peak speed in pairs, one each way; none where there is no such speed."""
     speeds = [abs(stroke.at_peak()[0]) if stroke.kind else 0.0 for stroke in strokes]
     usual = float(np.median(speeds))
     alike = [usual > 0.0 and same_motion(speed, usual) for speed in speeds]
@@ -416,26 +428,27 @@ def _cycles_of_one_speed(strokes: Sequence[Stroke]) -> list[tuple[Stroke, Stroke
     return found
 
 
-# --- As it stands ---
+# --- Records without a test of force over speed ---
 
 
 def as_it_stands(
     constant: Sequence[Condition], moving: Sequence[Record], recognised: Collection[str]
 ) -> tuple[AsItStandsRow, ...]:
-    """One row for each record in which no test was recognised.
+    """Return one row of extremes for each record in which no test was recognised.
 
     Parameters
     ----------
-    constant : the conditions, in each of which the control signal stands still
-    moving : the records in which it moves
+    constant : conditions, in each of which the control signal is constant
+    moving : records in which it moves
     recognised : names of the records that hold a test of another kind
     """
-    held = [(record, one.voltage, one.temperature) for one in constant for record in one.records]
-    found = [*held, *((record, None, record.median_temperature()) for record in moving)]
+    still = [(record, one.voltage, one.temperature) for one in constant for record in one.records]
+    found = [*still, *((record, None, record.median_temperature()) for record in moving)]
     return tuple(_as_it_stands_row(*one) for one in found if one[0].name not in recognised)
 
 
 def _as_it_stands_row(record: Record, voltage: float | None, temperature: float | None) -> AsItStandsRow:
+    """Return the extremes of one record."""
     return AsItStandsRow(
         record=record.name,
         setting=record.setting,

@@ -10,17 +10,14 @@ from pzd.artefacts import AuxiliaryRow, Identified, Knees, ParameterRow, Rig
 from pzd.identification.config import IdentifyConfig
 from pzd.parallel.processes import Listener, Progress, no_listener, parallel_map
 from pzd.quantities import TEMPERATURE, Control
-from pzd.record import Condition, Record, conditions, merged_voltages
+from pzd.record import Condition, Labels, Record, conditions, merged_voltages
 from pzd.schema.errors import ConfigError, DataError, counted, supported
 from pzd.signals.cycles import Cycles, cycles_of, remember_cycles
-
-Labels = tuple[str | None, float | None, float | None]
 
 log = logging.getLogger(__name__)
 
 WORTH_A_PROCESS = 2_000_000
-"""Samples in all from which conditions are fitted in processes of their own, each of which imports a library first:
-fewer are fitted as soon here."""
+"""Fewest samples in all for which conditions are fitted in separate processes: each has to import its libraries."""
 
 _VOLTAGE = Control()
 
@@ -33,21 +30,21 @@ def identify(
     control: Control = _VOLTAGE,
     jobs: int = 1,
 ) -> Identified:
-    """The Bingham parameters of every condition of every setting, with intervals and their trust.
+    """Identify the Bingham parameters of every condition of every setting, with intervals and status.
 
     Parameters
     ----------
-    identify : how they are found
+    identify : the `identify` block of the config
     rig : the records
     seed : of the evolutionary search
-    progress : hears of every condition that is done
+    progress : called after every condition
     control : the control signal, which names the voltage in messages
     jobs : conditions that are fitted at the same time
 
     Returns
     -------
-    one row a condition or voltage node, one row of measures a record, one of auxiliaries a condition that shows any,
-    and the characteristics that the tests show without a model
+    one row a condition or voltage node, one row of measures a record, one of auxiliary forces a condition that shows
+    any, and the characteristics of the tests without a model
 
     Raises
     ------
@@ -80,7 +77,7 @@ def _knees(
     control: Control,
     progress: Listener,
 ) -> Knees:
-    """The knee law of every condition, where the config asks for it."""
+    """Identify the knee law of every condition, where the config asks for it."""
     if config.law == "bingham":
         return Knees()
     from pzd.identification.knee import identify_knees
@@ -141,6 +138,7 @@ def refuse_partly_recorded(rig: Rig, control: Control) -> None:
 def _constant_rows(
     found: Sequence[Condition], config: IdentifyConfig, seed: int, progress: Listener, jobs: int
 ) -> list[tuple[ParameterRow, AuxiliaryRow | None]]:
+    """Identify the conditions, several at the same time where they are worth a process."""
     from pzd.identification.condition import identify_condition
 
     rows: list[tuple[ParameterRow, AuxiliaryRow | None]] = []
@@ -162,6 +160,7 @@ def _constant_rows(
 
 
 def _auxiliary_text(row: AuxiliaryRow | None) -> str:
+    """Return the forces beside the element as the end of a line of progress."""
     if row is None:
         return ""
     force = supported(row.F_0_N, row.F_0_N_low95, row.F_0_N_high95)
@@ -175,6 +174,7 @@ def _moving_rows(
     auxiliaries: Sequence[AuxiliaryRow],
     config: IdentifyConfig,
 ) -> list[ParameterRow]:
+    """Identify the voltage nodes from records of moving voltage, setting by setting."""
     from pzd.identification.condition import subtract_auxiliary
     from pzd.identification.moving_voltage import fit_moving
 
@@ -195,11 +195,14 @@ def _labels(row: ParameterRow | AuxiliaryRow) -> Labels:
 
 
 def _sort_key(labels: Labels) -> tuple[str, float, float]:
+    """Order rows by setting, temperature and voltage."""
     setting, voltage, temperature = labels
     return setting or "", temperature or 0.0, voltage or 0.0
 
 
 def _parameter_text(row: ParameterRow) -> str:
+    """Return the parameters of one row as a line of progress."""
+
     def shown(value: float | None, low: float | None, high: float | None) -> str:
         if value is None:
             return "-"

@@ -1,4 +1,8 @@
-"""Strokes and loops."""
+"""Strokes and loops of single tests: the kind of motion, work per cycle, and the equivalent viscous damper.
+
+A stroke runs from one reversal to the next and is examined by itself, so that neither the name of the waveform, nor the
+number of repetitions, nor rests between strokes matter. A loop is the average cycle of force over displacement.
+"""
 
 from __future__ import annotations
 
@@ -24,28 +28,28 @@ from pzd.signals.segmentation import separate_tests
 # --- Strokes ---
 
 STRAIGHT_PART = (0.2, 0.8)
-"""Shares of the stroke between which a test of constant speed holds it: an actuator needs the rest to turn round."""
+"""Shares of the stroke between which a test of constant speed keeps its speed: an actuator reverses in the rest."""
 MIDDLE_PART = (0.4, 0.6)
-"""Shares of the stroke between which its force is read: far from the reversal, after which the oil spring winds up."""
+"""Shares of the stroke between which its force is read: far from the reversal, after which the oil spring loads."""
 STRAIGHT_PIECES = 4
-"""The straight part is cut into so many parts of equal way, whose speeds are compared."""
+"""Pieces of equal length of the straight part, whose speeds are compared."""
 CONSTANT_SPEED = 0.03
-"""A speed stays constant within this share of its mean; that of a sine moves by 5 % over these parts."""
+"""Largest relative deviation of a constant speed from its mean; that of a sine changes by 5 % over these pieces."""
 SINUSOIDAL = 0.03
-"""R.m.s. deviation from half a cosine, as a share of the stroke: a slider-crank leaves 0.02, a triangle 0.07."""
+"""Largest r.m.s. deviation of a sine from half a cosine, as a share of stroke: a crank has 0.02, a triangle 0.07."""
 AROUND_PEAK = 0.7
-"""The peak speed of a sine is looked for within this share of the half stroke to either side of its middle."""
+"""Part of the stroke around its middle in which the peak speed of a sine is sought."""
 BESIDE_PEAK = 0.4
-"""The force is read from a parabola over this share of that time to either side of the peak, 18 degrees of a sine."""
+"""Half width of the parabola for the force at the peak, as a share of half that time: 18 degrees of a sine."""
 SMOOTHNESS = 0.005
-"""R.m.s. deviation from the polynomial around the middle, as a share of the stroke, up to which there is one peak."""
+"""Largest r.m.s. deviation from the polynomial around the middle, as a share of the stroke, with a single peak."""
 FEWEST_POINTS = 6
-"""Samples that a fit over a part of a stroke needs, at least."""
+"""Fewest samples for a fit over a part of a stroke."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stroke:
-    """The rod from one reversal to the next; every array is (n,)."""
+    """Motion and force from one reversal to the next, in SI units; every array is (n,)."""
 
     time: Array
     displacement: Array
@@ -58,17 +62,17 @@ class Stroke:
 
     @property
     def length(self) -> float:
-        """Way from end to end [m]."""
+        """Distance from end to end [m]."""
         return float(np.ptp(self.displacement))
 
     @property
     def middle(self) -> float:
-        """Displacement half way [m]."""
+        """Displacement at mid-stroke [m]."""
         return 0.5 * float(self.displacement.min() + self.displacement.max())
 
     @cached_property
     def kind(self) -> Kind | None:
-        """What the motion is; None where its speed has no clear peak, or there are too few samples to say."""
+        """Kind of the motion; None where its speed has no clear peak, or there are too few samples."""
         if self._constant():
             return "constant velocity"
         if self.time[self._around_middle].size < FEWEST_POINTS or not self._has_one_peak():
@@ -76,12 +80,10 @@ class Stroke:
         return "sine" if self._sinusoidal() else "other swing"
 
     def at_peak(self) -> tuple[float, float]:
-        """Speed [m/s] and force [N] where the stroke is fastest.
-
-        At constant speed that is the middle of the stroke, as anywhere in its straight part.
+        """Return speed [m/s] and force [N] where the stroke is fastest: at constant speed, at mid-stroke.
 
         Equation: v from a straight line, or a polynomial of degree five, through x; F from one through F
-                                                                    Source: least squares, so that noise averages out
+                                                                    Source: least squares
         """
         if self.kind == "constant velocity":
             part = self.between(*STRAIGHT_PART)
@@ -99,28 +101,30 @@ class Stroke:
 
     @cached_property
     def _around_middle(self) -> slice:
+        """Samples around mid-stroke."""
         return self.between(0.5 - 0.5 * AROUND_PEAK, 0.5 + 0.5 * AROUND_PEAK)
 
     def _course(self) -> tuple[np.polynomial.Polynomial, float]:
-        """Displacement around the middle [m] over time from -1 to 1, and half of that time [s]."""
+        """Return the displacement around mid-stroke [m] over time from -1 to 1, and half of that time [s]."""
         t, x = self.time[self._around_middle], self.displacement[self._around_middle]
         half = 0.5 * float(t[-1] - t[0])
         return np.polynomial.Polynomial.fit((t - t[0]) / half - 1.0, x, 5, domain=(-1.0, 1.0)), half
 
     def _has_one_peak(self) -> bool:
-        """Whether the motion around the middle is smooth, and fastest inside of it and not at its end."""
+        """Tell whether the motion around mid-stroke is smooth, and fastest inside and not at its ends."""
         course, half = self._course()
         t, x = self.time[self._around_middle], self.displacement[self._around_middle]
         left = x - course((t - t[0]) / half - 1.0)
         return bool(np.sqrt(np.mean(left**2)) <= SMOOTHNESS * self.length) and abs(_steepest_place(course)) < 1.0
 
     def between(self, low: float, high: float) -> slice:
-        """The samples between two shares of the way, counted from where the stroke begins."""
+        """Return the samples between two shares of the stroke, counted from its beginning."""
         way = np.abs(self.displacement - self.displacement[0]) / abs(self.displacement[-1] - self.displacement[0])
         first = int(np.argmax(way >= low))
         return slice(first, first + int(np.argmax(np.append(way[first:], 2.0) > high)))
 
     def _constant(self) -> bool:
+        """Tell whether the speed is constant in the straight part."""
         shares = np.linspace(*STRAIGHT_PART, STRAIGHT_PIECES + 1)
         parts = [self.between(low, high) for low, high in pairwise(shares)]
         if any(part.stop - part.start < FEWEST_POINTS // 2 for part in parts):
@@ -129,36 +133,36 @@ class Stroke:
         return bool(np.all(np.abs(speeds / speeds.mean() - 1.0) <= CONSTANT_SPEED))
 
     def _sinusoidal(self) -> bool:
+        """Tell whether the stroke is half a cosine."""
         share = (self.time - self.time[0]) / (self.time[-1] - self.time[0])
-        ideal = self.displacement[0] + (self.displacement[-1] - self.displacement[0]) * 0.5 * (
-            1.0 - np.cos(np.pi * share)
-        )
+        first, last = self.displacement[0], self.displacement[-1]
+        ideal = first + (last - first) * 0.5 * (1.0 - np.cos(np.pi * share))
         return bool(np.sqrt(np.mean((self.displacement - ideal) ** 2)) <= SINUSOIDAL * self.length)
 
 
 def _polynomial_value(x: Array, values: Array, degree: int, place: float) -> float:
-    """Value of the polynomial of a degree through (n,) values over (n,) x at a place."""
+    """Return the value at a place of the least-squares polynomial through values (n,) over x (n,)."""
     return float(np.polynomial.Polynomial.fit(x, values, degree)(place))
 
 
 def _steepest_place(course: np.polynomial.Polynomial) -> float:
-    """Where from -1 to 1 a course has its steepest slope."""
+    """Return the place from -1 to 1 of the steepest slope."""
     fine = np.linspace(-1.0, 1.0, 2001)
     return float(fine[np.argmax(np.abs(course.deriv()(fine)))])
 
 
 SHORT_STROKE = 0.7
-"""A stroke of less than this share of the record's stroke is a start, a stop or a return."""
+"""Least stroke, as a share of that of the record: a shorter one is a start, a stop or a return."""
 RECOGNISED_SHARE = 0.8
-"""Share of the way of a record that must lie in strokes of constant speed, or it is another motion."""
+"""Least share of the path of a record in strokes of constant speed: otherwise it is another motion."""
 CLOSURE = 0.02
-"""A record of a single cycle ends where it began, within this share of its stroke."""
+"""Largest distance between the ends of a record of a single cycle, as a share of its stroke."""
 MID_STROKE_SPEED = 0.1
-"""Share of the largest speed from which a single cycle begins in the midst of a stroke, and not at a reversal."""
+"""Speed, as a share of the largest, above which a single cycle begins within a stroke and not at a reversal."""
 
 
 def strokes_of(time: Array, displacement: Array, force: Array) -> list[Stroke]:
-    """The whole strokes between reversals, ends of the record among them."""
+    """Return the whole strokes between reversals, the ends of the record among them."""
     turns = sorted({0, *reversals(displacement), displacement.size - 1})
     found = [
         Stroke(time[first : last + 1], displacement[first : last + 1], force[first : last + 1])
@@ -171,7 +175,7 @@ def strokes_of(time: Array, displacement: Array, force: Array) -> list[Stroke]:
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """One closed cycle from its lowest point on, rebound first; every array is (n,)."""
+    """One closed cycle from its lowest point on, rebound first, in SI units; every array is (n,)."""
 
     time: Array
     displacement: Array
@@ -182,16 +186,16 @@ class Cycle:
 
 @dataclass(frozen=True, eq=False)
 class SpeedTest:
-    """Strokes of one kind and, if it is constant, of one speed."""
+    """Strokes of one kind and, at constant speed, of one speed."""
 
     kind: Kind
     strokes: tuple[Stroke, ...]
     cycle: Cycle | None
-    """Where the motion repeats."""
+    """Average cycle, where the motion repeats."""
 
 
 def speed_tests(record: Record) -> tuple[SpeedTest, ...]:
-    """The tests of a record whose control signal stands still; none where it holds another motion.
+    """Find the tests of force over speed in a record of constant control signal; none where it holds another motion.
 
     Parameters
     ----------
@@ -201,6 +205,7 @@ def speed_tests(record: Record) -> tuple[SpeedTest, ...]:
 
 
 def _tests_of_one_motion(record: Record) -> list[SpeedTest]:
+    """Find the tests in a record of one motion."""
     cycle = settled_cycle(record)
     if cycle is None:
         strokes = strokes_of(record.time, record.displacement, record.force)
@@ -213,7 +218,7 @@ def _tests_of_one_motion(record: Record) -> list[SpeedTest]:
 
 
 def _tests_of_constant_speed(strokes: Sequence[Stroke], cycle: Cycle | None) -> list[SpeedTest]:
-    """One test for each speed, slowest first."""
+    """Group strokes of constant speed into one test for each speed, slowest first."""
     constant = [stroke for stroke in strokes if stroke.kind == "constant velocity"]
     if sum(s.length for s in constant) < RECOGNISED_SHARE * sum(s.length for s in strokes):
         return []
@@ -227,7 +232,7 @@ def _tests_of_constant_speed(strokes: Sequence[Stroke], cycle: Cycle | None) -> 
 
 
 def settled_cycle(record: Record) -> Cycle | None:
-    """The average of the cycles in which motion and force repeat, or the only cycle of a record that closes."""
+    """Return the average of the cycles in which motion and force repeat, or the only cycle of a closed record."""
     run = cycles_of(record)
     if run is None:
         return _single_cycle(record)
@@ -237,7 +242,7 @@ def settled_cycle(record: Record) -> Cycle | None:
 
 
 def _single_cycle(record: Record) -> Cycle | None:
-    """A record of one cycle, as a damper dyno saves it, whatever the phase in which it begins."""
+    """Return the cycle of a record of one cycle, as a damper dyno saves it, whatever the phase at its beginning."""
     x, closed = record.displacement, CLOSURE * float(np.ptp(record.displacement))
     way = float(np.sum(np.abs(np.diff(x))))
     if len(reversals(x)) > 2 or abs(x[-1] - x[0]) > closed or abs(way - 2.0 * np.ptp(x)) > 2.0 * closed:
@@ -245,7 +250,7 @@ def _single_cycle(record: Record) -> Cycle | None:
     speed = 0.5 * float(record.velocity[0] + record.velocity[-1])
     last, gap = x.size, 1.0 / record.rate
     if abs(speed) > MID_STROKE_SPEED * float(np.max(np.abs(record.velocity))):
-        # It begins in the midst of a stroke: what goes beyond its first place at the end is the next cycle.
+        # It begins within a stroke: what goes beyond its first place at the end belongs to the next cycle.
         last = int(np.flatnonzero(np.sign(speed) * (x - x[0]) < 0.0)[-1]) + 1
         gap = float(x[0] - x[last - 1]) / speed
     time, velocity, force = (values[:last] for values in (record.time, record.velocity, record.force))
@@ -253,6 +258,7 @@ def _single_cycle(record: Record) -> Cycle | None:
 
 
 def _cycle_from_lowest(time: Array, displacement: Array, velocity: Array, force: Array, period: float) -> Cycle:
+    """Return a cycle from its lowest point on."""
     first = int(np.argmin(displacement))
     later = np.concatenate((time[first:], time[:first] + period)) - time[first]
     x, v, f = (np.roll(values, -first) for values in (displacement, velocity, force))
@@ -261,18 +267,18 @@ def _cycle_from_lowest(time: Array, displacement: Array, velocity: Array, force:
     return Cycle(np.append(later, period), x, v, f, period)
 
 
-# --- Loops ---
+# --- Loops: work per cycle, equivalent damping, dynamic range ---
 
 SPEED_WINDOWS = 16
-"""A constant speed is looked for in means over this part of a cycle: long against noise, short against a stroke."""
+"""Windows in a cycle in which a constant speed is sought: long against noise, short against a stroke."""
 LOOP_CONSTANT_SPEED = 0.03
-"""A speed stays constant within this share; a sine does so for a sixth of its cycle."""
+"""Largest relative deviation of a constant speed; a sine stays within it for a sixth of its cycle."""
 CONSTANT_SPEED_SHARE = 0.5
-"""Share of the cycle in which a test of constant speed holds it, at least."""
+"""Least share of the cycle in which a test of constant speed keeps it."""
 
 
 def measures(records: Sequence[Record]) -> tuple[MeasureRow, ...]:
-    """The measures of every test, in the records' order; several tests in one record have a row each, of its name."""
+    """Compute the measures of every test, in the order of the records; each test of a record has a row of its name."""
     scale = voltage_scale(records)
     still = [(record, is_constant(record, scale)) for record in records]
     rows = [
@@ -284,7 +290,7 @@ def measures(records: Sequence[Record]) -> tuple[MeasureRow, ...]:
 
 @dataclass(frozen=True)
 class Loop:
-    """A closed loop of displacement, speed and force, or a record without one from its warm-up on."""
+    """A closed loop of displacement, speed and force (n,), or a record without one after its warm-up, in SI units."""
 
     displacement: Array
     velocity: Array
@@ -293,11 +299,11 @@ class Loop:
     closed: bool
     frequency: float | None
     cycles: float
-    """How many cycles the arrays cover."""
+    """Number of cycles that the arrays cover."""
 
 
 def loop_of(record: Record) -> Loop:
-    """The record's average cycle where its motion repeats, else all of it after the warm-up."""
+    """Return the average cycle of a record where its motion repeats, else all of it after the warm-up."""
     run = cycles_of(record)
     if run is None:
         start = warm_up(record.displacement)
@@ -320,7 +326,7 @@ def loop_of(record: Record) -> Loop:
 
 
 def equivalent_damping(work_done: float, velocity: Array, step: float) -> float:
-    """The viscous coefficient that would do the same work under the same motion.
+    """Compute the viscous coefficient that does the same work under the same motion.
 
     Equation: c_eq = W / integral of v^2 dt      Source: definition
 
@@ -333,15 +339,18 @@ def equivalent_damping(work_done: float, velocity: Array, step: float) -> float:
     Returns
     -------
     c_eq [N s/m]
+
+    Examples
+    --------
+    >>> v = np.sin(np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False))  # of a viscous damper of 50 N s/m
+    >>> round(equivalent_damping(float(50.0 * v @ v) * 0.001, v, 0.001), 9)
+    50.0
     """
     return work_done / (float(velocity @ velocity) * step)
 
 
 def force_at_rest(velocity: Array, force: Array, closed: bool) -> float:
-    """Mean of abs(F) where the speed passes through zero, both branches alike [N].
-
-    0 where the speed never changes its sign.
-    """
+    """Compute the mean of abs(F) where the speed passes through zero [N]; 0 where it never does."""
     if closed:
         velocity, force = np.append(velocity, velocity[0]), np.append(force, force[0])
     before = np.flatnonzero((velocity[:-1] >= 0.0) != (velocity[1:] >= 0.0))
@@ -352,10 +361,10 @@ def force_at_rest(velocity: Array, force: Array, closed: bool) -> float:
 
 
 def peak_speed(loop: Loop) -> float:
-    """The largest speed of a test; of one driven to and fro at a constant speed, that speed [m/s].
+    """Return the largest speed of a test, or the speed of one at constant speed [m/s].
 
-    A speed that steps at every turn overshoots there when it is made of a limited number of harmonics (Gibbs), by
-    9 % and more, and so does the noise of a slow test: its constant part is the speed that was driven.
+    A speed that steps at every reversal overshoots there by 9 % and more when made of a limited number of harmonics
+    (Gibbs), and so does the noise of a slow test: the constant part is the speed that was driven.
     """
     largest = float(np.max(np.abs(loop.velocity)))
     points = loop.displacement.size
@@ -369,6 +378,7 @@ def peak_speed(loop: Loop) -> float:
 
 
 def _measures_row(record: Record, still: bool) -> MeasureRow:
+    """Return the measures of one test, without its dynamic range."""
     loop = loop_of(record)
     total = work(loop.displacement, loop.force, loop.closed)
     return MeasureRow(
@@ -388,7 +398,7 @@ def _measures_row(record: Record, still: bool) -> MeasureRow:
 
 
 class _SameTests:
-    """Finds the tests like one among many: by setting and speed first, for of a thousand few are alike."""
+    """Search for tests of equal motion among many: by setting and speed first, since of a thousand few are equal."""
 
     def __init__(self, rows: Sequence[MeasureRow]) -> None:
         self.rows: dict[str | None, list[tuple[float, int, MeasureRow]]] = {}
@@ -399,7 +409,7 @@ class _SameTests:
             of_setting.sort(key=lambda entry: entry[:2])
 
     def to(self, row: MeasureRow) -> list[MeasureRow]:
-        """The tests with a voltage and a frequency that are the same but for the voltage, in the rows' order."""
+        """Return the periodic tests that are the same but for the voltage, in the order of the rows."""
         speed, mine = row.peak_velocity_m_per_s, self.rows.get(row.setting, [])
         low = bisect_left(mine, speed * (1.0 - 2.0 * SAME_MOTION), key=lambda entry: entry[0])
         high = bisect_right(mine, speed * (1.0 + 2.0 * SAME_MOTION), key=lambda entry: entry[0])
@@ -407,7 +417,7 @@ class _SameTests:
 
 
 def _dynamic_range(row: MeasureRow, others: Sequence[MeasureRow]) -> float | None:
-    """Peak force over that of the lowest voltage at the same speed, setting and temperature."""
+    """Return the peak force over that at the lowest voltage, at the same speed, setting and temperature."""
     if row.voltage_V is None or row.frequency_Hz is None:
         return None
     lowest = min(others, key=lambda r: r.voltage_V or 0.0)
@@ -417,6 +427,7 @@ def _dynamic_range(row: MeasureRow, others: Sequence[MeasureRow]) -> float | Non
 
 
 def _same_test(a: MeasureRow, b: MeasureRow) -> bool:
+    """Tell whether two tests have the same temperature, speed and stroke."""
     speeds = a.peak_velocity_m_per_s, b.peak_velocity_m_per_s
     strokes = a.amplitude_m, b.amplitude_m
     warm = abs((a.temperature_degC or 0.0) - (b.temperature_degC or 0.0)) <= SAME_TEMPERATURE

@@ -11,8 +11,10 @@ from pzd.record import Array, Complex, Mask
 
 # --- Fourier sums: roads, triangles, random motions ---
 
-_WHOLE = 1e-7  # a period this close to a whole number of steps is one, in steps
-_BLOCK = 8192  # samples that stay in the cache
+_WHOLE = 1e-7
+"""A period this close to a whole number of steps is one [steps]."""
+_BLOCK = 8192
+"""Samples a block in the sum by Horner's rule: their complex sums stay in the cache of the processor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +22,12 @@ class FourierSum:
     """A periodic function of time or distance.
 
     Equation: x(s) = Re sum c_n exp(2 pi i n s / P)        Source: definition
+
+    Examples
+    --------
+    >>> cosine = FourierSum(1.0, np.array([0.0, 2.0 + 0.0j]))
+    >>> [float(each[0]) for each in cosine(np.array([0.0]))]  # 2 cos(2 pi s) and its derivatives at s = 0
+    [2.0, 0.0, -78.95683520871486]
     """
 
     period: float
@@ -28,7 +36,7 @@ class FourierSum:
     """(n,) c_0, c_1, ...; the amplitude of line n is abs(c_n)."""
 
     def __call__(self, place: Array) -> tuple[Array, Array, Array]:
-        """The function and its first two derivatives, exactly.
+        """Evaluate the function and its first two derivatives, exactly.
 
         Parameters
         ----------
@@ -36,7 +44,7 @@ class FourierSum:
 
         Returns
         -------
-        three arrays (n,)
+        x, dx/ds and d2x/ds2, each (n,)
         """
         orders = 2j * np.pi / self.period * np.arange(self.coefficients.size)
         sums = np.stack([self.coefficients, self.coefficients * orders, self.coefficients * orders**2])
@@ -48,7 +56,7 @@ class FourierSum:
 
 
 def _steps_a_period(place: Array, period: float) -> int | None:
-    """How many steps of an even grid make one period; None where the grid is uneven or the number is not whole."""
+    """Return the number of grid steps in a period; None where the grid is uneven or the number is not whole."""
     if place.size < 3:
         return None
     step = (place[-1] - place[0]) / (place.size - 1)
@@ -58,7 +66,7 @@ def _steps_a_period(place: Array, period: float) -> int | None:
 
 
 def _sum_by_fft(sums: Complex, place: Array, period: float, steps: int) -> Array:
-    """The sums on an even grid that meets itself again after one period."""
+    """Evaluate the sums on an even grid that repeats after one period."""
     lines = sums.shape[1]
     shifted = sums * np.exp(2j * np.pi * np.arange(lines) * (place[0] / period))
     if 2 * (lines - 1) >= steps:
@@ -71,7 +79,7 @@ def _sum_by_fft(sums: Complex, place: Array, period: float, steps: int) -> Array
 
 
 def _sum_by_horner(sums: Complex, phase: Array) -> Array:
-    """The sums at any places, by Horner's rule in exp(2 pi i phase)."""
+    """Evaluate the sums at any places, by Horner's rule in exp(2 pi i phase)."""
     result = np.empty((3, phase.size))
     for start in range(0, phase.size, _BLOCK):
         turn = np.exp(2j * np.pi * phase[start : start + _BLOCK])
@@ -86,24 +94,23 @@ def _sum_by_horner(sums: Complex, phase: Array) -> Array:
 # --- Mains hum ---
 
 MAINS = (50.0, 60.0)
-"""Of the grids of the world [Hz]."""
+"""Frequencies of the mains of the world [Hz]."""
 MAINS_TOLERANCE = 0.2
-"""The mains may be off by this much [Hz]."""
+"""Largest deviation of the mains from their nominal frequency [Hz]."""
 PROMINENCE = 3.0
-"""The line is this many times as large as anything in its neighbourhood."""
+"""Least ratio of a line to the largest amplitude in its neighbourhood."""
 LEAST_RATE = 2.5
-"""Sampling rate over the frequency of the mains from which it can be seen."""
+"""Least ratio of the sampling rate to the frequency of a line."""
 MAINS_ORDERS = (1, 3)
-"""Of the mains, as transformers and rectifiers give them."""
+"""Harmonics of the mains that transformers and rectifiers produce."""
 LOW_ORDER = 12.0
-"""Harmonics of the motion below this order may stand out by themselves, so that one at the mains' frequency is none."""
+"""Order of the motion below which a harmonic may be prominent by itself, and is then not taken for the mains."""
 _STEP = 0.01
-"""Step of the frequencies at which the line is looked for, times the length of the record: half of it is 1 degree of
-phase at either end."""
+"""Step of the frequency grid, times the length of the record: half of it is 1 degree of phase at either end."""
 
 
 def line_amplitudes(values: Array, rate: float, frequencies: Sequence[float], cycle: float) -> list[float]:
-    """Amplitudes of lines that stand out of their neighbourhood, which holds harmonics of the motion; else 0.
+    """Return the amplitudes of lines that exceed their neighbourhood, harmonics of the motion included; else 0.
 
     Parameters
     ----------
@@ -111,6 +118,10 @@ def line_amplitudes(values: Array, rate: float, frequencies: Sequence[float], cy
     rate : sampling rate [Hz]
     frequencies : of the lines [Hz]
     cycle : frequency of the motion, 0 where it does not repeat [Hz]
+
+    Returns
+    -------
+    one amplitude a frequency, in the unit of the channel
     """
     if values.size == 0 or not frequencies:
         return [0.0] * len(frequencies)
@@ -122,7 +133,7 @@ def line_amplitudes(values: Array, rate: float, frequencies: Sequence[float], cy
 
 
 def _prominent_amplitude(spectrum: Array, off: Array, resolution: float, cycle: float) -> float:
-    """Amplitude of the line in a spectrum, by how far its places are off the line."""
+    """Return the amplitude of a prominent line, else 0; `off` (n,) is the distance of each frequency from it [Hz]."""
     wide = max(MAINS_TOLERANCE, 1.5 * resolution)
     inside, around = off <= wide, (off > wide + 3.0 * resolution) & (off <= max(5.0, 3.0 * cycle, 20.0 * resolution))
     if not inside.any() or not around.any():
@@ -132,7 +143,7 @@ def _prominent_amplitude(spectrum: Array, off: Array, resolution: float, cycle: 
 
 
 def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) -> Array:
-    """The wave that the mains and their third harmonic make in a channel, its size from the samples that are wanted.
+    """Estimate the hum of the mains and their third harmonic in a channel.
 
     Equation: min |r - sum a_h cos(2 pi h f t) + b_h sin(2 pi h f t)|^2, f within 0.2 Hz of the mains
                                                                                     Source: least squares
@@ -140,14 +151,14 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
     Parameters
     ----------
     time : (n,) evenly spaced [s]
-    values : (n,) of the channel, less what is not the mains' as far as that is known
-    wanted : (n,) the samples that count
+    values : (n,) of the channel, the known motion subtracted
+    wanted : (n,) mask of the samples that are fitted
     cycle : frequency of the motion, 0 where it does not repeat [Hz]
-    least : amplitude below which a line is none
+    least : least amplitude of a line, in the unit of the channel
 
     Returns
     -------
-    (n,) in the unit of the channel; zero where no line stands out
+    (n,) in the unit of the channel; zero where no line is prominent
     """
     wave, rate = np.zeros(values.size), (values.size - 1) / float(time[-1] - time[0])
     if np.count_nonzero(wanted) <= 2 * len(MAINS_ORDERS):
@@ -170,14 +181,14 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
 
 
 def _waves(frequency: float, time: Array) -> Array:
-    """Cosine and sine of each harmonic that the rate can show, (n, 2 times harmonics)."""
+    """Return cosine and sine of each harmonic below half the sampling rate (n, 2 h)."""
     rate = (time.size - 1) / float(time[-1] - time[0])
     phases = [2.0 * np.pi * h * frequency * time for h in MAINS_ORDERS if rate > 2.0 * h * frequency]
     return np.column_stack([f(phase) for phase in phases for f in (np.cos, np.sin)])
 
 
 def _frequency_correction(frequency: float, time: Array, level: Array, wanted: Mask) -> float:
-    """How far the least squares lie from a frequency of the grid [Hz]: a step of Gauss and Newton, by all harmonics."""
+    """Return the Gauss-Newton step from a frequency of the grid to the least-squares one [Hz], by all harmonics."""
     waves = _waves(frequency, time)
     sizes = np.linalg.lstsq(waves[wanted], level[wanted], rcond=None)[0]
     cosines, sines = waves[:, ::2], waves[:, 1::2]
@@ -188,6 +199,6 @@ def _frequency_correction(frequency: float, time: Array, level: Array, wanted: M
 
 
 def _is_motion_harmonic(mains: float, cycle: float, resolution: float) -> bool:
-    """Whether a low harmonic of the motion lies where the mains do."""
+    """Tell whether a low harmonic of the motion lies at the frequency of the mains."""
     order = mains / cycle if cycle > 0.0 else LOW_ORDER
     return order < LOW_ORDER and abs(order - round(order)) * cycle <= MAINS_TOLERANCE + 2.0 * resolution

@@ -6,7 +6,7 @@ the displacement is smoothed by cross-validation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,7 @@ DRIFT_CORNER = 3.0
 """Corner of the drift about the average cycle, in cycles: quicker departures are noise."""
 
 
-@dataclass(frozen=True, eq=False)
-class Kinematics:
+class Kinematics(NamedTuple):
     """Motion without its noise, in the unit of the displacement and s; every array is (n,)."""
 
     displacement: Array
@@ -48,14 +47,13 @@ def kinematics(time: Array, displacement: Array, run: Cycles | None) -> Kinemati
     inside = run.inside(time)
     cyclic = _average_cycle(time, displacement - mean_over_period(time, displacement, run), run)
     drift = _smoothed_motion(time[inside], displacement[inside] - cyclic.displacement, DRIFT_CORNER * run.frequency)
-    parts = [cyclic.displacement + drift.displacement, cyclic.velocity + drift.velocity]
-    parts.append(cyclic.acceleration + drift.acceleration)
+    repeating = Kinematics(*(one + other for one, other in zip(cyclic, drift, strict=True)))
     if inside.all():
-        return Kinematics(*parts)
-    outside = _smoothed_motion(time, displacement, np.inf)
-    for whole, part in zip((outside.displacement, outside.velocity, outside.acceleration), parts, strict=True):
+        return repeating
+    motion = _smoothed_motion(time, displacement, np.inf)
+    for whole, part in zip(motion, repeating, strict=True):
         whole[inside] = part
-    return outside
+    return motion
 
 
 def significant_harmonics(folded: Array) -> Array:

@@ -1,4 +1,10 @@
-"""Lack of fit: whether a residual holds more than noise, and which part of it does."""
+"""Lack of fit: whether a residual holds more than noise, and which part of it does.
+
+Where a test repeats, the harmonics of its average cycle are compared with the pure error between cycles. Where it does
+not, a model of many smooth functions of motion, force, voltage and time takes up the misfit and leaves the noise;
+Fisher's test on the whitened residual tells whether it takes up more than noise allows. A corner of the residual, which
+no single harmonic shows, is found in short-time spectra of the average cycle.
+"""
 
 from __future__ import annotations
 
@@ -16,28 +22,34 @@ from pzd.signals.noise import Autoregression, PureError, autoregression, harmoni
 # --- Records that repeat ---
 
 TREND_CYCLES = 4
-"""Fewest cycles on which a trend is judged."""
+"""Fewest cycles for a trend: three steps between cycles."""
 TREND_HARMONICS = 15
-"""Harmonics on which a trend is judged."""
+"""Harmonics in which a trend is sought: those that a change of T0, C or k moves most."""
 FEWEST_DIFFERENCES = 100
-"""Fewest differences between cycles that tell the colour of noise; with fewer nothing is judged."""
+"""Fewest samples of differences between cycles for the colour of the noise; with fewer nothing is judged."""
 
 
 def octave_bands(last: int) -> list[tuple[int, int]]:
-    """Octaves of harmonics (first, last): 0, 1, 2-3, 4-7, ... up to `last`."""
+    """Return the octaves of harmonics (first, last): 0, 1, 2-3, 4-7, ... up to `last`.
+
+    Examples
+    --------
+    >>> octave_bands(5)
+    [(0, 0), (1, 1), (2, 3), (4, 5)]
+    """
     edges = [0] + [2**i for i in range(int(np.log2(max(last, 1))) + 1)]
     return [(low, min(high - 1, last)) for low, high in zip(edges, [*edges[1:], last + 1], strict=True)]
 
 
 def p_values_by_harmonics(error: PureError) -> Array:
-    """Probability, a band of harmonics, that noise alone makes the average cycle so large.
+    """Compute the p-value of each octave of harmonics: the probability that noise alone makes it so large.
 
     Equation: F = mean_h |c_h|^2 / s_h^2 over the band, against F(2 n, nu)      Source: Fisher's variance ratio
 
     Returns
     -------
-    (bands,) probabilities, uniform where nothing is missing; those below 1e-5 are too small where the noise is
-    correlated over a tenth of a cycle, for its ends do not meet and leak into all high harmonics at once
+    (bands,) p-values, uniform where nothing is missing; those below 1e-5 are too small where the noise is correlated
+    over a tenth of a cycle, whose ends then do not meet and leak into all high harmonics at once
     """
     from scipy.special import fdtrc
 
@@ -53,7 +65,7 @@ def p_values_by_harmonics(error: PureError) -> Array:
 
 
 def p_value_of_trend(folded: Array) -> float | None:
-    """Probability that noise alone makes the residual change so steadily from cycle to cycle.
+    """Compute the probability that noise alone makes the residual change so steadily from cycle to cycle.
 
     Equation: b_h = sum_j (j - j0) c_jh / sum_j (j - j0)^2, F = mean_h |b_h|^2 / var b_h
                                                                     Source: least squares
@@ -64,7 +76,7 @@ def p_value_of_trend(folded: Array) -> float | None:
 
     Returns
     -------
-    the probability, None with fewer than four cycles
+    the p-value, None with fewer than four cycles
     """
     from scipy.special import fdtrc
 
@@ -82,17 +94,20 @@ def p_value_of_trend(folded: Array) -> float | None:
 
 
 def pooled_p_value(by_record: Sequence[Array]) -> float:
-    """Probability that noise alone makes all tests together look so, however many looks were taken.
+    """Pool the p-values of several tests into one.
 
-    The smallest of all probabilities finds what one test shows plainly, Fisher's sum a band what
-    all tests show a little; Bonferroni pays for every look, so that the rate of false alarms is at
-    most what it says.
+    The smallest p-value finds a misfit that one test shows plainly, Fisher's sum over a band one that all tests show a
+    little; Bonferroni's factors bound the rate of false alarms over all comparisons.
 
     Equation: p = 2 min(R B min p, B min_b P(chi2_2R > -2 sum_r ln p_rb))       Source: Fisher 1932; Bonferroni
 
     Parameters
     ----------
-    by_record : one array of probabilities a test, of differing length
+    by_record : p-values of each test, of differing length
+
+    Returns
+    -------
+    probability that noise alone makes all tests together look so; 1 without tests
     """
     from scipy.special import chdtrc
 
@@ -111,41 +126,41 @@ def pooled_p_value(by_record: Sequence[Array]) -> float:
 # --- Records that do not repeat ---
 
 HATS = 8
-"""Piecewise linear functions over each quantity."""
+"""Piecewise linear functions of each quantity."""
 WHITENING_ROUNDS = 3
-"""Rounds of fitting the model and the colour of what it leaves."""
+"""Rounds of fitting the model and the colour of its remainder in turn."""
 SINGULAR_SHARE = 1e-9
-"""Combinations of terms smaller than this share of the largest are the same term twice."""
+"""Singular value, as a share of the largest, below which a combination of terms is redundant."""
 VOLTAGE_LAGS = (0.005, 0.02, 0.08)
-"""Time constants with which the force may follow a moving voltage [s]."""
+"""Time constants with which the force may lag a moving voltage [s]: from a valve to its supply."""
 SAMPLES_PER_TERM = 20
-"""Fewest samples for each term of the model; with fewer nothing is judged."""
+"""Fewest samples a term of the model; with fewer nothing is judged."""
 QUIETEST = 0.05
-"""No frequency is believed to be quieter than this share of the noise's mean density.
+"""Least density of the noise at any frequency, as a share of its mean.
 
-Reason: a filter against aliasing takes nearly all noise away near half the sampling rate, but not from the simulated
-force, whose corners would then count there as misfit; not tuned."""
+Reason: an anti-aliasing filter removes nearly all noise near half the sampling rate, but not from the simulated force,
+whose corners would then count there as misfit; not tuned."""
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothResidual:
-    """A residual parted into what a smooth model of many terms explains, and noise."""
+    """A residual split into the part that a smooth model explains, and noise."""
 
     explained: Array
-    """(m,) [N]."""
+    """(m,) part that the model explains [N]."""
     spread: Array
-    """(m,) variance that noise alone gives to what is explained [N^2]."""
+    """(m,) variance of the explained part by noise alone [N^2]."""
     noise: Autoregression
-    """What is left."""
+    """Noise of the remainder."""
     probability: float
-    """That noise alone lets the model explain so much."""
+    """Probability that noise alone lets the model explain so much."""
 
 
 def fit_smooth_residual(residual: Array, record: Record, predicted: Array, counted: Mask) -> SmoothResidual:
-    """The residual of a record that does not repeat, parted into misfit and noise.
+    """Split the residual of a record that does not repeat into misfit and noise.
 
-    Noise that wanders hides a level or a slow term: of a term that the samples hardly tell no more is explained than
-    they tell, each of p being expected to explain as much as any other.
+    Wandering noise hides a level or a slow term: terms that the samples hardly determine are shrunk, each of p being
+    expected to explain as much as any other.
 
     Equation: F = ((RSS_0 - RSS) / p) / (RSS / (n - p)) on the whitened residual     Source: Aitken 1935, Fisher
     Equation: a_i = t / (t + s_i^2) times its estimate, t = sum r^2 / p, s_i its standard error
@@ -153,10 +168,10 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array, count
 
     Parameters
     ----------
-    residual : (m,) measured less predicted force, the test's nuisances taken off [N]
+    residual : (m,) measured less predicted force, the nuisances of the test projected out [N]
     record : the motion, (n,)
     predicted : (m,) force [N]
-    counted : (n,) which samples of the record these m are; what follows on one left out is not whitened by it
+    counted : (n,) which samples of the record these m are; whitening does not reach across those left out
     """
     from scipy.special import fdtrc
 
@@ -182,21 +197,21 @@ def fit_smooth_residual(residual: Array, record: Record, predicted: Array, count
     spread = np.sum(to_samples**2, axis=1) if noise.innovation > 0.0 else np.zeros(residual.size)
     free = flat.size - rank - noise.coefficients.size
     over = float(flat @ flat - taken @ taken)
-    # Of the white noise that QUIETEST puts beside coloured noise there may be none: then less is left than expected.
+    # QUIETEST adds white noise that may not be there: then the remainder is smaller than expected.
     scale = max(over / free, 1.0 if noise.coefficients.size else 0.0)
     ratio = float(taken @ taken) / rank / scale if over > 0.0 else np.inf
     return SmoothResidual(explained, spread, noise, float(fdtrc(rank, free, ratio)))
 
 
 def _orthonormal(terms: Array) -> Array:
-    """(m, r) orthonormal: all that sums of some (m, p) terms can be, each of them once."""
+    """Return an orthonormal basis (m, r) of the space of the terms (m, p)."""
     basis, triangle = np.linalg.qr(terms)
     left, sizes, _ = np.linalg.svd(triangle)
     return np.asarray(basis @ left[:, sizes > SINGULAR_SHARE * sizes[0]])
 
 
 def _smooth_terms(record: Record, predicted: Array, counted: Mask) -> Array:
-    """(m, p) smooth functions of motion, force, voltage and time, scaled to about one, without repeated columns."""
+    """Return smooth functions (m, p) of motion, force, voltage and time, scaled to about one."""
     part = sliced(record, counted)
     v, a = _scaled(part.velocity), _scaled(part.acceleration)
     rate = _scaled(gradient_within_stretches(predicted, counted))
@@ -215,7 +230,7 @@ def _smooth_terms(record: Record, predicted: Array, counted: Mask) -> Array:
 
 
 def _lag_error(voltage: Array, samples: float) -> Array:
-    """What a first-order lag of so many samples leaves between the voltage and itself."""
+    """Return the difference (n,) between the voltage and itself after a first-order lag of so many samples."""
     from scipy.signal import lfilter
 
     share = 1.0 - np.exp(-1.0 / samples)
@@ -229,7 +244,7 @@ def _scaled(values: Array) -> Array:
 
 
 def _hats(values: Array) -> Array:
-    """(n, HATS) piecewise linear functions with nodes at even quantiles."""
+    """Return piecewise linear functions (n, HATS) with nodes at even quantiles."""
     nodes = np.unique(np.quantile(values, np.linspace(0.0, 1.0, HATS)))
     return np.stack([np.interp(values, nodes, unit) for unit in np.eye(nodes.size)], axis=-1)
 
@@ -237,43 +252,47 @@ def _hats(values: Array) -> Array:
 # --- Short-time spectra ---
 
 WINDOW_COUNTS = (8, 16, 32, 64, 128, 256)
-"""In so many overlapping parts the cycle is looked at, the longer ones first.
+"""Numbers of overlapping windows in a cycle, the longest windows first.
 
-Reason: in octaves, down to parts as short as the corner of a slow triangle; not tuned."""
+Reason: in octaves, down to windows as short as the corner of a slow triangle; not tuned."""
 SHORTEST_WINDOW = 8
-"""Samples of the shortest part, less than which do not show a corner."""
+"""Fewest samples in a window: fewer do not show a corner."""
 BLOCK = 8
-"""Neighbouring frequencies of a part that are kept or left together.
+"""Neighbouring frequencies of a window that are kept or dropped together.
 
-Reason: a corner fills a band; together they stand clear at a third of the power that each would need alone."""
+Reason: a corner fills a band; together they are significant at a third of the power that each would need alone."""
 NEIGHBOUR_CHANCE = 0.05
-"""Beside what stands clear, powers are kept that noise alone would show less often.
+"""Largest p-value of a block that is kept beside a significant one.
 
-Reason: a corner reaches over a part's whole spectrum and sinks into the noise slowly; not tuned."""
+Reason: a corner reaches over the whole spectrum of a window and sinks into the noise slowly; not tuned."""
 
 
 @dataclass(frozen=True, eq=False)
 class ShortTimeMask:
-    """Which short-time coefficients stand clear of the noise, at each length of the parts."""
+    """Significant short-time coefficients of a cycle, at each length of the windows.
+
+    Equation: x_j = F* (T (F (w_j x))), x = sum_j w_j x_j, sum_j w_j^2 = 1; T keeps what exceeds its noise
+    Source: Allen and Rabiner 1977 (short-time Fourier transform); Donoho and Johnstone 1994 (thresholding)
+    """
 
     points: int
     """Samples in a cycle."""
     masks: tuple[NDArray[np.bool_], ...]
-    """(parts, frequencies) each, for as many lengths as the cycle has samples for."""
+    """(windows, frequencies) each, for as many lengths as the cycle has samples for."""
 
     @classmethod
     def of(cls, cycle: Array, variance: Array, errors: float) -> tuple[ShortTimeMask, Array]:
-        """What stands clear in a cycle, and the cycle of that alone.
+        """Find the significant coefficients of a cycle, and the part of the cycle that they make up.
 
         Parameters
         ----------
-        cycle : (points,) what the harmonics leave
-        variance : (H + 1,) variance |.|^2 of the Fourier coefficients of the cycle by noise
-        errors : standard errors from which a coefficient would stand clear by itself
+        cycle : (points,) remainder of the harmonics [N]
+        variance : (H + 1,) variance |.|^2 of the Fourier coefficients of the cycle by noise [N^2]
+        errors : standard errors at which a single coefficient is significant
 
         Returns
         -------
-        the masks, and (points,) the part of the cycle that they keep
+        the masks, and (points,) the part of the cycle that they keep [N]
         """
         masks: list[NDArray[np.bool_]] = []
         found = np.zeros(cycle.size)
@@ -289,7 +308,7 @@ class ShortTimeMask:
         return cls(cycle.size, tuple(masks)), found
 
     def kept(self, cycle: Array) -> Array:
-        """(points,) the part of another cycle that the same coefficients keep."""
+        """Return the part (points,) of another cycle that the same coefficients keep."""
         found = np.zeros(cycle.size)
         for parts, mask in zip(_window_counts(self.points), self.masks, strict=True):
             if np.any(mask):
@@ -299,7 +318,7 @@ class ShortTimeMask:
 
 
 def _significant_powers(ratio: Array, errors: float) -> NDArray[np.bool_]:
-    """(parts, frequencies) which powers, in units of noise, stand clear of it, with those beside that probably do."""
+    """Find the significant powers (windows, frequencies), in units of noise, and the probable ones beside them."""
     parts, count = ratio.shape
     blocks = np.pad(ratio, ((0, 0), (0, -count % BLOCK))).reshape(parts, -1, BLOCK).sum(axis=2)
     clear, probable = blocks > _block_threshold(errors**2), blocks > _block_threshold(-np.log(NEIGHBOUR_CHANCE))
@@ -313,7 +332,7 @@ def _significant_powers(ratio: Array, errors: float) -> NDArray[np.bool_]:
 
 
 def _block_threshold(exponent: float) -> float:
-    """What the powers of neighbours [units of noise] add up to in exp(-exponent) of all cases by noise alone.
+    """Return the sum of powers of a block [units of noise] that noise alone exceeds with probability exp(-exponent).
 
     Equation: P(sum |c|^2/s^2 > x) = exp(-x/l_1) prod_k l_1/(l_1 - l_k), l_k = 1 + cos(k pi/(n + 1)), as far out as
     x counts. Source: Box 1954, theorem 2.4; l are the eigenvalues of the correlation of neighbours, 1/2 by a half sine
@@ -323,18 +342,20 @@ def _block_threshold(exponent: float) -> float:
 
 
 def _window_counts(points: int) -> Sequence[int]:
+    """Return the numbers of windows for which a cycle has the samples."""
     return [parts for parts in WINDOW_COUNTS if 2 * points >= SHORTEST_WINDOW * parts]
 
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """A cycle cut into overlapping parts by half sines, whose squares add up to one."""
+    """A cycle cut into overlapping windows of half sines, whose squares add up to one."""
 
     samples: NDArray[np.int64]
-    """(parts, m) of the cycle that a part looks at."""
+    """(windows, m) indices of the samples in each window."""
     weights: Array
-    """(parts, m) of them."""
+    """(windows, m) weights of these samples."""
     points: int
+    """Samples in the cycle."""
 
     @classmethod
     def of(cls, points: int, parts: int) -> _Windows:
@@ -348,17 +369,17 @@ class _Windows:
 
     @property
     def power(self) -> Array:
-        """(parts,) variance of a coefficient as a share of that of the whole cycle, for white noise."""
+        """Variance (windows,) of a coefficient as a share of that of the whole cycle, for white noise."""
         shares: Array = np.sum(self.weights**2, axis=1) / self.points
         return shares
 
     def coefficients(self, cycle: Array) -> Complex:
-        """(parts, frequencies) Fourier coefficients of the parts, scaled like those of the cycle."""
+        """Return the Fourier coefficients of the windows (windows, frequencies), scaled like those of the cycle."""
         found: Complex = np.fft.rfft(self.weights * cycle[self.samples], axis=1) / self.points
         return found
 
     def cycle(self, coefficients: Complex) -> Array:
-        """(points,) the cycle of given coefficients of its parts."""
+        """Return the cycle (points,) of given coefficients of its windows."""
         parts: Array = self.weights * np.fft.irfft(coefficients, self.samples.shape[1], axis=1) * self.points
         found: Array = np.bincount(self.samples.ravel(), parts.ravel(), self.points).astype(np.float64)
         return found

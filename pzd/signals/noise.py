@@ -1,4 +1,8 @@
-"""Noise of a record: linear recursions, autoregressive models, and pure error between cycles that ought to be equal."""
+"""Noise of a record: linear recursions, autoregressive models, and pure error between cycles that ought to be equal.
+
+Adjacent cycles of a periodic test differ by noise alone, whatever a model misses: slow drift cancels, repeatable misfit
+cancels. Their differences give the noise as a short autoregressive model, and its variance at each harmonic.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +19,11 @@ from pzd.record import Array, Complex
 # --- Linear recursions: noise of first order, the warming of a lump, filters of any order ---
 
 _NEGLIGIBLE_SHARE = 1e-18
+"""Share of an input below which a recursion has forgotten it: far below rounding."""
 
 
 def recursion(memory: float, inputs: Array) -> Array:
-    """What a first-order memory makes of its inputs.
+    """Filter inputs by a first-order recursion.
 
     Equation: y_i = m y_(i-1) + u_i, y_(-1) = 0, that is (1 + m B)(1 + m^2 B^2)(1 + m^4 B^4) ... u
               Source: geometric series of the backward shift B, by doubling
@@ -31,6 +36,11 @@ def recursion(memory: float, inputs: Array) -> Array:
     Returns
     -------
     (n,) y
+
+    Examples
+    --------
+    >>> recursion(0.5, np.array([1.0, 0.0, 0.0])).tolist()
+    [1.0, 0.5, 0.25]
     """
     values = np.array(inputs, dtype=np.float64)
     shift, share = 1, memory
@@ -41,7 +51,7 @@ def recursion(memory: float, inputs: Array) -> Array:
 
 
 def all_pole(coefficients: Array, inputs: Array) -> Array:
-    """What a memory of any order makes of its inputs, column by column.
+    """Filter inputs by a recursion of any order, column by column.
 
     Equation: y_i = u_i - a_1 y_(i-1) - a_2 y_(i-2) - ..., at rest before the first
 
@@ -70,26 +80,26 @@ def _recur(coefficients: Array, values: Array) -> None:
 # --- Coloured noise as a short autoregressive model ---
 
 ORDER_MAX = 12
-"""Longest model tried unless said otherwise: two poles each for sensor, amplifier and mains, and as many to spare."""
+"""Default largest order: two poles each for sensor, amplifier and mains, and as many to spare."""
 SAMPLES_PER_ORDER = 20
-"""At least this many samples stand behind each coefficient: its standard error is then below 0.25."""
+"""Fewest samples a coefficient: its standard error is then below 0.25."""
 WITH_PREDECESSORS = 0.5
-"""At least this share of the samples has as many predecessors in its stretch as the model has coefficients.
+"""Least share of the samples with as many predecessors in their stretch as the model has coefficients.
 
-Reason: the others say nothing of the last coefficients; not tuned."""
+Reason: the others hold no information on the last coefficients; not tuned."""
 INNOVATION_FLOOR = 1e-12
-"""Innovation variance is never below this share of the variance: rounding is no noise model."""
+"""Least innovation variance, as a share of the variance: below it the model would describe rounding."""
 MORE_WITH_WHITE = 4
-"""Coefficients more that coloured noise takes together with white noise. Their sum is no autoregression of any length:
-one of the same length would be too quiet at low frequencies, where a gap is sought, by 28 % where each
-sample correlates with the one before by 0.9; with four more it is within 1 %."""
+"""Additional coefficients for coloured noise plus white noise. Their sum is no autoregression of finite order: one of
+the same order would be too quiet at low frequencies, where a gap is sought, by 28 % for a correlation of 0.9 from
+sample to sample; with four more it is within 1 %."""
 GRID = 4096
 """Frequencies over which a density is summed: enough for poles within 1e-3 of the unit circle."""
 
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
-    """Noise e_i = sum_j a_j e_(i-j) + w_i with white w."""
+    """Autoregressive noise e_i = sum_j a_j e_(i-j) + w_i with white w."""
 
     coefficients: Array
     """(p,) a_1 ... a_p; empty for white noise."""
@@ -97,7 +107,7 @@ class Autoregression:
     """Variance of w, in the square of the noise's unit."""
 
     def whitened(self, series: Array) -> Array:
-        """The series (n,) or (n, m) without its colour, scaled to unit variance; the first p rows dropped.
+        """Whiten a series (n,) or (n, m) and scale it to unit variance; the first p rows are dropped.
 
         Equation: w_i = (e_i - sum_j a_j e_(i-j)) / sigma_w      Source: Box and Jenkins 1970, ch. 3
         """
@@ -108,7 +118,7 @@ class Autoregression:
         return out / np.sqrt(self.innovation) if self.innovation > 0.0 else out
 
     def density(self, share_of_rate: Array) -> Array:
-        """Variance density at frequencies given as a share of the sampling rate.
+        """Compute the variance density at frequencies given as a share of the sampling rate.
 
         Equation: S = sigma_w^2 / |1 - sum_j a_j exp(-2 pi i f j)|^2      Source: Box and Jenkins 1970, eq. (3.2.5)
         """
@@ -119,23 +129,23 @@ class Autoregression:
 
     @property
     def whitening_filter(self) -> Array:
-        """(p + 1,) coefficients 1, -a_1, ... -a_p of the filter that gives w from e."""
+        """Coefficients (p + 1,) 1, -a_1, ... -a_p of the filter from e to w."""
         return np.concatenate([np.ones(1), -self.coefficients])
 
     @cached_property
     def variance(self) -> float:
-        """Variance of the noise itself: the density summed over all frequencies."""
+        """Variance of the noise: the density summed over all frequencies."""
         return float(np.mean(self._density_on_grid))
 
     @cached_property
     def _density_on_grid(self) -> Array:
-        """(GRID,) density in the middle of `GRID` bands of equal width, by a transform of the whitening filter."""
+        """Density (GRID,) in the middle of bands of equal width, by a transform of the whitening filter."""
         taps = self.whitening_filter
         response = np.fft.fft(taps * np.exp(-1j * np.pi * np.arange(taps.size) / GRID), GRID)
         return np.asarray(self.innovation / np.abs(response) ** 2)
 
     def with_white(self, share: float) -> Autoregression:
-        """The noise together with white noise of a share of its variance, by a model of a few coefficients more.
+        """Add white noise of a share of the variance, by a model of a few more coefficients.
 
         Equation: R a = r, sigma_w^2 = r_0 - a r, r_0 (1 + share) in place of r_0      Source: Yule 1927, Walker 1931
         """
@@ -152,7 +162,7 @@ class Autoregression:
 
 
 def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autoregression:
-    """The short model that describes stretches of noise best, its order by the Bayesian criterion.
+    """Fit an autoregressive model to stretches of noise, its order by the Bayesian criterion.
 
     Equation: minimise the forward and backward prediction errors together       Source: Burg 1975
     Equation: BIC = n ln sigma_p^2 + p ln n                                      Source: Schwarz 1978
@@ -160,7 +170,7 @@ def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autor
     Parameters
     ----------
     series : stretches (n_i,) of one noise, zero mean
-    order_max : longest model tried
+    order_max : largest order
 
     Returns
     -------
@@ -197,16 +207,16 @@ def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autor
 # --- Pure error ---
 
 BAND_LIMIT = 0.4
-"""Harmonics are judged up to this share of the sampling rate."""
+"""Highest frequency of the harmonics judged, as a share of the sampling rate: anti-aliasing filters act above."""
 LOCAL_HARMONICS = 16
 """Fewest harmonics over which the local level of the noise is averaged."""
 LEAST_COLOUR = 5.0
-"""Noise counts as at least so coloured (density at its peak over variance): a short record hides colour."""
+"""Least colour of noise (peak density over variance): a short record hides colour."""
 
 
 @dataclass(frozen=True, eq=False)
 class PureError:
-    """The harmonics of the average cycle, and how uncertain noise alone makes them."""
+    """Harmonics of the average cycle, and their variance by noise alone."""
 
     count: int
     """Number of cycles."""
@@ -224,21 +234,21 @@ class PureError:
     sample_variance: float
     """Variance of one sample by noise [N^2]."""
     shared: Array | float = 0.0
-    """(H + 1,) variance of the coefficient by what all cycles share, and more of them would not shrink [N^2]."""
+    """(H + 1,) variance of the coefficient by errors that all cycles share; more cycles do not reduce it [N^2]."""
 
     @property
     def of_mean(self) -> Array:
-        """(H + 1,) variance of the coefficient of the average cycle [N^2]."""
+        """Variance (H + 1,) of the coefficient of the average cycle [N^2]."""
         return self.single / self.count + self.shared
 
 
 def harmonics_of(points: int) -> int:
-    """Number H of harmonics up to the band limit of a cycle of that many samples."""
+    """Return the number of harmonics up to the band limit of a cycle of so many samples."""
     return max(int(BAND_LIMIT * points), 1)
 
 
 def pure_error(folded: Array) -> PureError:
-    """Noise of a periodic residual from the differences between adjacent cycles.
+    """Estimate the noise of a periodic residual from the differences between adjacent cycles.
 
     Equation: s_h^2 = mean_j |c_(j+1,h) - c_(j,h)|^2 / 2, averaged over neighbouring harmonics
     after division by the autoregressive shape                      Source: von Neumann 1941
@@ -277,9 +287,9 @@ def pure_error(folded: Array) -> PureError:
 
 
 def neighbouring_harmonics(last: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First and last harmonic, from 1 on, whose scatter describes the noise at each harmonic from 0 to the last.
+    """Return first and last harmonic (from 1 on) whose scatter is averaged for the noise at each harmonic 0 ... last.
 
-    Those within a third of its number, and at least `LOCAL` of them where there are so many.
+    These are the harmonics within a third of its order, and at least `LOCAL_HARMONICS` where there are so many.
     """
     h = np.arange(last + 1)
     reach = np.maximum(h // 3, LOCAL_HARMONICS // 2)
@@ -289,7 +299,7 @@ def neighbouring_harmonics(last: int) -> tuple[NDArray[np.int64], NDArray[np.int
 
 
 def _degrees_of_freedom(count: int) -> float:
-    """Degrees of freedom of the variance of a complex coefficient from adjacent differences of `count` cycles.
+    """Return the degrees of freedom of the variance of a complex coefficient from differences of `count` cycles.
 
     Equation: nu = 4 (n - 1)^2 / (3 n - 4)                          Source: von Neumann 1941
     """
@@ -297,9 +307,9 @@ def _degrees_of_freedom(count: int) -> float:
 
 
 def _freedom_with_shape(freedom: Array, density: Array, noise: Autoregression, samples: int) -> Array:
-    """Degrees of freedom that also allow for the uncertain shape: few independent samples, little is known.
+    """Reduce the degrees of freedom by the uncertainty of the spectral shape, which few independent samples determine.
 
-    Equation: 2 / nu = 2 / nu_local + (4 / n_eff) S_h / S_max, n_eff = n var / S_max; S_max at least `COLOUR` var
+    Equation: 2 / nu = 2 / nu_local + (4 / n_eff) S_h / S_max, n_eff = n var / S_max; S_max at least 5 var
                                         Source: delta method on S(0) = sigma_w^2 / (1 - a)^2, var a = (1 - a^2) / n
     """
     largest = float(density.max())
@@ -311,15 +321,15 @@ def _freedom_with_shape(freedom: Array, density: Array, noise: Autoregression, s
 
 
 def repeatable_power(error: PureError) -> Array:
-    """Power of the repeatable part of the residual at each harmonic, the noise's share taken off.
+    """Estimate the power of the repeatable part of the residual at each harmonic, the share of the noise subtracted.
 
     Equation: P_0 = c_0^2 - s_0^2,  P_h = 2 (|c_h|^2 - s_h^2)       Source: Parseval
 
-    What all cycles share by the noise of the displacement takes off at most what is there, at each harmonic.
+    Errors shared by all cycles (noise of the displacement) are subtracted down to zero at most, at each harmonic.
 
     Returns
     -------
-    (H + 1,) mean square [N^2], unbiased, so that noise alone gives values around zero
+    (H + 1,) mean square [N^2], unbiased: noise alone gives values around zero
     """
     weights = np.where(np.arange(error.mean.size) == 0, 1.0, 2.0)
     repeats = np.abs(error.mean) ** 2 - error.single / error.count

@@ -13,7 +13,7 @@ _CORNERS = 60
 _BINS = 2000
 """Bands of frequency in which the spectrum is summed, so that a score does not cost a pass over all samples."""
 _HALVINGS = 6
-"""Halvings of the band examined: down to 1/64 of half the sampling rate, since no sensor is sampled faster than that."""
+"""Halvings of the band examined, down to 1/64 of half the sampling rate: no sensor is sampled faster than that."""
 CLEAR = 2.0
 """Multiple of the corner above which the filter removes all but 1.5 %: what lies there is noise."""
 _FEWEST = 50
@@ -55,7 +55,7 @@ def motion_below(values: Array) -> float:
 
 
 def _reflected(values: Array) -> tuple[Array, Complex, Array]:
-    """Return the line (n,) through both ends, the spectrum (n,) of the rest with its reflection, and 2 sin(w/2) (n,)."""
+    """Return the line (n,) through both ends, the spectrum (n,) of the reflected rest, and 2 sin(w/2) (n,)."""
     line = np.linspace(values[0], values[-1], values.size)
     flat = values - line
     spectrum = np.fft.rfft(np.concatenate((flat, -flat[-2:0:-1])))

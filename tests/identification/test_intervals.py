@@ -37,7 +37,7 @@ def held(row: ParameterRow, truth: Bingham) -> int:
 def parts_for(records: Sequence[Record], config: IdentifyConfig) -> tuple[tuple[FittedRecord, ...], Array]:
     """The parts of a fit, and its estimate."""
     objective, fit, _ = fit_with_auxiliary(records, config, seed=1)
-    return fitted_records(records, objective.trials, (fit.residuals, fit.slopes), config.nuisance), np.array(
+    return fitted_records(records, objective.prepared, (fit.residuals, fit.slopes), config.nuisance), np.array(
         fit.parameters
     )
 

@@ -38,7 +38,8 @@ def misfit_for(records: tuple[Record, ...]) -> Misfit:
     """What the element alone misses, nothing carried beside it."""
     objective = Objective(tuple(prepare(record) for record in records))
     fit = fit_separable(objective)
-    return misfit_of(fitted_records(records, objective.trials, (fit.residuals, fit.slopes), IdentifyConfig().nuisance))
+    fitted = fitted_records(records, objective.prepared, (fit.residuals, fit.slopes), IdentifyConfig().nuisance)
+    return misfit_of(fitted)
 
 
 def test_a_hidden_orifice_makes_the_parameters_the_model_s_and_not_the_damper_s(rng: np.random.Generator) -> None:

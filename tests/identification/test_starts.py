@@ -30,7 +30,7 @@ def test_the_pre_slip_slope_is_the_stiffness() -> None:
 def test_graphical_and_grid_starts_lie_near_the_truth(draw, rng: np.random.Generator) -> None:
     truth, records = acceptance_test(rng)
     objective = Objective(tuple(prepare(with_noise(r, rng)) for r in records))
-    for start in (graphical_start(objective.trials), grid_starts(objective)[0]):
+    for start in (graphical_start(objective.prepared), grid_starts(objective)[0]):
         np.testing.assert_allclose(np.log(start), np.log(truth), atol=np.log(2.0))
 
 
