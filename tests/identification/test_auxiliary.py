@@ -67,7 +67,7 @@ def test_the_intervals_of_a_gas_charge_hold_it_nineteen_times_in_twenty(rng: np.
     assert sum(held) >= 13
 
 
-def test_where_the_zero_of_the_displacement_lies_changes_nothing(rng: np.random.Generator) -> None:
+def test_the_zero_of_the_displacement_changes_neither_gas_nor_parameters(rng: np.random.Generator) -> None:
     records = on_the_rig(RACING, rng, GAS)
     row, beside = identified(records)
     moved_row, moved = identified(tuple(replace(r, displacement=r.displacement + 0.031) for r in records))
@@ -90,7 +90,9 @@ def test_a_damper_without_gas_is_fitted_by_the_element_alone(truth: Bingham, rng
         assert fit.parameters == fit_separable(objective).parameters
 
 
-def test_the_plain_damper_handed_on_has_no_gas_and_the_file_tells_it(rng: np.random.Generator, tmp_path: Path) -> None:
+def test_the_identified_damper_has_no_gas_and_the_file_of_auxiliary_forces_has_it(
+    rng: np.random.Generator, tmp_path: Path
+) -> None:
     found = identify(IdentifyConfig(), Rig(on_the_rig(RACING, rng, GAS), ()), 1)
     assert base_of(found.rows, None).effects == {}
     found.write(tmp_path, Control())
@@ -103,7 +105,7 @@ def test_the_plain_damper_handed_on_has_no_gas_and_the_file_tells_it(rng: np.ran
     assert Identified.read(tmp_path, Control()).auxiliary == found.auxiliary
 
 
-def test_records_with_a_moving_voltage_are_freed_of_the_gas_that_the_others_show(rng: np.random.Generator) -> None:
+def test_the_gas_of_constant_records_is_subtracted_from_records_of_moving_voltage(rng: np.random.Generator) -> None:
     """A node that only moving records reach: its friction is that of the damper without gas to within the noise."""
 
     def charged(record: Record) -> Record:

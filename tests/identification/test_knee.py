@@ -126,7 +126,7 @@ def test_bleed_knee_and_blow_off_of_each_direction_lie_in_their_intervals(with_a
     assert row.missed_share == 0.0
 
 
-def test_kept_back_tests_of_a_damper_with_round_knees_are_predicted_five_times_better(
+def test_held_out_tests_of_a_damper_with_round_knees_are_predicted_five_times_better(
     with_round_knees: Identified,
 ) -> None:
     (law,) = with_round_knees.knees.laws
@@ -168,7 +168,7 @@ def test_bingham_stays_the_law_unless_asked_with_the_same_rows_and_no_file_of_th
     assert here.rows == with_a_knee.rows
 
 
-def test_the_files_read_back_as_they_were_written(with_a_knee: Identified, tmp_path: Path) -> None:
+def test_the_files_of_the_knee_law_read_back_as_written(with_a_knee: Identified, tmp_path: Path) -> None:
     with_a_knee.write(tmp_path, Control())
     assert Identified.read(tmp_path, Control()).knees == with_a_knee.knees
 
@@ -226,13 +226,13 @@ def test_the_knee_is_taken_where_it_predicts_better_by_two_standard_errors_and_n
     assert law_row("auto", None, predicted(-0.01, 6), 1).law == "bingham"
 
 
-def test_what_nobody_can_see_makes_no_law_however_sure_it_is() -> None:
+def test_an_invisible_improvement_chooses_no_knee_law_however_significant() -> None:
     law = law_row("auto", None, predicted(0.01, 6, unseen=0.011), 1)
     assert law.law == "bingham"
     assert "less than 0.25% of peak" in law.reason
 
 
-def test_too_few_tests_choose_nothing_and_the_reason_says_so() -> None:
+def test_too_few_tests_choose_no_law_and_the_reason_says_so() -> None:
     law = law_row("auto", None, predicted(0.01, 2), 1)
     assert law.law == "bingham"
     assert "3 are needed" in law.reason
@@ -331,7 +331,7 @@ def test_a_volt_is_no_click() -> None:
 
 
 @pytest.mark.parametrize("unit", ["psi", "bar", "kPa"])
-def test_of_a_gas_pressure_is_told_the_force_a_unit_and_what_it_makes_of_the_gas_force(unit: str) -> None:
+def test_a_gas_pressure_has_a_force_per_unit_with_the_change_of_the_gas_force(unit: str) -> None:
     forces = [force_row(f"gas {p} {unit}", 5.0, 300.0 + 0.2 * p, gas=-1.5 * p) for p in (200, 100)]
     clicks, (row,) = force_changes(forces, Control())
     assert (row.setting, row.voltage_V, row.unit) == (f"gas # {unit}", 5.0, unit)

@@ -15,7 +15,7 @@ from pzd.record import Array, Record
 from pzd.signals.measures import reversals
 
 
-def test_a_sine_turns_twice_a_cycle() -> None:
+def test_a_sine_reverses_twice_a_cycle() -> None:
     time = np.arange(5001) / 1000.0
     turns = reversals(0.01 * np.sin(2.0 * np.pi * time))
     np.testing.assert_allclose(time[turns], 0.25 + 0.5 * np.arange(10), atol=1e-9)
@@ -28,14 +28,14 @@ def test_small_wobbles_are_no_reversals() -> None:
     assert len(reversals(wobbling)) == len(reversals(plain))
 
 
-def test_the_warm_up_ends_after_the_first_turn_also_when_the_record_begins_at_rest() -> None:
+def test_the_warm_up_ends_after_the_first_reversal_also_when_the_record_begins_at_rest() -> None:
     time = np.arange(4001) / 1000.0
     moving = np.where(time > 1.0, 0.01 * np.sin(2.0 * np.pi * (time - 1.0)), 0.0)
     ends = time[warm_up(moving)]
     assert 1.25 < ends < 1.5
 
 
-def test_a_record_that_never_turns_still_counts_half_of_its_samples() -> None:
+def test_a_record_without_reversal_still_counts_half_of_its_samples() -> None:
     assert warm_up(np.linspace(0.0, 0.1, 100)) == 50
 
 
@@ -103,12 +103,12 @@ def test_the_fine_grid_keeps_the_samples_and_is_fine_enough() -> None:
     assert 2.0 * np.pi * 5.0 * trial.step <= 1.0 / 250.0
 
 
-def test_rounded_time_stamps_are_no_irregular_clock() -> None:
+def test_rounded_time_stamps_count_as_a_regular_clock() -> None:
     record = sine_test(TABLE_2[0.0], 2.0, 0.03, rate=300)
     assert prepare(replace(record, time=np.round(record.time, 3))).positions is None
 
 
-def test_an_irregular_clock_is_taken_as_it_is(rng: np.random.Generator) -> None:
+def test_an_irregular_clock_is_fitted_at_its_own_samples(rng: np.random.Generator) -> None:
     truth = TABLE_2[0.0]
     record = sine_test(truth, 2.0, 0.03)
     kept = np.sort(rng.permutation(record.time.size)[: int(0.7 * record.time.size)])
