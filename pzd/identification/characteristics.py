@@ -24,6 +24,7 @@ from pzd.artefacts.characteristics import (
     WarmUpRow,
 )
 from pzd.artefacts.rig import same_motion
+from pzd.identification.intervals import label_columns
 from pzd.identification.moving_voltage import dwell_levels
 from pzd.identification.strokes_and_loops import Cycle, SpeedTest, Stroke, speed_tests, strokes_of
 from pzd.record import CONSTANT_SHARE, Array, Condition, Record
@@ -74,9 +75,7 @@ def _peak_velocity_row(condition: Condition, record: Record, test: SpeedTest) ->
     compression = _mean_of_direction([s for s in test.strokes if not s.rebound])
     return PeakVelocityRow(
         record=record.name,
-        setting=condition.setting,
-        voltage_V=condition.voltage,
-        temperature_degC=condition.temperature,
+        **label_columns(condition.labels),
         kind=test.kind,
         frequency_Hz=1.0 / test.cycle.period if test.cycle else None,
         amplitude_m=0.5 * float(np.mean([s.length for s in test.strokes])),
@@ -124,9 +123,7 @@ def _continuous_velocity_rows(condition: Condition, record: Record, cycle: Cycle
     return [
         ContinuousVelocityRow(
             record=record.name,
-            setting=condition.setting,
-            voltage_V=condition.voltage,
-            temperature_degC=condition.temperature,
+            **label_columns(condition.labels),
             frequency_Hz=1.0 / cycle.period,
             amplitude_m=amplitude,
             displacement_m=float(x),
@@ -186,9 +183,7 @@ def _gas_and_friction_row(rows: Sequence[PeakVelocityRow]) -> GasAndFrictionRow:
         gas, friction = gas - share * (next_gas - gas), friction - share * (next_friction - friction)
         method = "extrapolated to rest"
     return GasAndFrictionRow(
-        setting=rows[0].setting,
-        voltage_V=rows[0].voltage_V,
-        temperature_degC=rows[0].temperature_degC,
+        **label_columns((rows[0].setting, rows[0].voltage_V, rows[0].temperature_degC)),
         gas_force_N=gas,
         friction_N=friction,
         velocity_m_per_s=speed,
@@ -451,9 +446,7 @@ def _as_it_stands_row(record: Record, voltage: float | None, temperature: float 
     """Return the extremes of one record."""
     return AsItStandsRow(
         record=record.name,
-        setting=record.setting,
-        voltage_V=voltage,
-        temperature_degC=temperature,
+        **label_columns((record.setting, voltage, temperature)),
         rebound_force_N=float(record.force.max()),
         compression_force_N=float(record.force.min()),
         rebound_velocity_m_per_s=max(float(record.velocity.max()), 0.0),

@@ -17,7 +17,7 @@ import numpy as np
 from pzd.artefacts import AuxiliaryRow, ParameterRow
 from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit_evolutionary, fit_separable
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.intervals import half_widths, interval_columns, uncertainty
+from pzd.identification.intervals import half_widths, interval_columns, label_columns, uncertainty
 from pzd.identification.prepared_record import FittedRecord, fitted_records, prepare
 from pzd.identification.trust import (
     MISFIT_THRESHOLD,
@@ -148,8 +148,7 @@ def parameter_row(
     """
     trust = trust_of(evidence)
     measured, residuals = fitted
-    setting, voltage, temperature = labels
-    cells: dict[str, float | str | None] = {"setting": setting, "voltage_V": voltage, "temperature_degC": temperature}
+    cells = label_columns(labels)
     names = zip(("T0_N", "C_Ns_per_m", "k_N_per_m"), ("positive", "log", "log"), strict=True)
     for (name, scale), value, width, known in zip(names, parameters, widths, trust.determined, strict=True):
         cells |= interval_columns(name, value if known else None, float(width), scale)
@@ -159,8 +158,7 @@ def parameter_row(
 
 def _auxiliary_row(labels: Labels, found: Auxiliary) -> AuxiliaryRow:
     """Return the row of the forces beside the element."""
-    setting, voltage, temperature = labels
-    cells: dict[str, float | str | None] = {"setting": setting, "voltage_V": voltage, "temperature_degC": temperature}
+    cells = label_columns(labels)
     for name, value, width in zip(("F_0_N", "k_g_N_per_m"), found.values, found.widths, strict=True):
         cells |= interval_columns(name, float(value), float(width), "linear")
     return AuxiliaryRow.model_validate({**cells, "zero_m": found.middle})

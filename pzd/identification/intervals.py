@@ -13,12 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from pzd.identification.prepared_record import FittedRecord
 from pzd.identification.trust import Misfit
-from pzd.record import Array
+from pzd.record import Array, Labels
 from pzd.signals.measures import reversals, rms
 from pzd.signals.noise import Autoregression, all_pole, autoregression
 
@@ -303,7 +304,12 @@ def _independent_share(noise: Autoregression) -> float:
     return float(np.mean(spectrum) ** 2 / np.mean(spectrum**2))
 
 
-# --- Columns ---
+# --- Columns of rows ---
+
+
+def label_columns(labels: Labels) -> dict[str, Any]:
+    """Return the columns that name a condition: setting, voltage, temperature."""
+    return dict(zip(("setting", "voltage_V", "temperature_degC"), labels, strict=True))
 
 
 def interval_columns(

@@ -17,7 +17,7 @@ from pzd.artefacts.knee import DIRECTIONS, LawName, knee_damper
 from pzd.artefacts.table import LENGTHS, PRESSURES, numbers_in
 from pzd.damper.compose import static_force, steady_force
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.intervals import half_widths, interval_columns
+from pzd.identification.intervals import half_widths, interval_columns, label_columns
 from pzd.identification.knee_fit import REFIT_EVALUATIONS, KneeData, KneeFit, descend, fit_bingham, fit_knee
 from pzd.identification.prepared_record import fitted_records, prepare
 from pzd.identification.trust import MISFIT_THRESHOLD, WEAK_WIDTH, Misfit, friction_scale, misfit_of
@@ -129,7 +129,7 @@ def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceCo
         cells |= interval_columns(name, values.get(name), widths.get(name), scale, WIDEST_LOGARITHM)
     return KneeRow.model_validate(
         {
-            **dict(zip(("setting", "voltage_V", "temperature_degC"), labels, strict=True)),
+            **label_columns(labels),
             **cells,
             "zero_m": tests.middle,
             "reached_m_per_s": tests.fastest,
@@ -281,9 +281,7 @@ def _predicted(labels: Labels, one: KneeData, left: Sequence[Array]) -> Predicte
     """Return the row of one test from the prediction errors (2, N) of both laws."""
     return PredictedRow(
         record=one.tests[0].record.name,
-        setting=labels[0],
-        voltage_V=labels[1],
-        temperature_degC=labels[2],
+        **label_columns(labels),
         W_s_bingham=criterion(left[0], one.measured),
         W_s_knee=criterion(left[1], one.measured),
     )
@@ -377,12 +375,8 @@ def force_changes(forces: Sequence[KneeForceRow], control: Control) -> tuple[tup
             # Magnitudes without the gas force, which has a sign: below zero where it pushes the rod out.
             rebound = [row.rebound_force_N - row.gas_force_N for row in (before, after)]
             compression = [row.gas_force_N - row.compression_force_N for row in (before, after)]
-            labels = {
-                "setting": axis.setting,
-                "voltage_V": axis.voltage,
-                "temperature_degC": before.temperature_degC,
-                "velocity_m_per_s": before.velocity_m_per_s,
-            }
+            labels = label_columns((axis.setting, axis.voltage, before.temperature_degC))
+            labels["velocity_m_per_s"] = before.velocity_m_per_s
             changes = [(rebound[1] - rebound[0]) / (high - low), (compression[1] - compression[0]) / (high - low)]
             if axis.unit:
                 cells = {"unit": axis.unit, "from_value": low, "to_value": high}

@@ -169,18 +169,19 @@ class FittedRecord:
         return self.record.force[self.counted]
 
     @cached_property
+    def whole_cycles(self) -> list[int]:
+        """Repeating cycles all of whose samples are counted; none where there are fewer than two."""
+        whole = self.run.whole(self.record.time, self.counted) if self.run else []
+        return whole if len(whole) > 1 else []
+
+    @cached_property
     def number(self) -> NDArray[np.int64]:
-        """Number (m,) of the whole repeating cycle of each sample, -1 outside and where there are fewer than two."""
-        nothing = np.full(self.residuals.size, -1)
-        if self.run is None:
-            return nothing
-        of_all = self.run.number(self.record.time)
-        whole = self.run.whole(self.record.time, self.counted)
-        if len(whole) < 2:
-            return nothing
-        place = np.full(self.run.count + 1, -1)
-        place[whole] = np.arange(len(whole))
-        found: NDArray[np.int64] = place[of_all][self.counted]
+        """Number (m,) of the whole repeating cycle of each sample: 0, 1, ..., and -1 outside."""
+        if self.run is None or not self.whole_cycles:
+            return np.full(self.residuals.size, -1)
+        place = np.full(self.run.count + 1, -1)  # the last entry serves samples outside the run, whose index is -1
+        place[self.whole_cycles] = np.arange(len(self.whole_cycles))
+        found: NDArray[np.int64] = place[self.run.number(self.record.time)][self.counted]
         return found
 
     @cached_property
@@ -191,15 +192,12 @@ class FittedRecord:
         return np.asarray(found[self.counted] == 0.0)
 
     def folded(self, values: Array) -> Array | None:
-        """Fold values (m,) over the whole repeating cycles (cycles, points); None with fewer than two."""
-        if self.run is None:
-            return None
-        whole = self.run.whole(self.record.time, self.counted)
-        if len(whole) < 2:
+        """Fold values (m,) over the whole repeating cycles (cycles, points); None where there are none."""
+        if self.run is None or not self.whole_cycles:
             return None
         everywhere = np.zeros(self.record.time.size)
         everywhere[self.counted] = values
-        return self.run.fold(self.record.time, everywhere)[whole]
+        return self.run.fold(self.record.time, everywhere)[self.whole_cycles]
 
 
 def fitted_records(

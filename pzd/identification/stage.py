@@ -159,15 +159,6 @@ def _constant_rows(
     return rows
 
 
-def _auxiliary_text(row: AuxiliaryRow | None) -> str:
-    """Return the forces beside the element as the end of a line of progress."""
-    if row is None:
-        return ""
-    force = supported(row.F_0_N, row.F_0_N_low95, row.F_0_N_high95)
-    stiffness = supported(row.k_g_N_per_m, row.k_g_N_per_m_low95, row.k_g_N_per_m_high95)
-    return f"; beside the element {force} N and {stiffness} N/m"
-
-
 def _moving_rows(
     moving: Sequence[Record],
     known: Sequence[tuple[Condition, ParameterRow]],
@@ -202,23 +193,23 @@ def _sort_key(labels: Labels) -> tuple[str, float, float]:
 
 def _parameter_text(row: ParameterRow) -> str:
     """Return the parameters of one row as a line of progress."""
+    voltage = None if row.voltage_V is None else f"{row.voltage_V:.4g}"
+    temperature = None if row.temperature_degC is None else f"{row.temperature_degC:.4g} degC"
+    place = ", ".join(part for part in (row.setting, voltage, temperature) if part)
+    T0, C, k = (_supported(row, name) for name in ("T0_N", "C_Ns_per_m", "k_N_per_m"))
+    return f"{place or 'all records'}: T0 = {T0} N, C = {C} N s/m, k = {k} N/m, W_s = {row.W_s:.3g}, {row.status}"
 
-    def shown(value: float | None, low: float | None, high: float | None) -> str:
-        if value is None:
-            return "-"
-        return f"{value:.4g}" if low is None or high is None else supported(value, low, high)
 
-    place = ", ".join(
-        part
-        for part in (
-            row.setting,
-            None if row.voltage_V is None else f"{row.voltage_V:.4g}",
-            None if row.temperature_degC is None else f"{row.temperature_degC:.4g} degC",
-        )
-        if part
-    )
-    return (
-        f"{place or 'all records'}: T0 = {shown(row.T0_N, row.T0_N_low95, row.T0_N_high95)} N,"
-        f" C = {shown(row.C_Ns_per_m, row.C_Ns_per_m_low95, row.C_Ns_per_m_high95)} N s/m,"
-        f" k = {shown(row.k_N_per_m, row.k_N_per_m_low95, row.k_N_per_m_high95)} N/m, W_s = {row.W_s:.3g}, {row.status}"
-    )
+def _auxiliary_text(row: AuxiliaryRow | None) -> str:
+    """Return the forces beside the element as the end of a line of progress."""
+    if row is None:
+        return ""
+    return f"; beside the element {_supported(row, 'F_0_N')} N and {_supported(row, 'k_g_N_per_m')} N/m"
+
+
+def _supported(row: ParameterRow | AuxiliaryRow, name: str) -> str:
+    """Return a value with the digits that its interval supports, `-` where there is none."""
+    value, low, high = (getattr(row, f"{name}{end}") for end in ("", "_low95", "_high95"))
+    if value is None:
+        return "-"
+    return f"{value:.4g}" if low is None or high is None else supported(value, low, high)
