@@ -194,8 +194,8 @@ def conditions(
     still = [r for r in records if is_constant(r, scale)]
     groups: list[tuple[str | None, list[Record]]] = []
     for setting in sorted({r.setting for r in still}, key=lambda s: s or ""):
-        mine = [r for r in still if r.setting == setting]
-        for at_voltage in _bands(mine, [r.median_voltage() for r in mine], within):
+        of_setting = [r for r in still if r.setting == setting]
+        for at_voltage in _bands(of_setting, [r.median_voltage() for r in of_setting], within):
             bands = _bands(at_voltage, [r.median_temperature() for r in at_voltage], temperature_within)
             groups.extend((setting, members) for members in bands)
     found = [_condition(*group, (within, temperature_within)) for group in groups]

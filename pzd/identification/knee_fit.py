@@ -42,9 +42,9 @@ class KneeCurve(NamedTuple):
     blow_off: tuple[float, float]
     """B [N s/m]; equal to the bleed without a knee."""
 
-    def knee_force(self, way: int) -> float:
+    def knee_force(self, direction: int) -> float:
         """Return the force at the knee of one direction [N]."""
-        return self.friction + self.bleed[way] * self.knee_speed[way]
+        return self.friction + self.bleed[direction] * self.knee_speed[direction]
 
     @property
     def damping(self) -> float:
@@ -53,7 +53,7 @@ class KneeCurve(NamedTuple):
 
     def effect(self) -> dict[str, float]:
         """Return the parameters of the law `knee` beside T0, `damping` and k."""
-        forces = [min(self.knee_force(way), NO_KNEE) for way in (REBOUND, COMPRESSION)]
+        forces = [min(self.knee_force(direction), NO_KNEE) for direction in (REBOUND, COMPRESSION)]
         return {
             "beta": (self.bleed[REBOUND] - self.bleed[COMPRESSION]) / (2.0 * self.damping),
             "F_reb": forces[REBOUND],
@@ -75,12 +75,16 @@ class KneeForm:
     @property
     def directions_with_knee(self) -> tuple[int, ...]:
         """Directions with a knee."""
-        return tuple(way for way in (REBOUND, COMPRESSION) if self.has_knee[way])
+        return tuple(direction for direction in (REBOUND, COMPRESSION) if self.has_knee[direction])
 
     def natural(self, curve: KneeCurve) -> Array:
         """Return the free parameters (p,) in SI units: T0, the bleeds, k, then w_k and B of each knee."""
         bleeds = curve.bleed[:1] if self.symmetric else curve.bleed
-        knees = [value for way in self.directions_with_knee for value in (curve.knee_speed[way], curve.blow_off[way])]
+        knees = [
+            value
+            for direction in self.directions_with_knee
+            for value in (curve.knee_speed[direction], curve.blow_off[direction])
+        ]
         return np.array([curve.friction, *bleeds, curve.stiffness, *knees])
 
     def curve(self, natural: Array) -> KneeCurve:
@@ -89,8 +93,8 @@ class KneeForm:
         bleed = (rest[0], rest[0]) if self.symmetric else (rest[0], rest[1])
         stiffness, *knees = rest[1:] if self.symmetric else rest[2:]
         speed, slope = [np.inf, np.inf], [*bleed]
-        for place, way in enumerate(self.directions_with_knee):
-            speed[way], slope[way] = knees[2 * place : 2 * place + 2]
+        for place, direction in enumerate(self.directions_with_knee):
+            speed[direction], slope[direction] = knees[2 * place : 2 * place + 2]
         return KneeCurve(friction, bleed, stiffness, (speed[0], speed[1]), (slope[0], slope[1]))
 
     def searched(self, curve: KneeCurve, force: float) -> Array:
@@ -126,17 +130,6 @@ class KneeRecord:
     counted: Mask
     """(n,) mask of the samples that enter the criterion."""
 
-    @property
-    def measured(self) -> Array:
-        """Force (m,) at the counted samples [N]."""
-        return self.record.force[self.counted]
-
-    @property
-    def gas_columns(self) -> Array:
-        """Forces (m, 2) of F_0 = 1 N and k_g = 1 N/m at the counted samples."""
-        x = self.motion.displacement[self.counted]
-        return np.column_stack([np.ones(x.size), x])
-
     def simulated(self, curve: KneeCurve, gas: Array) -> Array:
         """Compute the force (m,) of the element [N], starting from the measured force less that of the gas (2,)."""
         rows, _ = constant_rows(curve.friction, curve.damping, curve.stiffness, {"knee": curve.effect()})
@@ -168,12 +161,13 @@ class KneeData:
     @cached_property
     def measured(self) -> Array:
         """Force (N,) at the counted samples, test by test [N]."""
-        return np.concatenate([t.measured for t in self.tests])
+        return np.concatenate([t.record.force[t.counted] for t in self.tests])
 
     @cached_property
     def gas_columns(self) -> Array:
-        """Forces (N, 2) of F_0 = 1 N and k_g = 1 N/m."""
-        return np.vstack([t.gas_columns for t in self.tests])
+        """Forces (N, 2) of F_0 = 1 N and k_g = 1 N/m at the counted samples."""
+        x = np.concatenate([t.motion.displacement[t.counted] for t in self.tests])
+        return np.column_stack([np.ones(x.size), x])
 
     @cached_property
     def speed(self) -> Array:
@@ -226,7 +220,7 @@ def grid_start(tests: KneeData, stiffness: float) -> tuple[KneeCurve, Array]:
     found: list[tuple[float, KneeCurve, Array]] = []
     for knees in product((share * fastest for share in KNEE_GRID), repeat=2):
         terms = np.column_stack(
-            [of_gas, np.sign(v), *(t for way in (0, 1) for t in _slope_columns(v, way, knees[way]))]
+            [of_gas, np.sign(v), *(t for direction in (0, 1) for t in _slope_columns(v, direction, knees[direction]))]
         )
         size = np.linalg.norm(terms, axis=0)
         size[size == 0.0] = 1.0
@@ -237,9 +231,9 @@ def grid_start(tests: KneeData, stiffness: float) -> tuple[KneeCurve, Array]:
     return curve, gas
 
 
-def _slope_columns(v: Array, way: int, knee: float) -> tuple[Array, Array]:
+def _slope_columns(v: Array, direction: int, knee: float) -> tuple[Array, Array]:
     """Return the forces (N,) of a unit slope up to the knee of one direction, and of one beyond it."""
-    sign = (1.0, -1.0)[way]
+    sign = (1.0, -1.0)[direction]
     w = np.maximum(sign * v, 0.0)
     return sign * np.minimum(w, knee), sign * np.maximum(w - knee, 0.0)
 
@@ -305,8 +299,8 @@ def fit_knee(tests: KneeData, stiffness: float) -> KneeFit:
     stiffness : of the oil spring at the start [N/m]
     """
     best = descend(tests, KneeForm(), *grid_start(tests, stiffness))
-    for way in best.form.directions_with_knee:
-        has_knee = tuple(each and other != way for other, each in enumerate(best.form.has_knee))
+    for direction in best.form.directions_with_knee:
+        has_knee = tuple(each and other != direction for other, each in enumerate(best.form.has_knee))
         form = KneeForm(has_knee=(has_knee[0], has_knee[1]))
         straight = descend(tests, form, best.curve, best.gas, PROBE_EVALUATIONS)
         if not _knee_is_visible(tests, best, straight):

@@ -91,10 +91,7 @@ def _within(a: float | None, b: float | None, within: float) -> bool:
 
 
 def _fit_band(
-    records: list[Record],
-    temperature: float | None,
-    known: list[ConstantRow],
-    config: IdentifyConfig,
+    records: list[Record], temperature: float | None, known: list[ConstantRow], config: IdentifyConfig
 ) -> list[ParameterRow]:
     """Fit the free nodes of one setting and temperature."""
     scale = voltage_scale([*records, *(r for c, _ in known for r in c.records)])
@@ -250,11 +247,11 @@ def dwell_levels(voltage: Array, band: float) -> list[float]:
     rest = np.sort(voltage)
     levels: list[float] = []
     while rest.size:
-        fixed = np.searchsorted(rest, rest + band, side="right") - np.arange(rest.size)
-        first = int(np.argmax(fixed))
-        if fixed[first] < DWELL_SHARE * voltage.size:
+        inside = np.searchsorted(rest, rest + band, side="right") - np.arange(rest.size)
+        first = int(np.argmax(inside))
+        if inside[first] < DWELL_SHARE * voltage.size:
             break
-        levels.append(float(np.median(rest[first : first + fixed[first]])))
+        levels.append(float(np.median(rest[first : first + inside[first]])))
         rest = rest[np.abs(rest - levels[-1]) > 2.0 * band]
     if len(levels) < 2:
         extremes = [float(voltage.min()), float(voltage.max())]
@@ -281,6 +278,7 @@ class MovingObjective:
 
     records: tuple[Record, ...]
     nodes: Array
+    """(m,) voltages of the nodes, rising [V]."""
     fixed: dict[int, Bingham]
     """Parameters of the fixed nodes, by their index."""
     constant: Objective
@@ -293,6 +291,7 @@ class MovingObjective:
 
     @cached_property
     def _motions(self) -> tuple[tuple[Motion, Rows], ...]:
+        """Motion of each record, and the indices of its samples in it."""
         return tuple(motion_of(record) for record in self.records)
 
     def residuals(self, free: Sequence[Bingham]) -> Array:
@@ -320,22 +319,17 @@ class MovingObjective:
 
     def touched(self) -> Array:
         """Return the share (N, m) of each node in the parameters at the counted samples."""
-        return np.concatenate(
-            [
-                node_weights(self.nodes, voltage_of(r)[t.counted])
-                for r, t in zip(self.records, self.constant.prepared, strict=True)
-            ]
-        )
+        pairs = zip(self.records, self.constant.prepared, strict=True)
+        return np.concatenate([node_weights(self.nodes, voltage_of(r)[t.counted]) for r, t in pairs])
 
 
 def damper_with_nodes(nodes: Array, values: Sequence[Bingham]) -> Damper:
     """Return the Bingham damper with these parameters at these voltages."""
-    return Damper(
-        base=tuple(
-            BaseRow(voltage_V=float(u), T0_N=p.friction, C_Ns_per_m=p.damping, k_N_per_m=p.stiffness)
-            for u, p in zip(nodes, values, strict=True)
-        )
+    rows = (
+        BaseRow(voltage_V=float(u), T0_N=p.friction, C_Ns_per_m=p.damping, k_N_per_m=p.stiffness)
+        for u, p in zip(nodes, values, strict=True)
     )
+    return Damper(base=tuple(rows))
 
 
 def motion_of(record: Record) -> tuple[Motion, Rows]:

@@ -122,12 +122,12 @@ def refuse_partly_recorded(rig: Rig, control: Control) -> None:
     DataError : with the first test that lacks one
     """
     for setting in dict.fromkeys(record.setting for record in rig.records):
-        mine = [record for record in rig.records if record.setting == setting]
+        of_setting = [record for record in rig.records if record.setting == setting]
         for name, unit, without in (
-            (control.quantity.name, control.unit, [r.name for r in mine if r.voltage is None]),
-            (TEMPERATURE.name, TEMPERATURE.unit, [r.name for r in mine if r.temperature is None]),
+            (control.quantity.name, control.unit, [r.name for r in of_setting if r.voltage is None]),
+            (TEMPERATURE.name, TEMPERATURE.unit, [r.name for r in of_setting if r.temperature is None]),
         ):
-            if 0 < len(without) < len(mine):
+            if 0 < len(without) < len(of_setting):
                 more = f" and {counted(len(without) - 1, 'more test')}" if len(without) > 1 else ""
                 raise DataError(
                     f"{without[0]}{more}: no {name}, which other tests of the setting have: say what it was, "
@@ -172,16 +172,17 @@ def _moving_rows(
     rows = []
     for setting in sorted({r.setting for r in moving}, key=lambda s: s or ""):
         auxiliary = [row for row in auxiliaries if row.setting == setting]
-        mine = [(c, row) for c, row in known if c.setting == setting]
-        still = [replace(c, records=tuple(subtract_auxiliary(r, auxiliary) for r in c.records)) for c, _ in mine]
-        of_setting = [subtract_auxiliary(r, auxiliary) for r in moving if r.setting == setting]
-        for row in fit_moving(of_setting, still, [row for _, row in mine], config):
+        of_setting = [(c, row) for c, row in known if c.setting == setting]
+        still = [replace(c, records=tuple(subtract_auxiliary(r, auxiliary) for r in c.records)) for c, _ in of_setting]
+        moving_of_setting = [subtract_auxiliary(r, auxiliary) for r in moving if r.setting == setting]
+        for row in fit_moving(moving_of_setting, still, [row for _, row in of_setting], config):
             rows.append(row)
             log.info("node from records with moving voltage: %s", _parameter_text(row))
     return rows
 
 
 def _labels(row: ParameterRow | AuxiliaryRow) -> Labels:
+    """Return setting, voltage and temperature of a row."""
     return row.setting, row.voltage_V, row.temperature_degC
 
 

@@ -119,9 +119,9 @@ class Stroke:
 
     def between(self, low: float, high: float) -> slice:
         """Return the samples between two shares of the stroke, counted from its beginning."""
-        way = np.abs(self.displacement - self.displacement[0]) / abs(self.displacement[-1] - self.displacement[0])
-        first = int(np.argmax(way >= low))
-        return slice(first, first + int(np.argmax(np.append(way[first:], 2.0) > high)))
+        path = np.abs(self.displacement - self.displacement[0]) / abs(self.displacement[-1] - self.displacement[0])
+        first = int(np.argmax(path >= low))
+        return slice(first, first + int(np.argmax(np.append(path[first:], 2.0) > high)))
 
     def _constant(self) -> bool:
         """Tell whether the speed is constant in the straight part."""
@@ -244,8 +244,8 @@ def settled_cycle(record: Record) -> Cycle | None:
 def _single_cycle(record: Record) -> Cycle | None:
     """Return the cycle of a record of one cycle, as a damper dyno saves it, whatever the phase at its beginning."""
     x, closed = record.displacement, CLOSURE * float(np.ptp(record.displacement))
-    way = float(np.sum(np.abs(np.diff(x))))
-    if len(reversals(x)) > 2 or abs(x[-1] - x[0]) > closed or abs(way - 2.0 * np.ptp(x)) > 2.0 * closed:
+    path = float(np.sum(np.abs(np.diff(x))))
+    if len(reversals(x)) > 2 or abs(x[-1] - x[0]) > closed or abs(path - 2.0 * np.ptp(x)) > 2.0 * closed:
         return None
     speed = 0.5 * float(record.velocity[0] + record.velocity[-1])
     last, gap = x.size, 1.0 / record.rate
@@ -410,10 +410,10 @@ class _SameTests:
 
     def to(self, row: MeasureRow) -> list[MeasureRow]:
         """Return the periodic tests that are the same but for the voltage, in the order of the rows."""
-        speed, mine = row.peak_velocity_m_per_s, self.rows.get(row.setting, [])
-        low = bisect_left(mine, speed * (1.0 - 2.0 * SAME_MOTION), key=lambda entry: entry[0])
-        high = bisect_right(mine, speed * (1.0 + 2.0 * SAME_MOTION), key=lambda entry: entry[0])
-        return [r for _, _, r in sorted(mine[low:high], key=lambda entry: entry[1]) if _same_test(r, row)]
+        speed, of_setting = row.peak_velocity_m_per_s, self.rows.get(row.setting, [])
+        low = bisect_left(of_setting, speed * (1.0 - 2.0 * SAME_MOTION), key=lambda entry: entry[0])
+        high = bisect_right(of_setting, speed * (1.0 + 2.0 * SAME_MOTION), key=lambda entry: entry[0])
+        return [r for _, _, r in sorted(of_setting[low:high], key=lambda entry: entry[1]) if _same_test(r, row)]
 
 
 def _dynamic_range(row: MeasureRow, others: Sequence[MeasureRow]) -> float | None:
