@@ -1,4 +1,4 @@
-"""The level of a condition is what was set: noise gives it no digits, and two conditions never the same one."""
+"""Grouping into conditions: a level carries no digits of noise, and no two conditions have the same level."""
 
 from __future__ import annotations
 

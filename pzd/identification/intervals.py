@@ -67,14 +67,14 @@ def half_widths(records: Sequence[FittedRecord], misfit: Misfit, level: float = 
     """
     from scipy.special import stdtrit
 
-    size = np.sqrt(sum(np.sum(p.slopes**2, axis=0) for p in records))
+    size = np.sqrt(sum(np.sum(r.slopes**2, axis=0) for r in records))
     unseen = size == 0.0
     size = np.where(unseen, 1.0, size)
-    slopes = [p.slopes / size for p in records]
+    slopes = [r.slopes / size for r in records]
     bread: Array = np.linalg.pinv(np.sum([s.T @ s for s in slopes], axis=0), rcond=1e-14, hermitian=True)
     noise = _noise_variance(records, slopes, bread)
     sensors = _sensor_variance(records, slopes, bread, noise)
-    samples = sum(p.residuals.size for p in records)
+    samples = sum(r.residuals.size for r in records)
     absorbed = misfit.absorbed**2 * samples * np.diag(bread) + _hidden_law_variance(records, slopes, bread)
     together = _sum_of_variances([noise, sensors, _Variance(absorbed, np.full(size.size, np.inf))])
     quantile = stdtrit(np.maximum(together.freedom, 1.0), 0.5 + 0.5 * level)
@@ -178,9 +178,9 @@ def _sensor_variance(
                                         Source: Bell and McCaffrey 2002 for R and n; L a weighted mean
     """
     count = len(bread)
-    given = [(s.T @ p.nuisances) for s, p in zip(slopes, records, strict=True)]
+    given = [(s.T @ r.nuisances) for s, r in zip(slopes, records, strict=True)]
     grams = [s.T @ s for s in slopes]
-    pulls = np.stack([(s.T @ p.residuals) @ bread for s, p in zip(slopes, records, strict=True)])
+    pulls = np.stack([(s.T @ r.residuals) @ bread for s, r in zip(slopes, records, strict=True)])
     prior = np.sum([(g.T @ bread) ** 2 for g in given], axis=(0, 1))
     if len(records) < 2:
         return _Variance(prior, np.full(count, np.inf))
@@ -223,10 +223,10 @@ def _hidden_law_variance(records: Sequence[FittedRecord], slopes: Sequence[Array
     show more, and less of it can hide.
     """
     # The slope by C is the speed of the flow; where the control signal moves, every node has a C: use the rod's speed.
-    speeds = [p.slopes[:, 1] if p.constant else p.record.velocity[p.counted] for p in records]
+    speeds = [r.slopes[:, 1] if r.constant else r.record.velocity[r.counted] for r in records]
     squares = [v * np.abs(v) for v in speeds]
     taken = bread @ np.sum([s.T @ g for s, g in zip(slopes, squares, strict=True)], axis=0)
-    peaks = [float(np.max(np.abs(p.force))) for p in records]
+    peaks = [float(np.max(np.abs(r.force))) for r in records]
     left = [(g - s @ taken) / peak for s, g, peak in zip(slopes, squares, peaks, strict=True)]
     whole = [g / peak for g, peak in zip(squares, peaks, strict=True)]
     rms_left, rms_whole = (rms(np.concatenate(each)) for each in (left, whole))
@@ -283,9 +283,9 @@ def uncertainty(slopes: Array, residuals: Array, lengths: Sequence[int]) -> Unce
     meat = np.zeros((slopes.shape[1],) * 2)
     independent, start = 0.0, 0
     for length in lengths:
-        record = slice(start, start + length)
-        noise = autoregression([residuals[record]], LARGEST_ORDER)
-        filtered = all_pole(noise.whitening_filter, scaled[record][::-1])
+        rows = slice(start, start + length)
+        noise = autoregression([residuals[rows]], LARGEST_ORDER)
+        filtered = all_pole(noise.whitening_filter, scaled[rows][::-1])
         meat += noise.innovation * filtered.T @ filtered
         independent += length * _independent_share(noise)
         start += length

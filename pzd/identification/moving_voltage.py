@@ -298,11 +298,11 @@ class MovingObjective:
         """Compute the measured less simulated force (N,) at the counted samples [N]."""
         values = dict(self.fixed) | dict(zip(self.free, free, strict=True))
         damper = damper_with_nodes(self.nodes, [values[i] for i in range(self.nodes.size)])
-        fitted = [
+        forces = [
             respond(damper, motion, float(r.force[0]), INTEGRATION)[places][t.counted]
             for r, t, (motion, places) in zip(self.records, self.constant.prepared, self._motions, strict=True)
         ]
-        residuals: Array = self.constant.measured - np.concatenate(fitted)
+        residuals: Array = self.constant.measured - np.concatenate(forces)
         return residuals
 
     def slopes(self, free: Sequence[Bingham], residuals: Array) -> Array:

@@ -101,8 +101,8 @@ def trust_of(evidence: Sequence[ParameterEvidence]) -> Trust:
     reasons = [e.undetermined() for e in evidence]
     weak = [None if reason else e.weak() for e, reason in zip(evidence, reasons, strict=True)]
     names = [e.name for e in evidence]
-    records = [_clause("undetermined", names, reasons), _clause("weak", names, weak)]
-    return Trust("; ".join(p for p in records if p) or "ok", tuple(reason is None for reason in reasons))
+    clauses = [_clause("undetermined", names, reasons), _clause("weak", names, weak)]
+    return Trust("; ".join(clause for clause in clauses if clause) or "ok", tuple(reason is None for reason in reasons))
 
 
 def _clause(word: str, names: Sequence[str], reasons: Sequence[str | None]) -> str:
@@ -339,9 +339,9 @@ def _without_nuisances(records: Sequence[FittedRecord]) -> list[Array]:
     from scipy.optimize import lsq_linear
 
     size = records[0].slopes.shape[1]
-    scale = np.sqrt(sum(np.sum(p.slopes**2, axis=0) for p in records))
+    scale = np.sqrt(sum(np.sum(r.slopes**2, axis=0) for r in records))
     scale[scale == 0.0] = 1.0
-    whole = size + sum(p.nuisances.shape[1] for p in records)
+    whole = size + sum(r.nuisances.shape[1] for r in records)
     normal, right = np.zeros((whole, whole)), np.zeros(whole)
     columns, at = [], size
     for record in records:

@@ -1,4 +1,4 @@
-"""Gas beside the element: T0, C and k stay unbiased, and what stands beside them is told with an interval."""
+"""Gas beside the element: T0, C and k stay unbiased, and the forces beside them have intervals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tests show without a model, against closed forms: force over speed, gas force, friction, response to a step."""
+"""Characteristics of tests against closed forms: force over speed, gas force, friction, response to a step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Intervals hold the truth: under coloured noise, with sensors that differ from test to test, and a small misfit."""
+"""Coverage of the intervals: under coloured noise, with sensors that differ from test to test, and a small misfit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Passive dampers: bleed, knee and blow-off are found, and the law that predicts kept-back tests is handed on."""
+"""Knee law of passive dampers: bleed, knee and blow-off, and the choice of the law by held-out tests."""
 
 from __future__ import annotations
 

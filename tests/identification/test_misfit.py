@@ -1,4 +1,4 @@
-"""What repeats and the Bingham element misses is told from noise and from what the sensors of a test do."""
+"""Misfit of the Bingham element, told from noise and from the sensors of a test."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Records whose voltage moves are identified at nodes, the piston's place being the state."""
+"""Nodes of records with moving voltage, the state being the place of the piston."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The displacement between samples, and what is left out of the criterion at the start."""
+"""Records prepared for a fit: fine displacement, warm-up, rest after the motion; and the criterion over them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the data do not determine gets no number, and the reason is said."""
+"""Undetermined parameters have no number, and the status says why."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Warm-up: every cycle of a long test over its time and temperature, against forces that fade by a known law."""
+"""Warm-up: every cycle of a long test over time and temperature, against forces that fade by a known law."""
 
 from __future__ import annotations
 

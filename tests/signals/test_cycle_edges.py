@@ -1,4 +1,4 @@
-"""Ramps, rest and the oil spring being wound up stay outside the run; the period is as good as the noise lets it."""
+"""Edges of the run: ramps, rest and the loading of the oil spring stay outside; error of the period."""
 
 from __future__ import annotations
 

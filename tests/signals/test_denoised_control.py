@@ -1,4 +1,4 @@
-"""A control signal between its steps is a line where noise is all that it differs from one by."""
+"""A control signal between its steps is a line where it differs from one by noise alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An average over cycles is taken only where what it takes away is noise."""
+"""Cycles are averaged only where the average removes noise alone."""
 
 from __future__ import annotations
 

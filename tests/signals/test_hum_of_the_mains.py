@@ -1,4 +1,4 @@
-"""The mains are found where a line of theirs stands out, and taken for nothing else."""
+"""Hum of the mains is found where its line is prominent, and nowhere else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Speed and acceleration come from average cycles or a smoothed displacement, with known errors."""
+"""Velocity and acceleration from average cycles or a smoothed displacement, with known errors."""
 
 from __future__ import annotations
 

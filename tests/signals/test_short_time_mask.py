@@ -1,4 +1,4 @@
-"""What stands clear in parts of a cycle: corners come out, noise and smooth motions do not."""
+"""Short-time mask: corners of a cycle are kept, noise is dropped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Noise alone is told from a gap in a record that does not repeat, whatever the colour of the noise."""
+"""Misfit of a record that does not repeat is told from noise, whatever the colour of the noise."""
 
 from __future__ import annotations
 

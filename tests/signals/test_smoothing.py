@@ -1,4 +1,4 @@
-"""A displacement is freed of its noise whatever colour a filter gave that, and keeps what stands out of it."""
+"""Smoothing removes noise of any colour from a displacement, and nothing that exceeds it."""
 
 from __future__ import annotations
 
