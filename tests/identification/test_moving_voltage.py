@@ -33,7 +33,7 @@ def values(row: ParameterRow) -> Bingham:
 
 @pytest.mark.parametrize("voltage", [steps, ramp])
 def test_moving_records_alone_give_both_ends(voltage) -> None:
-    rows = rows_for(moving_test(voltage))
+    rows = rows_for(moving_test(voltage, seconds=6.0))
     assert [row.voltage_V for row in rows] == pytest.approx([0.0, 150.0], abs=0.1)
     for row, truth in zip(rows, TABLE_2.values(), strict=True):
         assert row.status == "ok"
@@ -82,7 +82,7 @@ def test_a_node_that_its_constant_record_does_not_determine_is_fitted_to_moving_
 
 
 def test_the_config_may_choose_the_nodes() -> None:
-    rows = rows_for(moving_test(ramp), nodes=(0.0, 75.0, 150.0))
+    rows = rows_for(moving_test(ramp, seconds=8.0), nodes=(0.0, 75.0, 150.0))
     assert [row.voltage_V for row in rows] == [0.0, 75.0, 150.0]
     middle = np.mean([TABLE_2[0.0], TABLE_2[150.0]], axis=0)
     np.testing.assert_allclose(values(rows[1]), middle, rtol=1e-2)
