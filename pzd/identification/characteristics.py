@@ -41,8 +41,9 @@ def characteristics(constant: Sequence[Condition], moving: Sequence[Record]) -> 
     """
     found = [(condition, [(r, test) for r in condition.records for test in speed_tests(r)]) for condition in constant]
     peaks = tuple(row for condition, tests in found for row in peak_velocity(condition, tests))
-    steps = step_responses(moving)
-    warm = tuple(row for condition in constant for row in warm_up_rows(condition))
+    steps = tuple(row for record in moving for row in _step_rows(record))
+    tests = [(one, record.name, part) for one in constant for record in one.records for part in separate_tests(record)]
+    warm = tuple(row for test in tests for row in _warm_up_rows(*test))
     recognised = {row.record for rows in (peaks, steps, warm) for row in rows}
     return Characteristics(
         peak_velocity=peaks,
@@ -220,16 +221,6 @@ STEADY_PART = (0.05, 0.95)
 """Shares of a stroke of constant speed between which a step and its response have to lie."""
 
 
-def step_responses(records: Sequence[Record]) -> tuple[StepRow, ...]:
-    """Return every step of the control signal, in the order of the records.
-
-    Parameters
-    ----------
-    records : whose control signal moves
-    """
-    return tuple(row for record in records for row in _step_rows(record))
-
-
 @dataclass(frozen=True)
 class ControlStep:
     """One step of the control signal."""
@@ -269,7 +260,7 @@ def steps_of(time: Array, voltage: Array) -> Iterator[ControlStep]:
 
 
 def _step_rows(record: Record) -> Iterator[StepRow]:
-    """Yield the rows of one record."""
+    """Yield one row for every step of the control signal of a record."""
     if record.voltage is None:
         return
     strokes = strokes_of(record.time, record.displacement, record.force)
@@ -358,23 +349,15 @@ EQUAL_SPEED_SHARE = 0.8
 """Least share of the strokes that have one peak speed: the others are starts and stops."""
 
 
-def warm_up_rows(condition: Condition) -> tuple[WarmUpRow, ...]:
-    """Return one row for each cycle of the tests that are many cycles long or change in temperature.
+def _warm_up_rows(condition: Condition, name: str, part: Record) -> Iterator[WarmUpRow]:
+    """Yield one row for each cycle of a test that is many cycles long or changes in temperature.
 
     Parameters
     ----------
     condition : of constant control signal
+    name : of the record
+    part : the test, of which a record may hold several
     """
-    return tuple(
-        row
-        for record in condition.records
-        for part in separate_tests(record)
-        for row in _warm_up_rows(condition, record.name, part)
-    )
-
-
-def _warm_up_rows(condition: Condition, name: str, part: Record) -> Iterator[WarmUpRow]:
-    """Yield the rows of one test."""
     strokes = strokes_of(part.time, part.displacement, part.force)
     if len(strokes) < 2 * (FEWEST_CYCLES if _temperature_change(part) > LEAST_WARMING_K else MANY_CYCLES):
         return

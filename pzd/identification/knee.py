@@ -310,31 +310,27 @@ def law_row(
     the law, with the reason
     """
     count = len(found)
-    if not conditions:
-        return _law(setting, "bingham", count, None, "the knee law needs tests at a constant control signal")
     squares = np.sum([each for _, each in found], axis=0) if found else None
     pooled = None if squares is None else (float(squares[0] / squares[2]), float(squares[1] / squares[2]))
     comparison = f"{count} tests kept back are predicted with W_s {pooled[1]:.3g} by the knee law" if pooled else ""
     comparison += f", {pooled[0]:.3g} by Bingham's" if pooled else ""
-    if asked == "knee":
-        why = f"as the config asks for; {comparison or 'no test could be kept back'}"
-        return _law(setting, "knee", count, pooled, why)
-    if count < FEWEST_TESTS:
-        why = f"{count} tests could be kept back, and {FEWEST_TESTS} are needed to choose a law; "
-        why += "record several in a condition"
-        return _law(setting, "bingham", count, pooled, why)
-    apart = np.array([row.W_s_bingham - row.W_s_knee for row, _ in found])
-    mean, error = float(apart.mean()), float(np.std(apart, ddof=1) / np.sqrt(count))
-    visible = squares is not None and float(squares[0] - squares[1]) > float(squares[3])
-    measure = f"mean difference {mean:.2g}, its standard error {error:.2g}"
-    measure += "" if visible or mean <= 0.0 else f", less than {MISFIT_THRESHOLD:.2%} of peak"
-    law: LawName = "knee" if mean > SIGNIFICANT_ERRORS * error and visible else "bingham"
-    return _law(setting, law, count, pooled, f"{comparison}; {measure}")
-
-
-def _law(setting: str | None, law: LawName, tests: int, pooled: tuple[float, float] | None, reason: str) -> LawRow:
+    law: LawName = "bingham"
+    if not conditions:
+        reason = "the knee law needs tests at a constant control signal"
+    elif asked == "knee":
+        law, reason = "knee", f"as the config asks for; {comparison or 'no test could be kept back'}"
+    elif count < FEWEST_TESTS:
+        reason = f"{count} tests could be kept back, and {FEWEST_TESTS} are needed to choose a law; "
+        reason += "record several in a condition"
+    else:
+        apart = np.array([row.W_s_bingham - row.W_s_knee for row, _ in found])
+        mean, error = float(apart.mean()), float(np.std(apart, ddof=1) / np.sqrt(count))
+        visible = squares is not None and float(squares[0] - squares[1]) > float(squares[3])
+        law = "knee" if mean > SIGNIFICANT_ERRORS * error and visible else "bingham"
+        reason = f"{comparison}; mean difference {mean:.2g}, its standard error {error:.2g}"
+        reason += "" if visible or mean <= 0.0 else f", less than {MISFIT_THRESHOLD:.2%} of peak"
     bingham, knee = pooled or (None, None)
-    return LawRow(setting=setting, law=law, tests=tests, W_s_bingham=bingham, W_s_knee=knee, reason=reason)
+    return LawRow(setting=setting, law=law, tests=count, W_s_bingham=bingham, W_s_knee=knee, reason=reason)
 
 
 # --- Force per click and per unit ---

@@ -61,28 +61,19 @@ def identify(
     auxiliary = {_labels(row): row for _, row in found if row is not None}
     known = list(zip(constant, rows.values(), strict=True))
     rows |= {_labels(row): row for row in _moving_rows(moving, known, list(auxiliary.values()), identify)}
+    knees = Knees()
+    if identify.law != "bingham":
+        from pzd.identification.knee import identify_knees
+
+        settings = tuple(dict.fromkeys(record.setting for record in rig.records))
+        knees = identify_knees(known, settings, identify, control, progress)
     return Identified(
         tuple(rows[labels] for labels in sorted(rows, key=_sort_key)),
         measures(rig.records),
         tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_sort_key)),
         characteristics(constant, moving),
-        _knees(identify, known, [r.setting for r in rig.records], control, progress),
+        knees,
     )
-
-
-def _knees(
-    config: IdentifyConfig,
-    known: Sequence[tuple[Condition, ParameterRow]],
-    settings: Sequence[str | None],
-    control: Control,
-    progress: Listener,
-) -> Knees:
-    """Identify the knee law of every condition, where the config asks for it."""
-    if config.law == "bingham":
-        return Knees()
-    from pzd.identification.knee import identify_knees
-
-    return identify_knees(known, tuple(dict.fromkeys(settings)), config, control, progress)
 
 
 def refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> None:
