@@ -124,7 +124,7 @@ def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceCo
             values[f"{direction}_knee_velocity_m_per_s"] = curve.knee_speed[way]
             values[f"{direction}_blow_off_Ns_per_m"] = curve.blow_off[way]
     cells: dict[str, float | None] = {}
-    for name in _quantities_with_interval():
+    for name in (field.removesuffix("_low95") for field in KneeRow.model_fields if field.endswith("_low95")):
         scale = "positive" if name == "friction_N" else "linear" if name.startswith("gas") else "log"
         cells |= interval_columns(name, values.get(name), widths.get(name), scale, WIDEST_LOGARITHM)
     return KneeRow.model_validate(
@@ -184,27 +184,15 @@ def _half_widths(tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> tup
         forces[place] = f"{DIRECTIONS[way]}_knee_force_N"
     records = [test.record for test in tests.tests]
     prepared = [prepare(record) for record in records]
-    misfit = misfit_of(fitted_records(records, prepared, (fit.residuals, fit.slopes), nuisance))
+    fitted = [fitted_records(records, prepared, (fit.residuals, s), nuisance) for s in (fit.slopes, by_force)]
     # Records that are not constant use the speed of the rod for that of the flow: here no single C stands for it.
-    widths, of_force = (
-        half_widths(
-            [replace(p, constant=False) for p in fitted_records(records, prepared, (fit.residuals, s), nuisance)],
-            NO_MISFIT,
-        )
-        for s in (fit.slopes, by_force)
-    )
-    return misfit, dict(zip(columns, widths.tolist(), strict=True)) | {
-        name: width for name, width in zip(forces, of_force.tolist(), strict=True) if name not in columns
-    }
+    widths, of_force = (half_widths([replace(r, constant=False) for r in each], NO_MISFIT) for each in fitted)
+    by_column = dict(zip(forces, of_force.tolist(), strict=True)) | dict(zip(columns, widths.tolist(), strict=True))
+    return misfit_of(fitted[0]), by_column
 
 
 WIDEST_LOGARITHM = 20.0
 """Largest half width of an interval in the logarithm: nothing is known then."""
-
-
-def _quantities_with_interval() -> list[str]:
-    """Return the columns that have an interval."""
-    return [name.removesuffix("_low95") for name in KneeRow.model_fields if name.endswith("_low95")]
 
 
 _UNITS = ("_Ns_per_m", "_N_per_m", "_m_per_s", "_N")
@@ -220,17 +208,14 @@ def _status(values: Mapping[str, float], widths: Mapping[str, float], misfit: Mi
     """Return `ok`, or the weak parameters with the reason; the gas is judged against the scale of the friction."""
     least = {"friction_N": friction_scale(values["friction_N"], measured)}
     least["gas_force_N"] = max(abs(values["gas_force_N"]), least["friction_N"])
-    wide = [
+    weak = [
         f"{_quantity_name(name)} to +-{min(widths[name] / least.get(name, value), 9.99):.0%}"
         for name, value in values.items()
         if name != "gas_spring_N_per_m" and widths[name] > WEAK_WIDTH * least.get(name, value)
     ]
-    lacking = (
-        [f"the law misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's"]
-        if misfit.is_large
-        else []
-    )
-    return f"weak: {'; '.join([*wide, *lacking])}" if wide or lacking else "ok"
+    if misfit.is_large:
+        weak.append(f"the law misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's")
+    return f"weak: {'; '.join(weak)}" if weak else "ok"
 
 
 # --- Choice of the law by held-out tests ---

@@ -43,38 +43,38 @@ def identified(records: tuple[Record, ...]) -> tuple[ParameterRow, AuxiliaryRow 
 
 
 def test_a_gas_charge_biases_neither_friction_nor_damping_nor_spring(rng: np.random.Generator) -> None:
-    row, beside = identified(on_the_rig(RACING, rng, GAS))
+    row, auxiliary = identified(on_the_rig(RACING, rng, GAS))
     # The interval of T0 is 9 to 13 % wide to either side, and from 10 % on it is called weak: in 7 of 16 draws.
     assert re.fullmatch(r"ok|weak: T0 \(95 % interval of \+-1\d %\)", row.status)
     assert row.W_s < 0.01
     assert pytest.approx(RACING.friction, rel=0.15) == row.T0_N
     assert row.C_Ns_per_m == pytest.approx(RACING.damping, rel=0.05)
     assert row.k_N_per_m == pytest.approx(RACING.stiffness, rel=0.1)
-    assert beside is not None
-    assert pytest.approx(GAS[0], rel=0.05) == beside.F_0_N
-    assert beside.k_g_N_per_m == pytest.approx(GAS[1], rel=0.05)
+    assert auxiliary is not None
+    assert pytest.approx(GAS[0], rel=0.05) == auxiliary.F_0_N
+    assert auxiliary.k_g_N_per_m == pytest.approx(GAS[1], rel=0.05)
 
 
 @pytest.mark.ci
 def test_the_intervals_of_a_gas_charge_hold_it_nineteen_times_in_twenty(rng: np.random.Generator) -> None:
     held = []
     for _ in range(8):
-        _, beside = identified(on_the_rig(ROAD, rng, (250.0, 3000.0)))
-        assert beside is not None
-        held += [beside.F_0_N_low95 <= 250.0 <= beside.F_0_N_high95]
-        held += [beside.k_g_N_per_m_low95 <= 3000.0 <= beside.k_g_N_per_m_high95]
+        _, auxiliary = identified(on_the_rig(ROAD, rng, (250.0, 3000.0)))
+        assert auxiliary is not None
+        held += [auxiliary.F_0_N_low95 <= 250.0 <= auxiliary.F_0_N_high95]
+        held += [auxiliary.k_g_N_per_m_low95 <= 3000.0 <= auxiliary.k_g_N_per_m_high95]
     # 16 intervals of 95 %: fewer than 13 hold the truth in seven of a thousand runs of a right method.
     assert sum(held) >= 13
 
 
 def test_the_zero_of_the_displacement_changes_neither_gas_nor_parameters(rng: np.random.Generator) -> None:
     records = on_the_rig(RACING, rng, GAS)
-    row, beside = identified(records)
+    row, auxiliary = identified(records)
     moved_row, moved = identified(tuple(replace(r, displacement=r.displacement + 0.031) for r in records))
-    assert beside is not None
+    assert auxiliary is not None
     assert moved is not None
-    assert moved.zero_m - beside.zero_m == pytest.approx(0.031)
-    assert pytest.approx(beside.F_0_N, rel=1e-6) == moved.F_0_N
+    assert moved.zero_m - auxiliary.zero_m == pytest.approx(0.031)
+    assert pytest.approx(auxiliary.F_0_N, rel=1e-6) == moved.F_0_N
     assert pytest.approx(row.T0_N, rel=1e-6) == moved_row.T0_N
     assert moved_row.k_N_per_m == pytest.approx(row.k_N_per_m, rel=1e-6)
 

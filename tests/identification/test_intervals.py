@@ -34,8 +34,8 @@ def held(row: ParameterRow, truth: Bingham) -> int:
     )
 
 
-def parts_for(records: Sequence[Record], config: IdentifyConfig) -> tuple[tuple[FittedRecord, ...], Array]:
-    """The parts of a fit, and its estimate."""
+def fitted_for(records: Sequence[Record], config: IdentifyConfig) -> tuple[tuple[FittedRecord, ...], Array]:
+    """Fit the records; return them with residuals and slopes, and the estimate."""
     objective, fit, _ = fit_with_auxiliary(records, config, seed=1)
     return fitted_records(records, objective.prepared, (fit.residuals, fit.slopes), config.nuisance), np.array(
         fit.parameters
@@ -43,8 +43,8 @@ def parts_for(records: Sequence[Record], config: IdentifyConfig) -> tuple[tuple[
 
 
 def relative_widths(records: Sequence[Record], config: IdentifyConfig) -> Array:
-    parts, estimate = parts_for(records, config)
-    return half_widths(parts, misfit_of(parts)) / estimate
+    fitted, estimate = fitted_for(records, config)
+    return half_widths(fitted, misfit_of(fitted)) / estimate
 
 
 @pytest.mark.ci
@@ -90,10 +90,10 @@ def test_scatter_between_cycles_widens_an_interval_that_the_colour_of_the_noise_
     for draw in rng.spawn(12):
         record = sine_test(truth, 2.0, 0.03, cycles=CYCLES + 2, rate=500)
         gain = 1.0 + 0.05 * draw.standard_normal(CYCLES + 3)[(record.time * 2.0).astype(int)]
-        parts, estimate = parts_for([replace(record, force=gain * record.force)], SENSORS_ALIKE)
-        widths = half_widths(parts, misfit_of(parts))
+        fitted, estimate = fitted_for([replace(record, force=gain * record.force)], SENSORS_ALIKE)
+        widths = half_widths(fitted, misfit_of(fitted))
         covered += np.count_nonzero(np.abs(estimate - np.array(truth)) <= widths)
-        colour = uncertainty(parts[0].slopes, parts[0].residuals, [parts[0].residuals.size])
+        colour = uncertainty(fitted[0].slopes, fitted[0].residuals, [fitted[0].residuals.size])
         wider.append(widths[1] / colour.half_widths()[1])
     # The median is 2.2 to 2.3; of 36 intervals at 0.95 that hang together by three, 28 is four deviations off.
     assert np.median(wider) > 1.8
@@ -128,9 +128,9 @@ def test_tests_that_disagree_widen_the_interval_and_tests_that_agree_narrow_it(r
 
 def relative_widths_by_priors(records: Sequence[Record]) -> Array:
     """Of the same estimate, were nothing known of the sensors but their priors."""
-    parts, estimate = parts_for(records, IdentifyConfig())
-    slopes = np.concatenate([p.slopes for p in parts])
-    pulls = [np.linalg.inv(slopes.T @ slopes) @ p.slopes.T @ p.nuisances for p in parts]
+    fitted, estimate = fitted_for(records, IdentifyConfig())
+    slopes = np.concatenate([p.slopes for p in fitted])
+    pulls = [np.linalg.inv(slopes.T @ slopes) @ p.slopes.T @ p.nuisances for p in fitted]
     return np.asarray(1.96 * np.sqrt(sum(np.sum(p**2, axis=1) for p in pulls)) / estimate)
 
 
@@ -149,15 +149,15 @@ def test_few_cycles_widen_the_interval_beyond_the_root_of_their_number(rng: np.r
 def test_a_misfit_below_the_threshold_widens_the_interval(rng: np.random.Generator) -> None:
     records = [with_noise(sine_test(TABLE_2[0.0], 2.0, 0.02, rate=500), rng, 0.002)]
     bent = [replace(r, force=r.force + 300.0 * r.velocity * np.abs(r.velocity)) for r in records]
-    parts, _ = parts_for(bent, IdentifyConfig())
-    misfit = misfit_of(parts)
+    fitted, _ = fitted_for(bent, IdentifyConfig())
+    misfit = misfit_of(fitted)
     assert 0.0 < misfit.share < 0.0025
-    assert np.all(half_widths(parts, misfit) > 1.05 * half_widths(parts, Misfit(0.0, 0.0)))
+    assert np.all(half_widths(fitted, misfit) > 1.05 * half_widths(fitted, Misfit(0.0, 0.0)))
 
 
 def test_a_parameter_that_does_nothing_has_no_interval() -> None:
-    parts, _ = parts_for([sine_test(TABLE_2[0.0], 2.0, 0.03, rate=500)], IdentifyConfig())
-    idle = [replace(p, slopes=np.column_stack([p.slopes[:, :2], np.zeros(p.residuals.size)])) for p in parts]
+    fitted, _ = fitted_for([sine_test(TABLE_2[0.0], 2.0, 0.03, rate=500)], IdentifyConfig())
+    idle = [replace(p, slopes=np.column_stack([p.slopes[:, :2], np.zeros(p.residuals.size)])) for p in fitted]
     widths = half_widths(idle, misfit_of(idle))
     assert np.all(np.isfinite(widths[:2]))
     assert np.isinf(widths[2])

@@ -35,7 +35,7 @@ def row_for(records: list[Record]) -> ParameterRow:
 
 
 def misfit_for(records: tuple[Record, ...]) -> Misfit:
-    """What the element alone misses, nothing carried beside it."""
+    """Misfit of the element alone, without auxiliary forces."""
     objective = Objective(tuple(prepare(record) for record in records))
     fit = fit_separable(objective)
     fitted = fitted_records(records, objective.prepared, (fit.residuals, fit.slopes), IdentifyConfig().nuisance)
