@@ -1,11 +1,16 @@
-"""One rig record in SI, and which records are one condition."""
+"""One rig record in SI units, and the grouping of records into conditions.
+
+A record whose control signal stands still belongs to a condition: records of one setting at one voltage and one
+temperature. Glitches of up to three samples are left out wherever a voltage is judged.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,25 +19,26 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
 Rows = NDArray[np.intp]
-"""Types of arrays for all of pzd: numbers, which samples, complex numbers, and indices of samples."""
+"""Array types of all of pzd: real numbers, masks over samples, complex numbers, and indices of samples."""
 
 CONSTANT_SHARE = 0.02
-"""A voltage whose r.m.s. about its median stays within this share of the scale is constant."""
+"""Largest r.m.s. of a constant voltage about its median, as a share of the scale: a supply scatters by less."""
 DIFFERENT_SHARE = 0.1
-"""Voltages further apart than this share of the scale were set: a supply scatters by a few hundredths at most."""
+"""Least difference of two voltages set on purpose, as a share of the scale: a supply scatters by a few hundredths."""
 SAME_TEMPERATURE = 2.0
-"""Records within this many degC are one condition."""
-
-
+"""Largest spread of temperature in one condition [K], unless the config says otherwise."""
 _EQUAL_GAPS = 1e-9
-"""Gaps that differ by less than this share are equal but for rounding."""
+"""Relative difference below which two gaps are equal but for rounding."""
 _EVEN = 1e-3
-"""Steps that scatter by less than this share are even: a clock in microseconds at 1 kHz."""
+"""Relative scatter below which time steps are even: that of a clock in microseconds at 1 kHz."""
+
+Labels = tuple[str | None, float | None, float | None]
+"""Setting, voltage [V] and temperature [degC] of a condition."""
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What one test recorded; every array is (n,), extension positive, in SI and degC."""
+    """One test as recorded; every array is (n,), extension positive, in SI units and degC."""
 
     name: str
     setting: str | None
@@ -47,43 +53,31 @@ class Record:
 
     @cached_property
     def rate(self) -> float:
-        """Sampling rate [Hz], from the median step, or the mean of the usual ones where a coarse clock rounds them."""
+        """Sampling rate [Hz]: of the median time step, or of the mean usual step where a coarse clock rounds."""
         steps = np.diff(self.time)
         middle = float(np.median(steps))
         usual = steps[np.abs(steps - middle) <= 0.5 * middle]  # no gaps
         return float(1.0 / (middle if np.ptp(usual) <= _EVEN * middle else np.mean(usual)))
 
     def median_voltage(self) -> float | None:
-        """The voltage that labels the record, None where none was recorded."""
+        """Return the median voltage [V], None where none was recorded."""
         return None if self.voltage is None else float(np.median(self.voltage))
 
     def median_temperature(self) -> float | None:
-        """The temperature that labels the record [degC], None where none was recorded."""
+        """Return the median temperature [degC], None where none was recorded."""
         return None if self.temperature is None else float(np.median(self.temperature))
 
 
 def sliced(record: Record, kept: Mask) -> Record:
-    """The record's samples where the mask (n,) is set."""
-
-    def cut(channel: Array | None) -> Array | None:
-        return None if channel is None else channel[kept]
-
-    return Record(
-        record.name,
-        record.setting,
-        record.time[kept],
-        record.displacement[kept],
-        record.velocity[kept],
-        record.acceleration[kept],
-        record.force[kept],
-        cut(record.voltage),
-        cut(record.temperature),
-        cut(record.pressure),
-    )
+    """Return the record at the samples where the mask (n,) is set."""
+    channels: dict[str, Any] = {
+        name: values[kept] for name, values in vars(record).items() if isinstance(values, np.ndarray)
+    }
+    return replace(record, **channels)
 
 
 def clock_fault(time: Array) -> tuple[int, str] | None:
-    """The first sample at which a clock (n,) stands still or goes back, and that in words; None where it goes on."""
+    """Return the first sample at which a clock (n,) does not increase, and a message; None for a good clock."""
     wrong = np.flatnonzero(np.diff(time) <= 0.0)
     if not wrong.size:
         return None
@@ -101,19 +95,28 @@ class Condition:
     temperature: float | None
     records: tuple[Record, ...]
 
+    @property
+    def labels(self) -> Labels:
+        """Setting, voltage [V] and temperature [degC]."""
+        return self.setting, self.voltage, self.temperature
 
-def glitches(values: Array, away: Array | None = None) -> NDArray[np.int64]:
-    """Rows of up to three samples that jump away from their neighbours and back.
 
-    They stand out of the running median of seven samples by ten robust standard deviations of what stands
-    out of it, by four times the steepest usual step, and by 2 % of the usual range.
+def glitches(values: Array, deviation: Array | None = None) -> NDArray[np.int64]:
+    """Find the glitches of a channel: up to three samples that jump away from their neighbours and back.
+
+    A glitch deviates from the running median of seven samples by ten robust standard deviations of that deviation,
+    by four times the steepest usual step, and by 2 % of the usual range.
 
     Parameters
     ----------
     values : (n,) of any channel
-    away : (n,) their deviation from their neighbours, where it is known
+    deviation : (n,) from the running median, where it is known
+
+    Returns
+    -------
+    indices of the samples
     """
-    deviation = np.abs(from_neighbours(values) if away is None else away)
+    deviation = np.abs(deviation_from_median(values) if deviation is None else deviation)
     noise = 1.4826 * float(np.median(deviation))
     steepest = float(np.percentile(np.abs(np.diff(values)), 99.0)) if values.size > 1 else 0.0
     low, high = np.percentile(values, (0.5, 99.5))
@@ -122,8 +125,8 @@ def glitches(values: Array, away: Array | None = None) -> NDArray[np.int64]:
     return rows
 
 
-def from_neighbours(values: Array) -> Array:
-    """Deviation (n,) from the running median of seven samples; at the ends from that of the samples there are."""
+def deviation_from_median(values: Array) -> Array:
+    """Return the deviation (n,) from the running median of seven samples, the ends continued by reflection."""
     half = 3
     if values.size <= 2 * half:
         return np.zeros_like(values)
@@ -134,27 +137,27 @@ def from_neighbours(values: Array) -> Array:
 
 
 def without_glitches(values: Array) -> Array:
-    """The samples of a channel that are no glitches of more than 2 % of its usual magnitude."""
+    """Return the samples of a channel without glitches of more than 2 % of its usual magnitude."""
     spread = float(np.ptp(values))
     if spread == 0.0:
         return values  # most control signals, and no median is needed for them
     usual = float(np.median(np.abs(values)))
     if spread <= CONSTANT_SHARE * usual:
         return values
-    away = from_neighbours(values)
-    rows = glitches(values, away)
-    rows = rows[np.abs(away[rows]) > CONSTANT_SHARE * usual]
+    deviation = deviation_from_median(values)
+    rows = glitches(values, deviation)
+    rows = rows[np.abs(deviation[rows]) > CONSTANT_SHARE * usual]
     return np.delete(values, rows) if rows.size else values
 
 
 def mid_stroke(displacements: Iterable[Array]) -> float:
-    """Middle between the ends of what several tests reached [m], of their displacements (n,) as recorded."""
+    """Return the middle of the range of displacement that several tests cover [m], each (n,) as recorded."""
     ends = [end(displacement) for displacement in displacements for end in (np.min, np.max)]
     return 0.5 * float(min(ends) + max(ends))
 
 
 def voltage_scale(records: Iterable[Record]) -> float:
-    """The larger of the rig's voltage span and its largest magnitude [V], glitches aside; 0 without voltages."""
+    """Return the larger of the rig's voltage span and largest magnitude [V], without glitches; 0 without voltages."""
     voltages = [without_glitches(record.voltage) for record in records if record.voltage is not None]
     extremes = [(float(voltage.min()), float(voltage.max())) for voltage in voltages]
     if not extremes:
@@ -164,7 +167,7 @@ def voltage_scale(records: Iterable[Record]) -> float:
 
 
 def is_constant(record: Record, scale: float) -> bool:
-    """Whether the record's voltage stands still, glitches aside: r.m.s. about the median within 2 % of the scale."""
+    """Tell whether the voltage stands still: r.m.s. about the median within 2 % of the scale, glitches left out."""
     if record.voltage is None:
         return True
     deviation = without_glitches(record.voltage) - np.median(record.voltage)
@@ -174,7 +177,7 @@ def is_constant(record: Record, scale: float) -> bool:
 def conditions(
     records: Sequence[Record], voltage_within: float | None = None, temperature_within: float = SAME_TEMPERATURE
 ) -> tuple[tuple[Condition, ...], tuple[Record, ...]]:
-    """Group the constant records of every setting into conditions; the moving ones come second.
+    """Group the records of constant voltage into conditions, and return those of moving voltage apart.
 
     Parameters
     ----------
@@ -189,20 +192,20 @@ def conditions(
     scale = voltage_scale(records)
     within = CONSTANT_SHARE * scale if voltage_within is None else voltage_within
     still = [r for r in records if is_constant(r, scale)]
-    alike: list[tuple[str | None, list[Record]]] = []
+    groups: list[tuple[str | None, list[Record]]] = []
     for setting in sorted({r.setting for r in still}, key=lambda s: s or ""):
-        mine = [r for r in still if r.setting == setting]
-        for at_voltage in _bands(mine, [r.median_voltage() for r in mine], within):
+        of_setting = [r for r in still if r.setting == setting]
+        for at_voltage in _bands(of_setting, [r.median_voltage() for r in of_setting], within):
             bands = _bands(at_voltage, [r.median_temperature() for r in at_voltage], temperature_within)
-            alike.extend((setting, members) for members in bands)
-    found = [_condition(*each, (within, temperature_within)) for each in alike]
-    if len({_labels(each) for each in found}) < len(found):
-        found = [_condition(*each, (0.0, 0.0)) for each in alike]
+            groups.extend((setting, members) for members in bands)
+    found = [_condition(*group, (within, temperature_within)) for group in groups]
+    if len({each.labels for each in found}) < len(found):  # rounding has made two labels equal: round less
+        found = [_condition(*group, (0.0, 0.0)) for group in groups]
     return tuple(found), tuple(r for r in records if not is_constant(r, scale))
 
 
 def merged_voltages(records: Sequence[Record], voltage_within: float) -> tuple[float, float] | None:
-    """Lowest and highest voltage of the constant records, where one condition would hold them all though they differ.
+    """Find the lowest and highest constant voltage where one condition would merge all of them though they differ.
 
     Parameters
     ----------
@@ -211,7 +214,7 @@ def merged_voltages(records: Sequence[Record], voltage_within: float) -> tuple[f
 
     Returns
     -------
-    None where they make several conditions, or where they are scatter about one voltage
+    both [V]; None where there are several conditions, or where the voltages scatter about one
     """
     scale = voltage_scale(records)
     voltages = [r.median_voltage() for r in records if is_constant(r, scale)]
@@ -220,18 +223,18 @@ def merged_voltages(records: Sequence[Record], voltage_within: float) -> tuple[f
     return (min(known), max(known)) if DIFFERENT_SHARE * scale < spread <= voltage_within else None
 
 
-def _level(values: Array, finest: float) -> float:
-    """The median of a channel that stands still, without the digits that its noise made.
+def _median_level(values: Array, finest: float) -> float:
+    """Return the median of a constant channel without the digits that its noise makes.
 
     Parameters
     ----------
     values : (n,) of one condition
-    finest : a difference that counts [unit of the values]
+    finest : smallest difference that separates conditions [unit of the values]
 
     Returns
     -------
-    rounded to the largest power of ten within both the robust standard deviation and a tenth of what counts; as it is
-    where most samples are alike
+    the median, rounded to the largest power of ten within both the robust standard deviation and a tenth of `finest`;
+    unrounded where most samples are equal
     """
     middle = float(np.median(values))
     step = min(1.4826 * float(np.median(np.abs(values - middle))), 0.1 * finest)
@@ -239,36 +242,32 @@ def _level(values: Array, finest: float) -> float:
 
 
 def _condition(setting: str | None, members: Sequence[Record], finest: tuple[float, float]) -> Condition:
-    """Of records alike, voltage and temperature told no finer than what differs by so much."""
+    """Make a condition of equal records; `finest` is the smallest difference of voltage and temperature that counts."""
     voltages = [r.voltage for r in members if r.voltage is not None]
     temperatures = [r.temperature for r in members if r.temperature is not None]
     return Condition(
         setting,
-        _level(np.concatenate(voltages), finest[0]) if voltages else None,
-        _level(np.concatenate(temperatures), finest[1]) if temperatures else None,
+        _median_level(np.concatenate(voltages), finest[0]) if voltages else None,
+        _median_level(np.concatenate(temperatures), finest[1]) if temperatures else None,
         tuple(members),
     )
 
 
-def _labels(condition: Condition) -> tuple[str | None, float | None, float | None]:
-    return condition.setting, condition.voltage, condition.temperature
-
-
 def _bands(records: Sequence[Record], labels: Sequence[float | None], within: float) -> list[list[Record]]:
-    """Split records into bands of labels no wider than `within`, lowest first; no label is a band of its own."""
+    """Split records into bands of labels no wider than `within`, lowest first; those without a label come first."""
     unknown = [record for record, label in zip(records, labels, strict=True) if label is None]
     known = sorted(((label, i) for i, label in enumerate(labels) if label is not None), key=lambda one: one[0])
-    parts = _parted(np.array([label for label, _ in known]), within) if known else []
+    parts = _split_at_widest_gaps(np.array([label for label, _ in known]), within) if known else []
     bands = [[records[i] for _, i in known[part]] for part in parts]
     return [unknown, *bands] if unknown else bands
 
 
-def _parted(rising: Array, within: float) -> list[slice]:
-    """Ranges of (n,) rising numbers no wider than `within`: cut at the widest gap, of equal ones at the middlemost."""
+def _split_at_widest_gaps(rising: Array, within: float) -> list[slice]:
+    """Cut (n,) rising numbers into ranges no wider than `within`, at the widest, of equal gaps at the middlemost."""
     if rising[-1] - rising[0] <= within:
         return [slice(0, rising.size)]
     gaps = np.diff(rising)
     widest = np.flatnonzero(gaps >= gaps.max() * (1.0 - _EQUAL_GAPS)) + 1
     cut = int(widest[np.argmin(np.abs(widest - 0.5 * rising.size))])
-    above = (slice(cut + part.start, cut + part.stop) for part in _parted(rising[cut:], within))
-    return [*_parted(rising[:cut], within), *above]
+    above = (slice(cut + part.start, cut + part.stop) for part in _split_at_widest_gaps(rising[cut:], within))
+    return [*_split_at_widest_gaps(rising[:cut], within), *above]

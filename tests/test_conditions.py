@@ -1,4 +1,4 @@
-"""The level of a condition is what was set: noise gives it no digits, and two conditions never the same one."""
+"""Grouping into conditions: a level carries no digits of noise, and no two conditions have the same level."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_noise_gives_a_level_no_digits(unit: float, rng: np.random.Generator) ->
     assert [each.voltage for each in found] == [unit * u for u in levels]
 
 
-def test_a_level_without_noise_stays_what_it_is() -> None:
+def test_a_level_without_noise_keeps_its_digits() -> None:
     found, _ = conditions([record(f"{u}", np.full(TIME.size, u)) for u in (0.123456789, 1.5)])
     assert [each.voltage for each in found] == [0.123456789, 1.5]
 
@@ -36,7 +36,7 @@ def test_two_conditions_never_have_the_same_level() -> None:
     assert len({each.temperature for each in found}) == 2
 
 
-def test_records_are_parted_where_the_widest_gap_is(rng: np.random.Generator) -> None:
+def test_records_are_split_at_the_widest_gap(rng: np.random.Generator) -> None:
     """Two tests at each of three voltages, each pair warmer than the last: no pair is parted."""
     levels = [(0.0, 25.88), (0.0, 25.9), (75.0, 27.7), (75.0, 27.88), (150.0, 29.94), (150.0, 30.6)]
     records = [record(f"{u}-{T}", np.full(TIME.size, u), np.full(TIME.size, T)) for u, T in levels]
@@ -46,7 +46,7 @@ def test_records_are_parted_where_the_widest_gap_is(rng: np.random.Generator) ->
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_row_of_evenly_spaced_temperatures_is_parted_alike_from_either_end(sign: float) -> None:
+def test_evenly_spaced_temperatures_are_split_alike_from_either_end(sign: float) -> None:
     still = np.full(TIME.size, 75.0)
     found, _ = conditions([record(f"{T}", still, np.full(TIME.size, sign * T)) for T in (20.0, 21.0, 22.0, 23.0)])
     assert [len(each.records) for each in found] == [2, 2]

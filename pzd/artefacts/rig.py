@@ -19,7 +19,7 @@ from pzd.schema.model import Frozen
 from pzd.schema.validate import read_json_list, write_json
 from pzd.schema.yamlfile import read_yaml
 from pzd.signals.cycles import Cycles, cycles_of
-from pzd.signals.smoothing import reversals, work
+from pzd.signals.measures import reversals, work
 
 INGEST = "ingest.json"
 """What was done to the files of a real rig."""

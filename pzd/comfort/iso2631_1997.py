@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pzd.record import Array
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 
 # ----------------------------------------------------------------------------------------------------
 # Measures of a vibration history beside its r.m.s.: peak, VDV and MTVV.

@@ -35,7 +35,7 @@ from pzd.diagnosis.search.candidates import Candidate, by_voltage, candidate, mo
 from pzd.diagnosis.search.evidence import evidence_of
 from pzd.diagnosis.thresholds import FARTHEST_HALF_WAY, LEAST_CUT_IN_PREDICTION, PREDICTED_AT_ONCE, SCREENED
 from pzd.record import Array
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 
 # ----------------------------------------------------------------------------------------------------
 # Whether a damper's force half-way between two tested voltages lies between its forces at either.

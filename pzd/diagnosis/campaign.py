@@ -17,11 +17,18 @@ from pzd.diagnosis.fit.prediction import Predicted, counted, expected
 from pzd.diagnosis.thresholds import CYCLE_CHANGE_SIGNIFICANCE, LEAST_HUM
 from pzd.record import Array, Mask
 from pzd.signals.harmonics import hum
-from pzd.signals.jumps import jumps_in_cycles, jumps_in_samples, within_a_sample
-from pzd.signals.lack_of_fit import TREND_CYCLES, TREND_HARMONICS, by_harmonics, by_trend, pooled
-from pzd.signals.noise import PureError, fit_smooth_residual, harmonics_of, pure_error, repeatable_power
-from pzd.signals.nuisance import NuisanceConfig, nuisance
-from pzd.signals.smoothing import reversals
+from pzd.signals.jumps import jump_timing_error, jumps_in_cycles, jumps_in_samples
+from pzd.signals.lack_of_fit import (
+    TREND_CYCLES,
+    TREND_HARMONICS,
+    fit_smooth_residual,
+    p_value_of_trend,
+    p_values_by_harmonics,
+    pooled_p_value,
+)
+from pzd.signals.measures import reversals
+from pzd.signals.noise import PureError, harmonics_of, pure_error, repeatable_power
+from pzd.signals.nuisance import NuisanceConfig, nuisance_forces
 
 # ----------------------------------------------------------------------------------------------------
 # One record against one damper: the residual, its noise, and how unlikely it is by noise alone.
@@ -80,7 +87,7 @@ def check_residual(given: Predicted, prepared: Prepared, wanted: Mask, config: N
     calm = bend_beside_jumps(prepared, predicted) == 0.0
     slack = np.zeros(residual.size)
     late = np.zeros(residual.size)
-    slack[mask], late[mask] = nuisance(
+    slack[mask], late[mask] = nuisance_forces(
         without[mask], predicted[mask], record.rate, rough, config, given.timing[mask], calm[mask], mask
     )
     slack = mains + np.where(mask & ~calm, _beside_jumps(record.force - mains, predicted, slack, late), slack + late)
@@ -115,7 +122,7 @@ def _beside_jumps(force: Array, predicted: Array, sized: Array, late: Array) -> 
     force, predicted : (n,) [N]
     sized, late : (n,) what the test's offset and gain explain, and what its delay does along the slope [N]
     """
-    found = [slack + within_a_sample(force - slack, predicted) for slack in (sized, sized + late)]
+    found = [slack + jump_timing_error(force - slack, predicted) for slack in (sized, sized + late)]
     left = [np.abs(force - predicted - slack) for slack in found]
     return np.where(left[0] <= left[1], *found)
 
@@ -124,8 +131,8 @@ def _repeating(
     prepared: Prepared, mask: Mask, residual: Array, slack: Array, folded: Array, by_displacement: Array | float
 ) -> ResidualCheck:
     error = replace(pure_error(folded), shared=by_displacement)
-    trend = by_trend(folded)
-    probability = {"harmonics": by_harmonics(error)}
+    trend = p_value_of_trend(folded)
+    probability = {"harmonics": p_values_by_harmonics(error)}
     if trend is not None:
         probability["trend"] = np.array([trend])
     power = float(repeatable_power(error).sum())
@@ -308,7 +315,9 @@ def _by_block(check: ResidualCheck, values: Array) -> Array:
 def probability_of_noise(checks: Sequence[ResidualCheck]) -> float:
     """Probability that noise alone looks so in any kind of test (Bonferroni over the kinds)."""
     kinds = {kind for c in checks for kind in c.probability}
-    return min(1.0, *(len(kinds) * pooled([c.probability[k] for c in checks if k in c.probability]) for k in kinds))
+    return min(
+        1.0, *(len(kinds) * pooled_p_value([c.probability[k] for c in checks if k in c.probability]) for k in kinds)
+    )
 
 
 def visible_gap(checks: Sequence[ResidualCheck]) -> float:

@@ -26,7 +26,7 @@ from pzd.diagnosis.fit.prediction import counted, predicted_force
 from pzd.diagnosis.search.evidence import evidence_of
 from pzd.diagnosis.thresholds import PREDICTS_WORSE, WORSE_BETWEEN
 from pzd.record import Array, Mask
-from pzd.signals.nuisance import NuisanceConfig, columns_of
+from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
 # ----------------------------------------------------------------------------------------------------
 # The tests of one setting dealt into folds, each of which is kept back once.
@@ -372,7 +372,7 @@ class Trials:
             peak = float(np.max(np.abs(p.record.force)))
             limit = residual.size * (self.visible * peak) ** 2
             if i in self._alone:
-                limit += float(np.sum(columns_of(force, p.record.rate, self.campaign.nuisance, kept) ** 2))
+                limit += float(np.sum(nuisance_columns(force, p.record.rate, self.campaign.nuisance, kept) ** 2))
             records.append(i)
             about_mean = force - force.mean()
             rows.append((residual @ residual, force @ force, about_mean @ about_mean, limit))

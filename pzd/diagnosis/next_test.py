@@ -18,7 +18,7 @@ from pzd.diagnosis.cross_validation import Missed, Trials
 from pzd.diagnosis.data import Prepared
 from pzd.record import Array, Record
 from pzd.rig.config import Limits
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 
 # ----------------------------------------------------------------------------------------------------
 

@@ -35,8 +35,8 @@ from pzd.diagnosis.thresholds import (
 )
 from pzd.quantities import Control
 from pzd.record import Array
-from pzd.signals.criterion import rms
-from pzd.signals.nuisance import NuisanceConfig, columns_of
+from pzd.signals.measures import rms
+from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
 # ----------------------------------------------------------------------------------------------------
 # How sure a verdict is: the share that what it says has of all that the tests leave possible.
@@ -202,7 +202,7 @@ def _own(checks: Sequence[ResidualCheck]) -> tuple[Array, Array]:
     found, size = [], []
     for check in checks:
         force = check.predicted[check.wanted]
-        columns = columns_of(force, check.prepared.record.rate, UNIT, check.wanted)
+        columns = nuisance_columns(force, check.prepared.record.rate, UNIT, check.wanted)
         found.append(np.linalg.lstsq(columns, check.residual[check.wanted], rcond=None)[0])
         size.append(np.sqrt(np.mean(columns**2, axis=0)) / check.peak)
     return np.array(found).reshape(-1, 3), np.mean(np.array(size).reshape(-1, 3), axis=0)

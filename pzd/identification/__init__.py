@@ -1,1 +1,1 @@
-"""Identification: the Bingham parameters of every condition, with intervals and their trust."""
+"""Identification: Bingham parameters of every condition with intervals and status, knee law, characteristics."""

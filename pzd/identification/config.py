@@ -13,7 +13,7 @@ from pzd.signals.nuisance import NuisanceConfig
 
 
 class GroupConfig(Frozen):
-    """Which constant records are one condition."""
+    """Grouping of constant records into conditions."""
 
     voltage_V: float | None = Field(default=None, ge=0.0)
     """Largest spread of the control signal inside one condition; empty for 2 % of the rig's scale."""
@@ -33,7 +33,7 @@ class EvolutionaryConfig(Frozen):
 
 
 class IdentifyConfig(Frozen):
-    """How the Bingham parameters are found."""
+    """Identification of the Bingham parameters."""
 
     law: Literal["bingham", "knee", "auto"] = "bingham"
     """Which damper is handed on. `bingham`: one T0 and C, what it lacks is named by diagnose. `knee`, for passive road

@@ -1,4 +1,8 @@
-"""The knee law by least squares: criterion (4) over the tests of a condition, gas force and spring solved inside."""
+"""Least-squares fit of the knee law: criterion (4) over the tests of a condition, gas force and spring profiled out.
+
+Equation: |F| = T0 + C w up to the speed w_k of the knee, then T0 + C w_k + B (w - w_k); C, w_k and B of each direction
+                                        Source: bleed and blow-off, Dixon 2007; element of eq. (1)-(3) with k
+"""
 
 from __future__ import annotations
 
@@ -14,23 +18,18 @@ from pzd.damper.compose import constant_rows, integrated_force, sampling_steps
 from pzd.damper.fitted_laws.knee import NO_KNEE
 from pzd.damper.motion import Motion
 from pzd.identification.prepared_record import in_motion
-from pzd.identification.trust import VISIBLE
+from pzd.identification.trust import MISFIT_THRESHOLD
 from pzd.record import Array, Mask, Record, mid_stroke
-from pzd.signals.criterion import criterion, rms
+from pzd.signals.measures import criterion, rms
 
-# ----------------------------------------------------------------------------------------------------
-# The knee law as numbers: bleed, knee and blow-off of each direction, and the coordinates in which they are searched.
-#
-# Equation: |F| = T0 + C w up to the speed w_k of the knee, then T0 + C w_k + B (w - w_k); C, w_k and B of each direction
-#                                         Source: bleed and blow-off, Dixon 2007; element of eq. (1)-(3) with k
-
+# --- Knee curve and search coordinates ---
 
 REBOUND, COMPRESSION = 0, 1
-"""The directions, in this order wherever there are two of something."""
+"""Directions: indices of every pair."""
 
 
 class KneeCurve(NamedTuple):
-    """The parameters of the element; pairs are of rebound and compression."""
+    """Parameters of the knee law; pairs are of rebound and compression."""
 
     friction: float
     """T0 [N]."""
@@ -41,20 +40,20 @@ class KneeCurve(NamedTuple):
     knee_speed: tuple[float, float]
     """w_k [m/s]; infinite without a knee."""
     blow_off: tuple[float, float]
-    """B [N s/m]; without a knee the bleed."""
+    """B [N s/m]; equal to the bleed without a knee."""
 
-    def knee_force(self, way: int) -> float:
-        """Force at the knee of one direction [N]."""
-        return self.friction + self.bleed[way] * self.knee_speed[way]
+    def knee_force(self, direction: int) -> float:
+        """Return the force at the knee of one direction [N]."""
+        return self.friction + self.bleed[direction] * self.knee_speed[direction]
 
     @property
     def damping(self) -> float:
-        """Mean of both bleeds [N s/m], the C of the damper's base row."""
+        """Mean of both bleeds [N s/m], the C of the base row of the damper."""
         return 0.5 * (self.bleed[REBOUND] + self.bleed[COMPRESSION])
 
     def effect(self) -> dict[str, float]:
-        """Parameters of the law `knee` beside T0, `damping` and k."""
-        forces = [min(self.knee_force(way), NO_KNEE) for way in (REBOUND, COMPRESSION)]
+        """Return the parameters of the law `knee` beside T0, `damping` and k."""
+        forces = [min(self.knee_force(direction), NO_KNEE) for direction in (REBOUND, COMPRESSION)]
         return {
             "beta": (self.bleed[REBOUND] - self.bleed[COMPRESSION]) / (2.0 * self.damping),
             "F_reb": forces[REBOUND],
@@ -66,120 +65,113 @@ class KneeCurve(NamedTuple):
 
 @dataclass(frozen=True)
 class KneeForm:
-    """Which of the parameters are free."""
+    """Selection of the free parameters."""
 
-    alike: bool = False
-    """Whether both directions have one bleed and no knee: the Bingham element."""
-    bent: tuple[bool, bool] = (True, True)
+    symmetric: bool = False
+    """Whether both directions share one bleed and have no knee: the Bingham element."""
+    has_knee: tuple[bool, bool] = (True, True)
     """Whether rebound and compression have a knee."""
 
     @property
-    def ways(self) -> tuple[int, ...]:
-        """The directions with a knee."""
-        return tuple(way for way in (REBOUND, COMPRESSION) if self.bent[way])
+    def directions_with_knee(self) -> tuple[int, ...]:
+        """Directions with a knee."""
+        return tuple(direction for direction in (REBOUND, COMPRESSION) if self.has_knee[direction])
 
     def natural(self, curve: KneeCurve) -> Array:
-        """(p,) the free parameters in their own units: T0, the bleeds, k, then w_k and B of each knee."""
-        bleeds = curve.bleed[:1] if self.alike else curve.bleed
-        knees = [value for way in self.ways for value in (curve.knee_speed[way], curve.blow_off[way])]
+        """Return the free parameters (p,) in SI units: T0, the bleeds, k, then w_k and B of each knee."""
+        bleeds = curve.bleed[:1] if self.symmetric else curve.bleed
+        knees = [
+            value
+            for direction in self.directions_with_knee
+            for value in (curve.knee_speed[direction], curve.blow_off[direction])
+        ]
         return np.array([curve.friction, *bleeds, curve.stiffness, *knees])
 
     def curve(self, natural: Array) -> KneeCurve:
-        """The curve that they stand for."""
+        """Return the curve of the free parameters (p,)."""
         friction, *rest = natural.tolist()
-        bleed = (rest[0], rest[0]) if self.alike else (rest[0], rest[1])
-        stiffness, *knees = rest[1:] if self.alike else rest[2:]
+        bleed = (rest[0], rest[0]) if self.symmetric else (rest[0], rest[1])
+        stiffness, *knees = rest[1:] if self.symmetric else rest[2:]
         speed, slope = [np.inf, np.inf], [*bleed]
-        for place, way in enumerate(self.ways):
-            speed[way], slope[way] = knees[2 * place : 2 * place + 2]
+        for place, direction in enumerate(self.directions_with_knee):
+            speed[direction], slope[direction] = knees[2 * place : 2 * place + 2]
         return KneeCurve(friction, bleed, stiffness, (speed[0], speed[1]), (slope[0], slope[1]))
 
     def searched(self, curve: KneeCurve, force: float) -> Array:
-        """(p,) what least squares searches: T0 as a share of a force [N], the logarithms of all others."""
+        """Return the search coordinates (p,): T0 as a share of a force [N], the logarithms of all others."""
         natural = self.natural(curve)
         return np.concatenate([natural[:1] / force, np.log(natural[1:])])
 
     def found(self, searched: Array, force: float) -> KneeCurve:
-        """The curve at a point of the search."""
+        """Return the curve at search coordinates (p,)."""
         return self.curve(np.concatenate([searched[:1] * force, np.exp(searched[1:])]))
 
 
-BINGHAM = KneeForm(alike=True, bent=(False, False))
-"""One T0 and C."""
+BINGHAM_FORM = KneeForm(symmetric=True, has_knee=(False, False))
+"""The Bingham element: one T0 and C."""
 
 
-# ----------------------------------------------------------------------------------------------------
-# Tests as the fit of the knee law sees them: motion, force to be met, and the force that a curve gives.
-
+# --- Data ---
 
 FORCE_TOLERANCE = 1e-6
-"""Admissible error of a piece of the path, as a share of the force; between its corners the law is in closed form."""
+"""Largest error of a step of the integration, as a share of the force; between corners the law is in closed form."""
 
 
 @dataclass(frozen=True, eq=False)
-class Test:
-    """One test, the displacement counted from the middle of all tests concerned."""
+class KneeRecord:
+    """One test, its displacement counted from mid-stroke of all tests of the fit."""
 
     __test__ = False
 
     record: Record
     motion: Motion
     steps: Array
+    """Time steps of the integration, see `pzd.damper.compose.sampling_steps` [s]."""
     counted: Mask
-    """(n,) which samples enter the criterion."""
-
-    @property
-    def measured(self) -> Array:
-        """(m,) force at the counted samples [N]."""
-        return self.record.force[self.counted]
-
-    @property
-    def of_gas(self) -> Array:
-        """(m, 2) force of F_0 = 1 N and k_g = 1 N/m at the counted samples."""
-        x = self.motion.displacement[self.counted]
-        return np.column_stack([np.ones(x.size), x])
+    """(n,) mask of the samples that enter the criterion."""
 
     def simulated(self, curve: KneeCurve, gas: Array) -> Array:
-        """(m,) force of the element [N], begun at the measured force less that of the gas, (2,) F_0 and k_g."""
+        """Compute the force (m,) of the element [N], starting from the measured force less that of the gas (2,)."""
         rows, _ = constant_rows(curve.friction, curve.damping, curve.stiffness, {"knee": curve.effect()})
         first = float(self.record.force[0] - gas[0] - gas[1] * self.motion.displacement[0])
         return integrated_force(rows, self.motion, self.steps, first, FORCE_TOLERANCE)[self.counted]
 
 
 @dataclass(frozen=True, eq=False)
-class Tests:
-    """The tests of one condition, or some of them."""
+class KneeData:
+    """Tests of one condition, or a subset of them."""
 
     __test__ = False
 
-    tests: tuple[Test, ...]
+    tests: tuple[KneeRecord, ...]
     middle: float
-    """Displacement, as recorded, from which x is counted [m]."""
+    """Mid-stroke: displacement, as recorded, from which x is counted [m]."""
 
     @classmethod
-    def of(cls, records: Sequence[Record]) -> Tests:
-        """The tests, the displacement counted from the middle of their motion."""
+    def of(cls, records: Sequence[Record]) -> KneeData:
+        """Collect tests, their displacement counted from mid-stroke."""
         middle = mid_stroke(r.displacement for r in records)
-        found = (Test(r, Motion.of(r).about(middle), sampling_steps(r.time), in_motion(r)) for r in records)
+        found = (KneeRecord(r, Motion.of(r).about(middle), sampling_steps(r.time), in_motion(r)) for r in records)
         return cls(tuple(found), middle)
 
-    def some(self, kept: Sequence[int]) -> Tests:
-        """Some of the tests, about the same zero."""
-        return Tests(tuple(self.tests[i] for i in kept), self.middle)
+    def subset(self, kept: Sequence[int]) -> KneeData:
+        """Return a subset of the tests, with the same mid-stroke."""
+        return KneeData(tuple(self.tests[i] for i in kept), self.middle)
 
     @cached_property
     def measured(self) -> Array:
-        """(N,) force at the counted samples, test by test [N]."""
-        return np.concatenate([t.measured for t in self.tests])
+        """Force (N,) at the counted samples, test by test [N]."""
+        return np.concatenate([t.record.force[t.counted] for t in self.tests])
 
     @cached_property
-    def of_gas(self) -> Array:
-        """(N, 2) force of F_0 = 1 N and k_g = 1 N/m."""
-        return np.vstack([t.of_gas for t in self.tests])
+    def gas_columns(self) -> Array:
+        """Forces (N, 2) of F_0 = 1 N and k_g = 1 N/m at the counted samples."""
+        x = np.concatenate([t.motion.displacement[t.counted] for t in self.tests])
+        return np.column_stack([np.ones(x.size), x])
 
     @cached_property
     def speed(self) -> Array:
-        """(N,) extension speed [m/s]."""
+        """Extension speed (N,) [m/s]."""
         return np.concatenate([t.record.velocity[t.counted] for t in self.tests])
 
     @property
@@ -193,61 +185,61 @@ class Tests:
         return float(np.max(np.abs(self.measured)))
 
     def simulated(self, curve: KneeCurve, gas: Array) -> Array:
-        """(N,) force of the element [N]."""
+        """Compute the force (N,) of the element [N]."""
         return np.concatenate([t.simulated(curve, gas) for t in self.tests])
 
 
-# ----------------------------------------------------------------------------------------------------
-# Where the fit of the knee law begins: the curve by linear least squares, the knees on a grid, no oil spring.
+# --- Start: linear least squares with the knees on a grid ---
 
-
-KNEES = (0.06, 0.12, 0.2, 0.3, 0.45, 0.65)
-"""Knee speeds of the grid, as shares of the fastest speed."""
-SAMPLES = 6000
-"""The grid is evaluated on at most so many samples."""
-TURNING = 0.02
-"""Below this share of the fastest speed the oil spring winds up, and the force is not that of the curve."""
+KNEE_GRID = (0.06, 0.12, 0.2, 0.3, 0.45, 0.65)
+"""Knee speeds of the grid, as shares of the largest speed."""
+GRID_SAMPLES = 6000
+"""Most samples on which the grid is evaluated."""
+SLOWEST = 0.02
+"""Least speed of a sample of the grid, as a share of the largest: below it the oil spring loads, off the curve."""
 LEAST_SLOPE = 0.02
 """Least slope of a start, as a share of peak force over peak speed."""
 MOST_SLOPE = 50.0
-"""Largest slope of a start, likewise."""
+"""Largest slope of a start, as a share of peak force over peak speed."""
 
 
-def start_of(tests: Tests, stiffness: float) -> tuple[KneeCurve, Array]:
-    """The best curve of the grid, and (2,) the gas force and gas spring beside it.
+def grid_start(tests: KneeData, stiffness: float) -> tuple[KneeCurve, Array]:
+    """Return the best curve of the grid, and its gas force and gas spring (2,).
 
     Equation: F = F_0 + k_g x + T0 sign(v) + sum over the directions of C min(|v|, w_k) + B max(|v| - w_k, 0)
 
     Parameters
     ----------
     tests : that are fitted
-    stiffness : of the oil spring, which this does not look for [N/m]
+    stiffness : of the oil spring, which the grid does not search [N/m]
     """
     v, fastest = tests.speed, tests.fastest
-    kept = np.flatnonzero(np.abs(v) > TURNING * fastest)
-    kept = kept[:: max(1, kept.size // SAMPLES)]
-    v, measured, beside = v[kept], tests.measured[kept], tests.of_gas[kept]
+    kept = np.flatnonzero(np.abs(v) > SLOWEST * fastest)
+    kept = kept[:: max(1, kept.size // GRID_SAMPLES)]
+    v, measured, of_gas = v[kept], tests.measured[kept], tests.gas_columns[kept]
     found: list[tuple[float, KneeCurve, Array]] = []
-    for knees in product((share * fastest for share in KNEES), repeat=2):
-        terms = np.column_stack([beside, np.sign(v), *(t for way in (0, 1) for t in _terms(v, way, knees[way]))])
+    for knees in product((share * fastest for share in KNEE_GRID), repeat=2):
+        terms = np.column_stack(
+            [of_gas, np.sign(v), *(t for direction in (0, 1) for t in _slope_columns(v, direction, knees[direction]))]
+        )
         size = np.linalg.norm(terms, axis=0)
         size[size == 0.0] = 1.0
         values = np.linalg.lstsq(terms / size, measured, rcond=1e-9)[0] / size
         left = measured - terms @ values
-        found.append((float(left @ left), _curve(values[2:], knees, stiffness, tests), values[:2]))
+        found.append((float(left @ left), _clipped_curve(values[2:], knees, stiffness, tests), values[:2]))
     _, curve, gas = min(found, key=lambda each: each[0])
     return curve, gas
 
 
-def _terms(v: Array, way: int, knee: float) -> tuple[Array, Array]:
-    """(N,) force of a slope of one up to the knee of one direction, and of one beyond it."""
-    sign = (1.0, -1.0)[way]
+def _slope_columns(v: Array, direction: int, knee: float) -> tuple[Array, Array]:
+    """Return the forces (N,) of a unit slope up to the knee of one direction, and of one beyond it."""
+    sign = (1.0, -1.0)[direction]
     w = np.maximum(sign * v, 0.0)
     return sign * np.minimum(w, knee), sign * np.maximum(w - knee, 0.0)
 
 
-def _curve(values: Array, knees: tuple[float, ...], stiffness: float, tests: Tests) -> KneeCurve:
-    """The curve of a linear fit, its values brought to what a damper may have."""
+def _clipped_curve(values: Array, knees: tuple[float, ...], stiffness: float, tests: KneeData) -> KneeCurve:
+    """Return the curve of a linear fit, its values clipped to those of a damper."""
     unit = tests.peak / tests.fastest
     slopes = np.clip(values[1:], LEAST_SLOPE * unit, MOST_SLOPE * unit).tolist()
     return KneeCurve(
@@ -259,30 +251,29 @@ def _curve(values: Array, knees: tuple[float, ...], stiffness: float, tests: Tes
     )
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Least squares ---
 
 DIFFERENCE = 1e-5
-"""Step of the search coordinates for a slope."""
+"""Step of the difference quotients in search coordinates."""
 EVALUATIONS = 60
-"""Most simulations with slopes of one descent."""
-REFIT = 12
-"""The same without a test: it begins at the optimum of all tests, and one of them moves that little."""
+"""Most evaluations with slopes in one descent."""
+REFIT_EVALUATIONS = 12
+"""Most evaluations of a refit without a fold: it starts at the optimum of all tests, which one fold hardly moves."""
 TOLERANCE = 1e-5
-"""Tolerance of the least squares, relative, on parameters and criterion: far below any interval."""
-GLANCE = 4
-"""Evaluations after which a straight line that would do as well as a knee is near it."""
+"""Relative tolerance of the least squares on parameters and criterion: far below any interval."""
+PROBE_EVALUATIONS = 4
+"""Evaluations after which a straight line that fits as well as a knee is near its optimum."""
 NEAREST_KNEE = 0.01
-"""Least knee speed of the search, as a share of the fastest: below, the oil spring decides on the force."""
-SLOPES = (1e-3, 1e3)
+"""Least knee speed of the search, as a share of the largest speed: below it the oil spring governs the force."""
+SLOPE_RANGE = (1e-3, 1e3)
 """Smallest and largest slope of the search, in peak force over peak speed."""
-SPRINGS = (1e-1, 1e5)
+STIFFNESS_RANGE = (1e-1, 1e5)
 """Smallest and largest k of the search, in peak force over the range of displacement."""
 
 
 @dataclass(frozen=True, eq=False)
 class KneeFit:
-    """An optimum of criterion (4)."""
+    """An optimum of criterion (4) for the knee law."""
 
     form: KneeForm
     curve: KneeCurve
@@ -294,59 +285,59 @@ class KneeFit:
     """(N, p + 2) derivatives of the force by the natural parameters of the form, by F_0 and by k_g."""
     criterion: float
 
-    def predicted(self, tests: Tests) -> Array:
-        """(N,) force of other tests of the damper [N]."""
-        return tests.simulated(self.curve, self.gas) + tests.of_gas @ self.gas
+    def predicted(self, tests: KneeData) -> Array:
+        """Predict the force (N,) of other tests of the damper [N]."""
+        return tests.simulated(self.curve, self.gas) + tests.gas_columns @ self.gas
 
 
-def fit_knee(tests: Tests, stiffness: float) -> KneeFit:
-    """The knee law of a condition; a direction has a knee where a straight line would visibly do worse.
+def fit_knee(tests: KneeData, stiffness: float) -> KneeFit:
+    """Fit the knee law; a direction has a knee where a straight line fits visibly worse.
 
     Parameters
     ----------
     tests : of the condition
-    stiffness : of the oil spring where the search begins [N/m]
+    stiffness : of the oil spring at the start [N/m]
     """
-    best = descend(tests, KneeForm(), *start_of(tests, stiffness))
-    for way in best.form.ways:
-        bent = tuple(each and other != way for other, each in enumerate(best.form.bent))
-        form = KneeForm(bent=(bent[0], bent[1]))
-        straight = descend(tests, form, best.curve, best.gas, GLANCE)
-        if not _bends(tests, best, straight):
+    best = descend(tests, KneeForm(), *grid_start(tests, stiffness))
+    for direction in best.form.directions_with_knee:
+        has_knee = tuple(each and other != direction for other, each in enumerate(best.form.has_knee))
+        form = KneeForm(has_knee=(has_knee[0], has_knee[1]))
+        straight = descend(tests, form, best.curve, best.gas, PROBE_EVALUATIONS)
+        if not _knee_is_visible(tests, best, straight):
             best = descend(tests, form, straight.curve, straight.gas)
     return best
 
 
-def fit_bingham(tests: Tests, start: KneeFit) -> KneeFit:
-    """One T0 and C beside the same gas force, gas spring and oil spring: what the knee law is held against."""
+def fit_bingham(tests: KneeData, start: KneeFit) -> KneeFit:
+    """Fit one T0 and C with gas force, gas spring and oil spring: the alternative law to the knee."""
     slope = 0.25 * sum((*start.curve.bleed, *start.curve.blow_off))
     begin = start.curve._replace(bleed=(slope, slope))
-    return descend(tests, BINGHAM, begin, start.gas)
+    return descend(tests, BINGHAM_FORM, begin, start.gas)
 
 
-def _bends(tests: Tests, bent: KneeFit, straight: KneeFit) -> bool:
-    """Whether the knee takes visibly more off the residual than a straight line."""
-    gained = rms(straight.residuals) ** 2 - rms(bent.residuals) ** 2
-    return gained > (VISIBLE * tests.peak) ** 2
+def _knee_is_visible(tests: KneeData, has_knee: KneeFit, straight: KneeFit) -> bool:
+    """Tell whether the knee reduces the residual visibly beyond a straight line."""
+    gained = rms(straight.residuals) ** 2 - rms(has_knee.residuals) ** 2
+    return gained > (MISFIT_THRESHOLD * tests.peak) ** 2
 
 
-def descend(tests: Tests, form: KneeForm, start: KneeCurve, gas: Array, evaluations: int = EVALUATIONS) -> KneeFit:
-    """The optimum reached from a curve, by trust-region least squares within bounds.
+def descend(tests: KneeData, form: KneeForm, start: KneeCurve, gas: Array, evaluations: int = EVALUATIONS) -> KneeFit:
+    """Find the optimum from a curve by trust-region least squares within bounds.
 
-    Equation: min over the curve of |P (F - F_sim)|^2, P what F_0 and k_g cannot make up
+    Equation: min over the curve of |P (F - F_sim)|^2, P projects F_0 and k_g out
                                                         Source: Golub and Pereyra 1973, variable projection
 
     Parameters
     ----------
-    tests : to be met
-    form : which parameters are free
-    start : where the search begins; what the form does not free is not looked at
-    gas : (2,) F_0 and k_g with which the warm-up of a test begins; it is not counted
-    evaluations : at most
+    tests : that are fitted
+    form : selection of the free parameters
+    start : of the search; parameters that are not free are ignored
+    gas : (2,) F_0 and k_g in the first force of a test; its effect is over before the counted samples
+    evaluations : largest number
     """
     from scipy.optimize import least_squares
 
-    basis, _ = np.linalg.qr(tests.of_gas)
+    basis, _ = np.linalg.qr(tests.gas_columns)
     norm, peak = float(np.linalg.norm(tests.measured)), tests.peak
 
     def without_gas(values: Array) -> Array:
@@ -363,7 +354,7 @@ def descend(tests: Tests, form: KneeForm, start: KneeCurve, gas: Array, evaluati
         steps = DIFFERENCE * np.eye(x.size)
         return without_gas(-np.column_stack([(simulated(x + step) - at) / DIFFERENCE for step in steps])) / norm
 
-    low, high = _bounds(tests, form)
+    low, high = _search_bounds(tests, form)
     begin = np.clip(form.searched(start, peak), low + 1e-6, high - 1e-6)
     found = least_squares(
         residuals,
@@ -378,25 +369,27 @@ def descend(tests: Tests, form: KneeForm, start: KneeCurve, gas: Array, evaluati
     )
     curve = form.found(found.x, peak)
     left = tests.measured - tests.simulated(curve, gas)
-    beside = np.asarray(np.linalg.lstsq(tests.of_gas, left, rcond=None)[0])
-    left = left - tests.of_gas @ beside
-    return KneeFit(form, curve, beside, left, _slopes(tests, form, curve, beside), criterion(left, tests.measured))
+    of_gas = np.asarray(np.linalg.lstsq(tests.gas_columns, left, rcond=None)[0])
+    left = left - tests.gas_columns @ of_gas
+    return KneeFit(
+        form, curve, of_gas, left, _natural_slopes(tests, form, curve, of_gas), criterion(left, tests.measured)
+    )
 
 
-def _bounds(tests: Tests, form: KneeForm) -> tuple[Array, Array]:
-    """(p,) bounds of the search coordinates."""
+def _search_bounds(tests: KneeData, form: KneeForm) -> tuple[Array, Array]:
+    """Return the bounds (p,) of the search coordinates."""
     unit = tests.peak / tests.fastest
     stroke = 2.0 * max(float(np.max(np.abs(t.motion.displacement))) for t in tests.tests)
-    slope = [np.log(share * unit) for share in SLOPES]
-    spring = [np.log(share * tests.peak / stroke) for share in SPRINGS]
+    slope = [np.log(share * unit) for share in SLOPE_RANGE]
+    spring = [np.log(share * tests.peak / stroke) for share in STIFFNESS_RANGE]
     knee = [np.log(NEAREST_KNEE * tests.fastest), np.log(tests.fastest)]
-    bleeds = 1 if form.alike else 2
-    pairs = [[0.0, 1.0], *[slope] * bleeds, spring, *[knee, slope] * len(form.ways)]
+    bleeds = 1 if form.symmetric else 2
+    pairs = [[0.0, 1.0], *[slope] * bleeds, spring, *[knee, slope] * len(form.directions_with_knee)]
     return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
 
 
-def _slopes(tests: Tests, form: KneeForm, curve: KneeCurve, gas: Array) -> Array:
-    """(N, p + 2) derivatives of the force by the natural parameters, F_0 and k_g."""
+def _natural_slopes(tests: KneeData, form: KneeForm, curve: KneeCurve, gas: Array) -> Array:
+    """Return the derivatives (N, p + 2) of the force by the natural parameters, F_0 and k_g."""
     natural = form.natural(curve)
     steps = DIFFERENCE * np.where(natural > 0.0, natural, tests.peak)
     at = tests.simulated(curve, gas)
@@ -404,4 +397,4 @@ def _slopes(tests: Tests, form: KneeForm, curve: KneeCurve, gas: Array) -> Array
         (tests.simulated(form.curve(natural + step * unit), gas) - at) / step
         for step, unit in zip(steps, np.eye(natural.size), strict=True)
     ]
-    return np.column_stack([*moved, tests.of_gas])
+    return np.column_stack([*moved, tests.gas_columns])

@@ -1,9 +1,8 @@
-"""Records whose voltage moves: parameters piecewise linear in the voltage, the piston's place being the state.
+"""Records of moving voltage: T0, C and k piecewise linear in the voltage, the state being the piston's place.
 
-Nodes that constant records determine are held at what those gave, since a lag or hysteresis of
-the valve, which the plain element lacks, would else leak from the moving records into them. The
-other nodes are fitted to the moving records, together with the constant ones of a node whose own
-fit left a parameter undetermined.
+Nodes that constant records determine are fixed at those values, since a lag or hysteresis of the valve, which the
+Bingham element lacks, would otherwise leak into them. The other nodes are fitted to the moving records, together with
+the constant records of a node whose own fit left a parameter undetermined.
 """
 
 from __future__ import annotations
@@ -20,236 +19,45 @@ from pzd.artefacts import ParameterRow
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion, parts_of_steps
-from pzd.identification.config import IdentifyConfig
-from pzd.identification.fit import TOLERANCE, fit_separable, row_of
-from pzd.identification.intervals import half_widths, uncertainty
-from pzd.identification.prepared_record import (
+from pzd.identification.bingham_fit import (
+    TOLERANCE,
     Bingham,
     Objective,
-    Trial,
+    fit_separable,
     from_search,
-    parts_of,
     search_slopes,
     to_search,
-    trial_of,
 )
-from pzd.identification.trust import evidence_of, misfit_of, scales_of, stationarity, visible_shares
+from pzd.identification.condition import parameter_rows
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.prepared_record import fitted_records, prepare
 from pzd.record import CONSTANT_SHARE, Array, Condition, Record, Rows, conditions, voltage_scale
 from pzd.schema.errors import ConfigError
-from pzd.signals.criterion import criterion
-from pzd.signals.jumps import without_noise
-from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.jumps import denoised_control
 
-# ----------------------------------------------------------------------------------------------------
-# The voltages at which records with moving voltage are fitted.
-
-
-DWELL_SHARE = 0.05
-"""A level holds at least this share of the samples, in a band of 2 % of the voltage's scale."""
-
-
-def nodes_of(
-    moving: Sequence[Record], constant: Sequence[float], chosen: Sequence[float] | None, scale: float
-) -> Array:
-    """The nodes of the piecewise linear parameters, rising [V].
-
-    The voltages of constant records always are nodes. The config may add others; where it does
-    not and there are fewer than two, the levels that the voltage dwells on join them.
-
-    Parameters
-    ----------
-    moving : the records with moving voltage
-    constant : voltages of the constant records of the same setting and temperature
-    chosen : `identify.nodes`, None where the config does not give any
-    scale : the rig's voltage scale [V]
-
-    Returns
-    -------
-    (m,) nodes
-
-    Raises
-    ------
-    ConfigError : when two chosen nodes are closer than 2 % of the scale
-    """
-    apart = CONSTANT_SHARE * scale
-    constant = _merged(constant, apart)
-    if chosen is not None and np.any(np.diff(np.sort(chosen)) <= apart):
-        raise ConfigError(f"identify.nodes: two nodes are closer than {apart:g}; leave one out (got {list(chosen)})")
-    if chosen is None and len(constant) > 1:
-        return np.sort(constant)
-    voltage = np.concatenate([r.voltage for r in moving if r.voltage is not None])
-    added = dwelled_levels(voltage, apart) if chosen is None else chosen
-    return np.sort([*constant, *(v for v in added if all(abs(v - c) > apart for c in constant))])
-
-
-def _merged(voltages: Sequence[float], apart: float) -> list[float]:
-    """Voltages, those no further apart than that counting as the lowest of them: one voltage at two temperatures."""
-    kept: list[float] = []
-    for voltage in sorted(voltages):
-        if not kept or voltage - kept[-1] > apart:
-            kept.append(voltage)
-    return kept
-
-
-def dwelled_levels(voltage: Array, band: float) -> list[float]:
-    """Levels on which a voltage dwells, its extremes where there are fewer than two.
-
-    Parameters
-    ----------
-    voltage : (n,) voltage [V]
-    band : width of the band that makes a level [V]
-
-    Returns
-    -------
-    medians of the bands that hold most samples, most first
-    """
-    rest = np.sort(voltage)
-    levels: list[float] = []
-    while rest.size:
-        held = np.searchsorted(rest, rest + band, side="right") - np.arange(rest.size)
-        first = int(np.argmax(held))
-        if held[first] < DWELL_SHARE * voltage.size:
-            break
-        levels.append(float(np.median(rest[first : first + held[first]])))
-        rest = rest[np.abs(rest - levels[-1]) > 2.0 * band]
-    if len(levels) < 2:
-        extremes = [float(voltage.min()), float(voltage.max())]
-        levels += [e for e in extremes if all(abs(e - level) > 2.0 * band for level in levels)]
-    return levels
-
-
-def weights(nodes: Array, voltage: Array) -> Array:
-    """(n, m) share of each node in the parameters at each voltage, held beyond the outermost."""
-    return np.stack([np.interp(voltage, nodes, unit) for unit in np.eye(nodes.size)], axis=-1)
-
-
-# ----------------------------------------------------------------------------------------------------
-# Criterion (4) over records whose voltage moves, the parameters being piecewise linear in the voltage.
-
-
-DIFFERENCE = 1e-5
-"""Step of the difference quotients, as a share of the parameter; for T0 of a hundredth of peak force at least."""
-INTEGRATION = 1e-10
-"""Tolerance of the integration, well below the step of the difference quotients."""
-
-
-@dataclass(frozen=True, eq=False)
-class MovingObjective:
-    """Criterion (4) over moving records, the parameters of some nodes free and of the others held."""
-
-    records: tuple[Record, ...]
-    nodes: Array
-    held: dict[int, Bingham]
-    """Parameters of the nodes that stand, by their index."""
-    plain: Objective
-    """The same records with constant parameters: bounds, warm-up and starting values."""
-
-    @property
-    def free(self) -> list[int]:
-        """Indices of the nodes to be fitted."""
-        return [i for i in range(self.nodes.size) if i not in self.held]
-
-    @cached_property
-    def _motions(self) -> tuple[tuple[Motion, Rows], ...]:
-        return tuple(motion_of(record) for record in self.records)
-
-    def residuals(self, free: Sequence[Bingham]) -> Array:
-        """(N,) measured less simulated force at the counted samples [N]."""
-        values = dict(self.held) | dict(zip(self.free, free, strict=True))
-        damper = damper_of(self.nodes, [values[i] for i in range(self.nodes.size)])
-        parts = [
-            respond(damper, motion, float(r.force[0]), INTEGRATION)[places][t.counted]
-            for r, t, (motion, places) in zip(self.records, self.plain.trials, self._motions, strict=True)
-        ]
-        residuals: Array = self.plain.measured - np.concatenate(parts)
-        return residuals
-
-    def slopes(self, free: Sequence[Bingham], residuals: Array) -> Array:
-        """(N, 3 f) derivatives of the simulated force by T0, C, k of each free node, by difference quotients."""
-        peak = self.plain.scales[0]
-        columns = []
-        for i, parameters in enumerate(free):
-            steps = DIFFERENCE * np.array([max(parameters.friction, 1e-2 * peak), *parameters[1:]])
-            for j, step in enumerate(steps):
-                moved = Bingham(*(p + step * (i == j) for i, p in enumerate(parameters)))
-                other = [*free[:i], moved, *free[i + 1 :]]
-                columns.append((residuals - self.residuals(other)) / step)
-        return np.stack(columns, axis=-1)
-
-    def touched(self) -> Array:
-        """(N, m) share of each node in the parameters at the counted samples."""
-        return np.concatenate(
-            [
-                weights(self.nodes, voltage_of(r)[t.counted])
-                for r, t in zip(self.records, self.plain.trials, strict=True)
-            ]
-        )
-
-
-def damper_of(nodes: Array, values: Sequence[Bingham]) -> Damper:
-    """The plain damper with these parameters at these voltages."""
-    return Damper(
-        base=tuple(
-            BaseRow(voltage_V=float(u), T0_N=p.friction, C_Ns_per_m=p.damping, k_N_per_m=p.stiffness)
-            for u, p in zip(nodes, values, strict=True)
-        )
-    )
-
-
-def motion_of(record: Record) -> tuple[Motion, Rows]:
-    """The record's motion, its speed from the cubic through the displacement, on a finer grid where the voltage steps.
-
-    Returns
-    -------
-    the motion, and (n,) which of its samples are those of the record
-    """
-    from scipy.interpolate import CubicSpline
-
-    speed, voltage = CubicSpline(record.time, record.displacement)(record.time, 1), voltage_of(record)
-    motion = Motion(record.time, record.displacement, speed, record.acceleration, voltage, None)
-    return motion.finer(parts_of_steps(voltage, voltage.size))
-
-
-def voltage_of(record: Record) -> Array:
-    """(n,) the record's voltage, its levels and ramps free of noise.
-
-    Raises
-    ------
-    ValueError : when it has none
-    """
-    if record.voltage is None:
-        raise ValueError(f"record {record.name} has no voltage")
-    return without_noise(record.voltage)
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-Known = tuple[Condition, ParameterRow]
-
+ConstantRow = tuple[Condition, ParameterRow]
 log = logging.getLogger(__name__)
-
-SETTLED = 0.05
-"""For starting values the voltage has been near its node for this long [s]."""
-FEWEST = 200
-"""Samples near a node that starting values need."""
+DWELL_TIME = 0.05
+"""Time for which the voltage has been near a node before a sample serves for starting values [s]."""
+FEWEST_NEAR_NODE = 200
+"""Fewest samples near a node for starting values of its own."""
 
 
 def fit_moving(
     records: Sequence[Record], constant: Sequence[Condition], rows: Sequence[ParameterRow], config: IdentifyConfig
 ) -> list[ParameterRow]:
-    """Rows of the nodes that moving records of one setting determine.
+    """Identify the nodes that moving records of one setting determine.
 
     Parameters
     ----------
     records : moving records of the setting
     constant : its conditions
     rows : their rows, in the same order
-    config : which records are one condition, and the nodes
+    config : grouping of records into conditions, and the nodes
 
     Returns
     -------
-    rows of the nodes without a fully determined constant condition; they replace rows of the same labels
+    rows of the nodes without a fully determined condition; they replace rows of the same labels
     """
     still = [replace(r, voltage=None) for r in records]
     bands, _ = conditions(still, None, config.group.temperature_degC)
@@ -261,8 +69,10 @@ def fit_moving(
     return found
 
 
-def _at_nearest_temperature(known: list[Known], temperature: float | None, config: IdentifyConfig) -> list[Known]:
-    """The conditions whose temperature is nearest: base parameters over temperature come from constant records."""
+def _at_nearest_temperature(
+    known: list[ConstantRow], temperature: float | None, config: IdentifyConfig
+) -> list[ConstantRow]:
+    """Return the conditions at the nearest temperature: the course over temperature comes from constant records."""
 
     def distance(condition: Condition) -> float:
         a, b = condition.temperature, temperature
@@ -272,80 +82,79 @@ def _at_nearest_temperature(known: list[Known], temperature: float | None, confi
         return []
     nearest = min((c for c, _ in known), key=distance).temperature
     within = config.group.temperature_degC
-    return [(c, r) for c, r in known if c.temperature == nearest or _close(c.temperature, nearest, within)]
+    return [(c, r) for c, r in known if c.temperature == nearest or _within(c.temperature, nearest, within)]
 
 
-def _close(a: float | None, b: float | None, within: float) -> bool:
+def _within(a: float | None, b: float | None, within: float) -> bool:
+    """Tell whether two temperatures are known and close."""
     return a is not None and b is not None and abs(a - b) <= within
 
 
 def _fit_band(
-    records: list[Record],
-    temperature: float | None,
-    known: list[Known],
-    config: IdentifyConfig,
+    records: list[Record], temperature: float | None, known: list[ConstantRow], config: IdentifyConfig
 ) -> list[ParameterRow]:
     """Fit the free nodes of one setting and temperature."""
     scale = voltage_scale([*records, *(r for c, _ in known for r in c.records)])
     voltages = [c.voltage for c, _ in known if c.voltage is not None]
-    nodes = nodes_of(records, voltages, config.nodes, scale)
-    held: dict[int, Bingham] = {}
+    nodes = voltage_nodes(records, voltages, config.nodes, scale)
+    fixed: dict[int, Bingham] = {}
+    temperatures: dict[int, float | None] = {}
     for condition, row in known:
         node = int(np.argmin(np.abs(nodes - (condition.voltage or 0.0))))
+        temperatures[node] = condition.temperature
         if row.T0_N is not None and row.C_Ns_per_m is not None and row.k_N_per_m is not None:
-            held[node] = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
+            fixed[node] = Bingham(row.T0_N, row.C_Ns_per_m, row.k_N_per_m)
         else:
             records = [*records, *condition.records]
-    objective = MovingObjective(tuple(records), nodes, held, Objective(tuple(_at_samples(r) for r in records)))
+    objective = MovingObjective(tuple(records), nodes, fixed, Objective(tuple(prepare(r) for r in records)))
     if not objective.free:
         residuals = objective.residuals([])
-        ratio = float(residuals @ residuals) / objective.plain.energy
+        ratio = float(residuals @ residuals) / objective.constant.energy
         log.info("moving records: every node has constant records; with these W_s = %.3g", ratio)
         return []
-    free = _descend(objective, _starts(objective, CONSTANT_SHARE * scale))
+    free = _descend(objective, _starting_values(objective, CONSTANT_SHARE * scale))
     setting = records[0].setting
-    temperatures = {int(np.argmin(np.abs(nodes - (c.voltage or 0.0)))): c.temperature for c, _ in known}
     labels = [(setting, float(nodes[i]), temperatures.get(i, temperature)) for i in objective.free]
-    return _rows(objective, free, labels, config.nuisance)
+    residuals = objective.residuals(free)
+    slopes = objective.slopes(free, residuals)
+    prepared = objective.constant.prepared
+    # Where the voltage moves nothing repeats, and no lack of fit is judged.
+    fitted = fitted_records(objective.records, prepared, (residuals, slopes), config.nuisance, constant=False)
+    optimum, touched = list(zip(labels, free, strict=True)), objective.touched()[:, objective.free] > 0.0
+    return parameter_rows(objective.constant, optimum, (residuals, slopes), fitted, touched)
 
 
-def _at_samples(record: Record) -> Trial:
-    """The trial of a record, without a voltage that would be missing later."""
-    voltage_of(record)
-    return trial_of(record)
-
-
-def _starts(objective: MovingObjective, band: float) -> list[Bingham]:
-    """Starting values of each free node: a constant fit to the samples near it, else to all of them."""
-    overall = fit_separable(objective.plain).parameters
+def _starting_values(objective: MovingObjective, band: float) -> list[Bingham]:
+    """Estimate each free node by a fit of constant parameters to the samples near it, else to all."""
+    overall = fit_separable(objective.constant).parameters
     starts = []
     for node in objective.nodes[objective.free]:
         others = objective.nodes[objective.nodes != node]
         window = max(0.25 * float(np.min(np.abs(others - node), initial=np.inf)), band) if others.size else np.inf
-        trials = [
+        prepared = [
             replace(t, counted=t.counted & _dwells(r, float(node), window))
-            for r, t in zip(objective.records, objective.plain.trials, strict=True)
+            for r, t in zip(objective.records, objective.constant.prepared, strict=True)
         ]
-        trials = [t for t in trials if np.any(t.counted)]
-        near = sum(int(np.count_nonzero(t.counted)) for t in trials)
-        starts.append(fit_separable(Objective(tuple(trials))).parameters if near >= FEWEST else overall)
-    return [objective.plain.clipped(s) for s in starts]
+        prepared = [t for t in prepared if np.any(t.counted)]
+        near = sum(int(np.count_nonzero(t.counted)) for t in prepared)
+        starts.append(fit_separable(Objective(tuple(prepared))).parameters if near >= FEWEST_NEAR_NODE else overall)
+    return [objective.constant.clipped(s) for s in starts]
 
 
 def _dwells(record: Record, node: float, window: float) -> NDArray[np.bool_]:
-    """(n,) whether the voltage has been near the node for long enough."""
+    """Find the samples (n,) at which the voltage has been near the node for long enough."""
     outside = np.abs(voltage_of(record) - node) > window
     index = np.arange(outside.size)
     last_outside = np.maximum.accumulate(np.where(outside, index, -outside.size))
-    return np.asarray(index - last_outside > SETTLED * record.rate)
+    return np.asarray(index - last_outside > DWELL_TIME * record.rate)
 
 
 def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bingham]:
-    """The optimum over all free nodes together, by trust-region least squares."""
+    """Find the optimum over all free nodes together by trust-region least squares."""
     from scipy.optimize import least_squares
 
-    stroke, norm = objective.plain.scales[2], np.sqrt(objective.plain.energy)
-    low, high = (np.tile(b, len(starts)) for b in objective.plain.search_bounds)
+    stroke, norm = objective.constant.scales[2], np.sqrt(objective.constant.energy)
+    low, high = (np.tile(b, len(starts)) for b in objective.constant.search_bounds)
 
     def parameters(x: Array) -> list[Bingham]:
         return [from_search(part, stroke) for part in x.reshape(-1, 3)]
@@ -374,33 +183,176 @@ def _descend(objective: MovingObjective, starts: Sequence[Bingham]) -> list[Bing
     return parameters(found.x)
 
 
-def _rows(
-    objective: MovingObjective,
-    free: list[Bingham],
-    labels: list[tuple[str | None, float, float | None]],
-    nuisance: NuisanceConfig,
-) -> list[ParameterRow]:
-    """One row a free node, judged on the samples that the node touches.
+# --- Voltage nodes ---
 
-    Where the voltage moves nothing repeats, so that no lack of fit is judged.
+DWELL_SHARE = 0.05
+"""Least share of the samples at a level, in a band of 2 % of the scale of the voltage."""
+
+
+def voltage_nodes(
+    moving: Sequence[Record], constant: Sequence[float], chosen: Sequence[float] | None, scale: float
+) -> Array:
+    """Choose the nodes of the piecewise linear parameters, rising [V].
+
+    The voltages of constant records are always nodes. The config may add others; where it does not and there are fewer
+    than two, the levels on which the voltage dwells are added.
+
+    Parameters
+    ----------
+    moving : the records with moving voltage
+    constant : voltages of the constant records of the same setting and temperature
+    chosen : `identify.nodes`, None where the config does not give any
+    scale : the rig's voltage scale [V]
+
+    Returns
+    -------
+    (m,) nodes
+
+    Raises
+    ------
+    ConfigError : when two chosen nodes are closer than 2 % of the scale
     """
-    residuals = objective.residuals(free)
-    slopes = objective.slopes(free, residuals)
-    plain = objective.plain
-    parts = parts_of(objective.records, plain.trials, (residuals, slopes), nuisance, constant=False)
-    misfit = misfit_of(parts)
-    noise = uncertainty(slopes, residuals, plain.lengths).half_widths().reshape(-1, 3)
-    widths = half_widths(parts, misfit).reshape(-1, 3)
-    scales = np.stack([scales_of(p, plain.measured) for p in free])
-    visible = visible_shares(slopes, scales.ravel(), plain.energy).reshape(-1, 3)
-    cosines = stationarity(slopes, residuals, plain.energy).reshape(-1, 3)
-    touched = objective.touched()[:, objective.free] > 0.0
-    rows = []
-    for i, parameters in enumerate(free):
-        here = touched[:, i] if np.any(touched[:, i]) else slice(None)
-        measured, left = plain.measured[here], residuals[here]
-        energy = float(measured @ measured)
-        facts = np.stack([scales[i], noise[i], widths[i], visible[i] * np.sqrt(plain.energy / energy), cosines[i]])
-        evidence = evidence_of(plain, parameters, criterion(left, measured), facts, misfit)
-        rows.append(row_of(labels[i], parameters, widths[i], evidence, (measured, left)))
-    return rows
+    apart = CONSTANT_SHARE * scale
+    constant = _distinct_voltages(constant, apart)
+    if chosen is not None and np.any(np.diff(np.sort(chosen)) <= apart):
+        raise ConfigError(f"identify.nodes: two nodes are closer than {apart:g}; leave one out (got {list(chosen)})")
+    if chosen is None and len(constant) > 1:
+        return np.sort(constant)
+    voltage = np.concatenate([r.voltage for r in moving if r.voltage is not None])
+    added = dwell_levels(voltage, apart) if chosen is None else chosen
+    return np.sort([*constant, *(v for v in added if all(abs(v - c) > apart for c in constant))])
+
+
+def _distinct_voltages(voltages: Sequence[float], apart: float) -> list[float]:
+    """Merge voltages no further apart into the lowest of them: one voltage may occur at two temperatures."""
+    kept: list[float] = []
+    for voltage in sorted(voltages):
+        if not kept or voltage - kept[-1] > apart:
+            kept.append(voltage)
+    return kept
+
+
+def dwell_levels(voltage: Array, band: float) -> list[float]:
+    """Find the levels on which a voltage dwells; its extremes where there are fewer than two.
+
+    Parameters
+    ----------
+    voltage : (n,) voltage [V]
+    band : width of the band that makes a level [V]
+
+    Returns
+    -------
+    medians of the bands that hold most samples, most first
+    """
+    rest = np.sort(voltage)
+    levels: list[float] = []
+    while rest.size:
+        inside = np.searchsorted(rest, rest + band, side="right") - np.arange(rest.size)
+        first = int(np.argmax(inside))
+        if inside[first] < DWELL_SHARE * voltage.size:
+            break
+        levels.append(float(np.median(rest[first : first + inside[first]])))
+        rest = rest[np.abs(rest - levels[-1]) > 2.0 * band]
+    if len(levels) < 2:
+        extremes = [float(voltage.min()), float(voltage.max())]
+        levels += [e for e in extremes if all(abs(e - level) > 2.0 * band for level in levels)]
+    return levels
+
+
+def node_weights(nodes: Array, voltage: Array) -> Array:
+    """Return the share (n, m) of each node in the parameters at each voltage, constant beyond the outermost nodes."""
+    return np.stack([np.interp(voltage, nodes, unit) for unit in np.eye(nodes.size)], axis=-1)
+
+
+# --- Criterion (4) with parameters piecewise linear in the voltage ---
+
+DIFFERENCE = 1e-5
+"""Step of the difference quotients, as a share of the parameter; for T0 of at least a hundredth of the peak force."""
+INTEGRATION = 1e-10
+"""Tolerance of the integration, well below the step of the difference quotients."""
+
+
+@dataclass(frozen=True, eq=False)
+class MovingObjective:
+    """Criterion (4) over records of moving voltage, the parameters of some nodes free and of the others fixed."""
+
+    records: tuple[Record, ...]
+    nodes: Array
+    """(m,) voltages of the nodes, rising [V]."""
+    fixed: dict[int, Bingham]
+    """Parameters of the fixed nodes, by their index."""
+    constant: Objective
+    """The same records with constant parameters, for bounds, warm-up and starting values."""
+
+    @property
+    def free(self) -> list[int]:
+        """Indices of the nodes to be fitted."""
+        return [i for i in range(self.nodes.size) if i not in self.fixed]
+
+    @cached_property
+    def _motions(self) -> tuple[tuple[Motion, Rows], ...]:
+        """Motion of each record, and the indices of its samples in it."""
+        return tuple(motion_of(record) for record in self.records)
+
+    def residuals(self, free: Sequence[Bingham]) -> Array:
+        """Compute the measured less simulated force (N,) at the counted samples [N]."""
+        values = dict(self.fixed) | dict(zip(self.free, free, strict=True))
+        damper = damper_with_nodes(self.nodes, [values[i] for i in range(self.nodes.size)])
+        forces = [
+            respond(damper, motion, float(r.force[0]), INTEGRATION)[places][t.counted]
+            for r, t, (motion, places) in zip(self.records, self.constant.prepared, self._motions, strict=True)
+        ]
+        residuals: Array = self.constant.measured - np.concatenate(forces)
+        return residuals
+
+    def slopes(self, free: Sequence[Bingham], residuals: Array) -> Array:
+        """Compute the derivatives (N, 3 f) of the force by T0, C, k of each free node, by difference quotients."""
+        peak = self.constant.scales[0]
+        columns = []
+        for i, parameters in enumerate(free):
+            steps = DIFFERENCE * np.array([max(parameters.friction, 1e-2 * peak), *parameters[1:]])
+            for j, step in enumerate(steps):
+                moved = Bingham(*(p + step * (i == j) for i, p in enumerate(parameters)))
+                other = [*free[:i], moved, *free[i + 1 :]]
+                columns.append((residuals - self.residuals(other)) / step)
+        return np.stack(columns, axis=-1)
+
+    def touched(self) -> Array:
+        """Return the share (N, m) of each node in the parameters at the counted samples."""
+        pairs = zip(self.records, self.constant.prepared, strict=True)
+        return np.concatenate([node_weights(self.nodes, voltage_of(r)[t.counted]) for r, t in pairs])
+
+
+def damper_with_nodes(nodes: Array, values: Sequence[Bingham]) -> Damper:
+    """Return the Bingham damper with these parameters at these voltages."""
+    rows = (
+        BaseRow(voltage_V=float(u), T0_N=p.friction, C_Ns_per_m=p.damping, k_N_per_m=p.stiffness)
+        for u, p in zip(nodes, values, strict=True)
+    )
+    return Damper(base=tuple(rows))
+
+
+def motion_of(record: Record) -> tuple[Motion, Rows]:
+    """Return the motion of a record, its speed from a cubic spline, on a finer grid where the voltage steps.
+
+    Returns
+    -------
+    the motion, and (n,) indices of the samples of the record in it
+    """
+    from scipy.interpolate import CubicSpline
+
+    speed, voltage = CubicSpline(record.time, record.displacement)(record.time, 1), voltage_of(record)
+    motion = Motion(record.time, record.displacement, speed, record.acceleration, voltage, None)
+    return motion.finer(parts_of_steps(voltage, voltage.size))
+
+
+def voltage_of(record: Record) -> Array:
+    """Return the voltage (n,) of a record, its levels and ramps free of noise.
+
+    Raises
+    ------
+    ValueError : when it has none
+    """
+    if record.voltage is None:
+        raise ValueError(f"record {record.name} has no voltage")
+    return denoised_control(record.voltage)

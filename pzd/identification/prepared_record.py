@@ -1,6 +1,9 @@
-"""Criterion (4) over the records of one condition, and the bounds of the search.
+"""Records prepared for a fit, and records with the residuals and sensitivities of a fit.
 
-Equation: W_s = sum (F - F_sim)^2 / sum F^2      Source: Makowski and Knap 2021, eq. (4)
+The exact element takes the displacement as linear between samples. A sine sampled at 1 kHz and read that way biases k
+by 0.04 %, so the displacement is first interpolated on a finer grid by a cubic spline. The force at the first sample
+is unknown to the model, since it depends on what went before: the simulation starts from the measured force, and the
+warm-up is left out of the criterion; so is the rest behind the motion.
 """
 
 from __future__ import annotations
@@ -8,42 +11,32 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.element import element_force, element_force_sensitivities
 from pzd.record import Array, Record
 from pzd.signals.cycles import Cycles, cycles_of
 from pzd.signals.jumps import jumps, jumps_in_cycles
-from pzd.signals.nuisance import NuisanceConfig, columns_of
-from pzd.signals.period import moving
-from pzd.signals.smoothing import REVERSAL_SHARE, reversals
+from pzd.signals.measures import REVERSAL_SHARE, reversals
+from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
+from pzd.signals.period import moving_range
 
-# ----------------------------------------------------------------------------------------------------
-# A record made ready for fitting: displacement on a fine grid, force to be met, warm-up and rest left out.
-#
-# The exact element takes the displacement as linear between samples. A sine sampled at 1 kHz and
-# read that way biases k by 0.04 %, so the displacement is first laid on a finer grid by a cubic
-# spline. The force at the first sample is unknown to the model (it depends on what went before):
-# simulation starts from the measured force, and a warm-up is left out of the
-# criterion; so is the rest behind the motion.
-
+# --- Preparation ---
 
 FINE_RATE = 4000.0
-"""The fine grid has at least this rate [Hz]."""
+"""Least rate of the fine grid [Hz]: 0.25 ms is a tenth of the shortest time constant C/k."""
 FINE_ANGLE = 1.0 / 256.0
-"""The fine step is at most this share of 1/omega of the fastest half cycle."""
-RELAXES = 0.05
-"""After the motion has ended the oil relaxes for some time constants C/k, of 3 to 15 ms, and shows k in it [s]."""
+"""Largest fine step, as a share of 1/omega of the fastest half cycle."""
+RELAXATION = 0.05
+"""Time after the end of the motion that is still fitted [s]: some time constants C/k of 3 to 15 ms, which show k."""
 FINEST = 64
-"""Largest factor between the fine grid and the samples."""
+"""Most fine steps in one sample."""
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
-    """One record as the fit sees it."""
+class PreparedRecord:
+    """One record prepared for a fit: displacement on a fine grid, measured force, and the samples that count."""
 
     name: str
     displacement: Array
@@ -61,22 +54,22 @@ class Trial:
 
     @property
     def every(self) -> int:
-        """Fine steps from one simulated force that is needed to the next."""
+        """Fine steps from one simulated force to the next that is needed."""
         return self.factor if self.positions is None else 1
 
-    def met(self, simulated: Array) -> Array:
-        """What of a simulated signal, every so many fine steps, (n,) or (n, p), stands against the counted samples."""
+    def at_counted(self, simulated: Array) -> Array:
+        """Read a simulated signal, one row each `every` fine steps, (n,) or (n, p), at the counted samples."""
         return (simulated if self.positions is None else self.at_samples(simulated))[self._counted_rows]
 
     @cached_property
     def _counted_rows(self) -> slice | NDArray[np.bool_]:
-        """The counted samples: nearly always one piece, which need not be picked out one by one."""
+        """Counted samples: nearly always contiguous, and a slice is quicker than a mask."""
         rows = np.flatnonzero(self.counted)
         whole = rows.size > 0 and rows[-1] - rows[0] == rows.size - 1
         return slice(int(rows[0]), int(rows[-1]) + 1) if whole else self.counted
 
     def at_samples(self, fine: Array) -> Array:
-        """What a fine signal, (m,) or (m, p), reads at the n samples."""
+        """Read a signal on the fine grid, (m,) or (m, p), at the n samples."""
         if self.positions is None:
             return fine[:: self.factor]
         low = np.minimum(self.positions.astype(int), fine.shape[0] - 2)
@@ -84,13 +77,13 @@ class Trial:
         return np.asarray(fine[low] * (1.0 - share) + fine[low + 1] * share)
 
 
-def trial_of(record: Record) -> Trial:
-    """The record made ready for fitting, its warm-up and the rest after it left out."""
+def prepare(record: Record) -> PreparedRecord:
+    """Prepare a record for a fit, its warm-up and the rest after the motion not counted."""
     from scipy.interpolate import CubicSpline
 
     time, factor, positions = _fine_time(record)
     clock = record.time if positions is not None else np.linspace(record.time[0], record.time[-1], record.time.size)
-    return Trial(
+    return PreparedRecord(
         record.name,
         CubicSpline(clock, record.displacement)(time),
         float((time[-1] - time[0]) / (time.size - 1)),
@@ -102,22 +95,22 @@ def trial_of(record: Record) -> Trial:
 
 
 def in_motion(record: Record) -> NDArray[np.bool_]:
-    """(n,) whether a sample says something of T0, C and k: past the warm-up, and until the motion ends for good.
+    """Find the samples (n,) that depend on T0, C and k: after the warm-up, until the motion ends for good.
 
-    Afterwards the element is stuck at whatever force it had, and what a real damper does then, creep and the zero of
-    the load cell, would be fitted as if it were friction. A hold between two motions counts.
+    At rest the element keeps its last force; creep of a real damper and the zero of the load cell would be fitted as
+    friction. A hold between two motions counts.
     """
-    order, (_, last) = np.arange(record.time.size), moving(record.displacement)
-    counted: NDArray[np.bool_] = (order >= warm_up(record.displacement)) & (order <= last + RELAXES * record.rate)
+    order, (_, last) = np.arange(record.time.size), moving_range(record.displacement)
+    counted: NDArray[np.bool_] = (order >= warm_up(record.displacement)) & (order <= last + RELAXATION * record.rate)
     return counted
 
 
 def warm_up(displacement: Array) -> int:
-    """How many samples to leave out until the force no longer depends on how the record began.
+    """Return the number of samples until the force no longer depends on how the record began.
 
-    The force at the first sample decays only while the element slips. It has slipped both ways
-    once the motion has turned a first time, with more than 10 % of its range before the turn, and
-    gone as far again after it. At most half the record is left out.
+    The force at the first sample decays only while the element slips. It has slipped both ways once the motion has
+    reversed a first time, with more than 10 % of its range before the reversal, and moved as far after it. At most
+    half the record is left out.
     """
     turns = reversals(displacement)
     if not turns:
@@ -128,7 +121,7 @@ def warm_up(displacement: Array) -> int:
 
 
 def upsampling_factor(record: Record) -> int:
-    """Fine steps in one sample, from the sampling rate and the fastest half cycle of the motion."""
+    """Return the number of fine steps in one sample, from the sampling rate and the fastest half cycle."""
     step = 1.0 / record.rate
     half_cycle = min(np.diff(reversals(record.displacement)), default=record.displacement.size) * step
     wanted = max(FINE_RATE * step, np.pi / half_cycle * step / FINE_ANGLE)
@@ -136,9 +129,9 @@ def upsampling_factor(record: Record) -> int:
 
 
 def _fine_time(record: Record) -> tuple[Array, int, Array | None]:
-    """Fine time stamps; their factor; and where samples lie among them, None where the clock is regular.
+    """Return the fine time stamps, their factor, and the positions of the samples, None where the clock is regular.
 
-    Stamps off a regular clock by less than half a step are rounded ones, not an irregular clock.
+    Stamps off a regular clock by less than half a step are rounded, the clock is not irregular.
     """
     time, factor = record.time, upsampling_factor(record)
     clock = np.linspace(time[0], time[-1], time.size)
@@ -149,256 +142,90 @@ def _fine_time(record: Record) -> tuple[Array, int, Array | None]:
     return fine, factor, (time - time[0]) / (fine[1] - fine[0])
 
 
-# ----------------------------------------------------------------------------------------------------
-# What each record has to do with a fit: its residuals and slopes, what its sensors may have done, what repeats.
+# --- After the fit ---
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """One record's part in a fit; (m,) are its counted samples."""
+class FittedRecord:
+    """One record with the residuals and sensitivities of a fit; (m,) are its counted samples."""
 
     record: Record
     counted: NDArray[np.bool_]
-    """(n,) which samples of the record the fit counts."""
+    """(n,) mask of the samples that are fitted."""
     residuals: Array
     """(m,) measured less simulated force [N]."""
     slopes: Array
     """(m, p) derivatives of the simulated force by the parameters."""
     nuisances: Array
-    """(m, 3) force that one standard deviation of the test's offset, gain and delay makes [N]."""
+    """(m, 3) force by one standard deviation of offset, gain and delay of the test [N]."""
     run: Cycles | None
-    """The cycles that repeat, None where the motion does not or the control signal moves."""
+    """Cycles that repeat, None where the motion does not or the control signal moves."""
     constant: bool = True
-    """Whether the control signal stands still."""
+    """Whether the control signal is constant."""
 
     @property
     def force(self) -> Array:
-        """(m,) measured force [N]."""
+        """Measured force (m,) [N]."""
         return self.record.force[self.counted]
 
     @cached_property
+    def whole_cycles(self) -> list[int]:
+        """Repeating cycles all of whose samples are counted; none where there are fewer than two."""
+        whole = self.run.whole(self.record.time, self.counted) if self.run else []
+        return whole if len(whole) > 1 else []
+
+    @cached_property
     def number(self) -> NDArray[np.int64]:
-        """(m,) the whole repeating cycle of each sample, 0, 1, ..., and -1 for all others; -1 with fewer than two."""
-        nothing = np.full(self.residuals.size, -1)
-        if self.run is None:
-            return nothing
-        of_all = self.run.number(self.record.time)
-        whole = self.run.whole(self.record.time, self.counted)
-        if len(whole) < 2:
-            return nothing
-        place = np.full(self.run.count + 1, -1)
-        place[whole] = np.arange(len(whole))
-        found: NDArray[np.int64] = place[of_all][self.counted]
+        """Number (m,) of the whole repeating cycle of each sample: 0, 1, ..., and -1 outside."""
+        if self.run is None or not self.whole_cycles:
+            return np.full(self.residuals.size, -1)
+        place = np.full(self.run.count + 1, -1)  # the last entry serves samples outside the run, whose index is -1
+        place[self.whole_cycles] = np.arange(len(self.whole_cycles))
+        found: NDArray[np.int64] = place[self.run.number(self.record.time)][self.counted]
         return found
 
     @cached_property
     def calm(self) -> NDArray[np.bool_]:
-        """(m,) the samples beside no jump of the force, where its instant is chance."""
+        """Samples (m,) beside no jump of the force, where its instant is chance."""
         record = self.record
         found = jumps_in_cycles(self.run, record.time, record.force) if self.run else jumps(record.force)
         return np.asarray(found[self.counted] == 0.0)
 
     def folded(self, values: Array) -> Array | None:
-        """(cycles, points) of (m,) values over the whole repeating cycles, None with fewer than two."""
-        if self.run is None:
-            return None
-        whole = self.run.whole(self.record.time, self.counted)
-        if len(whole) < 2:
+        """Fold values (m,) over the whole repeating cycles (cycles, points); None where there are none."""
+        if self.run is None or not self.whole_cycles:
             return None
         everywhere = np.zeros(self.record.time.size)
         everywhere[self.counted] = values
-        return self.run.fold(self.record.time, everywhere)[whole]
+        return self.run.fold(self.record.time, everywhere)[self.whole_cycles]
 
 
-def parts_of(
+def fitted_records(
     records: Sequence[Record],
-    trials: Sequence[Trial],
+    prepared: Sequence[PreparedRecord],
     fitted: tuple[Array, Array],
     nuisance: NuisanceConfig,
     *,
     constant: bool = True,
-) -> tuple[Part, ...]:
-    """The parts of a fit.
+) -> tuple[FittedRecord, ...]:
+    """Split the residuals and sensitivities of a fit by record.
 
     Parameters
     ----------
     records : that were fitted
-    trials : the same, as the fit saw them
+    prepared : the same, prepared
     fitted : (N,) residuals and (N, p) slopes of the counted samples, record by record
-    nuisance : what may differ from test to test
-    constant : whether the control signal stands still, so that the force repeats where the motion does
+    nuisance : standard deviations of what differs from test to test
+    constant : whether the control signal is constant, so that the force repeats where the motion does
     """
     residuals, slopes = fitted
-    ends = np.cumsum([np.count_nonzero(t.counted) for t in trials])[:-1]
-    return tuple(
-        Part(
-            record,
-            trial.counted,
-            left,
-            slope,
-            columns_of(record.force[trial.counted] - left, record.rate, nuisance, trial.counted),
-            cycles_of(record) if constant else None,
-            constant,
-        )
-        for record, trial, left, slope in zip(
-            records, trials, np.split(residuals, ends), np.split(slopes, ends), strict=True
-        )
-    )
-
-
-# ----------------------------------------------------------------------------------------------------
-
-
-LARGEST_PRE_SLIP = 0.45
-"""Largest pre-slip deflection T0/k of the search, as a share of the range of displacement."""
-AT_BOUND = 1e-3
-"""A parameter within this share of a bound, in search coordinates, lies at it."""
-
-
-class Bingham(NamedTuple):
-    """The three parameters of the element, or one number for each of them."""
-
-    friction: float
-    damping: float
-    stiffness: float
-
-
-@dataclass(frozen=True, eq=False)
-class Objective:
-    """What both methods minimise: criterion (4) pooled over the counted samples of the trials."""
-
-    trials: tuple[Trial, ...]
-    basis: Array | None = None
-    """(N, q) orthonormal forces beside the element whose best multiples are solved inside, by variable projection."""
-
-    @cached_property
-    def measured(self) -> Array:
-        """(N,) measured force at the counted samples, trial by trial [N]."""
-        return np.concatenate([t.force[t.counted] for t in self.trials])
-
-    @cached_property
-    def energy(self) -> float:
-        """Denominator of the criterion [N2]."""
-        return float(self.measured @ self.measured)
-
-    @property
-    def lengths(self) -> tuple[int, ...]:
-        """Counted samples of each trial."""
-        return tuple(int(np.count_nonzero(t.counted)) for t in self.trials)
-
-    def simulated(self, parameters: Bingham) -> Array:
-        """(N,) force of the element [N]."""
-        return np.concatenate(
-            [
-                t.met(element_force(t.displacement, t.step, *parameters, float(t.force[0]), every=t.every))
-                for t in self.trials
-            ]
-        )
-
-    def residuals(self, parameters: Bingham) -> Array:
-        """(N,) measured less simulated force, the forces beside the element at their best [N]."""
-        return self._projected(self.measured - self.simulated(parameters))
-
-    def residuals_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
-        """(N,) residuals and (N, 3) what T0, C and k do to the force that nothing beside the element makes up."""
-        simulated, slopes = self.simulated_and_slopes(parameters)
-        return self._projected(self.measured - simulated), self._projected(slopes)
-
-    def simulated_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
-        """(N,) force of the element and (N, 3) its derivatives by T0, C and k."""
-        forces, slopes = [], []
-        for t in self.trials:
-            force, slope = element_force_sensitivities(
-                t.displacement, t.step, *parameters, float(t.force[0]), every=t.every
-            )
-            forces.append(t.met(force))
-            slopes.append(t.met(slope))
-        return np.concatenate(forces), np.concatenate(slopes)
-
-    def _projected(self, values: Array) -> Array:
-        """What of (N,) or (N, p) forces the basis cannot make up.
-
-        Equation: (I - Q Q') r                      Source: Golub and Pereyra 1973, variable projection
-        """
-        return values if self.basis is None else values - self.basis @ (self.basis.T @ values)
-
-    def criterion(self, parameters: Bingham) -> float:
-        """W_s at the parameters."""
-        residuals = self.residuals(parameters)
-        return float(residuals @ residuals) / self.energy
-
-    @cached_property
-    def scales(self) -> tuple[float, float, float]:
-        """Peak force [N], peak speed [m/s] and range of displacement [m] over the trials."""
-        speed = max(float(np.max(np.abs(np.diff(t.displacement)))) / t.step for t in self.trials)
-        stroke = max(float(np.ptp(t.displacement)) for t in self.trials)
-        return float(np.max(np.abs(self.measured))), speed, stroke
-
-    @cached_property
-    def bounds(self) -> tuple[Bingham, Bingham]:
-        """Smallest and largest parameters worth a look, from the data's own scales.
-
-        T0 up to the peak force; C from 1e-4 to 1e2 of peak force over peak speed; k from 0.1 to
-        1e4 of peak force over the range of displacement.
-        """
-        force, speed, stroke = self.scales
-        return (
-            Bingham(0.0, 1e-4 * force / speed, 0.1 * force / stroke),
-            Bingham(force, 1e2 * force / speed, 1e4 * force / stroke),
-        )
-
-    @cached_property
-    def search_bounds(self) -> tuple[Array, Array]:
-        """(3,) bounds of what least squares searches."""
-        low, high = self.bounds
-        return (
-            np.array([0.0, np.log(low.damping), np.log(low.stiffness)]),
-            np.array([LARGEST_PRE_SLIP, np.log(high.damping), np.log(high.stiffness)]),
-        )
-
-    def slips(self, parameters: Bingham) -> bool:
-        """Whether the element slips within every full stroke: else F(0) would act as a free offset for ever."""
-        return parameters.friction <= LARGEST_PRE_SLIP * parameters.stiffness * self.scales[2]
-
-    def at_bounds(self, parameters: Bingham) -> tuple[bool, ...]:
-        """Whether each parameter lies at a bound of the search; a friction of zero does not."""
-        low, high = self.search_bounds
-        x = to_search(parameters, self.scales[2])
-        beyond = x >= high - AT_BOUND * np.abs(high)
-        below = x <= low + AT_BOUND * np.abs(low)
-        return bool(beyond[0]), bool(beyond[1] or below[1]), bool(beyond[2] or below[2])
-
-    def clipped(self, parameters: Bingham) -> Bingham:
-        """The parameters, brought inside the bounds."""
-        stroke = self.scales[2]
-        return from_search(np.clip(to_search(parameters, stroke), *self.search_bounds), stroke)
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """An optimum of the criterion."""
-
-    parameters: Bingham
-    criterion: float
-    residuals: Array
-    """(N,) measured less simulated force at the counted samples [N]."""
-    slopes: Array
-    """(N, 3) derivatives of the simulated force by T0, C and k."""
-
-
-def to_search(parameters: Bingham, stroke: float) -> Array:
-    """(3,) what least squares searches: pre-slip T0/k as a share of the stroke, the logarithms of C and k."""
-    friction, damping, stiffness = parameters
-    return np.array([friction / (stiffness * stroke), np.log(damping), np.log(stiffness)])
-
-
-def from_search(x: Array, stroke: float) -> Bingham:
-    """The parameters from what least squares searches."""
-    stiffness = float(np.exp(x[2]))
-    return Bingham(float(x[0]) * stiffness * stroke, float(np.exp(x[1])), stiffness)
-
-
-def search_slopes(parameters: Bingham, stroke: float) -> Array:
-    """(3, 3) derivatives of T0, C, k (rows) by what least squares searches (columns)."""
-    friction, damping, stiffness = parameters
-    return np.array([[stiffness * stroke, 0.0, friction], [0.0, damping, 0.0], [0.0, 0.0, stiffness]])
+    ends = np.cumsum([np.count_nonzero(each.counted) for each in prepared])[:-1]
+    found = []
+    for record, each, left, slope in zip(
+        records, prepared, np.split(residuals, ends), np.split(slopes, ends), strict=True
+    ):
+        counted = each.counted
+        nuisances = nuisance_columns(record.force[counted] - left, record.rate, nuisance, counted)
+        run = cycles_of(record) if constant else None
+        found.append(FittedRecord(record, counted, left, slope, nuisances, run, constant))
+    return tuple(found)

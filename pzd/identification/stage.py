@@ -7,21 +7,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pzd.artefacts import AuxiliaryRow, Identified, Knees, ParameterRow, Rig
-from pzd.artefacts.csv_rows import Estimate
 from pzd.identification.config import IdentifyConfig
 from pzd.parallel.processes import Listener, Progress, no_listener, parallel_map
 from pzd.quantities import TEMPERATURE, Control
-from pzd.record import Condition, Record, conditions, merged_voltages
-from pzd.schema.errors import ConfigError, DataError, counted
-from pzd.signals.cycles import Cycles, cycles_of, remember
-
-Labels = tuple[str | None, float | None, float | None]
+from pzd.record import Condition, Labels, Record, conditions, merged_voltages
+from pzd.schema.errors import ConfigError, DataError, counted, supported
+from pzd.signals.cycles import Cycles, cycles_of, remember_cycles
 
 log = logging.getLogger(__name__)
 
 WORTH_A_PROCESS = 2_000_000
-"""Samples in all from which conditions are fitted in processes of their own, each of which imports a library first:
-fewer are fitted as soon here."""
+"""Fewest samples in all for which conditions are fitted in separate processes: each has to import its libraries."""
 
 _VOLTAGE = Control()
 
@@ -34,27 +30,28 @@ def identify(
     control: Control = _VOLTAGE,
     jobs: int = 1,
 ) -> Identified:
-    """The Bingham parameters of every condition of every setting, with intervals and their trust.
+    """Identify the Bingham parameters of every condition of every setting, with intervals and status.
 
     Parameters
     ----------
-    identify : how they are found
+    identify : the `identify` block of the config
     rig : the records
     seed : of the evolutionary search
-    progress : hears of every condition that is done
+    progress : called after every condition
     control : the control signal, which names the voltage in messages
     jobs : conditions that are fitted at the same time
 
     Returns
     -------
-    one row a condition or voltage node, one row of measures a record, one of auxiliaries a condition that shows any,
-    and the characteristics that the tests show without a model
+    one row a condition or voltage node, one row of measures a record, one of auxiliary forces a condition that shows
+    any, and the characteristics of the tests without a model
 
     Raises
     ------
     ConfigError : when `identify.group` makes one condition of all voltages
     """
-    from pzd.identification.tests_over_time import characteristics, measures
+    from pzd.identification.characteristics import characteristics
+    from pzd.identification.strokes_and_loops import measures
 
     refuse_one_condition(identify, rig, control)
     refuse_partly_recorded(rig, control)
@@ -64,28 +61,19 @@ def identify(
     auxiliary = {_labels(row): row for _, row in found if row is not None}
     known = list(zip(constant, rows.values(), strict=True))
     rows |= {_labels(row): row for row in _moving_rows(moving, known, list(auxiliary.values()), identify)}
+    knees = Knees()
+    if identify.law != "bingham":
+        from pzd.identification.knee import identify_knees
+
+        settings = tuple(dict.fromkeys(record.setting for record in rig.records))
+        knees = identify_knees(known, settings, identify, control, progress)
     return Identified(
-        tuple(rows[labels] for labels in sorted(rows, key=_order)),
+        tuple(rows[labels] for labels in sorted(rows, key=_sort_key)),
         measures(rig.records),
-        tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_order)),
+        tuple(auxiliary[labels] for labels in sorted(auxiliary, key=_sort_key)),
         characteristics(constant, moving),
-        _knees(identify, known, [r.setting for r in rig.records], control, progress),
+        knees,
     )
-
-
-def _knees(
-    config: IdentifyConfig,
-    known: Sequence[tuple[Condition, ParameterRow]],
-    settings: Sequence[str | None],
-    control: Control,
-    progress: Listener,
-) -> Knees:
-    """The knee law of every condition, where the config asks for it."""
-    if config.law == "bingham":
-        return Knees()
-    from pzd.identification.knee import knees
-
-    return knees(known, tuple(dict.fromkeys(settings)), config, control, progress)
 
 
 def refuse_one_condition(config: IdentifyConfig, rig: Rig, control: Control) -> None:
@@ -125,12 +113,12 @@ def refuse_partly_recorded(rig: Rig, control: Control) -> None:
     DataError : with the first test that lacks one
     """
     for setting in dict.fromkeys(record.setting for record in rig.records):
-        mine = [record for record in rig.records if record.setting == setting]
+        of_setting = [record for record in rig.records if record.setting == setting]
         for name, unit, without in (
-            (control.quantity.name, control.unit, [r.name for r in mine if r.voltage is None]),
-            (TEMPERATURE.name, TEMPERATURE.unit, [r.name for r in mine if r.temperature is None]),
+            (control.quantity.name, control.unit, [r.name for r in of_setting if r.voltage is None]),
+            (TEMPERATURE.name, TEMPERATURE.unit, [r.name for r in of_setting if r.temperature is None]),
         ):
-            if 0 < len(without) < len(mine):
+            if 0 < len(without) < len(of_setting):
                 more = f" and {counted(len(without) - 1, 'more test')}" if len(without) > 1 else ""
                 raise DataError(
                     f"{without[0]}{more}: no {name}, which other tests of the setting have: say what it was, "
@@ -141,7 +129,8 @@ def refuse_partly_recorded(rig: Rig, control: Control) -> None:
 def _constant_rows(
     found: Sequence[Condition], config: IdentifyConfig, seed: int, progress: Listener, jobs: int
 ) -> list[tuple[ParameterRow, AuxiliaryRow | None]]:
-    from pzd.identification.fit import identify_condition
+    """Identify the conditions, several at the same time where they are worth a process."""
+    from pzd.identification.condition import identify_condition
 
     rows: list[tuple[ParameterRow, AuxiliaryRow | None]] = []
 
@@ -152,20 +141,13 @@ def _constant_rows(
     def collected(made: tuple[ParameterRow, AuxiliaryRow | None, list[Cycles | None]]) -> None:
         row, auxiliary, runs = made
         for record, run in zip(found[len(rows)].records, runs, strict=True):
-            remember(record, run)
+            remember_cycles(record, run)
         rows.append((row, auxiliary))
-        progress(Progress(len(rows), len(found), f"conditions: {_line(row)}{_auxiliary_text(auxiliary)}"))
+        progress(Progress(len(rows), len(found), f"conditions: {_parameter_text(row)}{_auxiliary_text(auxiliary)}"))
 
     samples = sum(record.time.size for condition in found for record in condition.records)
     parallel_map(fitted, range(len(found)), jobs if samples > WORTH_A_PROCESS else 1, collected)
     return rows
-
-
-def _auxiliary_text(row: AuxiliaryRow | None) -> str:
-    if row is None:
-        return ""
-    force, stiffness = (Estimate.of(row, name).digits()[0] for name in ("F_0_N", "k_g_N_per_m"))
-    return f"; beside the element {force} N and {stiffness} N/m"
 
 
 def _moving_rows(
@@ -174,39 +156,52 @@ def _moving_rows(
     auxiliaries: Sequence[AuxiliaryRow],
     config: IdentifyConfig,
 ) -> list[ParameterRow]:
-    from pzd.identification.auxiliary import without
+    """Identify the voltage nodes from records of moving voltage, setting by setting."""
+    from pzd.identification.condition import subtract_auxiliary
     from pzd.identification.moving_voltage import fit_moving
 
     rows = []
     for setting in sorted({r.setting for r in moving}, key=lambda s: s or ""):
         auxiliary = [row for row in auxiliaries if row.setting == setting]
-        mine = [(c, row) for c, row in known if c.setting == setting]
-        still = [replace(c, records=tuple(without(r, auxiliary) for r in c.records)) for c, _ in mine]
-        of_setting = [without(r, auxiliary) for r in moving if r.setting == setting]
-        for row in fit_moving(of_setting, still, [row for _, row in mine], config):
+        of_setting = [(c, row) for c, row in known if c.setting == setting]
+        still = [replace(c, records=tuple(subtract_auxiliary(r, auxiliary) for r in c.records)) for c, _ in of_setting]
+        moving_of_setting = [subtract_auxiliary(r, auxiliary) for r in moving if r.setting == setting]
+        for row in fit_moving(moving_of_setting, still, [row for _, row in of_setting], config):
             rows.append(row)
-            log.info("node from records with moving voltage: %s", _line(row))
+            log.info("node from records with moving voltage: %s", _parameter_text(row))
     return rows
 
 
 def _labels(row: ParameterRow | AuxiliaryRow) -> Labels:
+    """Return setting, voltage and temperature of a row."""
     return row.setting, row.voltage_V, row.temperature_degC
 
 
-def _order(labels: Labels) -> tuple[str, float, float]:
+def _sort_key(labels: Labels) -> tuple[str, float, float]:
+    """Order rows by setting, temperature and voltage."""
     setting, voltage, temperature = labels
     return setting or "", temperature or 0.0, voltage or 0.0
 
 
-def _line(row: ParameterRow) -> str:
-    T0, C, k = ((Estimate.of(row, name).digits() or ("-",))[0] for name in ("T0_N", "C_Ns_per_m", "k_N_per_m"))
-    place = ", ".join(
-        part
-        for part in (
-            row.setting,
-            None if row.voltage_V is None else f"{row.voltage_V:.4g}",
-            None if row.temperature_degC is None else f"{row.temperature_degC:.4g} degC",
-        )
-        if part
-    )
+def _parameter_text(row: ParameterRow) -> str:
+    """Return the parameters of one row as a line of progress."""
+    voltage = None if row.voltage_V is None else f"{row.voltage_V:.4g}"
+    temperature = None if row.temperature_degC is None else f"{row.temperature_degC:.4g} degC"
+    place = ", ".join(part for part in (row.setting, voltage, temperature) if part)
+    T0, C, k = (_supported(row, name) for name in ("T0_N", "C_Ns_per_m", "k_N_per_m"))
     return f"{place or 'all records'}: T0 = {T0} N, C = {C} N s/m, k = {k} N/m, W_s = {row.W_s:.3g}, {row.status}"
+
+
+def _auxiliary_text(row: AuxiliaryRow | None) -> str:
+    """Return the forces beside the element as the end of a line of progress."""
+    if row is None:
+        return ""
+    return f"; beside the element {_supported(row, 'F_0_N')} N and {_supported(row, 'k_g_N_per_m')} N/m"
+
+
+def _supported(row: ParameterRow | AuxiliaryRow, name: str) -> str:
+    """Return a value with the digits that its interval supports, `-` where there is none."""
+    value, low, high = (getattr(row, f"{name}{end}") for end in ("", "_low95", "_high95"))
+    if value is None:
+        return "-"
+    return f"{value:.4g}" if low is None or high is None else supported(value, low, high)

@@ -1,1 +1,1 @@
-"""What any record is made of: cycles, kinematics, smoothing, recursions, autoregression, harmonics, roads."""
+"""Signal processing of any record: cycles, kinematics, smoothing, noise, lack of fit, harmonics and road spectra."""

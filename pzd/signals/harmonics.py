@@ -1,4 +1,4 @@
-"""Sums of harmonics with exact derivatives: what roads, triangles and random motions are made of."""
+"""Harmonics: Fourier sums with exact derivatives, and lines of the mains in a channel."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import numpy as np
 
 from pzd.record import Array, Complex, Mask
 
-# ----------------------------------------------------------------------------------------------------
+# --- Fourier sums: roads, triangles, random motions ---
 
-
-_WHOLE = 1e-7  # a period this close to a whole number of steps is one, in steps
-_BLOCK = 8192  # samples that stay in the cache
+_WHOLE = 1e-7
+"""A period this close to a whole number of steps is one [steps]."""
+_BLOCK = 8192
+"""Samples a block in the sum by Horner's rule: their complex sums stay in the cache of the processor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +22,12 @@ class FourierSum:
     """A periodic function of time or distance.
 
     Equation: x(s) = Re sum c_n exp(2 pi i n s / P)        Source: definition
+
+    Examples
+    --------
+    >>> cosine = FourierSum(1.0, np.array([0.0, 2.0 + 0.0j]))
+    >>> [float(each[0]) for each in cosine(np.array([0.0]))]  # 2 cos(2 pi s) and its derivatives at s = 0
+    [2.0, 0.0, -78.95683520871486]
     """
 
     period: float
@@ -29,7 +36,7 @@ class FourierSum:
     """(n,) c_0, c_1, ...; the amplitude of line n is abs(c_n)."""
 
     def __call__(self, place: Array) -> tuple[Array, Array, Array]:
-        """The function and its first two derivatives, exactly.
+        """Evaluate the function and its first two derivatives, exactly.
 
         Parameters
         ----------
@@ -37,17 +44,19 @@ class FourierSum:
 
         Returns
         -------
-        three arrays (n,)
+        x, dx/ds and d2x/ds2, each (n,)
         """
         orders = 2j * np.pi / self.period * np.arange(self.coefficients.size)
         sums = np.stack([self.coefficients, self.coefficients * orders, self.coefficients * orders**2])
         steps = _steps_a_period(place, self.period)
-        values = _direct(sums, place / self.period) if steps is None else _fast(sums, place, self.period, steps)
+        values = (
+            _sum_by_horner(sums, place / self.period) if steps is None else _sum_by_fft(sums, place, self.period, steps)
+        )
         return values[0], values[1], values[2]
 
 
 def _steps_a_period(place: Array, period: float) -> int | None:
-    """How many steps of an even grid make one period; None where the grid is uneven or the number is not whole."""
+    """Return the number of grid steps in a period; None where the grid is uneven or the number is not whole."""
     if place.size < 3:
         return None
     step = (place[-1] - place[0]) / (place.size - 1)
@@ -56,12 +65,12 @@ def _steps_a_period(place: Array, period: float) -> int | None:
     return whole if even and whole > 0 and abs(period / step - whole) < _WHOLE else None
 
 
-def _fast(sums: Complex, place: Array, period: float, steps: int) -> Array:
-    """The sums on an even grid that meets itself again after one period."""
+def _sum_by_fft(sums: Complex, place: Array, period: float, steps: int) -> Array:
+    """Evaluate the sums on an even grid that repeats after one period."""
     lines = sums.shape[1]
     shifted = sums * np.exp(2j * np.pi * np.arange(lines) * (place[0] / period))
     if 2 * (lines - 1) >= steps:
-        return _direct(sums, place / period)
+        return _sum_by_horner(sums, place / period)
     spectrum = np.zeros((3, steps // 2 + 1), dtype=np.complex128)
     spectrum[:, :lines] = 0.5 * steps * shifted
     spectrum[:, 0] = steps * shifted[:, 0].real
@@ -69,8 +78,8 @@ def _fast(sums: Complex, place: Array, period: float, steps: int) -> Array:
     return np.stack([np.resize(row, place.size) for row in once])
 
 
-def _direct(sums: Complex, phase: Array) -> Array:
-    """The sums at any places, by Horner's rule in exp(2 pi i phase)."""
+def _sum_by_horner(sums: Complex, phase: Array) -> Array:
+    """Evaluate the sums at any places, by Horner's rule in exp(2 pi i phase)."""
     result = np.empty((3, phase.size))
     for start in range(0, phase.size, _BLOCK):
         turn = np.exp(2j * np.pi * phase[start : start + _BLOCK])
@@ -82,29 +91,26 @@ def _direct(sums: Complex, phase: Array) -> Array:
     return result
 
 
-# ----------------------------------------------------------------------------------------------------
-# The mains in a channel: whether a line at 50 or 60 Hz stands out, and the wave that it makes.
-
+# --- Mains hum ---
 
 MAINS = (50.0, 60.0)
-"""Of the grids of the world [Hz]."""
-LINES_OFF = 0.2
-"""The mains may be off by this much [Hz]."""
-STANDS_OUT = 3.0
-"""The line is this many times as large as anything in its neighbourhood."""
+"""Frequencies of the mains of the world [Hz]."""
+MAINS_TOLERANCE = 0.2
+"""Largest deviation of the mains from their nominal frequency [Hz]."""
+PROMINENCE = 3.0
+"""Least ratio of a line to the largest amplitude in its neighbourhood."""
 LEAST_RATE = 2.5
-"""Sampling rate over the frequency of the mains from which it can be seen."""
-HARMONICS = (1, 3)
-"""Of the mains, as transformers and rectifiers give them."""
+"""Least ratio of the sampling rate to the frequency of a line."""
+MAINS_ORDERS = (1, 3)
+"""Harmonics of the mains that transformers and rectifiers produce."""
 LOW_ORDER = 12.0
-"""Harmonics of the motion below this order may stand out by themselves, so that one at the mains' frequency is none."""
+"""Order of the motion below which a harmonic may be prominent by itself, and is then not taken for the mains."""
 _STEP = 0.01
-"""Step of the frequencies at which the line is looked for, times the length of the record: half of it is 1 degree of
-phase at either end."""
+"""Step of the frequency grid, times the length of the record: half of it is 1 degree of phase at either end."""
 
 
-def lines(values: Array, rate: float, frequencies: Sequence[float], cycle: float) -> list[float]:
-    """Amplitudes of lines that stand out of their neighbourhood, which holds harmonics of the motion; else 0.
+def line_amplitudes(values: Array, rate: float, frequencies: Sequence[float], cycle: float) -> list[float]:
+    """Return the amplitudes of lines that exceed their neighbourhood, harmonics of the motion included; else 0.
 
     Parameters
     ----------
@@ -112,6 +118,10 @@ def lines(values: Array, rate: float, frequencies: Sequence[float], cycle: float
     rate : sampling rate [Hz]
     frequencies : of the lines [Hz]
     cycle : frequency of the motion, 0 where it does not repeat [Hz]
+
+    Returns
+    -------
+    one amplitude a frequency, in the unit of the channel
     """
     if values.size == 0 or not frequencies:
         return [0.0] * len(frequencies)
@@ -119,21 +129,21 @@ def lines(values: Array, rate: float, frequencies: Sequence[float], cycle: float
     ramp = np.linspace(values[0], values[-1], values.size)
     spectrum = 2.0 * np.abs(np.fft.rfft((values - ramp) * window)) / window.sum()
     resolution, places = rate / values.size, np.fft.rfftfreq(values.size, 1.0 / rate)
-    return [_standing_out(spectrum, np.abs(places - frequency), resolution, cycle) for frequency in frequencies]
+    return [_prominent_amplitude(spectrum, np.abs(places - frequency), resolution, cycle) for frequency in frequencies]
 
 
-def _standing_out(spectrum: Array, off: Array, resolution: float, cycle: float) -> float:
-    """Amplitude of the line in a spectrum, by how far its places are off the line."""
-    wide = max(LINES_OFF, 1.5 * resolution)
+def _prominent_amplitude(spectrum: Array, off: Array, resolution: float, cycle: float) -> float:
+    """Return the amplitude of a prominent line, else 0; `off` (n,) is the distance of each frequency from it [Hz]."""
+    wide = max(MAINS_TOLERANCE, 1.5 * resolution)
     inside, around = off <= wide, (off > wide + 3.0 * resolution) & (off <= max(5.0, 3.0 * cycle, 20.0 * resolution))
     if not inside.any() or not around.any():
         return 0.0
     amplitude = float(spectrum[inside].max())
-    return amplitude if amplitude > STANDS_OUT * float(spectrum[around].max()) else 0.0
+    return amplitude if amplitude > PROMINENCE * float(spectrum[around].max()) else 0.0
 
 
 def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) -> Array:
-    """The wave that the mains and their third harmonic make in a channel, its size from the samples that are wanted.
+    """Estimate the hum of the mains and their third harmonic in a channel.
 
     Equation: min |r - sum a_h cos(2 pi h f t) + b_h sin(2 pi h f t)|^2, f within 0.2 Hz of the mains
                                                                                     Source: least squares
@@ -141,54 +151,54 @@ def hum(time: Array, values: Array, wanted: Mask, cycle: float, least: float) ->
     Parameters
     ----------
     time : (n,) evenly spaced [s]
-    values : (n,) of the channel, less what is not the mains' as far as that is known
-    wanted : (n,) the samples that count
+    values : (n,) of the channel, the known motion subtracted
+    wanted : (n,) mask of the samples that are fitted
     cycle : frequency of the motion, 0 where it does not repeat [Hz]
-    least : amplitude below which a line is none
+    least : least amplitude of a line, in the unit of the channel
 
     Returns
     -------
-    (n,) in the unit of the channel; zero where no line stands out
+    (n,) in the unit of the channel; zero where no line is prominent
     """
     wave, rate = np.zeros(values.size), (values.size - 1) / float(time[-1] - time[0])
-    if np.count_nonzero(wanted) <= 2 * len(HARMONICS):
+    if np.count_nonzero(wanted) <= 2 * len(MAINS_ORDERS):
         return wave
     level = values - values[wanted].mean()
-    asked = [m for m in MAINS if rate >= LEAST_RATE * m and not _of_motion(m, cycle, rate / values.size)]
-    for mains, amplitude in zip(asked, lines(values, rate, asked, cycle), strict=True):
+    asked = [m for m in MAINS if rate >= LEAST_RATE * m and not _is_motion_harmonic(m, cycle, rate / values.size)]
+    for mains, amplitude in zip(asked, line_amplitudes(values, rate, asked, cycle), strict=True):
         if amplitude <= least:
             continue
         from scipy.signal import zoom_fft  # it takes 0.7 s to load, and few records hum
 
-        points = 1 + int(np.ceil(2.0 * LINES_OFF * values.size / rate / _STEP))
-        near = np.linspace(mains - LINES_OFF, mains + LINES_OFF, points)
+        points = 1 + int(np.ceil(2.0 * MAINS_TOLERANCE * values.size / rate / _STEP))
+        near = np.linspace(mains - MAINS_TOLERANCE, mains + MAINS_TOLERANCE, points)
         spectrum = zoom_fft(level * np.hanning(level.size), [near[0], near[-1]], m=points, fs=rate, endpoint=True)
         found = near[int(np.argmax(np.abs(spectrum)))]
-        found = float(np.clip(found + _off(found, time, level, wanted), near[0], near[-1]))
+        found = float(np.clip(found + _frequency_correction(found, time, level, wanted), near[0], near[-1]))
         waves = _waves(found, time)
         wave += waves @ np.linalg.lstsq(waves[wanted], level[wanted], rcond=None)[0]
     return wave
 
 
 def _waves(frequency: float, time: Array) -> Array:
-    """Cosine and sine of each harmonic that the rate can show, (n, 2 times harmonics)."""
+    """Return cosine and sine of each harmonic below half the sampling rate (n, 2 h)."""
     rate = (time.size - 1) / float(time[-1] - time[0])
-    phases = [2.0 * np.pi * h * frequency * time for h in HARMONICS if rate > 2.0 * h * frequency]
+    phases = [2.0 * np.pi * h * frequency * time for h in MAINS_ORDERS if rate > 2.0 * h * frequency]
     return np.column_stack([f(phase) for phase in phases for f in (np.cos, np.sin)])
 
 
-def _off(frequency: float, time: Array, level: Array, wanted: Mask) -> float:
-    """How far the least squares lie from a frequency of the grid [Hz]: a step of Gauss and Newton, by all harmonics."""
+def _frequency_correction(frequency: float, time: Array, level: Array, wanted: Mask) -> float:
+    """Return the Gauss-Newton step from a frequency of the grid to the least-squares one [Hz], by all harmonics."""
     waves = _waves(frequency, time)
     sizes = np.linalg.lstsq(waves[wanted], level[wanted], rcond=None)[0]
     cosines, sines = waves[:, ::2], waves[:, 1::2]
-    rising = 2.0 * np.pi * time[:, np.newaxis] * np.array(HARMONICS[: cosines.shape[1]])
+    rising = 2.0 * np.pi * time[:, np.newaxis] * np.array(MAINS_ORDERS[: cosines.shape[1]])
     slope = np.sum(rising * (sizes[1::2] * cosines - sizes[::2] * sines), axis=1)
     more = np.column_stack([waves, slope])
     return float(np.linalg.lstsq(more[wanted], level[wanted], rcond=None)[0][-1])
 
 
-def _of_motion(mains: float, cycle: float, resolution: float) -> bool:
-    """Whether a low harmonic of the motion lies where the mains do."""
+def _is_motion_harmonic(mains: float, cycle: float, resolution: float) -> bool:
+    """Tell whether a low harmonic of the motion lies at the frequency of the mains."""
     order = mains / cycle if cycle > 0.0 else LOW_ORDER
-    return order < LOW_ORDER and abs(order - round(order)) * cycle <= LINES_OFF + 2.0 * resolution
+    return order < LOW_ORDER and abs(order - round(order)) * cycle <= MAINS_TOLERANCE + 2.0 * resolution

@@ -1,4 +1,4 @@
-"""Roads by ISO 8608: the classes, the spectrum of their height, and profiles drawn from it.
+"""Road roughness by ISO 8608: classes, spectral density of the height, and random profiles.
 
 The classes stand in `iso8608_classes.csv`: the spectral density at the reference wavenumber
 n0 = 0.1 cycles/m is 16e-6 4^k m3 for class k = A..H (the geometric mean, not the upper limit,
@@ -19,18 +19,18 @@ from pzd.signals.harmonics import FourierSum
 REFERENCE_WAVENUMBER = 0.1
 """n0 [cycles/m]; not the Omega0 = 1 rad/m of other tables, at which the density is 16 times smaller."""
 WAVINESS = 2.0
-"""Exponent of the spectrum; a constant density of the slope."""
+"""Exponent of the spectrum: 2 gives a constant density of the slope."""
 
 
 @cache
 def classes() -> dict[str, float]:
-    """Spectral density Gd(n0) [m3] of every road class: the geometric mean of its range (ISO 8608:2016)."""
+    """Return the spectral density Gd(n0) [m3] of every road class: the geometric mean of its range (ISO 8608:2016)."""
     with (Path(__file__).parent / "iso8608_classes.csv").open(encoding="utf-8", newline="") as file:
         return {row["class"]: float(row["Gd_n0_geomean_m3"]) for row in csv.DictReader(file)}
 
 
 def height_density(wavenumber: Array, density: float, waviness: float = WAVINESS) -> Array:
-    """One-sided spectral density of the height of a road.
+    """Compute the one-sided spectral density of the height of a road.
 
     Equation: Gd(n) = Gd(n0) (n / n0)^-w                        Source: ISO 8608:2016
 
@@ -43,6 +43,11 @@ def height_density(wavenumber: Array, density: float, waviness: float = WAVINESS
     Returns
     -------
     (n,) [m3]
+
+    Examples
+    --------
+    >>> height_density(np.array([0.1, 1.0]), classes()["A"]).round(8).tolist()
+    [1.6e-05, 1.6e-07]
     """
     return np.asarray(density * (wavenumber / REFERENCE_WAVENUMBER) ** -waviness)
 
@@ -54,7 +59,7 @@ def profile(
     band: tuple[float, float] = (0.01, 10.0),
     waviness: float = WAVINESS,
 ) -> FourierSum:
-    """A road drawn from its spectrum: height over distance, periodic over its length.
+    """Draw a road from its spectrum: height over distance, periodic over its length.
 
     Equation: xi(s) = sum sqrt(2 Gd(n_i) dn) cos(2 pi n_i s + phi_i), n_i = i dn, dn = 1 / length
               Source: definition of the one-sided density; phi_i uniform
@@ -63,7 +68,7 @@ def profile(
     ----------
     density : Gd(n0) [m3], e.g. ``classes()["C"]``
     length : after which the road repeats [m]
-    draw : where the phases come from; the phase of a line depends on its number alone
+    draw : random generator of the phases; the phase of a line depends on its number alone
     band : lowest and highest wavenumber [cycles/m], both included; ISO 8608 covers 0.011 to 2.83
     waviness : exponent of the spectrum
 

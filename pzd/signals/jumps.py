@@ -1,4 +1,8 @@
-"""Where a recorded force jumps: what is recorded beside a jump is chance, for it falls anywhere between two samples."""
+"""Jumps of a recorded force, gaps in a record, and steps of a control signal.
+
+A jump (dry friction at a reversal) falls anywhere between two samples, so that the samples beside it are left to
+chance. Where samples are left out, nothing is differenced across the gap.
+"""
 
 from __future__ import annotations
 
@@ -7,23 +11,22 @@ import numpy as np
 from pzd.record import Array, Mask
 from pzd.signals.cycles import Cycles
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Jumps of the force ---
 
 SUDDEN = 6.0
-"""A sample at which the force bends by so many times its usual scatter lies beside a jump."""
+"""Second difference of the force beside a jump, in its robust standard deviations."""
 MOST_SUDDEN = 40
-"""Samples beside jumps that are allowed for in one record or average cycle, the largest."""
+"""Most samples beside jumps in one record or average cycle, those of the largest second difference."""
 MOST_IN_SAMPLES = 150
-"""The same in a record that is compared sample by sample: no cycle stands for the others there."""
-BESIDE_REVERSAL = 4
-"""Samples beside the jump of a dry friction: two, and at either end one that it reaches through a filter."""
-USUAL = 1.4826
+"""Most samples beside jumps in a record compared sample by sample, which has as many jumps as reversals."""
+SAMPLES_PER_REVERSAL = 4
+"""Samples beside the jump of a dry friction: two, and one at either end that it reaches through a filter."""
+MAD_TO_SIGMA = 1.4826
 """Standard deviation of Gaussian scatter over its median magnitude."""
 
 
 def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
-    """(n,) how far the force bends at the samples beside a jump (dry friction at a reversal) [N]; 0 at all others.
+    """Find the samples beside jumps of the force, as by dry friction at a reversal.
 
     Equation: |F_(i-1) - 2 F_i + F_(i+1)| where it exceeds 6 of its robust standard deviations
                                                                     Source: Hampel 1974, median deviation
@@ -31,11 +34,15 @@ def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
     Parameters
     ----------
     force : (n,) [N]
-    most : samples that are allowed for, the largest
+    most : largest number of samples
+
+    Returns
+    -------
+    (n,) magnitude of the second difference at these samples [N]; 0 at all others
     """
     bend = np.abs(np.convolve(force, (1.0, -2.0, 1.0), "same"))
     bend[[0, -1]] = 0.0
-    sudden = np.flatnonzero(bend > SUDDEN * USUAL * np.median(bend))
+    sudden = np.flatnonzero(bend > SUDDEN * MAD_TO_SIGMA * np.median(bend))
     largest = sudden[np.argsort(-bend[sudden], kind="stable")][:most]
     found = np.zeros(force.size)
     found[largest] = bend[largest]
@@ -43,19 +50,19 @@ def jumps(force: Array, most: int = MOST_SUDDEN) -> Array:
 
 
 def jumps_in_samples(measured: Array, predicted: Array, reversals: int = 0) -> Array:
-    """(n,) the same for a record compared sample by sample: noise hides jumps of it that its prediction shows [N].
+    """Find the samples beside jumps in a record or in its prediction, which shows jumps that noise hides; as `jumps`.
 
     Parameters
     ----------
     measured, predicted : (n,) force [N]
-    reversals : of the motion; of many, more samples are allowed for
+    reversals : number of reversals of the motion, with which the largest number of samples grows
     """
-    most = max(MOST_IN_SAMPLES, BESIDE_REVERSAL * reversals)
+    most = max(MOST_IN_SAMPLES, SAMPLES_PER_REVERSAL * reversals)
     return np.maximum(jumps(measured, most), jumps(predicted, most))
 
 
 def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:
-    """(n,) the same for a record that repeats, as its average cycle shows them, free of most of the noise [N]."""
+    """Find the samples beside jumps of a periodic record from its average cycle, which has little noise; as `jumps`."""
     cycle = jumps(run.mean(time, force))
     place = run.phase(time) * cycle.size
     before = np.floor(place).astype(np.int64) % cycle.size
@@ -63,11 +70,11 @@ def jumps_in_cycles(run: Cycles, time: Array, force: Array) -> Array:
     return found
 
 
-def within_a_sample(measured: Array, predicted: Array) -> Array:
-    """(n,) what a jump makes of the residual that comes up to one sample earlier or later than predicted [N].
+def jump_timing_error(measured: Array, predicted: Array) -> Array:
+    """Compute the part (n,) of the residual that a jump up to one sample earlier or later than predicted explains [N].
 
-    Only where the record jumps as well, by half of what is predicted from one sample to the next: a flank that it
-    resolves is no matter of timing.
+    Only where the record jumps as well, by half of the predicted change from one sample to the next: a flank that it
+    resolves is not a matter of timing.
 
     Parameters
     ----------
@@ -82,17 +89,16 @@ def within_a_sample(measured: Array, predicted: Array) -> Array:
 
 
 def _neighbours(force: Array) -> Array:
-    """(3, n) force one sample before, at, and after each."""
+    """Return the force one sample before, at, and after each sample (3, n)."""
     padded = np.pad(force, 1, mode="edge")
     return np.stack([padded[:-2], force, padded[2:]])
 
 
-# ----------------------------------------------------------------------------------------------------
-# Where a record parts, of which samples are left out: nothing is differenced across what is missing.
+# --- Gaps ---
 
 
-def parted(values: Array, counted: Mask) -> list[Array]:
-    """Values (m,) or (m, p) at the counted samples of a record, parted where samples between them are left out.
+def split_at_gaps(values: Array, counted: Mask) -> list[Array]:
+    """Split values (m,) or (m, p) of a record where samples are left out.
 
     Parameters
     ----------
@@ -103,69 +109,68 @@ def parted(values: Array, counted: Mask) -> list[Array]:
     return np.split(values, ends)
 
 
-def slope_within(values: Array, counted: Mask) -> Array:
-    """(m,) change from sample to sample, by central differences within each stretch; 0 for a sample that stands alone.
+def gradient_within_stretches(values: Array, counted: Mask) -> Array:
+    """Compute central differences (m,) within each stretch without gap; 0 for an isolated sample.
 
     Parameters
     ----------
     values : (m,) at the samples that count
     counted : (n,) which samples of the record these are
     """
-    parts = parted(values, counted)
+    parts = split_at_gaps(values, counted)
     return np.concatenate([np.gradient(part) if part.size > 1 else np.zeros(part.size) for part in parts])
 
 
-def unbroken(counted: Mask, memory: int) -> Mask:
-    """Which of the counted samples (m,), but for the first few, have as many predecessors in the same stretch.
+def has_predecessors(counted: Mask, memory: int) -> Mask:
+    """Find the counted samples, but for the first few, that have so many predecessors without a gap.
 
     Parameters
     ----------
     counted : (n,) which samples of a record count
-    memory : how many predecessors; the first so many of the m samples are left out of what is returned
+    memory : number of predecessors
 
     Returns
     -------
-    (m - memory,)
+    (m - memory,) mask over the counted samples from number `memory` on
     """
     run = np.convolve(counted, np.ones(memory + 1, dtype=np.int64))[: counted.size]
     whole: Mask = run[counted][memory:] == memory + 1
     return whole
 
 
-# ----------------------------------------------------------------------------------------------------
-# A control signal between its steps: where noise is all that it differs from a line by, it is that line.
+# --- Steps of a control signal ---
 #
-# Noise of the recorded signal is none of the valve's, and a law that follows it steps in the force wherever the noise
-# turns. A level that is held and a ramp are lines; what is bent stays as it was recorded.
+# Noise of the recorded signal is not the valve's, and a law that follows it steps in the force wherever the noise
+# turns. A constant level and a ramp are lines; what is curved stays as recorded.
+
+FEWEST_FOR_LINE = 10
+"""Fewest samples of a stretch that is compared with a line."""
+LINE_TO_NOISE = 1.5
+"""Largest r.m.s. of a stretch about its line, in the noise of one sample, at which it is that line."""
 
 
-FEWEST = 10
-"""Samples from which a stretch is held against a line."""
-BY_NOISE = 1.5
-"""A stretch whose r.m.s. about its line is at most so many times the noise of a sample is that line."""
-
-
-def without_noise(values: Array) -> Array:
-    """A signal whose levels and ramps are free of noise.
+def denoised_control(values: Array) -> Array:
+    """Remove the noise from the levels and ramps of a control signal.
 
     Parameters
     ----------
-    values : (n,) of a signal that steps, is held, rises and falls
+    values : (n,) of a signal of steps, levels and ramps [any unit]
 
     Returns
     -------
-    (n,) by least squares on each stretch between two steps that is a line but for noise; the rest as it is
+    (n,) a least-squares line for each stretch between two steps that is a line but for noise; the rest unchanged
     """
     changes = np.diff(values)
     usual = np.median(changes) if changes.size else 0.0
-    scatter = USUAL * float(np.median(np.abs(changes - usual))) if changes.size else 0.0
+    scatter = MAD_TO_SIGMA * float(np.median(np.abs(changes - usual))) if changes.size else 0.0
     if scatter == 0.0:
         return values
     ends = np.flatnonzero(np.abs(changes - usual) > SUDDEN * scatter) + 1
     found = values.copy()
     for part in np.split(np.arange(values.size), ends):
-        if part.size >= FEWEST:
-            line = np.polyval(np.polyfit(part - part.mean(), values[part], 1), part - part.mean())
-            if np.sqrt(np.mean((values[part] - line) ** 2)) <= BY_NOISE * scatter / np.sqrt(2.0):
+        if part.size >= FEWEST_FOR_LINE:
+            centred = part - part.mean()
+            line = np.polyval(np.polyfit(centred, values[part], 1), centred)
+            if np.sqrt(np.mean((values[part] - line) ** 2)) <= LINE_TO_NOISE * scatter / np.sqrt(2.0):
                 found[part] = line
     return found

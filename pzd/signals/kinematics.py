@@ -1,28 +1,28 @@
-"""Velocity and acceleration from the displacement, never by differencing what was sampled.
+"""Velocity and acceleration from the displacement, without differencing samples.
 
-Where cycles repeat, their average is differentiated with the harmonics that stand out of their
-own scatter; elsewhere the displacement is smoothed as far as its noise asks for.
+Where cycles repeat, the average cycle is differentiated with the harmonics that exceed their own scatter; elsewhere
+the displacement is smoothed by cross-validation.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from pzd.record import Array
 from pzd.signals.cycles import Cycles
-from pzd.signals.smoothing import HIGHEST, low_pass, usual_step
+from pzd.signals.measures import usual_step
+from pzd.signals.smoothing import HIGHEST, low_pass
 
 STANDARD_ERRORS = 4.0
-"""A harmonic is kept where its mean exceeds this many standard errors of its scatter over cycles."""
-NOT_CYCLIC = 3.0
-"""Departures from the average cycle are followed up to this many times its frequency."""
+"""A harmonic is kept where its mean exceeds this many standard errors: noise does so once in 10^7."""
+DRIFT_CORNER = 3.0
+"""Corner of the drift about the average cycle, in cycles: quicker departures are noise."""
 
 
-@dataclass(frozen=True, eq=False)
-class Kinematics:
-    """The motion without its noise; every array is (n,)."""
+class Kinematics(NamedTuple):
+    """Motion without its noise, in the unit of the displacement and s; every array is (n,)."""
 
     displacement: Array
     velocity: Array
@@ -30,7 +30,7 @@ class Kinematics:
 
 
 def kinematics(time: Array, displacement: Array, run: Cycles | None) -> Kinematics:
-    """Displacement, velocity and acceleration without the noise of the displacement sensor.
+    """Compute displacement, velocity and acceleration without the noise of the displacement sensor.
 
     Parameters
     ----------
@@ -40,26 +40,24 @@ def kinematics(time: Array, displacement: Array, run: Cycles | None) -> Kinemati
 
     Returns
     -------
-    inside the run from the average cycle and what departs from it slowly, outside from the
-    smoothed displacement
+    inside the run from the average cycle plus a slow drift, outside from the smoothed displacement
     """
     if run is None:
-        return _smoothed(time, displacement, np.inf)
+        return _smoothed_motion(time, displacement, np.inf)
     inside = run.inside(time)
-    cyclic = _average_cycle(time, displacement - drift_of(time, displacement, run), run)
-    drift = _smoothed(time[inside], displacement[inside] - cyclic.displacement, NOT_CYCLIC * run.frequency)
-    parts = [cyclic.displacement + drift.displacement, cyclic.velocity + drift.velocity]
-    parts.append(cyclic.acceleration + drift.acceleration)
+    cyclic = _average_cycle(time, displacement - mean_over_period(time, displacement, run), run)
+    drift = _smoothed_motion(time[inside], displacement[inside] - cyclic.displacement, DRIFT_CORNER * run.frequency)
+    repeating = Kinematics(*(one + other for one, other in zip(cyclic, drift, strict=True)))
     if inside.all():
-        return Kinematics(*parts)
-    outside = _smoothed(time, displacement, np.inf)
-    for whole, part in zip((outside.displacement, outside.velocity, outside.acceleration), parts, strict=True):
+        return repeating
+    motion = _smoothed_motion(time, displacement, np.inf)
+    for whole, part in zip(motion, repeating, strict=True):
         whole[inside] = part
-    return outside
+    return motion
 
 
 def significant_harmonics(folded: Array) -> Array:
-    """Mask (points // 2 + 1,) of the harmonics whose mean stands out of its scatter over the cycles.
+    """Find the harmonics whose mean exceeds its scatter over the cycles, as a mask (points // 2 + 1,).
 
     Equation: abs(mean c_h) > 4 sqrt(sum abs(c_h - mean)^2 / (n (n - 1)))     Source: standard error of a complex mean
 
@@ -79,10 +77,10 @@ def significant_harmonics(folded: Array) -> Array:
     return result
 
 
-def drift_of(time: Array, displacement: Array, run: Cycles) -> Array:
-    """The mean over one period around every sample (n,), which no harmonic of the cycle moves.
+def mean_over_period(time: Array, displacement: Array, run: Cycles) -> Array:
+    """Compute the mean over one period around every sample (n,), to which no harmonic of the cycle contributes.
 
-    Half a cycle at either end of the run is continued as a straight line; outside it is held.
+    Half a cycle at either end of the run is extrapolated linearly; outside the run the mean is constant.
     """
     from scipy.integrate import cumulative_trapezoid
 
@@ -99,7 +97,7 @@ def drift_of(time: Array, displacement: Array, run: Cycles) -> Array:
 
 
 def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:
-    """The average cycle and its derivatives at the samples inside the run."""
+    """Return the average cycle and its derivatives at the samples inside the run."""
     from scipy.interpolate import CubicSpline
 
     folded = run.fold(time, displacement)
@@ -114,8 +112,8 @@ def _average_cycle(time: Array, displacement: Array, run: Cycles) -> Kinematics:
     return Kinematics(*np.ascontiguousarray(wrapped.T))
 
 
-def _smoothed(time: Array, displacement: Array, highest: float) -> Kinematics:
-    """The displacement smoothed as far as cross-validation asks, with a corner of at most `highest` [Hz]."""
+def _smoothed_motion(time: Array, displacement: Array, highest: float) -> Kinematics:
+    """Smooth the displacement by cross-validation, with a corner of at most `highest` [Hz]."""
     from scipy.interpolate import CubicSpline
 
     steps = np.diff(time)

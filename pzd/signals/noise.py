@@ -1,8 +1,7 @@
-"""Noise and misfit of a record that does not repeat: a smooth model of its residual is misfit, the rest noise.
+"""Noise of a record: linear recursions, autoregressive models, and pure error between cycles that ought to be equal.
 
-Whatever the damper misses is a function of motion, force, voltage and time; a model with many smooth
-functions of them takes it up, and what is left is noise. Whether the model takes up more than noise
-would let it is Fisher's test on the whitened residual.
+Adjacent cycles of a periodic test differ by noise alone, whatever a model misses: slow drift cancels, repeatable misfit
+cancels. Their differences give the noise as a short autoregressive model, and its variance at each harmonic.
 """
 
 from __future__ import annotations
@@ -15,285 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.compiled import compiled
-from pzd.record import Array, Complex, Mask, Record, sliced
-from pzd.signals.criterion import rms
-from pzd.signals.jumps import parted, slope_within, unbroken
+from pzd.record import Array, Complex
 
-# ----------------------------------------------------------------------------------------------------
-# Coloured noise as a short autoregressive model: its spectrum, its variance, and whitening by it.
+# --- Linear recursions: noise of first order, the warming of a lump, filters of any order ---
 
-
-ORDER_MAX = 12
-"""Longest model tried unless said otherwise: two poles each for sensor, amplifier and mains, and as many to spare."""
-SAMPLES_PER_ORDER = 20
-"""At least this many samples stand behind each coefficient: its standard error is then below 0.25."""
-WITH_PREDECESSORS = 0.5
-"""At least this share of the samples has as many predecessors in its stretch as the model has coefficients.
-
-Reason: the others say nothing of the last coefficients; not tuned."""
-FLOOR = 1e-12
-"""Innovation variance is never below this share of the variance: rounding is no noise model."""
-
-MORE_WITH_WHITE = 4
-"""Coefficients more that coloured noise takes together with white noise. Their sum is no autoregression of any length:
-one of the same length would be too quiet at low frequencies, where a gap is sought, by 28 % where each
-sample correlates with the one before by 0.9; with four more it is within 1 %."""
-GRID = 4096
-"""Frequencies over which a density is summed: enough for poles within 1e-3 of the unit circle."""
-
-
-@dataclass(frozen=True, eq=False)
-class Autoregression:
-    """Noise e_i = sum_j a_j e_(i-j) + w_i with white w."""
-
-    coefficients: Array
-    """(p,) a_1 ... a_p; empty for white noise."""
-    innovation: float
-    """Variance of w, in the square of the noise's unit."""
-
-    def whitened(self, series: Array) -> Array:
-        """The series (n,) or (n, m) without its colour, scaled to unit variance; the first p rows dropped.
-
-        Equation: w_i = (e_i - sum_j a_j e_(i-j)) / sigma_w      Source: Box and Jenkins 1970, ch. 3
-        """
-        p = self.coefficients.size
-        out = np.array(series[p:], dtype=np.float64)
-        for j, a in enumerate(self.coefficients, start=1):
-            out -= a * series[p - j : len(series) - j]
-        return out / np.sqrt(self.innovation) if self.innovation > 0.0 else out
-
-    def density(self, share_of_rate: Array) -> Array:
-        """Variance density at frequencies given as a share of the sampling rate.
-
-        Equation: S = sigma_w^2 / |1 - sum_j a_j exp(-2 pi i f j)|^2      Source: Box and Jenkins 1970, eq. (3.2.5)
-        """
-        j = np.arange(1, self.coefficients.size + 1)
-        response = 1.0 - np.exp(-2j * np.pi * np.outer(share_of_rate, j)) @ self.coefficients
-        density: Array = self.innovation / np.abs(response) ** 2
-        return density
-
-    @property
-    def whitening_filter(self) -> Array:
-        """(p + 1,) coefficients 1, -a_1, ... -a_p of the filter that gives w from e."""
-        return np.concatenate([np.ones(1), -self.coefficients])
-
-    @cached_property
-    def variance(self) -> float:
-        """Variance of the noise itself: the density summed over all frequencies."""
-        return float(np.mean(self._density_on_grid))
-
-    @cached_property
-    def _density_on_grid(self) -> Array:
-        """(GRID,) density in the middle of `GRID` bands of equal width, by a transform of the whitening filter."""
-        taps = self.whitening_filter
-        response = np.fft.fft(taps * np.exp(-1j * np.pi * np.arange(taps.size) / GRID), GRID)
-        return np.asarray(self.innovation / np.abs(response) ** 2)
-
-    def with_white(self, share: float) -> Autoregression:
-        """The noise together with white noise of a share of its variance, by a model of a few coefficients more.
-
-        Equation: R a = r, sigma_w^2 = r_0 - a r, r_0 (1 + share) in place of r_0      Source: Yule 1927, Walker 1931
-        """
-        from scipy.linalg import solve_toeplitz
-
-        if self.coefficients.size == 0 or self.innovation <= 0.0:
-            return self
-        shares = (np.arange(GRID) + 0.5) / GRID
-        lags = np.arange(self.coefficients.size + MORE_WITH_WHITE + 1)
-        r = np.cos(2.0 * np.pi * np.outer(lags, shares)) @ self._density_on_grid / GRID
-        r[0] *= 1.0 + share
-        a = solve_toeplitz(r[:-1], r[1:])
-        return Autoregression(a, float(r[0] - a @ r[1:]))
-
-
-def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autoregression:
-    """The short model that describes stretches of noise best, its order by the Bayesian criterion.
-
-    Equation: minimise the forward and backward prediction errors together       Source: Burg 1975
-    Equation: BIC = n ln sigma_p^2 + p ln n                                      Source: Schwarz 1978
-
-    Parameters
-    ----------
-    series : stretches (n_i,) of one noise, zero mean
-    order_max : longest model tried
-
-    Returns
-    -------
-    the model; white noise of variance 0 where the stretches are zero
-    """
-    sizes = np.array([stretch.size for stretch in series])
-    count = int(sizes.sum())
-    order_max = min(order_max, count // SAMPLES_PER_ORDER)
-    while order_max > 0 and np.maximum(sizes - order_max, 0).sum() < WITH_PREDECESSORS * count:
-        order_max -= 1
-    variance = whole = sum(float(stretch @ stretch) for stretch in series) / max(count, 1)
-    a = np.zeros(0)
-    best = Autoregression(a, variance)
-    if variance <= 0.0:
-        return best
-    best_bic = count * np.log(variance)
-    errors = [(stretch[1:].copy(), stretch[:-1].copy()) for stretch in series]
-    for order in range(1, order_max + 1):
-        total = sum(float(forward @ forward + backward @ backward) for forward, backward in errors)
-        if total <= 0.0:
-            break
-        reflection = 2.0 * sum(float(forward @ backward) for forward, backward in errors) / total
-        a = np.append(a - reflection * a[::-1], reflection)
-        variance *= 1.0 - reflection**2
-        if variance <= FLOOR * whole:
-            break
-        errors = [((f - reflection * b)[1:], (b - reflection * f)[:-1]) for f, b in errors]
-        bic = count * np.log(variance) + order * np.log(count)
-        if bic < best_bic:
-            best, best_bic = Autoregression(a.copy(), variance), bic
-    return best
-
-
-# ----------------------------------------------------------------------------------------------------
-# The noise of a record, apart from any model: what differs between cycles that ought to be equal.
-#
-# Adjacent cycles of a periodic test differ by noise alone, whatever the model misses: slow drift
-# cancels, repeatable misfit cancels. The noise is described by a short autoregressive model, and
-# at each harmonic of the test by the scatter of the differences themselves.
-
-
-BAND_LIMIT = 0.4
-"""Harmonics are judged up to this share of the sampling rate."""
-LOCAL = 16
-"""Fewest harmonics over which the local level of the noise is averaged."""
-COLOUR = 5.0
-"""Noise counts as at least so coloured (density at its peak over variance): a short record hides colour."""
-
-
-@dataclass(frozen=True, eq=False)
-class PureError:
-    """The harmonics of the average cycle, and how uncertain noise alone makes them."""
-
-    count: int
-    """Number of cycles."""
-    points: int
-    """Samples in a cycle."""
-    mean: Complex
-    """(H + 1,) Fourier coefficient of the average cycle at harmonics 0 ... H [N]; the cycle is
-    mean_0 + 2 Re sum_h mean_h exp(i h phase)."""
-    single: Array
-    """(H + 1,) variance |.|^2 of the coefficient of one cycle by noise [N^2]."""
-    freedom: Array
-    """(H + 1,) degrees of freedom of that variance."""
-    noise: Autoregression
-    """The noise of one sample."""
-    sample_variance: float
-    """Variance of one sample by noise [N^2]."""
-    shared: Array | float = 0.0
-    """(H + 1,) variance of the coefficient by what all cycles share, and more of them would not shrink [N^2]."""
-
-    @property
-    def of_mean(self) -> Array:
-        """(H + 1,) variance of the coefficient of the average cycle [N^2]."""
-        return self.single / self.count + self.shared
-
-
-def harmonics_of(points: int) -> int:
-    """Number H of harmonics up to the band limit of a cycle of that many samples."""
-    return max(int(BAND_LIMIT * points), 1)
-
-
-def pure_error(folded: Array) -> PureError:
-    """Noise of a periodic residual from the differences between adjacent cycles.
-
-    Equation: s_h^2 = mean_j |c_(j+1,h) - c_(j,h)|^2 / 2, averaged over neighbouring harmonics
-    after division by the autoregressive shape                      Source: von Neumann 1941
-
-    Parameters
-    ----------
-    folded : (cycles, points) residual, one row a cycle, at least two rows [N]
-    """
-    count, points = folded.shape
-    differences = np.diff(folded, axis=0)
-    noise = autoregression([(differences - differences.mean()).ravel() / np.sqrt(2.0)])
-    last = harmonics_of(points)
-    coefficients = np.fft.rfft(folded, axis=1)[:, : last + 1] / points
-    steps = np.diff(coefficients, axis=0)
-    shape = noise.density(np.arange(last + 1) / points) / points
-    shape = np.where(shape > 0.0, shape, 1.0)
-    own = np.mean(np.abs(steps) ** 2, axis=0) / 2.0 / shape
-    low, high = neighbours(last)
-    total = np.concatenate([[0.0], np.cumsum(own)])
-    local = (total[high + 1] - total[low]) / (high + 1 - low)
-    freedom = _with_shape(
-        np.asarray(_freedom(count) * (high + 1 - low), dtype=np.float64), shape * points, noise, differences.size
-    )
-    return PureError(
-        count,
-        points,
-        coefficients.mean(axis=0),
-        local * shape,
-        freedom,
-        noise,
-        float(np.mean(differences**2) / 2.0),
-    )
-
-
-def neighbours(last: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First and last harmonic, from 1 on, whose scatter describes the noise at each harmonic from 0 to the last.
-
-    Those within a third of its number, and at least `LOCAL` of them where there are so many.
-    """
-    h = np.arange(last + 1)
-    reach = np.maximum(h // 3, LOCAL // 2)
-    low = np.clip(h - reach, 1, max(last - LOCAL + 1, 1))
-    high = np.clip(np.maximum(h + reach, low + LOCAL - 1), 1, last)
-    return low, high
-
-
-def _freedom(count: int) -> float:
-    """Degrees of freedom of the variance of a complex coefficient from adjacent differences of `count` cycles.
-
-    Equation: nu = 4 (n - 1)^2 / (3 n - 4)                          Source: von Neumann 1941
-    """
-    return 4.0 * (count - 1) ** 2 / (3.0 * count - 4.0)
-
-
-def _with_shape(freedom: Array, density: Array, noise: Autoregression, samples: int) -> Array:
-    """Degrees of freedom that also allow for the uncertain shape: few independent samples, little is known.
-
-    Equation: 2 / nu = 2 / nu_local + (4 / n_eff) S_h / S_max, n_eff = n var / S_max; S_max at least `COLOUR` var
-                                        Source: delta method on S(0) = sigma_w^2 / (1 - a)^2, var a = (1 - a^2) / n
-    """
-    largest = float(density.max())
-    if noise.variance <= 0.0 or largest <= 0.0:
-        return freedom
-    independent = samples / max(largest / noise.variance, COLOUR)
-    total: Array = 2.0 / (2.0 / freedom + 4.0 / independent * density / largest)
-    return total
-
-
-def repeatable_power(error: PureError) -> Array:
-    """Power of the repeatable part of the residual at each harmonic, the noise's share taken off.
-
-    Equation: P_0 = c_0^2 - s_0^2,  P_h = 2 (|c_h|^2 - s_h^2)       Source: Parseval
-
-    What all cycles share by the noise of the displacement takes off at most what is there, at each harmonic.
-
-    Returns
-    -------
-    (H + 1,) mean square [N^2], unbiased, so that noise alone gives values around zero
-    """
-    weights = np.where(np.arange(error.mean.size) == 0, 1.0, 2.0)
-    repeats = np.abs(error.mean) ** 2 - error.single / error.count
-    power: Array = weights * (repeats - np.minimum(error.shared, np.maximum(repeats, 0.0)))
-    return power
-
-
-# ----------------------------------------------------------------------------------------------------
-# Linear recursions: coloured noise and the warming of a lump are of first order, filters of any.
-
-
-_FORGOTTEN = 1e-18
+_NEGLIGIBLE_SHARE = 1e-18
+"""Share of an input below which a recursion has forgotten it: far below rounding."""
 
 
 def recursion(memory: float, inputs: Array) -> Array:
-    """What a first-order memory makes of its inputs.
+    """Filter inputs by a first-order recursion.
 
     Equation: y_i = m y_(i-1) + u_i, y_(-1) = 0, that is (1 + m B)(1 + m^2 B^2)(1 + m^4 B^4) ... u
               Source: geometric series of the backward shift B, by doubling
@@ -306,17 +36,22 @@ def recursion(memory: float, inputs: Array) -> Array:
     Returns
     -------
     (n,) y
+
+    Examples
+    --------
+    >>> recursion(0.5, np.array([1.0, 0.0, 0.0])).tolist()
+    [1.0, 0.5, 0.25]
     """
     values = np.array(inputs, dtype=np.float64)
     shift, share = 1, memory
-    while shift < values.size and share > _FORGOTTEN:
+    while shift < values.size and share > _NEGLIGIBLE_SHARE:
         values[shift:] += share * values[:-shift]
         shift, share = 2 * shift, share * share
     return values
 
 
 def all_pole(coefficients: Array, inputs: Array) -> Array:
-    """What a memory of any order makes of its inputs, column by column.
+    """Filter inputs by a recursion of any order, column by column.
 
     Equation: y_i = u_i - a_1 y_(i-1) - a_2 y_(i-2) - ..., at rest before the first
 
@@ -342,129 +77,261 @@ def _recur(coefficients: Array, values: Array) -> None:
                 values[i, n] -= coefficients[j] * values[i - j, n]
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Coloured noise as a short autoregressive model ---
 
+ORDER_MAX = 12
+"""Default largest order: two poles each for sensor, amplifier and mains, and as many to spare."""
+SAMPLES_PER_ORDER = 20
+"""Fewest samples a coefficient: its standard error is then below 0.25."""
+WITH_PREDECESSORS = 0.5
+"""Least share of the samples with as many predecessors in their stretch as the model has coefficients.
 
-HATS = 8
-"""Piecewise linear functions over each quantity."""
-ROUNDS = 3
-"""Rounds of fitting the model and the colour of what it leaves."""
-SINGULAR = 1e-9
-"""Combinations of terms smaller than this share of the largest are the same term twice."""
-LAGS = (0.005, 0.02, 0.08)
-"""Time constants with which the force may follow a moving voltage [s]."""
-SAMPLES_PER_TERM = 20
-"""Fewest samples for each term of the model; with fewer nothing is judged."""
-
-QUIETEST = 0.05
-"""No frequency is believed to be quieter than this share of the noise's mean density.
-
-Reason: a filter against aliasing takes nearly all noise away near half the sampling rate, but not from the simulated
-force, whose corners would then count there as misfit; not tuned."""
+Reason: the others hold no information on the last coefficients; not tuned."""
+INNOVATION_FLOOR = 1e-12
+"""Least innovation variance, as a share of the variance: below it the model would describe rounding."""
+MORE_WITH_WHITE = 4
+"""Additional coefficients for coloured noise plus white noise. Their sum is no autoregression of finite order: one of
+the same order would be too quiet at low frequencies, where a gap is sought, by 28 % for a correlation of 0.9 from
+sample to sample; with four more it is within 1 %."""
+GRID = 4096
+"""Frequencies over which a density is summed: enough for poles within 1e-3 of the unit circle."""
 
 
 @dataclass(frozen=True, eq=False)
-class SmoothResidual:
-    """A residual parted into what a smooth model of many terms explains, and noise."""
+class Autoregression:
+    """Autoregressive noise e_i = sum_j a_j e_(i-j) + w_i with white w."""
 
-    explained: Array
-    """(m,) [N]."""
-    spread: Array
-    """(m,) variance that noise alone gives to what is explained [N^2]."""
-    noise: Autoregression
-    """What is left."""
-    probability: float
-    """That noise alone lets the model explain so much."""
+    coefficients: Array
+    """(p,) a_1 ... a_p; empty for white noise."""
+    innovation: float
+    """Variance of w, in the square of the noise's unit."""
+
+    def whitened(self, series: Array) -> Array:
+        """Whiten a series (n,) or (n, m) and scale it to unit variance; the first p rows are dropped.
+
+        Equation: w_i = (e_i - sum_j a_j e_(i-j)) / sigma_w      Source: Box and Jenkins 1970, ch. 3
+        """
+        p = self.coefficients.size
+        out = np.array(series[p:], dtype=np.float64)
+        for j, a in enumerate(self.coefficients, start=1):
+            out -= a * series[p - j : len(series) - j]
+        return out / np.sqrt(self.innovation) if self.innovation > 0.0 else out
+
+    def density(self, share_of_rate: Array) -> Array:
+        """Compute the variance density at frequencies given as a share of the sampling rate.
+
+        Equation: S = sigma_w^2 / |1 - sum_j a_j exp(-2 pi i f j)|^2      Source: Box and Jenkins 1970, eq. (3.2.5)
+        """
+        j = np.arange(1, self.coefficients.size + 1)
+        response = 1.0 - np.exp(-2j * np.pi * np.outer(share_of_rate, j)) @ self.coefficients
+        density: Array = self.innovation / np.abs(response) ** 2
+        return density
+
+    @property
+    def whitening_filter(self) -> Array:
+        """Coefficients (p + 1,) 1, -a_1, ... -a_p of the filter from e to w."""
+        return np.concatenate([np.ones(1), -self.coefficients])
+
+    @cached_property
+    def variance(self) -> float:
+        """Variance of the noise: the density summed over all frequencies."""
+        return float(np.mean(self._density_on_grid))
+
+    @cached_property
+    def _density_on_grid(self) -> Array:
+        """Density (GRID,) in the middle of bands of equal width, by a transform of the whitening filter."""
+        taps = self.whitening_filter
+        response = np.fft.fft(taps * np.exp(-1j * np.pi * np.arange(taps.size) / GRID), GRID)
+        return np.asarray(self.innovation / np.abs(response) ** 2)
+
+    def with_white(self, share: float) -> Autoregression:
+        """Add white noise of a share of the variance, by a model of a few more coefficients.
+
+        Equation: R a = r, sigma_w^2 = r_0 - a r, r_0 (1 + share) in place of r_0      Source: Yule 1927, Walker 1931
+        """
+        from scipy.linalg import solve_toeplitz
+
+        if self.coefficients.size == 0 or self.innovation <= 0.0:
+            return self
+        shares = (np.arange(GRID) + 0.5) / GRID
+        lags = np.arange(self.coefficients.size + MORE_WITH_WHITE + 1)
+        r = np.cos(2.0 * np.pi * np.outer(lags, shares)) @ self._density_on_grid / GRID
+        r[0] *= 1.0 + share
+        a = solve_toeplitz(r[:-1], r[1:])
+        return Autoregression(a, float(r[0] - a @ r[1:]))
 
 
-def fit_smooth_residual(residual: Array, record: Record, predicted: Array, counted: Mask) -> SmoothResidual:
-    """The residual of a record that does not repeat, parted into misfit and noise.
+def autoregression(series: Sequence[Array], order_max: int = ORDER_MAX) -> Autoregression:
+    """Fit an autoregressive model to stretches of noise, its order by the Bayesian criterion.
 
-    Noise that wanders hides a level or a slow term: of a term that the samples hardly tell no more is explained than
-    they tell, each of p being expected to explain as much as any other.
-
-    Equation: F = ((RSS_0 - RSS) / p) / (RSS / (n - p)) on the whitened residual     Source: Aitken 1935, Fisher
-    Equation: a_i = t / (t + s_i^2) times its estimate, t = sum r^2 / p, s_i its standard error
-                                                                            Source: Hoerl and Kennard 1970
+    Equation: minimise the forward and backward prediction errors together       Source: Burg 1975
+    Equation: BIC = n ln sigma_p^2 + p ln n                                      Source: Schwarz 1978
 
     Parameters
     ----------
-    residual : (m,) measured less predicted force, the test's nuisances taken off [N]
-    record : the motion, (n,)
-    predicted : (m,) force [N]
-    counted : (n,) which samples of the record these m are; what follows on one left out is not whitened by it
+    series : stretches (n_i,) of one noise, zero mean
+    order_max : largest order
+
+    Returns
+    -------
+    the model; white noise of variance 0 where the stretches are zero
     """
-    from scipy.special import fdtrc
-
-    terms = _terms(record, predicted, counted)
-    if residual.size < SAMPLES_PER_TERM * terms.shape[1]:
-        nothing = np.zeros(residual.size)
-        return SmoothResidual(nothing, nothing, autoregression([residual - residual.mean()]), 1.0)
-    basis = _orthonormal(terms)
-    explained = basis @ (basis.T @ residual)
-    expected = float(residual @ residual) / basis.shape[1]
-    for _ in range(ROUNDS):
-        noise = autoregression(parted(residual - explained, counted)).with_white(QUIETEST)
-        whole = unbroken(counted, noise.coefficients.size)
-        flat = noise.whitened(residual)[whole]
-        whitened = noise.whitened(basis)[whole]
-        _, sizes, right = np.linalg.svd(np.linalg.qr(whitened, mode="r"))
-        rank = int(np.count_nonzero(sizes > SINGULAR * sizes[0]))
-        taken = right[:rank] @ (whitened.T @ flat) / sizes[:rank]
-        known = sizes[:rank] ** 2 * expected
-        share = known / (known + 1.0) if noise.innovation > 0.0 else np.ones(rank)
-        to_samples = basis @ right[:rank].T * (share / sizes[:rank])
-        explained = to_samples @ taken
-    spread = np.sum(to_samples**2, axis=1) if noise.innovation > 0.0 else np.zeros(residual.size)
-    free = flat.size - rank - noise.coefficients.size
-    over = float(flat @ flat - taken @ taken)
-    # Of the white noise that QUIETEST puts beside coloured noise there may be none: then less is left than expected.
-    scale = max(over / free, 1.0 if noise.coefficients.size else 0.0)
-    ratio = float(taken @ taken) / rank / scale if over > 0.0 else np.inf
-    return SmoothResidual(explained, spread, noise, float(fdtrc(rank, free, ratio)))
+    sizes = np.array([stretch.size for stretch in series])
+    count = int(sizes.sum())
+    order_max = min(order_max, count // SAMPLES_PER_ORDER)
+    while order_max > 0 and np.maximum(sizes - order_max, 0).sum() < WITH_PREDECESSORS * count:
+        order_max -= 1
+    variance = whole = sum(float(stretch @ stretch) for stretch in series) / max(count, 1)
+    a = np.zeros(0)
+    best = Autoregression(a, variance)
+    if variance <= 0.0:
+        return best
+    best_bic = count * np.log(variance)
+    errors = [(stretch[1:].copy(), stretch[:-1].copy()) for stretch in series]
+    for order in range(1, order_max + 1):
+        total = sum(float(forward @ forward + backward @ backward) for forward, backward in errors)
+        if total <= 0.0:
+            break
+        reflection = 2.0 * sum(float(forward @ backward) for forward, backward in errors) / total
+        a = np.append(a - reflection * a[::-1], reflection)
+        variance *= 1.0 - reflection**2
+        if variance <= INNOVATION_FLOOR * whole:
+            break
+        errors = [((f - reflection * b)[1:], (b - reflection * f)[:-1]) for f, b in errors]
+        bic = count * np.log(variance) + order * np.log(count)
+        if bic < best_bic:
+            best, best_bic = Autoregression(a.copy(), variance), bic
+    return best
 
 
-def _orthonormal(terms: Array) -> Array:
-    """(m, r) orthonormal: all that sums of some (m, p) terms can be, each of them once."""
-    basis, triangle = np.linalg.qr(terms)
-    left, sizes, _ = np.linalg.svd(triangle)
-    return np.asarray(basis @ left[:, sizes > SINGULAR * sizes[0]])
+# --- Pure error ---
+
+BAND_LIMIT = 0.4
+"""Highest frequency of the harmonics judged, as a share of the sampling rate: anti-aliasing filters act above."""
+LOCAL_HARMONICS = 16
+"""Fewest harmonics over which the local level of the noise is averaged."""
+LEAST_COLOUR = 5.0
+"""Least colour of noise (peak density over variance): a short record hides colour."""
 
 
-def _terms(record: Record, predicted: Array, counted: Mask) -> Array:
-    """(m, p) smooth functions of motion, force, voltage and time, scaled to about one, without repeated columns."""
-    part = sliced(record, counted)
-    v, a = _scaled(part.velocity), _scaled(part.acceleration)
-    rate = _scaled(slope_within(predicted, counted))
-    columns = [
-        _hats(part.velocity),
-        _hats(part.displacement),
-        _hats(predicted),
-        np.column_stack([a, v * np.abs(v), a * np.sign(v), rate, np.abs(rate), _scaled(part.displacement) * v]),
-        _hats(part.time)[:, ::3],
-    ]
-    along = np.column_stack([np.sign(v), v])
-    if record.voltage is not None and part.voltage is not None and np.ptp(part.voltage) > 0.0:
-        columns.append(_hats(part.voltage)[:, ::2] * np.sign(v)[:, None])
-        columns += [_behind(record.voltage, tau * record.rate)[counted][:, None] * along for tau in LAGS]
-    return np.column_stack(columns)
+@dataclass(frozen=True, eq=False)
+class PureError:
+    """Harmonics of the average cycle, and their variance by noise alone."""
+
+    count: int
+    """Number of cycles."""
+    points: int
+    """Samples in a cycle."""
+    mean: Complex
+    """(H + 1,) Fourier coefficient of the average cycle at harmonics 0 ... H [N]; the cycle is
+    mean_0 + 2 Re sum_h mean_h exp(i h phase)."""
+    single: Array
+    """(H + 1,) variance |.|^2 of the coefficient of one cycle by noise [N^2]."""
+    freedom: Array
+    """(H + 1,) degrees of freedom of that variance."""
+    noise: Autoregression
+    """The noise of one sample."""
+    sample_variance: float
+    """Variance of one sample by noise [N^2]."""
+    shared: Array | float = 0.0
+    """(H + 1,) variance of the coefficient by errors that all cycles share; more cycles do not reduce it [N^2]."""
+
+    @property
+    def of_mean(self) -> Array:
+        """Variance (H + 1,) of the coefficient of the average cycle [N^2]."""
+        return self.single / self.count + self.shared
 
 
-def _behind(voltage: Array, samples: float) -> Array:
-    """What a first-order lag of so many samples leaves between the voltage and itself."""
-    from scipy.signal import lfilter
-
-    share = 1.0 - np.exp(-1.0 / samples)
-    lagged, _ = lfilter([share], [1.0, share - 1.0], voltage, zi=[voltage[0] * (1.0 - share)])
-    return _scaled(voltage - lagged)
+def harmonics_of(points: int) -> int:
+    """Return the number of harmonics up to the band limit of a cycle of so many samples."""
+    return max(int(BAND_LIMIT * points), 1)
 
 
-def _scaled(values: Array) -> Array:
-    size = rms(values)
-    return values / size if size > 0.0 else values
+def pure_error(folded: Array) -> PureError:
+    """Estimate the noise of a periodic residual from the differences between adjacent cycles.
+
+    Equation: s_h^2 = mean_j |c_(j+1,h) - c_(j,h)|^2 / 2, averaged over neighbouring harmonics
+    after division by the autoregressive shape                      Source: von Neumann 1941
+
+    Parameters
+    ----------
+    folded : (cycles, points) residual, one row a cycle, at least two rows [N]
+    """
+    count, points = folded.shape
+    differences = np.diff(folded, axis=0)
+    noise = autoregression([(differences - differences.mean()).ravel() / np.sqrt(2.0)])
+    last = harmonics_of(points)
+    coefficients = np.fft.rfft(folded, axis=1)[:, : last + 1] / points
+    steps = np.diff(coefficients, axis=0)
+    shape = noise.density(np.arange(last + 1) / points) / points
+    shape = np.where(shape > 0.0, shape, 1.0)
+    own = np.mean(np.abs(steps) ** 2, axis=0) / 2.0 / shape
+    low, high = neighbouring_harmonics(last)
+    total = np.concatenate([[0.0], np.cumsum(own)])
+    local = (total[high + 1] - total[low]) / (high + 1 - low)
+    freedom = _freedom_with_shape(
+        np.asarray(_degrees_of_freedom(count) * (high + 1 - low), dtype=np.float64),
+        shape * points,
+        noise,
+        differences.size,
+    )
+    return PureError(
+        count,
+        points,
+        coefficients.mean(axis=0),
+        local * shape,
+        freedom,
+        noise,
+        float(np.mean(differences**2) / 2.0),
+    )
 
 
-def _hats(values: Array) -> Array:
-    """(n, HATS) piecewise linear functions with nodes at even quantiles."""
-    nodes = np.unique(np.quantile(values, np.linspace(0.0, 1.0, HATS)))
-    return np.stack([np.interp(values, nodes, unit) for unit in np.eye(nodes.size)], axis=-1)
+def neighbouring_harmonics(last: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return first and last harmonic (from 1 on) whose scatter is averaged for the noise at each harmonic 0 ... last.
+
+    These are the harmonics within a third of its order, and at least `LOCAL_HARMONICS` where there are so many.
+    """
+    h = np.arange(last + 1)
+    reach = np.maximum(h // 3, LOCAL_HARMONICS // 2)
+    low = np.clip(h - reach, 1, max(last - LOCAL_HARMONICS + 1, 1))
+    high = np.clip(np.maximum(h + reach, low + LOCAL_HARMONICS - 1), 1, last)
+    return low, high
+
+
+def _degrees_of_freedom(count: int) -> float:
+    """Return the degrees of freedom of the variance of a complex coefficient from differences of `count` cycles.
+
+    Equation: nu = 4 (n - 1)^2 / (3 n - 4)                          Source: von Neumann 1941
+    """
+    return 4.0 * (count - 1) ** 2 / (3.0 * count - 4.0)
+
+
+def _freedom_with_shape(freedom: Array, density: Array, noise: Autoregression, samples: int) -> Array:
+    """Reduce the degrees of freedom by the uncertainty of the spectral shape, which few independent samples determine.
+
+    Equation: 2 / nu = 2 / nu_local + (4 / n_eff) S_h / S_max, n_eff = n var / S_max; S_max at least 5 var
+                                        Source: delta method on S(0) = sigma_w^2 / (1 - a)^2, var a = (1 - a^2) / n
+    """
+    largest = float(density.max())
+    if noise.variance <= 0.0 or largest <= 0.0:
+        return freedom
+    independent = samples / max(largest / noise.variance, LEAST_COLOUR)
+    total: Array = 2.0 / (2.0 / freedom + 4.0 / independent * density / largest)
+    return total
+
+
+def repeatable_power(error: PureError) -> Array:
+    """Estimate the power of the repeatable part of the residual at each harmonic, the share of the noise subtracted.
+
+    Equation: P_0 = c_0^2 - s_0^2,  P_h = 2 (|c_h|^2 - s_h^2)       Source: Parseval
+
+    Errors shared by all cycles (noise of the displacement) are subtracted down to zero at most, at each harmonic.
+
+    Returns
+    -------
+    (H + 1,) mean square [N^2], unbiased: noise alone gives values around zero
+    """
+    weights = np.where(np.arange(error.mean.size) == 0, 1.0, 2.0)
+    repeats = np.abs(error.mean) ** 2 - error.single / error.count
+    power: Array = weights * (repeats - np.minimum(error.shared, np.maximum(repeats, 0.0)))
+    return power

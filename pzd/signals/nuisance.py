@@ -1,4 +1,4 @@
-"""What may differ from test to test without being an effect: offset, gain and delay of the force."""
+"""Nuisance parameters of a test: offset, gain and delay of the force, which differ from test to test."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from pydantic import Field
 
 from pzd.record import Array, Mask
 from pzd.schema.model import Frozen
-from pzd.signals.jumps import slope_within
+from pzd.signals.jumps import gradient_within_stretches
 
-TIMED = 2
-"""Columns from this one on say when a force comes; those before it, how large it is."""
-AT_MOST = 3.5
-"""Offset, gain, delay and the instant of the voltage explain at most so many standard deviations of a test: chance
-goes further in one of two thousand; more is a gap. What all tests share shows in the fits, whatever this allows."""
+FIRST_TIMING_COLUMN = 2
+"""Index of the first column of timing (delay, instant of the voltage); those before it are of size (offset, gain)."""
+NUISANCE_LIMIT = 3.5
+"""Largest nuisance of a test, in standard deviations of its prior: chance exceeds it in one of two thousand tests; a
+larger one is a gap of the model. What all tests share shows in the fits, whatever this allows."""
 
 
 class NuisanceConfig(Frozen):
-    """What may differ from test to test without being an effect: standard deviations, zero mean."""
+    """Standard deviations of what differs from test to test without being an effect; the means are zero."""
 
     offset: float = Field(default=0.005, ge=0.0, le=0.5)
     """Offset of the force, as a share of the test's peak force."""
@@ -28,7 +28,7 @@ class NuisanceConfig(Frozen):
     """Gain of the force, as a share of it."""
 
 
-def nuisance(
+def nuisance_forces(
     residual: Array,
     predicted: Array,
     rate: float,
@@ -38,7 +38,7 @@ def nuisance(
     calm: NDArray[np.bool_],
     counted: Mask,
 ) -> tuple[Array, Array]:
-    """The part of a residual that offset, gain and delay of the test explain within their priors.
+    """Compute the part of a residual that offset, gain and delay of the test explain within their priors.
 
     Equation: min_b |r - A b|^2 / s^2 + |b|^2, |b_i| <= 3.5, A = [sd_o peak, sd_g F, -sd_d dF/dt, sd_t dF/dt_U]
                                                                     Source: Gaussian prior, truncated
@@ -50,26 +50,28 @@ def nuisance(
     rate : sampling rate [Hz]
     variance : of the noise [N^2]
     config : standard deviations of the priors
-    timing : (m, 1) what one standard deviation of the voltage's instant makes of the force [N]; (m, 0) without
-    calm : (m,) the samples that count, those beside no jump
+    timing : (m, 1) force by one standard deviation of the instant of the voltage [N]; (m, 0) without
+    calm : (m,) the samples that enter the estimate, those beside no jump
     counted : (n,) which samples of the record these m are
 
     Returns
     -------
-    (m,) force by offset and gain, and (m,) by when it comes [N]; beside a jump, where the slope of the force is that of
-    one sample, the second may be far from anything that a delay does
+    (m,) force by offset and gain, and (m,) by timing [N]; beside a jump, where the slope of the force is that of one
+    sample, the second is not meaningful
     """
-    columns = np.hstack([columns_of(predicted, rate, config, counted), timing])
+    columns = np.hstack([nuisance_columns(predicted, rate, config, counted), timing])
     weight = max(variance, 1e-12 * float(np.max(np.abs(predicted))) ** 2)
     kept = columns[calm]
     normal = kept.T @ kept / weight + np.eye(columns.shape[1])
     estimate = np.linalg.solve(normal, kept.T @ residual[calm] / weight)
-    within = np.clip(estimate, -AT_MOST, AT_MOST)
-    return columns[:, :TIMED] @ within[:TIMED], columns[:, TIMED:] @ within[TIMED:]
+    within = np.clip(estimate, -NUISANCE_LIMIT, NUISANCE_LIMIT)
+    return columns[:, :FIRST_TIMING_COLUMN] @ within[:FIRST_TIMING_COLUMN], columns[:, FIRST_TIMING_COLUMN:] @ within[
+        FIRST_TIMING_COLUMN:
+    ]
 
 
-def columns_of(predicted: Array, rate: float, config: NuisanceConfig, counted: Mask | None = None) -> Array:
-    """(m, 3) force [N] that one standard deviation of offset, gain and delay makes of a predicted force.
+def nuisance_columns(predicted: Array, rate: float, config: NuisanceConfig, counted: Mask | None = None) -> Array:
+    """Return the force (m, 3) [N] by one standard deviation of offset, of gain and of delay.
 
     Parameters
     ----------
@@ -78,12 +80,7 @@ def columns_of(predicted: Array, rate: float, config: NuisanceConfig, counted: M
     config : standard deviations of the priors
     counted : (n,) which samples of the record these m are; None for all
     """
-    slope = np.gradient(predicted) if counted is None else slope_within(predicted, counted)
+    slope = np.gradient(predicted) if counted is None else gradient_within_stretches(predicted, counted)
     peak = float(np.max(np.abs(predicted)))
-    return np.column_stack(
-        [
-            np.full(predicted.size, config.offset * peak),
-            config.gain * predicted,
-            -config.delay_s * slope * rate,
-        ]
-    )
+    offset = np.full(predicted.size, config.offset * peak)
+    return np.column_stack([offset, config.gain * predicted, -config.delay_s * slope * rate])

@@ -19,7 +19,7 @@ from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.quantities import Control
 from pzd.record import Array, Record
-from pzd.signals.nuisance import NuisanceConfig, nuisance
+from pzd.signals.nuisance import NuisanceConfig, nuisance_forces
 
 TWO = (0.0, 150.0)
 NEIGHBOURS = ("preload_offset", "asymmetry", "gas_spring")
@@ -185,7 +185,7 @@ def test_a_nuisance_explains_a_pure_delay() -> None:
     late = 1000.0 * np.sin(4 * np.pi * (t - 4e-4)) - force
     everything = np.ones(t.size, dtype=np.bool_)
     explained = sum(
-        nuisance(late, force, 1000.0, 1e-2, NuisanceConfig(), np.zeros((t.size, 0)), everything, everything)
+        nuisance_forces(late, force, 1000.0, 1e-2, NuisanceConfig(), np.zeros((t.size, 0)), everything, everything)
     )
     assert np.max(np.abs(explained - late)) < 0.03 * np.max(np.abs(late))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from campaign import coloured
 
-from pzd.signals.lack_of_fit import bands, by_harmonics, by_trend, pooled
+from pzd.signals.lack_of_fit import octave_bands, p_value_of_trend, p_values_by_harmonics, pooled_p_value
 from pzd.signals.noise import autoregression, pure_error, repeatable_power
 
 COLOURS = (0.0, 0.5, 0.9)
@@ -59,12 +59,12 @@ def test_false_alarms_are_as_rare_as_they_say(
     rng: np.random.Generator, colour: float, cycles: int, points: int
 ) -> None:
     found = [
-        by_harmonics(pure_error(coloured(rng, cycles * points, 1.0, colour).reshape(cycles, points)))
+        p_values_by_harmonics(pure_error(coloured(rng, cycles * points, 1.0, colour).reshape(cycles, points)))
         for _ in range(160)
     ]
     every = np.concatenate(found)
     assert np.mean(every < 0.01) < 0.01 + 4.0 * np.sqrt(0.01 / every.size) + 0.01
-    campaigns = [pooled(found[i : i + 16]) for i in range(0, 160, 16)]
+    campaigns = [pooled_p_value(found[i : i + 16]) for i in range(0, 160, 16)]
     if colour <= 0.9:
         assert every.min() * every.size > 1e-4
         assert min(campaigns) > 1e-4
@@ -83,37 +83,37 @@ def test_a_trend_is_seen_and_noise_is_not(rng: np.random.Generator, colour: floa
     quiet, drifting = [], []
     for _ in range(60):
         noise = coloured(rng, 4000, 1.0, colour).reshape(10, 400)
-        quiet.append(by_trend(noise))
-        drifting.append(by_trend(noise + rise * np.arange(10)[:, None] * shape))
+        quiet.append(p_value_of_trend(noise))
+        drifting.append(p_value_of_trend(noise + rise * np.arange(10)[:, None] * shape))
     assert min(p for p in quiet if p is not None) > 1e-5
     assert max(p for p in drifting if p is not None) < 1e-4
 
 
 def test_three_cycles_show_no_trend(rng: np.random.Generator) -> None:
-    assert by_trend(coloured(rng, 600, 1.0, 0.5).reshape(3, 200)) is None
+    assert p_value_of_trend(coloured(rng, 600, 1.0, 0.5).reshape(3, 200)) is None
 
 
 def test_a_repeatable_misfit_below_the_noise_is_found(rng: np.random.Generator) -> None:
     misfit = 0.5 * np.sin(6 * np.pi * np.arange(500) / 500)
     for _ in range(20):
         error = pure_error(coloured(rng, 5000, 1.0, 0.5).reshape(10, 500) + misfit)
-        assert pooled([by_harmonics(error)]) < 1e-4
+        assert pooled_p_value([p_values_by_harmonics(error)]) < 1e-4
 
 
 def test_what_every_test_shows_a_little_adds_up(rng: np.random.Generator) -> None:
     found = []
     for _ in range(16):
         misfit = 0.25 * np.sin(6 * np.pi * np.arange(500) / 500 + rng.uniform(0, 6))
-        found.append(by_harmonics(pure_error(coloured(rng, 5000, 1.0, 0.5).reshape(10, 500) + misfit)))
-    assert pooled(found) < 1e-6
+        found.append(p_values_by_harmonics(pure_error(coloured(rng, 5000, 1.0, 0.5).reshape(10, 500) + misfit)))
+    assert pooled_p_value(found) < 1e-6
 
 
 def test_bands_are_octaves_that_leave_no_harmonic_out() -> None:
-    assert bands(9) == [(0, 0), (1, 1), (2, 3), (4, 7), (8, 9)]
+    assert octave_bands(9) == [(0, 0), (1, 1), (2, 3), (4, 7), (8, 9)]
     for last in (1, 2, 31, 32, 200):
-        covered = [h for low, high in bands(last) for h in range(low, high + 1)]
+        covered = [h for low, high in octave_bands(last) for h in range(low, high + 1)]
         assert covered == list(range(last + 1))
 
 
 def test_too_few_differences_are_not_judged(rng: np.random.Generator) -> None:
-    assert np.all(by_harmonics(pure_error(coloured(rng, 80, 1.0, 0.9).reshape(2, 40))) == 1.0)
+    assert np.all(p_values_by_harmonics(pure_error(coloured(rng, 80, 1.0, 0.9).reshape(2, 40))) == 1.0)

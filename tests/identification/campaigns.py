@@ -16,7 +16,7 @@ from pzd.damper.effect import Scales
 from pzd.damper.effects import library
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.identification.prepared_record import Bingham
+from pzd.identification.bingham_fit import Bingham
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig
 

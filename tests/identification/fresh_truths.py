@@ -12,8 +12,8 @@ from pzd.damper.compose import respond
 from pzd.damper.element import element_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.identification.bingham_fit import Bingham
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.prepared_record import Bingham
 from pzd.paper.published import published
 from pzd.record import Array, Record
 from pzd.signals.nuisance import NuisanceConfig

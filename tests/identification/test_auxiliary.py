@@ -1,4 +1,4 @@
-"""Gas beside the element: T0, C and k stay unbiased, and what stands beside them is told with an interval."""
+"""Gas beside the element: T0, C and k stay unbiased, and the forces beside them have intervals."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import pytest
 from fresh_truths import TABLE_2, moving_test, sine_test, with_noise
 
 from pzd.artefacts import AuxiliaryRow, Identified, ParameterRow, Rig, base_of
+from pzd.identification.bingham_fit import Bingham, fit_separable
+from pzd.identification.condition import fit_with_auxiliary, identify_condition
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.fit import fit_separable, fit_with_auxiliary, identify_condition
-from pzd.identification.prepared_record import Bingham
 from pzd.identification.stage import identify
 from pzd.quantities import Control
 from pzd.record import Condition, Record
@@ -43,38 +43,38 @@ def identified(records: tuple[Record, ...]) -> tuple[ParameterRow, AuxiliaryRow 
 
 
 def test_a_gas_charge_biases_neither_friction_nor_damping_nor_spring(rng: np.random.Generator) -> None:
-    row, beside = identified(on_the_rig(RACING, rng, GAS))
+    row, auxiliary = identified(on_the_rig(RACING, rng, GAS))
     # The interval of T0 is 9 to 13 % wide to either side, and from 10 % on it is called weak: in 7 of 16 draws.
     assert re.fullmatch(r"ok|weak: T0 \(95 % interval of \+-1\d %\)", row.status)
     assert row.W_s < 0.01
     assert pytest.approx(RACING.friction, rel=0.15) == row.T0_N
     assert row.C_Ns_per_m == pytest.approx(RACING.damping, rel=0.05)
     assert row.k_N_per_m == pytest.approx(RACING.stiffness, rel=0.1)
-    assert beside is not None
-    assert pytest.approx(GAS[0], rel=0.05) == beside.F_0_N
-    assert beside.k_g_N_per_m == pytest.approx(GAS[1], rel=0.05)
+    assert auxiliary is not None
+    assert pytest.approx(GAS[0], rel=0.05) == auxiliary.F_0_N
+    assert auxiliary.k_g_N_per_m == pytest.approx(GAS[1], rel=0.05)
 
 
 @pytest.mark.ci
 def test_the_intervals_of_a_gas_charge_hold_it_nineteen_times_in_twenty(rng: np.random.Generator) -> None:
     held = []
     for _ in range(8):
-        _, beside = identified(on_the_rig(ROAD, rng, (250.0, 3000.0)))
-        assert beside is not None
-        held += [beside.F_0_N_low95 <= 250.0 <= beside.F_0_N_high95]
-        held += [beside.k_g_N_per_m_low95 <= 3000.0 <= beside.k_g_N_per_m_high95]
+        _, auxiliary = identified(on_the_rig(ROAD, rng, (250.0, 3000.0)))
+        assert auxiliary is not None
+        held += [auxiliary.F_0_N_low95 <= 250.0 <= auxiliary.F_0_N_high95]
+        held += [auxiliary.k_g_N_per_m_low95 <= 3000.0 <= auxiliary.k_g_N_per_m_high95]
     # 16 intervals of 95 %: fewer than 13 hold the truth in seven of a thousand runs of a right method.
     assert sum(held) >= 13
 
 
-def test_where_the_zero_of_the_displacement_lies_changes_nothing(rng: np.random.Generator) -> None:
+def test_the_zero_of_the_displacement_changes_neither_gas_nor_parameters(rng: np.random.Generator) -> None:
     records = on_the_rig(RACING, rng, GAS)
-    row, beside = identified(records)
+    row, auxiliary = identified(records)
     moved_row, moved = identified(tuple(replace(r, displacement=r.displacement + 0.031) for r in records))
-    assert beside is not None
+    assert auxiliary is not None
     assert moved is not None
-    assert moved.zero_m - beside.zero_m == pytest.approx(0.031)
-    assert pytest.approx(beside.F_0_N, rel=1e-6) == moved.F_0_N
+    assert moved.zero_m - auxiliary.zero_m == pytest.approx(0.031)
+    assert pytest.approx(auxiliary.F_0_N, rel=1e-6) == moved.F_0_N
     assert pytest.approx(row.T0_N, rel=1e-6) == moved_row.T0_N
     assert moved_row.k_N_per_m == pytest.approx(row.k_N_per_m, rel=1e-6)
 
@@ -90,7 +90,9 @@ def test_a_damper_without_gas_is_fitted_by_the_element_alone(truth: Bingham, rng
         assert fit.parameters == fit_separable(objective).parameters
 
 
-def test_the_plain_damper_handed_on_has_no_gas_and_the_file_tells_it(rng: np.random.Generator, tmp_path: Path) -> None:
+def test_the_identified_damper_has_no_gas_and_the_file_of_auxiliary_forces_has_it(
+    rng: np.random.Generator, tmp_path: Path
+) -> None:
     found = identify(IdentifyConfig(), Rig(on_the_rig(RACING, rng, GAS), ()), 1)
     assert base_of(found.rows, None).effects == {}
     found.write(tmp_path, Control())
@@ -103,7 +105,7 @@ def test_the_plain_damper_handed_on_has_no_gas_and_the_file_tells_it(rng: np.ran
     assert Identified.read(tmp_path, Control()).auxiliary == found.auxiliary
 
 
-def test_records_with_a_moving_voltage_are_freed_of_the_gas_that_the_others_show(rng: np.random.Generator) -> None:
+def test_the_gas_of_constant_records_is_subtracted_from_records_of_moving_voltage(rng: np.random.Generator) -> None:
     """A node that only moving records reach: its friction is that of the damper without gas to within the noise."""
 
     def charged(record: Record) -> Record:

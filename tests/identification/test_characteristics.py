@@ -1,4 +1,4 @@
-"""What tests show without a model, against closed forms: force over speed, gas force, friction, response to a step."""
+"""Characteristics of tests against closed forms: force over speed, gas force, friction, response to a step."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from pzd.damper.compose import respond
 from pzd.damper.element import element_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.identification.prepared_record import Bingham
-from pzd.identification.tests_over_time import characteristics
+from pzd.identification.bingham_fit import Bingham
+from pzd.identification.characteristics import characteristics
 from pzd.quantities import Control
 from pzd.record import Array, Record, conditions
 from pzd.schema.errors import DataError
@@ -105,7 +105,7 @@ def test_one_cycle_in_any_phase_shows_what_many_show(phase: float) -> None:
     assert forces(single) == pytest.approx(forces(repeated), rel=3e-3)
 
 
-def test_when_and_where_a_test_was_run_is_no_matter() -> None:
+def test_characteristics_do_not_depend_on_time_and_zero_of_a_test() -> None:
     record = sine_test(TABLE_2[0.0], 2.0, 0.03)
     shifted = replace(record, time=record.time + 1234.5, displacement=record.displacement + 0.31)
     (here,), (there,) = of(record).peak_velocity, of(shifted).peak_velocity
@@ -125,7 +125,7 @@ def test_a_damper_turned_round_swaps_rebound_and_compression() -> None:
 
 
 @pytest.mark.parametrize("every", [2, 5])
-def test_the_sampling_rate_is_no_matter(every: int) -> None:
+def test_characteristics_do_not_depend_on_the_sampling_rate(every: int) -> None:
     for record in (sine_test(TABLE_2[0.0], 2.0, 0.03), at_constant_speed((0.131, 0.524), TABLE_2[0.0])):
         channels = ("time", "displacement", "velocity", "acceleration", "force")
         coarse = replace(record, **{name: getattr(record, name)[::every] for name in channels})
@@ -183,7 +183,7 @@ def knock(name: str) -> Record:
     return Record(name, None, time, x, v, np.gradient(v, time), force)
 
 
-def test_a_knock_is_told_as_it_stands_by_its_extremes_alone() -> None:
+def test_a_knock_has_a_row_of_its_extremes_alone() -> None:
     record = knock("knock")
     found = of(record, at_constant_speed((0.131,), TABLE_2[0.0]))
     assert {row.record for row in found.peak_velocity} == {"r"}
@@ -195,7 +195,7 @@ def test_a_knock_is_told_as_it_stands_by_its_extremes_alone() -> None:
     assert row.duration_s == pytest.approx(0.499)
 
 
-def test_several_tests_without_a_pause_are_told_apart() -> None:
+def test_several_tests_without_a_pause_have_a_row_each() -> None:
     truth, speeds = TABLE_2[0.0], []
     parts = [(1.0, 6.0), (2.0, 3.0)]
 
@@ -324,7 +324,7 @@ def test_a_ramp_of_the_voltage_is_no_step() -> None:
 # ---------------------------------------------------------------- the files
 
 
-def test_they_are_written_and_read_back_under_the_name_of_the_control(tmp_path: Path) -> None:
+def test_step_responses_are_written_and_read_back_under_the_name_of_the_control(tmp_path: Path) -> None:
     current = Control("current", "A")
     found = of(sine_test(TABLE_2[0.0], 2.0, 0.03, voltage=0.0), stepped(triangle, 4.0))
     found.write(tmp_path, current)

@@ -1,4 +1,4 @@
-"""Intervals hold the truth: under coloured noise, with sensors that differ from test to test, and a small misfit."""
+"""Coverage of the intervals: under coloured noise, with sensors that differ from test to test, and a small misfit."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from campaigns import CYCLES, campaign
 from fresh_truths import SENSORS_ALIKE, TABLE_2, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
+from pzd.identification.bingham_fit import Bingham
+from pzd.identification.condition import fit_with_auxiliary, identify_condition
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.fit import fit_with_auxiliary, identify_condition
 from pzd.identification.intervals import half_widths, uncertainty
-from pzd.identification.prepared_record import Bingham, Part, parts_of
-from pzd.identification.trust import VISIBLE, Misfit, misfit_of
+from pzd.identification.prepared_record import FittedRecord, fitted_records
+from pzd.identification.trust import Misfit, misfit_of
 from pzd.record import Array, Condition, Record
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -33,15 +34,17 @@ def held(row: ParameterRow, truth: Bingham) -> int:
     )
 
 
-def parts_for(records: Sequence[Record], config: IdentifyConfig) -> tuple[tuple[Part, ...], Array]:
-    """The parts of a fit, and its estimate."""
+def fitted_for(records: Sequence[Record], config: IdentifyConfig) -> tuple[tuple[FittedRecord, ...], Array]:
+    """Fit the records; return them with residuals and slopes, and the estimate."""
     objective, fit, _ = fit_with_auxiliary(records, config, seed=1)
-    return parts_of(records, objective.trials, (fit.residuals, fit.slopes), config.nuisance), np.array(fit.parameters)
+    return fitted_records(records, objective.prepared, (fit.residuals, fit.slopes), config.nuisance), np.array(
+        fit.parameters
+    )
 
 
 def relative_widths(records: Sequence[Record], config: IdentifyConfig) -> Array:
-    parts, estimate = parts_for(records, config)
-    return half_widths(parts, misfit_of(parts)) / estimate
+    fitted, estimate = fitted_for(records, config)
+    return half_widths(fitted, misfit_of(fitted)) / estimate
 
 
 @pytest.mark.ci
@@ -79,7 +82,7 @@ def test_intervals_hold_the_truth_where_sensors_differ_and_a_little_is_hidden(rn
     assert 0.87 <= found / (3 * ok) <= 0.995
 
 
-def test_what_differs_from_cycle_to_cycle_widens_an_interval_though_no_colour_of_noise_shows_it(
+def test_scatter_between_cycles_widens_an_interval_that_the_colour_of_the_noise_does_not(
     rng: np.random.Generator,
 ) -> None:
     # Every cycle has a gain of its own, by 5 %, which is a C of its own; the colour of the residual knows of no cycles.
@@ -87,10 +90,10 @@ def test_what_differs_from_cycle_to_cycle_widens_an_interval_though_no_colour_of
     for draw in rng.spawn(12):
         record = sine_test(truth, 2.0, 0.03, cycles=CYCLES + 2, rate=500)
         gain = 1.0 + 0.05 * draw.standard_normal(CYCLES + 3)[(record.time * 2.0).astype(int)]
-        parts, estimate = parts_for([replace(record, force=gain * record.force)], SENSORS_ALIKE)
-        widths = half_widths(parts, misfit_of(parts))
+        fitted, estimate = fitted_for([replace(record, force=gain * record.force)], SENSORS_ALIKE)
+        widths = half_widths(fitted, misfit_of(fitted))
         covered += np.count_nonzero(np.abs(estimate - np.array(truth)) <= widths)
-        colour = uncertainty(parts[0].slopes, parts[0].residuals, [parts[0].residuals.size])
+        colour = uncertainty(fitted[0].slopes, fitted[0].residuals, [fitted[0].residuals.size])
         wider.append(widths[1] / colour.half_widths()[1])
     # The median is 2.2 to 2.3; of 36 intervals at 0.95 that hang together by three, 28 is four deviations off.
     assert np.median(wider) > 1.8
@@ -125,13 +128,13 @@ def test_tests_that_disagree_widen_the_interval_and_tests_that_agree_narrow_it(r
 
 def relative_widths_by_priors(records: Sequence[Record]) -> Array:
     """Of the same estimate, were nothing known of the sensors but their priors."""
-    parts, estimate = parts_for(records, IdentifyConfig())
-    slopes = np.concatenate([p.slopes for p in parts])
-    pulls = [np.linalg.inv(slopes.T @ slopes) @ p.slopes.T @ p.nuisances for p in parts]
+    fitted, estimate = fitted_for(records, IdentifyConfig())
+    slopes = np.concatenate([p.slopes for p in fitted])
+    pulls = [np.linalg.inv(slopes.T @ slopes) @ p.slopes.T @ p.nuisances for p in fitted]
     return np.asarray(1.96 * np.sqrt(sum(np.sum(p**2, axis=1) for p in pulls)) / estimate)
 
 
-def test_few_cycles_leave_more_open_than_their_number_says(rng: np.random.Generator) -> None:
+def test_few_cycles_widen_the_interval_beyond_the_root_of_their_number(rng: np.random.Generator) -> None:
     """Two cycles against twenty, by the r.m.s. of the widths: two show their own scatter so badly that every fourth
     width is no larger than that of twenty, and every fourth more than seven times as large."""
     long = with_noise(sine_test(TABLE_2[0.0], 2.0, 0.03, cycles=20.5, rate=500), rng, 0.02)
@@ -143,25 +146,25 @@ def test_few_cycles_leave_more_open_than_their_number_says(rng: np.random.Genera
     assert wider[2] > np.sqrt(10.0)
 
 
-def test_a_misfit_too_small_to_speak_widens_the_interval(rng: np.random.Generator) -> None:
+def test_a_misfit_below_the_threshold_widens_the_interval(rng: np.random.Generator) -> None:
     records = [with_noise(sine_test(TABLE_2[0.0], 2.0, 0.02, rate=500), rng, 0.002)]
     bent = [replace(r, force=r.force + 300.0 * r.velocity * np.abs(r.velocity)) for r in records]
-    parts, _ = parts_for(bent, IdentifyConfig())
-    misfit = misfit_of(parts)
-    assert 0.0 < misfit.share < VISIBLE
-    assert np.all(half_widths(parts, misfit) > 1.05 * half_widths(parts, Misfit(0.0, 0.0)))
+    fitted, _ = fitted_for(bent, IdentifyConfig())
+    misfit = misfit_of(fitted)
+    assert 0.0 < misfit.share < 0.0025
+    assert np.all(half_widths(fitted, misfit) > 1.05 * half_widths(fitted, Misfit(0.0, 0.0)))
 
 
 def test_a_parameter_that_does_nothing_has_no_interval() -> None:
-    parts, _ = parts_for([sine_test(TABLE_2[0.0], 2.0, 0.03, rate=500)], IdentifyConfig())
-    idle = [replace(p, slopes=np.column_stack([p.slopes[:, :2], np.zeros(p.residuals.size)])) for p in parts]
+    fitted, _ = fitted_for([sine_test(TABLE_2[0.0], 2.0, 0.03, rate=500)], IdentifyConfig())
+    idle = [replace(p, slopes=np.column_stack([p.slopes[:, :2], np.zeros(p.residuals.size)])) for p in fitted]
     widths = half_widths(idle, misfit_of(idle))
     assert np.all(np.isfinite(widths[:2]))
     assert np.isinf(widths[2])
 
 
 @pytest.mark.parametrize("kind", ["one sine", "five tests", "one random"])
-def test_the_estimate_is_what_it_was_whatever_its_interval(kind, rng: np.random.Generator) -> None:
+def test_the_row_holds_the_estimate_of_the_fit(kind, rng: np.random.Generator) -> None:
     _, records = campaign(rng, kind, hidden=0.1)
     _, fit, _ = fit_with_auxiliary(records, IdentifyConfig(), seed=1)
     row = row_for(records, IdentifyConfig())
@@ -180,7 +183,7 @@ def test_a_law_that_grows_with_the_square_of_the_speed_may_hide_in_c_of_a_single
     assert relative_widths([quiet], SENSORS_ALIKE)[1] > 0.02
 
 
-def test_what_the_status_tells_does_not_widen_an_interval_beyond_all_meaning() -> None:
+def test_a_misfit_that_the_status_reports_widens_no_interval_any_further() -> None:
     """A tenth of the force is missed: that the damper's parameters lie between nothing and infinity is no news."""
     peak = 1500.0
     little, some, much = (Misfit(share, share * peak) for share in (0.005, 0.01, 0.1))

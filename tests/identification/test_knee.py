@@ -1,4 +1,4 @@
-"""Passive dampers: bleed, knee and blow-off are found, and the law that predicts kept-back tests is handed on."""
+"""Knee law of passive dampers: bleed, knee and blow-off, and the choice of the law by held-out tests."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from pzd.damper.motion import Motion
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.stage import as_fitted
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.knee import TRADE_SPEEDS, clicks, knees, law_row, per_unit
+from pzd.identification.knee import TRADE_SPEEDS, force_changes, identify_knees, law_row
 from pzd.identification.stage import identify
 from pzd.parallel.processes import no_listener
 from pzd.quantities import Control
@@ -126,7 +126,7 @@ def test_bleed_knee_and_blow_off_of_each_direction_lie_in_their_intervals(with_a
     assert row.missed_share == 0.0
 
 
-def test_kept_back_tests_of_a_damper_with_round_knees_are_predicted_five_times_better(
+def test_held_out_tests_of_a_damper_with_round_knees_are_predicted_five_times_better(
     with_round_knees: Identified,
 ) -> None:
     (law,) = with_round_knees.knees.laws
@@ -168,7 +168,7 @@ def test_bingham_stays_the_law_unless_asked_with_the_same_rows_and_no_file_of_th
     assert here.rows == with_a_knee.rows
 
 
-def test_the_files_read_back_as_they_were_written(with_a_knee: Identified, tmp_path: Path) -> None:
+def test_the_files_of_the_knee_law_read_back_as_written(with_a_knee: Identified, tmp_path: Path) -> None:
     with_a_knee.write(tmp_path, Control())
     assert Identified.read(tmp_path, Control()).knees == with_a_knee.knees
 
@@ -199,8 +199,8 @@ def test_what_the_law_misses_visibly_is_unexplained_and_not_nothing(with_round_k
 
 def test_a_setting_whose_control_signal_always_moves_has_no_knee_law() -> None:
     with pytest.raises(ConfigError, match=r"law: needs tests of setting soft at a constant control.*\(got knee\)"):
-        knees((), ("soft",), IdentifyConfig(law="knee"), Control(), no_listener)
-    (law,) = knees((), ("soft",), IdentifyConfig(law="auto"), Control(), no_listener).laws
+        identify_knees((), ("soft",), IdentifyConfig(law="knee"), Control(), no_listener)
+    (law,) = identify_knees((), ("soft",), IdentifyConfig(law="auto"), Control(), no_listener).laws
     assert law.law == "bingham"
     assert "constant control signal" in law.reason
 
@@ -226,13 +226,13 @@ def test_the_knee_is_taken_where_it_predicts_better_by_two_standard_errors_and_n
     assert law_row("auto", None, predicted(-0.01, 6), 1).law == "bingham"
 
 
-def test_what_nobody_can_see_makes_no_law_however_sure_it_is() -> None:
+def test_an_invisible_improvement_chooses_no_knee_law_however_significant() -> None:
     law = law_row("auto", None, predicted(0.01, 6, unseen=0.011), 1)
     assert law.law == "bingham"
     assert "less than 0.25% of peak" in law.reason
 
 
-def test_too_few_tests_choose_nothing_and_the_reason_says_so() -> None:
+def test_too_few_tests_choose_no_law_and_the_reason_says_so() -> None:
     law = law_row("auto", None, predicted(0.01, 2), 1)
     assert law.law == "bingham"
     assert "3 are needed" in law.reason
@@ -310,7 +310,7 @@ def force_row(setting: str | None, voltage: float | None, force: float, gas: flo
 
 def test_a_click_is_the_force_between_neighbouring_positions_over_their_distance_without_the_gas() -> None:
     forces = [force_row(None, 4.0, 460.0, gas=-150.0), force_row(None, 0.0, 300.0), force_row(None, 1.0, 310.0)]
-    rows = clicks(forces, Control("rebound", "clicks"))
+    rows, _ = force_changes(forces, Control("rebound", "clicks"))
     assert [(row.from_click, row.to_click) for row in rows] == [(0.0, 1.0), (1.0, 4.0)]
     assert [row.rebound_N_per_click for row in rows] == pytest.approx([10.0, 50.0])
     assert [row.compression_N_per_click for row in rows] == pytest.approx([5.0, 25.0])
@@ -318,45 +318,46 @@ def test_a_click_is_the_force_between_neighbouring_positions_over_their_distance
 
 def test_clickers_in_the_name_of_a_setting_are_told_apart() -> None:
     forces = [force_row("R3 C8", None, 300.0), force_row("R5 C8", None, 340.0), force_row("R3 C9", None, 303.0)]
-    rows = clicks(forces, Control())
+    rows, _ = force_changes(forces, Control())
     assert {(row.setting, row.rebound_N_per_click) for row in rows} == {("R# C8", 20.0), ("R3 C#", 3.0)}
 
 
 def test_settings_without_a_number_have_no_clicks() -> None:
-    assert clicks([force_row("soft", None, 300.0), force_row("hard", None, 600.0)], Control()) == ()
+    assert force_changes([force_row("soft", None, 300.0), force_row("hard", None, 600.0)], Control()) == ((), ())
 
 
 def test_a_volt_is_no_click() -> None:
-    assert clicks([force_row(None, 0.0, 300.0), force_row(None, 1.0, 310.0)], Control()) == ()
+    assert force_changes([force_row(None, 0.0, 300.0), force_row(None, 1.0, 310.0)], Control()) == ((), ())
 
 
 @pytest.mark.parametrize("unit", ["psi", "bar", "kPa"])
-def test_of_a_gas_pressure_is_told_the_force_a_unit_and_what_it_makes_of_the_gas_force(unit: str) -> None:
+def test_a_gas_pressure_has_a_force_per_unit_with_the_change_of_the_gas_force(unit: str) -> None:
     forces = [force_row(f"gas {p} {unit}", 5.0, 300.0 + 0.2 * p, gas=-1.5 * p) for p in (200, 100)]
-    (row,) = per_unit(forces, Control())
+    clicks, (row,) = force_changes(forces, Control())
     assert (row.setting, row.voltage_V, row.unit) == (f"gas # {unit}", 5.0, unit)
     assert (row.from_value, row.to_value) == (100.0, 200.0)
     assert row.rebound_N_per_unit == pytest.approx(0.2)
     assert row.compression_N_per_unit == pytest.approx(0.1)
     assert row.gas_force_N_per_unit == pytest.approx(-1.5)
-    assert clicks(forces, Control()) == ()
+    assert clicks == ()
 
 
 def test_a_gas_pressure_may_be_the_control_signal() -> None:
     forces = [force_row(None, p, 300.0 + 20.0 * p, gas=-30.0 * p) for p in (5.0, 10.0, 20.0)]
-    rows = per_unit(forces, Control("gas", "bar"))
+    clicks, rows = force_changes(forces, Control("gas", "bar"))
     assert [(row.setting, row.voltage_V, row.unit) for row in rows] == [(None, None, "bar")] * 2
     assert [(row.from_value, row.to_value) for row in rows] == [(5.0, 10.0), (10.0, 20.0)]
     assert [row.rebound_N_per_unit for row in rows] == pytest.approx([20.0, 20.0])
     assert [row.gas_force_N_per_unit for row in rows] == pytest.approx([-30.0, -30.0])
-    assert clicks(forces, Control("gas", "bar")) == ()
+    assert clicks == ()
 
 
 def test_a_clicker_and_a_gas_pressure_in_one_name_are_told_apart() -> None:
     names = {"C4 100psi": 300.0, "C6 100psi": 340.0, "C4 150psi": 310.0}
     forces = [force_row(name, None, force) for name, force in names.items()]
-    assert [(row.setting, row.rebound_N_per_click) for row in clicks(forces, Control())] == [("C# 100psi", 20.0)]
-    assert [(row.setting, row.rebound_N_per_unit) for row in per_unit(forces, Control())] == [("C4 #psi", 0.2)]
+    clicks, units = force_changes(forces, Control())
+    assert [(row.setting, row.rebound_N_per_click) for row in clicks] == [("C# 100psi", 20.0)]
+    assert [(row.setting, row.rebound_N_per_unit) for row in units] == [("C4 #psi", 0.2)]
 
 
 def test_the_trade_reads_its_forces_at_the_speeds_of_a_crank_of_100_mm() -> None:

@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from pzd.artefacts import MeasureRow
 from pzd.damper.element import element_force
-from pzd.identification.tests_over_time import measures
+from pzd.identification.strokes_and_loops import measures
 from pzd.record import Array, Record
 from pzd.signals.cycles import cycles
 from pzd.signals.kinematics import kinematics
@@ -58,7 +58,7 @@ def test_a_slow_test_has_its_frequency_and_its_speed(sensor: dict[str, float], r
     assert found.peak_velocity_m_per_s == pytest.approx(INCH_A_SECOND, rel=0.02)
 
 
-def test_few_slow_cycles_have_it_as_well(rng: Generator) -> None:
+def test_few_slow_cycles_have_a_frequency_and_a_speed(rng: Generator) -> None:
     found = measured(to_and_fro(rng, noise=1e-5, resolution=1e-5, hum=0.0, count=2.5))
     assert found.peak_velocity_m_per_s == pytest.approx(INCH_A_SECOND, rel=0.02)
 
@@ -69,7 +69,7 @@ def test_the_peak_speed_of_a_sine_with_a_tenth_of_its_size_at_ten_times_its_freq
     assert measured(recorded(time, x, x)).peak_velocity_m_per_s == pytest.approx(2.0 * np.pi * 0.04, rel=0.01)
 
 
-def test_a_second_tone_of_the_size_of_that_hum_is_motion(rng: Generator) -> None:
+def test_a_second_tone_of_the_size_of_mains_hum_is_motion(rng: Generator) -> None:
     """Averaging takes away what is in step with the mains, and nothing else."""
     time = np.arange(0.0, 28.0, 1.0 / RATE)
     x = AMPLITUDE * np.sin(2.0 * np.pi * FREQUENCY * time) + 1e-4 * np.sin(2.0 * np.pi * 20.1 * time)

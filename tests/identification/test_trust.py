@@ -1,4 +1,4 @@
-"""What the data do not determine gets no number, and the reason is said."""
+"""Undetermined parameters have no number, and the status says why."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import pytest
 from fresh_truths import SENSORS_ALIKE, TABLE_2, acceptance_test, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
+from pzd.identification.bingham_fit import Bingham, Objective, fit_evolutionary, fit_separable
+from pzd.identification.condition import identify_condition
 from pzd.identification.config import EvolutionaryConfig, IdentifyConfig
-from pzd.identification.fit import fit_evolutionary, fit_separable, identify_condition
-from pzd.identification.prepared_record import Bingham, Objective, trial_of
-from pzd.identification.trust import ParameterEvidence, displacement_noise, trust_of, visible_shares
+from pzd.identification.prepared_record import prepare
+from pzd.identification.trust import ParameterEvidence, displacement_noise, partial_sensitivities, trust_of
 from pzd.record import Condition, Record
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -40,13 +41,13 @@ def test_a_damper_that_never_slips_shows_neither_friction_nor_damping() -> None:
 
 def test_a_tare_of_the_load_cell_is_not_explained_by_an_element_that_never_slips() -> None:
     record = sine_test(Bingham(50.0, 1000.0, 4e5), 2.0, 0.01)
-    tared = Objective((trial_of(replace(record, force=record.force + 600.0)),))
+    tared = Objective((prepare(replace(record, force=record.force + 600.0)),))
     for fit in (fit_separable(tared), fit_evolutionary(tared, EvolutionaryConfig(), seed=1)):
         assert fit.parameters.friction < 0.5 * fit.parameters.stiffness * np.ptp(record.displacement)
     assert row_for(replace(record, force=record.force + 600.0)).status != "ok"
 
 
-def test_a_damper_without_friction_has_a_friction_of_nothing_and_not_an_unknown_one(rng: np.random.Generator) -> None:
+def test_a_damper_without_friction_has_a_friction_of_zero_and_not_an_undetermined_one(rng: np.random.Generator) -> None:
     record = sine_test(Bingham(0.0, 2500.0, 4e5), 2.0, 0.02)
     row = row_for(with_noise(record, rng))
     assert row.T0_N is not None
@@ -86,12 +87,12 @@ def test_a_model_that_misses_half_of_the_force_is_weak_throughout() -> None:
 
 
 @pytest.mark.parametrize("draw", range(6))
-def test_good_tests_are_ok(draw, rng: np.random.Generator) -> None:
+def test_the_status_of_good_tests_is_ok(draw, rng: np.random.Generator) -> None:
     _, records = acceptance_test(rng)
     assert row_for(*(with_noise(r, rng) for r in records), config=SENSORS_ALIKE).status == "ok"
 
 
-def test_what_the_sensors_leave_open_is_weak_and_never_undetermined(rng: np.random.Generator) -> None:
+def test_a_parameter_uncertain_by_the_sensors_is_weak_and_never_undetermined(rng: np.random.Generator) -> None:
     # Friction over damping: a gain of 20 % between two tests says nothing of C, and yet noise alone would.
     records = [sine_test(TABLE_2[150.0], f, 0.02, rate=500) for f in (0.5, 1.0)]
     noisy = [with_noise(r, rng, 0.002) for r in records]
@@ -101,11 +102,11 @@ def test_what_the_sensors_leave_open_is_weak_and_never_undetermined(rng: np.rand
     assert row.C_Ns_per_m_high95 > 1.5 * row.C_Ns_per_m
 
 
-def test_linearly_dependent_slopes_are_invisible(rng: np.random.Generator) -> None:
+def test_linearly_dependent_slopes_have_no_partial_sensitivity(rng: np.random.Generator) -> None:
     base = rng.standard_normal((100, 2))
     slopes = np.column_stack([base, base @ [1.0, 2.0]])
-    np.testing.assert_allclose(visible_shares(slopes, np.ones(3), 100.0), 0.0, atol=1e-7)
-    assert np.all(visible_shares(base, np.ones(2), 100.0) > 0.5)
+    np.testing.assert_allclose(partial_sensitivities(slopes, np.ones(3), 100.0), 0.0, atol=1e-7)
+    assert np.all(partial_sensitivities(base, np.ones(2), 100.0) > 0.5)
 
 
 def test_undetermined_and_weak_stand_in_one_status() -> None:

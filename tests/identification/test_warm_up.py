@@ -1,4 +1,4 @@
-"""Warm-up: every cycle of a long test over its time and temperature, against forces that fade by a known law."""
+"""Warm-up: every cycle of a long test over time and temperature, against forces that fade by a known law."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from fresh_truths import TABLE_2, sine_test
 
-from pzd.artefacts.identified import Characteristics, WarmUpRow, courses
-from pzd.identification.tests_over_time import characteristics
+from pzd.artefacts.characteristics import Characteristics, WarmUpRow, courses
+from pzd.cli.text_tables import characteristics_tables
+from pzd.identification.characteristics import characteristics
+from pzd.pipeline.run_summary import RunSummary
 from pzd.quantities import Control
 from pzd.record import Record, conditions
-from pzd.report import tables
 
 FADES_PER_K = 0.01
 GAS = 85.0
@@ -64,7 +65,7 @@ def test_a_sweep_is_no_warm_up_however_long() -> None:
     assert of(replace(base, displacement=x, velocity=v, force=2000.0 * v)).warm_up == ()
 
 
-def test_where_in_the_cycle_a_record_begins_is_no_matter() -> None:
+def test_the_warm_up_does_not_depend_on_the_phase_at_which_a_record_begins() -> None:
     whole = warming(40, 20.0)
     late = whole.time >= 0.31
     channels = ("time", "displacement", "velocity", "acceleration", "force", "temperature")
@@ -97,7 +98,7 @@ def row(cycle: int, force: float, record: str = "r", warmth: float | None = None
     )
 
 
-def test_a_course_goes_from_the_mean_of_three_cycles_to_that_of_three_and_each_test_has_its_own() -> None:
+def test_each_test_has_a_warm_up_from_the_mean_of_its_first_three_cycles_to_its_last_three() -> None:
     rows = [*(row(n, 100.0 * n) for n in range(1, 8)), row(1, 7.0), row(2, 9.0), row(3, 8.0, record="s")]
     assert [
         (one.cycles, one.first.rebound_force_N, one.last.rebound_force_N, one.last.record) for one in courses(rows)
@@ -105,7 +106,7 @@ def test_a_course_goes_from_the_mean_of_three_cycles_to_that_of_three_and_each_t
     assert courses([]) == ()
 
 
-def test_it_is_written_read_back_and_an_earlier_run_has_none(tmp_path: Path) -> None:
+def test_warm_up_rows_are_written_and_read_back_and_an_earlier_run_has_none(tmp_path: Path) -> None:
     found, current = of(warming(10, 5.0)), Control("current", "A")
     found.write(tmp_path, current)
     assert "current_A" in (tmp_path / "warm_up.csv").read_text(encoding="utf-8").splitlines()[0]
@@ -114,9 +115,12 @@ def test_it_is_written_read_back_and_an_earlier_run_has_none(tmp_path: Path) -> 
     assert Characteristics.read(tmp_path, current) == replace(found, warm_up=())
 
 
-def test_the_terminal_shows_the_course() -> None:
+def test_the_terminal_shows_the_warm_up(tmp_path: Path) -> None:
     found = Characteristics(warm_up=tuple(row(n, 100.0 * n, warmth=20.0 + n) for n in range(1, 8)))
-    assert tables.warm_up(found, Control()).lines() == [
-        "speed [m/s]  cycles  temperature [degC]  rebound [N]  compression [N]  record",
-        "0.1          7       22 to 26            200 to 600   -200 to -600     r",
+    shown = RunSummary(tmp_path, Control(), (), None, (), (), None, (), characteristics=found)
+    titles = dict(characteristics_tables(shown))
+    (rows,) = [rows for title, rows in titles.items() if title.startswith("warm-up")]
+    assert rows == [
+        ["speed [m/s]", "cycles", "T [degC]", "rebound [N]", "compression [N]", "record"],
+        ["0.1", "7", "22 to 26", "200 to 600", "-200 to -600", "r"],
     ]

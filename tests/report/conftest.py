@@ -41,7 +41,7 @@ from pzd.artefacts import (
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.identification.tests_over_time import characteristics
+from pzd.identification.characteristics import characteristics
 from pzd.quantities import Control
 from pzd.record import Record, conditions
 from pzd.report.config import ReportConfig

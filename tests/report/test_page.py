@@ -30,7 +30,7 @@ from pzd.artefacts import (
     WarmUpRow,
 )
 from pzd.damper.model import BaseRow, Damper
-from pzd.identification.tests_over_time import characteristics
+from pzd.identification.characteristics import characteristics
 from pzd.quantities import Control
 from pzd.record import conditions
 from pzd.report.config import ReportConfig

@@ -1,4 +1,4 @@
-"""Ramps, rest and the oil spring being wound up stay outside the run; the period is as good as the noise lets it."""
+"""Edges of the run: ramps, rest and the loading of the oil spring stay outside; error of the period."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pzd.damper.element import element_force
-from pzd.signals.cycles import POINTS, averaged, cycles, settled
+from pzd.signals.cycles import cycles, decimated_means, settled_cycles
 
 SIGMAS = 4.0
 NOT_SEEN = 0.002
@@ -67,13 +67,15 @@ def tests(request: pytest.FixtureRequest, rng: np.random.Generator) -> list[Test
     return [drawn(draw, request.param) for draw in rng.spawn(12)]
 
 
-def test_run_lies_in_the_steady_part(tests: list[Test]) -> None:
+def test_the_run_lies_in_the_steady_part_of_a_test(tests: list[Test]) -> None:
     for test in tests:
         run = cycles(test.time, test.displacement)
         assert run is not None
         inside = run.inside(test.time)
         departure = np.abs(test.clean - test.continued)[inside]
-        averaged_noise = test.noise / np.sqrt(max(run.points(test.time) / POINTS, 1.0))
+        averaged_noise = test.noise / np.sqrt(
+            max(run.points(test.time) / 100.0, 1.0)
+        )  # 100 points of a cycle are compared
         seen = NOT_SEEN * np.ptp(test.continued) + 8.0 * averaged_noise
         outside = np.abs(test.time[inside] - 0.5 * (test.begin + test.end)) > 0.5 * test.count * test.period
         # what departs so that it can be told from noise is at most the half of the neighbours compared
@@ -91,7 +93,7 @@ def test_no_more_than_a_cycle_is_lost_at_either_end(tests: list[Test]) -> None:
         assert run.count >= test.count - 1
 
 
-def test_period_is_as_good_as_the_noise_lets_it(tests: list[Test]) -> None:
+def test_the_error_of_the_period_is_within_the_bound_by_noise(tests: list[Test]) -> None:
     """Bound: var P = 12 sigma^2 / (n (n^2 - 1) sum m'^2), the shift of n cycles by a straight line."""
     for test in tests:
         run = cycles(test.time, test.displacement)
@@ -114,14 +116,14 @@ def noisy(force: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return force + 0.005 * np.abs(force).max() * rng.standard_normal(force.size)
 
 
-def test_cycle_in_which_the_oil_spring_is_wound_up_is_left_out(rng: np.random.Generator) -> None:
+def test_the_cycle_in_which_the_oil_spring_is_loaded_is_left_out(rng: np.random.Generator) -> None:
     left_out = 0
     for _ in range(12):
         test = drawn(rng, "sine from rest")
         force = force_of(test.clean, test.time[1] - test.time[0])
         run = cycles(test.time, test.displacement)
         assert run is not None
-        kept = settled(run, test.time, noisy(force, rng))
+        kept = settled_cycles(run, test.time, noisy(force, rng))
         assert kept.count >= max(run.count - 1, 2)
         left_out += run.count - kept.count
         if run.count > 2:
@@ -141,13 +143,13 @@ def test_force_that_repeats_from_the_first_cycle_on_loses_none(rng: np.random.Ge
         run = cycles(time, test.displacement[cut])
         assert run is not None
         warming = 1.0 - 0.05 * (time - time[0]) / (time[-1] - time[0])
-        assert settled(run, time, force[cut] * warming) == run
+        assert settled_cycles(run, time, force[cut] * warming) == run
 
 
-def test_averages_keep_both_ends_and_a_line_as_it_is() -> None:
+def test_decimated_means_keep_both_ends_and_a_straight_line() -> None:
     for count in (999, 1000, 1037):
         time = np.arange(count) * 1e-3
-        at, values = averaged(time, 3.0 + 2.0 * time, 0.5, POINTS)
+        at, values = decimated_means(time, 3.0 + 2.0 * time, 0.5, 100)
         assert at[0] == time[0]
         assert at[-1] == time[-1]
         assert values == pytest.approx(3.0 + 2.0 * at, abs=1e-12)

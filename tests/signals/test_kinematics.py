@@ -1,4 +1,4 @@
-"""Speed and acceleration come from average cycles or a smoothed displacement, with known errors."""
+"""Velocity and acceleration from average cycles or a smoothed displacement, with known errors."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_noise_of_a_triangle_is_averaged_away(
     assert np.all(np.median(errors, axis=0) < (speed, acceleration))
 
 
-def test_drift_is_followed(rng: np.random.Generator) -> None:
+def test_the_velocity_follows_a_drift_of_the_displacement(rng: np.random.Generator) -> None:
     x, v, _ = series(np.array([1.0]), np.array([0.01]))
     drift, rate = -5e-4 * TIME + 1e-3 * np.sin(0.4 * TIME), -5e-4 + 4e-4 * np.cos(0.4 * TIME)
     errors = []
@@ -66,7 +66,7 @@ def test_drift_is_followed(rng: np.random.Generator) -> None:
     assert max(errors) < 1e-2
 
 
-def test_rest_is_followed(rng: np.random.Generator) -> None:
+def test_the_velocity_is_zero_while_the_motion_rests(rng: np.random.Generator) -> None:
     x, v, _ = series(np.array([1.0]), np.array([0.01]))
     envelope = np.interp(TIME, [2.0, 3.0, 8.0, 9.0], [0.0, 1.0, 1.0, 0.0])
     shown = envelope * x + 5e-6 * rng.standard_normal(x.size)
@@ -91,7 +91,7 @@ def test_random_motion_is_smoothed_as_far_as_its_noise_asks(rng: np.random.Gener
         assert relative(without_noise.acceleration, scale * a) < 2e-3
 
 
-def test_an_uneven_clock_is_no_obstacle(rng: np.random.Generator) -> None:
+def test_an_uneven_clock_gives_the_same_velocity(rng: np.random.Generator) -> None:
     time = np.sort(rng.uniform(0.0, 10.0, 8000))
     time = time[np.concatenate(([True], np.diff(time) > 1e-5))]
     x = 0.01 * np.sin(OMEGA * time)
@@ -99,7 +99,7 @@ def test_an_uneven_clock_is_no_obstacle(rng: np.random.Generator) -> None:
     assert relative(clean.velocity, 0.01 * OMEGA * np.cos(OMEGA * time)) < 0.01
 
 
-def test_harmonics_are_kept_by_their_own_scatter(rng: np.random.Generator) -> None:
+def test_harmonics_that_do_not_exceed_their_scatter_are_dropped(rng: np.random.Generator) -> None:
     phase = 2.0 * np.pi * np.arange(200) / 200.0
     cycle = np.sin(phase) + 0.01 * np.sin(7.0 * phase)
     false = 0

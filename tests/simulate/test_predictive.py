@@ -19,7 +19,7 @@ from pzd.damper.element import element_force
 from pzd.damper.model import Damper
 from pzd.quantities import Control
 from pzd.schema.errors import ConfigError
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.control.prediction.choice import choose
 from pzd.simulate.control.prediction.plant import oil_after, predicted

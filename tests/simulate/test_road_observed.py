@@ -10,7 +10,7 @@ import pytest
 from simulate_dampers import table_of
 
 from pzd.comfort.weighting import weighted
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 from pzd.simulate.config import KM_PER_H, SensorNoise, SimulateConfig
 from pzd.simulate.control.prediction.forecast import filtered_height, learn
 from pzd.simulate.control.prediction.predictor import Memory, Predictor, predictor_of

@@ -17,9 +17,9 @@ from pzd.comfort.iso2631_1997 import evaluate, maximum_transient, vibration_dose
 from pzd.comfort.weighting import WK, response, weighted
 from pzd.damper.element import element_force
 from pzd.damper.model import BaseRow, Damper
+from pzd.identification.bingham_fit import Bingham, Objective, descend, fit_evolutionary, fit_separable
 from pzd.identification.config import EvolutionaryConfig
-from pzd.identification.fit import descend, fit_evolutionary, fit_separable
-from pzd.identification.prepared_record import Bingham, Objective, trial_of
+from pzd.identification.prepared_record import prepare
 from pzd.pipeline.command import opened
 from pzd.pipeline.execution import InMemory
 from pzd.pipeline.stages import stages
@@ -60,7 +60,7 @@ def true_of(rng: np.random.Generator) -> Bingham:
 
 def fits() -> Iterator[Row]:
     """The separable method beside differential evolution on the same criterion and kernel."""
-    objective = Objective((trial_of(record_of(np.random.default_rng(22))),))
+    objective = Objective((prepare(record_of(np.random.default_rng(22))),))
 
     def ours() -> float:
         return fit_separable(objective).criterion
@@ -75,7 +75,7 @@ def fits() -> Iterator[Row]:
     yield Row("identify a record of 10^4 samples, beside differential_evolution", ratio, "x", 100.0, about=about)
     found = 0
     for seed in range(SEEDS):
-        one = Objective((trial_of(record_of(np.random.default_rng(seed))),))
+        one = Objective((prepare(record_of(np.random.default_rng(seed))),))
         truth = _truth(seed)
         found += fit_separable(one).criterion <= descend(one, truth).criterion * (1.0 + SAME)
     yield Row(f"identify: optimum as low as from the truth, of {SEEDS}", found, "", SEEDS)

@@ -23,9 +23,9 @@ import numpy as np
 from campaigns import KINDS, SENSORS, campaign
 
 from pzd.artefacts import ParameterRow
+from pzd.identification.bingham_fit import Bingham
+from pzd.identification.condition import identify_condition
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.fit import identify_condition
-from pzd.identification.prepared_record import Bingham
 from pzd.record import Condition
 from pzd.signals.nuisance import NuisanceConfig
 

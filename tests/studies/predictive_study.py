@@ -24,7 +24,7 @@ from pathlib import Path
 from pzd.artefacts import Diagnosed, Table
 from pzd.comfort.weighting import weighted
 from pzd.pipeline.command import execute, opened
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 from pzd.simulate.config import KM_PER_H, SimulateConfig
 from pzd.simulate.policies import policies
 from pzd.simulate.ride.model import dynamic_damper_of, grid_of

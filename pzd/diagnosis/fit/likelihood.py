@@ -24,10 +24,11 @@ from pzd.diagnosis.data import Prepared
 from pzd.diagnosis.fit.prediction import Predicted, motion_of, warms
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Record, Rows
-from pzd.signals.jumps import jumps, jumps_in_samples, slope_within, unbroken
-from pzd.signals.noise import Autoregression, PureError, fit_smooth_residual, pure_error
+from pzd.signals.jumps import gradient_within_stretches, has_predecessors, jumps, jumps_in_samples
+from pzd.signals.lack_of_fit import fit_smooth_residual
+from pzd.signals.measures import reversals
+from pzd.signals.noise import Autoregression, PureError, pure_error
 from pzd.signals.nuisance import NuisanceConfig
-from pzd.signals.smoothing import reversals
 
 # ----------------------------------------------------------------------------------------------------
 # What the nuisances of a test may explain within their priors, taken out of residuals once and for all.
@@ -192,7 +193,9 @@ class RecordLikelihood:
     @cached_property
     def _unbroken(self) -> NDArray[np.bool_]:
         """Which whitened samples count: those whose predecessors, as many as the noise remembers, are compared too."""
-        return unbroken(self.compared, self.noise.coefficients.size if isinstance(self.noise, Autoregression) else 0)
+        return has_predecessors(
+            self.compared, self.noise.coefficients.size if isinstance(self.noise, Autoregression) else 0
+        )
 
     def _scaled(self, values: Array) -> Array:
         if isinstance(self.noise, Autoregression):
@@ -380,12 +383,16 @@ def _of_samples(
     noise = fit_smooth_residual(measured - force[mask], record, force[mask], mask).noise
     peak = float(np.max(np.abs(measured)))
     alike = _samples_alike(record)
-    left = alike * (DISCREPANCY * _left_by(measured, force[mask], slope_within(force[mask], mask), noise.variance)) ** 2
+    left = (
+        alike
+        * (DISCREPANCY * _left_by(measured, force[mask], gradient_within_stretches(force[mask], mask), noise.variance))
+        ** 2
+    )
     if left > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left)
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
     motion, places = motion_of(record)
-    rows = int(np.count_nonzero(unbroken(compared, noise.coefficients.size)))
+    rows = int(np.count_nonzero(has_predecessors(compared, noise.coefficients.size)))
     bare = RecordLikelihood(
         record.name,
         place,

@@ -13,8 +13,8 @@ from pzd.damper.motion import Motion, parts_of_steps, steps_of_voltage
 from pzd.diagnosis.data import Prepared
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Record, Rows
+from pzd.signals.measures import reversals
 from pzd.signals.noise import harmonics_of
-from pzd.signals.smoothing import reversals
 
 # ----------------------------------------------------------------------------------------------------
 

@@ -22,7 +22,7 @@ from pzd.diagnosis.hypotheses.shapes import Shape, Signals, shapes_of, signals_o
 from pzd.diagnosis.search.evidence import nearest_row
 from pzd.diagnosis.thresholds import PREDICTS_WORSE
 from pzd.record import Array, Mask
-from pzd.signals.nuisance import NuisanceConfig, columns_of
+from pzd.signals.nuisance import NuisanceConfig, nuisance_columns
 
 # ----------------------------------------------------------------------------------------------------
 # What T0, C, k and the parameters of adopted effects could take up of a residual, to first order.
@@ -301,7 +301,7 @@ class ResidualOfTest:
     @cached_property
     def nuisances(self) -> Array:
         """(n, c) force of one standard deviation of the test's own offset, gain and delay [N]."""
-        return columns_of(self.signals.F, self.check.prepared.record.rate, self.config)
+        return nuisance_columns(self.signals.F, self.check.prepared.record.rate, self.config)
 
     def taken_up(self, residual: Array, counts: Mask) -> Array:
         """(n,) what offset, gain and delay within their priors explain of a residual (n,) over some samples [N]."""

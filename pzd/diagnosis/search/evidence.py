@@ -18,7 +18,7 @@ from pzd.diagnosis.fit.likelihood import RecordLikelihood, record_likelihood
 from pzd.diagnosis.fit.parameters import Problem
 from pzd.diagnosis.thresholds import MOST_TIME_CONSTANTS
 from pzd.record import Array, Mask, voltage_scale
-from pzd.signals.criterion import criterion
+from pzd.signals.measures import criterion
 
 
 @dataclass(frozen=True, eq=False)

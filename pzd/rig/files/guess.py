@@ -32,7 +32,7 @@ from pzd.rig.files.sniffing import (
 )
 from pzd.schema.errors import DataError, UserError, at
 from pzd.schema.yamltree import written
-from pzd.signals.smoothing import work
+from pzd.signals.measures import work
 
 # --- Layout that fits a file: its columns are there, and its tests are accepted ---
 

@@ -25,7 +25,7 @@ from pzd.comfort.iso2631_1997 import evaluate, maximum_transient
 from pzd.comfort.spectrum import Components, harmonics, third_octaves
 from pzd.comfort.weighting import WK, weighted
 from pzd.record import Array
-from pzd.signals.criterion import rms
+from pzd.signals.measures import rms
 from pzd.simulate.config import SimulateConfig
 from pzd.simulate.ride.outcome import (
     POINT,

@@ -1,4 +1,4 @@
-"""The mains are found where a line of theirs stands out, and taken for nothing else."""
+"""Hum of the mains is found where its line is prominent, and nowhere else."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def wave(frequency: float, amplitude: float) -> Array:
 
 @pytest.mark.parametrize("frequency", [49.93, 50.0, 60.007])
 @pytest.mark.parametrize("share", [1.0, 0.5])
-def test_the_wave_of_the_mains_is_found_to_a_percent_also_from_a_part_of_the_samples(
+def test_mains_hum_is_estimated_to_a_percent_also_from_part_of_the_samples(
     rng: np.random.Generator, frequency: float, share: float
 ) -> None:
     made = wave(frequency, 5.0)
@@ -31,20 +31,20 @@ def test_the_wave_of_the_mains_is_found_to_a_percent_also_from_a_part_of_the_sam
     assert float(np.sqrt(np.mean((found - made) ** 2))) < 0.01 * 5.0 + 0.03 / np.sqrt(share)
 
 
-def test_nothing_is_taken_where_no_line_stands_out(rng: np.random.Generator) -> None:
+def test_a_channel_without_a_prominent_line_has_no_hum(rng: np.random.Generator) -> None:
     friction = 300.0 * np.sign(np.sin(2.0 * np.pi * TIME))  # harmonics 47, 49, 51, 53 beside 50 Hz
     for values in (rng.standard_normal(TIME.size), friction + rng.standard_normal(TIME.size), np.zeros(TIME.size)):
         assert not hum(TIME, values, ALL, 1.0, 1e-3).any()
 
 
-def test_a_line_below_what_counts_is_none(rng: np.random.Generator) -> None:
+def test_a_line_below_the_least_amplitude_is_no_hum(rng: np.random.Generator) -> None:
     values = wave(50.0, 0.4) + 0.1 * rng.standard_normal(TIME.size)
     assert hum(TIME, values, ALL, 1.0, 0.3).any()
     assert not hum(TIME, values, ALL, 1.0, 0.5).any()
 
 
 @pytest.mark.parametrize("cycle", [50.0 / 3.0, 10.0, 60.0 / 7.0])
-def test_a_low_harmonic_of_the_motion_at_the_mains_frequency_is_the_motions(cycle: float) -> None:
+def test_a_low_harmonic_of_the_motion_at_the_mains_frequency_is_no_hum(cycle: float) -> None:
     order = round(50.0 / cycle) if cycle != 60.0 / 7.0 else 7
     values = 5.0 * np.sin(2.0 * np.pi * order * cycle * TIME)
     assert not hum(TIME, values, ALL, cycle, 0.1).any()

@@ -1,4 +1,4 @@
-"""What stands clear in parts of a cycle: corners come out, noise and smooth motions do not."""
+"""Short-time mask: corners of a cycle are kept, noise is dropped."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ def without_high_harmonics(cycle: Array, last: int) -> Array:
 
 
 @pytest.mark.parametrize("points", [333, 512, 2000, 8001])
-def test_without_noise_all_that_it_looks_at_is_kept(points: int, rng: np.random.Generator) -> None:
+def test_without_noise_the_short_time_mask_keeps_the_whole_cycle(points: int, rng: np.random.Generator) -> None:
     """The parts overlap so that their squares add up to one: nothing below the band limit gets lost."""
     cycle = without_high_harmonics(rng.standard_normal(points), int(0.3 * points))
     _, found = ShortTimeMask.of(cycle, variance_of(1e-9, points), 4.0)
     np.testing.assert_allclose(found, cycle, atol=0.02 * np.max(np.abs(cycle)))
 
 
-def test_where_cycles_are_equal_to_the_last_digit_nothing_is_noise(rng: np.random.Generator) -> None:
+def test_cycles_equal_to_the_last_digit_are_kept_whole_by_the_short_time_mask(rng: np.random.Generator) -> None:
     cycle = without_high_harmonics(rng.standard_normal(512), 150)
     _, found = ShortTimeMask.of(cycle, np.zeros(int(0.4 * 512) + 1), 4.0)
     np.testing.assert_allclose(found, cycle, atol=0.02 * np.max(np.abs(cycle)))
 
 
-def test_noise_alone_is_left_out(rng: np.random.Generator) -> None:
+def test_the_short_time_mask_drops_noise_alone(rng: np.random.Generator) -> None:
     """Of fifteen hundred blocks beyond 4 standard errors, exp(-16) each, one is kept in several thousand cycles."""
     cycles = NOISE * rng.standard_normal((100, POINTS))
     kept = [np.any(ShortTimeMask.of(cycle, variance_of(NOISE), 4.0)[1] != 0.0) for cycle in cycles]
@@ -60,7 +60,7 @@ def test_a_corner_of_a_triangle_is_found_below_the_noise_of_every_harmonic(rng: 
     np.testing.assert_array_equal(clear.kept(noisy), found)
 
 
-def test_what_is_kept_of_another_cycle_is_linear_in_it(rng: np.random.Generator) -> None:
+def test_the_short_time_mask_is_linear_in_the_cycle(rng: np.random.Generator) -> None:
     clear, _ = ShortTimeMask.of(triangle() - without_high_harmonics(triangle(), 90), variance_of(NOISE), 4.0)
     one, other = rng.standard_normal((2, POINTS))
     np.testing.assert_allclose(clear.kept(one + 2.0 * other), clear.kept(one) + 2.0 * clear.kept(other), atol=1e-12)

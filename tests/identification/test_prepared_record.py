@@ -1,4 +1,4 @@
-"""The displacement between samples, and what is left out of the criterion at the start."""
+"""Records prepared for a fit: fine displacement, warm-up, rest after the motion; and the criterion over them."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import pytest
 from fresh_truths import TABLE_2, sine_test
 
 from pzd.damper.element import element_force
-from pzd.identification.fit import fit_separable
-from pzd.identification.prepared_record import Bingham, Objective, trial_of, upsampling_factor, warm_up
+from pzd.identification.bingham_fit import Bingham, Objective, fit_separable
+from pzd.identification.prepared_record import prepare, upsampling_factor, warm_up
 from pzd.record import Array, Record
-from pzd.signals.smoothing import reversals
+from pzd.signals.measures import reversals
 
 
-def test_a_sine_turns_twice_a_cycle() -> None:
+def test_a_sine_reverses_twice_a_cycle() -> None:
     time = np.arange(5001) / 1000.0
     turns = reversals(0.01 * np.sin(2.0 * np.pi * time))
     np.testing.assert_allclose(time[turns], 0.25 + 0.5 * np.arange(10), atol=1e-9)
@@ -28,14 +28,14 @@ def test_small_wobbles_are_no_reversals() -> None:
     assert len(reversals(wobbling)) == len(reversals(plain))
 
 
-def test_the_warm_up_ends_after_the_first_turn_also_when_the_record_begins_at_rest() -> None:
+def test_the_warm_up_ends_after_the_first_reversal_also_when_the_record_begins_at_rest() -> None:
     time = np.arange(4001) / 1000.0
     moving = np.where(time > 1.0, 0.01 * np.sin(2.0 * np.pi * (time - 1.0)), 0.0)
     ends = time[warm_up(moving)]
     assert 1.25 < ends < 1.5
 
 
-def test_a_record_that_never_turns_still_counts_half_of_its_samples() -> None:
+def test_a_record_without_reversal_still_counts_half_of_its_samples() -> None:
     assert warm_up(np.linspace(0.0, 0.1, 100)) == 50
 
 
@@ -57,10 +57,10 @@ def test_rest_after_the_motion_does_not_move_the_fit() -> None:
     truth = TABLE_2[0.0]
     record = sine_test(truth, 2.0, 0.03, cycles=3)
     resting = at_rest_after(record, 3.0, truth, 0.5 * truth.friction)
-    counted = trial_of(resting).counted
+    counted = prepare(resting).counted
     assert not counted[resting.time > record.time[-1] + 0.1].any()
     assert counted[(resting.time > 0.5) & (resting.time <= record.time[-1])].all()
-    np.testing.assert_allclose(fit_separable(Objective((trial_of(resting),))).parameters, truth, rtol=0.01)
+    np.testing.assert_allclose(fit_separable(Objective((prepare(resting),))).parameters, truth, rtol=0.01)
 
 
 def test_a_hold_between_two_motions_counts() -> None:
@@ -71,7 +71,7 @@ def test_a_hold_between_two_motions_counts() -> None:
     twice = Record(
         "twice", None, *(np.concatenate(pair) for pair in zip(*map(_channels, (resting, later)), strict=True))
     )
-    assert trial_of(twice).counted[resting.time.size // 2 :][: resting.time.size // 2].all()
+    assert prepare(twice).counted[resting.time.size // 2 :][: resting.time.size // 2].all()
 
 
 @pytest.mark.parametrize("phase", [0.0, 1.0, 1.4, 2.5, 4.0, 5.5])
@@ -80,7 +80,7 @@ def test_a_wrong_force_at_the_first_sample_is_forgotten(phase) -> None:
     record = sine_test(truth, 2.0, 0.03, phase=phase)
     wrong = record.force.copy()
     wrong[0] -= 500.0
-    trial = trial_of(replace(record, force=wrong))
+    trial = prepare(replace(record, force=wrong))
     everything = replace(trial, counted=np.ones_like(trial.counted))
     assert Objective((everything,)).criterion(truth) > 100.0 * Objective((trial,)).criterion(truth)
     np.testing.assert_allclose(fit_separable(Objective((trial,))).parameters, truth, rtol=2e-4)
@@ -89,7 +89,7 @@ def test_a_wrong_force_at_the_first_sample_is_forgotten(phase) -> None:
 def test_fine_displacement_removes_the_bias_of_reading_a_sine_as_a_polygon() -> None:
     truth = TABLE_2[0.0]
     record = sine_test(truth, 2.0, 0.03, rate=200)
-    trial = trial_of(record)
+    trial = prepare(record)
     polygon = replace(trial, displacement=record.displacement, step=1.0 / record.rate, factor=1)
     assert abs(fit_separable(Objective((polygon,))).parameters.stiffness / truth.stiffness - 1.0) > 3e-3
     assert abs(fit_separable(Objective((trial,))).parameters.stiffness / truth.stiffness - 1.0) < 1e-4
@@ -97,31 +97,31 @@ def test_fine_displacement_removes_the_bias_of_reading_a_sine_as_a_polygon() -> 
 
 def test_the_fine_grid_keeps_the_samples_and_is_fine_enough() -> None:
     record = sine_test(TABLE_2[0.0], 5.0, 0.005, rate=200)
-    trial = trial_of(record)
+    trial = prepare(record)
     np.testing.assert_allclose(trial.at_samples(trial.displacement), record.displacement, atol=1e-15)
     assert trial.factor == upsampling_factor(record)
     assert 2.0 * np.pi * 5.0 * trial.step <= 1.0 / 250.0
 
 
-def test_rounded_time_stamps_are_no_irregular_clock() -> None:
+def test_rounded_time_stamps_count_as_a_regular_clock() -> None:
     record = sine_test(TABLE_2[0.0], 2.0, 0.03, rate=300)
-    assert trial_of(replace(record, time=np.round(record.time, 3))).positions is None
+    assert prepare(replace(record, time=np.round(record.time, 3))).positions is None
 
 
-def test_an_irregular_clock_is_taken_as_it_is(rng: np.random.Generator) -> None:
+def test_an_irregular_clock_is_fitted_at_its_own_samples(rng: np.random.Generator) -> None:
     truth = TABLE_2[0.0]
     record = sine_test(truth, 2.0, 0.03)
     kept = np.sort(rng.permutation(record.time.size)[: int(0.7 * record.time.size)])
     channels = ("time", "displacement", "velocity", "acceleration", "force")
     thinned = replace(record, **{c: getattr(record, c)[kept] for c in channels})
-    trial = trial_of(thinned)
+    trial = prepare(thinned)
     assert trial.positions is not None
     np.testing.assert_allclose(fit_separable(Objective((trial,))).parameters, truth, rtol=1e-3)
 
 
 def test_slopes_of_the_objective_agree_with_difference_quotients() -> None:
     truth = TABLE_2[150.0]
-    objective = Objective((trial_of(sine_test(truth, 2.0, 0.03, cycles=3)),))
+    objective = Objective((prepare(sine_test(truth, 2.0, 0.03, cycles=3)),))
     _, slopes = objective.residuals_and_slopes(truth)
     for i, value in enumerate(truth):
         up, down = (truth._replace(**{truth._fields[i]: value * f}) for f in (1.0 + 1e-6, 1.0 - 1e-6))
@@ -131,7 +131,7 @@ def test_slopes_of_the_objective_agree_with_difference_quotients() -> None:
 
 def test_the_criterion_is_the_paper_s_equation_4() -> None:
     record = sine_test(TABLE_2[0.0], 2.0, 0.03, cycles=3)
-    trial = trial_of(record)
+    trial = prepare(record)
     other = TABLE_2[150.0]
     simulated = trial.at_samples(element_force(trial.displacement, trial.step, *other, float(record.force[0])))
     kept = trial.counted

@@ -1,4 +1,4 @@
-"""Identification finds what the paper's dampers are made of, and says honestly how well."""
+"""The Bingham fit finds the parameters of the paper's dampers from starts that lie near them."""
 
 from __future__ import annotations
 
@@ -6,12 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from fresh_truths import SENSORS_ALIKE, acceptance_test, published_rows, sine_test, with_noise
+from fresh_truths import SENSORS_ALIKE, TABLE_2, acceptance_test, published_rows, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow
+from pzd.identification.bingham_fit import (
+    Bingham,
+    Objective,
+    evolutionary_search,
+    fit_evolutionary,
+    fit_separable,
+    graphical_start,
+    grid_starts,
+)
+from pzd.identification.condition import identify_condition
 from pzd.identification.config import EvolutionaryConfig
-from pzd.identification.fit import fit_evolutionary, fit_separable, identify_condition, search
-from pzd.identification.prepared_record import Objective, trial_of
+from pzd.identification.prepared_record import prepare
+from pzd.identification.strokes_and_loops import force_at_rest
 from pzd.record import Condition, Record
 
 NAMES = ("T0_N", "C_Ns_per_m", "k_N_per_m")
@@ -57,7 +67,7 @@ def test_with_noise_errors_stay_within_a_percent_and_intervals_hold_the_truth(
 @pytest.mark.parametrize("draw", range(2))
 def test_both_methods_reach_the_same_optimum(draw, noise, rng: np.random.Generator, seeds) -> None:
     _, records = acceptance_test(rng)
-    objective = Objective((trial_of(with_noise(records[0], rng, noise)),))
+    objective = Objective((prepare(with_noise(records[0], rng, noise)),))
     separable = fit_separable(objective)
     evolutionary = fit_evolutionary(objective, EvolutionaryConfig(), *seeds(1))
     assert evolutionary.criterion == pytest.approx(separable.criterion, rel=1e-6)
@@ -65,26 +75,59 @@ def test_both_methods_reach_the_same_optimum(draw, noise, rng: np.random.Generat
 
 
 @pytest.mark.parametrize("draw", range(2))
-def test_the_evolutionary_search_is_near_the_optimum_before_any_polish(draw, rng: np.random.Generator, seeds) -> None:
+def test_the_evolutionary_search_is_near_the_optimum_before_least_squares(
+    draw, rng: np.random.Generator, seeds
+) -> None:
     _, records = acceptance_test(rng)
-    objective = Objective((trial_of(with_noise(records[0], rng)),))
-    found = search(objective, EvolutionaryConfig(), *seeds(1))
+    objective = Objective((prepare(with_noise(records[0], rng)),))
+    found = evolutionary_search(objective, EvolutionaryConfig(), *seeds(1))
     assert objective.criterion(found) <= 1.05 * fit_separable(objective).criterion
 
 
 def test_the_evolutionary_search_repeats_itself_for_the_same_seed(rng: np.random.Generator) -> None:
     _, records = acceptance_test(rng)
-    objective = Objective((trial_of(records[0]),))
+    objective = Objective((prepare(records[0]),))
     config = EvolutionaryConfig(generations=5)
-    assert search(objective, config, 7) == search(objective, config, 7)
-    assert search(objective, config, 7) != search(objective, config, 8)
+    assert evolutionary_search(objective, config, 7) == evolutionary_search(objective, config, 7)
+    assert evolutionary_search(objective, config, 7) != evolutionary_search(objective, config, 8)
 
 
 @pytest.mark.parametrize("draw", range(3))
-def test_the_optimum_does_not_depend_on_which_start_was_followed(draw, rng: np.random.Generator) -> None:
+def test_the_optimum_does_not_depend_on_the_start(draw, rng: np.random.Generator) -> None:
     truth, records = acceptance_test(rng)
     fitted = row_for([with_noise(records[0], rng)])
-    objective = Objective((trial_of(records[0]),))
+    objective = Objective((prepare(records[0]),))
     assert objective.criterion(truth) < 1e-9
     for name, true in zip(NAMES, truth, strict=True):
         assert getattr(fitted, name) == pytest.approx(true, rel=0.03)
+
+
+# --- Starts ---
+
+
+def test_friction_is_where_the_flank_meets_zero_speed_and_not_the_force_there() -> None:
+    truth = TABLE_2[0.0]
+    record = sine_test(truth, 2.0, 0.03)
+    start = graphical_start([prepare(record)])
+    assert force_at_rest(record.velocity[2000:], record.force[2000:], closed=False) == pytest.approx(474.0, abs=3.0)
+    assert start.friction == pytest.approx(truth.friction, rel=0.1)
+
+
+def test_the_pre_slip_slope_is_the_stiffness() -> None:
+    for truth in TABLE_2.values():
+        assert graphical_start([prepare(sine_test(truth, 2.0, 0.03))]).stiffness == pytest.approx(
+            truth.stiffness, rel=1e-3
+        )
+
+
+@pytest.mark.parametrize("draw", range(6))
+def test_graphical_and_grid_starts_lie_near_the_truth(draw, rng: np.random.Generator) -> None:
+    truth, records = acceptance_test(rng)
+    objective = Objective(tuple(prepare(with_noise(r, rng)) for r in records))
+    for start in (graphical_start(objective.prepared), grid_starts(objective)[0]):
+        np.testing.assert_allclose(np.log(start), np.log(truth), atol=np.log(2.0))
+
+
+def test_a_rigid_damper_without_a_pre_slip_branch_still_gets_positive_starts() -> None:
+    record = sine_test(Bingham(1e-3, 1000.0, 1e9), 1.0, 0.02)
+    assert min(graphical_start([prepare(record)])) > 0.0

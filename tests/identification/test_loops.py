@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from fresh_truths import TABLE_2, moving_test, sine_test
 
-from pzd.identification.prepared_record import Bingham
-from pzd.identification.tests_over_time import equivalent_damping, force_at_rest, measures
-from pzd.signals.smoothing import work
+from pzd.identification.bingham_fit import Bingham
+from pzd.identification.strokes_and_loops import equivalent_damping, force_at_rest, measures
+from pzd.signals.measures import work
 
 
 def test_work_of_a_rigid_bingham_damper_over_a_sine() -> None:

@@ -1,4 +1,4 @@
-"""What noise of the residuals' own colour leaves of a parameter: the measure of what is undetermined."""
+"""Uncertainty of an estimate by noise of the colour of the residuals alone."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ def test_the_artefact_reads_back_as_it_was_written(tmp_path) -> None:
     assert read.measures == found.measures
 
 
-def test_progress_is_an_event_for_each_condition() -> None:
+def test_progress_reports_every_condition() -> None:
     heard: list[Progress] = []
     identify(IdentifyConfig(), rig(), seed=1, progress=heard.append)
     assert [(event.done, event.whole) for event in heard] == [(i, 4) for i in range(1, 5)]

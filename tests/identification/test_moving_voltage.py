@@ -1,4 +1,4 @@
-"""Records whose voltage moves are identified at nodes, the piston's place being the state."""
+"""Nodes of records with moving voltage, the state being the place of the piston."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import pytest
 from fresh_truths import TABLE_2, moving_test, sine_test, with_noise
 
 from pzd.artefacts import ParameterRow, Rig
+from pzd.identification.bingham_fit import Bingham
 from pzd.identification.config import IdentifyConfig
-from pzd.identification.moving_voltage import dwelled_levels, nodes_of, weights
-from pzd.identification.prepared_record import Bingham
+from pzd.identification.moving_voltage import dwell_levels, node_weights, voltage_nodes
 from pzd.identification.stage import identify
 from pzd.record import Array, Record
 from pzd.schema.errors import ConfigError
@@ -33,7 +33,7 @@ def values(row: ParameterRow) -> Bingham:
 
 @pytest.mark.parametrize("voltage", [steps, ramp])
 def test_moving_records_alone_give_both_ends(voltage) -> None:
-    rows = rows_for(moving_test(voltage))
+    rows = rows_for(moving_test(voltage, seconds=6.0))
     assert [row.voltage_V for row in rows] == pytest.approx([0.0, 150.0], abs=0.1)
     for row, truth in zip(rows, TABLE_2.values(), strict=True):
         assert row.status == "ok"
@@ -58,7 +58,7 @@ def test_constant_records_alone_decide_on_the_nodes_that_they_determine() -> Non
     assert [row.voltage_V for row in alone] == [0.0, 150.0]
 
 
-def test_a_single_constant_voltage_is_held_and_the_levels_dwelled_on_are_fitted() -> None:
+def test_a_single_constant_voltage_is_fixed_and_the_dwell_levels_are_fitted() -> None:
     constant = sine_test(TABLE_2[0.0], 2.0, 0.03, voltage=0.0, name="c")
     held, fitted = rows_for(constant, moving_test(steps))
     assert held == rows_for(constant)[0]
@@ -73,7 +73,7 @@ def test_rows_rise_with_the_voltage_whichever_was_fitted_first() -> None:
 
 
 @pytest.mark.ci
-def test_a_node_whose_constant_record_tells_too_little_is_fitted_to_both() -> None:
+def test_a_node_that_its_constant_record_does_not_determine_is_fitted_to_moving_records_too() -> None:
     slow = sine_test(TABLE_2[0.0], 0.05, 0.002, cycles=2, rate=250, voltage=0.0, name="slow")
     assert rows_for(slow)[0].C_Ns_per_m is None
     rows = rows_for(slow, moving_test(steps))
@@ -82,7 +82,7 @@ def test_a_node_whose_constant_record_tells_too_little_is_fitted_to_both() -> No
 
 
 def test_the_config_may_choose_the_nodes() -> None:
-    rows = rows_for(moving_test(ramp), nodes=(0.0, 75.0, 150.0))
+    rows = rows_for(moving_test(ramp, seconds=8.0), nodes=(0.0, 75.0, 150.0))
     assert [row.voltage_V for row in rows] == [0.0, 75.0, 150.0]
     middle = np.mean([TABLE_2[0.0], TABLE_2[150.0]], axis=0)
     np.testing.assert_allclose(values(rows[1]), middle, rtol=1e-2)
@@ -99,18 +99,18 @@ def test_nodes_too_close_together_are_refused() -> None:
         rows_for(moving_test(steps), nodes=(0.0, 1.0, 150.0))
 
 
-def test_levels_are_where_the_voltage_dwells() -> None:
+def test_dwell_levels_are_those_of_a_staircase_and_the_ends_of_a_ramp() -> None:
     time = np.arange(20000) / 1000.0
     staircase = np.select([time < 5.0, time < 9.0, time < 15.0], [20.0, 60.0, 140.0], 100.0)
-    assert sorted(dwelled_levels(staircase, 3.0)) == [20.0, 60.0, 100.0, 140.0]
-    low, high = sorted(dwelled_levels(ramp(time), 3.0))
+    assert sorted(dwell_levels(staircase, 3.0)) == [20.0, 60.0, 100.0, 140.0]
+    low, high = sorted(dwell_levels(ramp(time), 3.0))
     assert (low, high) == pytest.approx((0.0, 150.0), abs=0.1)
 
 
 def test_two_constant_voltages_are_the_nodes_whatever_moves() -> None:
-    np.testing.assert_array_equal(nodes_of([moving_test(ramp)], [140.0, 20.0], None, 150.0), [20.0, 140.0])
+    np.testing.assert_array_equal(voltage_nodes([moving_test(ramp)], [140.0, 20.0], None, 150.0), [20.0, 140.0])
 
 
-def test_weights_sum_to_one_and_are_held_beyond_the_ends() -> None:
-    shares = weights(np.array([0.0, 50.0, 150.0]), np.array([-10.0, 25.0, 100.0, 200.0]))
+def test_node_weights_sum_to_one_and_are_constant_beyond_the_ends() -> None:
+    shares = node_weights(np.array([0.0, 50.0, 150.0]), np.array([-10.0, 25.0, 100.0, 200.0]))
     np.testing.assert_allclose(shares, [[1, 0, 0], [0.5, 0.5, 0], [0, 0.5, 0.5], [0, 0, 1]])

@@ -13,7 +13,7 @@ from pzd.diagnosis.data import prepare, split
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.record import Array, Record
-from pzd.signals.stretches import separate_tests, steps
+from pzd.signals.segmentation import separate_tests, steps_between_tests
 
 TRUTH = (400.0, 2500.0, 4e5)
 
@@ -25,7 +25,7 @@ def record(x: Array, rng: Generator, noise: float = 5.0) -> Record:
 
 
 @pytest.mark.parametrize("kind", STEPS)
-def test_a_step_of_speed_or_amplitude_parts_two_tests(kind: str, rng: Generator) -> None:
+def test_a_step_of_speed_or_amplitude_separates_two_tests(kind: str, rng: Generator) -> None:
     before, after = separate_tests(record(STEPS[kind], rng))
     assert before.name == after.name == "r"
     assert before.time[0] == TIME[0]
@@ -35,9 +35,9 @@ def test_a_step_of_speed_or_amplitude_parts_two_tests(kind: str, rng: Generator)
 
 
 @pytest.mark.parametrize("kind", NO_STEPS)
-def test_what_changes_from_cycle_to_cycle_is_one_test(kind: str, rng: Generator) -> None:
+def test_a_motion_that_changes_from_cycle_to_cycle_is_one_test(kind: str, rng: Generator) -> None:
     whole = record(NO_STEPS[kind], rng)
-    assert steps(whole.time, whole.displacement) == ()
+    assert steps_between_tests(whole.time, whole.displacement) == ()
     assert separate_tests(whole) == (whole,)
 
 
@@ -45,7 +45,7 @@ def test_what_changes_from_cycle_to_cycle_is_one_test(kind: str, rng: Generator)
     ("two speeds", (1.0, 2.0), (0.01, 0.01)),
     ("two amplitudes", (1.5, 1.5), (0.005, 0.015)),
 ])  # fmt: skip
-def test_each_of_two_tests_has_its_measures_and_both_give_the_parameters(
+def test_two_tests_in_one_record_have_measures_each_and_give_the_parameters_together(
     kind: str, frequencies: tuple[float, ...], amplitudes: tuple[float, ...], rng: Generator
 ) -> None:
     found = identify(IdentifyConfig(), Rig((record(STEPS[kind], rng),), ()), 1)
@@ -57,7 +57,7 @@ def test_each_of_two_tests_has_its_measures_and_both_give_the_parameters(
     assert (row.T0_N, row.C_Ns_per_m) == pytest.approx(TRUTH[:2], rel=0.02)
 
 
-def test_the_diagnosis_sees_two_tests_that_repeat_and_tells_one_name(rng: Generator) -> None:
+def test_two_tests_in_one_record_are_diagnosed_as_two_under_one_name(rng: Generator) -> None:
     prepared = prepare([record(STEPS["two speeds"], rng)])
     assert [p.record.name for p in prepared] == ["r", "r"]
     assert [p.cycles.frequency for p in prepared if p.cycles] == pytest.approx([1.0, 2.0], rel=1e-3)

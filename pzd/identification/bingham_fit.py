@@ -1,0 +1,449 @@
+"""Least-squares fit of T0, C and k to the records of one condition.
+
+Equation: W_s = sum (F - F_sim)^2 / sum F^2      Source: Makowski and Knap 2021, eq. (4)
+
+The separable method starts from the characteristic and from a coarse grid. Scaling T0 and C with k scales the force,
+F = k f(T0/k, C/k), so the stiffness follows linearly and the grid covers delta = T0/k and tau = C/k only. The
+evolutionary method stands for the paper's genetic algorithm. Both end in least squares with exact sensitivities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pzd.damper.element import element_force, element_force_sensitivities
+from pzd.identification.config import EvolutionaryConfig
+from pzd.identification.prepared_record import PreparedRecord
+from pzd.record import Array
+
+# --- Criterion and search coordinates ---
+
+LARGEST_PRE_SLIP = 0.45
+"""Largest pre-slip deflection T0/k of the search, as a share of the range of displacement: the element still slips."""
+AT_BOUND = 1e-3
+"""A parameter within this share of a bound, in search coordinates, lies at it."""
+
+
+class Bingham(NamedTuple):
+    """Friction T0 [N], damping C [N s/m] and stiffness k [N/m] of the element, or one number for each of them."""
+
+    friction: float
+    damping: float
+    stiffness: float
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """Criterion (4) pooled over the counted samples of the records, which both methods minimise."""
+
+    prepared: tuple[PreparedRecord, ...]
+    basis: Array | None = None
+    """(N, q) orthonormal forces beside the element that are profiled out, by variable projection."""
+
+    @cached_property
+    def measured(self) -> Array:
+        """Measured force (N,) at the counted samples, record by record [N]."""
+        return np.concatenate([t.force[t.counted] for t in self.prepared])
+
+    @cached_property
+    def energy(self) -> float:
+        """Denominator of the criterion [N2]."""
+        return float(self.measured @ self.measured)
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Number of counted samples of each record."""
+        return tuple(int(np.count_nonzero(t.counted)) for t in self.prepared)
+
+    def simulated(self, parameters: Bingham) -> Array:
+        """Compute the force (N,) of the element [N]."""
+        return np.concatenate(
+            [
+                t.at_counted(element_force(t.displacement, t.step, *parameters, float(t.force[0]), every=t.every))
+                for t in self.prepared
+            ]
+        )
+
+    def residuals(self, parameters: Bingham) -> Array:
+        """Compute the measured less simulated force (N,), the forces beside the element profiled out [N]."""
+        return self._projected(self.measured - self.simulated(parameters))
+
+    def residuals_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
+        """Compute the residuals (N,) and the sensitivities (N, 3) to T0, C and k, the basis projected out of both."""
+        simulated, slopes = self.simulated_and_slopes(parameters)
+        return self._projected(self.measured - simulated), self._projected(slopes)
+
+    def simulated_and_slopes(self, parameters: Bingham) -> tuple[Array, Array]:
+        """Compute the force (N,) of the element and its derivatives (N, 3) by T0, C and k."""
+        forces, slopes = [], []
+        for t in self.prepared:
+            force, slope = element_force_sensitivities(
+                t.displacement, t.step, *parameters, float(t.force[0]), every=t.every
+            )
+            forces.append(t.at_counted(force))
+            slopes.append(t.at_counted(slope))
+        return np.concatenate(forces), np.concatenate(slopes)
+
+    def _projected(self, values: Array) -> Array:
+        """Project the basis out of forces (N,) or (N, p).
+
+        Equation: (I - Q Q') r                      Source: Golub and Pereyra 1973, variable projection
+        """
+        return values if self.basis is None else values - self.basis @ (self.basis.T @ values)
+
+    def criterion(self, parameters: Bingham) -> float:
+        """Compute W_s at the parameters."""
+        residuals = self.residuals(parameters)
+        return float(residuals @ residuals) / self.energy
+
+    @cached_property
+    def scales(self) -> tuple[float, float, float]:
+        """Peak force [N], peak speed [m/s] and range of displacement [m] over the records."""
+        speed = max(float(np.max(np.abs(np.diff(t.displacement)))) / t.step for t in self.prepared)
+        stroke = max(float(np.ptp(t.displacement)) for t in self.prepared)
+        return float(np.max(np.abs(self.measured))), speed, stroke
+
+    @cached_property
+    def bounds(self) -> tuple[Bingham, Bingham]:
+        """Smallest and largest parameters of the search, from the scales of the data.
+
+        T0 up to the peak force; C from 1e-4 to 1e2 of peak force over peak speed; k from 0.1 to 1e4 of peak force over
+        the range of displacement.
+        """
+        force, speed, stroke = self.scales
+        return (
+            Bingham(0.0, 1e-4 * force / speed, 0.1 * force / stroke),
+            Bingham(force, 1e2 * force / speed, 1e4 * force / stroke),
+        )
+
+    @cached_property
+    def search_bounds(self) -> tuple[Array, Array]:
+        """Bounds (3,) of the search coordinates."""
+        low, high = self.bounds
+        return (
+            np.array([0.0, np.log(low.damping), np.log(low.stiffness)]),
+            np.array([LARGEST_PRE_SLIP, np.log(high.damping), np.log(high.stiffness)]),
+        )
+
+    def slips(self, parameters: Bingham) -> bool:
+        """Tell whether the element slips within every full stroke: else F(0) would act as a free offset for ever."""
+        return parameters.friction <= LARGEST_PRE_SLIP * parameters.stiffness * self.scales[2]
+
+    def at_bounds(self, parameters: Bingham) -> tuple[bool, ...]:
+        """Tell whether each parameter lies at a bound of the search; a friction of zero does not."""
+        low, high = self.search_bounds
+        x = to_search(parameters, self.scales[2])
+        beyond = x >= high - AT_BOUND * np.abs(high)
+        below = x <= low + AT_BOUND * np.abs(low)
+        return bool(beyond[0]), bool(beyond[1] or below[1]), bool(beyond[2] or below[2])
+
+    def clipped(self, parameters: Bingham) -> Bingham:
+        """Return the parameters clipped to the bounds."""
+        stroke = self.scales[2]
+        return from_search(np.clip(to_search(parameters, stroke), *self.search_bounds), stroke)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """An optimum of the criterion."""
+
+    parameters: Bingham
+    criterion: float
+    residuals: Array
+    """(N,) measured less simulated force at the counted samples [N]."""
+    slopes: Array
+    """(N, 3) derivatives of the simulated force by T0, C and k."""
+
+
+def to_search(parameters: Bingham, stroke: float) -> Array:
+    """Return the search coordinates (3,): pre-slip T0/k as a share of the stroke, logarithms of C and k."""
+    friction, damping, stiffness = parameters
+    return np.array([friction / (stiffness * stroke), np.log(damping), np.log(stiffness)])
+
+
+def from_search(x: Array, stroke: float) -> Bingham:
+    """Return the parameters at search coordinates (3,)."""
+    stiffness = float(np.exp(x[2]))
+    return Bingham(float(x[0]) * stiffness * stroke, float(np.exp(x[1])), stiffness)
+
+
+def search_slopes(parameters: Bingham, stroke: float) -> Array:
+    """Return the derivatives (3, 3) of T0, C, k (rows) by the search coordinates (columns)."""
+    friction, damping, stiffness = parameters
+    return np.array([[stiffness * stroke, 0.0, friction], [0.0, damping, 0.0], [0.0, 0.0, stiffness]])
+
+
+# --- Start from the characteristic, as in the first stage of the paper ---
+
+FLANK_SPEED = 0.3
+"""Least speed of the slip flank, as a share of its peak: where the speed falls and exceeds it, the element slips."""
+PRE_SLIP_FORCE = 0.5
+"""Largest force of the pre-slip branch, as a share of T0."""
+
+
+def graphical_start(prepared: Sequence[PreparedRecord]) -> Bingham:
+    """Estimate T0, C and k from the characteristic of force over speed.
+
+    Equation: abs(F) = T0 + C (abs(v) - tau d abs(v)/dt) on the slip flank; k = dF/dx before slip
+              Source: eq. (1)-(3), to first order in tau = C/k
+
+    T0 is where the slip flank, extrapolated, meets zero piston speed (the measured force is larger there by the load of
+    the oil spring, which the term in tau removes); C is the slope of the flank; k the slope of force over displacement
+    where the force passes through zero.
+
+    Parameters
+    ----------
+    prepared : records of one condition
+
+    Returns
+    -------
+    T0 [N], C [N s/m], k [N/m], all positive
+    """
+    speed, slowing, force = _flank(prepared)
+    peak = max(float(np.max(force, initial=0.0)), np.finfo(float).tiny)
+    fastest = max(float(np.max(speed, initial=0.0)), np.finfo(float).tiny)
+    terms = np.column_stack([np.ones(speed.size), speed / fastest, slowing / max(np.max(slowing, initial=0.0), 1e-12)])
+    intercept, slope, _ = np.linalg.lstsq(terms, force / peak, rcond=1e-3)[0] * peak
+    damping = max(slope, 0.05 * peak) / fastest
+    friction = float(np.clip(intercept, 0.01 * peak, peak))
+    return Bingham(friction, float(damping), _pre_slip_slope(prepared, friction))
+
+
+def _flank(prepared: Sequence[PreparedRecord]) -> tuple[Array, Array, Array]:
+    """Return speed, deceleration, and force along the direction of motion, on the slip flank."""
+    parts = []
+    for t in prepared:
+        velocity = t.at_samples(np.gradient(t.displacement, t.step))
+        step = t.step * (t.displacement.size - 1) / (t.force.size - 1)
+        speed = np.abs(velocity)
+        slowing = -np.gradient(speed, step)
+        along = t.force * np.sign(velocity)
+        flank = t.counted & (speed > FLANK_SPEED * np.max(speed)) & (slowing >= 0.0) & (along > 0.0)
+        parts.append(np.stack([speed[flank], slowing[flank], along[flank]]))
+    speed, slowing, along = np.concatenate(parts, axis=1)
+    return speed, slowing, along
+
+
+def _pre_slip_slope(prepared: Sequence[PreparedRecord], friction: float) -> float:
+    """Return the slope of force over displacement where the force passes through zero, pooled over all passages."""
+    covariance = variance = 0.0
+    for t in prepared:
+        displacement = t.at_samples(t.displacement)[t.counted]
+        force = t.force[t.counted]
+        for part in _runs(np.abs(force) < PRE_SLIP_FORCE * friction):
+            dx = displacement[part] - displacement[part].mean()
+            covariance += float(dx @ (force[part] - force[part].mean()))
+            variance += float(dx @ dx)
+    if covariance > 0.0:
+        return covariance / variance
+    stroke = max(float(np.ptp(t.displacement)) for t in prepared)
+    return 20.0 * friction / stroke
+
+
+def _runs(inside: NDArray[np.bool_]) -> list[slice]:
+    """Return the runs of at least three samples inside."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], inside.astype(int), [0]))))
+    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 3]
+
+
+# --- Separable method ---
+
+DEFLECTION_AND_TIME_GRID = (12, 10)
+"""Points of the grid in delta = T0/k and in tau = C/k."""
+GRID_SAMPLES = 10_000
+"""Most samples on which the grid is evaluated, divided among the records."""
+GRID_DESCENTS = 3
+"""Best grid points that are starts."""
+SAME_OPTIMUM = 1e-6
+"""Relative difference of the criteria of two descents at the same optimum."""
+_CACHED_POINTS = 2
+"""Points whose forces are cached: the current one of a descent, and its last trial step."""
+TOLERANCE = 1e-12
+"""Relative tolerance of the least squares on parameters and criterion."""
+
+
+def fit_separable(objective: Objective) -> Fit:
+    """Find the global optimum of the criterion from the characteristic and the grid.
+
+    Descents are made until the best optimum has been reached twice. The second need not converge: a criterion so close
+    to that of a known optimum is no coincidence.
+    """
+    best = descend(objective, graphical_start(objective.prepared))
+    for start in grid_starts(objective):
+        try:
+            fit = descend(objective, start, best.criterion)
+        except KnownOptimum:
+            return best
+        best = min(best, fit, key=lambda f: f.criterion)
+    return best
+
+
+class KnownOptimum(Exception):  # noqa: N818  # nothing went wrong
+    """A descent has reached an optimum that is known."""
+
+
+def grid_starts(objective: Objective, count: int = GRID_DESCENTS) -> list[Bingham]:
+    """Return the best points of the grid, best first.
+
+    Equation: k = sum F f / sum f^2 with f = F(T0/k, C/k, 1)      Source: eq. (1)-(3), scaled by k
+    """
+    _, _, stroke = objective.scales
+    pieces = [_coarse_record(t, GRID_SAMPLES // len(objective.prepared)) for t in objective.prepared]
+    slowest = max((t.displacement.size - 1) * t.step for t in objective.prepared)
+    deltas = np.geomspace(1e-4, LARGEST_PRE_SLIP, DEFLECTION_AND_TIME_GRID[0]) * stroke
+    taus = np.geomspace(min(p[1] for p in pieces), 0.1 * slowest, DEFLECTION_AND_TIME_GRID[1])
+    found: list[tuple[float, Bingham]] = []
+    for delta in deltas:
+        for tau in taus:
+            match, energy = _inner_products(pieces, float(delta), float(tau))
+            if match > 0.0:
+                k = match / energy
+                found.append((-match * k, Bingham(float(delta) * k, float(tau) * k, k)))
+    return [objective.clipped(start) for _, start in sorted(found)[:count]]
+
+
+def descend(objective: Objective, start: Bingham, known: float | None = None) -> Fit:
+    """Find the optimum from a starting point by trust-region least squares within the bounds.
+
+    Parameters
+    ----------
+    objective : what is minimised
+    start : of the search
+    known : criterion of an optimum that is known already
+
+    Raises
+    ------
+    KnownOptimum : as soon as the criterion reaches the known one, which saves the rest of the way
+    """
+    from scipy.optimize import least_squares
+
+    stroke = objective.scales[2]
+    norm = np.sqrt(objective.energy)
+    low, high = objective.search_bounds
+
+    def reduced(fit: Fit) -> Array:
+        """Return the triangle (4, 4) with the inner products of slopes and residuals.
+
+        Least squares on four rows takes the same steps as on N rows, and costs next to nothing.
+        """
+        together = np.column_stack([fit.slopes @ -search_slopes(fit.parameters, stroke), fit.residuals])
+        together /= norm
+        return np.asarray(np.linalg.qr(together, mode="r"))
+
+    memory: dict[bytes, tuple[Fit, Array]] = {}
+
+    def at(x: Array) -> tuple[Fit, Array]:
+        key = x.tobytes()
+        if key not in memory:
+            if len(memory) == _CACHED_POINTS:
+                memory.pop(next(iter(memory)))
+            fit = _fit_at(objective, from_search(x, stroke))
+            memory[key] = fit, reduced(fit)
+        return memory[key]
+
+    def residuals_at(x: Array) -> Array:
+        fit, triangle = at(x)
+        if known is not None and abs(fit.criterion - known) <= SAME_OPTIMUM * known:
+            raise KnownOptimum
+        return triangle[:, 3]
+
+    def slopes_at(x: Array) -> Array:
+        return at(x)[1][:, :3]
+
+    inside = np.clip(to_search(start, stroke), low + 1e-9, high - 1e-9)
+    found = least_squares(
+        residuals_at,
+        inside,
+        jac=slopes_at,
+        bounds=(low, high),
+        x_scale="jac",
+        xtol=TOLERANCE,
+        ftol=TOLERANCE,
+        gtol=TOLERANCE,
+        max_nfev=100,
+    )
+    return at(found.x)[0]
+
+
+def _fit_at(objective: Objective, parameters: Bingham) -> Fit:
+    """Evaluate residuals and sensitivities at parameters."""
+    residuals, slopes = objective.residuals_and_slopes(parameters)
+    return Fit(parameters, float(residuals @ residuals) / objective.energy, residuals, slopes)
+
+
+def _coarse_record(record: PreparedRecord, samples: int) -> tuple[Array, float, Array, int]:
+    """Return displacement at the samples, its step, force, and first counted sample of the first part of a record."""
+    first = int(np.argmax(record.counted))
+    stop = max(first + samples, 2 * first)
+    displacement = np.ascontiguousarray(record.at_samples(record.displacement)[:stop])
+    step = record.step * (record.displacement.size - 1) / (record.force.size - 1)
+    return displacement, step, record.force[:stop], first
+
+
+def _inner_products(pieces: list[tuple[Array, float, Array, int]], delta: float, tau: float) -> tuple[float, float]:
+    """Return the sums of F f and of f^2 over the records."""
+    match = energy = 0.0
+    for displacement, step, force, first in pieces:
+        shape = element_force(displacement, step, delta, tau, 1.0)[first:]
+        match += float(force[first:] @ shape)
+        energy += float(shape @ shape)
+    return match, energy
+
+
+# --- Evolutionary method ---
+
+LEAST_FRICTION = 1e-4
+"""Least friction of the search, as a share of the peak force, since its logarithm is searched."""
+PENALTY = 10.0
+"""Criterion of parameters outside the bounds of the separable method: ten times that of no model at all."""
+LEAST_SPREAD = 1e-8
+"""Spread of the criterion over the population at which the search ends; least squares does the rest."""
+
+
+def fit_evolutionary(objective: Objective, config: EvolutionaryConfig, seed: int) -> Fit:
+    """Find the optimum by the evolutionary search, refined by least squares."""
+    return descend(objective, evolutionary_search(objective, config, seed))
+
+
+def evolutionary_search(objective: Objective, config: EvolutionaryConfig, seed: int) -> Bingham:
+    """Return the best member of the last generation of a differential evolution on the criterion.
+
+    Equation: minimise W_s over log T0, log C, log k      Source: Makowski and Knap 2021, eq. (4); Storn and Price 1997
+
+    Parameters
+    ----------
+    objective : criterion and bounds, the same as of the separable method
+    config : population, generations, tolerance
+    seed : of the random draws
+
+    Returns
+    -------
+    parameters, not yet refined by least squares
+    """
+    from scipy.optimize import Bounds, differential_evolution
+
+    low, high = objective.bounds
+    low = low._replace(friction=LEAST_FRICTION * high.friction)
+
+    def criterion(logarithms: Array) -> float:
+        parameters = Bingham(*(float(p) for p in np.exp(logarithms)))
+        return objective.criterion(parameters) if objective.slips(parameters) else PENALTY
+
+    found = differential_evolution(
+        criterion,
+        Bounds(np.log(low), np.log(high)),
+        popsize=config.population,
+        maxiter=config.generations,
+        tol=config.tolerance,
+        atol=LEAST_SPREAD,
+        seed=seed,
+        init="sobol",
+        polish=False,
+    )
+    return Bingham(*(float(p) for p in np.exp(found.x)))

@@ -1,0 +1,270 @@
+"""Parameters of one condition: fit, intervals and status, with the auxiliary forces of a gas-charged damper.
+
+Gas pushes the rod out at every control signal, and a Bingham element that has to replace it gets a wrong friction and a
+wrong stiffness. A constant force and a gas spring beside the element are linear in their coefficients, so these are
+profiled out of the criterion (variable projection) and cost the search nothing. They are kept only where the tests show
+them beyond offset, gain and delay of the sensors, the noise and the misfit of the element; else T0, C and k are those
+of the element alone. The damper that identify hands on has neither: diagnose names the effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pzd.artefacts import AuxiliaryRow, ParameterRow
+from pzd.identification.bingham_fit import Bingham, Fit, Objective, descend, fit_evolutionary, fit_separable
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.intervals import half_widths, interval_columns, label_columns, uncertainty
+from pzd.identification.prepared_record import FittedRecord, fitted_records, prepare
+from pzd.identification.trust import (
+    MISFIT_THRESHOLD,
+    ParameterEvidence,
+    misfit_of,
+    parameter_evidence,
+    parameter_scales,
+    partial_sensitivities,
+    stationarity,
+    trust_of,
+)
+from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels, Mask, Record, mid_stroke
+from pzd.signals.measures import criterion, rms
+from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.segmentation import separate_tests
+
+# --- Fit of one condition ---
+
+
+def identify_condition(
+    condition: Condition, config: IdentifyConfig, seed: int
+) -> tuple[ParameterRow, AuxiliaryRow | None]:
+    """Identify the Bingham parameters of one condition, and the forces that its tests show beside the element.
+
+    Parameters
+    ----------
+    condition : whose records are fitted
+    config : the method, and standard deviations of what differs from test to test
+    seed : of the evolutionary search
+    """
+    records = [test for record in condition.records for test in separate_tests(record)]
+    objective, fit, auxiliary = fit_with_auxiliary(records, config, seed)
+    fitted = fitted_records(records, objective.prepared, (fit.residuals, fit.slopes), config.nuisance)
+    (row,) = parameter_rows(objective, [(condition.labels, fit.parameters)], (fit.residuals, fit.slopes), fitted)
+    return row, None if auxiliary is None else _auxiliary_row(condition.labels, auxiliary)
+
+
+def fit_with_auxiliary(
+    records: Sequence[Record], config: IdentifyConfig, seed: int
+) -> tuple[Objective, Fit, Auxiliary | None]:
+    """Fit the element, and where the records show forces beside it, fit it again to the remainder.
+
+    Parameters
+    ----------
+    records : of one condition
+    config : the method, and standard deviations of what differs from test to test
+    seed : of the evolutionary search
+
+    Returns
+    -------
+    the data as fitted, the optimum, and the forces beside the element; None where there are none
+    """
+    whole = Objective(tuple(prepare(r) for r in records))
+    element_alone = _optimum(whole, config, seed)
+    if not auxiliary_is_visible(whole, element_alone):
+        return whole, element_alone, None
+    values = auxiliary_start(whole)
+    objective = without_auxiliary_force(whole, values)
+    fit = _optimum(objective, config, seed)
+    values = values + auxiliary_remainder(objective, fit)
+    objective = without_auxiliary_force(whole, values)
+    fit = descend(objective, fit.parameters)
+    auxiliary = significant_auxiliary(records, objective, fit, values, config.nuisance)
+    return (whole, element_alone, None) if auxiliary is None else (objective, fit, auxiliary)
+
+
+def _optimum(objective: Objective, config: IdentifyConfig, seed: int) -> Fit:
+    """Return the optimum by the method of the config."""
+    if config.method == "evolutionary":
+        return fit_evolutionary(objective, config.evolutionary, seed)
+    return fit_separable(objective)
+
+
+# --- Rows ---
+
+
+def parameter_rows(
+    objective: Objective,
+    optimum: Sequence[tuple[Labels, Bingham]],
+    fitted: tuple[Array, Array],
+    records: Sequence[FittedRecord],
+    touched: Mask | None = None,
+) -> list[ParameterRow]:
+    """Return the rows of a fit: one of a condition, or one a voltage node.
+
+    Parameters
+    ----------
+    objective : the data
+    optimum : labels and parameters of each row
+    fitted : (N,) residuals and (N, 3 rows) slopes
+    records : the same by record
+    touched : (N, rows) samples on which each row is judged; None for all
+    """
+    residuals, slopes = fitted
+    misfit = misfit_of(records)
+    noise = uncertainty(slopes, residuals, objective.lengths).half_widths().reshape(-1, 3)
+    widths = half_widths(records, misfit).reshape(-1, 3)
+    scales = np.stack([parameter_scales(parameters, objective.measured) for _, parameters in optimum])
+    shares = partial_sensitivities(slopes, scales.ravel(), objective.energy).reshape(-1, 3)
+    cosines = stationarity(slopes, residuals, objective.energy).reshape(-1, 3)
+    rows = []
+    for i, (labels, parameters) in enumerate(optimum):
+        here = touched[:, i] if touched is not None and np.any(touched[:, i]) else slice(None)
+        measured, left = objective.measured[here], residuals[here]
+        share = shares[i] * np.sqrt(objective.energy / float(measured @ measured))
+        facts = np.stack([scales[i], noise[i], widths[i], share, cosines[i]])
+        evidence = parameter_evidence(objective, parameters, criterion(left, measured), facts, misfit)
+        rows.append(parameter_row(labels, parameters, widths[i], evidence, (measured, left)))
+    return rows
+
+
+def parameter_row(
+    labels: Labels,
+    parameters: Bingham,
+    widths: Array,
+    evidence: Sequence[ParameterEvidence],
+    fitted: tuple[Array, Array],
+) -> ParameterRow:
+    """Return the row of one condition or node; an undetermined parameter has no number.
+
+    Parameters
+    ----------
+    labels : setting, voltage, temperature
+    parameters : the optimum
+    widths : (3,) half widths of the 95 % intervals
+    evidence : on T0, C and k
+    fitted : (N,) measured force and (N,) residuals of the samples that the row was fitted to
+    """
+    trust = trust_of(evidence)
+    measured, residuals = fitted
+    cells = label_columns(labels)
+    names = zip(("T0_N", "C_Ns_per_m", "k_N_per_m"), ("positive", "log", "log"), strict=True)
+    for (name, scale), value, width, known in zip(names, parameters, widths, trust.determined, strict=True):
+        cells |= interval_columns(name, value if known else None, float(width), scale)
+    cells |= {"W_s": criterion(residuals, measured), "rmse_N": rms(residuals), "status": trust.status}
+    return ParameterRow.model_validate(cells)
+
+
+def _auxiliary_row(labels: Labels, found: Auxiliary) -> AuxiliaryRow:
+    """Return the row of the forces beside the element."""
+    cells = label_columns(labels)
+    for name, value, width in zip(("F_0_N", "k_g_N_per_m"), found.values, found.widths, strict=True):
+        cells |= interval_columns(name, float(value), float(width), "linear")
+    return AuxiliaryRow.model_validate({**cells, "zero_m": found.middle})
+
+
+# --- Auxiliary forces ---
+
+AUXILIARY_CONFIDENCE = 0.999
+"""Level of the interval that has to exclude zero for at least one of the two forces."""
+
+
+@dataclass(frozen=True, eq=False)
+class Auxiliary:
+    """Forces F_0 + k_g (x - x_m) beside the element."""
+
+    values: Array
+    """(2,) F_0 [N] and k_g [N/m]."""
+    widths: Array
+    """(2,) half widths of their 95 % intervals."""
+    middle: float
+    """x_m, the middle of the motion of all records concerned [m]."""
+
+
+def auxiliary_columns(objective: Objective) -> tuple[Array, float]:
+    """Return the forces (N, 2) of F_0 = 1 N and k_g = 1 N/m at the counted samples, and the mid-stroke [m]."""
+    middle = mid_stroke(t.displacement for t in objective.prepared)
+    x = np.concatenate([t.at_samples(t.displacement)[t.counted] for t in objective.prepared]) - middle
+    return np.column_stack([np.ones(x.size), x]), middle
+
+
+def auxiliary_is_visible(objective: Objective, fit: Fit) -> bool:
+    """Tell whether the forces would explain, to first order, more than a load cell may be wrong by."""
+    columns, _ = auxiliary_columns(objective)
+    slopes = fit.slopes / np.maximum(np.linalg.norm(fit.slopes, axis=0), np.finfo(float).tiny)
+    base, _ = np.linalg.qr(slopes)
+    beyond, _ = np.linalg.qr(columns - base @ (base.T @ columns))
+    explained = float(np.sum((beyond.T @ fit.residuals) ** 2)) / fit.residuals.size
+    return bool(np.sqrt(explained) > MISFIT_THRESHOLD * objective.scales[0])
+
+
+def auxiliary_start(objective: Objective) -> Array:
+    """Estimate F_0 and k_g (2,) without a fit of the element, as a start.
+
+    Equation: F = F_0 + k_g (x - x_m) + a sign(v) + b v, by least squares      Source: a damper is odd in its speed
+    """
+    columns, _ = auxiliary_columns(objective)
+    speed = np.concatenate([t.at_samples(np.gradient(t.displacement, t.step))[t.counted] for t in objective.prepared])
+    terms = np.column_stack([columns, np.sign(speed), speed])
+    size = np.linalg.norm(terms, axis=0)
+    size[size == 0.0] = 1.0
+    found: Array = (np.linalg.lstsq(terms / size, objective.measured, rcond=1e-9)[0] / size)[:2]
+    return found
+
+
+def without_auxiliary_force(objective: Objective, values: Array) -> Objective:
+    """Subtract F_0 + k_g (x - x_m) from the data; the remainder of both forces is profiled out."""
+    columns, middle = auxiliary_columns(objective)
+    prepared = tuple(
+        replace(t, force=t.force - values[0] - values[1] * (t.at_samples(t.displacement) - middle))
+        for t in objective.prepared
+    )
+    basis, _ = np.linalg.qr(columns)
+    return Objective(prepared, basis)
+
+
+def auxiliary_remainder(objective: Objective, fit: Fit) -> Array:
+    """Estimate the remainder of F_0 and k_g (2,) at an optimum, to be added to what was subtracted."""
+    columns, _ = auxiliary_columns(objective)
+    left = objective.measured - objective.simulated(fit.parameters)
+    return np.asarray(np.linalg.lstsq(columns, left, rcond=None)[0], dtype=np.float64)
+
+
+def significant_auxiliary(
+    records: Sequence[Record], objective: Objective, fit: Fit, values: Array, nuisance: NuisanceConfig
+) -> Auxiliary | None:
+    """Return the forces with their intervals; None where the tests do not show them.
+
+    Parameters
+    ----------
+    records : that were fitted
+    objective : their data, the forces subtracted
+    fit : the optimum
+    values : (2,) forces that were subtracted, so that no remainder is left
+    nuisance : standard deviations of what differs from test to test
+    """
+    columns, middle = auxiliary_columns(objective)
+    slopes = np.hstack([objective.simulated_and_slopes(fit.parameters)[1], columns])
+    fitted = fitted_records(records, objective.prepared, (fit.residuals, slopes), nuisance)
+    misfit = misfit_of(fitted)
+    if not np.any(np.abs(values) > half_widths(fitted, misfit, AUXILIARY_CONFIDENCE)[3:]):
+        return None
+    return Auxiliary(values, half_widths(fitted, misfit)[3:], middle)
+
+
+def subtract_auxiliary(record: Record, auxiliaries: Sequence[AuxiliaryRow]) -> Record:
+    """Subtract from a record the forces that constant records show beside the element, at the nearest temperature.
+
+    Parameters
+    ----------
+    record : of moving voltage, whose own force tells friction and gas less well apart
+    auxiliaries : of its setting; the mean of those at one temperature is subtracted
+    """
+    if not auxiliaries:
+        return record
+    own = record.median_temperature() or 0.0
+    apart = [abs((row.temperature_degC or 0.0) - own) for row in auxiliaries]
+    near = [row for row, distance in zip(auxiliaries, apart, strict=True) if distance <= min(apart) + SAME_TEMPERATURE]
+    forces = [row.F_0_N + row.k_g_N_per_m * (record.displacement - row.zero_m) for row in near]
+    return replace(record, force=record.force - np.mean(forces, axis=0))

@@ -1,0 +1,401 @@
+"""The knee law of passive dampers: parameters of every condition, choice of the law, force per click and per unit."""
+
+from __future__ import annotations
+
+import logging
+from collections import defaultdict
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from pzd.artefacts import ClickRow, KneeForceRow, KneeRow, Knees, LawRow, ParameterRow, PredictedRow, UnitRow
+from pzd.artefacts.identified import FALLBACK
+from pzd.artefacts.knee import DIRECTIONS, LawName, knee_damper
+from pzd.artefacts.table import LENGTHS, PRESSURES, numbers_in
+from pzd.damper.compose import static_force, steady_force
+from pzd.identification.config import IdentifyConfig
+from pzd.identification.intervals import half_widths, interval_columns, label_columns
+from pzd.identification.knee_fit import REFIT_EVALUATIONS, KneeData, KneeFit, descend, fit_bingham, fit_knee
+from pzd.identification.prepared_record import fitted_records, prepare
+from pzd.identification.trust import MISFIT_THRESHOLD, WEAK_WIDTH, Misfit, friction_scale, misfit_of
+from pzd.parallel.processes import Listener, Progress
+from pzd.quantities import Control
+from pzd.record import SAME_TEMPERATURE, Array, Condition, Labels
+from pzd.schema.errors import ConfigError
+from pzd.signals.measures import criterion, rms
+from pzd.signals.nuisance import NuisanceConfig
+from pzd.signals.segmentation import separate_tests
+
+log = logging.getLogger(__name__)
+
+
+def identify_knees(
+    conditions: Sequence[tuple[Condition, ParameterRow]],
+    settings: Sequence[str | None],
+    config: IdentifyConfig,
+    control: Control,
+    progress: Listener,
+) -> Knees:
+    """Identify the knee law of every condition, and choose the law of each setting.
+
+    Parameters
+    ----------
+    conditions : of constant control signal, with their Bingham parameters
+    settings : of the rig
+    config : the law asked for, and standard deviations of what differs from test to test
+    control : the control signal, which may be a clicker
+    progress : called after every condition
+
+    Raises
+    ------
+    ConfigError : when the config asks for the knee law and a setting has no test at a constant control signal
+    """
+    rows: list[KneeRow] = []
+    forces: list[KneeForceRow] = []
+    found = []
+    for number, (condition, bingham) in enumerate(conditions, start=1):
+        tests = KneeData.of([test for record in condition.records for test in separate_tests(record)])
+        fit = fit_knee(tests, bingham.k_N_per_m or FALLBACK["k_N_per_m"])
+        row = knee_row(condition.labels, tests, fit, config.nuisance)
+        rows.append(row)
+        forces += knee_forces(row)
+        found += held_out_predictions(condition.labels, tests, fit, fit_bingham(tests, fit))
+        progress(Progress(number, len(conditions), f"knee law: {_knee_text(row)}"))
+    laws = []
+    for setting in settings:
+        if config.law == "knee" and not any(row.setting == setting for row in rows):
+            of = f" of setting {setting}" if setting else ""
+            raise ConfigError(
+                f"identify.law: needs tests{of} at a constant control signal; in all of them it moves: record some, or "
+                "say bingham (got knee)"
+            )
+        mine = [each for each in found if each[0].setting == setting]
+        law = law_row(config.law, setting, mine, sum(row.setting == setting for row in rows))
+        log.info("identify: law %s%s, %s", law.law, f" of {setting}" if setting else "", law.reason)
+        laws.append(law)
+    clicks, units = force_changes(forces, control)
+    return Knees(tuple(rows), tuple(forces), clicks, tuple(row for row, _ in found), tuple(laws), units)
+
+
+def _knee_text(row: KneeRow) -> str:
+    """Return the knees of one condition as a line of progress."""
+    place = ", ".join(str(part) for part in (row.setting, row.voltage_V, row.temperature_degC) if part is not None)
+    knee = {
+        "rebound": (row.rebound_knee_force_N, row.rebound_knee_velocity_m_per_s),
+        "compression": (row.compression_knee_force_N, row.compression_knee_velocity_m_per_s),
+    }
+    knees = [
+        f"{way} knee {force:.4g} N at {speed:.3g} m/s" if force is not None else f"no knee in {way}"
+        for way, (force, speed) in knee.items()
+    ]
+    return f"{place or 'all records'}: {', '.join(knees)}, W_s = {row.W_s:.3g}"
+
+
+# --- Rows of one condition ---
+
+TRADE_SPEEDS = tuple(float(np.round(np.pi * 0.1 * turns / 60.0, 3)) for turns in (10, 25, 50, 75, 100, 200, 300))
+"""Speeds at which dampers are specified [m/s]: peaks of a crank of 100 mm stroke at 10 to 300 revolutions a minute."""
+SPEED_ROUNDING = 1.001
+"""Factor within which a test reaches a speed, which is rounded to millimetres a second."""
+NO_MISFIT = Misfit(0.0, 0.0)
+
+
+def knee_row(labels: Labels, tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> KneeRow:
+    """Return the row of one condition.
+
+    Parameters
+    ----------
+    labels : of the condition
+    tests : that were fitted
+    fit : their optimum
+    nuisance : standard deviations of what differs from test to test
+    """
+    misfit, widths = _half_widths(tests, fit, nuisance)
+    curve, (force, spring) = fit.curve, fit.gas.tolist()
+    values: dict[str, float] = {"friction_N": curve.friction, "gas_force_N": force, "gas_spring_N_per_m": spring}
+    values["k_N_per_m"] = curve.stiffness
+    for way, direction in enumerate(DIRECTIONS):
+        values[f"{direction}_bleed_Ns_per_m"] = curve.bleed[way]
+        if fit.form.has_knee[way]:
+            values[f"{direction}_knee_force_N"] = curve.knee_force(way)
+            values[f"{direction}_knee_velocity_m_per_s"] = curve.knee_speed[way]
+            values[f"{direction}_blow_off_Ns_per_m"] = curve.blow_off[way]
+    cells: dict[str, float | None] = {}
+    for name in (field.removesuffix("_low95") for field in KneeRow.model_fields if field.endswith("_low95")):
+        scale = "positive" if name == "friction_N" else "linear" if name.startswith("gas") else "log"
+        cells |= interval_columns(name, values.get(name), widths.get(name), scale, WIDEST_LOGARITHM)
+    return KneeRow.model_validate(
+        {
+            **label_columns(labels),
+            **cells,
+            "zero_m": tests.middle,
+            "reached_m_per_s": tests.fastest,
+            "W_s": fit.criterion,
+            "rmse_N": rms(fit.residuals),
+            "missed_share": misfit.share,
+            "status": _status(values, widths, misfit, tests.measured),
+        }
+    )
+
+
+def knee_forces(row: KneeRow) -> Iterator[KneeForceRow]:
+    """Yield the force of a row at the trade's speeds, up to the first that no test reached."""
+    damper, voltage = knee_damper([row]), row.voltage_V
+    rest = float(static_force(damper, voltage))
+    for speed in TRADE_SPEEDS:
+        rebound, compression = steady_force(damper, voltage, row.temperature_degC, np.array([speed, -speed])) + rest
+        inside = speed <= SPEED_ROUNDING * row.reached_m_per_s
+        yield KneeForceRow(
+            setting=row.setting,
+            voltage_V=row.voltage_V,
+            temperature_degC=row.temperature_degC,
+            velocity_m_per_s=speed,
+            rebound_force_N=float(rebound),
+            compression_force_N=float(compression),
+            gas_force_N=rest,
+            inside=int(inside),
+        )
+        if not inside:
+            return
+
+
+def _half_widths(tests: KneeData, fit: KneeFit, nuisance: NuisanceConfig) -> tuple[Misfit, dict[str, float]]:
+    """Return the misfit of the law, and the half widths of the 95 % intervals by column.
+
+    For the force of a knee it replaces its speed as parameter: dF/dF_k = (dF/dw_k) / C, and T0 and C act at constant
+    F_k. The curve of any damper is round and the two lines are a reading of it: an interval holds what the same reading
+    of other tests would give; the misfit of the law stands in the status and widens no interval.
+    """
+    form, curve = fit.form, fit.curve
+    columns = ["friction_N", *(f"{name}_bleed_Ns_per_m" for name in DIRECTIONS), "k_N_per_m"]
+    for way in form.directions_with_knee:
+        columns += [f"{DIRECTIONS[way]}_knee_velocity_m_per_s", f"{DIRECTIONS[way]}_blow_off_Ns_per_m"]
+    columns += ["gas_force_N", "gas_spring_N_per_m"]
+    by_force, forces = fit.slopes.copy(), list(columns)
+    for way in form.directions_with_knee:
+        place, C = columns.index(f"{DIRECTIONS[way]}_knee_velocity_m_per_s"), curve.bleed[way]
+        slope = fit.slopes[:, place] / C
+        by_force[:, place] = slope
+        by_force[:, 0] -= slope
+        by_force[:, 1 + way] -= slope * curve.knee_speed[way]
+        forces[place] = f"{DIRECTIONS[way]}_knee_force_N"
+    records = [test.record for test in tests.tests]
+    prepared = [prepare(record) for record in records]
+    fitted = [fitted_records(records, prepared, (fit.residuals, s), nuisance) for s in (fit.slopes, by_force)]
+    # Records that are not constant use the speed of the rod for that of the flow: here no single C stands for it.
+    widths, of_force = (half_widths([replace(r, constant=False) for r in each], NO_MISFIT) for each in fitted)
+    by_column = dict(zip(forces, of_force.tolist(), strict=True)) | dict(zip(columns, widths.tolist(), strict=True))
+    return misfit_of(fitted[0]), by_column
+
+
+WIDEST_LOGARITHM = 20.0
+"""Largest half width of an interval in the logarithm: nothing is known then."""
+
+
+_UNITS = ("_Ns_per_m", "_N_per_m", "_m_per_s", "_N")
+
+
+def _quantity_name(column: str) -> str:
+    """Return the name of a column in words, without its unit."""
+    unit = next(unit for unit in _UNITS if column.endswith(unit))
+    return column.removesuffix(unit).replace("_", " ")
+
+
+def _status(values: Mapping[str, float], widths: Mapping[str, float], misfit: Misfit, measured: Array) -> str:
+    """Return `ok`, or the weak parameters with the reason; the gas is judged against the scale of the friction."""
+    least = {"friction_N": friction_scale(values["friction_N"], measured)}
+    least["gas_force_N"] = max(abs(values["gas_force_N"]), least["friction_N"])
+    weak = [
+        f"{_quantity_name(name)} to +-{min(widths[name] / least.get(name, value), 9.99):.0%}"
+        for name, value in values.items()
+        if name != "gas_spring_N_per_m" and widths[name] > WEAK_WIDTH * least.get(name, value)
+    ]
+    if misfit.is_large:
+        weak.append(f"the law misses {misfit.share:.1%} of peak: the parameters are the model's, not the damper's")
+    return f"weak: {'; '.join(weak)}" if weak else "ok"
+
+
+# --- Choice of the law by held-out tests ---
+
+LAW_FOLDS = 5
+"""Folds of the cross-validation of a law, or one a test where they are fewer."""
+SIGNIFICANT_ERRORS = 2.0
+"""Standard errors beyond which a mean difference is significant, as in diagnose."""
+FEWEST_TESTS = 3
+"""Fewest tests for a standard error."""
+
+
+def held_out_predictions(
+    labels: Labels, tests: KneeData, knee: KneeFit, bingham: KneeFit
+) -> list[tuple[PredictedRow, Array]]:
+    """Predict every test of a condition by both laws, each fitted without it; none where the test is alone.
+
+    Parameters
+    ----------
+    labels : of the condition
+    tests : of the condition
+    knee, bingham : the optima over all tests, at which the refits start
+
+    Returns
+    -------
+    the rows, each with (4,) sums over its samples [N2]: squared errors of Bingham's and of the knee law, squares of the
+    measured force, and of the misfit threshold
+    """
+    count = len(tests.tests)
+    if count < 2:
+        return []
+    order = np.argsort([float(np.max(np.abs(test.record.velocity))) for test in tests.tests], kind="stable")
+    found = {}
+    for fold in range(min(LAW_FOLDS, count)):
+        out = order[fold::LAW_FOLDS].tolist()
+        rest = tests.subset([i for i in range(count) if i not in out])
+        fits = [descend(rest, fit.form, fit.curve, fit.gas, REFIT_EVALUATIONS) for fit in (bingham, knee)]
+        for i in out:
+            one = tests.subset([i])
+            left = [one.measured - fit.predicted(one) for fit in fits]
+            unseen = np.full(one.measured.size, MISFIT_THRESHOLD * one.peak)
+            squares = np.array([float(r @ r) for r in (*left, one.measured, unseen)])
+            found[i] = _predicted(labels, one, left), squares
+    return [found[i] for i in range(count)]
+
+
+def _predicted(labels: Labels, one: KneeData, left: Sequence[Array]) -> PredictedRow:
+    """Return the row of one test from the prediction errors (2, N) of both laws."""
+    return PredictedRow(
+        record=one.tests[0].record.name,
+        **label_columns(labels),
+        W_s_bingham=criterion(left[0], one.measured),
+        W_s_knee=criterion(left[1], one.measured),
+    )
+
+
+def law_row(
+    asked: Literal["bingham", "knee", "auto"],
+    setting: str | None,
+    found: Sequence[tuple[PredictedRow, Array]],
+    conditions: int,
+) -> LawRow:
+    """Choose the law of one setting.
+
+    Equation: knee where mean d > 2 s_d / sqrt(n), d_i = W_s,i of Bingham less that of the knee, and where the error
+    over all tests is visibly less                                                   Source: paired differences
+
+    Parameters
+    ----------
+    asked : law that the config asks for
+    setting : of the rig
+    found : its held-out tests, with the squares of `held_out_predictions`
+    conditions : number of its conditions to which the knee law was fitted
+
+    Returns
+    -------
+    the law, with the reason
+    """
+    count = len(found)
+    squares = np.sum([each for _, each in found], axis=0) if found else None
+    pooled = None if squares is None else (float(squares[0] / squares[2]), float(squares[1] / squares[2]))
+    comparison = f"{count} tests kept back are predicted with W_s {pooled[1]:.3g} by the knee law" if pooled else ""
+    comparison += f", {pooled[0]:.3g} by Bingham's" if pooled else ""
+    law: LawName = "bingham"
+    if not conditions:
+        reason = "the knee law needs tests at a constant control signal"
+    elif asked == "knee":
+        law, reason = "knee", f"as the config asks for; {comparison or 'no test could be kept back'}"
+    elif count < FEWEST_TESTS:
+        reason = f"{count} tests could be kept back, and {FEWEST_TESTS} are needed to choose a law; "
+        reason += "record several in a condition"
+    else:
+        apart = np.array([row.W_s_bingham - row.W_s_knee for row, _ in found])
+        mean, error = float(apart.mean()), float(np.std(apart, ddof=1) / np.sqrt(count))
+        visible = squares is not None and float(squares[0] - squares[1]) > float(squares[3])
+        law = "knee" if mean > SIGNIFICANT_ERRORS * error and visible else "bingham"
+        reason = f"{comparison}; mean difference {mean:.2g}, its standard error {error:.2g}"
+        reason += "" if visible or mean <= 0.0 else f", less than {MISFIT_THRESHOLD:.2%} of peak"
+    bingham, knee = pooled or (None, None)
+    return LawRow(setting=setting, law=law, tests=count, W_s_bingham=bingham, W_s_knee=knee, reason=reason)
+
+
+# --- Force per click and per unit ---
+#
+# From one position of a clicker, one psi or one mm to the next, at the trade's speeds, without the gas. The number is
+# the control signal, as in `control: {name: rebound, unit: clicks}` or `{name: gas, unit: psi}`, or one in the name of
+# the setting, as in "R 3 C 12", "gas 150 psi" or "gap 0.2 mm".
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The quantity that varies from one position to the next, all else being equal."""
+
+    setting: str | None
+    """Name of the setting, with # for the number where it holds it."""
+    voltage: float | None
+    """Voltage, where the number is not the control signal itself."""
+    unit: str
+    """Unit of a pressure or length; empty where the number counts clicks."""
+
+
+def force_changes(forces: Sequence[KneeForceRow], control: Control) -> tuple[tuple[ClickRow, ...], tuple[UnitRow, ...]]:
+    """Compute the change of force per click of every clicker, and per unit of a gas pressure, gap or shim.
+
+    Parameters
+    ----------
+    forces : of every condition at the trade's speeds
+    control : the control signal
+
+    Returns
+    -------
+    rows between neighbouring positions, all other things equal
+    """
+    clicks: list[ClickRow] = []
+    units: list[UnitRow] = []
+    for axis, rows in _axes(forces, control).items():
+        for low, before, high, after in _neighbours(rows):
+            # Magnitudes without the gas force, which has a sign: below zero where it pushes the rod out.
+            rebound = [row.rebound_force_N - row.gas_force_N for row in (before, after)]
+            compression = [row.gas_force_N - row.compression_force_N for row in (before, after)]
+            labels = label_columns((axis.setting, axis.voltage, before.temperature_degC))
+            labels["velocity_m_per_s"] = before.velocity_m_per_s
+            changes = [(rebound[1] - rebound[0]) / (high - low), (compression[1] - compression[0]) / (high - low)]
+            if axis.unit:
+                cells = {"unit": axis.unit, "from_value": low, "to_value": high}
+                cells |= {"rebound_N_per_unit": changes[0], "compression_N_per_unit": changes[1]}
+                gas = (after.gas_force_N - before.gas_force_N) / (high - low)
+                units.append(UnitRow.model_validate({**labels, **cells, "gas_force_N_per_unit": gas}))
+            else:
+                cells = {"from_click": low, "to_click": high}
+                cells |= {"rebound_N_per_click": changes[0], "compression_N_per_click": changes[1]}
+                clicks.append(ClickRow.model_validate({**labels, **cells}))
+    return tuple(clicks), tuple(units)
+
+
+def _axes(forces: Sequence[KneeForceRow], control: Control) -> dict[Axis, list[tuple[float, KneeForceRow]]]:
+    """Group the rows that differ by one number alone, each with this number."""
+    measured = control.unit if control.unit in PRESSURES | LENGTHS else ""
+    stepped = bool(measured) or "click" in f"{control.name} {control.unit}".lower()
+    found: dict[Axis, list[tuple[float, KneeForceRow]]] = defaultdict(list)
+    for row in forces:
+        if stepped and row.voltage_V is not None:
+            found[Axis(row.setting, None, measured)].append((row.voltage_V, row))
+        for number in numbers_in(row.setting):
+            found[Axis(number.axis, row.voltage_V, number.unit)].append((number.value, row))
+    return found
+
+
+def _neighbours(
+    rows: Sequence[tuple[float, KneeForceRow]],
+) -> Iterator[tuple[float, KneeForceRow, float, KneeForceRow]]:
+    """Yield neighbouring positions on one axis with their rows, at one temperature and speed."""
+    groups: dict[Hashable, list[tuple[float, KneeForceRow]]] = defaultdict(list)
+    first: float | None = None
+    for position, row in sorted(rows, key=lambda each: (each[1].temperature_degC or 0.0, each[0])):
+        degrees = row.temperature_degC
+        if first is None or degrees is None or degrees - first > SAME_TEMPERATURE:
+            first = degrees
+        groups[first, row.velocity_m_per_s].append((position, row))
+    for same in groups.values():
+        for (low, before), (high, after) in pairwise(sorted(same, key=lambda each: each[0])):
+            if high > low:
+                yield low, before, high, after

@@ -1,0 +1,142 @@
+"""Elementary measures of a recorded signal: time step, r.m.s., criterion (4), reversals of the motion, work."""
+
+from __future__ import annotations
+
+from weakref import ref
+
+import numpy as np
+
+from pzd.record import Array
+
+_last_clock: list[tuple[ref[Array], float]] = []
+"""The last clock and its step: records are worked on one at a time, and a median is dear. Clocks are never modified."""
+
+
+def usual_step(time: Array) -> float:
+    """Return the median step of a clock (n,) [s]."""
+    if _last_clock and _last_clock[0][0]() is time:
+        return _last_clock[0][1]
+    step = float(np.median(np.diff(time)))
+    _last_clock[:] = [(ref(time), step)]
+    return step
+
+
+def rms(values: Array) -> float:
+    """Root mean square about zero, in the unit of the values.
+
+    Equation: a = sqrt(1/T int a(t)^2 dt)      Source: ISO 2631-1:1997, eq. (1), for an acceleration
+
+    Parameters
+    ----------
+    values : (n,) at even steps
+
+    Examples
+    --------
+    >>> rms(np.array([3.0, -3.0, 3.0]))
+    3.0
+    """
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def criterion(residual: Array, measured: Array) -> float:
+    """Criterion W_s: sum of squares of the residual over that of the measured force; a pure number.
+
+    Equation: W_s = sum (F - F_sim)^2 / sum F^2      Source: Makowski and Knap 2021, eq. (4)
+
+    Parameters
+    ----------
+    residual : (n,) measured less simulated force, of one record or of several in a row [N]
+    measured : (n,) the measured force of the same samples [N]
+
+    Examples
+    --------
+    >>> criterion(np.array([1.0, -1.0]), np.array([10.0, 10.0]))
+    0.01
+    """
+    return float(residual @ residual / (measured @ measured))
+
+
+REVERSAL_SHARE = 0.1
+"""Least stroke between two reversals, as a share of the range: noise and the creep of a servo stay below it."""
+
+
+def reversals(displacement: Array, share: float = REVERSAL_SHARE) -> list[int]:
+    """Find the samples at which a motion reverses, each between strokes larger than a share of the range.
+
+    Parameters
+    ----------
+    displacement : (n,) motion, in any unit
+    share : least stroke, as a share of the range
+
+    Returns
+    -------
+    indices of the samples, rising
+
+    Examples
+    --------
+    >>> reversals(np.array([0.0, 1.0, 2.0, 1.0, 0.0, 1.0]))
+    [2, 4]
+    """
+    enough = share * float(np.ptp(displacement))
+    steps = np.sign(np.diff(displacement))
+    candidates = [0, *(np.flatnonzero(steps[1:] != steps[:-1]) + 1).tolist(), displacement.size - 1]
+    turns: list[int] = []
+    low = high = 0
+    direction = 0
+    for i in candidates:
+        low = i if displacement[i] < displacement[low] else low
+        high = i if displacement[i] > displacement[high] else high
+        if direction >= 0 and displacement[high] - displacement[i] > enough:
+            if direction or displacement[high] - displacement[0] > enough:
+                turns.append(high)
+            direction, low = -1, i
+        elif direction <= 0 and displacement[i] - displacement[low] > enough:
+            if direction or displacement[0] - displacement[low] > enough:
+                turns.append(low)
+            direction, high = 1, i
+    return turns
+
+
+CHANCE_WORK = 0.05
+"""Work of one cycle that may be chance, as a share of stroke times range of the force.
+
+Reason: a damper that sticks draws a line without area, and the small area of its noise is as often negative as
+positive; a loop of dry friction alone has ten times this and more."""
+
+
+def work(displacement: Array, force: Array, closed: bool = False) -> float:
+    """Compute the work done on the damper along a path of force over displacement.
+
+    Equation: W = integral of F dx, the area of the loop of force over displacement      Source: definition
+
+    Parameters
+    ----------
+    displacement : (n,) extension [m]
+    force : (n,) force [N]
+    closed : whether the last sample is followed by the first, as in an average cycle
+
+    Returns
+    -------
+    work [J]
+
+    Examples
+    --------
+    >>> work(np.array([0.0, 1.0, 1.0, 0.0]), np.array([2.0, 2.0, -2.0, -2.0]), closed=True)
+    4.0
+    """
+    if closed:
+        displacement, force = np.append(displacement, displacement[0]), np.append(force, force[0])
+    return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(displacement)))
+
+
+def chance_work(displacement: Array, force: Array, cycles: float | None = None) -> float:
+    """Compute the work [J] that noise may do along a path; it grows with the root of the number of cycles.
+
+    Parameters
+    ----------
+    displacement : (n,) extension [m]
+    force : (n,) force [N]
+    cycles : number of cycles; None to count the reversals of the motion
+    """
+    of_cycle = CHANCE_WORK * float(np.ptp(displacement) * np.subtract(*np.percentile(force, (99, 1))))
+    return of_cycle * float(np.sqrt(1.0 + 0.5 * len(reversals(displacement)) if cycles is None else cycles))
