@@ -259,7 +259,7 @@ def test_the_code_of_a_stage_is_all_that_it_may_import_and_the_data_beside(tmp_p
         ("identify/README.md", "1\n"),
         (
             "damper/element.py",
-            "def f():\n    from pzd.quantities import x\n    find(f'pzd.damper.compiled.laws.{name}')\n",
+            "def f():\n    from pzd.quantities import x\n    find(f'pzd.damper.effect.{name}')\n",
         ),
         ("damper/laws/__init__.py", ""),
         ("damper/laws/lash.py", ""),

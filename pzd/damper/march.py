@@ -1,4 +1,4 @@
-"""The damper's path along a record: step by step, each whole where it stays in one regime, else piece by piece."""
+"""The damper's path along a sampled motion: each step whole where it stays in one regime, else piece by piece."""
 
 from __future__ import annotations
 
@@ -11,7 +11,17 @@ from pzd.compiled import compiled, inlined
 from pzd.damper.compiled.kernels import K, Row, effects_alike, row_of, stroke_straight
 from pzd.damper.element import Element, relaxation, slip
 from pzd.damper.flow import breakaway, damping, straight
-from pzd.damper.path import DEFLECTION, SPEED, STATES, Varied, advance, begin, carry, fill_slopes, not_varied, varied
+from pzd.damper.path import (
+    DEFLECTION,
+    SPEED,
+    STATES,
+    Sensitivities,
+    advance,
+    advance_sensitivities,
+    begin_sensitivities,
+    fill_slopes,
+    sensitivities_to,
+)
 from pzd.damper.regimes import (
     RELIEF,
     SMOOTH,
@@ -26,34 +36,33 @@ from pzd.damper.regimes import (
 )
 from pzd.record import Array
 
-# ----------------------------------------------------------------------------------------------------
-# One step of an element whose flow curve is straight, while T0, C and k move, where it stays in one regime.
+# --- A whole step in one regime, with a straight flow curve and T0, C and k that vary ---
 #
 # Equation: ds/dt = u + side T0/C - (k/C) s,  F = k s      Source: Makowski and Knap 2021, eq. (1)-(3), y eliminated
 #
-# With the time tau, d tau = (k/C) dt, this is ds/dtau = g - s, where g = (u C + side T0)/k is the extension of the spring
-# at which the oil would flow as fast as the rod. Over a step g is nearly a polynomial in tau, and with a polynomial the
-# integral is a sum of the functions phi_k of an exponential integrator, however stiff the oil is.
-
+# With the time tau, d tau = (k/C) dt, this is ds/dtau = g - s, where g = (u C + side T0)/k is the extension of the oil
+# stiffness at which the flow is as fast as the rod. Over a step g is nearly a polynomial in tau, and with a polynomial
+# the integral is a sum of the functions phi_k of an exponential integrator, however large k/C is.
 
 NODES = (1.0 / 3.0, 2.0 / 3.0)
-"""Shares of a step between its ends at which g and k/C are taken, for a cubic through four values."""
+"""Shares of a step at which g and k/C are evaluated besides its ends, for a cubic through four values."""
 UNSOLVED = (math.nan, math.nan)
+"""Result of a step that has to be solved piece by piece."""
 
 
 @compiled
 def whole_step(e: float, step: TimeStep, tolerance: float) -> tuple[float, float]:
-    """Elastic deflection [m] and flow speed [m/s] after a step that sticks or slips all the time.
+    """Compute elastic deflection [m] and flow speed [m/s] after a step that sticks or slips throughout.
 
     Parameters
     ----------
     e : elastic deflection at its start [m]
-    step : between rows of which `goes_straight` is true
+    step : between rows for which `is_straight` is true
     tolerance : admissible error, as a share of the force
 
     Returns
     -------
-    both; NaN where the step has to be cut: the regime changes, the rod turns round, or g is no such polynomial
+    both; NaN where the regime changes, the rod reverses, or g is not close enough to a polynomial
     """
     if step.u0 * step.u1 < 0.0:
         return UNSOLVED
@@ -81,25 +90,25 @@ def whole_step(e: float, step: TimeStep, tolerance: float) -> tuple[float, float
 
 
 @compiled
-def goes_straight(p: Row, q: Row) -> bool:
-    """Whether the flow curve has straight branches alone, and nothing but T0, C and k goes from row to row."""
+def is_straight(p: Row, q: Row) -> bool:
+    """Return whether the flow curve has straight branches alone, and T0, C and k alone differ between two rows."""
     return effects_alike(p, q) and stroke_straight(p) and straight(p)
 
 
 @inlined
 def _slipped(e: float, first: Element, last: Element, step: TimeStep) -> tuple[float, float]:
-    """Extension of the oil spring [m] after slipping through a step, and its error: what the third order adds.
+    """Compute the extension s [m] after slip over one step, and its error: the contribution of the third order.
 
     Parameters
     ----------
     e : at its start [m]
-    first, last : with the side that the oil flows to as the sign of T0
-    step : its length and speeds
+    first, last : elements at start and end, with the direction of flow as the sign of T0
+    step : the step
     """
-    start, rate = _flowing(first, step.u0)
+    start, rate = _g_and_rate(first, step.u0)
     second, rate_b = _between(first, last, step, NODES[0])
     third, rate_c = _between(first, last, step, NODES[1])
-    end, rate_d = _flowing(last, step.u1)
+    end, rate_d = _g_and_rate(last, step.u1)
     span = step.h * (rate + 3.0 * (rate_b + rate_c) + rate_d) / 8.0
     b = step.h * (9.0 * rate + 19.0 * rate_b - 5.0 * rate_c + rate_d) / 72.0 / span
     c = step.h * (rate + 4.0 * rate_b + rate_c) / 9.0 / span
@@ -113,32 +122,29 @@ def _slipped(e: float, first: Element, last: Element, step: TimeStep) -> tuple[f
 
 
 @inlined
-def _flowing(at: Element, u: float) -> tuple[float, float]:
-    """The extension [m] at which the oil flows as fast as the rod, u [m/s], and k/C [1/s]."""
+def _g_and_rate(at: Element, u: float) -> tuple[float, float]:
+    """Compute g, the extension [m] at which the flow is as fast as the rod, u [m/s], and k/C [1/s]."""
     return (u * at.C + at.T0) / at.k, at.k / at.C
 
 
 @inlined
 def _between(first: Element, last: Element, step: TimeStep, share: float) -> tuple[float, float]:
-    """The same at a share of a step."""
+    """Compute g and k/C at a share of a step."""
     at = Element(
         first.T0 + (last.T0 - first.T0) * share,
         first.C + (last.C - first.C) * share,
         first.k + (last.k - first.k) * share,
     )
-    return _flowing(at, step.u0 + (step.u1 - step.u0) * share)
+    return _g_and_rate(at, step.u0 + (step.u1 - step.u0) * share)
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-_HELD = np.zeros(0)  # nothing varies, the initial force neither
+# --- A sampled motion ---
 
 
 def march(
     displacement: Array, velocity: Array, steps: Array, rows: Array, initial_force: float, tolerance: float
 ) -> Array:
-    """Force of the element and its stroke and flow effects along a record.
+    """Compute the force of the element with its stroke and flow effects along a motion.
 
     Parameters
     ----------
@@ -146,18 +152,17 @@ def march(
     velocity : (n,) extension speed [m/s], whose change bends the displacement inside a step; (1,) for straight
     steps : (n - 1,) or (1,) sampling intervals [s]
     rows : (n, r) or (1, r) parameter rows, see `kernels.Row`, linear between samples
-    initial_force : force of the oil spring at the first sample [N]
+    initial_force : force of the element at the first sample [N]
     tolerance : admissible error of a piece, as a share of the force
 
     Returns
     -------
     (n,) force [N]
     """
-    force = np.empty(displacement.size)
-    none = np.empty((force.size, 0))
-    state, still = np.zeros(STATES), not_varied()
-    _march(displacement, velocity, steps, rows, initial_force, _HELD, tolerance, state, force, still, none)
-    return force
+    no_columns, no_variables = np.zeros(0, dtype=np.int64), np.zeros((1, 0, 0))
+    return march_sensitivities(
+        displacement, velocity, steps, rows, initial_force, np.zeros(0), tolerance, no_columns, no_variables
+    )[0]
 
 
 def march_sensitivities(
@@ -171,7 +176,7 @@ def march_sensitivities(
     columns: NDArray[np.int64],
     along: Array,
 ) -> tuple[Array, Array]:
-    """The same force, and its derivatives by v variables that move c columns of the rows and the initial force.
+    """Compute the same force, and its derivatives by v variables that change c columns of the rows and the first force.
 
     Parameters
     ----------
@@ -186,14 +191,14 @@ def march_sensitivities(
     (n,) force [N] and (n, v) its derivatives [N]
     """
     force, slopes = np.empty(displacement.size), np.empty((displacement.size, along.shape[1]))
-    v = varied(rows, columns, along)
+    v = sensitivities_to(rows, columns, along)
     state = np.zeros(STATES)
     _march(displacement, velocity, steps, rows, initial_force, initial_slopes, tolerance, state, force, v, slopes)
     return force, slopes
 
 
 def deflections(force: Array, rows: Array) -> Array:
-    """(n,) elastic deflection [m] at which the oil spring carries (n,) forces [N], by (n, r) or (1, r) rows."""
+    """Compute the (n,) elastic deflections [m] of an element that carries (n,) forces [N], by (n, r) or (1, r) rows."""
     found = np.empty(force.size)
     _fill_deflections(force, rows, found)
     return found
@@ -201,6 +206,7 @@ def deflections(force: Array, rows: Array) -> Array:
 
 @compiled
 def _fill_deflections(force: Array, rows: Array, found: Array) -> None:
+    """Fill the (n,) deflections of (n,) forces."""
     for i in range(force.size):
         found[i] = deflection_at(force[i], row_of(rows[min(i, rows.shape[0] - 1)]))
 
@@ -216,16 +222,16 @@ def _march(
     tolerance: float,
     state: Array,
     force: Array,
-    v: Varied,
+    v: Sensitivities,
     slopes: Array,
 ) -> None:
-    """Fill the force and, where something varies, the slopes."""
+    """Fill the (n,) force and, where there are variables, the (n, v) slopes."""
     p0 = row_of(rows[0])
     p1 = p0
     state[DEFLECTION] = deflection_at(initial_force, p0)
     force[0] = spring_force(state[DEFLECTION], p0)
-    begin(v, state[DEFLECTION], p0, initial_slopes)
-    if v.carried.size > 0:
+    begin_sensitivities(v, state[DEFLECTION], p0, initial_slopes)
+    if v.deflection.size > 0:
         fill_slopes(v, state[DEFLECTION], p0, 0, slopes[0])
     moving = False
     for i in range(1, displacement.size):
@@ -236,21 +242,21 @@ def _march(
         mean = (displacement[i] - displacement[i - 1]) / h
         half = 0.5 * (velocity[i] - velocity[i - 1]) if velocity.size > 1 else 0.0
         step = TimeStep(h, mean - half, mean + half, p0, p1, moving)
-        end, speed = whole_step(state[DEFLECTION], step, tolerance) if goes_straight(p0, p1) else UNSOLVED
+        end, speed = whole_step(state[DEFLECTION], step, tolerance) if is_straight(p0, p1) else UNSOLVED
         if math.isnan(end):
-            advance(state, step, tolerance, False, v, i - 1)
+            advance(state, step, tolerance, v, i - 1)
         else:
-            if v.carried.size > 0:
-                _carry_whole(v, state[DEFLECTION], end, speed, step, i - 1)
+            if v.deflection.size > 0:
+                _advance_whole_step(v, state[DEFLECTION], end, speed, step, i - 1)
             state[DEFLECTION], state[SPEED] = end, speed
         force[i] = spring_force(state[DEFLECTION], p1)
-        if v.carried.size > 0:
+        if v.deflection.size > 0:
             fill_slopes(v, state[DEFLECTION], p1, i, slopes[i])
 
 
 @compiled
-def _carry_whole(v: Varied, e: float, end: float, speed: float, step: TimeStep, sample: int) -> None:
-    """Bring the derivatives through a step that lies in one regime."""
+def _advance_whole_step(v: Sensitivities, e: float, end: float, speed: float, step: TimeStep, sample: int) -> None:
+    """Advance the derivatives over a step in one regime."""
     regime, side = regime_of(spring_force(e, step.p0), step.p0)
     w = speed_at(abs(spring_force(e, step.p0)), step.p0, regime, side, speed)
-    carry(v, e, end, w, speed, 0.0, step.h, regime, side, step, sample)
+    advance_sensitivities(v, e, end, w, speed, 0.0, step.h, regime, side, step, sample)

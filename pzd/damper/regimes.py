@@ -1,7 +1,7 @@
-"""The regimes of the damper: where nothing flows, where it flows smoothly, where the relief valve is open.
+"""Regimes of the damper (no flow, smooth flow, relief valve open) and the integration of a piece of path inside one.
 
-State is the elastic deflection e = x - y (paper, eq. 1); a stiffness that moves with the voltage
-then moves the force and nothing else. F = k s(e), s the extension of the oil spring behind the stroke effects.
+The state is the elastic deflection e = x - y (paper, eq. 1): a stiffness that varies with the voltage then changes the
+force and nothing else. F = k s(e), s the extension of the oil stiffness behind the stroke effects.
 """
 
 from __future__ import annotations
@@ -35,25 +35,23 @@ from pzd.damper.flow import (
     viscous_speed,
 )
 
-# ----------------------------------------------------------------------------------------------------
-# The functions and weights of an exponential Rosenbrock method of order 5, with an error of order 4.
+# --- An exponential Rosenbrock method of order 5, with an error estimate of order 4 ---
 #
 # Equation: y(t + h) = y + h phi_1(Z) r + h^2 phi_2(Z) v + h (2 a phi_3(Z) + 6 b phi_4(Z))
 # Source: Luan and Ostermann 2014, J. Comput. Appl. Math. 255, 417-431, method exprb53s3
 #
-# Z = h J, J and v the derivatives of the rate r by y and by time. What the rate does beside r + J (y - y0) + v t is
-# taken as a theta^2 + b theta^3 over the step, a and b from two stages, and the end found puts a theta^4 to it; this is
-# exact where that is all there is, however stiff J is.
-
+# Z = h J, J and v the derivatives of the rate r by y and by time. The rest of the rate, r + J (y - y0) + v t taken off,
+# is approximated by a theta^2 + b theta^3 over the step, a and b from two stages; the end found adds a theta^4. This is
+# exact where the rest is such a polynomial, however stiff J is.
 
 STAGES = (0.5, 0.9)
 """Share of the step at which the two stages stand; 0.9 follows from 0.5 by the conditions of order 5."""
 COUPLING = (27.0 / 25.0, 729.0 / 125.0)
-"""What the second stage takes of what the first one shows, by phi_3 at either stage's share of Z."""
-_SMALL = 1.0  # below it the series is used: the recursion loses digits like |z|^-4
-_CAUTION = 2.0  # the stages, of lower order than the whole, miss about as much again
-_CHANCE = 1e-3  # at a tolerance of 1e-9 the error of order 4 is about so much of that of order 3
-_SERIES = 15  # terms, the last below 1e-16 of the sum
+"""Weights of the first stage in the second one, for phi_3 at either stage's share of Z."""
+_SMALL_Z = 1.0  # below it the series is used: the recursion loses digits like |z|^-4
+_CAUTION = 2.0  # the stages, of lower order than the whole, have about the same error again
+_LEAST_ERROR = 1e-3  # share of the error of order 3 that the error of order 4 has at a tolerance of 1e-9
+_SERIES_TERMS = 15  # the last one is below 1e-16 of the sum
 
 
 class Phi(NamedTuple):
@@ -68,14 +66,14 @@ class Phi(NamedTuple):
 
 @compiled
 def phi(z: float) -> Phi:
-    """The functions phi_1 to phi_5 of an exponential integrator.
+    """Compute the functions phi_1 to phi_5 of an exponential integrator.
 
     Equation: phi_{k + 1}(z) = (phi_k(z) - 1/k!)/z, phi_1(z) = (e^z - 1)/z
     Source: Hochbruck and Ostermann 2010, Acta Numerica 19, eq. (2.10)-(2.11)
     """
-    if abs(z) < _SMALL:
+    if abs(z) < _SMALL_Z:
         five, term = 0.0, 1.0 / 120.0
-        for j in range(_SERIES):
+        for j in range(_SERIES_TERMS):
             five += term
             term *= z / (j + 6.0)
         four = z * five + 1.0 / 24.0
@@ -91,7 +89,7 @@ def phi(z: float) -> Phi:
 
 @inlined
 def bend(first: float, second: float) -> tuple[float, float]:
-    """Coefficients a and b of a theta^2 + b theta^3 through what the two stages show beside the linear rate."""
+    """Fit a theta^2 + b theta^3 through the rest of the rate at the two stages, and return a and b."""
     c, d = STAGES
     b = (second / (d * d) - first / (c * c)) / (d - c)
     return first / (c * c) - b * c, b
@@ -99,24 +97,23 @@ def bend(first: float, second: float) -> tuple[float, float]:
 
 @inlined
 def end_corrected(a: float, b: float, end: float, over: Phi) -> tuple[float, float]:
-    """What the end of a step adds to it, theta^4 put through it, and the error of the whole; shares of its length.
+    """Compute the theta^4 correction from the rest at the end of a step, and an error estimate; shares of its length.
 
-    The error is what the stage 1/2 and the end would miss by themselves, and what the end has added. It is no less than
-    a small share of what the stage 1/2 alone would miss: the end may lie on the curve by chance.
+    The estimate is the error of the stage 1/2 and the end without the other stage, plus the correction. It is no less
+    than a small share of the error of the stage 1/2 alone, since the end may lie on the curve by chance.
     """
     c, d = STAGES
     fourth = (end - a - b) / ((1.0 - c) * (1.0 - d))
     added = fourth * (2.0 * c * d * over.three - 6.0 * (c + d) * over.four + 24.0 * over.five)
     without = fourth * (2.0 * c * over.three - 6.0 * (1.0 + c) * over.four + 24.0 * over.five)
     alone = b * (6.0 * over.four - 2.0 * c * over.three)
-    return added, max(_CAUTION * abs(without) + abs(added), _CHANCE * abs(alone))
+    return added, max(_CAUTION * abs(without) + abs(added), _LEAST_ERROR * abs(alone))
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Regimes ---
 
 STICK, SMOOTH, RELIEF = 0, 1, 2
-"""The regimes: nothing flows; it flows along the smooth curve; the relief valve is open."""
+"""The regimes: no flow; flow along the smooth curve; relief valve open."""
 
 
 _GAUSS = (
@@ -130,7 +127,7 @@ _GAUSS = (
 
 @compiled
 def spring_extension(e: float, p: Row) -> float:
-    """Extension of the oil spring [m] at an elastic deflection [m]; 0 inside a free play."""
+    """Compute the extension s of the oil stiffness [m] at an elastic deflection [m]; 0 inside a free play."""
     side = 1.0 if e >= 0.0 else -1.0
     extension = stroke_law(e, side, p)
     return extension if side * extension > 0.0 else 0.0
@@ -138,13 +135,13 @@ def spring_extension(e: float, p: Row) -> float:
 
 @compiled
 def spring_force(e: float, p: Row) -> float:
-    """Force of the oil spring [N] at an elastic deflection [m]; eq. (1) behind the stroke effects."""
+    """Compute F = k s [N] at an elastic deflection [m]; eq. (1) behind the stroke effects."""
     return p[K] * spring_extension(e, p)
 
 
 @compiled
 def spring_energy(e: float, p: Row, k: float) -> float:
-    """Energy [J] of an oil spring of stiffness k [N/m] at an elastic deflection [m], behind the stroke effects.
+    """Compute the energy [J] stored in a stiffness k [N/m] at an elastic deflection [m], behind the stroke effects.
 
     Equation: k integral s de; k s^2 / 2 where s rises like e
     """
@@ -161,19 +158,19 @@ def spring_energy(e: float, p: Row, k: float) -> float:
 
 @compiled
 def deflection_at(force: float, p: Row) -> float:
-    """Elastic deflection [m] at which the oil spring carries `force` [N], the nearest to zero."""
+    """Compute the elastic deflection [m] at which F = `force` [N], the nearest to zero."""
     return 0.0 if force == 0.0 else stroke_inverse(force / p[K], math.copysign(1.0, force), p)
 
 
 @compiled
 def deflection_on(force: float, p: Row, side: float) -> float:
-    """Elastic deflection [m] at which the oil spring carries a force [N] on one side, counted from there."""
+    """Compute the elastic deflection [m] at which |F| = `force` [N] on one side."""
     return stroke_inverse(side * force / p[K], side, p)
 
 
 @compiled
 def regime_of(force: float, p: Row) -> tuple[int, float]:
-    """The regime and the side (sign of F) of a force [N]."""
+    """Return the regime and the side (sign of F) of a force [N]."""
     side = 1.0 if force >= 0.0 else -1.0
     if abs(force) <= breakaway(p, side):
         return STICK, side
@@ -182,15 +179,15 @@ def regime_of(force: float, p: Row) -> tuple[int, float]:
 
 @compiled
 def over_yield(e: float, p: Row, side: float) -> float:
-    """How far the force lies above breakaway on one side [N]; inside a free play it counts on below zero."""
+    """Compute |F| minus breakaway on one side [N]; inside a free play |F| counts as negative."""
     return p[K] * (side * stroke_law(e, side, p)) - breakaway(p, side)
 
 
 @compiled
 def beyond(e: float, p: Row, regime: int, side: float) -> tuple[float, int]:
-    """How far the state lies outside its regime, as a force [N], and past which edge: -1 low, 1 high.
+    """Compute the distance of the state beyond its regime, as a force [N], and the edge: -1 low, 1 high.
 
-    Negative inside; `side` is not looked at in STICK.
+    Negative inside; `side` is ignored in STICK.
     """
     if regime == STICK:
         return over_yield(e, p, math.copysign(1.0, e)), 1
@@ -203,7 +200,7 @@ def beyond(e: float, p: Row, regime: int, side: float) -> tuple[float, int]:
 
 @compiled
 def onto_edge(e: float, p: Row, regime: int, side: float, way: int) -> tuple[float, int, float]:
-    """The deflection on the edge that is crossed, and the regime and side beyond it."""
+    """Return the deflection on the edge that is crossed, and the regime and side beyond it."""
     if regime == STICK:
         side = math.copysign(1.0, e)
     low, high = breakaway(p, side), relief(p, side)
@@ -220,7 +217,7 @@ def onto_edge(e: float, p: Row, regime: int, side: float, way: int) -> tuple[flo
 
 @compiled
 def speed_at(force: float, p: Row, regime: int, side: float, guess: float) -> float:
-    """Flow speed [m/s] of a regime's own law at |F| = force."""
+    """Compute the flow speed [m/s] at |F| = force by the law of a regime, also beyond its edge."""
     if regime == STICK:
         return 0.0
     if regime == RELIEF:
@@ -229,18 +226,16 @@ def speed_at(force: float, p: Row, regime: int, side: float, guess: float) -> fl
     return smooth_speed(force, p, side, guess)
 
 
-# ----------------------------------------------------------------------------------------------------
-# One piece of the path inside one regime: in closed form where it is straight, else by an exponential integrator.
+# --- One piece of the path inside one regime ---
 #
-# Straight pieces with standing parameters are solved in closed form. The others are integrated by the method of
-# `pzd.damper.regimes`, which takes the slope of the flow curve exactly however fast the force settles beside the
-# piece (hard oil, slow test): in the elastic deflection e where the flow curve is inverted in closed form, else in the
-# viscous force s = visc(w), in which w(s) and F(s) are both explicit and dF/ds >= 1, so that nothing is inverted.
-
+# Straight pieces with constant parameters are solved in closed form. The others are integrated by the method above,
+# which takes the slope of the flow curve exactly however fast the force settles (large k/C, slow test): in the elastic
+# deflection e where the flow curve is inverted in closed form, else in the viscous force s = visc(w), in which w(s) and
+# F(s) are both explicit and dF/ds >= 1, so that nothing is inverted.
 
 _DIFFERENCE = 1e-3  # of a step, for the drift of the flow curve with moving parameters
 _SECOND_DIFFERENCE = 0.03  # of a step, for the change of that drift: a shorter one would show rounding
-_NUDGE = 1e-7  # of the integrated variable, for the derivative of its rate
+_NUDGE = 1e-7  # of the integrated variable, for the derivative of its rate: about half the digits of a double
 
 
 class TimeStep(NamedTuple):
@@ -257,13 +252,13 @@ class TimeStep(NamedTuple):
 
 @inlined
 def row_in(step: TimeStep, at: float) -> Row:
-    """The parameter row at a moment [s] of the step."""
+    """Interpolate the parameter row at a moment [s] of the step."""
     return interpolate(step.p0, step.p1, at / step.h) if step.moving else step.p0
 
 
 @inlined
 def extension_speed(step: TimeStep, at: float) -> float:
-    """dx/dt [m/s] at a moment [s] of the step."""
+    """Interpolate dx/dt [m/s] at a moment [s] of the step."""
     return step.u0 + (step.u1 - step.u0) * at / step.h
 
 
@@ -271,7 +266,7 @@ def extension_speed(step: TimeStep, at: float) -> float:
 def piece(
     e: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep
 ) -> tuple[float, float, float]:
-    """Elastic deflection and flow speed after a piece of length dt, and its embedded error as a force [N]."""
+    """Compute elastic deflection and flow speed after a piece of length dt, and its error estimate as a force [N]."""
     if regime == STICK:
         return e + dt * extension_speed(step, at + 0.5 * dt), 0.0, 0.0
     p = row_in(step, at)
@@ -302,20 +297,20 @@ def piece(
 def _exponential(
     y: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep, explicit: bool
 ) -> tuple[float, float]:
-    """The integrated variable after dt, and its error; see `pzd.damper.regimes`."""
+    """Compute the integrated variable after dt, and its error estimate, by the exponential Rosenbrock method."""
     rate = _rate(y, w, at, regime, side, step, explicit)
     by_y, by_time = _slopes(y, rate, w, at, dt, regime, side, step, explicit)
     z, c, d = by_y * dt, STAGES[0], STAGES[1]
     over, half, late = phi(z), phi(c * z), phi(d * z)
     way, drift = rate * dt, by_time * dt * dt
     first = y + c * way * half.one + c * c * drift * half.two
-    beside = _rate(first, w, at + c * dt, regime, side, step, explicit) - rate
-    beside -= by_y * (first - y) + by_time * c * dt
+    rest = _rate(first, w, at + c * dt, regime, side, step, explicit) - rate
+    rest -= by_y * (first - y) + by_time * c * dt
     second = y + d * way * late.one + d * d * drift * late.two
-    second += dt * beside * (COUPLING[0] * half.three + COUPLING[1] * late.three)
+    second += dt * rest * (COUPLING[0] * half.three + COUPLING[1] * late.three)
     later = _rate(second, w, at + d * dt, regime, side, step, explicit) - rate
     later -= by_y * (second - y) + by_time * d * dt
-    a, b = bend(beside, later)
+    a, b = bend(rest, later)
     end = y + way * over.one + drift * over.two + dt * (2.0 * a * over.three + 6.0 * b * over.four)
     last = _rate(end, w, at + dt, regime, side, step, explicit) - rate - by_y * (end - y) - by_time * dt
     added, error = end_corrected(a, b, last, over)
@@ -326,7 +321,7 @@ def _exponential(
 def _slopes(
     y: float, rate: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep, explicit: bool
 ) -> tuple[float, float]:
-    """Derivatives of the rate of the integrated variable by itself and by time."""
+    """Compute the derivatives of the rate of the integrated variable by itself and by time."""
     p = row_in(step, at)
     if explicit:
         rise = relief_slope(p, side) if regime == RELIEF else smooth_slope(w, p, side)
@@ -345,7 +340,7 @@ def _slopes(
 
 @compiled
 def _rate(y: float, guess: float, at: float, regime: int, side: float, step: TimeStep, explicit: bool) -> float:
-    """Rate of the integrated variable.
+    """Compute the rate of the integrated variable.
 
     Equation: de/dt = u(t) - side w(|F|)      Source: eq. (1), the flow curve inverted
     """
@@ -357,10 +352,10 @@ def _rate(y: float, guess: float, at: float, regime: int, side: float, step: Tim
 
 @compiled
 def _rate_of_force(y: float, at: float, regime: int, side: float, step: TimeStep) -> float:
-    """Rate of the integrated variable: of s in SMOOTH, of |F| in RELIEF.
+    """Compute the rate of s in SMOOTH, of |F| in RELIEF.
 
-    Equation: d|F|/dt = k s'(e) (side u - w) + (dk/dt)/k |F| + k ds/dt at e; in SMOOTH less what the moving curve
-    does by itself
+    Equation: d|F|/dt = k s'(e) (side u - w) + (dk/dt)/k |F| + k ds/dt at e; in SMOOTH minus the
+    rate of the flow curve at constant s
     """
     p = row_in(step, at)
     pull = side * extension_speed(step, at)
@@ -386,7 +381,7 @@ def _rate_of_force(y: float, at: float, regime: int, side: float, step: TimeStep
 
 @compiled
 def _behind_stroke(rate: float, force: float, at: float, p: Row, side: float, step: TimeStep) -> float:
-    """Rate of |F| [N/s] behind the stroke effects, at a |F| [N] whose rate without them is given.
+    """Compute the rate of |F| [N/s] behind the stroke effects from its rate without them.
 
     Equation: d|F|/dt = s'(e) rate + k ds/dt at constant e
     """

@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 
 from pzd.artefacts import KeptBack, LeftOut, Prediction
-from pzd.damper.material import by_voltage, with_rows
 from pzd.damper.model import Damper
+from pzd.damper.parameter_rows import rows_per_voltage, with_rows
 from pzd.diagnosis.campaign import Campaign
 from pzd.diagnosis.data import TRAINING, Prepared, Split
 from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, Fitted, fit
@@ -58,7 +58,7 @@ def deal(prepared: Sequence[Prepared], plain: Damper) -> Folds:
     prepared : the records of one setting
     plain : the damper, whose base rows say which voltages there are
     """
-    nodes = [voltage for voltage, _ in by_voltage(plain.base)]
+    nodes = [voltage for voltage, _ in rows_per_voltage(plain.base)]
     members: dict[int, list[int]] = {}
     for i, p in enumerate(prepared):
         own = p.record.median_voltage() or 0.0
@@ -346,7 +346,7 @@ class Trials:
         """What is kept back of the voltages for which some test was left to fit."""
         constant = [voltage for voltage in self.voltages if voltage is not None]
         # By the nearest: a voltage is that of one of its rows, and rows of other temperatures have it not quite.
-        fitted = {min(constant, key=lambda v: abs(v - u), default=None) for u, _ in by_voltage(damper.base)}
+        fitted = {min(constant, key=lambda v: abs(v - u), default=None) for u, _ in rows_per_voltage(damper.base)}
         lost = {
             i for v, group in zip(self.voltages, self.groups, strict=True) if v not in {*fitted, None} for i in group
         }

@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pzd.damper.compose import constant_rows, integrated_force, sampling_steps
+from pzd.damper.compose import integrated_force, sampling_steps
 from pzd.damper.fitted_laws.knee import NO_KNEE
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import constant_rows
 from pzd.identification.prepared_record import in_motion
 from pzd.identification.trust import VISIBLE
 from pzd.record import Array, Mask, Record, mid_stroke
@@ -160,7 +161,7 @@ class Tests:
     def of(cls, records: Sequence[Record]) -> Tests:
         """The tests, the displacement counted from the middle of their motion."""
         middle = mid_stroke(r.displacement for r in records)
-        found = (Test(r, Motion.of(r).about(middle), sampling_steps(r.time), in_motion(r)) for r in records)
+        found = (Test(r, Motion.of(r).centred_on(middle), sampling_steps(r.time), in_motion(r)) for r in records)
         return cls(tuple(found), middle)
 
     def some(self, kept: Sequence[int]) -> Tests:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.damper.compiled.laws import arguments
-from pzd.damper.compose import branch_forces, constant_rows, parallel_rows, respond, static_force, steady_force
+from pzd.damper.compose import branch_forces, respond, static_force, steady_force
 from pzd.damper.confounders import module_of
+from pzd.damper.effect import arguments
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import constant_rows, parallel_rows
 from pzd.rig.stand.frame import force_in_frame
 
 PLAIN = Damper(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.damper.compiled.laws import arguments, functions
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.confounders import confounders, known, module_of
+from pzd.damper.effect import arguments, functions
 from pzd.damper.effects import library
 from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.fitted_laws.knee import NO_KNEE

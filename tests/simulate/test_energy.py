@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pzd.damper.compiled.kernels import K
-from pzd.damper.compiled.rows import row_at
+from pzd.damper.parameter_rows import row_at
 from pzd.simulate.ride import riding
 from pzd.simulate.ride.energy import oil_energy
 from pzd.simulate.ride.equations import motion

@@ -25,21 +25,15 @@ def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
     return lambda s: {"F_g": 0.5 * scales.force * s, "L": column}
 
 
+_SEARCH = Search(lambda s: s.stroke, (2.0, 6.0), logarithmic=True)
+
 EFFECT = Effect(
     name="accumulator",
     place="parallel",
     law="-F_g (1 + x/L)^-1.3",
     parameters=(
         Parameter("F_g", "N", 0.0, 0.0, 1.0e6, "static force of the gas on the rod", Search(lambda s: s.force, (0.1,))),
-        Parameter(
-            "L",
-            "m",
-            0.1,
-            1.0e-3,
-            100.0,
-            "length of rod that would fill the volume of the gas",
-            Search(lambda s: s.stroke, (2.0, 6.0), logarithmic=True),
-        ),
+        Parameter("L", "m", 0.1, 1.0e-3, 100.0, "length of rod that would fill the volume of the gas", _SEARCH),
     ),
     same_at_every_voltage=True,
     source="polytropic gas on the area of the rod; Dixon 2007, The Shock Absorber Handbook",
@@ -55,5 +49,5 @@ EFFECT = Effect(
 
 
 def law(x: float, F_g: float, L: float) -> float:
-    """Force [N] beside the element at a displacement x [m]: it pushes the rod out."""
+    """Force [N] parallel to the element at a displacement x [m]: it pushes the rod out."""
     return float(-F_g * max(1.0 + x / L, LEAST) ** -POLYTROPIC)

@@ -8,19 +8,15 @@ from __future__ import annotations
 
 from pzd.damper.effect import Effect, Parameter, Search, growing
 
+_SEARCH = Search(lambda s: s.voltage, (0.03, 0.1))
+
 EFFECT = Effect(
     name="piezo_hysteresis",
     place="drive",
     law="Ue = max(U - r, min(U + r, Ue))",
     parameters=(
         Parameter(
-            "r",
-            "V",
-            0.0,
-            0.0,
-            1.0e4,
-            "half-width of the play; V stands for the unit of the control signal",
-            Search(lambda s: s.voltage, (0.03, 0.1)),
+            "r", "V", 0.0, 0.0, 1.0e4, "half-width of the play; V stands for the unit of the control signal", _SEARCH
         ),
     ),
     source="Prandtl-Ishlinskii play operator; Brokate and Sprekels 1996, Hysteresis and Phase Transitions",

@@ -23,5 +23,5 @@ EFFECT = Effect(
 
 
 def law(x: float, v: float, a: float, F_0: float) -> float:
-    """Force [N] beside the element."""
+    """Force [N] parallel to the element."""
     return F_0

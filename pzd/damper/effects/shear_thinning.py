@@ -37,7 +37,7 @@ def viscous_force(w: float, C: float, n: float) -> float:
 
 
 def viscous_slope(w: float, C: float, n: float) -> float:
-    """Derivative of the law by w [N s/m]; unbounded towards w = 0 for n < 1."""
+    """Compute the derivative of the law by w [N s/m]; unbounded towards w = 0 for n < 1."""
     if n == 1.0:
         return C
     if w <= 0.0:

@@ -11,21 +11,13 @@ import math
 
 from pzd.damper.effect import Effect, Parameter, Search, growing
 
+_SEARCH = Search(lambda _: 1.0e-3, (2.0, 10.0, 40.0), logarithmic=True)
+
 EFFECT = Effect(
     name="valve_lag",
     place="drive",
     law="tau dUe/dt + Ue = U",
-    parameters=(
-        Parameter(
-            "tau",
-            "s",
-            0.0,
-            0.0,
-            0.5,
-            "time constant of the valve and its supply",
-            Search(lambda _: 1.0e-3, (2.0, 10.0, 40.0), logarithmic=True),
-        ),
-    ),
+    parameters=(Parameter("tau", "s", 0.0, 0.0, 0.5, "time constant of the valve and its supply", _SEARCH),),
     source="first-order lag; response times in Makowski and Knap 2021, sec. 1",
     tests=(
         ({"effective": 0.0, "before": 100.0, "now": 100.0, "step": 0.01, "tau": 0.01}, 63.21205588285577),

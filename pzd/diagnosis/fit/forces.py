@@ -9,20 +9,20 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compiled.laws import ELEMENT
-from pzd.damper.compiled.rows import rows_along
-from pzd.damper.compose import (
+from pzd.damper.compose import constant_value
+from pzd.damper.compose import forces_parallel_to_element
+from pzd.damper.compose import integrated_sensitivities
+from pzd.damper.compose import sensors_of
+from pzd.damper.confounders import known
+from pzd.damper.effect import ELEMENT
+from pzd.damper.parameter_rows import (
     constant_rows,
-    constant_value,
     drive_row_of,
     element_rows,
-    forces_beside,
-    integrated_sensitivities,
+    material_factors,
     parallel_rows,
-    sensors_of,
+    rows_along,
 )
-from pzd.damper.confounders import known
-from pzd.damper.material import material_factors
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, RecordLikelihood
 from pzd.diagnosis.fit.parameters import Point, Problem, Unknown, Work
 from pzd.record import Array
@@ -69,7 +69,7 @@ class LaidOut:
 
     def force_beside(self, o: RecordLikelihood) -> Array:
         """(m,) force of what stands beside the element [N]; (1,) a zero without any."""
-        return np.zeros(1) if self.beside is None else forces_beside(o.motion.about(self.zero), self.beside)
+        return np.zeros(1) if self.beside is None else forces_parallel_to_element(o.motion.centred_on(self.zero), self.beside)
 
 
 def laid_out(point: Point, o: RecordLikelihood) -> LaidOut:

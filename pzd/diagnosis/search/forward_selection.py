@@ -30,18 +30,16 @@ from pzd.diagnosis.search.acceptance import (
     spurious,
     unsupported,
 )
-from pzd.diagnosis.search.candidates import (
-    Candidate,
-    as_candidate,
-    best_competing_form,
-    by_voltage,
-    candidate,
-    candidates,
-    converged,
-    delta_bic,
-    moved_by,
-    nearly_as_good,
-)
+from pzd.diagnosis.search.candidates import Candidate
+from pzd.diagnosis.search.candidates import as_candidate
+from pzd.diagnosis.search.candidates import best_confounder
+from pzd.diagnosis.search.candidates import by_voltage
+from pzd.diagnosis.search.candidates import candidate
+from pzd.diagnosis.search.candidates import candidates
+from pzd.diagnosis.search.candidates import converged
+from pzd.diagnosis.search.candidates import delta_bic
+from pzd.diagnosis.search.candidates import moved_by
+from pzd.diagnosis.search.candidates import nearly_as_good
 from pzd.diagnosis.search.evidence import Evidence, evidence_of
 from pzd.diagnosis.thresholds import AT_REST, MOST_REWEIGHTINGS, WIDER
 
@@ -328,11 +326,11 @@ class _Search:
         return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
 
     def competitions(self) -> tuple[Competition, ...]:
-        """The competing forms that would do as well as an effect adopted, in its place."""
+        """Return the confounders that fit as well as an adopted effect, in its place."""
         found = []
         for name in self.current.effects[len(self.config.force) :]:
             without = self._without(name)
-            form = best_competing_form(self.evidence.whole, without)
+            form = best_confounder(self.evidence.whole, without)
             behind = form.delta_bic - delta_bic(without, self.current)
             if behind < self.config.rival_bic:
                 found.append(Competition(name, self.current.damper, form.effect, form.fitted.damper, behind))

@@ -7,20 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from pzd.damper.compiled.kernels import K, row_of, stroke_straight
-from pzd.damper.compose import (
-    element_rows,
-    forces_beside,
-    integrated_force,
-    parallel_rows,
-    recorded,
-    respond,
-    sampling_steps,
-    sensors_of,
-    voltage_at_valve,
-)
+from pzd.damper.compose import forces_parallel_to_element
+from pzd.damper.compose import integrated_force
+from pzd.damper.compose import recorded
+from pzd.damper.compose import respond
+from pzd.damper.compose import sampling_steps
+from pzd.damper.compose import sensors_of
+from pzd.damper.compose import voltage_at_valve
 from pzd.damper.march import deflections
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import element_rows, parallel_rows
 from pzd.record import Array
 
 TOLERANCE = 1e-7
@@ -56,7 +53,7 @@ def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None
     """
     if frame_stiffness is None:
         return respond(damper, motion, tolerance=TOLERANCE)
-    motion = motion.about(damper.zero_m)
+    motion = motion.centred_on(damper.zero_m)
     steps = sampling_steps(motion.time)
     effective = voltage_at_valve(damper, motion.voltage, steps)
     own = np.array(element_rows(damper, effective, motion.temperature))
@@ -96,7 +93,7 @@ def _by_rounds(
         total, last = element + more, (more, bend)
         if parallel is not None:
             at = motion.displacement - total / frame_stiffness
-            more = forces_beside(replace(motion, displacement=at, velocity=velocity), parallel)
+            more = forces_parallel_to_element(replace(motion, displacement=at, velocity=velocity), parallel)
         if bent:
             bend = deflections(element, rows) - deflections(element, own) - element / frame_stiffness
         change = max(np.max(np.abs(more - last[0])), frame_stiffness * np.max(np.abs(bend - last[1])))

@@ -10,7 +10,7 @@ import numpy as np
 
 from pzd.compiled import compiled
 from pzd.damper.compiled.kernels import K
-from pzd.damper.compiled.rows import row_at
+from pzd.damper.parameter_rows import row_at
 from pzd.damper.regimes import spring_energy
 from pzd.record import Array, Complex
 from pzd.simulate.ride.model import (

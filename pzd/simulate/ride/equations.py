@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pzd.compiled import compiled, inlined
-from pzd.damper.compiled.rows import row_at
+from pzd.damper.parameter_rows import row_at
 from pzd.force_table.lookup import table_force
 from pzd.record import Array
 from pzd.simulate.control.demand import bounds_of, demand, one_sided, spring_acceleration, wanted_force

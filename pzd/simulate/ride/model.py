@@ -20,10 +20,10 @@ from pzd.damper.compiled.kernels import (
     effective_voltage_after,
     parallel_force,
 )
-from pzd.damper.compiled.rows import nodes_of
 from pzd.damper.compose import BRANCHES, any_slips, steady_force
 from pzd.damper.flow import flow_speed
 from pzd.damper.model import Damper
+from pzd.damper.parameter_rows import nodes_of
 from pzd.damper.regimes import spring_force
 from pzd.force_table.lookup import Lookup, bracket
 from pzd.record import Array

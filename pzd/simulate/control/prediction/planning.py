@@ -9,7 +9,7 @@ import numpy as np
 
 from pzd.comfort.weighting import WK, modes
 from pzd.damper.compiled.columns import DRIVE, NEUTRAL, STROKE_AND_FLOW, acting
-from pzd.damper.compiled.laws import ELEMENT
+from pzd.damper.effect import ELEMENT
 from pzd.record import Array, Complex
 from pzd.simulate.control.prediction.plant import (
     MEAN_LOAD_1,

@@ -13,11 +13,10 @@ import pytest
 
 import pzd
 from pzd.damper.compiled.columns import STROKE_AND_FLOW
-from pzd.damper.compiled.rows import nodes_of, row_at
 from pzd.damper.compose import respond
-from pzd.damper.material import drive_row, effective_voltage, material
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import bingham_parameters, drive_row, effective_voltage, nodes_of, row_at
 
 TIME = np.arange(0, 1, 1e-3)
 
@@ -53,8 +52,8 @@ GRID = Damper(
 def test_a_bilinear_damper_is_met_everywhere_inside_and_held_beyond(rng: np.random.Generator) -> None:
     u, t = rng.uniform(0, 150, 50), rng.uniform(22, 43, 50)
     expected = np.stack([100 + u - t, 2000 + u + 10 * t, 1e5 + 1e3 * u], axis=-1)
-    np.testing.assert_allclose(material(GRID, u, t), expected, rtol=1e-12)
-    np.testing.assert_allclose(material(GRID, 400.0, 90.0), material(GRID, 150.0, 43.0))
+    np.testing.assert_allclose(bingham_parameters(GRID, u, t), expected, rtol=1e-12)
+    np.testing.assert_allclose(bingham_parameters(GRID, 400.0, 90.0), bingham_parameters(GRID, 150.0, 43.0))
 
 
 def test_drift_is_exponential_about_the_reference() -> None:
@@ -63,7 +62,7 @@ def test_drift_is_exponential_about_the_reference() -> None:
         effects={"temperature_drift": {"beta_T0": 0.04, "beta_C": 0.01}},
         reference_temperature_degC=22.0,
     )
-    np.testing.assert_allclose(material(warm, None, 42.0), [[100 * np.exp(-0.8), 1000 * np.exp(-0.2), 1e5]])
+    np.testing.assert_allclose(bingham_parameters(warm, None, 42.0), [[100 * np.exp(-0.8), 1000 * np.exp(-0.2), 1e5]])
 
 
 def test_drift_may_differ_by_voltage_and_then_needs_one() -> None:
@@ -74,11 +73,13 @@ def test_drift_may_differ_by_voltage_and_then_needs_one() -> None:
     )
     voltage, temperature = np.array([0.0, 50.0, 100.0]), np.array([42.0, 42.0, 32.0])
     expected = 100 * np.exp([-0.8, -0.6, -0.2])
-    np.testing.assert_allclose(material(drifting, voltage, temperature)[:, 0], expected)
-    np.testing.assert_allclose(material(drifting, voltage, 42.0)[:, 0], 100 * np.exp([-0.8, -0.6, -0.4]))
-    np.testing.assert_allclose(material(drifting, voltage, temperature)[:, 1], 1000 * np.exp([-0.2, -0.2, -0.1]))
+    np.testing.assert_allclose(bingham_parameters(drifting, voltage, temperature)[:, 0], expected)
+    np.testing.assert_allclose(bingham_parameters(drifting, voltage, 42.0)[:, 0], 100 * np.exp([-0.8, -0.6, -0.4]))
+    np.testing.assert_allclose(
+        bingham_parameters(drifting, voltage, temperature)[:, 1], 1000 * np.exp([-0.2, -0.2, -0.1])
+    )
     with pytest.raises(ValueError, match="beta_T0 depends on the voltage, and none is given"):
-        material(drifting, None, 42.0)
+        bingham_parameters(drifting, None, 42.0)
 
 
 def test_the_nodes_for_compiled_loops_give_the_same_rows() -> None:
@@ -86,7 +87,7 @@ def test_the_nodes_for_compiled_loops_give_the_same_rows() -> None:
     nodes = nodes_of(damper, 30.0)
     for voltage in (-5.0, 10.0, 60.0, 149.0, 200.0):
         row = row_at(nodes.voltages, nodes.rows, voltage)
-        np.testing.assert_allclose(row[:3], material(damper, voltage, 30.0)[0])
+        np.testing.assert_allclose(row[:3], bingham_parameters(damper, voltage, 30.0)[0])
         q = row[3 + STROKE_AND_FLOW.index(("orifice_quadratic", "q"))]
         assert q == pytest.approx(np.interp(voltage, [20.0, 100.0], [10.0, 30.0]))
 

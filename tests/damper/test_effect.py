@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pzd.damper.compiled.laws import functions
 from pzd.damper.confounders import known, module_of
-from pzd.damper.effect import Scales
+from pzd.damper.effect import Scales, functions
 from pzd.damper.effects import effects_in, library, nameable
 
 GOOD = """
@@ -109,8 +108,8 @@ def test_a_foil_called_like_an_effect_is_an_error_with_both(monkeypatch: pytest.
     from pzd.damper import confounders
 
     known.cache_clear()
-    monkeypatch.setattr(confounders, "competing_forms", lambda: {"lash": library()["lash"]})
-    with pytest.raises(ImportError, match=r"effects/lash.py and .*competing_forms/lash.py both declare lash"):
+    monkeypatch.setattr(confounders, "confounders", lambda: {"lash": library()["lash"]})
+    with pytest.raises(ImportError, match=r"effects/lash.py and .*confounders/lash.py both declare lash"):
         known()
     known.cache_clear()
 
