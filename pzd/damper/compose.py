@@ -74,7 +74,7 @@ def respond(damper: Damper, motion: Motion, first_force: float | None = None, to
     effective = voltage_at_valve(damper, constant_value(motion.voltage), steps)
     rows = element_rows(damper, effective, constant_value(motion.temperature))
     parallel = parallel_rows(damper, effective)
-    parallel_force = np.zeros(1) if parallel is None else forces_parallel_to_element(motion, parallel)
+    parallel_force = np.zeros(1) if parallel is None else parallel_force_along(motion, parallel)
     initial = 0.0 if first_force is None else first_force - float(parallel_force[0])
     force = integrated_force(rows, motion, steps, initial, tolerance) + parallel_force
     return recorded(sensors_of(damper), motion.time, force)
@@ -138,7 +138,7 @@ def integrated_sensitivities(
     return march_sensitivities(x, v, steps, rows, initial_force, initial_slopes, tolerance, columns, along)
 
 
-def forces_parallel_to_element(motion: Motion, parallel: Array) -> Array:
+def parallel_force_along(motion: Motion, parallel: Array) -> Array:
     """Compute the (n,) sum of the forces parallel to the element [N], with memory and without.
 
     Parameters

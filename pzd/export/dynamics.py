@@ -141,7 +141,10 @@ class Dynamics:
         temperatures, reference = np.array(known or [0.0]), damper.reference_temperature_degC
         signals = nodes_of(damper, at_temperatures[0]).voltages
         extra = np.broadcast_to(columns_of(damper, COLUMNS, signals), (signals.size, len(COLUMNS)))
-        bases = [np.broadcast_to(bingham_parameters(still, signals, T), (signals.size, len(ELEMENT))) for T in at_temperatures]
+        bases = [
+            np.broadcast_to(bingham_parameters(still, signals, T), (signals.size, len(ELEMENT)))
+            for T in at_temperatures
+        ]
         return cls(
             temperatures,
             signals,

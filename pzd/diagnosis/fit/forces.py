@@ -9,10 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compose import constant_value
-from pzd.damper.compose import forces_parallel_to_element
-from pzd.damper.compose import integrated_sensitivities
-from pzd.damper.compose import sensors_of
+from pzd.damper.compose import constant_value, integrated_sensitivities, parallel_force_along, sensors_of
 from pzd.damper.confounders import known
 from pzd.damper.effect import ELEMENT
 from pzd.damper.parameter_rows import (
@@ -69,7 +66,7 @@ class LaidOut:
 
     def force_beside(self, o: RecordLikelihood) -> Array:
         """(m,) force of what stands beside the element [N]; (1,) a zero without any."""
-        return np.zeros(1) if self.beside is None else forces_parallel_to_element(o.motion.centred_on(self.zero), self.beside)
+        return np.zeros(1) if self.beside is None else parallel_force_along(o.motion.centred_on(self.zero), self.beside)
 
 
 def laid_out(point: Point, o: RecordLikelihood) -> LaidOut:

@@ -30,16 +30,18 @@ from pzd.diagnosis.search.acceptance import (
     spurious,
     unsupported,
 )
-from pzd.diagnosis.search.candidates import Candidate
-from pzd.diagnosis.search.candidates import as_candidate
-from pzd.diagnosis.search.candidates import best_confounder
-from pzd.diagnosis.search.candidates import by_voltage
-from pzd.diagnosis.search.candidates import candidate
-from pzd.diagnosis.search.candidates import candidates
-from pzd.diagnosis.search.candidates import converged
-from pzd.diagnosis.search.candidates import delta_bic
-from pzd.diagnosis.search.candidates import moved_by
-from pzd.diagnosis.search.candidates import nearly_as_good
+from pzd.diagnosis.search.candidates import (
+    Candidate,
+    as_candidate,
+    best_confounder,
+    by_voltage,
+    candidate,
+    candidates,
+    converged,
+    delta_bic,
+    moved_by,
+    nearly_as_good,
+)
 from pzd.diagnosis.search.evidence import Evidence, evidence_of
 from pzd.diagnosis.thresholds import AT_REST, MOST_REWEIGHTINGS, WIDER
 

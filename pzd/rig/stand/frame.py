@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from pzd.damper.compiled.kernels import K, row_of, stroke_straight
-from pzd.damper.compose import forces_parallel_to_element
-from pzd.damper.compose import integrated_force
-from pzd.damper.compose import recorded
-from pzd.damper.compose import respond
-from pzd.damper.compose import sampling_steps
-from pzd.damper.compose import sensors_of
-from pzd.damper.compose import voltage_at_valve
+from pzd.damper.compose import (
+    integrated_force,
+    parallel_force_along,
+    recorded,
+    respond,
+    sampling_steps,
+    sensors_of,
+    voltage_at_valve,
+)
 from pzd.damper.march import deflections
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
@@ -93,7 +95,7 @@ def _by_rounds(
         total, last = element + more, (more, bend)
         if parallel is not None:
             at = motion.displacement - total / frame_stiffness
-            more = forces_parallel_to_element(replace(motion, displacement=at, velocity=velocity), parallel)
+            more = parallel_force_along(replace(motion, displacement=at, velocity=velocity), parallel)
         if bent:
             bend = deflections(element, rows) - deflections(element, own) - element / frame_stiffness
         change = max(np.max(np.abs(more - last[0])), frame_stiffness * np.max(np.abs(bend - last[1])))
