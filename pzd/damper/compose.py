@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.compiled import compiled
 from pzd.damper.compiled.columns import DRIVE, NEUTRAL, PARALLEL, acting, columns_of, value_of
@@ -28,6 +27,7 @@ from pzd.damper.march import march, march_sensitivities
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import drive_row_of, effective_voltage, element_rows, parallel_rows
+from pzd.damper.path import Variables
 from pzd.record import Array
 
 BRANCHES = len(acting("branch"))
@@ -101,30 +101,20 @@ def integrated_force(rows: Array, motion: Motion, steps: Array, initial_force: f
 
 
 def integrated_sensitivities(
-    rows: Array,
-    columns: NDArray[np.int64],
-    along: Array,
-    motion: Motion,
-    steps: Array,
-    initial_force: float,
-    initial_slopes: Array,
-    tolerance: float,
+    rows: Array, variables: Variables, motion: Motion, steps: Array, initial_force: float, tolerance: float
 ) -> tuple[Array, Array]:
-    """Compute the same force, and its derivatives by v variables that change c columns of the rows and the first force.
+    """Compute the same force, and its derivatives by v variables.
 
     Parameters
     ----------
-    rows : as `integrated_force`
-    columns : (c,) places in the row
-    along : (n, v, c) or (1, v, c) derivatives of these columns by each variable
-    motion, steps, initial_force : as `integrated_force`
-    initial_slopes : (v,) derivatives of the initial force by each variable [N]
-    tolerance : as `integrated_force`
+    rows, motion, steps, initial_force, tolerance : as `integrated_force`
+    variables : what they change of the rows and of the initial force
 
     Returns
     -------
     (n,) force [N] and (n, v) its derivatives [N]
     """
+    columns, along, initial_slopes = variables
     x, v = motion.displacement, motion.velocity
     if len(rows) == len(along) == 1 and no_effects(row_of(rows[0])) and np.all(columns <= K):
         friction, damping, stiffness = rows[0, [T0, C, K]]
@@ -135,7 +125,7 @@ def integrated_sensitivities(
             begun = element_force(x, steps, friction, damping, stiffness, initial_force + nudge, v)
             found += np.outer((begun - force) / nudge, initial_slopes)
         return force, found
-    return march_sensitivities(x, v, steps, rows, initial_force, initial_slopes, tolerance, columns, along)
+    return march_sensitivities(x, v, steps, rows, initial_force, tolerance, variables)
 
 
 def parallel_force_along(motion: Motion, parallel: Array) -> Array:

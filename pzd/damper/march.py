@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pzd.compiled import compiled, inlined
 from pzd.damper.compiled.kernels import K, Row, effects_alike, row_of, stroke_straight
@@ -13,9 +12,11 @@ from pzd.damper.element import Element, relaxation, slip
 from pzd.damper.flow import breakaway, damping, straight
 from pzd.damper.path import (
     DEFLECTION,
+    NO_VARIABLES,
     SPEED,
     STATES,
     Sensitivities,
+    Variables,
     advance,
     advance_sensitivities,
     begin_sensitivities,
@@ -159,10 +160,7 @@ def march(
     -------
     (n,) force [N]
     """
-    no_columns, no_variables = np.zeros(0, dtype=np.int64), np.zeros((1, 0, 0))
-    return march_sensitivities(
-        displacement, velocity, steps, rows, initial_force, np.zeros(0), tolerance, no_columns, no_variables
-    )[0]
+    return march_sensitivities(displacement, velocity, steps, rows, initial_force, tolerance, NO_VARIABLES)[0]
 
 
 def march_sensitivities(
@@ -171,28 +169,22 @@ def march_sensitivities(
     steps: Array,
     rows: Array,
     initial_force: float,
-    initial_slopes: Array,
     tolerance: float,
-    columns: NDArray[np.int64],
-    along: Array,
+    variables: Variables,
 ) -> tuple[Array, Array]:
-    """Compute the same force, and its derivatives by v variables that change c columns of the rows and the first force.
+    """Compute the same force, and its derivatives by v variables.
 
     Parameters
     ----------
-    displacement, velocity, steps, rows, initial_force : as `march`
-    initial_slopes : (v,) derivatives of the initial force by each variable [N]
-    tolerance : as `march`
-    columns : (c,) places in the row
-    along : (n, v, c) or (1, v, c) derivatives of these columns by each variable
+    displacement, velocity, steps, rows, initial_force, tolerance : as `march`
+    variables : what they change
 
     Returns
     -------
     (n,) force [N] and (n, v) its derivatives [N]
     """
-    force, slopes = np.empty(displacement.size), np.empty((displacement.size, along.shape[1]))
-    v = sensitivities_to(rows, columns, along)
-    state = np.zeros(STATES)
+    force, slopes = np.empty(displacement.size), np.empty((displacement.size, variables.initial_slopes.size))
+    v, state, initial_slopes = sensitivities_to(variables, rows), np.zeros(STATES), variables.initial_slopes
     _march(displacement, velocity, steps, rows, initial_force, initial_slopes, tolerance, state, force, v, slopes)
     return force, slopes
 

@@ -88,13 +88,7 @@ class Damper(Frozen):
 
     def with_effect(self, name: str, values: EffectValues) -> Damper:
         """Return the damper with one effect more, or with other values of it."""
-        effects = {**self.effects, name: dict(values)}
-        return Damper(
-            base=self.base,
-            effects=effects,
-            reference_temperature_degC=self.reference_temperature_degC,
-            zero_m=self.zero_m,
-        )
+        return Damper(**{**dict(self), "effects": {**self.effects, name: dict(values)}})  # unlike a copy, validated
 
     def without_effects(self, *names: str) -> Damper:
         """Return the damper without some of its effects."""

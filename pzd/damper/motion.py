@@ -38,12 +38,7 @@ class Motion:
     def of(cls, record: Record) -> Self:
         """Return the motion of a rig record."""
         return cls(
-            record.time,
-            record.displacement,
-            record.velocity,
-            record.acceleration,
-            record.voltage,
-            record.temperature,
+            record.time, record.displacement, record.velocity, record.acceleration, record.voltage, record.temperature
         )
 
     def centred_on(self, zero: float) -> Self:

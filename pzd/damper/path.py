@@ -53,8 +53,22 @@ _SAMPLES_FOR_NUDGES = 100  # samples that show how large these derivatives are
 _VANISHING = 1e-9  # of the larger slope at the ends of a piece: hardly any flow there, and no steady state
 
 
+class Variables(NamedTuple):
+    """v variables by which a force is differentiated, each of which changes c columns of the parameter row."""
+
+    columns: NDArray[np.int64]
+    """(c,) columns of the parameter row."""
+    along: Array
+    """(n, v, c) or (1, v, c) derivatives of these columns by each variable, linear between samples."""
+    initial_slopes: Array
+    """(v,) derivatives of the initial force by each variable [N]."""
+
+
+NO_VARIABLES = Variables(np.zeros(0, dtype=np.int64), np.zeros((1, 0, 0)), np.zeros(0))
+
+
 class Sensitivities(NamedTuple):
-    """Derivatives of the elastic deflection by v variables, each of which changes c columns of the parameter row."""
+    """Derivatives of the elastic deflection by v variables, and what advances them; see `Variables`."""
 
     columns: NDArray[np.int64]
     """(c,) columns of the parameter row."""
@@ -74,30 +88,17 @@ class Sensitivities(NamedTuple):
     """(2,) regime and side of `last`, which starts the next piece of the same; NaN before the first piece."""
 
 
-def sensitivities_to(rows: Array, columns: NDArray[np.int64], along: Array) -> Sensitivities:
-    """Return the sensitivities to v variables before the first step.
-
-    Parameters
-    ----------
-    rows : (n, r) or (1, r) parameter rows
-    columns : (c,) places in the row
-    along : (n, v, c) or (1, v, c) derivatives of these columns by each variable
-    """
-    samples, variables, count = along.shape
+def sensitivities_to(variables: Variables, rows: Array) -> Sensitivities:
+    """Return the sensitivities to variables before the first step along (n, r) or (1, r) parameter rows."""
+    columns, along, _ = variables
+    samples, count = along.shape[:2]
     own, some = np.abs(rows[0, columns]), along[:: max(samples // _SAMPLES_FOR_NUDGES, 1)]
     largest = np.maximum(np.max(np.abs(some), axis=(0, 1), initial=0.0), np.where(np.isfinite(own), own, 0.0))
     nudges = _NUDGE * np.where(largest > 0.0, largest, 1.0)
-    ends = np.zeros((2, 1 + variables))
+    ends = np.zeros((2, 1 + count))
     place = np.full(2, np.nan)
     return Sensitivities(
-        columns,
-        nudges,
-        np.ascontiguousarray(along),
-        np.zeros(count),
-        np.zeros(variables),
-        ends[0],
-        ends[1],
-        place,
+        columns, nudges, np.ascontiguousarray(along), np.zeros(columns.size), np.zeros(count), ends[0], ends[1], place
     )
 
 

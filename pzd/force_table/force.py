@@ -221,12 +221,7 @@ def force_rows(config: TableConfig, damper: Damper, nodes: TableNodes, reach: Re
 
 
 def _column(
-    config: TableConfig,
-    damper: Damper,
-    temperature: float | None,
-    voltage: float | None,
-    velocity: Array,
-    limit: float,
+    config: TableConfig, damper: Damper, temperature: float | None, voltage: float | None, velocity: Array, limit: float
 ) -> list[ForceRow]:
     inside = np.abs(velocity) <= limit * (1.0 + 1e-9)
     asked = np.copysign(np.minimum(np.abs(velocity), limit), velocity) if config.outside == "clamp" else velocity

@@ -14,7 +14,7 @@ from pzd.damper.march import march, whole_step
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import constant_rows, element_rows
-from pzd.damper.path import DEFLECTION, SPEED, STATES, advance, sensitivities_to
+from pzd.damper.path import DEFLECTION, NO_VARIABLES, SPEED, STATES, advance, sensitivities_to
 from pzd.damper.regimes import TimeStep, spring_energy, spring_force
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
 
@@ -49,7 +49,7 @@ FLOWS = [
 ]
 
 
-NO_VARIABLES = sensitivities_to(np.zeros((1, 0)), np.zeros(0, dtype=np.int64), np.zeros((1, 0, 0)))
+NOTHING = sensitivities_to(NO_VARIABLES, np.zeros((1, 0)))
 NEUTRAL_ROW = tuple(constant_rows(1.0, 1.0, 1.0, {})[0][0, 3:])
 """Columns of a parameter row behind T0, C and k, without any effect."""
 
@@ -237,7 +237,7 @@ def test_a_scheme_of_fixed_steps_is_of_order_five(effects: dict, moving: bool) -
         rows = [tuple(a + s * (b - a) if a != b else a for a, b in zip(first, last, strict=True)) for s in share]
         for i in range(steps):
             ends = (rows[i], rows[i + 1]) if moving else (first, first)
-            advance(state, TimeStep(long / steps, u[i], u[i + 1], *ends, moving), unlimited, NO_VARIABLES, 0)
+            advance(state, TimeStep(long / steps, u[i], u[i + 1], *ends, moving), unlimited, NOTHING, 0)
         return float(state[DEFLECTION])
 
     truth = after(512)
@@ -255,7 +255,7 @@ def test_behind_an_open_relief_valve_moving_parameters_cost_no_order() -> None:
         rows = [tuple(a + s * (b - a) if a != b else a for a, b in zip(first, last, strict=True)) for s in share]
         u = 0.2 + 0.1 * share
         for i in range(steps):
-            advance(state, TimeStep(4e-3 / steps, u[i], u[i + 1], rows[i], rows[i + 1], True), 1e9, NO_VARIABLES, 0)
+            advance(state, TimeStep(4e-3 / steps, u[i], u[i + 1], rows[i], rows[i + 1], True), 1e9, NOTHING, 0)
         return float(state[DEFLECTION])
 
     truth = after(256)
@@ -333,13 +333,13 @@ def test_the_work_of_the_rod_is_stored_dissipated_or_done_by_the_valve(effects: 
         for share, w in zip(shares, np.tile(weights / 24, 12), strict=True):  # Gauss' rule on parts of the step
             middle = tuple(a + share * (b - a) if a != b else a for a, b in zip(p0, p1, strict=True))
             probe, u = state.copy(), mean + half * (2 * share - 1)
-            advance(probe, TimeStep(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, NO_VARIABLES, i)
+            advance(probe, TimeStep(share * STEP, mean - half, u, p0, middle, True), TOLERANCE, NOTHING, i)
             e = probe[DEFLECTION]
             force = spring_force(e, middle)
             work += w * STEP * force * u
             dissipated += w * STEP * abs(force) * probe[SPEED]
             valve += w * (spring_energy(e, p1, p1[K]) - spring_energy(e, p0, p0[K]))
-        advance(state, TimeStep(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, NO_VARIABLES, i)
+        advance(state, TimeStep(STEP, mean - half, mean + half, p0, p1, True), TOLERANCE, NOTHING, i)
     wound = np.linspace(0.0, state[DEFLECTION], 2001)
     stored = np.trapezoid([spring_force(e, row_of(rows[350])) for e in wound], wound)
     assert dissipated > 0.0
@@ -433,5 +433,5 @@ def in_parts(first: tuple, last: tuple, parts: int) -> float:
 def marched_step(first: tuple, last: tuple) -> float:
     """The same by pieces whose length follows from their error."""
     state = np.array([900.0 / first[2], 0.0])
-    advance(state, TimeStep(STEP, 0.3, 0.5, first, last, True), 1e-11, NO_VARIABLES, 0)
+    advance(state, TimeStep(STEP, 0.3, 0.5, first, last, True), 1e-11, NOTHING, 0)
     return state[DEFLECTION]

@@ -21,10 +21,7 @@ EFFECT = Effect(
         Parameter("n", "-", 1.0, 0.1, 1.0, "flow index; 1 is a Newtonian fluid", Search(lambda _: 1.0, (0.85,))),
     ),
     source="Ostwald-de Waele power law; Bird, Stewart and Lightfoot 2002, Transport Phenomena",
-    tests=(
-        ({"w": 0.3, "C": 2000.0, "n": 0.7}, 600.0),
-        ({"w": 0.03, "C": 2000.0, "n": 0.5}, 189.73665961010275),
-    ),
+    tests=(({"w": 0.3, "C": 2000.0, "n": 0.7}, 600.0), ({"w": 0.03, "C": 2000.0, "n": 0.5}, 189.73665961010275)),
     hidden=lambda draw, scales: lambda s: {"n": 1.0 - 0.6 * s},
 )
 

@@ -20,6 +20,7 @@ from pzd.damper.parameter_rows import (
     parallel_rows,
     rows_along,
 )
+from pzd.damper.path import Variables
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, RecordLikelihood
 from pzd.diagnosis.fit.parameters import Point, Problem, Unknown, Work
 from pzd.record import Array
@@ -152,15 +153,9 @@ def sensitivities(given: Directions, o: RecordLikelihood, work: Work) -> tuple[A
     beside = given.here.force_beside(o)
     changes = [_change_beside(pair, o) for pair in given.pairs]
     initial_slopes = np.array([-change[0] for change in changes])
+    variables, initial_force = Variables(given.moved, given.along, initial_slopes), o.begins_with - float(beside[0])
     force, slopes = integrated_sensitivities(
-        given.here.rows,
-        given.moved,
-        given.along,
-        o.motion,
-        o.steps,
-        o.begins_with - float(beside[0]),
-        initial_slopes,
-        SIMULATION_TOLERANCE,
+        given.here.rows, variables, o.motion, o.steps, initial_force, SIMULATION_TOLERANCE
     )
     force = force + beside
     for j, change in enumerate(changes):
