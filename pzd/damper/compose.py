@@ -23,11 +23,10 @@ from pzd.damper.confounders import module_of
 from pzd.damper.effect import arguments, functions
 from pzd.damper.element import element_force, element_force_sensitivities
 from pzd.damper.flow import flow_force
-from pzd.damper.march import march, march_sensitivities
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import drive_row_of, effective_voltage, element_rows, parallel_rows
-from pzd.damper.path import Variables
+from pzd.damper.path import Variables, march, march_sensitivities
 from pzd.record import Array
 
 BRANCHES = len(acting("branch"))
@@ -64,7 +63,7 @@ def respond(damper: Damper, motion: Motion, first_force: float | None = None, to
     --------
     >>> from pzd.damper.model import BaseRow, Damper
     >>> from pzd.damper.motion import Motion
-    >>> damper = Damper(base=[BaseRow(T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e5)])
+    >>> damper = Damper(base=(BaseRow(T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e5),))
     >>> time, none = np.arange(3.0), np.zeros(3)
     >>> respond(damper, Motion(time, 0.001 * time, none, none)).round(3).tolist()
     [0.0, 200.0, 302.7]

@@ -186,10 +186,7 @@ class Effect:
         ------
         KeyError : when the effect has no such parameter
         """
-        for parameter in self.parameters:
-            if parameter.name == name:
-                return parameter
-        raise KeyError(name)
+        return {parameter.name: parameter for parameter in self.parameters}[name]
 
 
 # --- Functions of each place, and the rules ---

@@ -61,7 +61,7 @@ def element_force(
     >>> element_force(np.array([0.0, 0.001, 0.002]), 1.0, 300.0, 2700.0, 2e5).round(3).tolist()
     [0.0, 200.0, 302.7]
     """
-    force = np.empty(_kept(displacement.size, every))
+    force = np.empty(displacement[::every].size)
     bend, steps = _STRAIGHT if velocity is None else velocity, np.atleast_1d(np.asarray(step, dtype=np.float64))
     _march(displacement, bend, steps, friction, damping, stiffness, initial_force, force, _NO_SLOPES, every)
     return force
@@ -109,16 +109,11 @@ def element_force_sensitivities(
     -------
     (n,) force [N] and (n, 3) dF/dT0 [-], dF/dC [m/s], dF/dk [m], or as many of them as are kept
     """
-    kept = _kept(displacement.size, every)
+    kept = displacement[::every].size
     force, slopes = np.empty(kept), np.empty((kept, 3))
     bend, steps = _STRAIGHT if velocity is None else velocity, np.atleast_1d(np.asarray(step, dtype=np.float64))
     _march(displacement, bend, steps, friction, damping, stiffness, initial_force, force, slopes, every)
     return force, slopes
-
-
-def _kept(samples: int, every: int) -> int:
-    """Return how many of the samples are kept."""
-    return -(-samples // every)
 
 
 class Element(NamedTuple):

@@ -52,15 +52,13 @@ def breakaway(p: Row, side: float) -> float:
 @compiled
 def relief(p: Row, side: float) -> float:
     """Return the force [N] beyond which the relief valve is open."""
-    edge, _ = relief_of(p[T0] * direction_factor(side, p), side, p)
-    return edge
+    return relief_of(p[T0] * direction_factor(side, p), side, p)[0]
 
 
 @compiled
 def relief_slope(p: Row, side: float) -> float:
     """Return the slope of the curve [N s/m] beyond `relief`."""
-    _, slope = relief_of(p[T0] * direction_factor(side, p), side, p)
-    return slope
+    return relief_of(p[T0] * direction_factor(side, p), side, p)[1]
 
 
 @compiled

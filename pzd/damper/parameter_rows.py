@@ -58,8 +58,8 @@ def bingham_parameters(damper: Damper, voltage: Array | float | None, temperatur
     Examples
     --------
     >>> from pzd.damper.model import BaseRow, Damper
-    >>> rows = [BaseRow(voltage_V=u, T0_N=300.0 + u, C_Ns_per_m=2700.0, k_N_per_m=2e5) for u in (0.0, 100.0)]
-    >>> bingham_parameters(Damper(base=rows), 50.0, None).tolist()
+    >>> rows = (BaseRow(voltage_V=u, T0_N=300.0 + u, C_Ns_per_m=2700.0, k_N_per_m=2e5) for u in (0.0, 100.0))
+    >>> bingham_parameters(Damper(base=tuple(rows)), 50.0, None).tolist()
     [[350.0, 2700.0, 200000.0]]
     """
     groups = rows_per_voltage(damper.base)

@@ -13,6 +13,7 @@ from pzd.compiled import compiled, inlined
 from pzd.damper.compiled.kernels import (
     K,
     Row,
+    effects_alike,
     interpolate,
     stroke_inverse,
     stroke_law,
@@ -20,9 +21,10 @@ from pzd.damper.compiled.kernels import (
     stroke_slope,
     stroke_straight,
 )
-from pzd.damper.element import relaxation, slip
+from pzd.damper.element import Element, relaxation, slip
 from pzd.damper.flow import (
     breakaway,
+    damping,
     relief,
     relief_slope,
     smooth_force_of,
@@ -371,10 +373,8 @@ def _rate_of_force(y: float, at: float, regime: int, side: float, step: TimeStep
         rate = _behind_stroke(rate, smooth_force_of(s, p, side), at, p, side, step)
     if step.moving:
         span = _DIFFERENCE * step.h
-        ahead, behind = (
-            smooth_force_of(s, row_in(step, at + span), side),
-            smooth_force_of(s, row_in(step, at - span), side),
-        )
+        ahead = smooth_force_of(s, row_in(step, at + span), side)
+        behind = smooth_force_of(s, row_in(step, at - span), side)
         rate += softening * smooth_force_of(s, p, side) - (ahead - behind) / (2.0 * span)
     return rate / smooth_rise(w, p, side)
 
@@ -392,3 +392,107 @@ def _behind_stroke(rate: float, force: float, at: float, p: Row, side: float, st
         ahead, behind = stroke_law(e, side, row_in(step, at + span)), stroke_law(e, side, row_in(step, at - span))
         rate += p[K] * side * (ahead - behind) / (2.0 * span)
     return rate
+
+
+# --- A whole step in one regime, with a straight flow curve and T0, C and k that vary ---
+#
+# Equation: ds/dt = u + side T0/C - (k/C) s,  F = k s      Source: Makowski and Knap 2021, eq. (1)-(3), y eliminated
+#
+# With the time tau, d tau = (k/C) dt, this is ds/dtau = g - s, where g = (u C + side T0)/k is the extension of the oil
+# stiffness at which the flow is as fast as the rod. Over a step g is nearly a polynomial in tau, and with a polynomial
+# the integral is a sum of the functions phi_k of an exponential integrator, however large k/C is.
+
+NODES = (1.0 / 3.0, 2.0 / 3.0)
+"""Shares of a step at which g and k/C are evaluated besides its ends, for a cubic through four values."""
+
+
+UNSOLVED = (math.nan, math.nan)
+"""Result of a step that has to be solved piece by piece."""
+
+
+@compiled
+def whole_step(e: float, step: TimeStep, tolerance: float) -> tuple[float, float]:
+    """Compute elastic deflection [m] and flow speed [m/s] after a step that sticks or slips throughout.
+
+    Parameters
+    ----------
+    e : elastic deflection at its start [m]
+    step : between rows for which `is_straight` is true
+    tolerance : admissible error, as a share of the force
+
+    Returns
+    -------
+    both; NaN where the regime changes, the rod reverses, or g is not close enough to a polynomial
+    """
+    if step.u0 * step.u1 < 0.0:
+        return UNSOLVED
+    p, q = step.p0, step.p1
+    force = spring_force(e, p)
+    regime, side = regime_of(force, p)
+    if regime == STICK:
+        end = e + 0.5 * (step.u0 + step.u1) * step.h
+        return (end, 0.0) if regime_of(spring_force(end, q), q)[0] == STICK else UNSOLVED
+    if regime == RELIEF:
+        return UNSOLVED
+    first = Element(side * breakaway(p, side), damping(p, side), p[K])
+    if step.moving:
+        last = Element(side * breakaway(q, side), damping(q, side), q[K])
+        spring, error = _slipped(force / p[K], first, last, step)
+        if error > tolerance * abs(force / p[K]):
+            return UNSOLVED
+    else:
+        last = first
+        spring = slip(force, first.T0, step.u0, step.u1, relaxation(step.h, first.C, first.k)) / first.k
+    end = deflection_on(side * last.k * spring, q, side)
+    if side * spring <= 0.0 or regime_of(last.k * spring, q)[0] != SMOOTH:
+        return UNSOLVED
+    return end, (last.k * spring - last.T0) * side / last.C
+
+
+@compiled
+def is_straight(p: Row, q: Row) -> bool:
+    """Return whether the flow curve has straight branches alone, and T0, C and k alone differ between two rows."""
+    return effects_alike(p, q) and stroke_straight(p) and straight(p)
+
+
+@inlined
+def _slipped(e: float, first: Element, last: Element, step: TimeStep) -> tuple[float, float]:
+    """Compute the extension s [m] after slip over one step, and its error: the contribution of the third order.
+
+    Parameters
+    ----------
+    e : at its start [m]
+    first, last : elements at start and end, with the direction of flow as the sign of T0
+    step : the step
+    """
+    start, rate = _g_and_rate(first, step.u0)
+    second, rate_b = _between(first, last, step, NODES[0])
+    third, rate_c = _between(first, last, step, NODES[1])
+    end, rate_d = _g_and_rate(last, step.u1)
+    span = step.h * (rate + 3.0 * (rate_b + rate_c) + rate_d) / 8.0
+    b = step.h * (9.0 * rate + 19.0 * rate_b - 5.0 * rate_c + rate_d) / 72.0 / span
+    c = step.h * (rate + 4.0 * rate_b + rate_c) / 9.0 / span
+    by_b = (second - start) / b
+    bend = (end - start - by_b) / (1.0 - b)
+    twist = (bend - ((third - start) / c - by_b) / (c - b)) / (1.0 - c)
+    over = phi(-span)
+    slipped = e + span * ((start - e) * over.one + (by_b - bend * b) * over.two + 2.0 * bend * over.three)
+    added = span * twist * (b * over.two - 2.0 * (1.0 + b) * over.three + 6.0 * over.four)
+    return slipped + added, abs(added)
+
+
+@inlined
+def _g_and_rate(at: Element, u: float) -> tuple[float, float]:
+    """Compute g, the extension [m] at which the flow is as fast as the rod, u [m/s], and k/C [1/s]."""
+    return (u * at.C + at.T0) / at.k, at.k / at.C
+
+
+@inlined
+def _between(first: Element, last: Element, step: TimeStep, share: float) -> tuple[float, float]:
+    """Compute g and k/C at a share of a step."""
+    at = Element(
+        first.T0 + (last.T0 - first.T0) * share,
+        first.C + (last.C - first.C) * share,
+        first.k + (last.k - first.k) * share,
+    )
+    return _g_and_rate(at, step.u0 + (step.u1 - step.u0) * share)

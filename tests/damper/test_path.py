@@ -10,12 +10,11 @@ from scipy.optimize import brentq
 from pzd.damper.compiled.kernels import K, row_of
 from pzd.damper.compose import TOLERANCE, integrated_force, respond, static_force, steady_force
 from pzd.damper.element import element_force
-from pzd.damper.march import march, whole_step
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import constant_rows, element_rows
-from pzd.damper.path import DEFLECTION, NO_VARIABLES, SPEED, STATES, advance, sensitivities_to
-from pzd.damper.regimes import TimeStep, spring_energy, spring_force
+from pzd.damper.path import DEFLECTION, NO_VARIABLES, SPEED, STATES, advance, march, sensitivities_to
+from pzd.damper.regimes import TimeStep, spring_energy, spring_force, whole_step
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
 
 STEP = 1e-3

@@ -10,10 +10,9 @@ from pzd.damper.compiled.columns import STROKE_AND_FLOW
 from pzd.damper.compose import integrated_sensitivities
 from pzd.damper.effect import ELEMENT
 from pzd.damper.element import element_force_sensitivities
-from pzd.damper.march import march, march_sensitivities
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import constant_rows
-from pzd.damper.path import Variables
+from pzd.damper.path import Variables, march, march_sensitivities
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
 from pzd.record import Array
 

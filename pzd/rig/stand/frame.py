@@ -16,10 +16,10 @@ from pzd.damper.compose import (
     sensors_of,
     voltage_at_valve,
 )
-from pzd.damper.march import deflections
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.damper.parameter_rows import element_rows, parallel_rows
+from pzd.damper.path import deflections
 from pzd.record import Array
 
 TOLERANCE = 1e-7
