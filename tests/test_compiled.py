@@ -10,6 +10,7 @@ from pathlib import Path
 from types import FunctionType
 
 import numpy as np
+import pytest
 
 from pzd.compiled import Kernel, compiled
 from pzd.record import Array
@@ -128,6 +129,7 @@ print(parallel_forces(rest, rest, rest, columns_of(damper, PARALLEL, None))[0])
 """
 
 
+@pytest.mark.ci
 def test_an_edited_effect_file_is_compiled_anew_although_the_kernels_that_call_it_were_cached(tmp_path: Path) -> None:
     effect = tmp_path / "effects" / "detent.py"
     effect.parent.mkdir()

@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import pzd
 from pzd.damper.compiled.columns import STROKE_AND_FLOW
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
@@ -90,30 +83,6 @@ def test_the_nodes_for_compiled_loops_give_the_same_rows() -> None:
         np.testing.assert_allclose(row[:3], bingham_parameters(damper, voltage, 30.0)[0])
         q = row[3 + STROKE_AND_FLOW.index(("orifice_quadratic", "q"))]
         assert q == pytest.approx(np.interp(voltage, [20.0, 100.0], [10.0, 30.0]))
-
-
-@pytest.mark.ci
-def test_an_edited_law_is_seen_although_the_kernels_are_cached(tmp_path: Path) -> None:
-    copy = tmp_path / "pzd"
-    shutil.copytree(Path(pzd.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    program = (
-        "from pzd.damper.compose import steady_force; from pzd.damper.model import BaseRow, Damper;"
-        "base = (BaseRow(T0_N=0.0, C_Ns_per_m=1000.0, k_N_per_m=1e5),);"
-        "print(float(steady_force(Damper(base=base, effects={'orifice_quadratic': {'q': 100.0}}), None, None, 0.5)))"
-    )
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-
-    def force() -> float:
-        run = subprocess.run(
-            [sys.executable, "-c", program], env=environment, cwd=tmp_path, capture_output=True, text=True, check=True
-        )
-        return float(run.stdout)
-
-    assert force() == pytest.approx(525.0)
-    assert force() == pytest.approx(525.0)
-    law = copy / "damper" / "effects" / "orifice_quadratic.py"
-    law.write_text(law.read_text().replace("return q * w * w", "return 2.0 * q * w * w"))
-    assert force() == pytest.approx(550.0)
 
 
 def test_time_need_not_be_even(rng: np.random.Generator) -> None:

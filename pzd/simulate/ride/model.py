@@ -356,7 +356,7 @@ LEAST_RELAXATION = 1e-5
 def grid_of(table: Table, temperature: float | None) -> TableArrays:
     """The table at one temperature [degC], as the compiled loop reads it."""
     lookup = Lookup.of(table, temperature)
-    return TableArrays(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.reach)
+    return TableArrays(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.envelope)
 
 
 def table_of(damper: Damper, table: Table) -> Table:
