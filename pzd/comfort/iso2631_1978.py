@@ -64,7 +64,7 @@ class Chart:
     """(n, m) r.m.s. acceleration [m/s2]"""
 
     def levels_at(self, frequency: float) -> Array:
-        """Interpolate the (m,) boundary [m/s2 r.m.s.] at one frequency, log-log between the centres, constant beyond."""
+        """Interpolate the (m,) boundary [m/s2 r.m.s.] at one frequency, log-log between centres, constant beyond."""
         centres, levels = np.log(self.frequency), np.log(self.level)
         place = min(max(np.log(frequency), centres[0]), centres[-1])
         i = min(max(int(np.searchsorted(centres, place)), 1), centres.size - 1)
