@@ -127,12 +127,12 @@ def _dispatcher(function: FunctionType, **options: Any) -> Any:
     def compile_once(signature: Any) -> Any:
         from filelock import FileLock
 
-        with ExitStack() as held:
+        with ExitStack() as stack:
             with suppress(OSError):  # without locks it is merely compiled twice
-                held.enter_context(FileLock(file_lock))
+                stack.enter_context(FileLock(file_lock))
             if gc.isenabled():  # looking for garbage in what is made takes an eighth of the time
                 gc.disable()
-                held.callback(gc.enable)
+                stack.callback(gc.enable)
             return compile_now(signature)
 
     dispatcher.compile = compile_once

@@ -56,7 +56,7 @@ Place = Literal["drive", "material", "stroke", "flow", "parallel", "branch", "se
 """Where in the damper an effect acts, in physical order."""
 
 Need = Literal["voltage", "temperature"]
-"""What must move inside a test."""
+"""What must vary inside a test."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class Parameter:
     """Largest admissible value."""
     meaning: str
     search: Search
-    """How a fit looks for it."""
+    """Starting values of a fit."""
     natural_from: float = -math.inf
     """Smallest physical value; a fit that goes below has found something that looks alike."""
     natural_to: float = math.inf
@@ -289,11 +289,11 @@ def _faults(effect: Effect, module: ModuleType) -> Iterator[str]:
         for name in own
         if name in reserved
     )
-    laws, held = LAWS[effect.place], functions(effect, module)
-    if not any(laws[name].suffices for name in held):
+    laws, present = LAWS[effect.place], functions(effect, module)
+    if not any(laws[name].suffices for name in present):
         yield f"an effect of the {effect.place} needs {' or '.join(name for name, law in laws.items() if law.suffices)}"
-    for name, function in held.items():
-        yield from (f"{other} must stand beside {name}" for other in laws[name].requires if other not in held)
+    for name, function in present.items():
+        yield from (f"{other} must stand beside {name}" for other in laws[name].requires if other not in present)
         known = (*laws[name].quantities, *own)
         yield from (
             f"{name} takes {', '.join(known) or 'nothing'} (got {argument})"

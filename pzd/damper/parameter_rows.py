@@ -2,7 +2,7 @@
 
 Order: T0, C and k from the damper's base rows, over temperature first and then over voltage, times the effects of the
 material; the effective voltage behind the effects of the drive; rows of the element, of the parallel forces and of the
-drive; rows at any voltage, linear between the nodes of a damper. All are held beyond the outermost values.
+drive; rows at any voltage, linear between the nodes of a damper. Beyond the outermost values all are constant.
 """
 
 from __future__ import annotations
@@ -313,7 +313,7 @@ def rows_along(voltages: Array, rows: Array, effective: Array) -> Array:
 
 @compiled
 def _fill_rows(voltages: Array, rows: Array, effective: Array, along: Array) -> None:
-    """Fill the (n, r) rows; the interval is looked for from the last one on, as a voltage moves little per sample."""
+    """Fill the (n, r) rows; the search starts at the last interval, as a voltage varies little per sample."""
     last, i = voltages.size - 1, 0
     for n in range(effective.size):
         voltage = min(max(effective[n], voltages[0]), voltages[last])

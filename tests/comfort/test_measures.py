@@ -40,7 +40,7 @@ def test_transient_value_of_a_burst_shorter_than_a_second() -> None:
     assert maximum_transient(burst[5000:5100], RATE) == pytest.approx(2.0, rel=1e-9)
 
 
-def test_a_shock_asks_for_more_than_the_rms_and_a_tone_does_not() -> None:
+def test_a_shock_exceeds_the_limits_of_the_rms_and_a_tone_does_not() -> None:
     shock = 0.01 * np.sin(2.0 * np.pi * 5.0 * TIME)
     shock[8000:8020] = 3.0
     assert len(evaluate(shock, RATE).beyond) == 3
@@ -53,7 +53,7 @@ def test_the_dose_ratio_of_a_sine_is_independent_of_time() -> None:
     assert evaluate(SINE[: round(8.0 * RATE)], RATE).vdv_ratio == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_vehicle_at_rest_divides_by_nothing() -> None:
+def test_a_vehicle_at_rest_has_ratios_of_zero() -> None:
     found = evaluate(np.zeros(1000), RATE)
     assert (found.a_w, found.crest, found.mtvv_ratio, found.vdv_ratio) == (0.0, 0.0, 0.0, 0.0)
 

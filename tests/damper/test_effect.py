@@ -73,7 +73,7 @@ def text(old: str = "", new: str = "", name: str = "cubic", place: str = "flow")
     return GOOD.replace("NAME", name).replace("PLACE", place).replace(old, new)
 
 
-def test_a_good_file_is_an_effect(effects: Effects) -> None:
+def test_a_file_that_keeps_the_rules_declares_an_effect(effects: Effects) -> None:
     assert effects(cubic=text()) == ["cubic"]
 
 
@@ -104,7 +104,7 @@ def test_two_files_of_one_name_are_an_error_with_both(effects: Effects) -> None:
         effects(cubic=text(), other=text())
 
 
-def test_a_foil_called_like_an_effect_is_an_error_with_both(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_confounder_with_the_name_of_an_effect_is_an_error_with_both_files(monkeypatch: pytest.MonkeyPatch) -> None:
     from pzd.damper import confounders
 
     known.cache_clear()

@@ -14,7 +14,7 @@ from pzd.damper.parameter_rows import bingham_parameters, drive_row, effective_v
 TIME = np.arange(0, 1, 1e-3)
 
 
-def test_the_lag_answers_a_step_as_an_exponential_and_a_ramp_late_by_tau() -> None:
+def test_the_lag_follows_a_step_exponentially_and_a_ramp_late_by_tau() -> None:
     steps = np.array([1e-3])
     lag = drive_row({"valve_lag": {"tau": 0.05}})
     step = effective_voltage(np.where(TIME > 0, 100.0, 0.0), steps, lag)
@@ -23,7 +23,7 @@ def test_the_lag_answers_a_step_as_an_exponential_and_a_ramp_late_by_tau() -> No
     np.testing.assert_allclose(ramp[-1], 100 * (TIME[-1] - 0.05), rtol=1e-6)
 
 
-def test_the_play_turns_only_after_its_whole_width() -> None:
+def test_the_play_reverses_only_after_its_whole_width() -> None:
     triangle = np.interp(TIME, [0, 0.25, 0.5, 1.0], [0, 100, 0, 100])
     felt = effective_voltage(triangle, np.array([1e-3]), drive_row({"piezo_hysteresis": {"r": 10.0}}))
     assert felt.max() == pytest.approx(90.0)
@@ -42,14 +42,14 @@ GRID = Damper(
 )
 
 
-def test_a_bilinear_damper_is_met_everywhere_inside_and_held_beyond(rng: np.random.Generator) -> None:
+def test_parameters_are_bilinear_in_voltage_and_temperature_and_constant_beyond(rng: np.random.Generator) -> None:
     u, t = rng.uniform(0, 150, 50), rng.uniform(22, 43, 50)
     expected = np.stack([100 + u - t, 2000 + u + 10 * t, 1e5 + 1e3 * u], axis=-1)
     np.testing.assert_allclose(bingham_parameters(GRID, u, t), expected, rtol=1e-12)
     np.testing.assert_allclose(bingham_parameters(GRID, 400.0, 90.0), bingham_parameters(GRID, 150.0, 43.0))
 
 
-def test_drift_is_exponential_about_the_reference() -> None:
+def test_drift_is_exponential_in_the_distance_from_the_reference_temperature() -> None:
     warm = Damper(
         base=(BaseRow(T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e5),),
         effects={"temperature_drift": {"beta_T0": 0.04, "beta_C": 0.01}},
@@ -58,7 +58,7 @@ def test_drift_is_exponential_about_the_reference() -> None:
     np.testing.assert_allclose(bingham_parameters(warm, None, 42.0), [[100 * np.exp(-0.8), 1000 * np.exp(-0.2), 1e5]])
 
 
-def test_drift_may_differ_by_voltage_and_then_needs_one() -> None:
+def test_a_drift_per_voltage_needs_a_voltage() -> None:
     drifting = Damper(
         base=(BaseRow(T0_N=100.0, C_Ns_per_m=1000.0, k_N_per_m=1e5),),
         effects={"temperature_drift": {"beta_T0": (0.04, 0.02), "beta_C": 0.01, "at_voltage_V": (0.0, 100.0)}},
@@ -85,7 +85,7 @@ def test_the_nodes_for_compiled_loops_give_the_same_rows() -> None:
         assert q == pytest.approx(np.interp(voltage, [20.0, 100.0], [10.0, 30.0]))
 
 
-def test_time_need_not_be_even(rng: np.random.Generator) -> None:
+def test_an_uneven_time_gives_the_same_force(rng: np.random.Generator) -> None:
     uneven = np.sort(rng.uniform(0, 1, 3000))
     omega = 2 * np.pi * 2
     single = Damper(base=(BaseRow(T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e5),))

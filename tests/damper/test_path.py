@@ -163,7 +163,7 @@ def test_a_moving_stiffness_agrees_with_a_restarted_high_order_solver_to_1e_9() 
     assert np.max(np.abs(ours - forces)) <= 1e-9 * np.max(np.abs(forces))
 
 
-def test_dropping_the_moving_stiffness_would_be_seen() -> None:
+def test_a_stiffness_that_follows_the_voltage_changes_the_force_visibly() -> None:
     jumping = np.where((TIME // 0.05) % 2 == 0, 20.0, 140.0)
     force = respond(PLAIN, sine(jumping))
     jumps = np.flatnonzero(np.diff(jumping))
@@ -210,7 +210,7 @@ def test_cutting_every_step_in_eight_changes_nothing(rng: np.random.Generator) -
 
 
 @pytest.mark.parametrize("effects", [*FLOWS[:3], FLOWS[7], FLOWS[8]], ids="+".join)
-def test_oil_that_settles_within_a_fraction_of_a_step_is_followed(effects: dict) -> None:
+def test_a_force_that_settles_within_a_fraction_of_a_step_is_followed(effects: dict) -> None:
     """C/k is a twentieth of the step and less, as in a slow test of a stiff damper; cut in 64, no piece is stiff."""
     hard = with_effects(effects)
     base = tuple(row.model_copy(update={"k_N_per_m": 6e7}) for row in hard.base)
@@ -271,7 +271,7 @@ def test_at_the_tolerance_of_the_diagnosis_the_force_is_right_to_1e_6_of_peak(ef
 
 
 @pytest.mark.parametrize("friction", [0.0, *(10.0 ** np.arange(-14.0, 1.0, 0.25))])
-def test_the_friction_may_vanish(friction: float) -> None:
+def test_an_element_without_friction_is_solved(friction: float) -> None:
     """An orifice too small to be seen sends the element through the march, which has to find where 1e-12 N sticks."""
     motion = sine(0.0, frequency=5.0, amplitude=0.015)
     row = BaseRow(voltage_V=None, T0_N=friction, C_Ns_per_m=4550.0, k_N_per_m=184041.0)
@@ -346,7 +346,7 @@ def test_the_work_of_the_rod_is_stored_dissipated_or_done_by_the_valve(effects: 
 
 
 @pytest.mark.parametrize("effects", [{}, *FLOWS], ids=lambda e: "+".join(e) or "plain")
-def test_a_long_even_stroke_ends_at_the_steady_force(effects: dict) -> None:
+def test_a_long_stroke_at_constant_speed_ends_at_the_steady_force(effects: dict) -> None:
     damper = with_effects(effects)
     for speed in (-0.4, -0.02, 0.05, 0.6):
         x = speed * TIME * 5
@@ -365,7 +365,7 @@ def test_at_rest_the_steady_force_has_two_sides_and_a_preload_is_left_to_the_bal
     np.testing.assert_allclose(static_force(by_voltage, np.array([0.0, 25.0, 100.0])), [50.0, 60.0, 90.0])
 
 
-def test_a_voltage_that_is_needed_and_not_given_is_said() -> None:
+def test_a_missing_voltage_is_an_error() -> None:
     motion = sine(0.0)
     blind = Motion(motion.time, motion.displacement, motion.velocity, motion.acceleration)
     with pytest.raises(ValueError, match="depends on the voltage"):
@@ -403,7 +403,7 @@ def test_a_step_with_moving_parameters_converges_with_order_four(stiffness: floa
     assert missed[2] < 1e-10 or np.log2(missed[0] / missed[2]) / 2 > 3.7, missed
 
 
-def test_a_step_with_moving_parameters_is_cut_where_it_would_miss_more_than_asked(rng) -> None:
+def test_a_step_with_moving_parameters_is_cut_where_its_error_exceeds_the_tolerance(rng) -> None:
     """Of rows that move by up to a half in one step, those taken at once are as exact as those that are cut."""
     taken = 0
     for _ in range(300):

@@ -59,7 +59,7 @@ def scaled(rows: Array, column: int, by: float) -> Array:
 
 @pytest.mark.parametrize("moving", [False, True], ids=["constant", "moving"])
 @pytest.mark.parametrize("effects", [{}, *CONSTANT], ids=lambda e: "+".join(e) or "plain")
-def test_they_are_the_differences_of_an_exact_path(effects: dict, moving: bool) -> None:
+def test_sensitivities_are_the_differences_of_an_exact_path(effects: dict, moving: bool) -> None:
     rows, columns, (x, v), steps = rows_of(effects, moving), columns_of(effects), motion(), np.array([STEP])
     along = np.stack([rows[:, columns] * (np.arange(len(columns)) == j) for j in range(len(columns))], axis=1)
     variables = Variables(np.array(columns), along, np.zeros(len(columns)))
@@ -83,7 +83,7 @@ def test_a_damper_of_twice_all_forces_gives_twice_the_force(effects: dict) -> No
     assert np.max(np.abs(slopes[:, 0] - force)) < 1e-3 * np.max(np.abs(force))
 
 
-def test_of_the_plain_element_they_are_those_of_the_closed_form_to_order_two() -> None:
+def test_sensitivities_of_the_element_without_effects_are_those_of_the_closed_form_to_order_two() -> None:
     rows, missed = rows_of({}, False), []
     for parts in (1, 2, 4):
         step, (x, v) = STEP / parts, motion(STEP / parts)
@@ -95,7 +95,7 @@ def test_of_the_plain_element_they_are_those_of_the_closed_form_to_order_two() -
     assert np.all(missed[1][1:] > 3.5 * missed[2][1:])
 
 
-def test_a_moment_without_flow_moves_the_force_by_the_spring_alone() -> None:
+def test_while_the_element_sticks_the_force_depends_on_k_alone() -> None:
     """While the oil sticks dF/dk is the way that the rod has gone, and T0 and C change nothing."""
     x = 1e-4 * np.sin(2 * np.pi * TIME)  # 20 N of 300
     v = 2e-4 * np.pi * np.cos(2 * np.pi * TIME)
@@ -105,7 +105,7 @@ def test_a_moment_without_flow_moves_the_force_by_the_spring_alone() -> None:
 
 
 @pytest.mark.parametrize("effects", [{}, {"orifice_quadratic": {"q": 3000.0}}, {"asymmetry": {"alpha": 0.2}}], ids=str)
-def test_a_force_that_the_damper_begins_with_is_felt_until_the_oil_has_flowed(effects: dict) -> None:
+def test_the_initial_force_affects_the_force_until_the_element_has_slipped(effects: dict) -> None:
     """By the closed form where it holds, by the march elsewhere: both go with what the variables make of that force."""
     t = np.arange(300) * STEP
     x, v = 2e-3 * np.sin(2 * np.pi * 2 * t), 8e-3 * np.pi * np.cos(2 * np.pi * 2 * t)

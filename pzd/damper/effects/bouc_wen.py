@@ -1,11 +1,11 @@
-"""A smooth hysteresis parallel to the element (Bouc and Wen): its force comes up over a travel, and bends into slip.
+"""A smooth hysteresis parallel to the element (Bouc and Wen): its force builds up over a travel and turns into slip.
 
 Law: dF/dx = F_h/x_h (1 - z^2) where the rod winds it up, F_h/x_h (1 + (2 sigma - 1) z^2) where it unwinds, z = F/F_h,
 whatever the speed: the form of the source with n = 2, counted in its ultimate force. sigma >= 1/2, else a loop would
 give off energy; 1/2 (beta = gamma) unwinds straight. Range: x_h 0.2-5 mm, F_h up to a quarter of the peak, sigma to 5.
-Its nearest neighbour is `second_branch`, told from it by small amplitudes: inside its shelf that one is a spring and
-loses nothing, while this one always loses, sigma F_h A^4/x_h^3, a sixteenth at half the amplitude. `rounded_yield` is
-told by one speed reached at two amplitudes: its loop is as wide in m/s, this one in mm.
+Its nearest neighbour is `second_branch`, distinguished by small amplitudes: inside its shelf that one is a spring and
+dissipates nothing, while this one always does, sigma F_h A^4/x_h^3, a sixteenth at half the amplitude. `rounded_yield`
+is distinguished by one speed at two amplitudes: its loop has the same width in m/s, this one in mm.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
 
 EXPONENT = 2
-"""n of the source: 1 is the friction of Dahl, which comes up without a bend; larger ones near `second_branch`."""
+"""n of the source: 1 is the friction of Dahl; larger ones approach `second_branch`."""
 STRAIGHT = 1e-9
 """Below this `2 sigma - 1` the unloading is straight to rounding."""
 
@@ -72,7 +72,7 @@ def law(deflection: float, F_h: float, x_h: float) -> float:
 
 
 def rate(deflection: float, side: float, x_h: float, sigma: float) -> float:
-    """Compute the derivative of the deflection by the travel to a side [-]: 0 in steady slip, 1 at no force."""
+    """Compute the derivative of the deflection by the travel to a side [-]: 0 in steady slip, 1 at zero force."""
     return hysteresis_rate(deflection / x_h, side, sigma, EXPONENT)
 
 

@@ -1,12 +1,12 @@
-"""A pocket of vapour or gas in one chamber: after a reversal it is squeezed before the oil takes up the force.
+"""A pocket of vapour or gas in one chamber: after a reversal it is compressed before the oil carries the force.
 
 Law: F = k e, x - y = e + d_c e/(e + s_c) on the side of the pocket: Boyle's law of a pocket of length d_c at the
-pressure p_c, s_c = p_c A/k; on the other side nothing. d_c > 0: the force is lost in rebound, behind a compression that
-outran the gas pressure; d_c < 0 in compression, behind a foot valve that starves. What the speed of the stroke before
-adds to the pocket is left out: the law has no memory. Range: 0.1-5 mm. Its nearest neighbour is `lash`, told from it by
-a slow sine: free play loses the same travel after both reversals, so the loop is odd and has no even harmonics,
-wherever its zero lies; a pocket bends one flank alone. From an `asymmetry`, which has them too, it is told by the
-plateaus of steady slip, which a pocket leaves alike; from `frame_compliance` as from `lash`.
+pressure p_c, s_c = p_c A/k; on the other side nothing. d_c > 0: the force is missing in rebound, after a compression
+faster than the gas pressure allows; d_c < 0 in compression, behind a foot valve that starves. The dependence of the
+pocket on the speed of the stroke before is left out: the law has no memory. Range: 0.1-5 mm. Its nearest neighbour is
+`lash`, distinguished by a slow sine: free play loses the same travel after both reversals, so the loop is odd and has
+no even harmonics, wherever its zero lies; a pocket bends one flank alone. An `asymmetry` has even harmonics too, but
+unequal plateaus of steady slip; `frame_compliance` is distinguished as `lash` is.
 """
 
 from __future__ import annotations

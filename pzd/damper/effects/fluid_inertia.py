@@ -1,4 +1,4 @@
-"""Oil that is accelerated through a long duct, or a mass that moves with the rod.
+"""Inertia of oil in a long duct, or of a mass on the rod.
 
 Law: m a. Range: inertance of a duct 1-100 kg; the sign is left free, for on a single frequency
 a mass and a spring of the other sign are the same thing.

@@ -1,4 +1,4 @@
-"""The gas charge pushes the rod out: a force that rises with the displacement.
+"""Stiffness of the gas charge, which pushes the rod out: a force that rises with the displacement.
 
 Law: k_g x. Range: monotube dampers 1-5 kN/m; the sign is left free, for the mount may pull.
 """

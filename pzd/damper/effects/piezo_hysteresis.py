@@ -1,4 +1,4 @@
-"""The piezo stack follows the voltage with play: it turns only after 2 r of reversal.
+"""Hysteresis of the piezo stack: it follows a reversal of the voltage only after 2 r.
 
 Law: play (backlash) operator of half-width r on U. Range: stacks show 10-15 % of stroke,
 so r up to about 10 V on 150 V.
@@ -37,6 +37,6 @@ def law(effective: float, now: float, r: float) -> float:
 
 
 def rate(effective: float, now: float, rate: float, r: float) -> float:
-    """Rate of the effective voltage [V/s] while the voltage stands at `now` [V] and moves at `rate` [V/s]."""
+    """Rate of the effective voltage [V/s] at a voltage `now` [V] that changes at `rate` [V/s]."""
     inside_play = abs(now - effective) < r * (1.0 - 1e-9)  # rounding of the law itself is no play
     return 0.0 if inside_play or (now - effective) * rate < 0.0 else rate

@@ -1,4 +1,4 @@
-"""A constant force: the gas charge at mid-stroke, a weight on the cell, or a load cell off zero.
+"""A constant force: the gas charge at mid-stroke, a weight on the load cell, or its zero offset.
 
 Law: F_0. Range: gas-charged dampers 50-300 N.
 """

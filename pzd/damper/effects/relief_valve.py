@@ -1,4 +1,4 @@
-"""A blow-off valve opens: beyond its force the characteristic goes on with a flatter slope.
+"""A blow-off valve: beyond its opening force the characteristic continues with a flatter slope.
 
 Law: where the flow curve passes b = max(F_r, T0) it goes on with slope C_r < C. Range: passenger
 car dampers open between 0.05 and 0.3 m/s.
@@ -20,7 +20,7 @@ def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
 
 
 def _flatter(values: Mapping[str, float], damping: float) -> bool:
-    """Whether an open valve lets more through than the closed one."""
+    """Return whether the open valve is softer than the closed one."""
     return values["C_r"] < damping
 
 

@@ -1,4 +1,4 @@
-"""The yield is rounded, as in magneto-rheological dampers: no stick, but a steep slope through zero.
+"""A rounded yield, as in magneto-rheological dampers: no stick, but a steep slope through zero.
 
 Law: T0 becomes T0 tanh(w / w_s). Range: w_s 1-50 mm/s.
 """

@@ -2,10 +2,10 @@
 
 Law: dF_2/dt = k_2 dx/dt, |F_2| <= T0_2, whatever the speed. Softer than the oil stiffness, it makes the shelf that
 measured magneto-rheological dampers show behind a reversal, T0_2/k_2 wide on either side: range 0.3-10 mm, T0_2 up to a
-quarter of the peak. Its nearest neighbours are told from it by two tests. At an amplitude below T0_2/k_2 it is a spring
-and nothing is lost: `rounded_yield` loses as much for each speed as ever, `lash` shows no force at all. And one
-speed reached at two amplitudes: a shelf that is as wide in millimetres in both is this one, one that is as wide in
-m/s is a rounded yield. A stiffer or softer oil stiffness k bends the whole way to T0, not its second part alone.
+quarter of the peak. Two tests distinguish its nearest neighbours. At an amplitude below T0_2/k_2 it is a spring and
+dissipates nothing: `rounded_yield` dissipates at every amplitude, `lash` shows no force at all. And one speed at two
+amplitudes: a shelf with the same width in millimetres in both is this one, one with the same width in m/s is a
+rounded yield. A larger or smaller k bends the whole way to T0, not its second part alone.
 """
 
 from __future__ import annotations

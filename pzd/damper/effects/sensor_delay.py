@@ -1,4 +1,4 @@
-"""Force and displacement were recorded at different instants: a filter or another converter in one of them.
+"""Delay between the recorded force and displacement: a filter or another converter in one of the channels.
 
 Law: F recorded at t - tau; the force is late where tau is positive, the displacement where it is negative.
 Range: 0.1-5 ms.

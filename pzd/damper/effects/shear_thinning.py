@@ -1,4 +1,4 @@
-"""A fluid that thins under shear: the viscous force bends below its straight line.
+"""A shear-thinning fluid: the viscous force bends below its straight line.
 
 Law: C w becomes C w_r (w/w_r)^n with w_r = 0.3 m/s and n < 1. Range: n 0.6-1 for
 multigrade oils and magneto-rheological fluids past yield.

@@ -1,4 +1,4 @@
-"""Seal friction that falls once the lip floats on its oil film.
+"""Seal friction that falls with speed, as the lip begins to float on its oil film.
 
 Law: F_s exp(-(v/v_s)^2) sign(v). Range: 10-200 N, v_s 5-50 mm/s.
 """

@@ -1,4 +1,4 @@
-"""The valve answers the voltage late, as a first-order lag.
+"""First-order lag of the valve behind the voltage.
 
 Law: tau dUe/dt + Ue = U, exact for U linear over the step. Range: piezo valves 1-10 ms,
 magneto-rheological ones 5-50 ms. The 9 ms of the paper is a response time over the whole range,
@@ -29,7 +29,7 @@ EFFECT = Effect(
 
 
 def law(effective: float, before: float, now: float, step: float, tau: float) -> float:
-    """Effective voltage [V] a step [s] later, the voltage going linearly from `before` to `now` [V]."""
+    """Effective voltage [V] after a step [s], the voltage changing linearly from `before` to `now` [V]."""
     if tau <= 0.0:
         return now
     lag = (now - before) * tau / step if step > 0.0 else 0.0
@@ -37,5 +37,5 @@ def law(effective: float, before: float, now: float, step: float, tau: float) ->
 
 
 def rate(effective: float, now: float, rate: float, tau: float) -> float:
-    """Rate of the effective voltage [V/s] while the voltage stands at `now` [V] and moves at `rate` [V/s]."""
+    """Rate of the effective voltage [V/s] at a voltage `now` [V] that changes at `rate` [V/s]."""
     return rate if tau <= 0.0 else (now - effective) / tau

@@ -1,7 +1,7 @@
 """Laws of the element that identify fits instead of T0 + C w, named by `identify.law` of the config.
 
-They are no effects of the library: diagnose does not look for them, and the benchmark does not hide them. One file
-each, written as an effect is; every module here is found by itself.
+They are no effects of the library: diagnose does not search for them, and the benchmark does not hide them. One file
+each, written as an effect is; every module here is found by discovery.
 """
 
 from __future__ import annotations

@@ -74,10 +74,10 @@ def independent(name: str, frame: float | None = None) -> np.ndarray:
     voltage = MOVING if name != "slew_limit" else None
 
     def parameters(t: float) -> tuple[float, float, float]:
-        share = (felt(t) if voltage is None else np.interp(t, TIME, voltage)) / 150.0
+        share = (effective(t) if voltage is None else np.interp(t, TIME, voltage)) / 150.0
         return 300.0 + 1000.0 * share, 2700.0 - 200.0 * share, 2e5 + 2e5 * share
 
-    def felt(t: float) -> float:
+    def effective(t: float) -> float:
         return float(np.interp(t, FINE, SLEWED))
 
     def force(t: float, e: float) -> float:
