@@ -86,7 +86,9 @@ class Kernel:
     def __init__(self, function: FunctionType) -> None:
         update_wrapper(self, function)
         self._function = function
-        self.inner = _dispatcher(_renamed(function, f"{function.__qualname__}.inner"), no_cpython_wrapper=True)
+        inner = _copied(function, function.__globals__)
+        inner.__qualname__ = f"{function.__qualname__}.inner"  # by which numba keeps it in its cache
+        self.inner = _dispatcher(inner, no_cpython_wrapper=True)
 
     @cached_property
     def outer(self) -> Any:
@@ -104,13 +106,9 @@ def _type_of_kernel(kernel: Kernel, context: object) -> types.Dispatcher:
     return types.Dispatcher(kernel.inner)
 
 
-def _renamed(function: FunctionType, name: str) -> FunctionType:
-    """Return a copy of a function under another qualified name, by which numba keeps it in its cache."""
-    copy = FunctionType(
-        function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
-    )
-    copy.__qualname__ = name
-    return copy
+def _copied(function: FunctionType, names: dict[str, Any]) -> FunctionType:
+    """Return a copy of a function that finds its global names elsewhere."""
+    return FunctionType(function.__code__, names, function.__name__, function.__defaults__, function.__closure__)
 
 
 def _dispatcher(function: FunctionType, **options: Any) -> Any:
@@ -121,6 +119,8 @@ def _dispatcher(function: FunctionType, **options: Any) -> Any:
     so `compile` is wrapped.
     """
     dispatcher = numba.njit(function, **_OPTIONS, **options)
+    if dispatcher is function:  # under NUMBA_DISABLE_JIT, for a debugger
+        return function
     compile_now = dispatcher.compile
     file_lock = Path(numba.config.CACHE_DIR) / f"{function.__module__}.{function.__qualname__}.lock"  # type: ignore[attr-defined]  # numba sets its options up at run time
 
@@ -165,11 +165,4 @@ def compiled_law(function: FunctionType) -> Callable[..., Any]:
         for name, value in named.items()
         if isinstance(value, FunctionType) and value.__module__.startswith("pzd.")
     }
-    law = FunctionType(
-        function.__code__,
-        {**function.__globals__, **called},
-        function.__name__,
-        function.__defaults__,
-        function.__closure__,
-    )
-    return compiled(law)
+    return compiled(_copied(function, {**function.__globals__, **called}))

@@ -1,4 +1,4 @@
-"""The gas of an accumulator: against the gas itself, solved step by step, and what tells it from a linear spring."""
+"""The gas of an accumulator: against the gas equation by another solver, and its distinction from a linear spring."""
 
 from __future__ import annotations
 

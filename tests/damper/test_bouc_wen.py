@@ -1,4 +1,4 @@
-"""The hysteresis of Bouc and Wen: against another solver, what it loses, and what tells it from its neighbours."""
+"""The hysteresis of Bouc and Wen: against another solver, its dissipation, and its distinction from its neighbours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The second branch: closed forms, how it is told from its neighbours, and that sampling and frame change nothing."""
+"""Branches: closed forms, distinction from their neighbours, and independence of sampling and frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pocket: what a slow sine shows of it, which a free play and an asymmetry do not show."""
+"""The pocket: its distinction from a free play and an asymmetry by a slow sine."""
 
 from __future__ import annotations
 

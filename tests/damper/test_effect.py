@@ -1,4 +1,4 @@
-"""What an effect file must hold: whoever breaks a rule is told at import, with the name of the file."""
+"""Rules of effect files: a broken one is an error at import, with the name of the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The mount that hardens: what a short stroke shows of it, and that a linear frame is nothing but a softer spring."""
+"""The hardening mount: its distinction by short strokes, and a linear frame as a smaller k."""
 
 from __future__ import annotations
 

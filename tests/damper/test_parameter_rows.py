@@ -1,4 +1,4 @@
-"""The voltage as felt, and T0, C, k as they are now."""
+"""The effective voltage, and T0, C and k over voltage and temperature."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def test_the_lag_follows_a_step_exponentially_and_a_ramp_late_by_tau() -> None:
 
 def test_the_play_reverses_only_after_its_whole_width() -> None:
     triangle = np.interp(TIME, [0, 0.25, 0.5, 1.0], [0, 100, 0, 100])
-    felt = effective_voltage(triangle, np.array([1e-3]), drive_row({"piezo_hysteresis": {"r": 10.0}}))
-    assert felt.max() == pytest.approx(90.0)
-    assert felt[400] == pytest.approx(min(90.0, triangle[400] + 10.0))
-    assert np.max(np.abs(felt - triangle)) == pytest.approx(10.0)
+    effective = effective_voltage(triangle, np.array([1e-3]), drive_row({"piezo_hysteresis": {"r": 10.0}}))
+    assert effective.max() == pytest.approx(90.0)
+    assert effective[400] == pytest.approx(min(90.0, triangle[400] + 10.0))
+    assert np.max(np.abs(effective - triangle)) == pytest.approx(10.0)
 
 
 GRID = Damper(

@@ -93,7 +93,7 @@ def independent(damper: Damper, motion: Motion, until: int) -> np.ndarray:
         return float(nodes[0] + (nodes[1] - nodes[0]) * u / 150.0)
 
     def extension(e: float, u: float) -> float:
-        """Of the oil spring: the free play is taken up first, then pocket and mount are squeezed."""
+        """Extension of the oil stiffness: the free play is taken up first, then pocket and mount are squeezed."""
         e = np.sign(e) * max(abs(e) - at(play, u) / 2, 0.0)
         d = at(pocket[0], u)
         e = squeezed(e, abs(d) * (d * e > 0.0), at(pocket[1], u))
@@ -396,11 +396,11 @@ def test_a_step_from_one_edge_of_the_smooth_flow_past_the_other_is_cut_at_both(r
 
 @pytest.mark.parametrize("stiffness", [2e4, 2e5, 2e7])
 def test_a_step_with_moving_parameters_converges_with_order_four(stiffness: float) -> None:
-    """Stiff or soft: what the polynomial of a whole step misses falls with the fourth power of its length."""
+    """Stiff or soft: the error of the polynomial of a whole step falls with the fourth power of its length."""
     first, last = (300.0, 2700.0, stiffness, *NEUTRAL_ROW), (420.0, 2300.0, 1.3 * stiffness, *NEUTRAL_ROW)
-    missed = [abs(in_parts(first, last, parts) - marched_step(first, last)) * stiffness / 900.0 for parts in (1, 2, 4)]
-    assert missed[0] < 1e-3
-    assert missed[2] < 1e-10 or np.log2(missed[0] / missed[2]) / 2 > 3.7, missed
+    errors = [abs(in_parts(first, last, parts) - marched_step(first, last)) * stiffness / 900.0 for parts in (1, 2, 4)]
+    assert errors[0] < 1e-3
+    assert errors[2] < 1e-10 or np.log2(errors[0] / errors[2]) / 2 > 3.7, errors
 
 
 def test_a_step_with_moving_parameters_is_cut_where_its_error_exceeds_the_tolerance(rng) -> None:

@@ -1,4 +1,4 @@
-"""Derivatives carried along the path: against differences of an exact path, the scaling law, and finer sampling."""
+"""Derivatives along the path: against differences of an exact path, the scaling law, and finer sampling."""
 
 from __future__ import annotations
 
@@ -84,15 +84,15 @@ def test_a_damper_of_twice_all_forces_gives_twice_the_force(effects: dict) -> No
 
 
 def test_sensitivities_of_the_element_without_effects_are_those_of_the_closed_form_to_order_two() -> None:
-    rows, missed = rows_of({}, False), []
+    rows, errors = rows_of({}, False), []
     for parts in (1, 2, 4):
         step, (x, v) = STEP / parts, motion(STEP / parts)
         _, found = march_sensitivities(x, v, np.array([step]), rows, 0.0, 1e-9, T0_C_AND_K)
         _, exact = element_force_sensitivities(x, step, *BASE, 0.0, v)
-        missed.append(np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0))
-    assert np.all(missed[0] < 2e-4)
-    assert np.all(missed[0][1:] > 3.5 * missed[1][1:])
-    assert np.all(missed[1][1:] > 3.5 * missed[2][1:])
+        errors.append(np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0))
+    assert np.all(errors[0] < 2e-4)
+    assert np.all(errors[0][1:] > 3.5 * errors[1][1:])
+    assert np.all(errors[1][1:] > 3.5 * errors[2][1:])
 
 
 def test_while_the_element_sticks_the_force_depends_on_k_alone() -> None:

@@ -1,4 +1,4 @@
-"""The functions of the exponential integrator, and what it takes exactly."""
+"""The functions of the exponential integrator, and the rates that it integrates exactly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An effect is one file: five that nobody has seen, put into a copy of the package, act everywhere and are named."""
+"""An effect is one file: five unknown ones, put into a copy of the package, act everywhere and are named."""
 
 from __future__ import annotations
 

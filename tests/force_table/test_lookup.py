@@ -1,3 +1,5 @@
+"""Interpolation in a force table: exact for a linear law, monotone, one-sided at zero speed."""
+
 from __future__ import annotations
 
 from collections.abc import Callable

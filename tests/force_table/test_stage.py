@@ -1,3 +1,5 @@
+"""The stage table: the force of the published dampers, its inverse, its operating envelope and its notes."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence

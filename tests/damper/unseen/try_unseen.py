@@ -63,7 +63,7 @@ def independent(name: str, frame: float | None = None) -> np.ndarray:
         return float(np.copysign(w, force))
 
     def deflection(total: float, k: float) -> float:
-        """Of the oil spring, of the deflection that it shares with a linear frame."""
+        """Return the part of a deflection that the oil stiffness has, which shares it with a linear frame."""
         if frame is None:
             return total
         e = total
