@@ -106,8 +106,9 @@ def integrated_sensitivities(
 
     Parameters
     ----------
-    rows, motion, steps, initial_force, tolerance : as `integrated_force`
+    rows : as `integrated_force`
     variables : what they change of the rows and of the initial force
+    motion, steps, initial_force, tolerance : as `integrated_force`
 
     Returns
     -------
