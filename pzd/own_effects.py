@@ -1,4 +1,4 @@
-"""Where effect files lie that are not of the package: in the folder that the environment variable PZD_EFFECTS names.
+"""A user's own effect files: in the folder that the environment variable PZD_EFFECTS names.
 
 A file there counts as one in `pzd/damper/effects/`: found, checked, compiled, and part of what a stage depends on.
 """
@@ -13,12 +13,12 @@ VARIABLE = "PZD_EFFECTS"
 
 
 def own_folder() -> Path | None:
-    """The folder of one's own effect files; None where the variable names none."""
+    """Return the folder of the user's effect files; None where the variable is not set."""
     given = os.environ.get(VARIABLE)
     return Path(given).absolute() if given else None
 
 
 def own_files() -> list[Path]:
-    """The effect files in it."""
+    """Return the user's effect files."""
     folder = own_folder()
     return [] if folder is None else sorted(folder.glob("*.py"))

@@ -1,4 +1,4 @@
-"""Every physical quantity once: its name, symbol, unit and meaning.
+"""Physical quantities, each declared once: name, symbol, unit and meaning.
 
 CSV headers, axis labels, config keys and the docs are made from this list, so a
 quantity cannot carry two names or two units.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-# How a unit is spelled inside a column name or a JSON key; the rest stand as they are.
+# Units as spelled inside a column name or a JSON key; others stand as they are.
 _SPELLED = {
     "m/s": "m_per_s",
     "m/s2": "m_per_s2",
@@ -23,21 +23,21 @@ class Quantity:
     """One measured or computed quantity."""
 
     name: str
-    """What code and column names call it."""
+    """Name in code and column names."""
     symbol: str
-    """What the paper and axis labels call it."""
+    """Symbol in the paper and in axis labels."""
     unit: str
     """SI, but for temperature in degC; empty for a pure number."""
     meaning: str
 
     @property
     def column(self) -> str:
-        """The header of its CSV column, e.g. ``velocity_m_per_s``."""
+        """Header of the CSV column, e.g. ``velocity_m_per_s``."""
         return f"{self.name}_{_SPELLED.get(self.unit, self.unit)}" if self.unit else self.name
 
     @property
     def label(self) -> str:
-        """The label of an axis, e.g. ``velocity v [m/s]``."""
+        """Label of an axis, e.g. ``velocity v [m/s]``."""
         return f"{self.name.replace('_', ' ')} {self.symbol} [{self.unit or '-'}]"
 
 
@@ -67,17 +67,17 @@ class Control:
 
     @property
     def quantity(self) -> Quantity:
-        """The control signal as a quantity of its own, for labels and column names."""
+        """Quantity of the control signal, for labels and column names."""
         if self == Control():
             return VOLTAGE
         return Quantity(self.name, self.name, self.unit, "control signal of the valve")
 
     def own_unit(self, unit: str) -> str:
-        """A unit as it is under this control: that of the control signal in the place of V."""
+        """Return a unit under this control: V becomes the unit of the control signal."""
         return self.unit if unit == VOLTAGE.unit else unit
 
     def renamed(self, column: str) -> str:
-        """The name a canonical column has under this control: voltage_1_V -> current_1_A."""
+        """Return the name of a canonical column under this control: voltage_1_V -> current_1_A."""
         if VOLTAGE.name not in column or self == Control():
             return column
         return column.replace(VOLTAGE.name, self.name).removesuffix(f"_{VOLTAGE.unit}") + (

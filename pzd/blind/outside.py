@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pzd.damper.material import drive_row, effective_voltage
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import drive_row, effective_voltage
 from pzd.record import Array
 
 

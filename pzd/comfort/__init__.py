@@ -1,1 +1,1 @@
-"""Human vibration: frequency weighting, measures, and what three standards make of them."""
+"""Human vibration: frequency weighting, measures, and their assessment by three standards."""

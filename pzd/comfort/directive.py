@@ -1,4 +1,4 @@
-"""Directive 2002/44/EC: daily exposure of somebody who does this ride for a living."""
+"""Directive 2002/44/EC: daily exposure of a professional driver."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ACTION_VDV, LIMIT_VDV = 9.1, 21.0
 
 
 def daily_exposure(a_w: float, hours: float) -> float:
-    """Daily exposure normalised to 8 h, from the vertical direction alone (its factor is 1).
+    """Compute the daily exposure normalised to 8 h, from the vertical direction alone (its factor is 1).
 
     Equation: A(8) = k a_w sqrt(T / 8 h), k = 1 for z    Source: Directive 2002/44/EC, Annex B
 
@@ -24,12 +24,17 @@ def daily_exposure(a_w: float, hours: float) -> float:
     Returns
     -------
     [m/s2]
+
+    Examples
+    --------
+    >>> daily_exposure(0.6, 2.0)
+    0.3
     """
     return float(a_w * (hours / REFERENCE_H) ** 0.5)
 
 
 def daily_dose(vdv: float, duration: float, hours: float) -> float:
-    """Vibration dose of a day of riding.
+    """Compute the vibration dose of a day of riding.
 
     Equation: VDV_day = VDV (T_day / T)^(1/4)            Source: Directive 2002/44/EC, Annex B
 
@@ -47,12 +52,12 @@ def daily_dose(vdv: float, duration: float, hours: float) -> float:
 
 
 def hours_until(value: float, a_w: float) -> float | None:
-    """Daily time after which A(8) reaches a value [h]; None for a vehicle at rest."""
+    """Compute the daily time after which A(8) reaches a value [h]; None for a vehicle at rest."""
     return REFERENCE_H * (value / a_w) ** 2 if a_w > 0.0 else None
 
 
 def zone(value: float, action: float, limit: float) -> str:
-    """Where a daily value stands between the action and the limit value, in words."""
+    """Describe a daily value relative to the action and the limit value."""
     if value > limit:
         return f"above the limit value {limit:g}"
     return f"above the action value {action:g}" if value > action else f"below the action value {action:g}"

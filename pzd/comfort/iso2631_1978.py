@@ -1,14 +1,14 @@
 """ISO 2631:1978 (withdrawn in 1997): how long a seated person may be exposed to vertical vibration.
 
-The boundaries are an unverified transcription: no printed copy was within reach. One outside check
-stands: a 1976 report of the Royal Aircraft Establishment puts 1.2 m/s2 at 5 Hz at 1 h
-(proficiency) and 3 h (exposure limit); this table gives 58 and 197 min.
+The boundaries are an unverified transcription: no printed copy was available. One independent check: a 1976 report of
+the Royal Aircraft Establishment puts 1.2 m/s2 at 5 Hz at 1 h (proficiency) and 3 h (exposure limit); this table gives
+58 and 197 min.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from importlib.resources import files
 from typing import Literal
 
@@ -37,24 +37,24 @@ _MINUTES |= {"16min": 16.0, "1min": FLAT_TOP_MIN}
 
 NOT_COVERED = "the chart begins at 1 Hz and ends at 80 Hz"
 LONGEST_MIN = _MINUTES["24h"]
-_SAME = 1e-9
+_SAME = 1e-9  # share within which a value lies on a line of the chart
 
 
 @dataclass(frozen=True)
 class Exposure:
-    """How long a vibration may last."""
+    """Permissible duration of a vibration."""
 
     minutes: float | None
     """0 over the chart, 1440 (or more) beyond it, None where the chart says nothing [min]."""
     remark: str
-    """Where on the chart that is; empty inside of it."""
+    """Position on the chart; empty inside of it."""
     frequency: float | None = None
-    """Frequency of the component that governs [Hz]."""
+    """Frequency of the governing component [Hz]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """The tabulated boundary of fatigue-decreased proficiency, a_z."""
+    """Tabulated boundary of fatigue-decreased proficiency, a_z."""
 
     frequency: Array
     """(n,) nominal third-octave centres [Hz]"""
@@ -64,21 +64,17 @@ class Chart:
     """(n, m) r.m.s. acceleration [m/s2]"""
 
     def levels_at(self, frequency: float) -> Array:
-        """(m,) boundary at one frequency [m/s2 r.m.s.], interpolated log-log between the centres, held beyond them."""
-        centres, levels = self._logarithms
+        """Interpolate the (m,) boundary [m/s2 r.m.s.] at one frequency, log-log between centres, constant beyond."""
+        centres, levels = np.log(self.frequency), np.log(self.level)
         place = min(max(np.log(frequency), centres[0]), centres[-1])
         i = min(max(int(np.searchsorted(centres, place)), 1), centres.size - 1)
         share = (place - centres[i - 1]) / (centres[i] - centres[i - 1])
         return np.asarray(np.exp(levels[i - 1] + share * (levels[i] - levels[i - 1])))
 
-    @cached_property
-    def _logarithms(self) -> tuple[Array, Array]:
-        return np.log(self.frequency), np.log(self.level)
-
 
 @cache
 def chart() -> Chart:
-    """The boundary table of the package."""
+    """Read the boundary table of the package."""
     text = files("pzd.comfort").joinpath("iso2631_1978_az_limits.csv").read_text(encoding="utf-8")
     header, *lines = [line.split(",") for line in text.splitlines() if line]
     values = np.array(lines, dtype=np.float64)
@@ -86,7 +82,7 @@ def chart() -> Chart:
 
 
 def exposure(acceleration: float, frequency: float, boundary: Boundary) -> Exposure:
-    """Time for which a tone may last before it reaches a boundary, interpolated log-log.
+    """Compute the time for which a tone may last before it reaches a boundary, interpolated log-log.
 
     Parameters
     ----------
@@ -96,7 +92,7 @@ def exposure(acceleration: float, frequency: float, boundary: Boundary) -> Expos
 
     Returns
     -------
-    the time, and where on the chart it lies
+    the time, and its position on the chart
     """
     table = chart()
     if not _covers(table, frequency):
@@ -106,11 +102,12 @@ def exposure(acceleration: float, frequency: float, boundary: Boundary) -> Expos
 
 
 def _covers(table: Chart, frequency: float) -> bool:
+    """Return whether the chart has the frequency."""
     return bool(table.frequency[0] * (1 - _SAME) <= frequency <= table.frequency[-1] * (1 + _SAME))
 
 
 def _time(acceleration: float, levels: Array, times: Array) -> tuple[float, str]:
-    """Time [min] at which the (m,) levels of a boundary [m/s2] reach an acceleration, and where on the chart it is."""
+    """Find the time [min] at which the (m,) levels of a boundary [m/s2] reach an acceleration, and its position."""
     if acceleration > levels[-1] * (1.0 + _SAME):
         return 0.0, "over the chart"
     if acceleration >= levels[-1] * (1.0 - _SAME):
@@ -121,27 +118,26 @@ def _time(acceleration: float, levels: Array, times: Array) -> tuple[float, str]
 
 
 def shortest(components: Components, boundary: Boundary) -> Exposure:
-    """The shortest time of any component: each is rated by itself, as the standard does with bands.
+    """Find the shortest time of all components, each rated by itself, as the standard does with bands.
 
-    A component below 1 Hz or above 80 Hz has no time. It is weighed as if it lay at the nearer end of the chart: where
-    it would govern there the vibration is not covered by the standard, and no time is given.
+    A component below 1 Hz or above 80 Hz has no time. It is compared as if it lay at the nearer end of the chart: where
+    it would govern there, the vibration is not covered by the standard, and no time is given.
     """
-    table = chart()
     rated = [
-        _rated(float(level), float(frequency), boundary, table)
+        _rated(float(level), float(frequency), boundary)
         for frequency, level in zip(components.frequency, components.rms, strict=True)
     ]
     covered = [item for item in rated if item[2].minutes is not None]
     worst = min(rated, key=lambda item: item[:2])
     if not covered or worst[:2] < min(item[:2] for item in covered):
-        return Exposure(None, f"not covered: {NOT_COVERED}", worst[2].frequency)
+        return worst[2]
     return min(covered, key=lambda item: item[:2])[2]
 
 
-def _rated(acceleration: float, frequency: float, boundary: Boundary, table: Chart) -> tuple[float, float, Exposure]:
-    """Time at the nearest frequency of the chart [min]; how far it is above the lowest line there, negative; itself."""
+def _rated(acceleration: float, frequency: float, boundary: Boundary) -> tuple[float, float, Exposure]:
+    """Rate a component: time at the nearest frequency of the chart [min], minus its share of the lowest line."""
+    table = chart()
     nearest = min(max(frequency, float(table.frequency[0])), float(table.frequency[-1]))
     levels = FACTORS[boundary] * table.levels_at(nearest)
-    minutes, remark = _time(acceleration, levels, table.minutes)
-    itself = Exposure(minutes, remark, frequency) if _covers(table, frequency) else Exposure(None, "", frequency)
-    return minutes, -float(acceleration / levels[0]), itself
+    minutes, _ = _time(acceleration, levels, table.minutes)
+    return minutes, -float(acceleration / levels[0]), exposure(acceleration, frequency, boundary)

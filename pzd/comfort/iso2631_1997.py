@@ -1,4 +1,4 @@
-"""ISO 2631-1:1997: the weighted measures of a ride, when they do not suffice, and how it is likely to be felt."""
+"""ISO 2631-1:1997: the weighted measures of a ride, when the r.m.s. does not suffice, and the likely reactions."""
 
 from __future__ import annotations
 
@@ -9,21 +9,14 @@ import numpy as np
 from pzd.record import Array
 from pzd.signals.measures import rms
 
-# ----------------------------------------------------------------------------------------------------
-# Measures of a vibration history beside its r.m.s.: peak, VDV and MTVV.
-
+EDITION = "ISO 2631-1:1997"
 
 INTEGRATION_TIME_S = 1.0
 """tau of the running r.m.s. behind MTVV, ISO 2631-1:1997, 6.3.1."""
 
 
-def peak(acceleration: Array) -> float:
-    """Largest magnitude [m/s2] of (n,) accelerations [m/s2]."""
-    return float(np.max(np.abs(acceleration)))
-
-
 def vibration_dose(acceleration: Array, rate: float) -> float:
-    """Fourth power vibration dose value; it grows with the length of the ride and is not divided by it.
+    """Compute the fourth power vibration dose value, which grows with the length of the ride.
 
     Equation: VDV = (int a(t)^4 dt)^(1/4)                Source: ISO 2631-1:1997, eq. (5)
 
@@ -35,12 +28,17 @@ def vibration_dose(acceleration: Array, rate: float) -> float:
     Returns
     -------
     [m/s^1.75]
+
+    Examples
+    --------
+    >>> vibration_dose(np.ones(1600), 100.0)
+    2.0
     """
     return float((np.sum(acceleration**4) / rate) ** 0.25)
 
 
 def maximum_transient(acceleration: Array, rate: float) -> float:
-    """Maximum transient vibration value: the largest running r.m.s. over 1 s.
+    """Compute the maximum transient vibration value: the largest running r.m.s. over 1 s.
 
     Equation: MTVV = max sqrt(1/tau int_(t0-tau)^t0 a(t)^2 dt), tau = 1 s
                                                          Source: ISO 2631-1:1997, eq. (2), (4)
@@ -59,20 +57,17 @@ def maximum_transient(acceleration: Array, rate: float) -> float:
     return float(np.sqrt(np.max(total[window:] - total[:-window]) / window))
 
 
-# ----------------------------------------------------------------------------------------------------
-
-
-EDITION = "ISO 2631-1:1997"
+# --- All measures of a ride, and the limits of the r.m.s. ---
 
 CREST_LIMIT = 9.0
 MTVV_LIMIT = 1.5
 VDV_LIMIT = 1.75
-"""Beyond any of these the r.m.s. alone understates the vibration (6.2.1 and 6.3.3)."""
+"""Above any of these the r.m.s. alone understates the vibration (6.2.1 and 6.3.3)."""
 
 
 @dataclass(frozen=True)
 class Reaction:
-    """One of the standard's likely reactions in public transport; neighbours overlap on purpose."""
+    """One of the likely reactions in public transport (Annex C); neighbouring ranges overlap in the standard."""
 
     text: str
     low: float
@@ -127,7 +122,7 @@ class Evaluation:
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """The conditions under which MTVV and VDV are to be reported beside a_w, as far as they are met."""
+        """Conditions that hold under which MTVV and VDV are to be reported besides a_w."""
         found = (
             (self.crest > CREST_LIMIT, f"crest factor above {CREST_LIMIT:g}"),
             (self.mtvv_ratio > MTVV_LIMIT, f"MTVV/a_w above {MTVV_LIMIT:g}"),
@@ -137,7 +132,7 @@ class Evaluation:
 
 
 def evaluate(weighted: Array, rate: float) -> Evaluation:
-    """All measures of a weighted history.
+    """Compute all measures of a weighted history.
 
     Source: ISO 2631-1:1997, eq. (1), (2), (4), (5) and 6.3.3
 
@@ -152,7 +147,7 @@ def evaluate(weighted: Array, rate: float) -> Evaluation:
     """
     return Evaluation(
         a_w=rms(weighted),
-        peak=peak(weighted),
+        peak=float(np.max(np.abs(weighted))),
         vdv=vibration_dose(weighted, rate),
         mtvv=maximum_transient(weighted, rate),
         duration=weighted.size / rate,
@@ -160,5 +155,5 @@ def evaluate(weighted: Array, rate: float) -> Evaluation:
 
 
 def reactions(a_w: float) -> tuple[Reaction, ...]:
-    """The likely reactions to a weighted r.m.s. [m/s2]; the bands overlap, so there may be two."""
+    """Return the likely reactions to a weighted r.m.s. [m/s2]; the ranges overlap, so there may be two."""
     return tuple(reaction for reaction in REACTIONS if reaction.low <= a_w < reaction.high)

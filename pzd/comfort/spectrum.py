@@ -1,4 +1,4 @@
-"""What a ride is made of: harmonics of a periodic one, third-octave bands of any other."""
+"""Frequency components of a ride: harmonics over a periodic road, third-octave bands over any other."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from numpy.typing import NDArray
 
 from pzd.record import Array
 
-_MOST_HARMONICS = 200
+_MOST_HARMONICS = 200  # more would be slow, and lie far beyond the 80 Hz of any standard
 _TRUE_CENTRE = 10.0
 """True centres are 10^(n/10) Hz, edges 10^((n +- 1/2)/10) Hz."""
 _NOMINAL = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)
 """Nominal centres of a decade, ISO 266."""
 _LOWEST_BAND = -10
-"""The band at 0.1 Hz; what lies below counts with it."""
+"""The band at 0.1 Hz, which includes all below."""
 
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    """Parts of a vibration, each at one frequency."""
+    """Components of a vibration, each at one frequency."""
 
     frequency: Array
     """(n,) [Hz]"""
     rms: Array
     """(n,) [m/s2]"""
     share: float
-    """Share of the mean square that all of them carry together."""
+    """Share of the mean square in all of them."""
 
 
 def harmonics(acceleration: Array, rate: float, fundamental: float) -> Components:
-    """Least-squares harmonics of a ride over a periodic road, whole number of periods or not.
+    """Fit harmonics to a ride over a periodic road by least squares, whole number of periods or not.
 
     Equation: a(t_n) = sum_k c_k exp(j k p n), |k| <= K, p = 2 pi f / rate; the normal equations are Toeplitz
     with the geometric sums g_m = (1 - exp(j m p N)) / (1 - exp(j m p)); r.m.s. of harmonic k = sqrt(2) |c_k|
@@ -44,7 +44,7 @@ def harmonics(acceleration: Array, rate: float, fundamental: float) -> Component
 
     Returns
     -------
-    one component a harmonic, from the fundamental up to the Nyquist frequency, or to the 200th
+    one component per harmonic, from the fundamental up to the Nyquist frequency, or to the 200th
     """
     from scipy.linalg import solve_toeplitz
 
@@ -60,7 +60,7 @@ def harmonics(acceleration: Array, rate: float, fundamental: float) -> Component
 
 
 def _projections(acceleration: Array, step: float, count: int) -> NDArray[np.complex128]:
-    """(count + 1,) sums of a(n) exp(-j k step n) over the samples, k from 0."""
+    """Compute the (count + 1,) sums of a(n) exp(-j k step n) over the samples, k from 0."""
     turn = np.exp(-1j * step * np.arange(acceleration.size))
     part = acceleration.astype(np.complex128)
     sums = np.empty(count + 1, dtype=np.complex128)
@@ -71,7 +71,7 @@ def _projections(acceleration: Array, step: float, count: int) -> NDArray[np.com
 
 
 def _gram(step: float, count: int, samples: int) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """First column and row (2 count + 1,) of the sums of exp(j (k - i) step n) over the samples."""
+    """Compute first column and row (2 count + 1,) of the sums of exp(j (k - i) step n) over the samples."""
     apart = step * np.arange(1.0, 2.0 * count + 1.0)
     row = np.empty(2 * count + 1, dtype=np.complex128)
     row[0] = samples
@@ -80,7 +80,7 @@ def _gram(step: float, count: int, samples: int) -> tuple[NDArray[np.complex128]
 
 
 def third_octaves(acceleration: Array, rate: float) -> Components:
-    """R.m.s. in third-octave bands, by adding up the mean square of the spectral lines between true edges.
+    """Compute the r.m.s. in third-octave bands from the mean square of the spectral lines between true edges.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def third_octaves(acceleration: Array, rate: float) -> Components:
 
     Returns
     -------
-    one component a band, at its nominal centre, from 0.1 Hz to the Nyquist frequency
+    one component per band, at its nominal centre, from 0.1 Hz to the Nyquist frequency
     """
     number = np.arange(_LOWEST_BAND, int(np.floor(_TRUE_CENTRE * np.log10(0.5 * rate) + 0.5)) + 1)
     nominal = np.array([_NOMINAL[n % 10] * 10.0 ** (n // 10) for n in number])

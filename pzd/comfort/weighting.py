@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pzd.record import Array
 
 MEMORY_S = 20.0
-"""The 0.4 Hz high-pass forgets as exp(-1.8 t): after 20 s nothing is left that could wrap round."""
+"""The response of the 0.4 Hz high-pass decays as exp(-1.8 t): after 20 s nothing is left that could wrap around."""
 _RAMP_S = 1.0
-"""The last value runs out over this time: a drop to zero would ring at the Nyquist frequency."""
+"""Duration of the ramp after the last value: a drop to zero would ring at the Nyquist frequency."""
 _ON_THE_CIRCLE = 64
 """Points of the mean over a circle; the nearest other pole is four radii away, so 4^-64 is left out."""
 
@@ -40,7 +40,7 @@ WK = Weighting("Wk", 0.4, 100.0, 12.5, 12.5, 0.63, (2.37, 0.91, 3.35, 0.91))
 
 
 def response(weighting: Weighting, frequency: Array) -> NDArray[np.complex128]:
-    """Complex frequency response of a weighting.
+    """Compute the complex frequency response of a weighting.
 
     Equation: H = Hh Hl Ht Hs, with s = j 2 pi f, p_i = s / (2 pi f_i) = j f / f_i,
     Hh = p1^2 / (1 + sqrt(2) p1 + p1^2), Hl = 1 / (1 + sqrt(2) p2 + p2^2),
@@ -61,7 +61,7 @@ def response(weighting: Weighting, frequency: Array) -> NDArray[np.complex128]:
 
 
 def _transfer(weighting: Weighting, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """H at complex frequencies s / (2 pi) [Hz]."""
+    """Compute H at complex frequencies s / (2 pi) [Hz]."""
     high, low = s / weighting.f1, s / weighting.f2
     p4 = s / weighting.f4
     band = high**2 / (1.0 + np.sqrt(2.0) * high + high**2) / (1.0 + np.sqrt(2.0) * low + low**2)
@@ -70,12 +70,11 @@ def _transfer(weighting: Weighting, s: NDArray[np.complex128]) -> NDArray[np.com
         f5, q5, f6, q6 = weighting.step
         p5, p6 = s / f5, s / f6
         h = h * (1.0 + p5 / q5 + p5**2) / (1.0 + p6 / q6 + p6**2) * (f5 / f6) ** 2
-    result: NDArray[np.complex128] = h
-    return result
+    return np.asarray(h)
 
 
 def modes(weighting: Weighting) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """The weighting as a sum of first-order lags, for recursions of any step.
+    """Expand the weighting into first-order lags, for recursions of any step.
 
     Equation: H = 2 Re sum_j r_j / (s - p_j) over the poles above the real axis; r_j is the mean of
     H (s - p_j) over a circle about p_j        Source: partial fractions; residue theorem
@@ -99,15 +98,14 @@ def modes(weighting: Weighting) -> tuple[NDArray[np.complex128], NDArray[np.comp
 
 
 def weighted(acceleration: Array, rate: float, weighting: Weighting = WK) -> Array:
-    """Frequency-weighted history of an acceleration.
+    """Compute the frequency-weighted history of an acceleration.
 
     The spectrum is multiplied by the exact response, so nothing is lost to a bilinear transform
     (7 % at 63 Hz for 500 Hz sampling). The response is causal and the record is padded with zeros
-    for as long as the filter remembers, so its end cannot wrap round to its start. Before the first
-    sample the vehicle is taken to be at rest, which is true of a whole ride: hand over the whole ride
-    and cut the settling time off afterwards. A piece cut out of the middle of a vibration would
-    carry a start transient over its first 3 s. Behind the end the last value runs out on a cosine
-    ramp, which no sample of the ride can feel.
+    for the memory of the filter, so its end cannot wrap around to its start. Before the first sample the
+    vehicle is at rest, as at the start of a whole ride: pass the whole ride, and cut the settling time off
+    afterwards. A section from the middle of a vibration would have a start transient over its first 3 s.
+    After the end the last value decays on a cosine ramp, which does not affect any sample of the ride.
 
     Parameters
     ----------
@@ -127,5 +125,4 @@ def weighted(acceleration: Array, rate: float, weighting: Weighting = WK) -> Arr
     frequency = (np.arange(length // 2 + 1) * (rate / length)).astype(np.float64)
     spectrum = np.fft.rfft(whole, length)
     spectrum *= response(weighting, frequency)
-    history: Array = np.fft.irfft(spectrum, length)[: acceleration.size]
-    return history
+    return np.asarray(np.fft.irfft(spectrum, length)[: acceleration.size])

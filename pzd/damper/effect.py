@@ -1,36 +1,35 @@
-"""What an effect file declares: place, parameters, how a fit looks for it, how the benchmark hides it, its law.
+"""What an effect file declares, which functions it holds, and whether it keeps to the rules.
 
-An effect is one file in `effects/`, called like its effect: `EFFECT`, and the functions of its place. Nothing else
-names it: rows, kernels, stand, fit, table, half-car and benchmark follow from what the files declare. A function takes
-by name what it needs of the quantities of its law and of the effect's own parameters; `laws.py` holds both, and an
-effect that breaks a rule is an ImportError with the file's name. All but `material` and `sensor` are compiled by
-numba: they take and give numbers, and use `math` alone. Effects of one place act by `order`, then by name; with
-every parameter at its neutral value an effect is left out.
+An effect is one file in `effects/`, named like its effect: `EFFECT`, and the functions of its place. Nothing else names
+it: parameter rows, kernels, stand, fit, table, half-car and benchmark follow from what the files declare. A function
+takes by name what it needs of the quantities of its law (`LAWS`) and of the effect's own parameters; an effect that
+breaks a rule is an ImportError with the file's name. All but those of `material` and `sensor` are compiled by numba:
+they take and return numbers, and use `math` alone. Effects of one place act by `order`, then by name; with every
+parameter at its neutral value an effect is left out.
 
 drive
     `law`: effective voltage a step later, the incoming one going linearly from `before` to `now`; `rate`: its rate.
-    What it remembers is the voltage it gave last. Supply, valve and actuator; no force acts back on it.
+    Its state is the voltage that it gave last. Supply, valve and actuator; no force acts back on it.
 material
     `friction_factor`, `damping_factor`, `stiffness_factor`: factors on T0, C and k by the recorded temperature.
 stroke
-    `law`: the extension of the oil spring, F = k extension, by the elastic deflection x - y and its side (+1 or -1),
+    `law`: the extension of the oil stiffness, F = k extension, by the elastic deflection x - y and its side (+1 or -1),
     rising; `inverse`; `slope` where it is not 1. A free play goes below zero on its side, and carries no force there.
-    Whatever is in series with the oil spring and gives by the force alone has its place here: late filling, a
+    Whatever is in series with the oil stiffness and gives by the force alone has its place here: late filling, a
     compliant frame or mount, a gas volume that is compressed (accumulator, cavitation without its history).
 flow
     One or more changes of the curve that gives the force by the flow speed w = |dy/dt| >= 0:
-    |F| = yield(w) + viscous(w) + extra(w), and beyond the force that opens a valve a straight line.
+    |F| = yield(w) + viscous(w) + extra(w), and beyond the force that opens a valve a straight line. All rise with w.
     `direction_factor`: on T0 and C by the sign of F; `bleed_factor`: on C alone.
-    `yield_force`, `yield_slope`: in place of T0, in proportion to it.
-    `viscous_force`, `viscous_slope`, `viscous_speed`: in place of C w, in proportion to C; speed is the inverse.
-    `extra_force`, `extra_slope`: beside both, 0 at w = 0; `extra_speed`: the flow speed at C w + extra, where there is
-    a closed form. `opens_at`, `slope_beyond`: force from which the slope is another, by the sign of F
-    too. All rise with w.
+    `yield_force`, `yield_slope`: replace T0, in proportion to it.
+    `viscous_force`, `viscous_slope`, `viscous_speed`: replace C w, in proportion to C; speed is the inverse.
+    `extra_force`, `extra_slope`: added to both, 0 at w = 0; `extra_speed`: the flow speed at C w + extra, where there
+    is a closed form. `opens_at`, `slope_beyond`: force beyond which the slope is another, by the sign of F too.
 parallel
-    `law`: force beside the element by x, v and a of the piston, `about_zero` where a fit looks for the zero of x too.
-    It has no memory.
+    `law`: force parallel to the element by x, v and a of the piston, without memory; with `needs_displacement_zero` a
+    fit looks for the zero of x too.
 branch
-    A force beside the element that remembers which way the rod went, whatever its speed: a spring behind a slip, a
+    A force parallel to the element that depends on the path of the rod, not on its speed: a spring behind a slip, a
     force of Dahl or of Bouc and Wen. `advance`: its elastic deflection after a travel of the rod to one side alone,
     from the deflection before; it has a limit for an infinite travel, which is steady slip. `law`: force by the
     deflection, 0 at 0; `rate`: derivative of the deflection by the travel, to a side (+1 or -1).
@@ -40,24 +39,29 @@ sensor
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     import numpy as np
 
 Place = Literal["drive", "material", "stroke", "flow", "parallel", "branch", "sensor"]
-"""Where in the damper something can be missing, in physical order."""
+"""Where in the damper an effect acts, in physical order."""
 
 Need = Literal["voltage", "temperature"]
-"""What must move inside a test."""
+"""What must vary inside a test."""
 
 
 @dataclass(frozen=True)
 class Scales:
-    """How large things are on one rig, so that a parameter can be searched in numbers around one."""
+    """Magnitudes of the signals of one rig, in which starting values of parameters are given."""
 
     force: float
     """Largest force [N]."""
@@ -77,32 +81,32 @@ class Scales:
 
 @dataclass(frozen=True)
 class Search:
-    """Where a fit begins to look for a parameter, and in which unit it steps."""
+    """Starting values of a parameter in a fit, and the scale in which it steps."""
 
     scale: Callable[[Scales], float]
-    """Size that the parameter is counted in."""
+    """Scale of the parameter, by the magnitudes of the rig."""
     starts: tuple[float, ...]
-    """Starting values, in that size; every one is tried."""
+    """Starting values, in that scale; every one is tried."""
     logarithmic: bool = False
     """Whether steps are ratios."""
     within: tuple[float, float] = (-math.inf, math.inf)
-    """Smallest and largest value that is looked at, in that size."""
+    """Smallest and largest value searched, in that scale."""
 
 
 Strength = Callable[[float], dict[str, float]]
 """Parameters of an effect at a strength between 0 (next to nothing) and 1 (the most)."""
 Hiding = Callable[["np.random.Generator", Scales], Strength]
-"""Draws what else there is to an effect than its strength, on a rig of that size."""
+"""Draws everything of an effect but its strength, on a rig of those magnitudes."""
 
 
 def growing(name: str, most: Callable[[Scales], float], *, either: bool = False) -> Hiding:
-    """Hides an effect of one parameter that grows from 0 with the strength.
+    """Return the hiding of an effect of one parameter, which grows from 0 with the strength.
 
     Parameters
     ----------
     name : of the parameter
     most : its value at strength 1
-    either : to either side, where the physics has no preference
+    either : whether the sign is drawn, where the physics has no preference
     """
 
     def hiding(draw: np.random.Generator, scales: Scales) -> Strength:
@@ -128,20 +132,21 @@ class Parameter:
     """Largest admissible value."""
     meaning: str
     search: Search
-    """How a fit looks for it."""
+    """Starting values of a fit."""
     natural_from: float = -math.inf
-    """Smallest value that the effect has in nature; a fit may go below, and is then something that looks alike."""
+    """Smallest physical value; a fit that goes below has found something that looks alike."""
     natural_to: float = math.inf
-    """Largest value that the effect has in nature; a fit may go beyond, and is then something that looks alike."""
+    """Largest physical value; a fit that goes beyond has found something that looks alike."""
     with_friction: bool = False
-    """Whether it goes with T0 from voltage to voltage, so that it is looked for by voltage, in proportion to T0."""
+    """Whether it changes with the voltage as T0 does: it is fitted per voltage, in proportion to T0."""
 
     def admits(self, value: float) -> bool:
-        """Whether the value lies within the limits."""
+        """Return whether the value lies within the limits."""
         return math.isfinite(value) and self.low <= value <= self.high
 
 
 def _always(values: Mapping[str, float], damping: float) -> bool:
+    """Accept any values: the default of `Effect.natural`."""
     return True
 
 
@@ -159,29 +164,139 @@ class Effect:
     tests: tuple[tuple[Mapping[str, float], float], ...]
     """Reference numbers: the arguments of one of the effect's laws, by name, and what it gives."""
     needs: Need | None = None
-    """What must move in a test for the effect to be seen at all."""
+    """What must vary in a test for the effect to show at all."""
     hidden: Hiding | None = None
-    """How the blind benchmark draws it; None for what it never hides: a competing form, or what is never named."""
+    """How the blind benchmark draws it; None for what it never hides: a confounder, or what is never named."""
     never_named: str | None = None
-    """Why no verdict names it, so that a damper has it where kept-back tests are predicted better with it, or where the
-    config forces it, alone; None where it is a name like others."""
+    """Why no verdict names it; a damper then has it only where held-out tests are predicted better with it, or where
+    the config forces it. None for an effect that a verdict may name."""
     order: int = 0
-    """Where it acts among the effects of its place: those of a smaller number come first."""
-    about_zero: bool = False
-    """Whether a fit looks for the zero of the displacement too: the law is another about another zero."""
+    """Order among the effects of its place, smaller numbers first."""
+    needs_displacement_zero: bool = False
+    """Whether its law depends on the zero of the displacement, which a fit then looks for too."""
     same_at_every_voltage: bool = False
-    """Whether no control signal changes it, as a length or a mass: a fit looks for one value alone."""
+    """Whether the control signal cannot change it, as a length or a mass: it is fitted as one value."""
     natural: Callable[[Mapping[str, float], float], bool] = _always
-    """Whether its parameters are possible together, beside the C of the element [N s/m]."""
+    """Whether its parameters are physical together, given the C of the element [N s/m]."""
 
     def parameter(self, name: str) -> Parameter:
-        """The parameter of that name.
+        """Return the parameter of that name.
 
         Raises
         ------
         KeyError : when the effect has no such parameter
         """
-        for parameter in self.parameters:
-            if parameter.name == name:
-                return parameter
-        raise KeyError(name)
+        return {parameter.name: parameter for parameter in self.parameters}[name]
+
+
+# --- Functions of each place, and the rules ---
+
+ELEMENT = ("T0", "C", "k")
+"""Parameters of the element, whose names no parameter of an effect may take."""
+NODE_VOLTAGES = "at_voltage_V"
+"""Key of the voltages at which an effect's parameters are given in a config."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """Rules of one function that an effect file may hold."""
+
+    quantities: tuple[str, ...]
+    """Arguments that it may take besides the effect's own parameters."""
+    requires: tuple[str, ...] = ()
+    """Functions that the file must hold too."""
+    suffices: bool = True
+    """Whether it makes an effect by itself; False for one that only accompanies another."""
+
+
+LAWS: Mapping[Place, Mapping[str, Law]] = {
+    "drive": {
+        "law": Law(("effective", "before", "now", "step"), ("rate",)),
+        "rate": Law(("effective", "now", "rate"), suffices=False),
+    },
+    "material": {
+        name: Law(("temperature", "reference")) for name in ("friction_factor", "damping_factor", "stiffness_factor")
+    },
+    "stroke": {
+        "law": Law(("deflection", "side"), ("inverse",)),
+        "inverse": Law(("extension", "side"), suffices=False),
+        "slope": Law(("deflection", "side"), suffices=False),
+    },
+    "flow": {
+        "direction_factor": Law(("side",)),
+        "bleed_factor": Law(("side",)),
+        "yield_force": Law(("w", "T0"), ("yield_slope",)),
+        "yield_slope": Law(("w", "T0"), suffices=False),
+        "viscous_force": Law(("w", "C"), ("viscous_slope", "viscous_speed")),
+        "viscous_slope": Law(("w", "C"), suffices=False),
+        "viscous_speed": Law(("viscous", "C"), suffices=False),
+        "extra_force": Law(("w",), ("extra_slope",)),
+        "extra_slope": Law(("w",), suffices=False),
+        "extra_speed": Law(("force", "C"), suffices=False),
+        "opens_at": Law(("T0", "side"), ("slope_beyond",)),
+        "slope_beyond": Law(("side",), suffices=False),
+    },
+    "parallel": {"law": Law(("x", "v", "a"))},
+    "branch": {
+        "advance": Law(("deflection", "travel"), ("law", "rate")),
+        "law": Law(("deflection",), ("advance",)),
+        "rate": Law(("deflection", "side"), suffices=False),
+    },
+    "sensor": {"law": Law(("time",))},
+}
+"""Rules by place and name; the docstring of this module says what each function returns."""
+
+
+def functions(effect: Effect, module: ModuleType) -> dict[str, Callable[..., float]]:
+    """Return the functions that a file holds for its effect, by name."""
+    return {name: vars(module)[name] for name in LAWS[effect.place] if callable(vars(module).get(name))}
+
+
+@cache
+def arguments(function: Callable[..., float]) -> tuple[str, ...]:
+    """Return the names of the arguments of a function."""
+    return tuple(inspect.signature(function).parameters)
+
+
+def declared_effect(module: ModuleType) -> Effect:
+    """Return the effect that a file declares.
+
+    Raises
+    ------
+    ImportError : when it declares none, or breaks a rule of `pzd.damper.effect`; with the name of the file
+    """
+    effect = vars(module).get("EFFECT")
+    if not isinstance(effect, Effect):
+        raise ImportError(f"{module.__file__}: declares no EFFECT")  # noqa: TRY004  # what fails is the import
+    faults = "; ".join(_faults(effect, module))
+    if faults:
+        raise ImportError(f"{module.__file__}: {faults}")
+    return effect
+
+
+def _faults(effect: Effect, module: ModuleType) -> Iterator[str]:
+    """Yield every rule that the file of an effect breaks."""
+    own = [parameter.name for parameter in effect.parameters]
+    yield from (f"parameter {name} is declared twice" for name, count in Counter(own).items() if count > 1)
+    if effect.place not in LAWS:
+        yield f"there is no place {effect.place}, but {', '.join(LAWS)}"
+        return
+    taken = {quantity for law in LAWS[effect.place].values() for quantity in law.quantities}
+    yield from (f"parameter {name} has the name of a quantity that its law takes" for name in own if name in taken)
+    reserved, model = (*ELEMENT, NODE_VOLTAGES), Path(__file__).with_name("model.py")
+    yield from (
+        f"parameter {name} has a name of the element's ({', '.join(reserved)}), see {model}"
+        for name in own
+        if name in reserved
+    )
+    laws, present = LAWS[effect.place], functions(effect, module)
+    if not any(laws[name].suffices for name in present):
+        yield f"an effect of the {effect.place} needs {' or '.join(name for name, law in laws.items() if law.suffices)}"
+    for name, function in present.items():
+        yield from (f"{other} must stand beside {name}" for other in laws[name].requires if other not in present)
+        known = (*laws[name].quantities, *own)
+        yield from (
+            f"{name} takes {', '.join(known) or 'nothing'} (got {argument})"
+            for argument in arguments(function)
+            if argument not in known
+        )

@@ -17,11 +17,11 @@ import numpy as np
 from pzd.compiled import compiled, inlined
 from pzd.record import Array
 
-_STRAIGHT = np.zeros(1)
+_STRAIGHT = np.zeros(1)  # no velocities: the displacement is linear between samples
 _NO_SLOPES = np.empty((0, 3))
-_SMALL = 1e-3  # below it the exponential's quotients are taken from their series
-_MOST_NEWTON_STEPS = 60
-_INSTANT = 1e-15  # of a stretch: how closely the moment is found at which the oil sticks
+_SMALL_Z = 1e-3  # below it the quotients are taken from their series: (e^z - 1)/z loses digits like 1/z
+_NEWTON_STEPS = 60  # bisection alone needs 53 for all digits of a double
+_INSTANT = 1e-15  # of a piece: how closely the moment of sticking is found
 
 
 def element_force(
@@ -34,7 +34,7 @@ def element_force(
     velocity: Array | None = None,
     every: int = 1,
 ) -> Array:
-    """Force of the Bingham element under a sampled displacement.
+    """Compute the force of the Bingham element under a sampled displacement.
 
     Equation: dF/dt = k dx/dt - (k/C) sign(F) max(|F| - T0, 0)      Source: eq. (1)-(3), y eliminated
 
@@ -53,15 +53,22 @@ def element_force(
     Returns
     -------
     (n,) force [N], or as many of them as are kept
+
+    Examples
+    --------
+    A slow pull of 1 mm winds k up to T0, and then slips:
+
+    >>> element_force(np.array([0.0, 0.001, 0.002]), 1.0, 300.0, 2700.0, 2e5).round(3).tolist()
+    [0.0, 200.0, 302.7]
     """
-    force = np.empty(_kept(displacement.size, every))
+    force = np.empty(displacement[::every].size)
     bend, steps = _STRAIGHT if velocity is None else velocity, np.atleast_1d(np.asarray(step, dtype=np.float64))
     _march(displacement, bend, steps, friction, damping, stiffness, initial_force, force, _NO_SLOPES, every)
     return force
 
 
 def element_forces(displacement: Array, step: float, elements: Array) -> Array:
-    """Force of many Bingham elements under one sampled displacement, linear between samples, from zero force on.
+    """Compute the forces of many Bingham elements under one displacement, linear between samples, from zero force.
 
     Parameters
     ----------
@@ -74,7 +81,8 @@ def element_forces(displacement: Array, step: float, elements: Array) -> Array:
     (m, n) force [N]
     """
     forces = np.empty((len(elements), displacement.size))
-    _march_each(displacement, _STRAIGHT, np.array([step]), elements, forces, _NO_SLOPES)
+    for (friction, damping, stiffness), force in zip(elements, forces, strict=True):
+        _march(displacement, _STRAIGHT, np.array([step]), friction, damping, stiffness, 0.0, force, _NO_SLOPES, 1)
     return forces
 
 
@@ -88,7 +96,7 @@ def element_force_sensitivities(
     velocity: Array | None = None,
     every: int = 1,
 ) -> tuple[Array, Array]:
-    """Force of the Bingham element and its derivatives by T0, C and k, the initial force held.
+    """Compute the force of the Bingham element and its derivatives by T0, C and k at a fixed initial force.
 
     Each piece of the closed form is differentiated at fixed duration; the field is continuous at
     |F| = T0, so the moving switching times add nothing.
@@ -101,15 +109,11 @@ def element_force_sensitivities(
     -------
     (n,) force [N] and (n, 3) dF/dT0 [-], dF/dC [m/s], dF/dk [m], or as many of them as are kept
     """
-    kept = _kept(displacement.size, every)
+    kept = displacement[::every].size
     force, slopes = np.empty(kept), np.empty((kept, 3))
     bend, steps = _STRAIGHT if velocity is None else velocity, np.atleast_1d(np.asarray(step, dtype=np.float64))
     _march(displacement, bend, steps, friction, damping, stiffness, initial_force, force, slopes, every)
     return force, slopes
-
-
-def _kept(samples: int, every: int) -> int:
-    return -(-samples // every)
 
 
 class Element(NamedTuple):
@@ -121,29 +125,29 @@ class Element(NamedTuple):
 
 
 class Relaxation(NamedTuple):
-    """What slipping for a time makes of the force, see `slip`."""
+    """Coefficients of the force after slip over one time step, see `slip`."""
 
     time: float
     """[s]"""
     decay: float
-    """exp(-k time/C), the share of the force that is left [-]."""
+    """exp(-k time/C), the remaining share of the force [-]."""
     rise: float
     """1 - decay."""
     by_speed: float
-    """Force by the extension speed at the start [N s/m]."""
+    """Derivative of the force by the extension speed at the start [N s/m]."""
     by_change: float
-    """Force by the change of the extension speed [N s/m]."""
+    """Derivative of the force by the change of the extension speed [N s/m]."""
 
 
 @inlined
 def relaxation(time: float, C: float, k: float) -> Relaxation:
-    """What slipping for a time [s] makes of the force.
+    """Compute the coefficients of the force after slip over a time step [s].
 
     Equation: phi_1(z) = (e^z - 1)/z, phi_2(z) = (phi_1(z) - 1)/z at z = -k time/C
     Source: Hochbruck and Ostermann 2010, Acta Numerica 19, eq. (2.10)
     """
     z = -k / C * time
-    if z > -_SMALL:
+    if z > -_SMALL_Z:
         second = 0.5 + z * (1.0 / 6.0 + z * (1.0 / 24.0 + z / 120.0))
         first = 1.0 + z * second
     else:
@@ -154,7 +158,7 @@ def relaxation(time: float, C: float, k: float) -> Relaxation:
 
 @inlined
 def slip(F: float, friction: float, u0: float, u1: float, over: Relaxation) -> float:
-    """Force [N] after slipping while the extension speed goes linearly from u0 to u1 [m/s].
+    """Compute the force [N] after slip over one time step, the extension speed going linearly from u0 to u1 [m/s].
 
     Equation: dF/dt = k u - (k/C) (F - friction)      Source: eq. (1)-(3), slipping; closed form
 
@@ -163,14 +167,14 @@ def slip(F: float, friction: float, u0: float, u1: float, over: Relaxation) -> f
     F : at the start [N]
     friction : T0 sign(F) [N]
     u0, u1 : extension speed at the start and at the end [m/s]
-    over : of the time that it slips
+    over : coefficients of the time step
     """
     return over.decay * F + (over.rise * friction + over.by_speed * u0 + over.by_change * (u1 - u0))
 
 
 @inlined
 def stick(F: float, k: float, u0: float, u1: float, time: float) -> float:
-    """Force [N] after sticking for a time [s] while the extension speed goes linearly from u0 to u1 [m/s].
+    """Compute the force [N] after sticking over a time [s], the extension speed going linearly from u0 to u1 [m/s].
 
     Equation: dF/dt = k u      Source: eq. (1), dy/dt = 0
     """
@@ -183,7 +187,7 @@ def _march(
 ) -> None:
     """Fill force and, where it is not empty, slopes: most steps lie in one regime, the others are cut.
 
-    Every so many-th sample has a row; one of slopes is brought along until it stands for the sample that it is for.
+    One in `every` samples has a row. A row of slopes is advanced in place from one of these samples to the next.
     """
     element, over = Element(T0, C, k), relaxation(steps[0], C, k)
     force[0] = F
@@ -211,7 +215,7 @@ def _march(
             end = slip(F, side * T0, u0, u1, over)
             whole = side * end > T0 and (side * u0 >= 0.0 or side * u1 <= 0.0)
         if slopes.size and whole:
-            _carry(slopes[row : row + 1], F, side, u0, u1, element, over)
+            _advance_slopes(slopes[row : row + 1], F, side, u0, u1, element, over)
         if not whole:
             end = _cut(F, u0, u1, h, element, slopes[row : row + 1])
             side = _side(end, T0)
@@ -219,25 +223,17 @@ def _march(
         force[row] = F
 
 
-@compiled
-def _march_each(x: Array, v: Array, steps: Array, elements: Array, forces: Array, slopes: Array) -> None:
-    """The same for many elements (m, 3), into (m, n) forces."""
-    for i in range(len(elements)):
-        T0, C, k = elements[i]
-        _march(x, v, steps, T0, C, k, 0.0, forces[i], slopes, 1)
-
-
 @inlined
 def _side(F: float, T0: float) -> float:
-    """To which side the oil flows; 0 where it sticks."""
+    """Return the direction of flow, +1 or -1; 0 where it sticks."""
     return 0.0 if abs(F) <= T0 else math.copysign(1.0, F)
 
 
 @compiled
 def _cut(F: float, u0: float, u1: float, h: float, element: Element, slopes: Array) -> float:
-    """Force [N] after a step in which the regime changes: cut where the rod turns round, then from regime to regime.
+    """Compute the force [N] after a step with changes of regime, cut at a reversal of the rod and at each change.
 
-    Where they are not empty, the (1, 3) slopes are brought along.
+    Where they are not empty, the (1, 3) slopes are advanced too.
     """
     T0, C, k = element
     bend, start = (u1 - u0) / h, 0.0
@@ -257,7 +253,7 @@ def _cut(F: float, u0: float, u1: float, h: float, element: Element, slopes: Arr
                 used = min(_until_risen((T0 - G) / k, s * u, s * bend), left) if leaves else left
             over, last = relaxation(used, C, k), u + bend * used
             if slopes.size:
-                _carry(slopes, F, regime * s, u, last, element, over)
+                _advance_slopes(slopes, F, regime * s, u, last, element, over)
             F = stick(F, k, u, last, used) if regime == 0.0 else slip(F, regime * s * T0, u, last, over)
             if leaves:
                 F = -s * T0 if regime < 0.0 else s * T0  # exactly on the edge of the next regime
@@ -267,7 +263,7 @@ def _cut(F: float, u0: float, u1: float, h: float, element: Element, slopes: Arr
 
 @compiled
 def _until_stuck(G: float, u0: float, u1: float, left: float, element: Element) -> float:
-    """Time [s] after which slip against the motion ends, G = -T0, by Newton's method within a bracket.
+    """Find the time [s] after which slip against the motion ends, G = -T0, by Newton's method within a bracket.
 
     Parameters
     ----------
@@ -279,14 +275,14 @@ def _until_stuck(G: float, u0: float, u1: float, left: float, element: Element) 
     T0, C, k = element
     low, high = 0.0, left
     time = min(C / k * math.log1p(max(-T0 - G, 0.0) / (C * (0.5 * (u0 + u1)))), left)
-    for _ in range(_MOST_NEWTON_STEPS):
+    for _ in range(_NEWTON_STEPS):
         u = u0 + (u1 - u0) * time / left
-        miss = slip(G, -T0, u0, u, relaxation(time, C, k)) + T0
-        if miss < 0.0:
+        residual = slip(G, -T0, u0, u, relaxation(time, C, k)) + T0
+        if residual < 0.0:
             low = time
         else:
             high = time
-        following = time - miss / (k * u - k / C * miss)
+        following = time - residual / (k * u - k / C * residual)
         if not low <= following <= high:
             following = 0.5 * (low + high)
         if abs(following - time) <= _INSTANT * left:
@@ -297,13 +293,15 @@ def _until_stuck(G: float, u0: float, u1: float, left: float, element: Element) 
 
 @inlined
 def _until_risen(distance: float, u: float, bend: float) -> float:
-    """Time [s] in which a motion of u + bend t [m/s] goes a distance [m]: the smaller root, without cancellation."""
+    """Solve for the time [s] in which a speed u + bend t [m/s] covers a distance [m]: the smaller root."""
     return 2.0 * distance / (u + math.sqrt(max(u * u + 2.0 * bend * distance, 0.0)))
 
 
 @inlined
-def _carry(slopes: Array, F: float, side: float, u0: float, u1: float, element: Element, over: Relaxation) -> None:
-    """Bring the (3,) derivatives of the force by T0, C and k through one piece of fixed duration.
+def _advance_slopes(
+    slopes: Array, F: float, side: float, u0: float, u1: float, element: Element, over: Relaxation
+) -> None:
+    """Advance the (3,) derivatives of the force by T0, C and k over one piece of fixed duration.
 
     Equation: those of `slip` and `stick` differentiated, with g = dF/dt at the start and the extension speed's rate b:
     d(dF/dk)/dt = u - w - (k/C) dF/dk, d(dF/dC)/dt = (k/C) (w - dF/dC), w = (F - T0 side)/C
@@ -312,10 +310,10 @@ def _carry(slopes: Array, F: float, side: float, u0: float, u1: float, element: 
     ----------
     slopes : (1, 3) changed in place
     F : force at the start [N]
-    side : to which the oil flows; 0 where it sticks
+    side : direction of flow; 0 where it sticks
     u0, u1 : extension speed at the start and at the end [m/s]
     element : T0, C, k
-    over : of the time that it takes
+    over : coefficients of its duration
     """
     T0, C, k = element
     if over.time <= 0.0:

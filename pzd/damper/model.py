@@ -9,19 +9,16 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from pzd.damper.confounders import known
-from pzd.damper.effect import Effect
+from pzd.damper.effect import NODE_VOLTAGES, Effect
 from pzd.damper.effects import library
 from pzd.schema.errors import InsideError
 from pzd.schema.model import Frozen
-
-# ----------------------------------------------------------------------------------------------------
-
 
 EffectValues = Mapping[str, float | tuple[float, ...]]
 
 PHYSICAL = {"T0_N": (0.0, 1e8), "C_Ns_per_m": (1e-4, 1e9), "k_N_per_m": (1.0, 1e13)}
 """Limits within which T0, C and k of any damper lie, from those of a drawer to those of a bridge, wide enough for an
-element that hardly damps or hardly gives. What lies outside is in another unit."""
+element that hardly damps or hardly yields. A value outside is in another unit."""
 
 
 class BaseRow(Frozen):
@@ -41,14 +38,14 @@ class BaseRow(Frozen):
     @field_validator(*PHYSICAL)
     @classmethod
     def _physical(cls, value: float, info: ValidationInfo) -> float:
-        """Of what a person writes; a search may look further."""
+        """Check what a person writes; a search may go further."""
         if info.mode == "json" and info.field_name and (wrong := unphysical(info.field_name, value)):
             raise ValueError(wrong)
         return value
 
 
 def unphysical(name: str, value: float) -> str | None:
-    """What a value of T0, C or k (by its column) must be, where no damper has it; None where one may."""
+    """Say what a value of T0, C or k (by its column) must be where no damper has it; None where it is possible."""
     low, high = PHYSICAL[name]
     if low <= value <= high:
         return None
@@ -90,37 +87,32 @@ class Damper(Frozen):
         return self
 
     def with_effect(self, name: str, values: EffectValues) -> Damper:
-        """The same damper with one effect more, or with other values of it."""
-        effects = {**self.effects, name: dict(values)}
-        return Damper(
-            base=self.base,
-            effects=effects,
-            reference_temperature_degC=self.reference_temperature_degC,
-            zero_m=self.zero_m,
-        )
+        """Return the damper with one effect more, or with other values of it."""
+        return Damper(**{**dict(self), "effects": {**self.effects, name: dict(values)}})  # unlike a copy, validated
 
     def without_effects(self, *names: str) -> Damper:
-        """The same damper without some of its effects."""
+        """Return the damper without some of its effects."""
         return self.model_copy(update={"effects": {n: values for n, values in self.effects.items() if n not in names}})
 
     def moved(self, by: float) -> Damper:
-        """The same damper on a stand whose displacement reads more by so much [m]."""
+        """Return the damper on a stand whose displacement reads more by an amount [m]."""
         return self.model_copy(update={"zero_m": self.zero_m + by})
 
 
 def _check_effect(name: str, values: EffectValues) -> None:
+    """Refuse an unknown effect, missing or unknown parameters, and values beyond the limits."""
     effects = known()
     if name not in effects:
         near = difflib.get_close_matches(name, library(), 1)
         hint = f"did you mean {near[0]}?" if near else "`pzd effects` lists those there are"
         raise InsideError(f"no effect is called {name}; {hint}", name, of_key=True)
     wanted = {p.name for p in effects[name].parameters}
-    given = set(values) - {"at_voltage_V"}
+    given = set(values) - {NODE_VOLTAGES}
     if given != wanted:
         unknown = sorted(given - wanted)
         says = f"{name} takes {', '.join(sorted(wanted))} (got {', '.join(sorted(given)) or 'nothing'})"
         raise InsideError(says, name, *unknown[:1], of_key=bool(unknown))
-    nodes = values.get("at_voltage_V")
+    nodes = values.get(NODE_VOLTAGES)
     for key in sorted(given):
         value = values[key]
         listed = value if isinstance(value, tuple) else (value,)
@@ -133,27 +125,27 @@ def _check_effect(name: str, values: EffectValues) -> None:
                 raise InsideError(f"{name}.{key} must lie in {limits} (got {number:g})", name, key)
 
 
-# ----------------------------------------------------------------------------------------------------
-# Which values an effect has in nature: a fit may go beyond them, and has then found something that looks alike.
-
-
 def against_nature(damper: Damper) -> tuple[str, ...]:
-    """The effects of a damper that have values which they have nowhere in nature, such as a negative mass."""
+    """Return the effects of a damper whose values are not physical, such as a negative mass.
+
+    A fit may go beyond physical values, and has then found something that looks alike.
+    """
     damping = max(row.C_Ns_per_m for row in damper.base)
     return tuple(
         name
         for name, values in damper.effects.items()
-        if not all(_natural(known()[name], at, damping) for at in _by_voltage(values))
+        if not all(_natural(known()[name], at, damping) for at in _per_voltage(values))
     )
 
 
 def _natural(effect: Effect, values: Mapping[str, float], damping: float) -> bool:
+    """Return whether an effect's parameters are physical at a C [N s/m]."""
     within = all(p.natural_from <= values.get(p.name, p.neutral) <= p.natural_to for p in effect.parameters)
     return within and effect.natural(values, damping)
 
 
-def _by_voltage(values: EffectValues) -> list[dict[str, float]]:
-    """The parameters of an effect, a set at each of its voltages."""
-    given = {name: np.atleast_1d(value).tolist() for name, value in values.items() if name != "at_voltage_V"}
+def _per_voltage(values: EffectValues) -> list[dict[str, float]]:
+    """Return the parameters of an effect, one set per voltage."""
+    given = {name: np.atleast_1d(value).tolist() for name, value in values.items() if name != NODE_VOLTAGES}
     count = max(len(each) for each in given.values())
     return [{name: each[min(i, len(each) - 1)] for name, each in given.items()} for i in range(count)]

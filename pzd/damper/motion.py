@@ -1,4 +1,4 @@
-"""What the damper is put through: the sampled motion, voltage and temperature."""
+"""Inputs of a damper: sampled motion, voltage and temperature."""
 
 from __future__ import annotations
 
@@ -10,42 +10,43 @@ from numpy.typing import NDArray
 
 from pzd.record import Array, Record, Rows
 
-STEP = 0.1
-"""A voltage that moves by more from one sample to the next [share of its range in the record] has stepped."""
+VOLTAGE_STEP = 0.1
+"""Change of the voltage between two samples that counts as a step, as a share of its range in the record."""
 PARTS_OF_STEP = 8
-"""Parts into which a sampling interval is cut in which the voltage steps: T0, C and k, linear between tested voltages,
-are not linear over a step that passes one. What that misses of the force falls with the square of the parts."""
+"""Parts into which a sampling interval is cut in which the voltage steps. T0, C and k are linear between tested
+voltages, but not over a step that passes one; the error of the force falls with the square of the parts."""
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Sampled kinematics and conditions; every array is (n,), None where not recorded."""
+    """Sampled kinematics and conditions, (n,) each; None where not recorded."""
 
     time: Array
+    """[s]"""
     displacement: Array
+    """[m]"""
     velocity: Array
+    """[m/s]"""
     acceleration: Array
+    """[m/s2]"""
     voltage: Array | None = None
+    """[V]"""
     temperature: Array | None = None
+    """[degC]"""
 
     @classmethod
     def of(cls, record: Record) -> Self:
-        """The motion of a rig record."""
+        """Return the motion of a rig record."""
         return cls(
-            record.time,
-            record.displacement,
-            record.velocity,
-            record.acceleration,
-            record.voltage,
-            record.temperature,
+            record.time, record.displacement, record.velocity, record.acceleration, record.voltage, record.temperature
         )
 
-    def about(self, zero: float) -> Self:
-        """The same motion, its displacement counted from another zero [m]."""
+    def centred_on(self, zero: float) -> Self:
+        """Return the same motion with its displacement counted from another zero [m]."""
         return self if zero == 0.0 else replace(self, displacement=self.displacement - zero)
 
     def finer(self, parts: NDArray[np.int64]) -> tuple[Self, Rows]:
-        """The same motion on a finer grid: by cubic splines, voltage and temperature linear between the samples.
+        """Interpolate the motion on a finer grid: cubic splines, voltage and temperature linear between the samples.
 
         Parameters
         ----------
@@ -53,7 +54,7 @@ class Motion:
 
         Returns
         -------
-        the motion, and (n,) which of its samples are those of this one
+        the motion, and (n,) indices of the samples of this one in it
         """
         from scipy.interpolate import CubicSpline
 
@@ -64,18 +65,18 @@ class Motion:
         fine = np.interp(np.arange(places[-1] + 1), places, samples)
         smooth = (self.displacement, self.velocity, self.acceleration)
         displacement, velocity, acceleration = (CubicSpline(samples, channel)(fine) for channel in smooth)
-        held = (None if c is None else np.interp(fine, samples, c) for c in (self.voltage, self.temperature))
+        conditions = (None if c is None else np.interp(fine, samples, c) for c in (self.voltage, self.temperature))
         time = np.interp(fine, samples, self.time)
-        return type(self)(time, displacement, velocity, acceleration, *held), places
+        return type(self)(time, displacement, velocity, acceleration, *conditions), places
 
 
 def steps_of_voltage(voltage: Array | None, samples: int) -> NDArray[np.bool_]:
-    """(n - 1,) whether a voltage (n,) steps from one of so many samples to the next; a steady one, or none, nowhere."""
+    """Return where a voltage (n,) steps: (n - 1,), one for each interval between so many samples."""
     if voltage is None or np.ptp(voltage) == 0.0:
         return np.zeros(samples - 1, dtype=np.bool_)
-    return np.asarray(np.abs(np.diff(voltage)) > STEP * np.ptp(voltage))
+    return np.asarray(np.abs(np.diff(voltage)) > VOLTAGE_STEP * np.ptp(voltage))
 
 
 def parts_of_steps(voltage: Array | None, samples: int) -> NDArray[np.int64]:
-    """(n - 1,) into how many parts the intervals between so many samples are cut for the steps of the voltage (n,)."""
+    """Return the (n - 1,) numbers of parts into which sampling intervals are cut for the steps of a voltage (n,)."""
     return np.where(steps_of_voltage(voltage, samples), PARTS_OF_STEP, 1)

@@ -1,11 +1,12 @@
-"""One step of the damper's path: stick, slip and relief, with everything moving.
+"""The damper's path through stick, slip and relief along a sampled motion, with its derivatives by parameters.
 
-Over a step the extension speed u = dx/dt and the parameter row go linearly:
+Between two samples the extension speed u = dx/dt and the parameter row are linear:
 
     de/dt = u(t) - side w(|F|),   F = k(t) s(e),   side = sign(F)
 
-Where a piece of the path leaves its regime, the moment is found within a bracket and the piece is cut; so it is where
-the rod turns round, for a force that leaves its regime and comes back would not be seen at the end.
+A step that stays in one regime is solved as a whole where there is a closed form, else piece by piece. Where a piece
+leaves its regime, the moment is found within a bracket and the piece ends there. It also ends where the rod reverses: a
+force that leaves its regime and returns within a piece would not show at its end.
 """
 
 from __future__ import annotations
@@ -17,249 +18,210 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.compiled import compiled, inlined
-from pzd.damper.compiled.kernels import FLOW, T0, C, K, Row, interpolate, nudged, stroke_law, stroke_slope
+from pzd.damper.compiled.kernels import FLOW, T0, C, K, Row, nudged, row_of, stroke_law, stroke_slope
 from pzd.damper.element import relaxation
 from pzd.damper.flow import breakaway, relief, relief_slope, smooth_force, smooth_slope, smooth_speed
 from pzd.damper.regimes import (
     RELIEF,
     SMOOTH,
     STICK,
+    UNSOLVED,
     TimeStep,
     beyond,
+    deflection_at,
     extension_speed,
+    is_straight,
     onto_edge,
     over_yield,
     piece,
     regime_of,
     row_in,
     speed_at,
-    spring_energy,
     spring_force,
+    whole_step,
 )
 from pzd.record import Array
 
-# ----------------------------------------------------------------------------------------------------
-# Derivatives of the damper's path by parameters, carried along it piece by piece.
-#
-# Equation: d(de)/dt = -(dW/de) de - (dW/dp) dp,  W = side w(|F|),  F = k s(e)
-# Source: Hairer, Norsett and Wanner 1993, Solving Ordinary Differential Equations I, section I.14: the variational
-# equation of de/dt = u(t) - W
-#
-# W is continuous where a piece ends on the edge of its regime, so the moment of that adds nothing. How W goes with p is
-# taken from the explicit flow curve, w_p = (|F|_p - f_p)/f_w, so nothing is inverted, and every law is served.
+DEFLECTION, SPEED = range(2)
+"""The state: elastic deflection e [m] and the last flow speed w [m/s], where the next search for it begins."""
+STATES = 2
 
 
-_NUDGE = 1e-6
-"""Change of a column for its derivatives, as a share of itself or of what a variable changes it by: about half the
-digits of a double."""
-_LOOKED_AT = 100  # samples that show how large these changes are
-_VANISHING = 1e-9  # of the larger slope at the ends of a piece: the oil hardly flows there, and has no steady state
-
-
-class Varied(NamedTuple):
-    """Which parameters vary, and what that makes of the elastic deflection."""
+class Variables(NamedTuple):
+    """v variables by which a force is differentiated, each of which changes c columns of the parameter row."""
 
     columns: NDArray[np.int64]
-    """(c,) columns of the parameter row that vary."""
+    """(c,) columns of the parameter row."""
+    along: Array
+    """(n, v, c) or (1, v, c) derivatives of these columns by each variable, linear between samples."""
+    initial_slopes: Array
+    """(v,) derivatives of the initial force by each variable [N]."""
+
+
+NO_VARIABLES = Variables(np.zeros(0, dtype=np.int64), np.zeros((1, 0, 0)), np.zeros(0))
+
+
+class Sensitivities(NamedTuple):
+    """Derivatives of the elastic deflection by v variables, and what advances them; see `Variables`."""
+
+    columns: NDArray[np.int64]
+    """(c,) columns of the parameter row."""
     nudges: Array
     """(c,) change of each for its derivative, in its own unit."""
     along: Array
     """(n, v, c) or (1, v, c) derivatives of these columns by each variable, linear between samples."""
     partial: Array
-    """(c,) derivatives by each column, of whatever is looked at."""
-    carried: Array
-    """(v,) derivative of the elastic deflection by each variable [m]."""
+    """(c,) working array: derivatives of one quantity by each column."""
+    deflection: Array
+    """(v,) the derivatives of the elastic deflection [m]."""
     first: Array
-    """(1 + v,) at the start of a piece: derivatives of W by the deflection [1/s], and by each variable, taken off."""
+    """(1 + v,) at the start of a piece: dW/de [1/s], and the derivatives of -W by each variable [m/s]."""
     last: Array
     """(1 + v,) the same at its end."""
     place: Array
-    """(2,) regime and side to which `last` belongs; NaN before the first piece."""
+    """(2,) regime and side of `last`, which starts the next piece of the same; NaN before the first piece."""
 
 
-def varied(rows: Array, columns: NDArray[np.int64], along: Array) -> Varied:
-    """What is carried along for the derivatives by v variables that move c columns of the parameter row.
+# --- A sampled motion ---
+
+
+def march(
+    displacement: Array, velocity: Array, steps: Array, rows: Array, initial_force: float, tolerance: float
+) -> Array:
+    """Compute the force of the element with its stroke and flow effects along a motion.
 
     Parameters
     ----------
-    rows : (n, r) or (1, r) parameter rows
-    columns : (c,) places in the row
-    along : (n, v, c) or (1, v, c) derivatives of these columns by each variable
+    displacement : (n,) extension [m]
+    velocity : (n,) extension speed [m/s], whose change bends the displacement inside a step; (1,) for straight
+    steps : (n - 1,) or (1,) sampling intervals [s]
+    rows : (n, r) or (1, r) parameter rows, see `kernels.Row`, linear between samples
+    initial_force : force of the element at the first sample [N]
+    tolerance : admissible error of a piece, as a share of the force
+
+    Returns
+    -------
+    (n,) force [N]
     """
-    samples, variables, count = along.shape
-    own, some = np.abs(rows[0, columns]), along[:: max(samples // _LOOKED_AT, 1)]
-    largest = np.maximum(np.max(np.abs(some), axis=(0, 1), initial=0.0), np.where(np.isfinite(own), own, 0.0))
-    nudges = _NUDGE * np.where(largest > 0.0, largest, 1.0)
-    ends = np.zeros((2, 1 + variables))
-    place = np.full(2, np.nan)
-    return Varied(
-        columns,
-        nudges,
-        np.ascontiguousarray(along),
-        np.zeros(count),
-        np.zeros(variables),
-        ends[0],
-        ends[1],
-        place,
-    )
+    return march_sensitivities(displacement, velocity, steps, rows, initial_force, tolerance, NO_VARIABLES)[0]
 
 
-def not_varied() -> Varied:
-    """No variables: nothing is carried along."""
-    return varied(np.zeros((1, 0)), np.zeros(0, dtype=np.int64), np.zeros((1, 0, 0)))
+def march_sensitivities(
+    displacement: Array,
+    velocity: Array,
+    steps: Array,
+    rows: Array,
+    initial_force: float,
+    tolerance: float,
+    variables: Variables,
+) -> tuple[Array, Array]:
+    """Compute the same force, and its derivatives by v variables.
+
+    Parameters
+    ----------
+    displacement, velocity, steps, rows, initial_force, tolerance : as `march`
+    variables : what they change
+
+    Returns
+    -------
+    (n,) force [N] and (n, v) its derivatives [N]
+    """
+    force, slopes = np.empty(displacement.size), np.empty((displacement.size, variables.initial_slopes.size))
+    v, state, initial_slopes = sensitivities_to(variables, rows), np.zeros(STATES), variables.initial_slopes
+    _march(displacement, velocity, steps, rows, initial_force, initial_slopes, tolerance, state, force, v, slopes)
+    return force, slopes
 
 
-@inlined
-def _by_variable(v: Varied, variable: int, sample: int, share: float) -> float:
-    """What the `partial` derivatives make of a variable, at a share of the way from one sample to the next."""
-    found, last = 0.0, v.along.shape[0] - 1
-    if last == 0 or share == 0.0 or share >= 1.0:
-        at = min(sample if share < 1.0 else sample + 1, last)
-        for c in range(v.columns.size):
-            found += v.partial[c] * v.along[at, variable, c]
-    else:
-        for c in range(v.columns.size):
-            before, after = v.along[sample, variable, c], v.along[sample + 1, variable, c]
-            found += v.partial[c] * (before + (after - before) * share)
+def deflections(force: Array, rows: Array) -> Array:
+    """Compute the (n,) elastic deflections [m] of an element that carries (n,) forces [N], by (n, r) or (1, r) rows."""
+    found = np.empty(force.size)
+    _fill_deflections(force, rows, found)
     return found
 
 
 @compiled
-def begin(v: Varied, e: float, p: Row, initial_slopes: Array) -> None:
-    """Begin at an elastic deflection [m] whose force goes with each variable by (v,) initial slopes [N]."""
-    if v.carried.size > 0:
-        by_deflection = _of_force(v, e, p)
-        for j in range(v.carried.size):
-            rest = initial_slopes[j] - _by_variable(v, j, 0, 0.0)
-            v.carried[j] = rest / by_deflection if by_deflection > 0.0 else 0.0
+def _fill_deflections(force: Array, rows: Array, found: Array) -> None:
+    """Fill the (n,) deflections of (n,) forces."""
+    for i in range(force.size):
+        found[i] = deflection_at(force[i], row_of(rows[min(i, rows.shape[0] - 1)]))
 
 
 @compiled
-def fill_slopes(v: Varied, e: float, p: Row, sample: int, slopes: Array) -> None:
-    """Fill derivatives of the force of the oil spring [N] by each variable, (v,), at a sample."""
-    by_deflection = _of_force(v, e, p)
-    for j in range(v.carried.size):
-        slopes[j] = by_deflection * v.carried[j] + _by_variable(v, j, sample, 0.0)
-
-
-@compiled
-def _of_force(v: Varied, e: float, p: Row) -> float:
-    """Derivative of the force of the oil spring by the deflection [N/m]; those by the columns go to `partial`."""
-    side, force = math.copysign(1.0, e), spring_force(e, p)
-    for c in range(v.columns.size):
-        by = v.nudges[c]
-        moves = K <= v.columns[c] < FLOW
-        v.partial[c] = (spring_force(e, nudged(p, v.columns[c], by)) - force) / by if moves else 0.0
-    return p[K] * stroke_slope(e, side, p) if force != 0.0 else 0.0
-
-
-@compiled
-def _rates(
-    v: Varied, e: float, w: float, p: Row, regime: int, side: float, sample: int, share: float, found: Array
+def _march(
+    displacement: Array,
+    velocity: Array,
+    steps: Array,
+    rows: Array,
+    initial_force: float,
+    initial_slopes: Array,
+    tolerance: float,
+    state: Array,
+    force: Array,
+    v: Sensitivities,
+    slopes: Array,
 ) -> None:
-    """Fill (1 + v,) derivatives of W by the deflection [1/s] and, taken off, by each variable, at one moment."""
-    if regime == STICK:
-        found[:] = 0.0
-        return
-    rise = relief_slope(p, side) if regime == RELIEF else smooth_slope(w, p, side)
-    found[0] = p[K] * stroke_slope(e, side, p) / rise
-    pull, curve = side * p[K] * stroke_law(e, side, p), _curve(w, p, regime, side)
-    for c in range(v.columns.size):
-        q = nudged(p, v.columns[c], v.nudges[c])
-        if K <= v.columns[c] < FLOW:
-            change = side * q[K] * stroke_law(e, side, q) - pull
+    """Fill the (n,) force and, where there are variables, the (n, v) slopes."""
+    p0 = row_of(rows[0])
+    p1 = p0
+    state[DEFLECTION] = deflection_at(initial_force, p0)
+    force[0] = spring_force(state[DEFLECTION], p0)
+    begin_sensitivities(v, state[DEFLECTION], p0, initial_slopes)
+    if v.deflection.size > 0:
+        fill_slopes(v, state[DEFLECTION], p0, 0, slopes[0])
+    moving = False
+    for i in range(1, displacement.size):
+        if rows.shape[0] > 1:
+            p0, p1 = p1, row_of(rows[i])
+            moving = p0 != p1
+        h = steps[min(i - 1, steps.size - 1)]
+        mean = (displacement[i] - displacement[i - 1]) / h
+        half = 0.5 * (velocity[i] - velocity[i - 1]) if velocity.size > 1 else 0.0
+        step = TimeStep(h, mean - half, mean + half, p0, p1, moving)
+        end, speed = whole_step(state[DEFLECTION], step, tolerance) if is_straight(p0, p1) else UNSOLVED
+        if math.isnan(end):
+            advance(state, step, tolerance, v, i - 1)
         else:
-            change = curve - _curve(w, q, regime, side)
-        v.partial[c] = -side * change / (rise * v.nudges[c])
-    for j in range(v.carried.size):
-        found[1 + j] = _by_variable(v, j, sample, share)
-
-
-@inlined
-def _curve(w: float, p: Row, regime: int, side: float) -> float:
-    """Force [N] that drives the oil at a flow speed [m/s] by a regime's own law."""
-    if regime == RELIEF:
-        edge = relief(p, side)
-        return edge + relief_slope(p, side) * (w - smooth_speed(edge, p, side, w))
-    return smooth_force(w, p, side)
+            if v.deflection.size > 0:
+                _advance_whole_step(v, state[DEFLECTION], end, speed, step, i - 1)
+            state[DEFLECTION], state[SPEED] = end, speed
+        force[i] = spring_force(state[DEFLECTION], p1)
+        if v.deflection.size > 0:
+            fill_slopes(v, state[DEFLECTION], p1, i, slopes[i])
 
 
 @compiled
-def carry(
-    v: Varied,
-    e: float,
-    end: float,
-    w: float,
-    speed: float,
-    at: float,
-    dt: float,
-    regime: int,
-    side: float,
-    step: TimeStep,
-    sample: int,
-) -> None:
-    """Bring the derivatives of the deflection through a piece of the path.
-
-    Over the time tau, d tau = (dW/de) dt, the derivative goes to g = -(dW/dp) dp / (dW/de), which is taken as linear.
-
-    Parameters
-    ----------
-    v : what varies; changed in place
-    e, end : elastic deflection at its start and end [m]
-    w, speed : flow speed there [m/s]
-    at, dt : where in the step it begins, and its length [s]
-    regime, side : see `pzd.damper.regimes`
-    step : in which it lies
-    sample : before that step
-    """
-    if v.place[0] == regime and v.place[1] == side:
-        for i in range(v.first.size):
-            v.first[i] = v.last[i]
-    else:
-        _rates(v, e, w, row_in(step, at), regime, side, sample, at / step.h, v.first)
-    v.place[0], v.place[1] = regime, side
-    _rates(v, end, speed, row_in(step, at + dt), regime, side, sample, (at + dt) / step.h, v.last)
-    slope, slope_after = v.first[0], v.last[0]
-    if slope == 0.0 and slope_after == 0.0:
-        return
-    z = 0.5 * (slope + slope_after) * dt
-    over = relaxation(1.0, 1.0, z)
-    if min(slope, slope_after) > _VANISHING * max(slope, slope_after):
-        early, late = (over.by_speed - over.by_change) / slope, over.by_change / slope_after
-    else:
-        early, late = (over.by_speed - over.by_change) / z * dt, over.by_change / z * dt
-    for j in range(v.carried.size):
-        v.carried[j] = over.decay * v.carried[j] + early * v.first[1 + j] + late * v.last[1 + j]
+def _advance_whole_step(v: Sensitivities, e: float, end: float, speed: float, step: TimeStep, sample: int) -> None:
+    """Advance the derivatives over a step in one regime."""
+    regime, side = regime_of(spring_force(e, step.p0), step.p0)
+    w = speed_at(abs(spring_force(e, step.p0)), step.p0, regime, side, speed)
+    advance_sensitivities(v, e, end, w, speed, 0.0, step.h, regime, side, step, sample)
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- One step, piece by piece ---
 
-
-DEFLECTION, SPEED, DISSIPATED, VALVE_WORK = range(4)
-"""The state: e [m], the last flow speed w [m/s], and the energies so far [J]."""
-STATES = 4
-
-_MOST_PIECES = 2000
-_MOST_BRACKETS = 60
-_NEWTON_STEPS = 12  # then bisection, which cannot creep
-_ON_EDGE = 1e-13  # of the force
-_OFF_EDGE = 1e-6  # of a piece
-_SHORTEST_PIECE = 1e-13  # of a piece; not zero, so that the side it leaves to is seen
-_SAME_FORCE = 1e-11  # of the force; a saved flow speed that gives it within this is kept
+_MOST_PIECES = 2000  # per step; one of usual length takes less than ten
+_BRACKET_STEPS = 60  # bisection alone needs 53 for all digits of a double
+_NEWTON_STEPS = 12  # then bisection, which converges in any case
+_ON_EDGE = 1e-13  # share of the force: a few times its rounding
+_OFF_EDGE = 1e-6  # share of a piece at which a state that starts on the edge has left it
+_SHORTEST_PIECE = 1e-13  # share of a piece; not zero, so that the side to which it leaves shows
+_SAME_FORCE = 1e-11  # share of the force; a saved flow speed that gives it within this is used again
+_REST = 1e-14  # share of a step; what is left is rounding
+_LEAST_SHARE = 1e-7  # of a step; pieces are not shortened further
+_SHORTENED, _LENGTHENED = 0.2, 4.0  # limits of the change of length from piece to piece
 
 
 @compiled
-def advance(state: Array, step: TimeStep, tolerance: float, booked: bool, v: Varied, sample: int) -> None:
-    """Carry the state through one step.
+def advance(state: Array, step: TimeStep, tolerance: float, v: Sensitivities, sample: int) -> None:
+    """Advance the state over one step.
 
     Parameters
     ----------
-    state : (4,) elastic deflection, flow speed, dissipated energy, work of the valve; changed in place
-    step : what happens in it
+    state : (2,) elastic deflection and flow speed; changed in place
+    step : the step
     tolerance : admissible error of a piece, as a share of the force
-    booked : whether the energies are booked, which doubles the work
-    v : what varies, its derivatives carried along; changed in place
-    sample : before the step
+    v : sensitivities, advanced too where there are variables; changed in place
+    sample : index of the sample before the step
     """
     e, w, at = state[DEFLECTION], state[SPEED], 0.0
     turn = step.u0 / (step.u0 - step.u1) * step.h if step.u0 * step.u1 < 0.0 else step.h
@@ -271,12 +233,12 @@ def advance(state: Array, step: TimeStep, tolerance: float, booked: bool, v: Var
         w = speed_at(force, step.p0, regime, side, w)
     for _ in range(_MOST_PIECES):
         dt = min(dt, step.h - at)
-        if at < turn * (1.0 - 1e-14):
+        if at < turn * (1.0 - _REST):
             dt = min(dt, turn - at)
         end, speed, error = piece(e, w, at, dt, regime, side, step)
         allowed = tolerance * (abs(spring_force(e, step.p1)) + size)
-        if not error <= allowed and dt > 1e-7 * step.h:  # where what grows has overflowed there is no error to compare
-            dt *= max(0.2, _growth(error, allowed)) if error > allowed else 0.2
+        if not error <= allowed and dt > _LEAST_SHARE * step.h:  # not `error > allowed`: an overflow leaves NaN
+            dt *= max(_SHORTENED, _growth(error, allowed)) if error > allowed else _SHORTENED
             continue
         over, way = beyond(end, row_in(step, at + dt), regime, side)
         following, onto = regime, side
@@ -286,37 +248,35 @@ def advance(state: Array, step: TimeStep, tolerance: float, booked: bool, v: Var
             p = row_in(step, at + dt)
             end, following, onto = onto_edge(end, p, regime, side, way)
             speed = speed_at(abs(spring_force(end, p)), p, following, onto, speed)
-        if booked:
-            _book(state, e, end, w, speed, at, dt, regime, side, step)
-        if v.carried.size > 0:
-            carry(v, e, end, w, speed, at, dt, regime, side, step, sample)
+        if v.deflection.size > 0:
+            advance_sensitivities(v, e, end, w, speed, at, dt, regime, side, step, sample)
         e, w = end, speed
         at += dt
-        if at >= step.h * (1.0 - 1e-14):
+        if at >= step.h * (1.0 - _REST):
             break
         regime, side = following, onto
-        dt = (step.h - at) if over > 0.0 else dt * min(4.0, _growth(error, allowed))
+        dt = (step.h - at) if over > 0.0 else dt * min(_LENGTHENED, _growth(error, allowed))
     state[DEFLECTION] = e
     state[SPEED] = w
 
 
 @compiled
 def _growth(error: float, allowed: float) -> float:
-    """By which factor a piece may be longer for the error that is allowed, its error being of fifth order."""
+    """Return the factor on the length of a piece that brings its error, of fifth order, to the allowed one."""
     return 0.9 * math.pow(allowed / max(error, 1e-9 * allowed), 0.2)
 
 
 @compiled
 def size_of(step: TimeStep) -> float:
-    """How large the force of a step is at least [N], where it passes through zero too: T0 + C |u|."""
+    """Return T0 + C |u|, the scale of the force in a step [N], which holds where the force passes through zero too."""
     return step.p1[T0] + step.p1[C] * max(abs(step.u0), abs(step.u1))
 
 
 @compiled
-def _miss(e: float, p: Row, regime: int, side: float, way: int) -> float:
-    """How far the state lies past the edge that is looked for [N], negative before it.
+def _distance_beyond(e: float, p: Row, regime: int, side: float, way: int) -> float:
+    """Compute the distance of the force beyond the edge that is searched for [N], negative before it.
 
-    In SMOOTH, which has two, that of the `way` alone: a piece may start on the other one.
+    In SMOOTH, which has two edges, that in the direction `way` alone: a piece may start on the other one.
     """
     if regime == STICK:
         return over_yield(e, p, side)
@@ -330,63 +290,184 @@ def _miss(e: float, p: Row, regime: int, side: float, way: int) -> float:
 def _crossing(
     e: float, w: float, at: float, dt: float, over: float, way: int, regime: int, side: float, step: TimeStep
 ) -> float:
-    """Length of the piece that ends on the edge of its regime: Newton's method within a bracket, then bisection."""
+    """Find the length of the piece up to the edge of its regime by Newton's method in a bracket, then bisection."""
     size = abs(spring_force(e, step.p0)) + size_of(step)
     if regime == STICK:
         end, _, _ = piece(e, w, at, dt, regime, side, step)
         side = math.copysign(1.0, end)
-    low, high, below, above = 0.0, dt, min(_miss(e, row_in(step, at), regime, side, way), 0.0), over
-    if regime == STICK and below > -_ON_EDGE * size:  # it starts on this edge: look for where it comes back
+    low, high, below, above = 0.0, dt, min(_distance_beyond(e, row_in(step, at), regime, side, way), 0.0), over
+    if regime == STICK and below > -_ON_EDGE * size:  # it starts on this edge: search for its return
         low = _OFF_EDGE * dt
         end, _, _ = piece(e, w, at, low, regime, side, step)
-        below = _miss(end, row_in(step, at + low), regime, side, way)
+        below = _distance_beyond(end, row_in(step, at + low), regime, side, way)
         if below >= 0.0:
             return _SHORTEST_PIECE * dt
     time = (low * above - high * below) / (above - below)
-    for i in range(_MOST_BRACKETS):
+    for i in range(_BRACKET_STEPS):
         if i > _NEWTON_STEPS or not low < time < high:
             time = 0.5 * (low + high)
         end, speed, _ = piece(e, w, at, time, regime, side, step)
         p = row_in(step, at + time)
-        miss = _miss(end, p, regime, side, way)
-        if abs(miss) <= _ON_EDGE * size or high - low <= 1e-15 * step.h:
+        residual = _distance_beyond(end, p, regime, side, way)
+        if abs(residual) <= _ON_EDGE * size or high - low <= 1e-15 * step.h:
             return time
-        if miss > 0.0:
+        if residual > 0.0:
             high = time
         else:
             low = time
         lengthening = side * extension_speed(step, at + time) - speed
-        time -= miss / (way * p[K] * stroke_slope(end, side, p) * lengthening)  # as if the parameters stood still
+        time -= residual / (way * p[K] * stroke_slope(end, side, p) * lengthening)  # as if the parameters were constant
     return high
 
 
+# --- Derivatives of the path by parameters, advanced piece by piece ---
+#
+# Equation: d(de)/dt = -(dW/de) de - (dW/dp) dp,  W = side w(|F|),  F = k s(e)
+# Source: Hairer, Norsett and Wanner 1993, Solving Ordinary Differential Equations I, section I.14: the variational
+# equation of de/dt = u(t) - W
+#
+# W is continuous where a piece ends on the edge of its regime, so the moment of that adds nothing. The derivative of W
+# by p follows from the explicit flow curve f, w_p = (|F|_p - f_p)/f_w, so nothing is inverted, for any law.
+
+_NUDGE = 1e-6
+"""Change of a column for its derivatives, as a share of itself or of its derivative by a variable: half the digits of a
+double."""
+_SAMPLES_FOR_NUDGES = 100  # samples that show how large these derivatives are
+_VANISHING = 1e-9  # of the larger slope at the ends of a piece: hardly any flow there, and no steady state
+
+
+def sensitivities_to(variables: Variables, rows: Array) -> Sensitivities:
+    """Return the sensitivities to variables before the first step along (n, r) or (1, r) parameter rows."""
+    columns, along, _ = variables
+    samples, count = along.shape[:2]
+    own, some = np.abs(rows[0, columns]), along[:: max(samples // _SAMPLES_FOR_NUDGES, 1)]
+    largest = np.maximum(np.max(np.abs(some), axis=(0, 1), initial=0.0), np.where(np.isfinite(own), own, 0.0))
+    nudges = _NUDGE * np.where(largest > 0.0, largest, 1.0)
+    ends = np.zeros((2, 1 + count))
+    place = np.full(2, np.nan)
+    return Sensitivities(
+        columns, nudges, np.ascontiguousarray(along), np.zeros(columns.size), np.zeros(count), ends[0], ends[1], place
+    )
+
+
+@inlined
+def _by_variable(v: Sensitivities, variable: int, sample: int, share: float) -> float:
+    """Apply the chain rule: derivative by a variable from `partial`, at a share of the way between two samples."""
+    found, last = 0.0, v.along.shape[0] - 1
+    if last == 0 or share == 0.0 or share >= 1.0:
+        at = min(sample if share < 1.0 else sample + 1, last)
+        for c in range(v.columns.size):
+            found += v.partial[c] * v.along[at, variable, c]
+    else:
+        for c in range(v.columns.size):
+            before, after = v.along[sample, variable, c], v.along[sample + 1, variable, c]
+            found += v.partial[c] * (before + (after - before) * share)
+    return found
+
+
 @compiled
-def _book(
-    state: Array,
-    e0: float,
-    e1: float,
-    w0: float,
-    w1: float,
+def begin_sensitivities(v: Sensitivities, e: float, p: Row, initial_slopes: Array) -> None:
+    """Start at an elastic deflection [m] from the (v,) derivatives of its force [N] by each variable."""
+    if v.deflection.size > 0:
+        by_deflection = _force_derivative(v, e, p)
+        for j in range(v.deflection.size):
+            rest = initial_slopes[j] - _by_variable(v, j, 0, 0.0)
+            v.deflection[j] = rest / by_deflection if by_deflection > 0.0 else 0.0
+
+
+@compiled
+def fill_slopes(v: Sensitivities, e: float, p: Row, sample: int, slopes: Array) -> None:
+    """Fill the (v,) derivatives of the force F = k s(e) [N] by each variable at a sample."""
+    by_deflection = _force_derivative(v, e, p)
+    for j in range(v.deflection.size):
+        slopes[j] = by_deflection * v.deflection[j] + _by_variable(v, j, sample, 0.0)
+
+
+@compiled
+def _force_derivative(v: Sensitivities, e: float, p: Row) -> float:
+    """Return the derivative of F = k s(e) by the deflection [N/m]; those by the columns go to `partial`."""
+    side, force = math.copysign(1.0, e), spring_force(e, p)
+    for c in range(v.columns.size):
+        by = v.nudges[c]
+        moves = K <= v.columns[c] < FLOW
+        v.partial[c] = (spring_force(e, nudged(p, v.columns[c], by)) - force) / by if moves else 0.0
+    return p[K] * stroke_slope(e, side, p) if force != 0.0 else 0.0
+
+
+@compiled
+def _w_derivatives(
+    v: Sensitivities, e: float, w: float, p: Row, regime: int, side: float, sample: int, share: float, found: Array
+) -> None:
+    """Fill (1 + v,) dW/de [1/s] and the derivatives of -W by each variable [m/s] at one moment."""
+    if regime == STICK:
+        found[:] = 0.0
+        return
+    rise = relief_slope(p, side) if regime == RELIEF else smooth_slope(w, p, side)
+    found[0] = p[K] * stroke_slope(e, side, p) / rise
+    pull, curve = side * p[K] * stroke_law(e, side, p), _curve(w, p, regime, side)
+    for c in range(v.columns.size):
+        q = nudged(p, v.columns[c], v.nudges[c])
+        if K <= v.columns[c] < FLOW:
+            change = side * q[K] * stroke_law(e, side, q) - pull
+        else:
+            change = curve - _curve(w, q, regime, side)
+        v.partial[c] = -side * change / (rise * v.nudges[c])
+    for j in range(v.deflection.size):
+        found[1 + j] = _by_variable(v, j, sample, share)
+
+
+@inlined
+def _curve(w: float, p: Row, regime: int, side: float) -> float:
+    """Compute the force [N] at a flow speed [m/s] by the law of a regime, also beyond its edge."""
+    if regime == RELIEF:
+        edge = relief(p, side)
+        return edge + relief_slope(p, side) * (w - smooth_speed(edge, p, side, w))
+    return smooth_force(w, p, side)
+
+
+@compiled
+def advance_sensitivities(
+    v: Sensitivities,
+    e: float,
+    end: float,
+    w: float,
+    speed: float,
     at: float,
     dt: float,
     regime: int,
     side: float,
     step: TimeStep,
+    sample: int,
 ) -> None:
-    """Book the energies of a piece by Simpson's rule, its middle computed like its end."""
-    em, wm, _ = piece(e0, w0, at, 0.5 * dt, regime, side, step)
-    first, last = row_in(step, at), row_in(step, at + dt)
-    middle = interpolate(first, last, 0.5)
-    if regime != STICK:
-        start, half, end = abs(spring_force(e0, first)), abs(spring_force(em, middle)), abs(spring_force(e1, last))
-        state[DISSIPATED] += dt / 6.0 * (start * w0 + 4.0 * half * wm + end * w1)
-    if step.moving:
-        state[VALVE_WORK] += (
-            _tightening(e0, first, last) + 4.0 * _tightening(em, first, last) + _tightening(e1, first, last)
-        ) / 6.0
+    """Advance the derivatives of the deflection over a piece of the path.
 
+    Over the time tau, d tau = (dW/de) dt, the derivative tends to g = -(dW/dp) dp / (dW/de), taken as linear in tau.
 
-@compiled
-def _tightening(e: float, first: Row, last: Row) -> float:
-    """Work [J] of turning one row into another at an elastic deflection [m]."""
-    return spring_energy(e, last, last[K]) - spring_energy(e, first, first[K])
+    Parameters
+    ----------
+    v : the sensitivities; changed in place
+    e, end : elastic deflection at its start and end [m]
+    w, speed : flow speed there [m/s]
+    at, dt : where in the step it begins, and its length [s]
+    regime, side : see `pzd.damper.regimes`
+    step : the step that holds it
+    sample : index of the sample before that step
+    """
+    if v.place[0] == regime and v.place[1] == side:
+        for i in range(v.first.size):
+            v.first[i] = v.last[i]
+    else:
+        _w_derivatives(v, e, w, row_in(step, at), regime, side, sample, at / step.h, v.first)
+    v.place[0], v.place[1] = regime, side
+    _w_derivatives(v, end, speed, row_in(step, at + dt), regime, side, sample, (at + dt) / step.h, v.last)
+    slope, slope_after = v.first[0], v.last[0]
+    if slope == 0.0 and slope_after == 0.0:
+        return
+    z = 0.5 * (slope + slope_after) * dt
+    over = relaxation(1.0, 1.0, z)
+    if min(slope, slope_after) > _VANISHING * max(slope, slope_after):
+        early, late = (over.by_speed - over.by_change) / slope, over.by_change / slope_after
+    else:
+        early, late = (over.by_speed - over.by_change) / z * dt, over.by_change / z * dt
+    for j in range(v.deflection.size):
+        v.deflection[j] = over.decay * v.deflection[j] + early * v.first[1 + j] + late * v.last[1 + j]

@@ -1,7 +1,7 @@
-"""The regimes of the damper: where nothing flows, where it flows smoothly, where the relief valve is open.
+"""Regimes of the damper (no flow, smooth flow, relief valve open) and the integration of a piece of path inside one.
 
-State is the elastic deflection e = x - y (paper, eq. 1); a stiffness that moves with the voltage
-then moves the force and nothing else. F = k s(e), s the extension of the oil spring behind the stroke effects.
+The state is the elastic deflection e = x - y (paper, eq. 1): a stiffness that varies with the voltage then changes the
+force and nothing else. F = k s(e), s the extension of the oil stiffness behind the stroke effects.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pzd.compiled import compiled, inlined
 from pzd.damper.compiled.kernels import (
     K,
     Row,
+    effects_alike,
     interpolate,
     stroke_inverse,
     stroke_law,
@@ -20,9 +21,10 @@ from pzd.damper.compiled.kernels import (
     stroke_slope,
     stroke_straight,
 )
-from pzd.damper.element import relaxation, slip
+from pzd.damper.element import Element, relaxation, slip
 from pzd.damper.flow import (
     breakaway,
+    damping,
     relief,
     relief_slope,
     smooth_force_of,
@@ -35,25 +37,23 @@ from pzd.damper.flow import (
     viscous_speed,
 )
 
-# ----------------------------------------------------------------------------------------------------
-# The functions and weights of an exponential Rosenbrock method of order 5, with an error of order 4.
+# --- An exponential Rosenbrock method of order 5, with an error estimate of order 4 ---
 #
 # Equation: y(t + h) = y + h phi_1(Z) r + h^2 phi_2(Z) v + h (2 a phi_3(Z) + 6 b phi_4(Z))
 # Source: Luan and Ostermann 2014, J. Comput. Appl. Math. 255, 417-431, method exprb53s3
 #
-# Z = h J, J and v the derivatives of the rate r by y and by time. What the rate does beside r + J (y - y0) + v t is
-# taken as a theta^2 + b theta^3 over the step, a and b from two stages, and the end found puts a theta^4 to it; this is
-# exact where that is all there is, however stiff J is.
-
+# Z = h J, J and v the derivatives of the rate r by y and by time. The rest of the rate, r + J (y - y0) + v t taken off,
+# is approximated by a theta^2 + b theta^3 over the step, a and b from two stages; the end found adds a theta^4. This is
+# exact where the rest is such a polynomial, however stiff J is.
 
 STAGES = (0.5, 0.9)
 """Share of the step at which the two stages stand; 0.9 follows from 0.5 by the conditions of order 5."""
 COUPLING = (27.0 / 25.0, 729.0 / 125.0)
-"""What the second stage takes of what the first one shows, by phi_3 at either stage's share of Z."""
-_SMALL = 1.0  # below it the series is used: the recursion loses digits like |z|^-4
-_CAUTION = 2.0  # the stages, of lower order than the whole, miss about as much again
-_CHANCE = 1e-3  # at a tolerance of 1e-9 the error of order 4 is about so much of that of order 3
-_SERIES = 15  # terms, the last below 1e-16 of the sum
+"""Weights of the first stage in the second one, for phi_3 at either stage's share of Z."""
+_SMALL_Z = 1.0  # below it the series is used: the recursion loses digits like |z|^-4
+_CAUTION = 2.0  # the stages, of lower order than the whole, have about the same error again
+_LEAST_ERROR = 1e-3  # share of the error of order 3 that the error of order 4 has at a tolerance of 1e-9
+_SERIES_TERMS = 15  # the last one is below 1e-16 of the sum
 
 
 class Phi(NamedTuple):
@@ -68,14 +68,14 @@ class Phi(NamedTuple):
 
 @compiled
 def phi(z: float) -> Phi:
-    """The functions phi_1 to phi_5 of an exponential integrator.
+    """Compute the functions phi_1 to phi_5 of an exponential integrator.
 
     Equation: phi_{k + 1}(z) = (phi_k(z) - 1/k!)/z, phi_1(z) = (e^z - 1)/z
     Source: Hochbruck and Ostermann 2010, Acta Numerica 19, eq. (2.10)-(2.11)
     """
-    if abs(z) < _SMALL:
+    if abs(z) < _SMALL_Z:
         five, term = 0.0, 1.0 / 120.0
-        for j in range(_SERIES):
+        for j in range(_SERIES_TERMS):
             five += term
             term *= z / (j + 6.0)
         four = z * five + 1.0 / 24.0
@@ -91,7 +91,7 @@ def phi(z: float) -> Phi:
 
 @inlined
 def bend(first: float, second: float) -> tuple[float, float]:
-    """Coefficients a and b of a theta^2 + b theta^3 through what the two stages show beside the linear rate."""
+    """Fit a theta^2 + b theta^3 through the rest of the rate at the two stages, and return a and b."""
     c, d = STAGES
     b = (second / (d * d) - first / (c * c)) / (d - c)
     return first / (c * c) - b * c, b
@@ -99,24 +99,23 @@ def bend(first: float, second: float) -> tuple[float, float]:
 
 @inlined
 def end_corrected(a: float, b: float, end: float, over: Phi) -> tuple[float, float]:
-    """What the end of a step adds to it, theta^4 put through it, and the error of the whole; shares of its length.
+    """Compute the theta^4 correction from the rest at the end of a step, and an error estimate; shares of its length.
 
-    The error is what the stage 1/2 and the end would miss by themselves, and what the end has added. It is no less than
-    a small share of what the stage 1/2 alone would miss: the end may lie on the curve by chance.
+    The estimate is the error of the stage 1/2 and the end without the other stage, plus the correction. It is no less
+    than a small share of the error of the stage 1/2 alone, since the end may lie on the curve by chance.
     """
     c, d = STAGES
     fourth = (end - a - b) / ((1.0 - c) * (1.0 - d))
     added = fourth * (2.0 * c * d * over.three - 6.0 * (c + d) * over.four + 24.0 * over.five)
     without = fourth * (2.0 * c * over.three - 6.0 * (1.0 + c) * over.four + 24.0 * over.five)
     alone = b * (6.0 * over.four - 2.0 * c * over.three)
-    return added, max(_CAUTION * abs(without) + abs(added), _CHANCE * abs(alone))
+    return added, max(_CAUTION * abs(without) + abs(added), _LEAST_ERROR * abs(alone))
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- Regimes ---
 
 STICK, SMOOTH, RELIEF = 0, 1, 2
-"""The regimes: nothing flows; it flows along the smooth curve; the relief valve is open."""
+"""The regimes: no flow; flow along the smooth curve; relief valve open."""
 
 
 _GAUSS = (
@@ -130,7 +129,7 @@ _GAUSS = (
 
 @compiled
 def spring_extension(e: float, p: Row) -> float:
-    """Extension of the oil spring [m] at an elastic deflection [m]; 0 inside a free play."""
+    """Compute the extension s of the oil stiffness [m] at an elastic deflection [m]; 0 inside a free play."""
     side = 1.0 if e >= 0.0 else -1.0
     extension = stroke_law(e, side, p)
     return extension if side * extension > 0.0 else 0.0
@@ -138,13 +137,13 @@ def spring_extension(e: float, p: Row) -> float:
 
 @compiled
 def spring_force(e: float, p: Row) -> float:
-    """Force of the oil spring [N] at an elastic deflection [m]; eq. (1) behind the stroke effects."""
+    """Compute F = k s [N] at an elastic deflection [m]; eq. (1) behind the stroke effects."""
     return p[K] * spring_extension(e, p)
 
 
 @compiled
 def spring_energy(e: float, p: Row, k: float) -> float:
-    """Energy [J] of an oil spring of stiffness k [N/m] at an elastic deflection [m], behind the stroke effects.
+    """Compute the energy [J] stored in a stiffness k [N/m] at an elastic deflection [m], behind the stroke effects.
 
     Equation: k integral s de; k s^2 / 2 where s rises like e
     """
@@ -161,19 +160,19 @@ def spring_energy(e: float, p: Row, k: float) -> float:
 
 @compiled
 def deflection_at(force: float, p: Row) -> float:
-    """Elastic deflection [m] at which the oil spring carries `force` [N], the nearest to zero."""
+    """Compute the elastic deflection [m] at which F = `force` [N], the nearest to zero."""
     return 0.0 if force == 0.0 else stroke_inverse(force / p[K], math.copysign(1.0, force), p)
 
 
 @compiled
 def deflection_on(force: float, p: Row, side: float) -> float:
-    """Elastic deflection [m] at which the oil spring carries a force [N] on one side, counted from there."""
+    """Compute the elastic deflection [m] at which |F| = `force` [N] on one side."""
     return stroke_inverse(side * force / p[K], side, p)
 
 
 @compiled
 def regime_of(force: float, p: Row) -> tuple[int, float]:
-    """The regime and the side (sign of F) of a force [N]."""
+    """Return the regime and the side (sign of F) of a force [N]."""
     side = 1.0 if force >= 0.0 else -1.0
     if abs(force) <= breakaway(p, side):
         return STICK, side
@@ -182,15 +181,15 @@ def regime_of(force: float, p: Row) -> tuple[int, float]:
 
 @compiled
 def over_yield(e: float, p: Row, side: float) -> float:
-    """How far the force lies above breakaway on one side [N]; inside a free play it counts on below zero."""
+    """Compute |F| minus breakaway on one side [N]; inside a free play |F| counts as negative."""
     return p[K] * (side * stroke_law(e, side, p)) - breakaway(p, side)
 
 
 @compiled
 def beyond(e: float, p: Row, regime: int, side: float) -> tuple[float, int]:
-    """How far the state lies outside its regime, as a force [N], and past which edge: -1 low, 1 high.
+    """Compute the distance of the state beyond its regime, as a force [N], and the edge: -1 low, 1 high.
 
-    Negative inside; `side` is not looked at in STICK.
+    Negative inside; `side` is ignored in STICK.
     """
     if regime == STICK:
         return over_yield(e, p, math.copysign(1.0, e)), 1
@@ -203,7 +202,7 @@ def beyond(e: float, p: Row, regime: int, side: float) -> tuple[float, int]:
 
 @compiled
 def onto_edge(e: float, p: Row, regime: int, side: float, way: int) -> tuple[float, int, float]:
-    """The deflection on the edge that is crossed, and the regime and side beyond it."""
+    """Return the deflection on the edge that is crossed, and the regime and side beyond it."""
     if regime == STICK:
         side = math.copysign(1.0, e)
     low, high = breakaway(p, side), relief(p, side)
@@ -220,7 +219,7 @@ def onto_edge(e: float, p: Row, regime: int, side: float, way: int) -> tuple[flo
 
 @compiled
 def speed_at(force: float, p: Row, regime: int, side: float, guess: float) -> float:
-    """Flow speed [m/s] of a regime's own law at |F| = force."""
+    """Compute the flow speed [m/s] at |F| = force by the law of a regime, also beyond its edge."""
     if regime == STICK:
         return 0.0
     if regime == RELIEF:
@@ -229,18 +228,16 @@ def speed_at(force: float, p: Row, regime: int, side: float, guess: float) -> fl
     return smooth_speed(force, p, side, guess)
 
 
-# ----------------------------------------------------------------------------------------------------
-# One piece of the path inside one regime: in closed form where it is straight, else by an exponential integrator.
+# --- One piece of the path inside one regime ---
 #
-# Straight pieces with standing parameters are solved in closed form. The others are integrated by the method of
-# `pzd.damper.regimes`, which takes the slope of the flow curve exactly however fast the force settles beside the
-# piece (hard oil, slow test): in the elastic deflection e where the flow curve is inverted in closed form, else in the
-# viscous force s = visc(w), in which w(s) and F(s) are both explicit and dF/ds >= 1, so that nothing is inverted.
-
+# Straight pieces with constant parameters are solved in closed form. The others are integrated by the method above,
+# which takes the slope of the flow curve exactly however fast the force settles (large k/C, slow test): in the elastic
+# deflection e where the flow curve is inverted in closed form, else in the viscous force s = visc(w), in which w(s) and
+# F(s) are both explicit and dF/ds >= 1, so that nothing is inverted.
 
 _DIFFERENCE = 1e-3  # of a step, for the drift of the flow curve with moving parameters
 _SECOND_DIFFERENCE = 0.03  # of a step, for the change of that drift: a shorter one would show rounding
-_NUDGE = 1e-7  # of the integrated variable, for the derivative of its rate
+_NUDGE = 1e-7  # of the integrated variable, for the derivative of its rate: about half the digits of a double
 
 
 class TimeStep(NamedTuple):
@@ -257,13 +254,13 @@ class TimeStep(NamedTuple):
 
 @inlined
 def row_in(step: TimeStep, at: float) -> Row:
-    """The parameter row at a moment [s] of the step."""
+    """Interpolate the parameter row at a moment [s] of the step."""
     return interpolate(step.p0, step.p1, at / step.h) if step.moving else step.p0
 
 
 @inlined
 def extension_speed(step: TimeStep, at: float) -> float:
-    """dx/dt [m/s] at a moment [s] of the step."""
+    """Interpolate dx/dt [m/s] at a moment [s] of the step."""
     return step.u0 + (step.u1 - step.u0) * at / step.h
 
 
@@ -271,7 +268,7 @@ def extension_speed(step: TimeStep, at: float) -> float:
 def piece(
     e: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep
 ) -> tuple[float, float, float]:
-    """Elastic deflection and flow speed after a piece of length dt, and its embedded error as a force [N]."""
+    """Compute elastic deflection and flow speed after a piece of length dt, and its error estimate as a force [N]."""
     if regime == STICK:
         return e + dt * extension_speed(step, at + 0.5 * dt), 0.0, 0.0
     p = row_in(step, at)
@@ -302,20 +299,20 @@ def piece(
 def _exponential(
     y: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep, explicit: bool
 ) -> tuple[float, float]:
-    """The integrated variable after dt, and its error; see `pzd.damper.regimes`."""
+    """Compute the integrated variable after dt, and its error estimate, by the exponential Rosenbrock method."""
     rate = _rate(y, w, at, regime, side, step, explicit)
     by_y, by_time = _slopes(y, rate, w, at, dt, regime, side, step, explicit)
     z, c, d = by_y * dt, STAGES[0], STAGES[1]
     over, half, late = phi(z), phi(c * z), phi(d * z)
     way, drift = rate * dt, by_time * dt * dt
     first = y + c * way * half.one + c * c * drift * half.two
-    beside = _rate(first, w, at + c * dt, regime, side, step, explicit) - rate
-    beside -= by_y * (first - y) + by_time * c * dt
+    rest = _rate(first, w, at + c * dt, regime, side, step, explicit) - rate
+    rest -= by_y * (first - y) + by_time * c * dt
     second = y + d * way * late.one + d * d * drift * late.two
-    second += dt * beside * (COUPLING[0] * half.three + COUPLING[1] * late.three)
+    second += dt * rest * (COUPLING[0] * half.three + COUPLING[1] * late.three)
     later = _rate(second, w, at + d * dt, regime, side, step, explicit) - rate
     later -= by_y * (second - y) + by_time * d * dt
-    a, b = bend(beside, later)
+    a, b = bend(rest, later)
     end = y + way * over.one + drift * over.two + dt * (2.0 * a * over.three + 6.0 * b * over.four)
     last = _rate(end, w, at + dt, regime, side, step, explicit) - rate - by_y * (end - y) - by_time * dt
     added, error = end_corrected(a, b, last, over)
@@ -326,7 +323,7 @@ def _exponential(
 def _slopes(
     y: float, rate: float, w: float, at: float, dt: float, regime: int, side: float, step: TimeStep, explicit: bool
 ) -> tuple[float, float]:
-    """Derivatives of the rate of the integrated variable by itself and by time."""
+    """Compute the derivatives of the rate of the integrated variable by itself and by time."""
     p = row_in(step, at)
     if explicit:
         rise = relief_slope(p, side) if regime == RELIEF else smooth_slope(w, p, side)
@@ -345,7 +342,7 @@ def _slopes(
 
 @compiled
 def _rate(y: float, guess: float, at: float, regime: int, side: float, step: TimeStep, explicit: bool) -> float:
-    """Rate of the integrated variable.
+    """Compute the rate of the integrated variable.
 
     Equation: de/dt = u(t) - side w(|F|)      Source: eq. (1), the flow curve inverted
     """
@@ -357,10 +354,10 @@ def _rate(y: float, guess: float, at: float, regime: int, side: float, step: Tim
 
 @compiled
 def _rate_of_force(y: float, at: float, regime: int, side: float, step: TimeStep) -> float:
-    """Rate of the integrated variable: of s in SMOOTH, of |F| in RELIEF.
+    """Compute the rate of s in SMOOTH, of |F| in RELIEF.
 
-    Equation: d|F|/dt = k s'(e) (side u - w) + (dk/dt)/k |F| + k ds/dt at e; in SMOOTH less what the moving curve
-    does by itself
+    Equation: d|F|/dt = k s'(e) (side u - w) + (dk/dt)/k |F| + k ds/dt at e; in SMOOTH minus the
+    rate of the flow curve at constant s
     """
     p = row_in(step, at)
     pull = side * extension_speed(step, at)
@@ -376,17 +373,15 @@ def _rate_of_force(y: float, at: float, regime: int, side: float, step: TimeStep
         rate = _behind_stroke(rate, smooth_force_of(s, p, side), at, p, side, step)
     if step.moving:
         span = _DIFFERENCE * step.h
-        ahead, behind = (
-            smooth_force_of(s, row_in(step, at + span), side),
-            smooth_force_of(s, row_in(step, at - span), side),
-        )
+        ahead = smooth_force_of(s, row_in(step, at + span), side)
+        behind = smooth_force_of(s, row_in(step, at - span), side)
         rate += softening * smooth_force_of(s, p, side) - (ahead - behind) / (2.0 * span)
     return rate / smooth_rise(w, p, side)
 
 
 @compiled
 def _behind_stroke(rate: float, force: float, at: float, p: Row, side: float, step: TimeStep) -> float:
-    """Rate of |F| [N/s] behind the stroke effects, at a |F| [N] whose rate without them is given.
+    """Compute the rate of |F| [N/s] behind the stroke effects from its rate without them.
 
     Equation: d|F|/dt = s'(e) rate + k ds/dt at constant e
     """
@@ -397,3 +392,107 @@ def _behind_stroke(rate: float, force: float, at: float, p: Row, side: float, st
         ahead, behind = stroke_law(e, side, row_in(step, at + span)), stroke_law(e, side, row_in(step, at - span))
         rate += p[K] * side * (ahead - behind) / (2.0 * span)
     return rate
+
+
+# --- A whole step in one regime, with a straight flow curve and T0, C and k that vary ---
+#
+# Equation: ds/dt = u + side T0/C - (k/C) s,  F = k s      Source: Makowski and Knap 2021, eq. (1)-(3), y eliminated
+#
+# With the time tau, d tau = (k/C) dt, this is ds/dtau = g - s, where g = (u C + side T0)/k is the extension of the oil
+# stiffness at which the flow is as fast as the rod. Over a step g is nearly a polynomial in tau, and with a polynomial
+# the integral is a sum of the functions phi_k of an exponential integrator, however large k/C is.
+
+NODES = (1.0 / 3.0, 2.0 / 3.0)
+"""Shares of a step at which g and k/C are evaluated besides its ends, for a cubic through four values."""
+
+
+UNSOLVED = (math.nan, math.nan)
+"""Result of a step that has to be solved piece by piece."""
+
+
+@compiled
+def whole_step(e: float, step: TimeStep, tolerance: float) -> tuple[float, float]:
+    """Compute elastic deflection [m] and flow speed [m/s] after a step that sticks or slips throughout.
+
+    Parameters
+    ----------
+    e : elastic deflection at its start [m]
+    step : between rows for which `is_straight` is true
+    tolerance : admissible error, as a share of the force
+
+    Returns
+    -------
+    both; NaN where the regime changes, the rod reverses, or g is not close enough to a polynomial
+    """
+    if step.u0 * step.u1 < 0.0:
+        return UNSOLVED
+    p, q = step.p0, step.p1
+    force = spring_force(e, p)
+    regime, side = regime_of(force, p)
+    if regime == STICK:
+        end = e + 0.5 * (step.u0 + step.u1) * step.h
+        return (end, 0.0) if regime_of(spring_force(end, q), q)[0] == STICK else UNSOLVED
+    if regime == RELIEF:
+        return UNSOLVED
+    first = Element(side * breakaway(p, side), damping(p, side), p[K])
+    if step.moving:
+        last = Element(side * breakaway(q, side), damping(q, side), q[K])
+        spring, error = _slipped(force / p[K], first, last, step)
+        if error > tolerance * abs(force / p[K]):
+            return UNSOLVED
+    else:
+        last = first
+        spring = slip(force, first.T0, step.u0, step.u1, relaxation(step.h, first.C, first.k)) / first.k
+    end = deflection_on(side * last.k * spring, q, side)
+    if side * spring <= 0.0 or regime_of(last.k * spring, q)[0] != SMOOTH:
+        return UNSOLVED
+    return end, (last.k * spring - last.T0) * side / last.C
+
+
+@compiled
+def is_straight(p: Row, q: Row) -> bool:
+    """Return whether the flow curve has straight branches alone, and T0, C and k alone differ between two rows."""
+    return effects_alike(p, q) and stroke_straight(p) and straight(p)
+
+
+@inlined
+def _slipped(e: float, first: Element, last: Element, step: TimeStep) -> tuple[float, float]:
+    """Compute the extension s [m] after slip over one step, and its error: the contribution of the third order.
+
+    Parameters
+    ----------
+    e : at its start [m]
+    first, last : elements at start and end, with the direction of flow as the sign of T0
+    step : the step
+    """
+    start, rate = _g_and_rate(first, step.u0)
+    second, rate_b = _between(first, last, step, NODES[0])
+    third, rate_c = _between(first, last, step, NODES[1])
+    end, rate_d = _g_and_rate(last, step.u1)
+    span = step.h * (rate + 3.0 * (rate_b + rate_c) + rate_d) / 8.0
+    b = step.h * (9.0 * rate + 19.0 * rate_b - 5.0 * rate_c + rate_d) / 72.0 / span
+    c = step.h * (rate + 4.0 * rate_b + rate_c) / 9.0 / span
+    by_b = (second - start) / b
+    bend = (end - start - by_b) / (1.0 - b)
+    twist = (bend - ((third - start) / c - by_b) / (c - b)) / (1.0 - c)
+    over = phi(-span)
+    slipped = e + span * ((start - e) * over.one + (by_b - bend * b) * over.two + 2.0 * bend * over.three)
+    added = span * twist * (b * over.two - 2.0 * (1.0 + b) * over.three + 6.0 * over.four)
+    return slipped + added, abs(added)
+
+
+@inlined
+def _g_and_rate(at: Element, u: float) -> tuple[float, float]:
+    """Compute g, the extension [m] at which the flow is as fast as the rod, u [m/s], and k/C [1/s]."""
+    return (u * at.C + at.T0) / at.k, at.k / at.C
+
+
+@inlined
+def _between(first: Element, last: Element, step: TimeStep, share: float) -> tuple[float, float]:
+    """Compute g and k/C at a share of a step."""
+    at = Element(
+        first.T0 + (last.T0 - first.T0) * share,
+        first.C + (last.C - first.C) * share,
+        first.k + (last.k - first.k) * share,
+    )
+    return _g_and_rate(at, step.u0 + (step.u1 - step.u0) * share)

@@ -244,7 +244,7 @@ def _tried(problem: Problem, fitted: Fitted, config: DiagnoseConfig, adopted: Se
             for effect in library().values()
             if effect.name not in (*fitted.effects, *config.forbid)
             and effect.place != "sensor"
-            and not effect.about_zero
+            and not effect.needs_displacement_zero
             and seen_in(problem, effect)
         ]
         for effect in most_promising(problem, fitted, new, SCREENED):

@@ -319,7 +319,7 @@ def next_voltage(
     fastest = rounded_down(min(reach.frequency, reach.speed / (2.0 * np.pi * amplitude)))
     frequency = min(rounded_down(frequency_of(test), MEASURED), fastest)
     motion = motion_of(sine, frequency, amplitude, voltage, temperature)
-    force = respond(predicting.damper, motion.about(-reach.middle)) + predicting.offset
+    force = respond(predicting.damper, motion.centred_on(-reach.middle)) + predicting.offset
     if np.min(force) < reach.force[0] or np.max(force) > reach.force[1]:
         return None
     return NextTest(

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pzd.damper.compiled.columns import NEUTRAL, acting, columns_of, value_of
-from pzd.damper.compiled.laws import ELEMENT
-from pzd.damper.compiled.rows import nodes_of
-from pzd.damper.material import material
+from pzd.damper.effect import ELEMENT
 from pzd.damper.model import Damper
+from pzd.damper.parameter_rows import bingham_parameters, nodes_of
 from pzd.export.content import Content
 from pzd.record import Array
 from pzd.schema.errors import ConfigError
@@ -142,7 +141,10 @@ class Dynamics:
         signals = nodes_of(damper, at_temperatures[0]).voltages
         # drift is left out of the rows: element.c applies it at the temperature of each step
         extra = np.broadcast_to(columns_of(damper, COLUMNS, signals), (signals.size, len(COLUMNS)))
-        bases = [np.broadcast_to(material(still, signals, T), (signals.size, len(ELEMENT))) for T in at_temperatures]
+        bases = [
+            np.broadcast_to(bingham_parameters(still, signals, T), (signals.size, len(ELEMENT)))
+            for T in at_temperatures
+        ]
         return cls(
             temperatures,
             signals,

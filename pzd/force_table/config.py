@@ -40,7 +40,7 @@ class TableConfig(Frozen):
     `settings.csv` holds the force, linear in the number."""
 
     def between(self, tested: Sequence[str | None]) -> tuple[Neighbours, ...]:
-        """The wanted settings, each with its neighbours among the tested ones.
+        """Return the wanted settings, each with its neighbours among the tested ones.
 
         Parameters
         ----------

@@ -1,9 +1,8 @@
-"""Reading a table: force, range of force and voltage at any voltage and velocity."""
+"""Interpolation in a force table: force, range of force and voltage at any voltage and velocity, and its inverse."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Self
 
@@ -16,18 +15,16 @@ from pzd.force_table.config import TableConfig
 from pzd.record import Array
 from pzd.schema.errors import DataError
 
-# ----------------------------------------------------------------------------------------------------
-# The table as regular arrays, read by compiled code: the one place where it is interpolated.
+# --- Interpolation in the compiled code of the ride; the one place where a table is interpolated ---
 #
-# Between nodes the force is linear in the voltage and linear in the speed, as the damper's own
-# parameters are linear in the voltage: it never overshoots, keeps every rise, and its inverse at a
-# given speed is a line as well, so that force and inverse agree to rounding. The branches v >= +0
-# and v <= -0 are two arrays: nothing is ever interpolated across v = 0.
+# Between nodes the force is linear in the voltage and linear in the speed, as the damper's own parameters are linear in
+# the voltage: it never overshoots, preserves every rise, and its inverse at a given speed is a line as well, so that
+# force and inverse agree to rounding. The branches v >= +0 and v <= -0 are two arrays: none is interpolated across 0.
 
 
 @compiled
 def bracket(nodes: Array, value: float) -> int:
-    """Index i of the interval nodes[i] <= value <= nodes[i + 1], the outermost one beyond the ends."""
+    """Find the index i of the interval nodes[i] <= value <= nodes[i + 1], the outermost one beyond the ends."""
     low, high = 0, nodes.size - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -42,7 +39,7 @@ def bracket(nodes: Array, value: float) -> int:
 def table_force(
     voltages: Array, speeds: Array, rebound: Array, compression: Array, voltage: float, velocity: float
 ) -> float:
-    """Force at one voltage and velocity; held beyond the outermost nodes.
+    """Interpolate the force at one voltage and velocity; constant beyond the outermost nodes.
 
     Equation: F = sum over the cell's corners of w_U w_v F_ij, w linear      Source: bilinear interpolation
 
@@ -76,7 +73,7 @@ def table_force(
 def table_voltage(
     voltages: Array, speeds: Array, rebound: Array, compression: Array, force: float, velocity: float
 ) -> float:
-    """Lowest voltage that gives a force at a velocity.
+    """Find the lowest voltage that gives a force at a velocity.
 
     Equation: U = U_i + (F - F_i) (U_i+1 - U_i) / (F_i+1 - F_i) in the first interval that holds F
                                                                 Source: inverse of the linear interpolation
@@ -102,7 +99,7 @@ def table_voltage(
         if min(before, after) <= force <= max(before, after):
             step = (force - before) / (after - before) if after != before else 0.0
             return float(voltages[i] + step * (voltages[i + 1] - voltages[i]))
-        if force == after:  # beside an empty cell
+        if force == after:  # next to an empty cell
             return float(voltages[i + 1])
         before = after
     return float(np.nan)
@@ -110,7 +107,7 @@ def table_voltage(
 
 @compiled
 def table_range(speeds: Array, rebound: Array, compression: Array, velocity: float) -> tuple[float, float]:
-    """Lowest and highest force that any voltage gives at a velocity.
+    """Find the lowest and highest force that any voltage gives at a velocity.
 
     Parameters
     ----------
@@ -134,7 +131,7 @@ def table_range(speeds: Array, rebound: Array, compression: Array, velocity: flo
 
 @compiled
 def _along(column: Array, j: int, share: float) -> float:
-    """Force between two speeds of one voltage; exact at the nodes, also beside an empty cell."""
+    """Interpolate between two speeds of one voltage; exact at the nodes, also next to an empty cell."""
     if share <= 0.0:
         return float(column[j])
     if share >= 1.0:
@@ -142,45 +139,18 @@ def _along(column: Array, j: int, share: float) -> float:
     return float(column[j] + share * (column[j + 1] - column[j]))
 
 
-@compiled
-def table_forces(
-    voltages: Array, speeds: Array, rebound: Array, compression: Array, voltage: Array, velocity: Array, out: Array
-) -> None:
-    """Fill `out` (n,) with `table_force` of (n,) voltages and velocities."""
-    for i in range(out.size):
-        out[i] = table_force(voltages, speeds, rebound, compression, voltage[i], velocity[i])
-
-
-@compiled
-def table_voltages(
-    voltages: Array, speeds: Array, rebound: Array, compression: Array, force: Array, velocity: Array, out: Array
-) -> None:
-    """Fill `out` (n,) with `table_voltage` of (n,) forces and velocities."""
-    for i in range(out.size):
-        out[i] = table_voltage(voltages, speeds, rebound, compression, force[i], velocity[i])
-
-
-@compiled
-def table_ranges(speeds: Array, rebound: Array, compression: Array, velocity: Array, low: Array, high: Array) -> None:
-    """Fill `low` and `high` (n,) with `table_range` of (n,) velocities."""
-    for i in range(velocity.size):
-        low[i], high[i] = table_range(speeds, rebound, compression, velocity[i])
-
-
-# ----------------------------------------------------------------------------------------------------
-
+# --- A table at one temperature ---
 
 FAR = 1000.0
-"""Speed to which the outermost interval is drawn out [m/s]."""
+"""Speed to which the outermost interval is extended [m/s]: no suspension is faster."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lookup:
-    """The table at one temperature as regular arrays, for this class and for compiled loops.
+    """A force table at one temperature as regular arrays, from which the compiled functions above interpolate.
 
-    The arrays go into `table_force`, `table_voltage` and `table_range` of `pzd.force_table.lookup`.
-    The last speed is a node drawn out to `FAR`: the last force where the table clamps, the last
-    slope where it goes on with the model, no value (NaN) where it ends.
+    The last speed is a node at `FAR`, with the last force where the table clamps, along the last slope where it goes on
+    with the model, and without a value (NaN) where it ends.
     """
 
     voltages: Array
@@ -191,12 +161,17 @@ class Lookup:
     """(m, n) force at +speed, first column v = +0 [N]; NaN where the table is empty."""
     compression: Array
     """(m, n) force at -speed, first column v = -0 [N]; NaN where the table is empty."""
-    reach: Array
-    """(m,) largest speed that the rig reached at each voltage [m/s]."""
+    envelope: Array
+    """(m,) largest tested speed at each voltage [m/s]."""
+
+    @property
+    def arrays(self) -> tuple[Array, Array, Array, Array]:
+        """The first arguments of the compiled functions."""
+        return self.voltages, self.speeds, self.rebound, self.compression
 
     @classmethod
     def of(cls, table: Table, temperature: float | None = None) -> Self:
-        """The table at one temperature, linear between its temperatures and held beyond them.
+        """Return the table at one temperature, linear between its temperatures and constant beyond them.
 
         Parameters
         ----------
@@ -213,44 +188,37 @@ class Lookup:
             weights = {min(slices, key=lambda t: t if t is not None else -np.inf): 1.0}
         else:
             weights = _weights(sorted(known), temperature)
-        forces = sum(weight * slices[t][2] for t, weight in weights.items())
+        forces = np.asarray(sum(weight * slices[t][2] for t, weight in weights.items()))
         inside = np.all([slices[t][3] for t in weights], axis=0)
         voltages, velocity = next(iter(slices.values()))[:2]
-        return cls._of_grid(voltages, velocity, np.asarray(forces), inside, table.notes.outside == "clamp")
-
-    @classmethod
-    def _of_grid(cls, voltages: Array, velocity: Array, forces: Array, inside: NDArray[np.bool_], held: bool) -> Self:
+        clamped = table.notes.outside == "clamp"
         half = velocity.size // 2
         speeds = np.append(velocity[half:], FAR)
-        rebound = _drawn_out(speeds, forces[:, half:], held)
-        compression = _drawn_out(speeds, forces[:, half - 1 :: -1], held)
-        reach = np.max(np.where(inside, np.abs(velocity), 0.0), axis=1)
-        return cls(voltages, speeds, rebound, compression, reach)
+        rebound = _extended(speeds, forces[:, half:], clamped)
+        compression = _extended(speeds, forces[:, half - 1 :: -1], clamped)
+        envelope = np.max(np.where(inside, np.abs(velocity), 0.0), axis=1)
+        return cls(voltages, speeds, rebound, compression, envelope)
 
     def force(self, voltage: ArrayLike, velocity: ArrayLike) -> Array:
-        """Force [N] at voltages and velocities (broadcast); NaN where the table ends."""
-        U, v, out = _broadcast(voltage, velocity)
-        table_forces(self.voltages, self.speeds, self.rebound, self.compression, U.ravel(), v.ravel(), out.reshape(-1))
-        return out
+        """Interpolate the force [N] at voltages and velocities (broadcast); NaN where the table ends."""
+        U, v = _broadcast(voltage, velocity)
+        return np.reshape([table_force(*self.arrays, *each) for each in zip(U.flat, v.flat, strict=True)], U.shape)
 
     def range(self, velocity: ArrayLike) -> tuple[Array, Array]:
-        """Lowest and highest force [N] that any voltage gives at velocities; (inf, -inf) where the table ends."""
-        v, low = np.array(velocity, dtype=np.float64), np.empty(np.shape(velocity))
-        high = np.empty_like(low)
-        table_ranges(self.speeds, self.rebound, self.compression, v.ravel(), low.reshape(-1), high.reshape(-1))
-        return low, high
+        """Find the range of force [N] that the voltages give at velocities; (inf, -inf) where the table ends."""
+        v = np.asarray(velocity, dtype=np.float64)
+        ends = [table_range(self.speeds, self.rebound, self.compression, each) for each in v.flat]
+        low, high = np.reshape(ends, (-1, 2)).T
+        return low.reshape(v.shape), high.reshape(v.shape)
 
     def voltage_for(self, force: ArrayLike, velocity: ArrayLike) -> Array:
-        """Lowest voltage [V] that gives a force at a velocity (broadcast); NaN where none does."""
-        F, v, out = _broadcast(force, velocity)
-        table_voltages(
-            self.voltages, self.speeds, self.rebound, self.compression, F.ravel(), v.ravel(), out.reshape(-1)
-        )
-        return out
+        """Find the lowest voltage [V] that gives a force at a velocity (broadcast); NaN where none does."""
+        F, v = _broadcast(force, velocity)
+        return np.reshape([table_voltage(*self.arrays, *each) for each in zip(F.flat, v.flat, strict=True)], F.shape)
 
     def nearest_voltage_for(self, force: ArrayLike, velocity: ArrayLike) -> Array:
-        """Lowest voltage [V] whose force comes nearest to the wanted one; NaN where the table ends."""
-        F, v, _ = _broadcast(force, velocity)
+        """Find the lowest voltage [V] whose force comes nearest to the wanted one; NaN where the table ends."""
+        F, v = _broadcast(force, velocity)
         low, high = self.range(v)
         found = self.voltage_for(np.clip(F, low, high), v)
         gap = np.isnan(found) & (low <= high)
@@ -259,25 +227,26 @@ class Lookup:
         return found
 
     def inside(self, voltage: ArrayLike, velocity: ArrayLike) -> NDArray[np.bool_]:
-        """Whether the rig reached that speed at that voltage, linear between the voltages."""
-        reached = np.interp(np.asarray(voltage, dtype=np.float64), self.voltages, self.reach)
-        within: NDArray[np.bool_] = np.abs(velocity) <= reached * (1.0 + 1e-9)
-        return within
+        """Return whether a speed at a voltage lies in the operating envelope, linear between the voltages."""
+        limit = np.interp(np.asarray(voltage, dtype=np.float64), self.voltages, self.envelope)
+        return np.asarray(np.abs(velocity) <= limit * (1.0 + 1e-9))
 
 
-def _broadcast(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array, Array]:
+def _broadcast(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array]:
+    """Return two arrays of numbers in one shape."""
     a, b = np.broadcast_arrays(np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64))
-    return a.copy(), b.copy(), np.empty(a.shape)
+    return a, b
 
 
-def _drawn_out(speeds: Array, forces: Array, held: bool) -> Array:
-    """The branch with one more node at `FAR`: held, or along the last slope (NaN stays NaN)."""
+def _extended(speeds: Array, forces: Array, clamped: bool) -> Array:
+    """Return a branch with one more node at `FAR`: constant, or along the last slope (NaN stays NaN)."""
     last = forces[:, -1]
-    slope = 0.0 if held or forces.shape[1] < 2 else (last - forces[:, -2]) / (speeds[-2] - speeds[-3])
+    slope = 0.0 if clamped or forces.shape[1] < 2 else (last - forces[:, -2]) / (speeds[-2] - speeds[-3])
     return np.ascontiguousarray(np.column_stack([forces, last + slope * (speeds[-1] - speeds[-2])]))
 
 
 def _weights(temperatures: list[float], wanted: float) -> dict[float | None, float]:
+    """Return the weights of the temperatures on either side."""
     at = float(np.interp(wanted, temperatures, np.arange(len(temperatures))))
     low = min(int(at), len(temperatures) - 2)
     shares = {temperatures[low]: 1.0 - (at - low), temperatures[low + 1]: at - low}
@@ -285,7 +254,7 @@ def _weights(temperatures: list[float], wanted: float) -> dict[float | None, flo
 
 
 def _slices(rows: tuple[ForceRow, ...]) -> dict[float | None, tuple[Array, Array, Array, NDArray[np.bool_]]]:
-    """Voltages, velocities, forces and inside of each temperature, checked to be one grid."""
+    """Return voltages, velocities, forces and inside of each temperature, after a check that they are one grid."""
     found: dict[float | None, tuple[Array, Array, Array, NDArray[np.bool_]]] = {}
     for temperature in dict.fromkeys(row.temperature_degC for row in rows):
         mine = [row for row in rows if row.temperature_degC == temperature]
@@ -300,6 +269,12 @@ def _slices(rows: tuple[ForceRow, ...]) -> dict[float | None, tuple[Array, Array
 
 
 def _grid(rows: list[ForceRow], place: str) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Return voltages (m,), velocities (n,), forces (m, n) and inside (m, n) of one temperature.
+
+    Raises
+    ------
+    DataError : when they are no grid; with the place
+    """
     voltages = np.array([0.0 if u is None else u for u in dict.fromkeys(row.voltage_V for row in rows)])
     if len(rows) % voltages.size:
         raise DataError(f"force.csv: {place}: not the same velocities at every voltage")
@@ -324,39 +299,34 @@ def _grid(rows: list[ForceRow], place: str) -> tuple[Array, Array, Array, NDArra
     return voltages, velocity[0], forces, inside
 
 
-# ----------------------------------------------------------------------------------------------------
-# The voltage that gives a force at a speed, as rows of a regular table.
+# --- The inverse table ---
 
 
 def inverse_rows(config: TableConfig, table: Table) -> tuple[InverseRow, ...]:
-    """Voltage over velocity and force, read off the table of force.
+    """Invert the table of force: voltage over velocity and force.
 
-    At each speed the forces are spaced evenly from the least to the largest that the damper gives there, so that
-    every row has its voltage. Where several voltages give the force the lowest stands; a force within a gap of the
-    table, whose ends were tested and whose middle was not, is empty or holds the voltage that comes nearest, as
-    `unreachable` says. Speeds at which the table is empty are left out; so is all without a control signal.
+    At each speed the forces are spaced evenly from the least to the largest that the damper gives there, so that every
+    row has its voltage. Where several voltages give the force the lowest is taken; a force within a gap of the table,
+    tested at its ends and not between, gets no voltage or the one that comes nearest, as `unreachable` says. Speeds
+    at which the table is empty are left out; without a control signal there are no rows.
     """
     if any(row.voltage_V is None for row in table.force):
         return ()
     rows: list[InverseRow] = []
     for temperature in dict.fromkeys(row.temperature_degC for row in table.force):
         lookup = Lookup.of(table, temperature)
+        read = lookup.voltage_for if config.unreachable == "empty" else lookup.nearest_voltage_for
         speeds = lookup.speeds[:-1]
         for velocity in (*-speeds[::-1], *speeds):
-            rows += _at(config, lookup, temperature, float(velocity))
+            low, high = lookup.range(velocity)
+            levels = np.unique(np.linspace(low, high, config.force_levels)) if low <= high else np.empty(0)
+            rows += [
+                InverseRow(
+                    temperature_degC=temperature,
+                    velocity_m_per_s=float(velocity),
+                    force_N=float(force),
+                    voltage_V=None if np.isnan(voltage) else float(voltage),
+                )
+                for force, voltage in zip(levels, read(levels, velocity), strict=True)
+            ]
     return tuple(rows)
-
-
-def _at(config: TableConfig, lookup: Lookup, temperature: float | None, velocity: float) -> Iterator[InverseRow]:
-    low, high = lookup.range(velocity)
-    if not low <= high:
-        return
-    read = lookup.voltage_for if config.unreachable == "empty" else lookup.nearest_voltage_for
-    levels = np.unique(np.linspace(low, high, config.force_levels))
-    for force, voltage in zip(levels, read(levels, velocity), strict=True):
-        yield InverseRow(
-            temperature_degC=temperature,
-            velocity_m_per_s=velocity,
-            force_N=float(force),
-            voltage_V=None if np.isnan(voltage) else float(voltage),
-        )

@@ -1,4 +1,4 @@
-"""The table stage: the damper that diagnose hands on becomes a table of force and its inverse."""
+"""The stage table: the final damper of diagnose becomes a table of force and its inverse."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ WARM_STEPS = 5
 def tabulate(
     table: TableConfig, rig: Rig, identified: Identified, diagnosed: Diagnosed, control: Control, setting: str | None
 ) -> Table:
-    """Force over (temperature, voltage, velocity) at steady slip, its inverse, and settings between tested ones.
+    """Tabulate the force at steady slip, its inverse, and settings between tested ones.
 
     Parameters
     ----------
     table : the config's block
-    rig : the records, for the speeds that were reached
+    rig : the records, for the operating envelope
     identified : the dampers of all settings, for those between
     diagnosed : the damper to tabulate
-    control : the control signal, for the words of the notes
+    control : the control signal, for the text of the notes
     setting : of the rig's settings, the one in use
 
     Raises
     ------
-    ConfigError : when a setting that is asked for does not lie between tested ones
+    ConfigError : when a wanted setting does not lie between tested ones
     """
     made = force_table(table, rig, diagnosed, control, setting)
     if table.settings is None:
@@ -48,37 +48,33 @@ def tabulate(
 
 
 def force_table(table: TableConfig, rig: Rig, diagnosed: Diagnosed, control: Control, setting: str | None) -> Table:
-    """Force over (temperature, voltage, velocity) at steady slip, its inverse, and what it cannot carry.
+    """Tabulate the force over (temperature, voltage, velocity) at steady slip, its inverse, and what it cannot hold.
 
     Parameters
     ----------
-    table : the config's block
-    rig : the records, for the speeds that were reached
-    diagnosed : the damper to tabulate
-    control : the control signal, for the words of the notes
-    setting : of the rig's settings, the one in use
+    table, rig, diagnosed, control, setting : as `tabulate`
     """
-    from pzd.force_table.force import force_rows, grid, lost, not_monotone, reached, temperatures_of, voltages_of
-    from pzd.force_table.lookup import inverse_rows
+    from pzd.force_table import force, lookup
 
     damper = diagnosed.damper
     records = [record for record in rig.records if record.setting == setting]
-    reach = reached(records, temperatures_of(diagnosed.baseline), voltages_of(diagnosed.baseline))
-    nodes = grid(table, damper, _temperatures(table, damper, records), reach)
+    given = force.temperatures_of(diagnosed.plain), force.voltages_of(diagnosed.plain)
+    envelope = force.operating_envelope(records, *given)
+    nodes = force.grid(table, damper, _temperatures(table, damper, records), envelope)
     notes = TableNotes(
         outside=table.outside,
-        reached_m_per_s=float(np.nanmax(reach.speeds)),
-        lost=lost(damper, nodes.temperatures, nodes.velocities),
-        not_monotone=not_monotone(damper, nodes.temperatures, nodes.velocities, control),
+        reached_m_per_s=float(np.nanmax(envelope.speeds)),
+        lost=force.lost(damper, nodes.temperatures, nodes.velocities),
+        not_monotone=force.not_monotone(damper, nodes.temperatures, nodes.velocities, control),
     )
     for line in notes.not_monotone:
         log.info("table: %s", line)
-    forward = Table(force_rows(table, damper, nodes, reach), (), notes)
-    return Table(forward.force, inverse_rows(table, forward), notes)
+    forward = Table(force.force_rows(table, damper, nodes, envelope), (), notes)
+    return replace(forward, inverse=lookup.inverse_rows(table, forward))
 
 
 def _temperatures(table: TableConfig, damper: Damper, records: Sequence[Record]) -> tuple[float | None, ...]:
-    """The temperatures of the table: as configured, over the rig's range under drift, else the damper's."""
+    """Return the temperatures of the table: as configured, over the rig's range under drift, else the damper's."""
     from pzd.damper.confounders import known
     from pzd.force_table.force import temperatures_of
 

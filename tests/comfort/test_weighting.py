@@ -34,7 +34,7 @@ def test_wk_of_2017_is_the_formula_at_true_centres() -> None:
     assert np.abs(factors(WK, "f_true_Hz_10^(n/10)") / table - 1.0).max() < 0.000345
 
 
-def test_the_same_formula_without_the_upward_step_gives_wd() -> None:
+def test_the_response_without_the_upward_step_is_wd() -> None:
     rows = printed()
     table = np.array([row["Wd_x1000_ISO2631-1_1997_Table3"] for row in rows])
     kept = np.array([row["f_nominal_Hz"] != MISPRINT_HZ for row in rows])
@@ -75,14 +75,14 @@ def test_wk_at_the_papers_frequencies(frequency: float, factor: float) -> None:
 
 @pytest.mark.parametrize("rate", [200.0, 500.0, 1000.0])
 @pytest.mark.parametrize("frequency", [0.5, 2.25, 4.5, 20.0, 63.0, 80.0])
-def test_a_settled_sine_keeps_its_form_and_takes_the_factor(rate: float, frequency: float) -> None:
+def test_a_settled_sine_is_multiplied_by_the_response(rate: float, frequency: float) -> None:
     time = np.arange(round(24.0 * rate)) / rate
     settled = weighted(np.sin(2.0 * np.pi * frequency * time), rate)[round(8.0 * rate) :]
     expected = abs(response(WK, np.array([frequency]))[0]) / np.sqrt(2.0)
     assert np.sqrt(np.mean(settled**2)) == pytest.approx(expected, rel=2e-3)
 
 
-def test_four_seconds_of_ride_are_enough_to_settle() -> None:
+def test_the_weighting_has_settled_after_four_seconds() -> None:
     rate = 500.0
     for phase in np.linspace(0.0, np.pi, 5):
         time = np.arange(round(20.0 * rate)) / rate
@@ -97,7 +97,7 @@ def test_the_end_of_a_ride_does_not_wrap_round_to_its_start() -> None:
     assert np.abs(weighted(ride, rate)[:4000]).max() < 2e-4 * 10.0
 
 
-def test_gravity_left_in_is_forgotten() -> None:
+def test_a_constant_gravity_decays_in_the_weighted_history() -> None:
     rate = 500.0
     assert np.abs(weighted(np.full(10000, 9.81), rate)[round(8.0 * rate) :]).max() < 1e-5
 

@@ -1,4 +1,4 @@
-"""The hysteresis of Bouc and Wen: against another solver, what it loses, and what tells it from its neighbours."""
+"""The hysteresis of Bouc and Wen: against another solver, its dissipation, and its distinction from its neighbours."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def lost(motion: Motion, force: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("sigma", [0.5, 1.0, 4.0])
-def test_as_the_equation_of_the_source_by_another_solver_it_converges_with_the_square_of_the_step(sigma: float) -> None:
+def test_bouc_and_wen_converges_to_another_solver_with_the_square_of_the_step(sigma: float) -> None:
     """dz/dt = A v - gamma |v| |z| z - beta v z^2 with z in newtons, on two tones."""
     A = F_H / X_H
     gamma, beta = (share * A / F_H**2 for share in (sigma, 1.0 - sigma))
@@ -80,7 +80,7 @@ def test_two_travels_to_one_side_are_their_sum(rng: np.random.Generator) -> None
 
 
 @pytest.mark.parametrize("sigma", [0.5, 1.0, 4.0])
-def test_the_rate_is_the_derivative_of_what_a_travel_makes(sigma: float) -> None:
+def test_the_rate_is_the_derivative_of_the_deflection_by_the_travel(sigma: float) -> None:
     for side in (-1.0, 1.0):
         for z in (-0.9, -0.3, 0.2, 0.7):
             step = side * 1e-6 * X_H
@@ -90,7 +90,7 @@ def test_the_rate_is_the_derivative_of_what_a_travel_makes(sigma: float) -> None
 
 @pytest.mark.parametrize("frequency", [0.1, 10.0])
 @pytest.mark.parametrize("sigma", [0.5, 2.0])
-def test_a_small_loop_loses_by_the_fourth_power_of_its_amplitude_whatever_the_speed(
+def test_a_small_loop_of_bouc_and_wen_dissipates_with_the_fourth_power_of_its_amplitude_at_any_speed(
     sigma: float, frequency: float
 ) -> None:
     """sigma F_h A^4/x_h^3 to lowest order: where `second_branch` is a spring and loses nothing."""
@@ -101,7 +101,7 @@ def test_a_small_loop_loses_by_the_fourth_power_of_its_amplitude_whatever_the_sp
         assert abs(lost(motion, beside(motion, "second_branch", branch))) < 1e-3 * sigma * F_H * X_H * share**4
 
 
-def test_a_wide_loop_loses_what_the_closed_form_says() -> None:
+def test_a_wide_loop_of_bouc_and_wen_dissipates_the_closed_form() -> None:
     """Each half cycle is short of F_h by 3/2 x_h while it unwinds straight, and by ln 2 x_h while it winds up."""
     motion = sine(50.0 * X_H, 1.0, 20000)
     force = force_of(motion)
@@ -109,7 +109,7 @@ def test_a_wide_loop_loses_what_the_closed_form_says() -> None:
     assert lost(motion, force) == pytest.approx(F_H * X_H * (200.0 - 2.0 * (1.5 + np.log(2.0))), rel=1e-6)
 
 
-def test_one_speed_at_two_amplitudes_tells_its_loop_in_millimetres_from_a_rounded_yield_in_metres_per_second() -> None:
+def test_one_speed_at_two_amplitudes_distinguishes_bouc_and_wen_from_a_rounded_yield() -> None:
     """How far from zero force the rod is, and how fast, where the force has come up to half of what it reaches."""
     fast = 0.2
     rigid = Damper(base=(BaseRow(T0_N=F_H, C_Ns_per_m=1e-3, k_N_per_m=1e9),))

@@ -1,16 +1,17 @@
-"""The second branch: closed forms, how it is told from its neighbours, and that sampling and frame change nothing."""
+"""Branches: closed forms, distinction from their neighbours, and independence of sampling and frame."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from pzd.damper.compiled.laws import arguments
-from pzd.damper.compose import branch_forces, constant_rows, parallel_rows, respond, static_force, steady_force
+from pzd.damper.compose import branch_forces, respond, static_force, steady_force
 from pzd.damper.confounders import module_of
+from pzd.damper.effect import arguments
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import constant_rows, parallel_rows
 from pzd.rig.stand.frame import force_in_frame
 
 PLAIN = Damper(
@@ -44,14 +45,14 @@ def lost(motion: Motion, force: np.ndarray) -> float:
     return float(np.trapezoid(force[last], motion.displacement[last]))
 
 
-def test_inside_its_shelf_it_is_a_spring_and_loses_nothing() -> None:
+def test_inside_its_shelf_a_branch_is_a_spring_and_dissipates_nothing() -> None:
     motion = sine(0.9 * SHELF)
     np.testing.assert_allclose(beside(motion), STIFFNESS * motion.displacement, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("frequency", [0.1, 10.0])
 @pytest.mark.parametrize("amplitude", [1.5, 4.0, 20.0])
-def test_beyond_it_loses_four_times_its_force_over_what_it_slips_whatever_the_speed(
+def test_beyond_its_shelf_a_branch_dissipates_four_times_its_force_times_the_slip_at_any_speed(
     amplitude: float, frequency: float
 ) -> None:
     """Masing's loop: each half cycle winds it through 2 T0_2/k_2 and slips through the rest of 2 A."""
@@ -61,7 +62,7 @@ def test_beyond_it_loses_four_times_its_force_over_what_it_slips_whatever_the_sp
     assert lost(motion, force) == pytest.approx(4.0 * SLIPS * (amplitude - 1.0) * SHELF, rel=1e-5)
 
 
-def test_a_small_amplitude_tells_it_from_a_rounded_yield_and_a_lash() -> None:
+def test_a_small_amplitude_distinguishes_a_branch_from_a_rounded_yield_and_a_lash() -> None:
     """Inside the shelf a rounded yield loses as much as its speed says, and behind a lash nothing pulls at all."""
     motion = sine(0.9 * SHELF)
     slippery = Damper(base=(BaseRow(T0_N=SLIPS, C_Ns_per_m=1.0, k_N_per_m=1e7),))
@@ -72,7 +73,7 @@ def test_a_small_amplitude_tells_it_from_a_rounded_yield_and_a_lash() -> None:
     assert abs(lost(motion, beside(motion))) < 1e-6 * SLIPS * SHELF
 
 
-def test_one_speed_at_two_amplitudes_tells_a_shelf_in_millimetres_from_one_in_metres_per_second() -> None:
+def test_one_speed_at_two_amplitudes_distinguishes_a_branch_from_a_rounded_yield() -> None:
     """Where the force comes up to half its way behind a reversal: at the same travel, not at the same speed."""
     fast = 0.2
 
@@ -103,7 +104,7 @@ def zigzag(corners: np.ndarray, parts: int) -> Motion:
     return Motion(fine, x, v, np.zeros_like(v))
 
 
-def test_a_step_is_cut_where_the_rod_turns_round(rng: np.random.Generator) -> None:
+def test_a_step_is_cut_where_the_rod_reverses(rng: np.random.Generator) -> None:
     """Against the same motion in steps a four hundredth as long, whose ends lie beside the turns."""
     corners = rng.normal(0.0, 0.2, 400)
     whole, fine = zigzag(corners, 1), zigzag(corners, 400)
@@ -134,7 +135,7 @@ def test_where_its_parameters_move_the_error_falls_with_the_square_of_the_step()
     assert errors[2] < 2.0 / 81.0 * errors[0]
 
 
-def test_steady_slip_is_a_dry_friction_and_at_rest_there_is_nothing() -> None:
+def test_at_steady_slip_a_branch_is_a_dry_friction_and_at_rest_it_has_no_force() -> None:
     speeds = np.array([-0.3, -0.0, 0.0, 0.3])
     damper = PLAIN.with_effect("second_branch", BY_VOLTAGE)
     for voltage, slips in ((0.0, 60.0), (75.0, 155.0), (150.0, 250.0)):
@@ -146,7 +147,7 @@ def test_steady_slip_is_a_dry_friction_and_at_rest_there_is_nothing() -> None:
     assert respond(damper, even)[-1] == pytest.approx(float(steady_force(damper, 75.0, None, 0.1)), rel=1e-9)
 
 
-def test_behind_a_frame_it_is_wound_by_the_damper_s_own_extension() -> None:
+def test_behind_a_frame_a_branch_follows_the_extension_of_the_damper() -> None:
     """Inside its shelf as a spring beside the element is; a frame that gives takes part of the travel."""
     motion, never = sine(0.01), {"T0_2": 1e6, "k_2": 8000.0}
     spring, branch = PLAIN.with_effect("gas_spring", {"k_g": 8000.0}), PLAIN.with_effect("second_branch", never)
@@ -155,7 +156,7 @@ def test_behind_a_frame_it_is_wound_by_the_damper_s_own_extension() -> None:
     assert np.max(np.abs(behind - respond(branch, motion))) > 1.0
 
 
-def test_the_rate_is_the_derivative_of_what_a_travel_makes() -> None:
+def test_the_rate_is_the_derivative_of_the_deflection_by_the_travel() -> None:
     """The half-car books by it what is stored and what slips."""
     for effect in (effect for effect in library().values() if effect.place == "branch"):
         laws = module_of(effect)
@@ -178,6 +179,6 @@ def test_two_travels_to_one_side_are_their_sum_and_a_step_may_be_cut_anywhere(rn
             assert advance(advance(deflection, same_way, **values), second, **values) == pytest.approx(ended, abs=1e-14)
 
 
-def test_no_verdict_names_it() -> None:
+def test_no_verdict_names_a_branch() -> None:
     assert "second_branch" in library()
     assert "second_branch" not in nameable()

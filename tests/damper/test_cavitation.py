@@ -1,4 +1,4 @@
-"""The pocket: what a slow sine shows of it, which a free play and an asymmetry do not show."""
+"""The pocket: its distinction from a free play and an asymmetry by a slow sine."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def even_part(force: np.ndarray) -> float:
     return float(np.max(size[2:40:2]) / size[1])
 
 
-def test_even_harmonics_tell_it_from_a_free_play_wherever_that_has_its_zero() -> None:
+def test_even_harmonics_distinguish_a_pocket_from_a_free_play_at_any_zero() -> None:
     for middle in (0.0, 0.013):
         assert even_part(last_cycle({"lash": {"delta": 2.0e-3}}, middle)[1]) < 1e-6
         assert even_part(last_cycle({"frame_compliance": {"d_f": 1.0e-3, "s_f": 4.0e-4}}, middle)[1]) < 1e-6
     assert even_part(last_cycle({"cavitation": POCKET})[1]) > 0.01
 
 
-def test_the_plateaus_tell_it_from_an_asymmetry() -> None:
+def test_the_plateaus_distinguish_a_pocket_from_an_asymmetry() -> None:
     """Where the speed is largest the oil has long been slipping: both ways alike, with a pocket; apart, without."""
 
     def both_ways(effects: dict[str, dict[str, float]]) -> float:
@@ -54,7 +54,7 @@ def test_the_plateaus_tell_it_from_an_asymmetry() -> None:
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_it_is_boyle_s_pocket_on_its_side_and_nothing_on_the_other(side: float) -> None:
+def test_cavitation_is_a_boyle_pocket_on_its_side_and_rigid_on_the_other(side: float) -> None:
     """The pocket of length d_c at a pressure p_c has the length d_c p_c/p under p, and p - p_c presses on A."""
     k, area, pressure = 2e5, 1e-3, 8e4
     s_c = pressure * area / k
@@ -66,7 +66,7 @@ def test_it_is_boyle_s_pocket_on_its_side_and_nothing_on_the_other(side: float) 
 
 
 @pytest.mark.parametrize("d_c", [-3e-3, 1e-9, 2e-3])
-def test_law_and_slope_belong_to_the_inverse_to_rounding(d_c: float) -> None:
+def test_law_and_slope_of_a_pocket_are_those_of_its_inverse_to_rounding(d_c: float) -> None:
     for s_c in (1e-7, 1e-4, 1.0):
         for e in (-1e-2, -1e-4, -1e-9, 1e-9, 1e-4, 1e-2):
             for side in (-1.0, 1.0):  # the other side too: a free play before it is looked for there

@@ -78,7 +78,7 @@ def test_sensitivities_are_the_limit_of_central_differences(rng: np.random.Gener
     assert np.max(np.abs(slopes[:, column] - expected)) <= 1e-6 * np.max(np.abs(expected))
 
 
-def test_many_elements_at_once_give_what_each_gives_by_itself(rng: np.random.Generator) -> None:
+def test_many_elements_at_once_give_the_force_of_each(rng: np.random.Generator) -> None:
     x = np.cumsum(rng.standard_normal(500)) * 1e-3
     elements = np.column_stack([rng.uniform(100, 1000, 20), rng.uniform(500, 5000, 20), rng.uniform(1e5, 1e6, 20)])
     each = [element_force(x, 2e-3, *element) for element in elements]
@@ -90,7 +90,7 @@ def test_steady_slip_gives_friction_plus_viscous_force() -> None:
     assert element_force(x, STEP, 301.0, 2720.0, 1.99e5)[-1] == pytest.approx(301.0 + 2720.0 * 0.2, rel=1e-12)
 
 
-def test_stick_is_a_spring() -> None:
+def test_a_sticking_element_is_a_spring() -> None:
     x = 1e-4 * np.sin(np.linspace(0, 20, 500))
     np.testing.assert_allclose(element_force(x, STEP, 301.0, 2720.0, 1.99e5), 1.99e5 * x, rtol=0, atol=1e-9)
 
@@ -146,7 +146,7 @@ def test_the_element_never_gives_energy_back(rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("every", [2, 7])
 @pytest.mark.parametrize("samples", [1, 2, 57, 60])
-def test_the_samples_that_are_kept_are_those_of_all(rng: np.random.Generator, every: int, samples: int) -> None:
+def test_every_nth_force_is_that_of_the_whole_path(rng: np.random.Generator, every: int, samples: int) -> None:
     displacement = 0.01 * np.cumsum(rng.standard_normal(samples))
     given = (displacement, 1e-3, 300.0, 2000.0, 2e5, 50.0)
     force, slopes = element_force_sensitivities(*given)

@@ -1,4 +1,4 @@
-"""With which force a damper begins: what stands beside the element is not carried by the oil spring as well."""
+"""The initial force of a damper: the element carries what the parallel forces do not."""
 
 from __future__ import annotations
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pzd.damper.compiled.laws import arguments, functions
 from pzd.damper.compose import respond, steady_force
 from pzd.damper.confounders import confounders, known, module_of
+from pzd.damper.effect import arguments, functions
 from pzd.damper.effects import library
 from pzd.damper.fitted_laws import fitted_laws
 from pzd.damper.fitted_laws.knee import NO_KNEE
@@ -31,7 +31,7 @@ def motion(sign: float = 1.0) -> Motion:
     return Motion(TIME, x, v, a)
 
 
-def test_a_fitted_law_is_no_effect_of_the_library_and_nobody_can_ask_for_it_to_be_adopted() -> None:
+def test_a_fitted_law_is_no_effect_of_the_library_and_a_config_cannot_force_it() -> None:
     assert set(known()) == {*library(), *confounders(), *fitted_laws()}
     assert not set(fitted_laws()) & {*library(), *confounders()}
     with pytest.raises(ValueError, match="no effect is called"):

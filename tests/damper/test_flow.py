@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pzd.damper.compiled.kernels import row_of
-from pzd.damper.compiled.rows import nodes_of
 from pzd.damper.flow import flow_force, flow_speed
 from pzd.damper.model import BaseRow, Damper
+from pzd.damper.parameter_rows import nodes_of
 
 
 @pytest.mark.parametrize("friction", [1e-7, 200.0])

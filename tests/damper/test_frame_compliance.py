@@ -1,4 +1,4 @@
-"""The mount that hardens: what a short stroke shows of it, and that a linear frame is nothing but a softer spring."""
+"""The hardening mount: its distinction by short strokes, and a linear frame as a smaller k."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def secant(damper: Damper, amplitude: float) -> float:
     return float(np.max(force) / amplitude)
 
 
-def test_strokes_on_which_nothing_slips_tell_it_from_a_softer_spring_and_a_free_play() -> None:
+def test_strokes_without_slip_distinguish_a_frame_from_a_softer_k_and_a_free_play() -> None:
     mount, play = STUCK.with_effect("frame_compliance", MOUNT), STUCK.with_effect("lash", {"delta": 2.0e-3})
     softer = Damper(base=(STUCK.base[0].model_copy(update={"k_N_per_m": 0.3 * K}),))
     assert secant(mount, 1e-6) == pytest.approx(K / (1.0 + MOUNT["d_f"] / MOUNT["s_f"]), rel=2e-3)
@@ -42,7 +42,7 @@ def test_strokes_on_which_nothing_slips_tell_it_from_a_softer_spring_and_a_free_
 
 
 @pytest.mark.parametrize("frame", [1e5, 2e6])
-def test_a_linear_frame_is_a_softer_oil_spring_and_no_effect(frame: float) -> None:
+def test_a_linear_frame_is_a_smaller_k_and_no_effect(frame: float) -> None:
     """F = k e, x - y = e + F/k_f, so F = k k_f/(k + k_f) (x - y), always; not so with a spring beside."""
     softer = Damper(base=(STUCK.base[0].model_copy(update={"k_N_per_m": K * frame / (K + frame)}),))
     for amplitude in (1e-3, 2e-2):

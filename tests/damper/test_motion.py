@@ -1,4 +1,4 @@
-"""A motion on a finer grid: where the voltage steps between two samples past a tested voltage."""
+"""A finer motion, where the voltage steps between two samples past a tested voltage."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
-from pzd.damper.motion import PARTS_OF_STEP, Motion, parts_of_steps
+from pzd.damper.motion import Motion, parts_of_steps
 from pzd.record import Array, Rows
 from pzd.rig.stand.config import Steps
 
@@ -33,23 +33,23 @@ def finer(motion: Motion) -> tuple[Motion, Rows]:
     return motion.finer(parts_of_steps(motion.voltage, motion.time.size))
 
 
-def miss(force: Array) -> float:
-    """R.m.s. beside the force on a grid of 32 kHz, as a share of its peak."""
+def error_of(force: Array) -> float:
+    """R.m.s. distance from the force on a grid of 32 kHz, as a share of its peak."""
     truth = respond(BENT, motion_at(32_000.0))
     return float(np.sqrt(np.mean((force - truth[::64]) ** 2)) / np.max(np.abs(truth)))
 
 
-def test_a_step_past_a_tested_voltage_is_followed_to_a_hundredth_of_what_a_line_misses() -> None:
+def test_a_voltage_step_past_a_tested_voltage_costs_a_tenth_of_the_error_of_a_coarse_grid() -> None:
     motion, places = finer(motion_at(500.0))
-    assert miss(respond(BENT, motion)[places]) < 1e-4
-    assert miss(respond(BENT, motion_at(500.0))) > 1e-3
+    assert error_of(respond(BENT, motion)[places]) < 1e-4
+    assert error_of(respond(BENT, motion_at(500.0))) > 1e-3
 
 
-def test_the_samples_of_the_motion_stay_what_they_are() -> None:
+def test_a_finer_motion_contains_the_samples_of_the_coarse_one() -> None:
     coarse = motion_at(500.0)
     motion, places = finer(coarse)
     steps = np.count_nonzero(np.abs(np.diff(coarse.voltage)) > 1.0)
-    assert motion.time.size == coarse.time.size + (PARTS_OF_STEP - 1) * steps
+    assert motion.time.size == coarse.time.size + 7 * steps
     for name in ("time", "displacement", "velocity", "acceleration", "voltage"):
         assert getattr(motion, name)[places] == pytest.approx(getattr(coarse, name), rel=1e-12, abs=1e-12)
 
@@ -57,7 +57,7 @@ def test_the_samples_of_the_motion_stay_what_they_are() -> None:
 @pytest.mark.parametrize(
     "voltage", [None, np.full(100, 75.0), np.linspace(0.0, 150.0, 100)], ids=["no", "still", "ramp"]
 )
-def test_a_voltage_that_does_not_step_leaves_the_motion_alone(voltage: Array | None) -> None:
+def test_a_motion_without_voltage_steps_is_not_refined(voltage: Array | None) -> None:
     t = np.arange(100) * 1e-3
     motion = Motion(t, t, t, t, voltage)
     same, places = finer(motion)

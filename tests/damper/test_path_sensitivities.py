@@ -1,4 +1,4 @@
-"""Derivatives carried along the path: against differences of an exact path, the scaling law, and finer sampling."""
+"""Derivatives along the path: against differences of an exact path, the scaling law, and finer sampling."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import pytest
 from test_path import FLOWS
 
 from pzd.damper.compiled.columns import STROKE_AND_FLOW
-from pzd.damper.compiled.laws import ELEMENT
-from pzd.damper.compose import constant_rows, integrated_sensitivities
+from pzd.damper.compose import integrated_sensitivities
+from pzd.damper.effect import ELEMENT
 from pzd.damper.element import element_force_sensitivities
-from pzd.damper.march import march, march_sensitivities
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import constant_rows
+from pzd.damper.path import Variables, march, march_sensitivities
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
 from pzd.record import Array
 
@@ -20,7 +21,7 @@ TIME = np.arange(3000) * STEP
 BASE = (300.0, 2700.0, 2e5)
 CONSTANT = [effects for effects in FLOWS if all("at_voltage_V" not in values for values in effects.values())]
 SMALL = 1e-4
-HELD, EACH = np.zeros(3), np.eye(3)[np.newaxis]
+T0_C_AND_K = Variables(np.arange(3), np.eye(3)[np.newaxis], np.zeros(3))
 
 
 def motion(step: float = STEP) -> tuple[Array, Array]:
@@ -58,12 +59,11 @@ def scaled(rows: Array, column: int, by: float) -> Array:
 
 @pytest.mark.parametrize("moving", [False, True], ids=["constant", "moving"])
 @pytest.mark.parametrize("effects", [{}, *CONSTANT], ids=lambda e: "+".join(e) or "plain")
-def test_they_are_the_differences_of_an_exact_path(effects: dict, moving: bool) -> None:
+def test_sensitivities_are_the_differences_of_an_exact_path(effects: dict, moving: bool) -> None:
     rows, columns, (x, v), steps = rows_of(effects, moving), columns_of(effects), motion(), np.array([STEP])
     along = np.stack([rows[:, columns] * (np.arange(len(columns)) == j) for j in range(len(columns))], axis=1)
-    force, found = march_sensitivities(
-        x, v, steps, rows, 50.0, np.zeros(len(columns)), SIMULATION_TOLERANCE, np.array(columns), along
-    )
+    variables = Variables(np.array(columns), along, np.zeros(len(columns)))
+    force, found = march_sensitivities(x, v, steps, rows, 50.0, SIMULATION_TOLERANCE, variables)
     np.testing.assert_array_equal(force, march(x, v, steps, rows, 50.0, SIMULATION_TOLERANCE))
     for j, column in enumerate(columns):
         more, less = (march(x, v, steps, scaled(rows, column, 1.0 + by), 50.0, 1e-11) for by in (SMALL, -SMALL))
@@ -77,40 +77,44 @@ def test_a_damper_of_twice_all_forces_gives_twice_the_force(effects: dict) -> No
     rows, (x, v) = rows_of(effects, False), motion()
     columns = [0, 1, 2, *(c for c in columns_of(effects)[3:] if "orifice_quadratic" in effects)]
     along = rows[:, np.newaxis, columns]
-    force, slopes = march_sensitivities(x, v, np.array([STEP]), rows, 0.0, HELD[:1], 1e-9, np.array(columns), along)
+    force, slopes = march_sensitivities(
+        x, v, np.array([STEP]), rows, 0.0, 1e-9, Variables(np.array(columns), along, np.zeros(1))
+    )
     assert np.max(np.abs(slopes[:, 0] - force)) < 1e-3 * np.max(np.abs(force))
 
 
-def test_of_the_plain_element_they_are_those_of_the_closed_form_to_order_two() -> None:
-    rows, missed = rows_of({}, False), []
+def test_sensitivities_of_the_element_without_effects_are_those_of_the_closed_form_to_order_two() -> None:
+    rows, errors = rows_of({}, False), []
     for parts in (1, 2, 4):
         step, (x, v) = STEP / parts, motion(STEP / parts)
-        _, found = march_sensitivities(x, v, np.array([step]), rows, 0.0, HELD, 1e-9, np.arange(3), EACH)
+        _, found = march_sensitivities(x, v, np.array([step]), rows, 0.0, 1e-9, T0_C_AND_K)
         _, exact = element_force_sensitivities(x, step, *BASE, 0.0, v)
-        missed.append(np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0))
-    assert np.all(missed[0] < 2e-4)
-    assert np.all(missed[0][1:] > 3.5 * missed[1][1:])
-    assert np.all(missed[1][1:] > 3.5 * missed[2][1:])
+        errors.append(np.linalg.norm(found - exact, axis=0) / np.linalg.norm(exact, axis=0))
+    assert np.all(errors[0] < 2e-4)
+    assert np.all(errors[0][1:] > 3.5 * errors[1][1:])
+    assert np.all(errors[1][1:] > 3.5 * errors[2][1:])
 
 
-def test_a_moment_without_flow_moves_the_force_by_the_spring_alone() -> None:
+def test_while_the_element_sticks_the_force_depends_on_k_alone() -> None:
     """While the oil sticks dF/dk is the way that the rod has gone, and T0 and C change nothing."""
     x = 1e-4 * np.sin(2 * np.pi * TIME)  # 20 N of 300
     v = 2e-4 * np.pi * np.cos(2 * np.pi * TIME)
-    _, slopes = march_sensitivities(x, v, np.array([STEP]), rows_of({}, False), 0.0, HELD, 1e-9, np.arange(3), EACH)
+    _, slopes = march_sensitivities(x, v, np.array([STEP]), rows_of({}, False), 0.0, 1e-9, T0_C_AND_K)
     np.testing.assert_array_equal(slopes[:, :2], 0.0)
     np.testing.assert_allclose(slopes[:, 2], x - x[0], atol=1e-12)
 
 
 @pytest.mark.parametrize("effects", [{}, {"orifice_quadratic": {"q": 3000.0}}, {"asymmetry": {"alpha": 0.2}}], ids=str)
-def test_a_force_that_the_damper_begins_with_is_felt_until_the_oil_has_flowed(effects: dict) -> None:
+def test_the_initial_force_affects_the_force_until_the_element_has_slipped(effects: dict) -> None:
     """By the closed form where it holds, by the march elsewhere: both go with what the variables make of that force."""
     t = np.arange(300) * STEP
     x, v = 2e-3 * np.sin(2 * np.pi * 2 * t), 8e-3 * np.pi * np.cos(2 * np.pi * 2 * t)
     motion, rows, initial = Motion(t, x, v, np.zeros_like(t)), rows_of(effects, False), np.array([0.0, -7.0])
     along = np.array([[[1.0, 0.0], [0.0, 2.0]]])
     held, moved = (
-        integrated_sensitivities(rows, np.array([0, 1]), along, motion, np.array([STEP]), 50.0, slopes, 1e-9)[1]
+        integrated_sensitivities(
+            rows, Variables(np.array([0, 1]), along, slopes), motion, np.array([STEP]), 50.0, 1e-9
+        )[1]
         for slopes in (np.zeros(2), initial)
     )
     more, less = (march(x, v, np.array([STEP]), rows, 50.0 + by, 1e-12) for by in (0.05, -0.05))

@@ -1,4 +1,4 @@
-"""An effect is one file: five that nobody has seen, put into a copy of the package, act everywhere and are named."""
+"""An effect is one file: five unknown ones, put into a copy of the package, act everywhere and are named."""
 
 from __future__ import annotations
 
@@ -47,7 +47,9 @@ def acts(run: Callable[..., str]) -> dict[str, dict[str, float]]:
     return found
 
 
-def test_the_plain_damper_is_the_same_although_two_effects_share_a_letter(acts: dict[str, dict[str, float]]) -> None:
+def test_a_damper_without_effects_is_the_same_although_two_effects_share_a_letter(
+    acts: dict[str, dict[str, float]],
+) -> None:
     sys.path.insert(0, str(UNSEEN))
     try:
         from try_unseen import plain_force

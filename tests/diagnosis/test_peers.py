@@ -11,9 +11,9 @@ from campaign import damper_of, sine, waveform
 from scipy.integrate import solve_ivp
 
 from pzd.damper.compose import respond
+from pzd.damper.effects.bouc_wen import hysteresis_after
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.damper.shared_laws import hysteresis_after
 from pzd.diagnosis.campaign import Campaign
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import Missed, deal, trials_of

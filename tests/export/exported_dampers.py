@@ -10,7 +10,7 @@ from pzd.artefacts import Table, TableNotes
 from pzd.damper.model import BaseRow, Damper
 from pzd.export.content import Content
 from pzd.force_table.config import TableConfig
-from pzd.force_table.force import ReachedSpeed, force_rows, grid, temperatures_of, voltages_of
+from pzd.force_table.force import OperatingEnvelope, force_rows, grid, temperatures_of, voltages_of
 from pzd.force_table.lookup import inverse_rows
 from pzd.quantities import Control
 from pzd.simulate.cars import cars
@@ -48,13 +48,13 @@ def content_of(damper: Damper, **table: Any) -> Content:
     """What is exported of a damper whose rig reached 0.6 m/s."""
     config = TableConfig(**table)
     temperatures, voltages = temperatures_of(damper), voltages_of(damper)
-    reach = ReachedSpeed(
+    envelope = OperatingEnvelope(
         np.array([t or 0.0 for t in temperatures]),
         np.array([u or 0.0 for u in voltages]),
         np.full((len(temperatures), len(voltages)), 0.6),
     )
     notes = TableNotes(outside=config.outside, reached_m_per_s=0.6, lost=(), not_monotone=())
-    rows = force_rows(config, damper, grid(config, damper, temperatures, reach), reach)
+    rows = force_rows(config, damper, grid(config, damper, temperatures, envelope), envelope)
     forward = Table(rows, (), notes)
     return Content(
         name="my-run",

@@ -1,3 +1,5 @@
+"""Interpolation in a force table: exact for a linear law, monotone, one-sided at zero speed."""
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -57,13 +59,13 @@ def test_zero_speed_has_two_sides_and_nothing_between() -> None:
     assert lookup.force(50.0, -1e-12) == pytest.approx(-550.0)
 
 
-def test_force_is_held_beyond_the_outermost_voltages() -> None:
+def test_force_is_constant_beyond_the_outermost_voltages() -> None:
     lookup = Lookup.of(table_of(bingham))
     assert lookup.force(-20.0, 0.2) == lookup.force(0.0, 0.2)
     assert lookup.force(400.0, 0.2) == lookup.force(150.0, 0.2)
 
 
-def test_beyond_the_last_speed_the_model_goes_on_the_clamp_holds_and_the_rest_is_empty() -> None:
+def test_beyond_the_last_speed_the_table_follows_the_model_is_constant_or_is_empty_as_configured() -> None:
     assert Lookup.of(table_of(bingham)).force(50.0, 0.9) == pytest.approx(bingham(None, 50.0, 0.9), rel=1e-12)
     assert Lookup.of(table_of(bingham, outside="clamp")).force(50.0, 0.9) == bingham(None, 50.0, 0.4)
 
@@ -77,7 +79,7 @@ def test_beyond_the_last_speed_the_model_goes_on_the_clamp_holds_and_the_rest_is
     assert empty.range(0.3) == (np.inf, -np.inf)
 
 
-def test_temperatures_are_read_linearly_between_and_held_beyond() -> None:
+def test_force_is_linear_between_temperatures_and_constant_beyond() -> None:
     lookup = table_of(lambda T, U, v: bingham(T, U, v) * (1.0 - 0.01 * T), temperatures=(20.0, 40.0))
     middle = Lookup.of(lookup, 25.0).force(50.0, 0.2)
     assert middle == pytest.approx(bingham(None, 50.0, 0.2) * 0.75)
@@ -85,7 +87,7 @@ def test_temperatures_are_read_linearly_between_and_held_beyond() -> None:
     assert Lookup.of(lookup).force(50.0, 0.2) == pytest.approx(bingham(None, 50.0, 0.2) * 0.8)
 
 
-def test_inside_follows_the_speed_that_the_rig_reached_at_each_voltage() -> None:
+def test_inside_follows_the_operating_envelope_of_each_voltage() -> None:
     table = table_of(bingham)
     rows = [
         row.model_copy(update={"inside": int(abs(row.velocity_m_per_s) <= (0.4 if row.voltage_V == 0.0 else 0.2))})
@@ -133,14 +135,14 @@ def test_force_never_leaves_the_forces_of_the_neighbouring_nodes(
     assert min(near) - margin <= lookup.force(voltage, velocity) <= max(near) + margin
 
 
-def test_the_lowest_of_several_voltages_is_taken() -> None:
+def test_of_several_voltages_that_give_a_force_the_lowest_is_taken() -> None:
     hill = {0.0: 100.0, 50.0: 500.0, 150.0: 200.0}
     lookup = Lookup.of(table_of(lambda _, U, v: float(np.copysign(hill[U], v))))
     assert lookup.voltage_for(300.0, 0.1) == pytest.approx(25.0)
     assert lookup.range(0.1) == (100.0, 500.0)
 
 
-def test_a_damper_without_control_signal_reads_one_column() -> None:
+def test_a_table_without_control_signal_has_one_column() -> None:
     lookup = Lookup.of(table_of(lambda T, _, v: bingham(T, 0.0, v), voltages=(None,)))
     assert lookup.force(70.0, 0.2) == pytest.approx(bingham(None, 0.0, 0.2))
     assert lookup.range(0.2) == (lookup.force(0.0, 0.2), lookup.force(0.0, 0.2))

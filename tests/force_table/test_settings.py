@@ -13,7 +13,7 @@ from pzd.artefacts import Identified, KneeRow, Knees, LawRow, ParameterRow, Rig,
 from pzd.artefacts.table import neighbours, numbers_in
 from pzd.cli.app import status
 from pzd.force_table.config import TableConfig
-from pzd.force_table.settings import COMPARED, between_settings
+from pzd.force_table.settings import between_settings
 from pzd.quantities import Control
 from pzd.record import Record
 from pzd.schema.errors import ConfigError
@@ -61,7 +61,7 @@ def test_the_force_lies_on_the_line_between_those_of_both_neighbours(wanted: str
     assert {one.value for one in rows} == {float(wanted.split()[1])}
 
 
-def test_at_rest_stand_two_one_sided_rows() -> None:
+def test_two_one_sided_rows_stand_for_zero_speed() -> None:
     rows, _ = found(steady(("click 2", 3000.0), ("click 6", 2000.0)), ["click 3"])
     at_rest = [(str(one.velocity_m_per_s), one.force_N) for one in rows if one.velocity_m_per_s == 0.0]
     assert at_rest == [("-0.0", -FRICTION), ("0.0", FRICTION)]
@@ -94,7 +94,7 @@ def test_voltages_are_those_that_both_cover_and_temperatures_within_2_degrees_ar
     assert fastest.force_N == pytest.approx(law, rel=1e-9)
 
 
-def test_neighbours_that_were_tested_at_nothing_in_common_are_refused_by_place() -> None:
+def test_neighbours_without_a_common_condition_are_refused_with_the_place() -> None:
     tests: list[Tried] = [("gap 0.1 mm", 8000.0, 0.3, None, 22.0), ("gap 0.2 mm", 2000.0, 0.3, None, 43.0)]
     with pytest.raises(ConfigError, match=r"^table\.settings\.0: .*in common.*\(got gap 0\.15 mm\)"):
         found(tests, ["gap 0.15 mm"])
@@ -107,7 +107,7 @@ def test_a_setting_whose_force_is_linear_in_its_number_is_predicted_without_erro
     assert left_out.largest_share_of_peak < 1e-12
 
 
-def test_a_setting_that_is_not_is_missed_by_as_much_as_the_line_lies_off_its_law() -> None:
+def test_the_prediction_error_of_a_nonlinear_setting_is_the_distance_of_the_line_from_its_law() -> None:
     """A slot gives C ~ 1/h^3: halfway between 0.1 and 0.3 mm the line has (1 + 1/27) / 2 of the first, the law 1/8."""
     damping = {h: 8.0 / (h / 0.1) ** 3 * 1000.0 for h in (0.1, 0.2, 0.3)}
     _, (left_out,) = found(steady(*((f"gap {h} mm", C) for h, C in damping.items())), ["gap 0.15 mm"])
@@ -116,7 +116,7 @@ def test_a_setting_that_is_not_is_missed_by_as_much_as_the_line_lies_off_its_law
     peak = FRICTION + damping[0.2] * speed
     assert left_out.peak_force_N == pytest.approx(peak)
     assert left_out.largest_share_of_peak == pytest.approx(off * speed / peak)
-    even = np.arange(1, COMPARED + 1) / COMPARED
+    even = np.arange(1, 201) / 200
     assert left_out.rms_share_of_peak == pytest.approx(off * speed * np.sqrt(np.mean(even**2)) / peak)
 
 
@@ -159,7 +159,7 @@ def test_between_two_gas_pressures_lies_the_static_force_of_the_gas() -> None:
     assert fastest.force_N == pytest.approx(beyond)
 
 
-def test_the_number_may_stand_anywhere_in_the_name_and_more_than_one() -> None:
+def test_a_setting_may_have_several_numbers_anywhere_in_its_name() -> None:
     assert [(one.axis, one.value, one.unit) for one in numbers_in("C08_R12")] == [
         ("C#_R12", 8.0, ""),
         ("C08_R#", 12.0, ""),
@@ -188,7 +188,7 @@ def test_what_does_not_lie_between_two_tested_settings_is_refused(wanted: str, s
         neighbours(wanted, ["gap 0.1 mm", "soft", "gap 0.2 mm", None])
 
 
-def test_they_are_written_and_read_back(tmp_path: Path) -> None:
+def test_settings_are_written_and_read_back(tmp_path: Path) -> None:
     control = Control("current", "A")
     tests: list[Tried] = [(f"gap 0.{n} mm", 8e3 / n, 0.3, 0.5, 22.0) for n in (1, 2, 3)]
     made = found(tests, ["gap 0.15 mm"])
@@ -224,7 +224,7 @@ def rig_of(pairs: dict[str, float]) -> dict[str, Any]:
     }
 
 
-def test_a_config_that_asks_beyond_ends_with_2_and_the_place(
+def test_a_setting_beyond_the_tested_ones_is_exit_2_with_its_place(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = {"rig": rig_of({"click 2": 3000, "click 6": 2000}), "setting": "click 2"}
@@ -241,7 +241,7 @@ def test_a_config_that_asks_beyond_ends_with_2_and_the_place(
 
 
 @pytest.mark.ci
-def test_page_and_terminal_say_between_which_tests_and_how_far_to_trust_it(
+def test_page_and_terminal_name_the_tested_neighbours_and_the_prediction_error(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = {

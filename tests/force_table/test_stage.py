@@ -1,3 +1,5 @@
+"""The stage table: the force of the published dampers, its inverse, its operating envelope and its notes."""
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -60,7 +62,7 @@ def test_the_table_holds_friction_plus_damping_times_speed(number: int) -> None:
         assert lookup.force(voltage, -0.0) == -T0
 
 
-def test_two_temperatures_stand_in_one_table_and_are_read_between() -> None:
+def test_two_temperatures_are_in_one_table_which_is_linear_between() -> None:
     table = table_of(damper_of([2, 3]))
     force = Lookup.of(table, 32.5).force(150.0, 0.2)
     assert force == pytest.approx((1325 + 1078) / 2 + (2560 + 3380) / 2 * 0.2)
@@ -125,7 +127,7 @@ def test_a_force_in_a_gap_of_the_table_is_empty_or_has_the_nearest_voltage() -> 
     assert [row.voltage_V for row in clamped] == [*[0.0] * 21, *[150.0] * 20]
 
 
-def test_rows_beyond_the_rig_are_marked_and_clamped_or_empty_as_asked() -> None:
+def test_rows_outside_the_envelope_are_marked_and_clamped_or_empty_as_configured() -> None:
     damper = damper_of([2])
     reached = 0.03 * 4 * np.pi
     tables = {o: table_of(damper, TableConfig(outside=o)) for o in ("model", "clamp", "error")}
@@ -140,7 +142,7 @@ def test_rows_beyond_the_rig_are_marked_and_clamped_or_empty_as_asked() -> None:
     assert np.isfinite(Lookup.of(tables["error"]).force(100.0, 0.37))
 
 
-def test_each_voltage_is_inside_as_far_as_it_was_driven() -> None:
+def test_each_voltage_has_the_operating_envelope_of_its_own_tests() -> None:
     damper = damper_of([2])
     amplitudes = {0.0: 0.03, 50.0: 0.03, 100.0: 0.01, 150.0: 0.01}
     records = tuple(sine(U, 22.0, amplitude) for U, amplitude in amplitudes.items())

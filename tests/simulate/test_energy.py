@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pzd.damper.compiled.kernels import K
-from pzd.damper.compiled.rows import row_at
+from pzd.damper.parameter_rows import row_at
 from pzd.simulate.ride import riding
 from pzd.simulate.ride.equations import motion, oil_energy
 from pzd.simulate.ride.loop import set_control

@@ -17,9 +17,10 @@ from bench_table import LEAST_SECONDS, PAIRS, Row, once, pairs
 from scipy.integrate import solve_ivp
 
 from pzd.damper.compiled.columns import STROKE_AND_FLOW
-from pzd.damper.compose import constant_rows, integrated_force, sampling_steps
+from pzd.damper.compose import integrated_force, sampling_steps
 from pzd.damper.element import element_force, element_forces
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import constant_rows
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE
 
 Array = np.ndarray

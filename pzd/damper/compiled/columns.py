@@ -1,4 +1,4 @@
-"""Which effect parameter stands in which column of the rows that the kernels take: read from the effect files."""
+"""Columns of the parameter rows: which parameter of which effect stands where, read from the effect files."""
 
 from __future__ import annotations
 
@@ -7,46 +7,40 @@ from collections.abc import Sequence
 import numpy as np
 
 from pzd.damper.confounders import known
-from pzd.damper.effect import Effect, Place
+from pzd.damper.effect import NODE_VOLTAGES, Effect, Place
 from pzd.damper.model import Damper
 from pzd.record import Array
-
-# ----------------------------------------------------------------------------------------------------
-
 
 Column = tuple[str, str]
 """Effect and parameter; a letter that two effects use is two columns."""
 
 
 def acting(place: Place) -> tuple[Effect, ...]:
-    """The effects and competing forms of a place in the order in which they act."""
+    """Return the known effects of a place in the order in which they act, confounders and fitted laws among them."""
     return tuple(sorted((e for e in known().values() if e.place == place), key=lambda e: (e.order, e.name)))
 
 
 def _columns(*places: Place) -> tuple[Column, ...]:
+    """Return the columns of all effects of some places."""
     return tuple((e.name, p.name) for place in places for e in acting(place) for p in e.parameters)
 
 
 DRIVE = _columns("drive")
 """Columns of a row of the drive."""
 STROKE_AND_FLOW = _columns("stroke", "flow")
-"""Columns of a row of the element, behind T0, C and k."""
+"""Columns of a row of the element, after T0, C and k."""
 PARALLEL = _columns("parallel", "branch")
-"""Columns of a row of the forces beside the element, those without memory first."""
+"""Columns of a row of the forces parallel to the element, those without memory first."""
 NEUTRAL = {(e.name, p.name): p.neutral for e in known().values() for p in e.parameters}
-"""The value of every column where a damper lacks the effect."""
-
-
-# ----------------------------------------------------------------------------------------------------
-# The numbers of a damper's effects, one each or by the effective voltage; neutral where it lacks an effect.
+"""Value of every column where a damper lacks the effect."""
 
 
 def value_of(damper: Damper, effect: str, parameter: str) -> float:
-    """A parameter that is one number: the damper's, or the neutral one where it lacks the effect.
+    """Return a parameter that is one number: the damper's, or the neutral one where it lacks the effect.
 
     Raises
     ------
-    ValueError : when the damper gives it by voltage
+    ValueError : when the damper has one value per voltage
     """
     value = damper.effects.get(effect, {}).get(parameter, NEUTRAL[effect, parameter])
     if isinstance(value, tuple):
@@ -55,7 +49,7 @@ def value_of(damper: Damper, effect: str, parameter: str) -> float:
 
 
 def columns_of(damper: Damper, columns: Sequence[Column], effective: Array | None) -> Array:
-    """(n, m) or (1, m) values of effect parameters, by the effective voltage [V] where they are lists."""
+    """Return the (n, m) or (1, m) values of m columns at (n,) effective voltages [V]."""
     if not columns:
         return np.empty((1, 0))
     found = [column(damper, *one, effective) for one in columns]
@@ -65,11 +59,11 @@ def columns_of(damper: Damper, columns: Sequence[Column], effective: Array | Non
 
 
 def column(damper: Damper, effect: str, parameter: str, effective: Array | None) -> Array:
-    """(n,) or (1,) values of one parameter, by the effective voltage [V] where it is a list.
+    """Return one parameter, (1,), or (n,) at (n,) effective voltages [V] where it has one value per voltage.
 
     Raises
     ------
-    ValueError : when it is a list and no voltage is given
+    ValueError : when it has one value per voltage and no voltage is given
     """
     given = damper.effects.get(effect, {})
     value = given.get(parameter, NEUTRAL[effect, parameter])
@@ -77,4 +71,4 @@ def column(damper: Damper, effect: str, parameter: str, effective: Array | None)
         return np.array([value])
     if effective is None:
         raise ValueError(f"{effect}.{parameter} depends on the voltage, and none is given")
-    return np.asarray(np.interp(effective, np.atleast_1d(given["at_voltage_V"]), np.array(value)))
+    return np.asarray(np.interp(effective, np.atleast_1d(given[NODE_VOLTAGES]), np.array(value)))

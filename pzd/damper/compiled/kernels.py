@@ -1,7 +1,8 @@
-"""The compiled laws of every effect found.
+"""Compiled laws of every effect found, composed place by place.
 
-They are written out as a module of its own (`kernel_source`) in the kernel cache, so that a new effect is one new
-file and still compiled into the loops of the damper and of the car.
+They are generated as a module of their own in the kernel cache, so that a new effect is one new file and still compiled
+into the loops of the damper and of the car: numba compiles a function that takes functions as arguments anew in each
+process, and one that calls them by name once for all.
 """
 
 from __future__ import annotations
@@ -18,63 +19,66 @@ import numpy as np
 
 from pzd.compiled import cache_folder
 from pzd.damper.compiled.columns import DRIVE, PARALLEL, STROKE_AND_FLOW, Column, acting
-from pzd.damper.compiled.laws import ELEMENT, arguments, functions
 from pzd.damper.confounders import module_of
-from pzd.damper.effect import Effect
+from pzd.damper.effect import ELEMENT, Effect, arguments, functions
 from pzd.record import Array
 
-# ----------------------------------------------------------------------------------------------------
-# The text of the module of compiled laws, each place composed as `pzd.damper.effect` says.
-
+# --- Source of the generated module, each place composed as `pzd.damper.effect` says ---
 
 _WIDTH = len(ELEMENT) + len(STROKE_AND_FLOW)
 
 
 def _has(place_effects: Sequence[Effect], name: str) -> list[Effect]:
+    """Return the effects that hold a function of that name."""
     return [effect for effect in place_effects if name in functions(effect, module_of(effect))]
 
 
 def _place(column: Column) -> str:
-    """A column as the generated code reads it."""
+    """Return a column as the generated code reads it."""
     if column in STROKE_AND_FLOW:
         return f"p[{len(ELEMENT) + STROKE_AND_FLOW.index(column)}]"
     return f"p[{(DRIVE if column in DRIVE else PARALLEL).index(column)}]"
 
 
 def _call(effect: Effect, name: str, **quantities: str) -> str:
-    """A law with what it asks for: quantities of the caller, and the effect's own parameters."""
+    """Return a call of a law with its arguments: quantities of the caller and the effect's own parameters."""
     own = {parameter.name: _place((effect.name, parameter.name)) for parameter in effect.parameters}
     given = {**own, **quantities}
     return f"_{effect.name}_{name}({', '.join(given[argument] for argument in _takes(effect, name))})"
 
 
 def _takes(effect: Effect, name: str) -> tuple[str, ...]:
+    """Return the arguments of a law."""
     return arguments(functions(effect, module_of(effect))[name])
 
 
 def _on(effect: Effect) -> str:
-    """Whether an effect acts: one of its parameters is not neutral."""
+    """Return the condition under which an effect acts: one of its parameters is not neutral."""
     return " or ".join(f"{_place((effect.name, p.name))} != {p.neutral!r}" for p in effect.parameters)
 
 
 def _none_on(effects: Sequence[Effect]) -> str:
+    """Return the condition under which none of some effects acts."""
     return " and ".join(f"not ({_on(effect)})" for effect in effects) or "True"
 
 
 def _function(head: str, *lines: str) -> list[str]:
+    """Return the lines of a compiled function."""
     return ["@compiled", f"def {head}:", *(f"    {line}" for line in lines)]
 
 
 def _guarded(effect: Effect, *lines: str) -> list[str]:
+    """Return lines that run only where an effect acts."""
     return [f"if {_on(effect)}:", *(f"    {line}" for line in lines)]
 
 
 def _tuple(entry: str) -> str:
-    """A tuple with one entry a column of a parameter row, `#` being the column's place."""
+    """Return a tuple with one entry per column of a parameter row, `#` standing for the column's place."""
     return f"({', '.join(entry.replace('#', str(i)) for i in range(_WIDTH))},)"
 
 
 def _rows() -> Iterator[str]:
+    """Yield the functions of parameter rows."""
     stroke = {effect.name for effect in acting("stroke")}
     moved = [len(ELEMENT) + i for i, (name, _) in enumerate(STROKE_AND_FLOW) if name in stroke]
     yield from _function("mix(a, b, share)", "return a if a == b else a + (b - a) * share")  # equal infinities stand
@@ -85,11 +89,11 @@ def _rows() -> Iterator[str]:
     yield from _function("stroke_moves(p, q)", f"return not ({same})")
     alike = " and ".join(f"p[{i}] == q[{i}]" for i in range(len(ELEMENT), _WIDTH)) or "True"
     yield from _function("effects_alike(p, q)", f"return {alike}")
-    yield from _function("plain(p)", f"return {_none_on([*acting('stroke'), *acting('flow')])}")
+    yield from _function("no_effects(p)", f"return {_none_on([*acting('stroke'), *acting('flow')])}")
 
 
 def _drive() -> Iterator[str]:
-    """Each effect takes what the one before gives; `state` is what each gave last."""
+    """Yield the drive: each effect takes the voltage of the one before; `state` is what each gave last."""
     effects = acting("drive")
     step, after, kept = [], [], []
     for i, effect in enumerate(effects):
@@ -108,6 +112,7 @@ def _drive() -> Iterator[str]:
 
 
 def _stroke() -> Iterator[str]:
+    """Yield the stroke: each effect takes the deflection that the one before leaves."""
     effects = acting("stroke")
     out, back, slope = [], [], ["slope = 1.0"]
     for effect in effects:
@@ -125,6 +130,7 @@ def _stroke() -> Iterator[str]:
 
 
 def _flow() -> Iterator[str]:
+    """Yield the flow curve."""
     effects = acting("flow")
     for name in ("direction_factor", "bleed_factor"):
         factors = [f"factor *= {_call(e, name, side='side')}" for e in _has(effects, name)]
@@ -140,7 +146,7 @@ def _flow() -> Iterator[str]:
 
 
 def _yield(effects: Sequence[Effect]) -> Iterator[str]:
-    """In the order in which they act, each takes what the one before made of T0; a law is in proportion to it."""
+    """Yield the friction: each effect takes the T0 of the one before, to which its law is proportional."""
     force: list[str] = []
     slope = ["slope = 0.0"]
     for i, effect in enumerate(effects):
@@ -154,7 +160,7 @@ def _yield(effects: Sequence[Effect]) -> Iterator[str]:
 
 
 def _viscous(effects: Sequence[Effect]) -> Iterator[str]:
-    """In the order in which they act, each takes viscous force / C of the one before as its speed."""
+    """Yield the viscous force: each effect takes viscous force / C of the one before as its speed."""
     force, slope, back = ["s = C * w"], ["s, slope = C * w, C"], []
     for i, effect in enumerate(effects):
         speed = "s / C" if i else "w"
@@ -171,6 +177,7 @@ def _viscous(effects: Sequence[Effect]) -> Iterator[str]:
 
 
 def _extra(effects: Sequence[Effect]) -> Iterator[str]:
+    """Yield the extra force, a sum."""
     force = [line for e in effects for line in _guarded(e, f"force += {_call(e, 'extra_force', w='w')}")]
     slope = [line for e in effects for line in _guarded(e, f"slope += {_call(e, 'extra_slope', w='w')}")]
     closed = []
@@ -184,6 +191,7 @@ def _extra(effects: Sequence[Effect]) -> Iterator[str]:
 
 
 def _parallel() -> Iterator[str]:
+    """Yield the parallel forces without memory, a sum."""
     terms = [_call(effect, "law", x="x", v="v", a="a") for effect in acting("parallel")]
     yield from _function("parallel_force(x, v, a, p)", f"return {' + '.join(terms) or '0.0'}")
     yield from _function(
@@ -194,7 +202,7 @@ def _parallel() -> Iterator[str]:
 
 
 def _branch() -> Iterator[str]:
-    """Each has its own elastic deflection, `state[i]`; all go with the rod, and their forces add."""
+    """Yield the branches: each has its own elastic deflection, `state[i]`; all follow the rod, and their forces add."""
     follow, stored, steady = [], [], []
     force: list[str] = []
     for i, effect in enumerate(acting("branch")):
@@ -212,29 +220,31 @@ def _branch() -> Iterator[str]:
 
 
 def source() -> str:
-    """The text of the module."""
-    lines = ["import math", "from math import inf", "from pzd.compiled import compiled"]
+    """Return the source of the module."""
+    lines = ["import math", "from math import inf", "from pzd.compiled import compiled, compiled_law"]
     for place in ("drive", "stroke", "flow", "parallel", "branch"):
         for effect in acting(place):
             module = module_of(effect)
             lines.append(f"import {module.__name__} as _{effect.name}")
-            lines += [f"_{effect.name}_{name} = compiled(_{effect.name}.{name})" for name in functions(effect, module)]
+            lines += [
+                f"_{effect.name}_{name} = compiled_law(_{effect.name}.{name})" for name in functions(effect, module)
+            ]
     return "\n".join([*lines, *_rows(), *_drive(), *_stroke(), *_flow(), *_parallel(), *_branch(), ""])
 
 
-# ----------------------------------------------------------------------------------------------------
-
+# --- The generated module ---
 
 Row = tuple[float, ...]
-"""Parameters at one moment: T0 [N], C [N s/m], k [N/m], then those of `columns.STROKE_AND_FLOW`."""
+"""Parameter row, see `pzd.damper.compiled`: T0 [N], C [N s/m], k [N/m], then those of `columns.STROKE_AND_FLOW`."""
 
 T0, C, K = range(len(ELEMENT))
-"""The first places in a parameter row."""
+"""Places of the element in a parameter row."""
 FLOW = len(ELEMENT) + sum(len(effect.parameters) for effect in acting("stroke"))
-"""The first place of a flow effect, behind those of the stroke."""
+"""First place of a flow effect, after those of the stroke."""
 
 
 def _load() -> ModuleType:
+    """Import the generated module, written by the first process that needs it."""
     path = cache_folder() / "damper_kernels.py"
     if not path.exists():
         handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".tmp")
@@ -253,16 +263,16 @@ def _load() -> ModuleType:
 _MODULE = _load()
 
 interpolate: Callable[[Row, Row, float], Row] = _MODULE.interpolate
-"""The parameter row at a share of the way from one to the other."""
+"""Parameter row at a share of the way from one to the other."""
 row_of: Callable[[Array], Row] = _MODULE.row_of
-"""An array as a parameter row."""
+"""Parameter row of an (r,) array."""
 nudged: Callable[[Row, int, float], Row] = _MODULE.nudged
-"""The parameter row with one of its columns changed by so much."""
+"""Parameter row with an amount added to one of its columns."""
 stroke_moves: Callable[[Row, Row], bool] = _MODULE.stroke_moves
 """Whether two rows differ in a parameter of a stroke effect."""
 effects_alike: Callable[[Row, Row], bool] = _MODULE.effects_alike
 """Whether two rows differ in T0, C and k alone."""
-plain: Callable[[Row], bool] = _MODULE.plain
+no_effects: Callable[[Row], bool] = _MODULE.no_effects
 """Whether no stroke or flow effect acts: the element of the paper alone."""
 
 follow_voltage: Callable[[float, float, float, Array, Array], float] = _MODULE.follow_voltage
@@ -276,9 +286,9 @@ keep_voltage: Callable[[float, float, Array, Array], None] = _MODULE.keep_voltag
 """Advance the (d,) voltages behind each drive effect [V] to a time [s] after a voltage [V] was set."""
 
 stroke_law: Callable[[float, float, Row], float] = _MODULE.stroke_law
-"""Extension of the oil spring [m] at an elastic deflection [m] on a side; below zero inside a free play."""
+"""Extension of the oil stiffness [m] at an elastic deflection [m] on a side; below zero inside a free play."""
 stroke_inverse: Callable[[float, float, Row], float] = _MODULE.stroke_inverse
-"""Elastic deflection [m] at an extension of the oil spring [m] on a side."""
+"""Elastic deflection [m] at an extension of the oil stiffness [m] on a side."""
 stroke_slope: Callable[[float, float, Row], float] = _MODULE.stroke_slope
 """Derivative of `stroke_law` by the deflection."""
 stroke_straight: Callable[[Row], bool] = _MODULE.stroke_straight
@@ -303,7 +313,7 @@ viscous_speed: Callable[[float, float, Row], float] = _MODULE.viscous_speed
 viscous_straight: Callable[[Row], bool] = _MODULE.viscous_straight
 """Whether the viscous force is C w."""
 extra_force: Callable[[float, Row], float] = _MODULE.extra_force
-"""Force beside friction and viscous force [N] at a flow speed [m/s]."""
+"""Force added to friction and viscous force [N] at a flow speed [m/s]."""
 extra_slope: Callable[[float, Row], float] = _MODULE.extra_slope
 """Derivative of `extra_force` by the speed [N s/m]."""
 extra_speed: Callable[[float, float, Row], float] = _MODULE.extra_speed
@@ -314,10 +324,10 @@ relief_of: Callable[[float, float, Row], tuple[float, float]] = _MODULE.relief_o
 """Force from which a valve is open [N] and the slope beyond [N s/m], by T0 [N] and side; the first to open counts."""
 
 parallel_force: Callable[[float, float, float, Array], float] = _MODULE.parallel_force
-"""Force [N] of what has no memory beside the element, at one x [m], v [m/s], a [m/s2] and one row of parameters."""
+"""Parallel force without memory [N] at one x [m], v [m/s], a [m/s2] and one row of the parallel effects."""
 
 branches_follow: Callable[[float, Array, Array], None] = _MODULE.branches_follow
-"""Bring the (b,) deflections of the branches [m] through a travel of the rod to one side [m], in place; one row."""
+"""Advance the (b,) deflections of the branches [m] by a travel of the rod to one side [m], in place; one row."""
 branch_force: Callable[[float, Array, Array], float] = _MODULE.branch_force
 """Force of the branches [N] after a travel [m] from (b,) deflections [m], which stay as they are; one row."""
 branch_stored: Callable[[float, float, Array, Array], float] = _MODULE.branch_stored
@@ -327,7 +337,7 @@ branch_steady: Callable[[float, Array], float] = _MODULE.branch_steady
 
 
 def parallel_forces(x: Array, v: Array, a: Array, rows: Array) -> Array:
-    """(n,) force [N] of what has no memory beside the element; (n,) x [m], v [m/s], a [m/s2], (n, m) or (1, m) rows."""
+    """Compute the (n,) parallel force without memory [N] from (n,) x [m], v [m/s], a [m/s2], (n, m) or (1, m) rows."""
     force = np.empty(x.size)
     _MODULE.fill_parallel(x, v, a, rows, force)
     return force

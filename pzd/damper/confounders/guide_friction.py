@@ -1,4 +1,4 @@
-"""Dry friction beside the damper, of a guide or a mount: no oil spring winds it up, no speed wears it down.
+"""Dry friction parallel to the damper, of a guide or a mount: without elastic travel, and the same at every speed.
 
 Law: F_g sign(v). It is the limit v_s -> infinity of `stribeck_friction`.
 """
@@ -24,5 +24,5 @@ EFFECT = Effect(
 
 
 def law(x: float, v: float, a: float, F_g: float) -> float:
-    """Force [N] beside the element at a piston speed v [m/s]."""
+    """Force [N] parallel to the element at a piston speed v [m/s]."""
     return math.copysign(F_g, v) if v != 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""The library of effects, one file each; every module here, and in the folder of `PZD_EFFECTS`, is found by itself."""
+"""The library of effects, one file each; every module here and in the folder of `PZD_EFFECTS` is found by discovery."""
 
 from __future__ import annotations
 
@@ -7,21 +7,20 @@ import pkgutil
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
+from typing import get_args
 
-from pzd.damper.compiled.laws import declared
-from pzd.damper.effect import Effect
+from pzd.damper.effect import Effect, Place, declared_effect
 from pzd.own_effects import VARIABLE, own_files, own_folder
 from pzd.schema.errors import ConfigError
 
 _OWN = own_folder()
 if _OWN is not None:
     __path__.append(str(_OWN))
-_PLACES = ("drive", "material", "stroke", "flow", "parallel", "branch", "sensor")
 
 
 @cache
 def library() -> dict[str, Effect]:
-    """Every effect by name, in the physical order of the places and by name within one.
+    """Return every effect by name, in the physical order of the places and by name within one.
 
     Raises
     ------
@@ -29,7 +28,8 @@ def library() -> dict[str, Effect]:
     ConfigError : when one of `PZD_EFFECTS` does, or that is no folder
     """
     _check_own()
-    found = sorted(effects_in(__name__, pkgutil.iter_modules(__path__)), key=lambda e: (_PLACES.index(e.place), e.name))
+    places = get_args(Place)
+    found = sorted(effects_in(__name__, pkgutil.iter_modules(__path__)), key=lambda e: (places.index(e.place), e.name))
     unhidden = [effect.name for effect in found if effect.hidden is None and effect.never_named is None]
     if unhidden:
         raise ImportError(f"{__path__[0]}/{unhidden[0]}.py: says not how the benchmark hides it (`hidden`)")
@@ -37,14 +37,14 @@ def library() -> dict[str, Effect]:
 
 
 def _check_own() -> None:
-    """Refuse effect files of one's own that cannot be taken: their faults are the user's, not the package's."""
+    """Refuse a user's effect files that break a rule: their faults are the user's, not the package's."""
     if _OWN is not None and not _OWN.is_dir():
         raise ConfigError(f"{VARIABLE}: there is no folder of that name; make it, or unset the variable (got {_OWN})")
     for file in own_files():
         if (taken := Path(__path__[0]) / file.name).is_file():
             raise ConfigError(f"{file}: the library has an effect of that name; rename file and effect ({taken})")
         try:
-            effect = declared(importlib.import_module(f"{__name__}.{file.stem}"))
+            effect = declared_effect(importlib.import_module(f"{__name__}.{file.stem}"))
         except Exception as error:
             raise ConfigError(f"{file}: is no effect file: {type(error).__name__}: {error}") from error
         if effect.name != file.stem:
@@ -55,12 +55,12 @@ def _check_own() -> None:
 
 @cache
 def nameable() -> dict[str, Effect]:
-    """Those of them that a verdict may name and the benchmark hides."""
+    """Return the effects that a verdict may name and the benchmark hides."""
     return {name: effect for name, effect in library().items() if effect.never_named is None}
 
 
 def effects_in(package: str, modules: Iterable[pkgutil.ModuleInfo]) -> list[Effect]:
-    """The effects that the modules of a package declare, one each.
+    """Return the effects that the modules of a package declare, one each.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def effects_in(package: str, modules: Iterable[pkgutil.ModuleInfo]) -> list[Effe
     found: dict[str, tuple[Effect, str | None]] = {}
     for info in modules:
         module = importlib.import_module(f"{package}.{info.name}")
-        effect = declared(module)
+        effect = declared_effect(module)
         if effect.name in found:
             raise ImportError(f"{found[effect.name][1]} and {module.__file__} both declare the effect {effect.name}")
         found[effect.name] = effect, module.__file__

@@ -1,11 +1,11 @@
-"""The gas of an accumulator or behind a floating piston: static pressure on the rod, hardening as the rod goes in.
+"""Gas of an accumulator or behind a floating piston: static pressure on the rod, hardening as the rod moves in.
 
 Law: -F_g (1 + x/L)^-1.3: pressure p_0 on the rod's area A, F_g = p_0 A, over a volume V_0 that the rod displaces,
-L = V_0/A; nothing but this product and this quotient shows in a force. Range: F_g 50-500 N, L two to ten strokes.
+L = V_0/A; the force depends on this product and this quotient alone. Range: F_g 50-500 N, L two to ten strokes.
 Its nearest neighbour is `gas_spring`, with a `preload_offset`: to first order the same, F_0 = -F_g and
-k_g = 1.3 F_g/L, but as stiff everywhere. A wide slow test tells them apart: the mean of rebound and compression is
-((L + X)/(L - X))^2.3 times as steep at the inner end of a stroke +-X as at the outer one. What hardens at both ends, a
-`cubic_spring` or `end_stop`, is told by the same mean: there it is odd about the middle.
+k_g = 1.3 F_g/L, but as stiff everywhere. A wide slow test distinguishes them: the mean of rebound and compression is
+((L + X)/(L - X))^2.3 times as steep at the inner end of a stroke +-X as at the outer one. The same mean distinguishes
+a `cubic_spring` or `end_stop`, which harden at both ends: there it is odd with respect to the middle.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
 
 POLYTROPIC = 1.3
-"""Exponent: 1 for gas that stays as warm as the wall, 1.4 for nitrogen that gives off no heat; near it above 1 Hz."""
+"""Exponent: 1 for isothermal gas, 1.4 for adiabatic nitrogen, which is approached above 1 Hz."""
 LEAST = 0.05
-"""Least share of its volume that the gas is pressed into: a motion beyond L meets a large force, none infinite."""
+"""Smallest share of its volume to which the gas is compressed: beyond L the force is large, not infinite."""
 
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
@@ -25,21 +25,15 @@ def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
     return lambda s: {"F_g": 0.5 * scales.force * s, "L": column}
 
 
+_SEARCH = Search(lambda s: s.stroke, (2.0, 6.0), logarithmic=True)
+
 EFFECT = Effect(
     name="accumulator",
     place="parallel",
     law="-F_g (1 + x/L)^-1.3",
     parameters=(
         Parameter("F_g", "N", 0.0, 0.0, 1.0e6, "static force of the gas on the rod", Search(lambda s: s.force, (0.1,))),
-        Parameter(
-            "L",
-            "m",
-            0.1,
-            1.0e-3,
-            100.0,
-            "length of rod that would fill the volume of the gas",
-            Search(lambda s: s.stroke, (2.0, 6.0), logarithmic=True),
-        ),
+        Parameter("L", "m", 0.1, 1.0e-3, 100.0, "length of rod that would fill the volume of the gas", _SEARCH),
     ),
     same_at_every_voltage=True,
     source="polytropic gas on the area of the rod; Dixon 2007, The Shock Absorber Handbook",
@@ -55,5 +49,5 @@ EFFECT = Effect(
 
 
 def law(x: float, F_g: float, L: float) -> float:
-    """Force [N] beside the element at a displacement x [m]: it pushes the rod out."""
+    """Force [N] parallel to the element at a displacement x [m]: it pushes the rod out."""
     return float(-F_g * max(1.0 + x / L, LEAST) ** -POLYTROPIC)

@@ -1,4 +1,4 @@
-"""Rebound and compression differ: other ports or shims for the two directions.
+"""Difference of rebound and compression: other ports or shims for the two directions.
 
 Law: T0 and C times (1 + alpha sign(F)). Range: passenger cars damp rebound two to three times
 as hard, alpha 0.3-0.5; a symmetric prototype shows a few percent.

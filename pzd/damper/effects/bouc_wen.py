@@ -1,22 +1,25 @@
-"""A smooth hysteresis beside the element (Bouc and Wen): its force comes up over a travel, and bends into slip.
+"""A smooth hysteresis parallel to the element (Bouc and Wen): its force builds up over a travel and turns into slip.
 
 Law: dF/dx = F_h/x_h (1 - z^2) where the rod winds it up, F_h/x_h (1 + (2 sigma - 1) z^2) where it unwinds, z = F/F_h,
 whatever the speed: the form of the source with n = 2, counted in its ultimate force. sigma >= 1/2, else a loop would
 give off energy; 1/2 (beta = gamma) unwinds straight. Range: x_h 0.2-5 mm, F_h up to a quarter of the peak, sigma to 5.
-Its nearest neighbour is `second_branch`, told from it by small amplitudes: inside its shelf that one is a spring and
-loses nothing, while this one always loses, sigma F_h A^4/x_h^3, a sixteenth at half the amplitude. `rounded_yield` is
-told by one speed reached at two amplitudes: its loop is as wide in m/s, this one in mm.
+Its nearest neighbour is `second_branch`, distinguished by small amplitudes: inside its shelf that one is a spring and
+dissipates nothing, while this one always does, sigma F_h A^4/x_h^3, a sixteenth at half the amplitude. `rounded_yield`
+is distinguished by one speed at two amplitudes: its loop has the same width in m/s, this one in mm.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
-from pzd.damper.shared_laws import hysteresis_after, hysteresis_rate
 
 EXPONENT = 2
-"""n of the source: 1 is the friction of Dahl, which comes up without a bend; larger ones near `second_branch`."""
+"""n of the source: 1 is the friction of Dahl; larger ones approach `second_branch`."""
+STRAIGHT = 1e-9
+"""Below this `2 sigma - 1` the unloading is straight to rounding."""
 
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
@@ -25,30 +28,16 @@ def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
     return lambda s: {"F_h": 0.5 * scales.force * s, "x_h": travel, "sigma": unwinding}
 
 
+_F_H_SEARCH = Search(lambda s: s.force, (0.1,))
+_X_H_SEARCH = Search(lambda s: s.stroke, (0.03, 0.15), logarithmic=True)
+
 EFFECT = Effect(
     name="bouc_wen",
     place="branch",
     law="dF/dx = F_h/x_h (1 - z^2) winding up, F_h/x_h (1 + (2 sigma - 1) z^2) unwinding, z = F/F_h",
     parameters=(
-        Parameter(
-            "F_h",
-            "N",
-            0.0,
-            0.0,
-            1.0e6,
-            "ultimate force of the hysteresis",
-            Search(lambda s: s.force, (0.1,)),
-            with_friction=True,
-        ),
-        Parameter(
-            "x_h",
-            "m",
-            1.0e-3,
-            1.0e-6,
-            1.0,
-            "travel over which it would come up without a bend",
-            Search(lambda s: s.stroke, (0.03, 0.15), logarithmic=True),
-        ),
+        Parameter("F_h", "N", 0.0, 0.0, 1.0e6, "ultimate force of the hysteresis", _F_H_SEARCH, with_friction=True),
+        Parameter("x_h", "m", 1.0e-3, 1.0e-6, 1.0, "travel over which it would come up without a bend", _X_H_SEARCH),
         Parameter(
             "sigma",
             "-",
@@ -78,10 +67,61 @@ def advance(deflection: float, travel: float, x_h: float, sigma: float) -> float
 
 
 def law(deflection: float, F_h: float, x_h: float) -> float:
-    """Force [N] beside the element at an elastic deflection [m]."""
+    """Force [N] parallel to the element at an elastic deflection [m]."""
     return F_h * deflection / x_h
 
 
 def rate(deflection: float, side: float, x_h: float, sigma: float) -> float:
-    """Derivative of the deflection by the travel to a side [-]: 0 in steady slip, 1 at no force."""
+    """Compute the derivative of the deflection by the travel to a side [-]: 0 in steady slip, 1 at zero force."""
     return hysteresis_rate(deflection / x_h, side, sigma, EXPONENT)
+
+
+# --- The equation of Bouc and Wen over the travel of the rod, solved for exponents 1 and 2 ---
+
+
+def hysteresis_after(z: float, travel: float, rho: float, sigma: float, exponent: int) -> float:
+    """Compute the hysteretic variable after a travel of the rod to one side.
+
+    Equation: dq/ds = 1 + (2 sigma - 1) |q|^n for q < 0, 1 - q^n for q >= 0, q = z sign(dx), s = rho |dx|
+                                        Source: Wen 1976, normalised as by Ikhouane and Rodellar 2005; n = 1, 2 solved
+
+    Parameters
+    ----------
+    z : before, in its ultimate value [-]
+    travel : of the rod, to one side [m]; may be infinite
+    rho : slope of z over the travel at z = 0 [1/m]
+    sigma : 1/2 where the unloading is straight, more where it is steeper [-]
+    exponent : n, 1 or 2
+
+    Returns
+    -------
+    z afterwards [-]
+    """
+    side = 1.0 if travel > 0.0 else -1.0
+    s, q = rho * abs(travel), side * z
+    if q < 0.0:
+        ratio, p = 2.0 * sigma - 1.0, -q
+        root = math.sqrt(max(ratio, 0.0))
+        if ratio < STRAIGHT:
+            way, p = p, p - s
+        elif exponent == 1:
+            way = math.log1p(ratio * p) / ratio
+            p = ((1.0 + ratio * p) * math.exp(-ratio * s) - 1.0) / ratio
+        else:
+            way = math.atan(root * p) / root
+            p = math.tan(root * max(way - s, 0.0)) / root
+        if s < way:
+            return -side * p
+        s, q = s - way, 0.0
+    if exponent == 1:
+        loaded = 1.0 - (1.0 - q) * math.exp(-s)
+    else:
+        t = math.tanh(s)
+        loaded = (q + t) / (1.0 + q * t)
+    return side * loaded
+
+
+def hysteresis_rate(z: float, side: float, sigma: float, exponent: int) -> float:
+    """Compute the derivative of the hysteretic variable by rho times the travel, to a side (+1 or -1) [-]."""
+    q = side * z
+    return 1.0 + (2.0 * sigma - 1.0) * (-q) ** exponent if q < 0.0 else 1.0 - q**exponent

@@ -1,20 +1,21 @@
-"""A pocket of vapour or gas in one chamber: after a reversal it is squeezed before the oil takes up the force.
+"""A pocket of vapour or gas in one chamber: after a reversal it is compressed before the oil carries the force.
 
 Law: F = k e, x - y = e + d_c e/(e + s_c) on the side of the pocket: Boyle's law of a pocket of length d_c at the
-pressure p_c, s_c = p_c A/k; on the other side nothing. d_c > 0: the force is lost in rebound, behind a compression that
-outran the gas pressure; d_c < 0 in compression, behind a foot valve that starves. What the speed of the stroke before
-adds to the pocket is left out: the law has no memory. Range: 0.1-5 mm. Its nearest neighbour is `lash`, told from it by
-a slow sine: free play loses the same travel after both reversals, so the loop is odd and has no even harmonics,
-wherever its zero lies; a pocket bends one flank alone. From an `asymmetry`, which has them too, it is told by the
-plateaus of steady slip, which a pocket leaves alike; from `frame_compliance` as from `lash`.
+pressure p_c, s_c = p_c A/k; on the other side nothing. d_c > 0: the force is missing in rebound, after a compression
+faster than the gas pressure allows; d_c < 0 in compression, behind a foot valve that starves. The dependence of the
+pocket on the speed of the stroke before is left out: the law has no memory. Range: 0.1-5 mm. Its nearest neighbour is
+`lash`, distinguished by a slow sine: free play loses the same travel after both reversals, so the loop is odd and has
+no even harmonics, wherever its zero lies; a pocket bends one flank alone. An `asymmetry` has even harmonics too, but
+unequal plateaus of steady slip; `frame_compliance` is distinguished as `lash` is.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
-from pzd.damper.shared_laws import deflection_with, extension_behind, extension_slope
 
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
@@ -22,6 +23,8 @@ def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
     pressed = float(np.exp(draw.uniform(np.log(0.01), np.log(0.05)))) * scales.stroke
     return lambda s: {"d_c": end * s, "s_c": pressed}
 
+
+_S_C_SEARCH = Search(lambda s: s.stroke, (0.01, 0.1), logarithmic=True)
 
 EFFECT = Effect(
     name="cavitation",
@@ -38,13 +41,7 @@ EFFECT = Effect(
             Search(lambda s: s.stroke, (0.05, -0.05)),
         ),
         Parameter(
-            "s_c",
-            "m",
-            1.0e-3,
-            1.0e-7,
-            1.0,
-            "extension of the oil spring at which half of it is left",
-            Search(lambda s: s.stroke, (0.01, 0.1), logarithmic=True),
+            "s_c", "m", 1.0e-3, 1.0e-7, 1.0, "extension of the oil spring at which half of it is left", _S_C_SEARCH
         ),
     ),
     source="Boyle's law of a pocket in series with the oil; late filling: Duym, Stiens and Reybrouck 1997, Vehicle "
@@ -63,21 +60,54 @@ EFFECT = Effect(
 
 
 def law(deflection: float, side: float, d_c: float, s_c: float) -> float:
-    """Extension of the oil spring [m] at an elastic deflection x - y [m] on a side."""
+    """Extension of the oil stiffness [m] at an elastic deflection x - y [m] on a side."""
     if side * d_c <= 0.0:
         return deflection
     return side * extension_behind(side * deflection, abs(d_c), s_c)
 
 
 def inverse(extension: float, side: float, d_c: float, s_c: float) -> float:
-    """Elastic deflection [m] at an extension of the oil spring [m] on a side: the law inverted."""
+    """Elastic deflection [m] at an extension of the oil stiffness [m] on a side: the law inverted."""
     if side * d_c <= 0.0:
         return extension
     return side * deflection_with(side * extension, abs(d_c), s_c)
 
 
 def slope(deflection: float, side: float, d_c: float, s_c: float) -> float:
-    """Derivative of the law by the deflection [-]."""
+    """Compute the derivative of the law by the deflection [-]."""
     if side * d_c <= 0.0:
         return 1.0
     return extension_slope(side * deflection, abs(d_c), s_c)
+
+
+# --- A pocket of gas or a mount, compressed by a force and by no more than its own length ---
+#
+# Equation: e = s + d s/(s + s_d), for s >= 0: Boyle's law of a pocket of length d at a static force p A, s_d = p A/k;
+# linear below 0. e is the elastic deflection, s = F/k the extension of the oil stiffness behind it.
+
+
+def deflection_with(extension: float, length: float, half: float) -> float:
+    """Compute the deflection e [m] of pocket and oil stiffness together.
+
+    Parameters
+    ----------
+    extension : s of the oil stiffness, to the side of the pocket [m]
+    length : of the pocket, d [m]
+    half : extension of the oil stiffness at which the pocket has half its length, s_d > 0 [m]
+    """
+    return extension * (1.0 + length / half) if extension <= 0.0 else extension * (1.0 + length / (extension + half))
+
+
+def extension_behind(deflection: float, length: float, half: float) -> float:
+    """Compute the extension s [m] at a deflection e of both [m]: the equation solved for s, without cancellation."""
+    if deflection <= 0.0:
+        return deflection / (1.0 + length / half)
+    b = half + length - deflection
+    root = math.sqrt(b * b + 4.0 * half * deflection)
+    return 2.0 * half * deflection / (b + root) if b > 0.0 else 0.5 * (root - b)
+
+
+def extension_slope(deflection: float, length: float, half: float) -> float:
+    """Compute the derivative of the extension by the deflection [-]."""
+    s = max(extension_behind(deflection, length, half), 0.0)
+    return 1.0 / (1.0 + length * half / ((s + half) * (s + half)))

@@ -1,4 +1,4 @@
-"""Oil that is accelerated through a long duct, or a mass that moves with the rod.
+"""Inertia of oil in a long duct, or of a mass on the rod.
 
 Law: m a. Range: inertance of a duct 1-100 kg; the sign is left free, for on a single frequency
 a mass and a spring of the other sign are the same thing.
@@ -8,21 +8,14 @@ from __future__ import annotations
 
 from pzd.damper.effect import Effect, Parameter, Search, growing
 
+_SEARCH = Search(lambda s: s.force / s.acceleration, (0.0,))
+
 EFFECT = Effect(
     name="fluid_inertia",
     place="parallel",
     law="m a",
     parameters=(
-        Parameter(
-            "m",
-            "kg",
-            0.0,
-            -1.0e5,
-            1.0e5,
-            "apparent mass of the oil column",
-            Search(lambda s: s.force / s.acceleration, (0.0,)),
-            natural_from=0.0,
-        ),
+        Parameter("m", "kg", 0.0, -1.0e5, 1.0e5, "apparent mass of the oil column", _SEARCH, natural_from=0.0),
     ),
     same_at_every_voltage=True,
     source="fluid inerter; Swift et al. 2013, Vehicle System Dynamics 51(11)",
@@ -32,5 +25,5 @@ EFFECT = Effect(
 
 
 def law(x: float, v: float, a: float, m: float) -> float:
-    """Force [N] beside the element at an acceleration a [m/s2]."""
+    """Force [N] parallel to the element at an acceleration a [m/s2]."""
     return m * a

@@ -1,11 +1,11 @@
-"""A frame, mount or rubber bushing in series with the oil spring, soft at first, that gives to an end.
+"""A frame, mount or rubber bushing in series with the oil stiffness: soft at first, hardening to a limit.
 
 Law: F = k e, x - y = e + d_f e/(|e| + s_f): a mount of stiffness k_f = k s_f/d_f at no force that hardens and gives d_f
-at most to either side. A linear frame is left out, for no test tells it from a softer oil spring: with e = F/k and
-x - y = F/k + F/k_f, F = k k_f/(k + k_f) (x - y), at every voltage; where it holds what is beside the element as well,
-the stand has it. Range: d_f 0.1-3 mm. Its nearest neighbours are `lash`, and a smaller k. A stroke
-so short that nothing slips tells it from both: a play that is free carries no force there, a linear spring is as stiff
-at twice the stroke, and this one is a spring that hardens. `cavitation` hardens to one side alone.
+at most to either side. A linear frame is left out, for no test distinguishes it from a softer k: with e = F/k and
+x - y = F/k + F/k_f, F = k k_f/(k + k_f) (x - y), at every voltage; where it carries the parallel forces as well, it
+belongs to the stand. Range: d_f 0.1-3 mm. Its nearest neighbours are `lash`, and a smaller k. A stroke so short that
+nothing slips distinguishes it from both: free play carries no force there, a linear spring is as stiff at twice the
+stroke, and this one hardens. `cavitation` hardens to one side alone.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from pzd.damper.effect import Effect, Parameter, Scales, Search, Strength
-from pzd.damper.shared_laws import deflection_with, extension_behind, extension_slope
+from pzd.damper.effects.cavitation import deflection_with, extension_behind, extension_slope
 
 
 def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
@@ -21,20 +21,14 @@ def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
     return lambda s: {"d_f": 0.15 * scales.stroke * s, "s_f": pressed}
 
 
+_D_F_SEARCH = Search(lambda s: s.stroke, (0.03,))
+
 EFFECT = Effect(
     name="frame_compliance",
     place="stroke",
     law="F = k e, x - y = e + d_f e/(|e| + s_f)",
     parameters=(
-        Parameter(
-            "d_f",
-            "m",
-            0.0,
-            0.0,
-            0.1,
-            "what the mount gives at most to either side",
-            Search(lambda s: s.stroke, (0.03,)),
-        ),
+        Parameter("d_f", "m", 0.0, 0.0, 0.1, "what the mount gives at most to either side", _D_F_SEARCH),
         Parameter(
             "s_f",
             "m",
@@ -58,15 +52,15 @@ EFFECT = Effect(
 
 
 def law(deflection: float, side: float, d_f: float, s_f: float) -> float:
-    """Extension of the oil spring [m] at an elastic deflection x - y [m] on a side."""
+    """Extension of the oil stiffness [m] at an elastic deflection x - y [m] on a side."""
     return side * extension_behind(side * deflection, d_f, s_f)
 
 
 def inverse(extension: float, side: float, d_f: float, s_f: float) -> float:
-    """Elastic deflection [m] at an extension of the oil spring [m] on a side: the law inverted."""
+    """Elastic deflection [m] at an extension of the oil stiffness [m] on a side: the law inverted."""
     return side * deflection_with(side * extension, d_f, s_f)
 
 
 def slope(deflection: float, side: float, d_f: float, s_f: float) -> float:
-    """Derivative of the law by the deflection [-]."""
+    """Compute the derivative of the law by the deflection [-]."""
     return extension_slope(side * deflection, d_f, s_f)

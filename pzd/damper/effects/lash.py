@@ -1,4 +1,4 @@
-"""Free play before the oil spring, or a chamber that fills late.
+"""Free play before the oil stiffness, or a chamber that fills late.
 
 Law: dead zone of whole width delta on the elastic deflection x - y. Range: worn bushings
 0.05-1 mm; a chamber that fills late looks the same from outside.
@@ -27,10 +27,10 @@ EFFECT = Effect(
 
 
 def law(deflection: float, side: float, delta: float) -> float:
-    """Extension of the oil spring [m] at an elastic deflection x - y [m] on a side; below zero there in the play."""
+    """Extension of the oil stiffness [m] at an elastic deflection x - y [m] on a side; below zero there in the play."""
     return deflection - side * 0.5 * delta
 
 
 def inverse(extension: float, side: float, delta: float) -> float:
-    """Elastic deflection [m] at an extension of the oil spring [m] on a side: the law inverted."""
+    """Elastic deflection [m] at an extension of the oil stiffness [m] on a side: the law inverted."""
     return extension + side * 0.5 * delta

@@ -9,21 +9,13 @@ import math
 
 from pzd.damper.effect import Effect, Parameter, Search, growing
 
+_SEARCH = Search(lambda s: s.force / s.speed**2, (0.05,))
+
 EFFECT = Effect(
     name="orifice_quadratic",
     place="flow",
     law="+ q w^2",
-    parameters=(
-        Parameter(
-            "q",
-            "N s2/m2",
-            0.0,
-            0.0,
-            1.0e8,
-            "force over the square of the flow speed",
-            Search(lambda s: s.force / s.speed**2, (0.05,)),
-        ),
-    ),
+    parameters=(Parameter("q", "N s2/m2", 0.0, 0.0, 1.0e8, "force over the square of the flow speed", _SEARCH),),
     source="orifice equation dp = rho Q^2 / (2 Cd^2 A^2); Merritt 1967, Hydraulic Control Systems",
     tests=(({"w": 0.3, "q": 1500.0}, 135.0),),
     hidden=growing("q", lambda s: s.force / s.speed**2),
@@ -31,12 +23,12 @@ EFFECT = Effect(
 
 
 def extra_force(w: float, q: float) -> float:
-    """Force [N] beside friction and viscous force at a flow speed w >= 0 [m/s]."""
+    """Force [N] added to friction and viscous force at a flow speed w >= 0 [m/s]."""
     return q * w * w
 
 
 def extra_slope(w: float, q: float) -> float:
-    """Derivative of the law by w [N s/m]."""
+    """Compute the derivative of the law by w [N s/m]."""
     return 2.0 * q * w
 
 

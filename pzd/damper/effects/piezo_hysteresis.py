@@ -1,4 +1,4 @@
-"""The piezo stack follows the voltage with play: it turns only after 2 r of reversal.
+"""Hysteresis of the piezo stack: it follows a reversal of the voltage only after 2 r.
 
 Law: play (backlash) operator of half-width r on U. Range: stacks show 10-15 % of stroke,
 so r up to about 10 V on 150 V.
@@ -8,19 +8,15 @@ from __future__ import annotations
 
 from pzd.damper.effect import Effect, Parameter, Search, growing
 
+_SEARCH = Search(lambda s: s.voltage, (0.03, 0.1))
+
 EFFECT = Effect(
     name="piezo_hysteresis",
     place="drive",
     law="Ue = max(U - r, min(U + r, Ue))",
     parameters=(
         Parameter(
-            "r",
-            "V",
-            0.0,
-            0.0,
-            1.0e4,
-            "half-width of the play; V stands for the unit of the control signal",
-            Search(lambda s: s.voltage, (0.03, 0.1)),
+            "r", "V", 0.0, 0.0, 1.0e4, "half-width of the play; V stands for the unit of the control signal", _SEARCH
         ),
     ),
     source="Prandtl-Ishlinskii play operator; Brokate and Sprekels 1996, Hysteresis and Phase Transitions",
@@ -41,6 +37,6 @@ def law(effective: float, now: float, r: float) -> float:
 
 
 def rate(effective: float, now: float, rate: float, r: float) -> float:
-    """Rate of the effective voltage [V/s] while the voltage stands at `now` [V] and moves at `rate` [V/s]."""
+    """Rate of the effective voltage [V/s] at a voltage `now` [V] that changes at `rate` [V/s]."""
     inside_play = abs(now - effective) < r * (1.0 - 1e-9)  # rounding of the law itself is no play
     return 0.0 if inside_play or (now - effective) * rate < 0.0 else rate

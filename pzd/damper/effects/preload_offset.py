@@ -1,4 +1,4 @@
-"""A constant force: the gas charge at mid-stroke, a weight on the cell, or a load cell off zero.
+"""A constant force: the gas charge at mid-stroke, a weight on the load cell, or its zero offset.
 
 Law: F_0. Range: gas-charged dampers 50-300 N.
 """
@@ -23,5 +23,5 @@ EFFECT = Effect(
 
 
 def law(x: float, v: float, a: float, F_0: float) -> float:
-    """Force [N] beside the element."""
+    """Force [N] parallel to the element."""
     return F_0

@@ -1,4 +1,4 @@
-"""A blow-off valve opens: beyond its force the characteristic goes on with a flatter slope.
+"""A blow-off valve: beyond its opening force the characteristic continues with a flatter slope.
 
 Law: where the flow curve passes b = max(F_r, T0) it goes on with slope C_r < C. Range: passenger
 car dampers open between 0.05 and 0.3 m/s.
@@ -20,25 +20,19 @@ def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
 
 
 def _flatter(values: Mapping[str, float], damping: float) -> bool:
-    """Whether an open valve lets more through than the closed one."""
+    """Return whether the open valve is softer than the closed one."""
     return values["C_r"] < damping
 
+
+# Close to 1 as well: where T0 is most of the force, no step leads on from a start below T0.
+_F_R_SEARCH = Search(lambda s: s.force, (0.05, 0.12, 0.3, 0.5, 0.7, 0.8, 0.9), logarithmic=True)
 
 EFFECT = Effect(
     name="relief_valve",
     place="flow",
     law="beyond b = max(F_r, T0) the slope is C_r",
     parameters=(
-        Parameter(
-            "F_r",
-            "N",
-            inf,
-            0.0,
-            1.0e7,
-            "force at which the valve opens",
-            # Close to 1 as well: where T0 is most of the force, no step leads on from a start below T0.
-            Search(lambda s: s.force, (0.05, 0.12, 0.3, 0.5, 0.7, 0.8, 0.9), logarithmic=True),
-        ),
+        Parameter("F_r", "N", inf, 0.0, 1.0e7, "force at which the valve opens", _F_R_SEARCH),
         Parameter(
             "C_r", "N s/m", 0.0, 1.0e-3, 1.0e8, "slope beyond it", Search(lambda s: s.damping, (0.4,), logarithmic=True)
         ),

@@ -1,4 +1,4 @@
-"""Force and displacement were recorded at different instants: a filter or another converter in one of them.
+"""Delay between the recorded force and displacement: a filter or another converter in one of the channels.
 
 Law: F recorded at t - tau; the force is late where tau is positive, the displacement where it is negative.
 Range: 0.1-5 ms.
@@ -17,21 +17,15 @@ LATEST = 0.03
 Three times the group delay of a filter of second order at 20 Hz (0.011 s), as slow as filters of a rig get.
 """
 
+_SEARCH = Search(lambda _: 1.0e-3, (0.0,))
+
 EFFECT = Effect(
     name="sensor_delay",
     place="sensor",
     law="F recorded at t - tau",
     parameters=(
         Parameter(
-            "tau",
-            "s",
-            0.0,
-            -0.1,
-            0.1,
-            "delay of the force channel",
-            Search(lambda _: 1.0e-3, (0.0,)),
-            natural_from=-LATEST,
-            natural_to=LATEST,
+            "tau", "s", 0.0, -0.1, 0.1, "delay of the force channel", _SEARCH, natural_from=-LATEST, natural_to=LATEST
         ),
     ),
     source="pure dead time of a measuring chain",

@@ -1,4 +1,4 @@
-"""A fluid that thins under shear: the viscous force bends below its straight line.
+"""A shear-thinning fluid: the viscous force bends below its straight line.
 
 Law: C w becomes C w_r (w/w_r)^n with w_r = 0.3 m/s and n < 1. Range: n 0.6-1 for
 multigrade oils and magneto-rheological fluids past yield.
@@ -21,10 +21,7 @@ EFFECT = Effect(
         Parameter("n", "-", 1.0, 0.1, 1.0, "flow index; 1 is a Newtonian fluid", Search(lambda _: 1.0, (0.85,))),
     ),
     source="Ostwald-de Waele power law; Bird, Stewart and Lightfoot 2002, Transport Phenomena",
-    tests=(
-        ({"w": 0.3, "C": 2000.0, "n": 0.7}, 600.0),
-        ({"w": 0.03, "C": 2000.0, "n": 0.5}, 189.73665961010275),
-    ),
+    tests=(({"w": 0.3, "C": 2000.0, "n": 0.7}, 600.0), ({"w": 0.03, "C": 2000.0, "n": 0.5}, 189.73665961010275)),
     hidden=lambda draw, scales: lambda s: {"n": 1.0 - 0.6 * s},
 )
 
@@ -37,7 +34,7 @@ def viscous_force(w: float, C: float, n: float) -> float:
 
 
 def viscous_slope(w: float, C: float, n: float) -> float:
-    """Derivative of the law by w [N s/m]; unbounded towards w = 0 for n < 1."""
+    """Compute the derivative of the law by w [N s/m]; unbounded towards w = 0 for n < 1."""
     if n == 1.0:
         return C
     if w <= 0.0:

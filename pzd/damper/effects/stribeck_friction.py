@@ -1,4 +1,4 @@
-"""Seal friction that falls once the lip floats on its oil film.
+"""Seal friction that falls with speed, as the lip begins to float on its oil film.
 
 Law: F_s exp(-(v/v_s)^2) sign(v). Range: 10-200 N, v_s 5-50 mm/s.
 """
@@ -17,6 +17,8 @@ def _hidden(draw: np.random.Generator, scales: Scales) -> Strength:
     return lambda s: {"F_s": 0.5 * scales.force * s, "v_s": speed}
 
 
+_V_S_SEARCH = Search(lambda s: s.speed, (0.03, 0.15, 0.5), logarithmic=True)
+
 EFFECT = Effect(
     name="stribeck_friction",
     place="parallel",
@@ -25,15 +27,7 @@ EFFECT = Effect(
         Parameter(
             "F_s", "N", 0.0, 0.0, 1.0e6, "friction at rest above that at speed", Search(lambda s: s.force, (0.02,))
         ),
-        Parameter(
-            "v_s",
-            "m/s",
-            0.02,
-            1.0e-4,
-            2.0,
-            "speed over which it falls",
-            Search(lambda s: s.speed, (0.03, 0.15, 0.5), logarithmic=True),
-        ),
+        Parameter("v_s", "m/s", 0.02, 1.0e-4, 2.0, "speed over which it falls", _V_S_SEARCH),
     ),
     source="Armstrong-Helouvry, Dupont and Canudas de Wit 1994, Automatica 30(7)",
     tests=(
@@ -46,7 +40,7 @@ EFFECT = Effect(
 
 
 def law(x: float, v: float, a: float, F_s: float, v_s: float) -> float:
-    """Force [N] beside the element at a piston speed v [m/s]."""
+    """Force [N] parallel to the element at a piston speed v [m/s]."""
     if v == 0.0:
         return 0.0
     return math.copysign(F_s * math.exp(-((v / v_s) ** 2)), v)

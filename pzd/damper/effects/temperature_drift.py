@@ -1,4 +1,4 @@
-"""Warm oil is thin: T0 and C fall exponentially with the recorded temperature.
+"""Viscosity of warm oil: T0 and C fall exponentially with the recorded temperature.
 
 Law: T0 exp(-beta_T0 (T - T_ref)), C exp(-beta_C (T - T_ref)). Range: hydraulic oil loses
 1-4 % of its viscosity a kelvin near room temperature.

@@ -1,4 +1,4 @@
-"""The valve answers the voltage late, as a first-order lag.
+"""First-order lag of the valve behind the voltage.
 
 Law: tau dUe/dt + Ue = U, exact for U linear over the step. Range: piezo valves 1-10 ms,
 magneto-rheological ones 5-50 ms. The 9 ms of the paper is a response time over the whole range,
@@ -11,21 +11,13 @@ import math
 
 from pzd.damper.effect import Effect, Parameter, Search, growing
 
+_SEARCH = Search(lambda _: 1.0e-3, (2.0, 10.0, 40.0), logarithmic=True)
+
 EFFECT = Effect(
     name="valve_lag",
     place="drive",
     law="tau dUe/dt + Ue = U",
-    parameters=(
-        Parameter(
-            "tau",
-            "s",
-            0.0,
-            0.0,
-            0.5,
-            "time constant of the valve and its supply",
-            Search(lambda _: 1.0e-3, (2.0, 10.0, 40.0), logarithmic=True),
-        ),
-    ),
+    parameters=(Parameter("tau", "s", 0.0, 0.0, 0.5, "time constant of the valve and its supply", _SEARCH),),
     source="first-order lag; response times in Makowski and Knap 2021, sec. 1",
     tests=(
         ({"effective": 0.0, "before": 100.0, "now": 100.0, "step": 0.01, "tau": 0.01}, 63.21205588285577),
@@ -37,7 +29,7 @@ EFFECT = Effect(
 
 
 def law(effective: float, before: float, now: float, step: float, tau: float) -> float:
-    """Effective voltage [V] a step [s] later, the voltage going linearly from `before` to `now` [V]."""
+    """Effective voltage [V] after a step [s], the voltage changing linearly from `before` to `now` [V]."""
     if tau <= 0.0:
         return now
     lag = (now - before) * tau / step if step > 0.0 else 0.0
@@ -45,5 +37,5 @@ def law(effective: float, before: float, now: float, step: float, tau: float) ->
 
 
 def rate(effective: float, now: float, rate: float, tau: float) -> float:
-    """Rate of the effective voltage [V/s] while the voltage stands at `now` [V] and moves at `rate` [V/s]."""
+    """Rate of the effective voltage [V/s] at a voltage `now` [V] that changes at `rate` [V/s]."""
     return rate if tau <= 0.0 else (now - effective) / tau

@@ -14,6 +14,7 @@ from pzd.damper.effect import Effect, Parameter, Search
 NO_KNEE = 1.0e7
 """Knee force of a direction without a knee [N]: no damper reaches it."""
 
+_SHARE = Search(lambda _: 1.0, (0.0,))
 _FORCES = Search(lambda s: s.force, (0.3,), logarithmic=True)
 _SLOPES = Search(lambda s: s.damping, (0.4,), logarithmic=True)
 
@@ -22,15 +23,7 @@ EFFECT = Effect(
     place="flow",
     law="C times (1 + beta sign(F)); beyond max(F_reb or F_comp, T0) the slope is C_reb or C_comp",
     parameters=(
-        Parameter(
-            "beta",
-            "-",
-            0.0,
-            -0.999,
-            0.999,
-            "share by which the bleed of rebound is steeper",
-            Search(lambda _: 1.0, (0.0,)),
-        ),
+        Parameter("beta", "-", 0.0, -0.999, 0.999, "share by which the bleed of rebound is steeper", _SHARE),
         Parameter("F_reb", "N", inf, 0.0, NO_KNEE, "force of the knee in rebound", _FORCES),
         Parameter("C_reb", "N s/m", 0.0, 1.0e-3, 1.0e8, "blow-off slope in rebound", _SLOPES),
         Parameter("F_comp", "N", inf, 0.0, NO_KNEE, "force of the knee in compression", _FORCES),

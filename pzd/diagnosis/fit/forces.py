@@ -9,20 +9,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pzd.damper.compiled.laws import ELEMENT
-from pzd.damper.compiled.rows import rows_along
-from pzd.damper.compose import (
+from pzd.damper.compose import constant_value, integrated_sensitivities, parallel_force_along, sensors_of
+from pzd.damper.confounders import known
+from pzd.damper.effect import ELEMENT
+from pzd.damper.parameter_rows import (
     constant_rows,
-    constant_value,
     drive_row_of,
     element_rows,
-    forces_beside,
-    integrated_sensitivities,
+    material_factors,
     parallel_rows,
-    sensors_of,
+    rows_along,
 )
-from pzd.damper.confounders import known
-from pzd.damper.material import material_factors
+from pzd.damper.path import Variables
 from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, RecordLikelihood
 from pzd.diagnosis.fit.parameters import Point, Problem, Unknown, Work
 from pzd.record import Array
@@ -69,7 +67,7 @@ class LaidOut:
 
     def force_beside(self, o: RecordLikelihood) -> Array:
         """(m,) force of what stands beside the element [N]; (1,) a zero without any."""
-        return np.zeros(1) if self.beside is None else forces_beside(o.motion.about(self.zero), self.beside)
+        return np.zeros(1) if self.beside is None else parallel_force_along(o.motion.centred_on(self.zero), self.beside)
 
 
 def laid_out(point: Point, o: RecordLikelihood) -> LaidOut:
@@ -155,15 +153,9 @@ def sensitivities(given: Directions, o: RecordLikelihood, work: Work) -> tuple[A
     beside = given.here.force_beside(o)
     changes = [_change_beside(pair, o) for pair in given.pairs]
     initial_slopes = np.array([-change[0] for change in changes])
+    variables, initial_force = Variables(given.moved, given.along, initial_slopes), o.begins_with - float(beside[0])
     force, slopes = integrated_sensitivities(
-        given.here.rows,
-        given.moved,
-        given.along,
-        o.motion,
-        o.steps,
-        o.begins_with - float(beside[0]),
-        initial_slopes,
-        SIMULATION_TOLERANCE,
+        given.here.rows, variables, o.motion, o.steps, initial_force, SIMULATION_TOLERANCE
     )
     force = force + beside
     for j, change in enumerate(changes):

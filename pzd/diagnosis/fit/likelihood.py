@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pzd.damper.compose import respond, sampling_steps, sensors_of, shown_moments
-from pzd.damper.material import effective_voltage
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import effective_voltage
 from pzd.diagnosis.data import Prepared
 from pzd.diagnosis.fit.prediction import Predicted, motion_of, warms
 from pzd.identification.prepared_record import in_motion

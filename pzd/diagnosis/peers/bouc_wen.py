@@ -14,8 +14,8 @@ from functools import partial
 
 import numpy as np
 
-from pzd.compiled import compiled
-from pzd.damper.shared_laws import hysteresis_after
+from pzd.compiled import compiled, compiled_law
+from pzd.damper.effects.bouc_wen import hysteresis_after
 from pzd.diagnosis.peers import Coefficient, Peer, PeerForm, ShapeParameter, StrokeMotion
 from pzd.record import Array
 
@@ -23,6 +23,8 @@ STEEPNESS = np.geomspace(1.0, 3000.0, 9)
 """rho of the grid times the largest amplitude: from a hysteresis that never saturates to one that is nearly a step."""
 UNLOADING = (0.5, 0.8, 1.2, 2.0, 5.0, 20.0)
 """sigma of the grid: from an unloading as stiff as at z = 0 to one that is nearly a step."""
+
+_hysteresis_after = compiled_law(hysteresis_after)
 
 
 def columns(exponent: int, motion: StrokeMotion, shape: Array) -> Array:
@@ -50,9 +52,9 @@ def _fill(x: Array, v: Array, step: float, rho: float, sigma: float, exponent: i
         before, after = travel / step - half, travel / step + half
         if before * after < 0.0:
             way = 0.5 * before * before / (before - after) * step
-            now = hysteresis_after(now, way, rho, sigma, exponent)
+            now = _hysteresis_after(now, way, rho, sigma, exponent)
             travel -= way
-        now = hysteresis_after(now, travel, rho, sigma, exponent)
+        now = _hysteresis_after(now, travel, rho, sigma, exponent)
         z[i] = now
 
 

@@ -249,8 +249,8 @@ def _barely(problem: Problem, before: Fitted, effect: Effect) -> Candidate:
     return replace(_from(problem, before, effect.name, np.concatenate([before.searched, start]), 1), searched=False)
 
 
-def best_competing_form(problem: Problem, before: Fitted) -> Candidate:
-    """The competing form (a law outside the library) that explains most, fitted as a candidate is."""
+def best_confounder(problem: Problem, before: Fitted) -> Candidate:
+    """Fit every confounder as a candidate, and return the one that explains most."""
     tried = (converged(problem, before, candidate(problem, before, form)) for form in confounders().values())
     return min(tried, key=lambda c: c.delta_bic)
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pzd.damper.effect import Scales
-from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
+from pzd.damper.parameter_rows import rows_per_voltage
 from pzd.diagnosis.campaign import Campaign, in_use, probability_of_noise, visible_gap
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import TRAINING, VALIDATION, Prepared
@@ -130,6 +130,6 @@ def _of(prepared: Prepared, channel: str) -> Array:
 def nearest_row(rows: Sequence[BaseRow], prepared: Prepared) -> int:
     """Index of the base row of a record: of the rows of the nearest voltage, that of the nearest temperature."""
     voltage, temperature = prepared.record.median_voltage() or 0.0, prepared.record.median_temperature() or 0.0
-    _, nearest = min(by_voltage(rows), key=lambda group: abs(group[0] - voltage))
+    _, nearest = min(rows_per_voltage(rows), key=lambda group: abs(group[0] - voltage))
     row = min(nearest, key=lambda r: abs((r.temperature_degC or 0.0) - temperature))
     return next(i for i, each in enumerate(rows) if each is row)

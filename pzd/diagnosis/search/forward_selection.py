@@ -33,7 +33,7 @@ from pzd.diagnosis.search.acceptance import (
 from pzd.diagnosis.search.candidates import (
     Candidate,
     as_candidate,
-    best_competing_form,
+    best_confounder,
     by_voltage,
     candidate,
     candidates,
@@ -328,11 +328,11 @@ class _Search:
         return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
 
     def competitions(self) -> tuple[Competition, ...]:
-        """The competing forms that would do as well as an effect adopted, in its place."""
+        """Return the confounders that fit as well as an adopted effect, in its place."""
         found = []
         for name in self.current.effects[len(self.config.force) :]:
             without = self._without(name)
-            form = best_competing_form(self.evidence.whole, without)
+            form = best_confounder(self.evidence.whole, without)
             behind = form.delta_bic - delta_bic(without, self.current)
             if behind < self.config.rival_bic:
                 found.append(Competition(name, self.current.damper, form.effect, form.fitted.damper, behind))

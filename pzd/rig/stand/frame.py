@@ -8,19 +8,18 @@ import numpy as np
 
 from pzd.damper.compiled.kernels import K, row_of, stroke_straight
 from pzd.damper.compose import (
-    element_rows,
-    forces_beside,
     integrated_force,
-    parallel_rows,
+    parallel_force_along,
     recorded,
     respond,
     sampling_steps,
     sensors_of,
     voltage_at_valve,
 )
-from pzd.damper.march import deflections
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import element_rows, parallel_rows
+from pzd.damper.path import deflections
 from pzd.record import Array
 
 TOLERANCE = 1e-7
@@ -58,7 +57,7 @@ def force_in_frame(damper: Damper, motion: Motion, frame_stiffness: float | None
     """
     if frame_stiffness is None:
         return respond(damper, motion, tolerance=TOLERANCE)
-    motion = motion.about(damper.zero_m)
+    motion = motion.centred_on(damper.zero_m)
     steps = sampling_steps(motion.time)
     effective = voltage_at_valve(damper, motion.voltage, steps)
     own = np.array(element_rows(damper, effective, motion.temperature))
@@ -98,7 +97,7 @@ def _iterated(
         total, last = element + more, (more, bend)
         if parallel is not None:
             at = motion.displacement - total / frame_stiffness
-            more = forces_beside(replace(motion, displacement=at, velocity=velocity), parallel)
+            more = parallel_force_along(replace(motion, displacement=at, velocity=velocity), parallel)
         if bent:
             bend = deflections(element, rows) - deflections(element, own) - element / frame_stiffness
         change = max(np.max(np.abs(more - last[0])), frame_stiffness * np.max(np.abs(bend - last[1])))

@@ -21,10 +21,10 @@ from pzd.damper.compiled.kernels import (
     effective_voltage_after,
     parallel_force,
 )
-from pzd.damper.compiled.rows import nodes_of
 from pzd.damper.compose import BRANCHES, any_slips, steady_force
 from pzd.damper.flow import flow_speed
 from pzd.damper.model import Damper
+from pzd.damper.parameter_rows import nodes_of
 from pzd.damper.regimes import spring_force
 from pzd.force_table.lookup import Lookup, bracket
 from pzd.record import Array
@@ -457,7 +457,7 @@ LEAST_RELAXATION = 1e-5
 def grid_of(table: Table, temperature: float | None) -> TableArrays:
     """Return the table at one temperature [degC], as the compiled loop reads it."""
     lookup = Lookup.of(table, temperature)
-    return TableArrays(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.reach)
+    return TableArrays(lookup.voltages, lookup.speeds, lookup.rebound, lookup.compression, lookup.envelope)
 
 
 def table_of(damper: Damper, table: Table) -> Table:

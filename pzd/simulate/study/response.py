@@ -15,11 +15,11 @@ import numpy as np
 from pzd.artefacts import Response
 from pzd.damper.compiled.columns import value_of
 from pzd.damper.compiled.kernels import parallel_forces
-from pzd.damper.compose import parallel_rows, respond, steady_force, voltage_at_valve
+from pzd.damper.compose import respond, steady_force, voltage_at_valve
 from pzd.damper.confounders import known
-from pzd.damper.material import base_voltages
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
+from pzd.damper.parameter_rows import base_voltages, parallel_rows
 from pzd.record import Array
 from pzd.simulate.config import SimulateConfig
 

@@ -1,4 +1,4 @@
-"""An oil spring that stiffens as it is wound up.
+"""An oil stiffness that hardens with its extension.
 
 Law: F = k (e + c e^3).
 """

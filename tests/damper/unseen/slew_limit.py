@@ -33,12 +33,12 @@ EFFECT = Effect(
 
 
 def law(effective: float, now: float, step: float, R: float) -> float:
-    """Voltage felt [V] a step [s] later."""
+    """Effective voltage [V] after a step [s]."""
     return effective + max(-R * step, min(R * step, now - effective))
 
 
 def rate(effective: float, now: float, rate: float, R: float) -> float:
-    """Rate of the voltage felt [V/s]."""
+    """Rate of the effective voltage [V/s]."""
     if abs(now - effective) > 1.0e-9:
         return R if now > effective else -R
     return max(-R, min(R, rate))

@@ -63,7 +63,7 @@ def independent(name: str, frame: float | None = None) -> np.ndarray:
         return float(np.copysign(w, force))
 
     def deflection(total: float, k: float) -> float:
-        """Of the oil spring, of the deflection that it shares with a linear frame."""
+        """Return the part of a deflection that the oil stiffness has, which shares it with a linear frame."""
         if frame is None:
             return total
         e = total
@@ -74,10 +74,10 @@ def independent(name: str, frame: float | None = None) -> np.ndarray:
     voltage = MOVING if name != "slew_limit" else None
 
     def parameters(t: float) -> tuple[float, float, float]:
-        share = (felt(t) if voltage is None else np.interp(t, TIME, voltage)) / 150.0
+        share = (effective(t) if voltage is None else np.interp(t, TIME, voltage)) / 150.0
         return 300.0 + 1000.0 * share, 2700.0 - 200.0 * share, 2e5 + 2e5 * share
 
-    def felt(t: float) -> float:
+    def effective(t: float) -> float:
         return float(np.interp(t, FINE, SLEWED))
 
     def force(t: float, e: float) -> float:

@@ -1,4 +1,4 @@
-"""What an effect file must hold: whoever breaks a rule is told at import, with the name of the file."""
+"""Rules of effect files: a broken one is an error at import, with the name of the file."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pzd.damper.compiled.laws import functions
 from pzd.damper.confounders import known, module_of
-from pzd.damper.effect import Scales
+from pzd.damper.effect import Scales, functions
 from pzd.damper.effects import effects_in, library, nameable
 
 GOOD = """
@@ -74,7 +73,7 @@ def text(old: str = "", new: str = "", name: str = "cubic", place: str = "flow")
     return GOOD.replace("NAME", name).replace("PLACE", place).replace(old, new)
 
 
-def test_a_good_file_is_an_effect(effects: Effects) -> None:
+def test_a_file_that_keeps_the_rules_declares_an_effect(effects: Effects) -> None:
     assert effects(cubic=text()) == ["cubic"]
 
 
@@ -105,12 +104,12 @@ def test_two_files_of_one_name_are_an_error_with_both(effects: Effects) -> None:
         effects(cubic=text(), other=text())
 
 
-def test_a_foil_called_like_an_effect_is_an_error_with_both(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_confounder_with_the_name_of_an_effect_is_an_error_with_both_files(monkeypatch: pytest.MonkeyPatch) -> None:
     from pzd.damper import confounders
 
     known.cache_clear()
-    monkeypatch.setattr(confounders, "competing_forms", lambda: {"lash": library()["lash"]})
-    with pytest.raises(ImportError, match=r"effects/lash.py and .*competing_forms/lash.py both declare lash"):
+    monkeypatch.setattr(confounders, "confounders", lambda: {"lash": library()["lash"]})
+    with pytest.raises(ImportError, match=r"effects/lash.py and .*confounders/lash.py both declare lash"):
         known()
     known.cache_clear()
 

@@ -1,4 +1,4 @@
-"""Foils: forces that the library does not hold, computed like its effects and never among them."""
+"""Confounders: forces outside the library, computed like its effects."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ MOTION = Motion(TIME, *(a * np.sin(2 * np.pi * TIME + p) for a, p in ((0.02, 0.0
 PLAIN = Damper(base=(BaseRow(T0_N=300.0, C_Ns_per_m=2700.0, k_N_per_m=2e5),))
 
 
-def test_a_foil_is_known_to_the_damper_and_not_to_the_library() -> None:
+def test_a_confounder_is_known_to_the_damper_and_is_no_effect_of_the_library() -> None:
     assert not set(confounders()) & set(library())
     assert set(known()) == {*confounders(), *library(), *fitted_laws()}
 
 
 @pytest.mark.parametrize("name", confounders())
-def test_a_foil_gives_its_reference_numbers(name: str) -> None:
+def test_a_confounder_gives_its_reference_numbers(name: str) -> None:
     law = importlib.import_module(f"pzd.damper.confounders.{name}").law
     for arguments, expected in confounders()[name].tests:
         assert law(**arguments) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", confounders())
-def test_a_foil_adds_its_law_to_the_force(name: str) -> None:
+def test_a_confounder_adds_its_law_to_the_force(name: str) -> None:
     law, values = (
         importlib.import_module(f"pzd.damper.confounders.{name}").law,
         {confounders()[name].parameters[0].name: 30.0},
@@ -44,6 +44,6 @@ def test_a_foil_adds_its_law_to_the_force(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", confounders())
-def test_nobody_can_ask_for_a_foil_to_be_adopted(name: str) -> None:
+def test_a_config_cannot_force_a_confounder(name: str) -> None:
     with pytest.raises(ValueError, match="no effect is called"):
         DiagnoseConfig(force=(name,))
