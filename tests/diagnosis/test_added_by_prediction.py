@@ -13,13 +13,13 @@ from whole_diagnosis import all_but
 
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import Damper, against_nature
-from pzd.diagnosis.adoption import ADDED, REPLACED, Extended, handed_on, with_predictive_effects
+from pzd.diagnosis.adoption import ADDED, REPLACED, Extended, adopt_effects, with_predictive_effects
+from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.cross_validation import Trials, trials_of
+from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.search.candidates import by_voltage, candidates, starts_of
-from pzd.diagnosis.search.evidence import evidence_of
+from pzd.diagnosis.search.candidates import candidates, per_voltage_candidates, starts_of
 from pzd.record import Record
 
 TESTS = ((0.5, 0.03), (1.0, 0.02), (2.0, 0.03))
@@ -29,19 +29,21 @@ def records_of(truth: Damper, rng: np.random.Generator) -> tuple[Record, ...]:
     return sines(truth, rng, TWO, tests=TESTS, cycles=3, noise=2e-3)
 
 
-def plain_selection(records: tuple[Record, ...], config: DiagnoseConfig) -> tuple[Selection, Trials]:
+def plain_selection(records: tuple[Record, ...], config: DiagnoseConfig) -> tuple[Selection, CrossValidation]:
     campaign = campaign_of(records)
     evidence = evidence_of(campaign, damper_of(TWO))
     plain = fit(evidence.whole, (), evidence.whole.start())
-    return Selection(plain, plain, (), {}, evidence, evidence), trials_of(campaign, plain.damper, config.visible)
+    return Selection(plain, plain, (), {}, evidence, evidence), cross_validation_of(
+        campaign, plain.damper, config.visible
+    )
 
 
 def extended(records: tuple[Record, ...], config: DiagnoseConfig) -> tuple[Extended | None, float]:
     """What is added to the plain damper, and what that misses of kept-back tests by itself."""
-    selection, trials = plain_selection(records, config)
-    missed = trials.plain_missed()
+    selection, validation = plain_selection(records, config)
+    missed = validation.baseline_error()
     assert missed.criterion is not None
-    return with_predictive_effects(selection, missed, trials.plain_missed_between, trials, config), missed.criterion
+    return with_predictive_effects(selection, missed, validation.baseline_interpolation_error, validation, config), missed.criterion
 
 
 def test_what_is_missing_is_added_one_effect_after_another(rng: np.random.Generator) -> None:
@@ -71,17 +73,17 @@ def test_a_branch_that_no_verdict_names_is_added_with_its_values(rng: np.random.
     for name in ("T0_2", "k_2"):
         assert values[name] == pytest.approx(by_voltage_V[name], rel=0.05)
     selection, _ = plain_selection(records, DiagnoseConfig())
-    tried = candidates(selection.first.whole, selection.plain, silent=True)
+    tried = candidates(selection.initial_evidence.whole, selection.baseline, silent=True)
     assert {c.effect for c in tried} <= nameable().keys()
 
 
 def test_what_goes_with_t0_starts_in_proportion_to_it_at_each_voltage(rng: np.random.Generator) -> None:
     selection, _ = plain_selection(records_of(damper_of(TWO), rng), DiagnoseConfig())
-    whole, effect = selection.first.whole, library()["second_branch"]
-    assert whole.growing(library()["gas_spring"]) is whole
-    wider = whole.growing(effect)
-    for start in starts_of(wider, selection.plain, effect):
-        point = wider.point(np.concatenate([selection.plain.searched, start]), wider.unknowns(("second_branch",)))
+    whole, effect = selection.initial_evidence.whole, library()["second_branch"]
+    assert whole.with_friction_scaling(library()["gas_spring"]) is whole
+    wider = whole.with_friction_scaling(effect)
+    for start in starts_of(wider, selection.baseline, effect):
+        point = wider.point(np.concatenate([selection.baseline.optimum, start]), wider.unknowns(("second_branch",)))
         values = point.effects["second_branch"]
         share = whole.base[0].T0_N / whole.base[1].T0_N
         for name in ("T0_2", "k_2"):
@@ -112,14 +114,14 @@ def test_what_was_added_takes_the_place_of_what_stood_in_for_it(rng: np.random.G
     records = records_of(truth, rng)
     forbid = all_but("preload_offset", "gas_spring", "accumulator")
     config = DiagnoseConfig(forbid=forbid)
-    selection, trials = plain_selection(records, config)
-    whole = selection.first.whole
+    selection, validation = plain_selection(records, config)
+    whole = selection.initial_evidence.whole
     stood_in = damper_of(TWO, preload_offset={"F_0": -250.0}, gas_spring={"k_g": 6000.0})
     fitted = fit(whole, ("preload_offset", "gas_spring"), whole.start_with(stood_in))
     adopted = replace(selection, fitted=fitted, reasons=dict.fromkeys(fitted.effects, "adopted"))
-    missed = trials.missed_by_criterion(fitted.damper)
-    between = trials.missed_between(fitted.damper, by_criterion=True)
-    found = with_predictive_effects(adopted, missed, between, trials, config)
+    missed = validation.error_by_criterion(fitted.damper)
+    between = validation.interpolation_error(fitted.damper, by_criterion=True)
+    found = with_predictive_effects(adopted, missed, between, validation, config)
     assert found is not None
     assert found.added == ("accumulator",)
     values = found.selection.fitted.damper.effects
@@ -130,7 +132,7 @@ def test_what_was_added_takes_the_place_of_what_stood_in_for_it(rng: np.random.G
     assert found.missed.criterion is not None
     assert found.missed.criterion < 0.5 * (missed.criterion or 0.0)
     asked = with_predictive_effects(
-        adopted, missed, between, trials, config.model_copy(update={"force": ("preload_offset", "gas_spring")})
+        adopted, missed, between, validation, config.model_copy(update={"force": ("preload_offset", "gas_spring")})
     )
     assert asked is not None
     assert {"preload_offset", "gas_spring"} <= set(asked.selection.fitted.damper.effects)
@@ -163,11 +165,11 @@ def test_what_is_worse_between_the_voltages_is_not_added(
         evidence.whole.start_with(truth.with_effect("preload_offset", {"F_0": 10.0})),
     )
     config = DiagnoseConfig(most_added=0)
-    trials = trials_of(campaign, plain.damper, config.visible)
+    validation = cross_validation_of(campaign, plain.damper, config.visible)
     selection = Selection(plain, fitted, (), {"preload_offset": "adopted"}, evidence, evidence)
-    missed = trials.missed_by_criterion(fitted.damper)
-    between = trials.missed_between(fitted.damper, by_criterion=True)
-    found = with_predictive_effects(selection, missed, between, trials, config)
+    missed = validation.error_by_criterion(fitted.damper)
+    between = validation.interpolation_error(fitted.damper, by_criterion=True)
+    found = with_predictive_effects(selection, missed, between, validation, config)
     assert (found is not None and found.added == ("preload_offset by voltage",)) == added
 
 
@@ -197,11 +199,11 @@ def test_one_impossible_value_among_those_by_voltage_is_enough() -> None:
 
 def test_an_effect_that_fits_with_an_impossible_value_alone_is_not_handed_on(rng: np.random.Generator) -> None:
     truth = damper_of(TWO, gas_spring={"k_g": -6000.0})
-    selection, trials = plain_selection(records_of(truth, rng), DiagnoseConfig())
-    whole = selection.first.whole
+    selection, validation = plain_selection(records_of(truth, rng), DiagnoseConfig())
+    whole = selection.initial_evidence.whole
     spring = fit(whole, ("gas_spring",), whole.start_with(truth))
-    assert spring.misfit < 0.1 * selection.plain.misfit
-    found = handed_on(replace(selection, fitted=spring, reasons={"gas_spring": "adopted"}), trials, (), "V")
+    assert spring.misfit < 0.1 * selection.baseline.misfit
+    found = adopt_effects(replace(selection, fitted=spring, reasons={"gas_spring": "adopted"}), validation, (), "V")
     assert found.selection.adopted == ()
     assert found.refused is not None
     said = re.match(r"gas_spring with k_g = (\S+) N/m ", found.refused)
@@ -213,9 +215,9 @@ def test_an_effect_that_fits_with_an_impossible_value_alone_is_not_handed_on(rng
 def test_lengths_and_masses_are_one_value_at_every_voltage(rng: np.random.Generator) -> None:
     truth = damper_of(TWO, end_stop={"k_e": 2e7, "x_e": 0.02}, preload_offset={"F_0": 100.0})
     selection, _ = plain_selection(records_of(truth, rng), DiagnoseConfig())
-    whole = selection.first.whole
+    whole = selection.initial_evidence.whole
     fitted = fit(whole, ("end_stop", "preload_offset"), whole.start_with(truth))
-    assert [c.effect for c in by_voltage(whole, fitted)] == ["preload_offset"]
+    assert [c.effect for c in per_voltage_candidates(whole, fitted)] == ["preload_offset"]
     assert {name for name, effect in library().items() if effect.same_at_every_voltage} == {
         "accumulator",
         "end_stop",

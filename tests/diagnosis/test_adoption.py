@@ -14,7 +14,7 @@ from whole_diagnosis import diagnosed
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.search.acceptance import Round, Selection
+from pzd.diagnosis.search.acceptance import Selection, SelectionStep
 from pzd.record import Record
 
 
@@ -74,8 +74,8 @@ def test_a_drift_is_named_where_the_damper_warms_and_only_if_there_is_one(
 
 
 def test_rivals_of_one_step_stay_rivals_when_another_effect_is_adopted_but_not_when_they_are() -> None:
-    spring_or_mass = Round((), "gas_spring", ("fluid_inertia",))
-    then = Round((), "asymmetry")
+    spring_or_mass = SelectionStep((), "gas_spring", ("fluid_inertia",))
+    then = SelectionStep((), "asymmetry")
 
     def named(*effects: str) -> Selection:
         standing: Any = SimpleNamespace(effects=effects)

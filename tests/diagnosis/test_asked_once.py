@@ -9,7 +9,7 @@ import pytest
 from campaign import damper_of, sines
 
 from pzd.diagnosis.campaign import Campaign
-from pzd.diagnosis.data import UNTOUCHED, prepare, split
+from pzd.diagnosis.data import HELD_OUT, prepare, split
 from pzd.signals.nuisance import NuisanceConfig
 
 TWO = (0.0, 150.0)
@@ -36,12 +36,12 @@ def test_a_damper_is_judged_once(asked: Callable[[int], Campaign]) -> None:
 def test_naming_sees_all_but_the_untouched_samples(asked: Callable[[int], Campaign]) -> None:
     campaign = asked(1)
     seen = {j.prepared.record.name: j.wanted for j in campaign.checks(PLAIN)}
-    held_out = {j.prepared.record.name: j.wanted for j in campaign.untouched(PLAIN)}
+    held_out = {j.prepared.record.name: j.wanted for j in campaign.held_out_checks(PLAIN)}
     assert held_out
-    for prepared, roles in zip(campaign.prepared, campaign.parts.roles, strict=True):
+    for prepared, roles in zip(campaign.prepared, campaign.split.roles, strict=True):
         nothing = np.zeros(roles.size, dtype=np.bool_)
-        assert not np.any(seen.get(prepared.record.name, nothing) & (roles == UNTOUCHED))
-        assert not np.any(held_out.get(prepared.record.name, nothing) & (roles != UNTOUCHED))
+        assert not np.any(seen.get(prepared.record.name, nothing) & (roles == HELD_OUT))
+        assert not np.any(held_out.get(prepared.record.name, nothing) & (roles != HELD_OUT))
 
 
 def test_records_judged_at_the_same_time_are_judged_the_same(asked: Callable[[int], Campaign]) -> None:

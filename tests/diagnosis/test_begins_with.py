@@ -8,7 +8,7 @@ from test_evidence import evidence
 
 from pzd.damper.compose import respond
 from pzd.damper.motion import Motion
-from pzd.diagnosis.fit.likelihood import response
+from pzd.diagnosis.fit.likelihood import simulated_force
 from pzd.record import Record
 
 
@@ -34,4 +34,4 @@ def test_a_part_that_begins_later_is_simulated_from_the_force_at_its_motions_fir
     parts = [o for half in found.halves for o in half.observations]
     assert any(o.places[0] > 0 for o in parts)
     for o in parts:
-        assert np.max(np.abs(o.measured - response(o, truth))) < 2.0, o.places[0]
+        assert np.max(np.abs(o.measured - simulated_force(o, truth))) < 2.0, o.places[0]

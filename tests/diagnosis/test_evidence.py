@@ -11,12 +11,11 @@ from campaign import damper_of, sine, sines
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.campaign import Campaign
-from pzd.diagnosis.data import TRAINING, UNTOUCHED, VALIDATION, prepare, split
+from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
+from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, prepare, split
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.fit.likelihood import RecordLikelihood
-from pzd.diagnosis.fit.prediction import BESIDE_STEP, counted, expected
-from pzd.diagnosis.search.evidence import Evidence, evidence_of
+from pzd.diagnosis.fit.likelihood import WeightedRecord
+from pzd.diagnosis.fit.prediction import NEAR_STEP, comparable_samples, predict
 from pzd.record import Record
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -38,7 +37,7 @@ def test_the_right_damper_leaves_no_more_than_noise(
     truth = damper_of(TWO, **effects)
     whole = evidence(sines(truth, rng, TWO, jitter=0.01), truth).whole
     found = fit(whole, tuple(effects), whole.start_with(truth))
-    freedom = found.size - found.searched.size
+    freedom = found.size - found.optimum.size
     # About a thousand residuals, and noise estimated from seven differences: over 36 draws 0.975, sd 0.058; 4.5 sd.
     assert 0.71 < found.misfit / freedom < 1.24
 
@@ -61,7 +60,7 @@ def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(rn
         (prepared,) = prepare((sine(stuck, 0.0, 1.0, 0.002, rng, displacement_noise=noise, cycles=8),))
         run = prepared.cycles
         assert run is not None
-        variance = expected(stuck, prepared, 0.0).displacement_variance
+        variance = predict(stuck, prepared, 0.0).displacement_variance
         assert isinstance(variance, np.ndarray)
         assert variance[0] == 0.0
         single = noise**2 / run.points(prepared.record.time) / run.count
@@ -75,7 +74,7 @@ def test_noise_of_the_displacement_goes_through_the_oil_spring_into_the_force(rn
 
 def test_the_instant_of_a_standing_voltage_does_not_matter(rng: np.random.Generator) -> None:
     (prepared,) = prepare((sine(damper_of(TWO), 0.0, 1.0, 0.02, rng),))
-    assert expected(damper_of(TWO), prepared, 5e-4).timing.shape == (prepared.record.time.size, 0)
+    assert predict(damper_of(TWO), prepared, 5e-4).timing.shape == (prepared.record.time.size, 0)
 
 
 def test_a_sample_beside_a_jump_is_worth_nothing(rng: np.random.Generator) -> None:
@@ -88,7 +87,7 @@ def test_a_sample_beside_a_jump_is_worth_nothing(rng: np.random.Generator) -> No
     spike = np.zeros(one.measured.size)
     spike[int(np.argmax(bend))] = 100.0
     elsewhere = np.roll(spike, 100)
-    worth = [float(np.sum(one.in_noise(s) ** 2)) for s in (spike, elsewhere)]
+    worth = [float(np.sum(one.standardised(s) ** 2)) for s in (spike, elsewhere)]
     assert worth[0] < 0.1 * worth[1]
 
 
@@ -97,10 +96,10 @@ def test_samples_beside_a_step_of_the_voltage_are_not_judged(rng: np.random.Gene
     voltage = np.where(np.arange(prepared.record.time.size) < 3000, 0.0, 150.0)
     stepped = replace(prepared, record=replace(prepared.record, voltage=voltage), lead=None, cycles=None)
     before, after = 2999, 3000
-    reach = round(BESIDE_STEP * stepped.record.rate)
+    reach = round(NEAR_STEP * stepped.record.rate)
     assert reach >= 1
-    assert not counted(stepped)[before - reach : after + reach + 1].any()
-    assert counted(stepped)[[before - reach - 1, after + reach + 1]].all()
+    assert not comparable_samples(stepped)[before - reach : after + reach + 1].any()
+    assert comparable_samples(stepped)[[before - reach - 1, after + reach + 1]].all()
 
 
 def test_the_hardest_tests_of_the_rig_are_fitted(rng: np.random.Generator) -> None:
@@ -129,7 +128,7 @@ def road_record(rng: np.random.Generator, count: int, name: str) -> Record:
     return Record(name, None, time, x, v, a, measured, np.zeros(count))
 
 
-def samples_of(observation: RecordLikelihood) -> set[tuple[str, int]]:
+def samples_of(observation: WeightedRecord) -> set[tuple[str, int]]:
     """The samples of the record that an observation is compared at."""
     assert np.all(np.diff(observation.places) == 1)
     return {(observation.name, int(i)) for i in observation.places[observation.compared]}
@@ -149,19 +148,19 @@ def test_no_sample_is_in_two_parts(rng: np.random.Generator, count: int) -> None
     }
     assert not compared[TRAINING] & compared[VALIDATION]
     assert compared[TRAINING] | compared[VALIDATION] == compared[TRAINING, VALIDATION]
-    roles = dict(zip((p.record.name for p in found.campaign.prepared), found.campaign.parts.roles, strict=True))
+    roles = dict(zip((p.record.name for p in found.campaign.prepared), found.campaign.split.roles, strict=True))
     for part, samples in compared.items():
         wanted = part if isinstance(part, tuple) else (part,)
         assert samples
         assert {int(roles[name][i]) for name, i in samples} == set(wanted)
-    assert UNTOUCHED not in {int(roles[name][i]) for name, i in compared[TRAINING, VALIDATION]}
+    assert HELD_OUT not in {int(roles[name][i]) for name, i in compared[TRAINING, VALIDATION]}
 
 
 def test_noise_is_white_within_the_stretches_that_are_compared(rng: np.random.Generator) -> None:
     found = evidence((road_record(rng, 10_000, "road"),), damper_of((0.0,)))
     (training,) = found.halves[0].observations
     (force,) = fit(found.halves[0], (), found.halves[0].start()).simulated
-    left = training.in_noise(training.measured - force)
+    left = training.standardised(training.measured - force)
     assert np.count_nonzero(np.diff(training.compared.astype(int)) == 1) == 3  # four stretches
     assert left.size < training.measured.size or not training.noise.coefficients.size
     assert float(left @ left) / left.size == pytest.approx(1.0, abs=0.15)

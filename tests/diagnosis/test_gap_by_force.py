@@ -8,8 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from pzd.diagnosis.campaign import gap_in_force, visible_gap
 from pzd.diagnosis.config import DiagnoseConfig
+from pzd.diagnosis.gap import gap_in_force, visible_gap
 from pzd.diagnosis.search.acceptance import leaves_gap
 
 SOFT, HARD = 100.0, 1000.0

@@ -12,9 +12,9 @@ from pzd.artefacts import Diagnosed, Rig, base_of
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.campaign import check_residual
-from pzd.diagnosis.data import TRAINING, UNTOUCHED, VALIDATION, prepare, split
-from pzd.diagnosis.fit.prediction import expected
+from pzd.diagnosis.data import HELD_OUT, TRAINING, VALIDATION, prepare, split
+from pzd.diagnosis.fit.prediction import predict
+from pzd.diagnosis.gap import check_residual
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify
 from pzd.quantities import Control
@@ -146,11 +146,11 @@ def test_every_role_has_every_kind_of_test_over_the_conditions(rng: np.random.Ge
     parts = split(prepared, None, 2.0)
     whole = [int(roles[0]) for roles in parts.roles]
     assert all(np.all(roles == role) for roles, role in zip(parts.roles, whole, strict=True))
-    assert [whole.count(role) for role in (TRAINING, VALIDATION, UNTOUCHED)] == [8, 4, 4]
+    assert [whole.count(role) for role in (TRAINING, VALIDATION, HELD_OUT)] == [8, 4, 4]
     kinds = [
         (round(p.cycles.frequency, 2), round(float(np.ptp(p.record.displacement)), 3)) for p in prepared if p.cycles
     ]
-    for role in (TRAINING, VALIDATION, UNTOUCHED):
+    for role in (TRAINING, VALIDATION, HELD_OUT):
         # The rig's hardest test is always fitted, so one kind may be missing elsewhere.
         kept = len({kind for kind, given in zip(kinds, whole, strict=True) if given == role})
         assert kept >= (4 if role == TRAINING else 3)
@@ -173,7 +173,7 @@ def test_small_offset_gain_and_delay_are_nuisances_and_large_ones_a_gap(rng: np.
         (prepared,) = prepare([record])
         everything = np.ones(prepared.record.time.size, dtype=np.bool_)
         judged = check_residual(
-            expected(damper, prepared, NuisanceConfig().delay_s), prepared, everything, NuisanceConfig()
+            predict(damper, prepared, NuisanceConfig().delay_s), prepared, everything, NuisanceConfig()
         )
         left = float(np.sqrt(np.mean(judged.cleared**2)) / np.sqrt(np.mean(judged.residual**2)))
         assert left < share if offset < 0.01 else left > share

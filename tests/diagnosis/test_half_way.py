@@ -10,8 +10,8 @@ from campaign import damper_of, sines
 from test_kept_back import campaign_of
 
 from pzd.damper.model import Damper
-from pzd.diagnosis.adoption import between_neighbours
-from pzd.diagnosis.cross_validation import Trials, trials_of
+from pzd.diagnosis.adoption import interpolation_check
+from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 
 THREE = (0.0, 50.0, 150.0)
 TESTS = ((0.5, 0.02), (2.0, 0.03))
@@ -23,9 +23,9 @@ def with_values(effect: str, values: Values) -> Damper:
 
 
 @pytest.fixture
-def trials(rng: np.random.Generator) -> Trials:
+def validation(rng: np.random.Generator) -> CrossValidation:
     damper = damper_of(THREE)
-    return trials_of(campaign_of(sines(damper, rng, THREE, tests=TESTS, cycles=3)), damper, 0.0025)
+    return cross_validation_of(campaign_of(sines(damper, rng, THREE, tests=TESTS, cycles=3)), damper, 0.0025)
 
 
 @pytest.mark.parametrize(
@@ -36,15 +36,17 @@ def trials(rng: np.random.Generator) -> Trials:
         ("bouc_wen", {"F_h": (70.0, 140.0, 210.0), "x_h": (2e-3, 2e-3, 3e-3), "sigma": (1.0, 1.0, 2.0)}),
     ],
 )
-def test_parameters_that_go_steadily_with_the_voltage_lie_between(effect: str, values: Values, trials: Trials) -> None:
-    assert between_neighbours(damper_of(THREE), trials)
-    assert between_neighbours(with_values(effect, values), trials)
+def test_parameters_that_go_steadily_with_the_voltage_lie_between(
+    effect: str, values: Values, validation: CrossValidation
+) -> None:
+    assert interpolation_check(damper_of(THREE), validation)
+    assert interpolation_check(with_values(effect, values), validation)
 
 
-def test_pairs_of_values_that_only_go_together_do_not(trials: Trials) -> None:
+def test_pairs_of_values_that_only_go_together_do_not(validation: CrossValidation) -> None:
     """A large force over a large length and a small one over a small length, but never a large one over a small one."""
     pairs = {"F_h": (2000.0, 1.0, 2000.0), "x_h": (0.2, 1e-6, 0.2), "sigma": (1.0, 1.0, 1.0)}
-    assert not between_neighbours(with_values("bouc_wen", pairs), trials)
+    assert not interpolation_check(with_values("bouc_wen", pairs), validation)
 
 
 def test_the_unit_of_the_control_signal_makes_no_difference(rng: np.random.Generator) -> None:
@@ -55,4 +57,6 @@ def test_the_unit_of_the_control_signal_makes_no_difference(rng: np.random.Gener
         values = {**volts.effects["bouc_wen"], "at_voltage_V": tuple(scale * v for v in THREE)}
         damper = Damper(base=tuple(base)).with_effect("bouc_wen", values)
         records = sines(Damper(base=tuple(base)), rng, [scale * v for v in THREE], tests=TESTS, cycles=3)
-        assert not between_neighbours(damper, trials_of(campaign_of(records), Damper(base=tuple(base)), 0.0025))
+        assert not interpolation_check(
+            damper, cross_validation_of(campaign_of(records), Damper(base=tuple(base)), 0.0025)
+        )

@@ -14,17 +14,17 @@ from campaign import damper_of, sines
 from test_kept_back import TWO, campaign_of
 from whole_diagnosis import all_but, diagnosed
 
-import pzd.diagnosis.hypotheses.summary
+import pzd.diagnosis.hypotheses
 from pzd.artefacts import Diagnosed, Hypotheses, HypothesisRow
 from pzd.cli.text_tables import diagnosis_lines
 from pzd.damper.compiled.laws import declared
+from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.cross_validation import Trials, trials_of
+from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.hypotheses.regression import residuals_of
 from pzd.diagnosis.hypotheses.shapes import IN_ONE_UNIT, SHAPES, play
-from pzd.diagnosis.hypotheses.summary import hypotheses, proposal_of
-from pzd.diagnosis.search.evidence import evidence_of
+from pzd.diagnosis.hypotheses import hypotheses, proposal_of
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.schema.errors import ConfigError
@@ -39,18 +39,18 @@ def records_with(force: Force, rng: np.random.Generator, jitter: float = 0.0) ->
     return tuple(replace(r, force=r.force + force(r)) for r in plain)
 
 
-def fitted(records: tuple[Record, ...]) -> Trials:
+def fitted(records: tuple[Record, ...]) -> CrossValidation:
     """The tests, dealt into folds, and the plain damper fitted to them."""
     campaign = campaign_of(records)
     evidence = evidence_of(campaign, damper_of(TWO))
     plain = fit(evidence.whole, (), evidence.whole.start()).damper
-    return trials_of(campaign, plain, DiagnoseConfig().visible)
+    return cross_validation_of(campaign, plain, DiagnoseConfig().visible)
 
 
 def told(records: tuple[Record, ...]) -> Hypotheses:
     """The hypotheses on what the plain damper, fitted to the records, leaves of them."""
-    trials = fitted(records)
-    return hypotheses(trials, trials.plain, Control())
+    validation = fitted(records)
+    return hypotheses(validation, validation.baseline, Control())
 
 
 FORCES: dict[str, tuple[Force, float]] = {
@@ -90,8 +90,8 @@ def test_what_friction_and_damping_take_up_of_a_shape_does_not_bias_its_coeffici
 
 def test_what_a_tests_own_gain_offset_and_delay_make_hardly_counts(rng: np.random.Generator) -> None:
     """By their priors: a gain of 2 % counts as one square of noise, however many samples show it."""
-    trials = fitted(records_with(lambda r: np.zeros(r.time.size), rng))
-    test = residuals_of(trials, trials.plain).tests[0]
+    validation = fitted(records_with(lambda r: np.zeros(r.time.size), rng))
+    test = residuals_of(validation, validation.baseline).tests[0]
     by_own = test.nuisances
     counted = np.diag(test.products(by_own, test.counts)) / test.noise
     assert np.all(counted <= 1.0)

@@ -7,9 +7,9 @@ from campaign import TABLE_2, damper_of, sine
 
 from pzd.damper.compose import respond
 from pzd.damper.motion import Motion
-from pzd.diagnosis.campaign import check_residual, visible_gap
 from pzd.diagnosis.data import prepare
-from pzd.diagnosis.fit.prediction import expected
+from pzd.diagnosis.fit.prediction import predict
+from pzd.diagnosis.gap import check_residual, visible_gap
 from pzd.record import Record, sliced
 from pzd.signals.jumps import jumps
 from pzd.signals.nuisance import NuisanceConfig
@@ -35,7 +35,7 @@ def test_the_true_damper_with_a_large_jump_at_every_reversal_leaves_no_gap(rng: 
     record = sine(damper, 0.0, 1.03, 0.03, rng, noise=0.005, rate=500.0)
     (prepared,) = prepare((record,))
     wanted = np.ones(prepared.record.time.size, dtype=np.bool_)
-    with_jump, without = (expected(d, prepared, NuisanceConfig().delay_s) for d in (damper, damper_of((0.0,))))
+    with_jump, without = (predict(d, prepared, NuisanceConfig().delay_s) for d in (damper, damper_of((0.0,))))
     assert visible_gap([check_residual(with_jump, prepared, wanted, NuisanceConfig())]) < 0.001
     assert visible_gap([check_residual(without, prepared, wanted, NuisanceConfig())]) > 0.01
 
@@ -56,7 +56,7 @@ def test_so_does_one_whose_test_does_not_repeat_and_has_more_jumps_than_a_cycle(
     assert prepared.cycles is None
     assert np.count_nonzero(np.diff(np.sign(v))) > 80
     check = check_residual(
-        expected(damper, prepared, NuisanceConfig().delay_s),
+        predict(damper, prepared, NuisanceConfig().delay_s),
         prepared,
         np.ones(prepared.record.time.size, dtype=np.bool_),
         NuisanceConfig(),

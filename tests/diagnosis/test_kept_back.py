@@ -11,14 +11,13 @@ from campaign import TABLE_2, damper_of, sine, sines
 
 from pzd.artefacts import Prediction
 from pzd.damper.model import Damper
-from pzd.diagnosis.adoption import handed_on
-from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.adoption import adopt_effects
+from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.cross_validation import Missed, Trials, trials_of, worse
+from pzd.diagnosis.cross_validation import CrossValidation, PredictionError, cross_validation_of, predicts_worse
 from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.search.evidence import Evidence, evidence_of
 from pzd.diagnosis.verdict import unpredicted
 from pzd.record import Record
 from pzd.signals.nuisance import NuisanceConfig
@@ -33,14 +32,14 @@ def campaign_of(records: tuple[Record, ...]) -> Campaign:
     return Campaign(prepared, split(prepared, None, 2.0), NuisanceConfig())
 
 
-def trials(records: tuple[Record, ...], plain: Damper) -> Trials:
-    return trials_of(campaign_of(records), plain, DiagnoseConfig().visible)
+def validation(records: tuple[Record, ...], plain: Damper) -> CrossValidation:
+    return cross_validation_of(campaign_of(records), plain, DiagnoseConfig().visible)
 
 
 def predicted(records: tuple[Record, ...], plain: Damper, damper: Damper) -> Prediction:
-    asked = trials(records, plain)
-    between = asked.missed_between(damper, by_criterion=False)
-    found = asked.prediction(asked.plain_missed(), asked.missed(damper), between)
+    asked = validation(records, plain)
+    between = asked.interpolation_error(damper, by_criterion=False)
+    found = asked.prediction(asked.baseline_error(), asked.held_out_error(damper), between)
     assert found is not None
     return found
 
@@ -87,9 +86,9 @@ def test_a_voltage_without_tests_stays_where_it_is_and_stops_no_other(rng: np.ra
     problem = evidence_of(campaign_of(records), damper_of(three)).whole
     effects, start = ("rounded_yield", "preload_offset"), problem.start_with(truth)
     start[[1, 2, 7, 8]] += 0.5
-    kept = replace(problem, observations=tuple(o for o in problem.observations if o.place != 1))
+    kept = replace(problem, observations=tuple(o for o in problem.observations if o.base_row != 1))
     found = fit(kept, effects, start)
-    np.testing.assert_array_equal(found.searched[3:6], start[3:6])
+    np.testing.assert_array_equal(found.optimum[3:6], start[3:6])
     exact = fit(kept, effects, problem.start_with(truth), 100)
     assert found.misfit < exact.misfit + 0.1
 
@@ -97,7 +96,7 @@ def test_a_voltage_without_tests_stays_where_it_is_and_stops_no_other(rng: np.ra
 def test_a_voltage_is_known_by_its_rows_at_any_temperature(rng: np.random.Generator) -> None:
     """They have it not quite: 150 V at one, 150.002 V at the other, and either row may be without a test."""
     plain = damper_of(TWO)
-    asked = trials(sines(plain, rng, TWO, tests=TESTS, cycles=3), plain)
+    asked = validation(sines(plain, rng, TWO, tests=TESTS, cycles=3), plain)
     warm = tuple(row.model_copy(update={"voltage_V": (row.voltage_V or 0.0) + 2e-3}) for row in plain.base)
     known = asked._known(plain.model_copy(update={"base": warm}), asked.folds[0])
     assert [mask.any() for mask in known] == [mask.any() for mask in asked.folds[0]]
@@ -123,8 +122,8 @@ def test_a_test_alone_at_its_voltage_keeps_back_its_cycles(
 
 def test_too_little_to_keep_a_test_back_is_told(rng: np.random.Generator) -> None:
     damper = damper_of((0.0,))
-    asked = trials((sine(damper, 0.0, 1.0, 0.03, rng, cycles=1, rate=1000.0),), damper)
-    assert asked.prediction(asked.plain_missed(), asked.missed(damper), asked.plain_missed_between) is None
+    asked = validation((sine(damper, 0.0, 1.0, 0.03, rng, cycles=1, rate=1000.0),), damper)
+    assert asked.prediction(asked.baseline_error(), asked.held_out_error(damper), asked.baseline_interpolation_error) is None
     assert "too little to keep a test back" in unpredicted(None)
 
 
@@ -132,51 +131,53 @@ def test_too_little_to_keep_a_test_back_is_told(rng: np.random.Generator) -> Non
 
 
 def test_worse_is_beyond_two_standard_errors_at_any_voltage(rng: np.random.Generator) -> None:
-    asked = trials(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
+    asked = validation(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
     records = tuple(range(8))
-    plain = Missed(records, *(np.full(8, value) for value in (1.0, 100.0, 100.0, 1e-3)))
+    plain = PredictionError(records, *(np.full(8, value) for value in (1.0, 100.0, 100.0, 1e-3)))
     alike = replace(plain, error=1.0 + 0.1 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0]))
     at_one = replace(plain, error=np.array([0.1, 0.2, 0.1, 0.2, 1.2, 1.3, 1.2, 1.3]))
-    assert asked.worse(alike, plain) == ()
-    assert asked.worse(at_one, plain) == (150.0,)
-    assert asked.worse(plain, at_one) == (0.0,)
+    assert asked.worse_at(alike, plain) == ()
+    assert asked.worse_at(at_one, plain) == (150.0,)
+    assert asked.worse_at(plain, at_one) == (0.0,)
 
 
 @pytest.mark.parametrize("tests", [2, 3, 12])
 def test_chance_predicts_worse_as_seldom_whatever_the_number_of_tests(tests: int, rng: np.random.Generator) -> None:
     """With two tests to a voltage, two standard errors of these two are chance in one of seven."""
     ones = np.ones(tests)
-    plain = Missed(tuple(range(tests)), ones, 100.0 * ones, ones, 0.0 * ones)
-    found = sum(worse(replace(plain, error=1.0 + 0.1 * rng.standard_normal(tests)), plain) for _ in range(8000))
+    plain = PredictionError(tuple(range(tests)), ones, 100.0 * ones, ones, 0.0 * ones)
+    found = sum(
+        predicts_worse(replace(plain, error=1.0 + 0.1 * rng.standard_normal(tests)), plain) for _ in range(8000)
+    )
     expected = 8000 * 0.02275
     assert abs(found - expected) < 4.0 * np.sqrt(expected)
 
 
 def test_worse_by_less_than_can_be_seen_is_not_worse(rng: np.random.Generator) -> None:
-    asked = trials(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
-    plain = Missed(tuple(range(8)), *(np.full(8, value) for value in (1.0, 100.0, 100.0, 1e-2)))
-    assert asked.worse(replace(plain, error=plain.error + 5e-3), plain) == ()
-    assert asked.worse(replace(plain, error=plain.error + 2e-2), plain) == TWO
+    asked = validation(sines(damper_of(TWO), rng, TWO, cycles=2), damper_of(TWO))
+    plain = PredictionError(tuple(range(8)), *(np.full(8, value) for value in (1.0, 100.0, 100.0, 1e-2)))
+    assert asked.worse_at(replace(plain, error=plain.error + 5e-3), plain) == ()
+    assert asked.worse_at(replace(plain, error=plain.error + 2e-2), plain) == TWO
 
 
 @pytest.mark.parametrize("lost", [1e180, np.inf])
 def test_a_path_that_was_lost_predicts_worse_and_warns_of_nothing(lost: float) -> None:
     """The square of what it misses would overflow, and leave a scatter beside which nothing is worse."""
-    plain = Missed(tuple(range(6)), *(np.full(6, value) for value in (1.0, 100.0, 100.0, 1e-3)))
-    assert worse(replace(plain, error=plain.error * lost), plain)
-    assert not worse(plain, replace(plain, error=plain.error * lost))
+    plain = PredictionError(tuple(range(6)), *(np.full(6, value) for value in (1.0, 100.0, 100.0, 1e-3)))
+    assert predicts_worse(replace(plain, error=plain.error * lost), plain)
+    assert not predicts_worse(plain, replace(plain, error=plain.error * lost))
 
 
 def test_much_worse_between_is_visible_and_half_as_much_again(rng: np.random.Generator) -> None:
     """The tests of one voltage all miss what the line misses: that they agree is no evidence."""
     damper = damper_of((0.0, 50.0, 100.0))
-    asked = trials(sines(damper, rng, (0.0, 50.0, 100.0), tests=OTHER_TESTS, cycles=4), damper)
-    plain = asked.plain_missed_between
-    assert asked.worse_between(plain) == ()
-    assert asked.worse_between(replace(plain, error=1.4 * plain.error)) == ()
-    assert asked.worse_between(replace(plain, error=1.6 * plain.error)) == (50.0,)
+    asked = validation(sines(damper, rng, (0.0, 50.0, 100.0), tests=OTHER_TESTS, cycles=4), damper)
+    plain = asked.baseline_interpolation_error
+    assert asked.interpolates_worse_at(plain) == ()
+    assert asked.interpolates_worse_at(replace(plain, error=1.4 * plain.error)) == ()
+    assert asked.interpolates_worse_at(replace(plain, error=1.6 * plain.error)) == (50.0,)
     small = replace(asked, visible=1.0)
-    assert small.worse_between(replace(small.plain_missed_between, error=1.6 * plain.error)) == ()
+    assert small.interpolates_worse_at(replace(small.baseline_interpolation_error, error=1.6 * plain.error)) == ()
 
 
 @dataclass
@@ -190,21 +191,21 @@ class FixedPredictions:
     visible: float = 0.0025
     between: dict[frozenset[str], float] = field(default_factory=dict)
     """What is missed of the voltages between others; where nothing is given as much as by the plain damper."""
-    plain_missed_between: float = 1.0
+    baseline_interpolation_error: float = 1.0
 
-    def worse_between(self, between: float) -> tuple[float | None, ...]:
-        return (150.0,) if between > 1.5 * self.plain_missed_between else ()
+    def interpolates_worse_at(self, between: float) -> tuple[float | None, ...]:
+        return (150.0,) if between > 1.5 * self.baseline_interpolation_error else ()
 
-    def missed_between(self, damper: Damper, *, by_criterion: bool) -> float:
-        return self.between.get(frozenset(damper.effects), self.plain_missed_between)
+    def interpolation_error(self, damper: Damper, *, by_criterion: bool) -> float:
+        return self.between.get(frozenset(damper.effects), self.baseline_interpolation_error)
 
-    def plain_missed(self) -> float:
+    def baseline_error(self) -> float:
         return self.plain
 
     def missed(self, damper: Damper) -> float:
         return self.by_effects[frozenset(damper.effects)]
 
-    def missed_by_criterion(self, damper: Damper) -> float:
+    def error_by_criterion(self, damper: Damper) -> float:
         return self.by_effects[frozenset(damper.effects)]
 
     def worse(self, one: float, other: float) -> tuple[float | None, ...]:
@@ -217,7 +218,7 @@ class _Figure(float):
     def of(self, _: object) -> _Figure:
         return self
 
-    def less_than(self, other: float) -> bool:
+    def visibly_below(self, other: float) -> bool:
         return self < other
 
     @property
@@ -249,7 +250,7 @@ def test_effects_that_harm_the_prediction_are_taken_back(
         plain=_Figure(1.0),
     )
     named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
-    found = handed_on(named, cast("Trials", fixed), (), "V")
+    found = adopt_effects(named, cast("CrossValidation", fixed), (), "V")
     assert found.selection.adopted == kept
     assert cast("float", found.missed) == (both if kept == (A, B) else only_a if kept else 1.0)
     assert all("worse" in found.selection.reasons[name] for name in {A, B} - set(kept))
@@ -268,10 +269,10 @@ def test_effects_that_harm_the_prediction_of_voltages_between_are_taken_back(
         {frozenset((A, B)): _Figure(0.2), frozenset((A,)): _Figure(0.5), frozenset((B,)): _Figure(0.6)},
         plain=_Figure(1.0),
         between={frozenset((A, B)): _Figure(1.6), frozenset((A,)): _Figure(only_a)},
-        plain_missed_between=_Figure(1.0),
+        baseline_interpolation_error=_Figure(1.0),
     )
     named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
-    found = handed_on(named, cast("Trials", fixed), (), "V")
+    found = adopt_effects(named, cast("CrossValidation", fixed), (), "V")
     assert found.selection.adopted == kept
     assert cast("float", found.between) == (only_a if kept else 1.0)
     assert (found.refused is None) == bool(kept)
@@ -282,7 +283,7 @@ def test_effects_that_harm_the_prediction_of_voltages_between_are_taken_back(
 
 def test_what_the_config_asks_for_is_handed_on_whatever_it_does(rng: np.random.Generator) -> None:
     fixed = FixedPredictions({frozenset((A,)): _Figure(2.0)}, plain=_Figure(1.0))
-    found = handed_on(selection(rng, preload_offset={"F_0": 120.0}), cast("Trials", fixed), (A,), "V")
+    found = adopt_effects(selection(rng, preload_offset={"F_0": 120.0}), cast("CrossValidation", fixed), (A,), "V")
     assert found.selection.adopted == (A,)
     assert found.refused is None
 
@@ -296,9 +297,9 @@ def bent(rng: np.random.Generator, *, offset: float) -> tuple[Record, ...]:
 
 def test_where_a_law_is_missing_the_last_fit_takes_every_sample_alike(rng: np.random.Generator) -> None:
     records = bent(rng, offset=100.0)
-    asked = trials(records, damper_of(TWO))
+    asked = validation(records, damper_of(TWO))
     damper = damper_of(TWO, preload_offset={"F_0": 100.0})
-    weighed, alike = asked.missed(damper), asked.missed_by_criterion(damper)
+    weighed, alike = asked.held_out_error(damper), asked.error_by_criterion(damper)
     assert (alike.criterion or 1.0) < (weighed.criterion or 0.0)
 
 
@@ -306,8 +307,8 @@ def test_where_noise_is_what_is_left_the_likelihood_predicts_as_well(rng: np.ran
     damper = damper_of(TWO, preload_offset={"F_0": 100.0})
     better = []
     for _ in range(3):
-        asked = trials(sines(damper, rng, TWO, cycles=4, jitter=0.02), damper_of(TWO))
-        better.append(asked.missed_by_criterion(damper).less_than(asked.missed(damper)))
+        asked = validation(sines(damper, rng, TWO, cycles=4, jitter=0.02), damper_of(TWO))
+        better.append(asked.error_by_criterion(damper).visibly_below(asked.held_out_error(damper)))
     # chance: two standard errors of eight skewed pairs are passed once in ten, three times in a row once in a thousand
     assert not all(better)
 
@@ -319,16 +320,16 @@ def test_the_fit_that_is_handed_on_goes_with_what_it_was_fitted_to(rng: np.rando
     evidence = evidence_of(campaign, damper)
     plain = fit(evidence.whole, (), evidence.whole.start())
     named = Selection(plain, fit(evidence.whole, (A,), evidence.whole.start_with(damper)), (), {}, evidence, evidence)
-    found = handed_on(named, trials_of(campaign, damper_of(TWO), 0.0025), (), "V")
+    found = adopt_effects(named, cross_validation_of(campaign, damper_of(TWO), 0.0025), (), "V")
     assert found.selection.adopted == (A,)
     assert found.by_criterion
-    compared = zip(found.selection.last.whole.observations, found.selection.fitted.simulated, strict=True)
+    compared = zip(found.selection.final_evidence.whole.observations, found.selection.fitted.simulated, strict=True)
     assert all(o.measured.size == force.size for o, force in compared)
     assert len(found.selection.fitted.simulated) == len(records)
 
 
 def test_every_voltage_of_the_campaign_is_dealt_into_folds(rng: np.random.Generator) -> None:
-    asked = trials(sines(damper_of(), rng, tests=OTHER_TESTS, cycles=2), damper_of())
+    asked = validation(sines(damper_of(), rng, tests=OTHER_TESTS, cycles=2), damper_of())
     assert asked.voltages == tuple(TABLE_2)
     for i, prepared in enumerate(asked.campaign.prepared):
         kept_back = np.stack([fold[i] for fold in asked.folds])

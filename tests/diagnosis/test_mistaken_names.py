@@ -12,7 +12,7 @@ from whole_diagnosis import diagnosed
 
 from pzd.artefacts import Rig
 from pzd.artefacts.rig import Finding, RecordEntry
-from pzd.diagnosis.data import whole_records, without
+from pzd.diagnosis.data import saturation_note, unsaturated_records
 from pzd.record import Record
 
 LINEAR_TESTS = ((0.5, 0.015), (0.5, 0.03), (2.0, 0.01), (2.0, 0.02))
@@ -60,8 +60,8 @@ def test_records_whose_force_is_cut_off_are_left_out_and_named(rng: np.random.Ge
         RecordEntry(name=r.name, setting=None, voltage_V=U, temperature_degC=None, rate_Hz=1e3, cycles=3.0, findings=f)
         for r, U, f in zip(records, TWO, ((cut,), ()), strict=True)
     )
-    used, left_out = whole_records(Rig(records, entries), None)
+    used, left_out = unsaturated_records(Rig(records, entries), None)
     assert [r.name for r in used] == [records[1].name]
-    assert records[0].name in without(left_out)
+    assert records[0].name in saturation_note(left_out)
     every = tuple(e.model_copy(update={"findings": (cut,)}) for e in entries)
-    assert whole_records(Rig(records, every), None) == (list(records), ())
+    assert unsaturated_records(Rig(records, every), None) == (list(records), ())

@@ -7,9 +7,9 @@ import pytest
 from campaign import damper_of, sine
 
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnosis.campaign import ResidualCheck, check_residual, gap_of
 from pzd.diagnosis.data import Split, prepare
-from pzd.diagnosis.fit.prediction import expected
+from pzd.diagnosis.fit.prediction import predict
+from pzd.diagnosis.gap import ResidualCheck, check_residual, held_out_criterion
 from pzd.signals.nuisance import NuisanceConfig
 
 QUIET = 0.3 / 1500.0
@@ -22,7 +22,7 @@ def checked(
 ) -> ResidualCheck:
     record = sine(true, 0.0, frequency, 0.02, rng, noise=QUIET, colour=0.0, rate=rate, cycles=cycles)
     (prepared,) = prepare([record])
-    given = expected(assumed, prepared, NuisanceConfig().delay_s)
+    given = predict(assumed, prepared, NuisanceConfig().delay_s)
     return check_residual(given, prepared, np.ones(prepared.record.time.size, np.bool_), NuisanceConfig())
 
 
@@ -40,13 +40,13 @@ def test_the_noise_floor_is_no_larger_than_what_is_left_by_the_damper_itself(
     for effects in ({}, {"preload_offset": {"F_0": 300.0}}):
         true = rigid(300.0, **effects)
         for _ in range(3):
-            gap = gap_of([checked(true, true, rng, rate, cycles)], NOBODY)
+            gap = held_out_criterion([checked(true, true, rng, rate, cycles)], NOBODY)
             assert 0.5 * gap.after < gap.noise_floor <= gap.after
 
 
 def test_what_the_model_misses_is_not_told_as_noise(rng: np.random.Generator) -> None:
     judged = checked(damper_of((0.0,), preload_offset={"F_0": 300.0}), damper_of((0.0,)), rng, 1000.0, 8.0)
-    gap = gap_of([judged], NOBODY)
+    gap = held_out_criterion([judged], NOBODY)
     # What remains is the offset that the test may have of its own, 3.5 times 0.5 % of its peak: a hundredth of 300 N.
     assert gap.noise_floor < 0.05 * gap.after
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from campaign import damper_of, sines
 
-from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.search import candidates as searching
-from pzd.diagnosis.search.evidence import evidence_of
 from pzd.signals.nuisance import NuisanceConfig
 
 TWO = (0.0, 150.0)

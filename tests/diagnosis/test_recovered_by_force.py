@@ -10,9 +10,9 @@ from test_kept_back import campaign_of
 from pzd.damper.effect import Scales
 from pzd.damper.effects import library, nameable
 from pzd.damper.model import against_nature
+from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.fit.least_squares import fit
-from pzd.diagnosis.search.candidates import candidate, finished
-from pzd.diagnosis.search.evidence import evidence_of
+from pzd.diagnosis.search.candidates import candidate, resumed
 
 VOLTAGES = (0.0, 150.0)
 TESTS = ((0.5, 0.005), (0.5, 0.03), (2.0, 0.01), (2.0, 0.03))
@@ -37,7 +37,7 @@ def test_its_values_are_found_again(name: str, rng: np.random.Generator) -> None
     records = sines(truth, rng, VOLTAGES, tests=TESTS, cycles=3, noise=5e-3)
     evidence = evidence_of(campaign_of(records), damper_of(VOLTAGES))
     plain = fit(evidence.whole, (), evidence.whole.start())
-    found = finished(evidence.whole, plain, candidate(evidence.whole, plain, effect))
+    found = resumed(evidence.whole, plain, candidate(evidence.whole, plain, effect))
     assert found.fitted.misfit < 0.5 * plain.misfit
     fitted = found.fitted.damper.effects[name]
     for parameter, value in values.items():

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.campaign import check_residual
 from pzd.diagnosis.data import prepare
-from pzd.diagnosis.fit.prediction import expected
+from pzd.diagnosis.fit.prediction import predict
+from pzd.diagnosis.gap import check_residual
 from pzd.record import Array, Record
 from pzd.signals.jumps import parted, slope_within, unbroken
 from pzd.signals.kinematics import kinematics
@@ -48,7 +48,7 @@ def probability(record: Record, wanted: NDArray[np.bool_]) -> float:
     """That noise alone leaves what the true damper leaves of the wanted samples."""
     (prepared,) = prepare((record,))
     config = NuisanceConfig()
-    found = check_residual(expected(DAMPER, prepared, config.delay_s), prepared, wanted, config)
+    found = check_residual(predict(DAMPER, prepared, config.delay_s), prepared, wanted, config)
     return float(np.min(found.probability["smooth"]))
 
 

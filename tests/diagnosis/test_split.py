@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from campaign import damper_of, sines
 
-from pzd.diagnosis.data import TRAINING, UNTOUCHED, prepare, split
+from pzd.diagnosis.data import HELD_OUT, TRAINING, prepare, split
 
 
 @pytest.mark.parametrize("channel", ["force", "velocity", "displacement"])
@@ -20,4 +20,4 @@ def test_something_of_the_largest_force_speed_and_displacement_is_fitted(
     peaks = [float(np.max(np.abs(getattr(p.record, channel)))) for p in prepared]
     fitted = [peak for peak, role in zip(peaks, roles, strict=True) if np.any(role == TRAINING)]
     assert max(fitted) > 0.95 * max(peaks)
-    assert any(np.any(role == UNTOUCHED) for role in roles)
+    assert any(np.any(role == HELD_OUT) for role in roles)

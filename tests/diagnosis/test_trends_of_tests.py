@@ -12,7 +12,7 @@ from whole_diagnosis import all_but, diagnosed
 
 from pzd.damper.model import BaseRow, Damper
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.verdict import Trend, trend_of_tests
+from pzd.diagnosis.verdict import NuisanceTrend, nuisance_trend
 from pzd.record import Record
 
 TESTS = ((0.5, 0.02), (0.5, 0.03), (2.0, 0.02), (2.0, 0.03))
@@ -42,8 +42,8 @@ def frequency_dependent(rng: np.random.Generator, share: float) -> tuple[Record,
     )
 
 
-def trend(records: tuple[Record, ...]) -> Trend | None:
-    return trend_of_tests(campaign_of(records), damper_of(TWO), DiagnoseConfig())
+def trend(records: tuple[Record, ...]) -> NuisanceTrend | None:
+    return nuisance_trend(campaign_of(records), damper_of(TWO), DiagnoseConfig())
 
 
 def test_gains_that_follow_the_frequency_are_a_trend(rng: np.random.Generator) -> None:

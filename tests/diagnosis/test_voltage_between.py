@@ -9,8 +9,8 @@ from test_kept_back import campaign_of
 
 from pzd.artefacts import NextTest
 from pzd.damper.model import Damper
-from pzd.diagnosis.cross_validation import trials_of
-from pzd.diagnosis.next_test import PredictingDamper, next_voltage, reach_of
+from pzd.diagnosis.cross_validation import cross_validation_of
+from pzd.diagnosis.next_test import PredictingDamper, intermediate_voltage_test, operating_envelope
 from pzd.rig.config import Limits
 
 THREE = (0.0, 50.0, 150.0)
@@ -34,10 +34,10 @@ ON_THE_LINE = (2.0 * 301.0 + 1325.0) / 3.0
 def asked(damper: Damper, rng: np.random.Generator, limits: Limits = LIMITS) -> NextTest | None:
     records = sines(damper, rng, [row.voltage_V or 0.0 for row in damper.base], tests=TESTS, cycles=4)
     campaign = campaign_of(records)
-    trials = trials_of(campaign, damper, 0.0025)
-    predicting = PredictingDamper(damper, 0.0, trials.plain_missed(), trials.plain_missed_between)
-    reach = reach_of(limits, campaign.prepared, [row.voltage_V or 0.0 for row in damper.base])
-    return next_voltage(predicting, trials, campaign.prepared, reach, None)
+    validation = cross_validation_of(campaign, damper, 0.0025)
+    predicting = PredictingDamper(damper, 0.0, validation.baseline_error(), validation.baseline_interpolation_error)
+    reach = operating_envelope(limits, campaign.prepared, [row.voltage_V or 0.0 for row in damper.base])
+    return intermediate_voltage_test(predicting, validation, campaign.prepared, reach, None)
 
 
 @pytest.mark.parametrize("T0", [0.6 * ON_THE_LINE, 1.5 * ON_THE_LINE])

@@ -15,10 +15,10 @@ from pzd.cli.text_tables import diagnosis_lines
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.search.acceptance import no_stop
+from pzd.diagnosis.search.acceptance import misplaced_end_stop
 from pzd.quantities import Control
 from pzd.record import Record
-from pzd.rig.stand.frame import force_in_frame
+from pzd.rig.stand.column_basis import force_in_frame
 
 TWO = (0.0, 150.0)
 STOPS = {"k_e": 1.5e6, "x_e": 0.018}
@@ -170,5 +170,5 @@ def test_an_end_stop_acts_near_both_ends_of_a_recorded_stroke_of_60_mm(
     x_e: float, zero: float, why: str | None
 ) -> None:
     damper = damper_of((0.0,), end_stop={"k_e": 1e6, "x_e": x_e}).moved(zero)
-    found = no_stop(damper, 0.03)
+    found = misplaced_end_stop(damper, 0.03)
     assert found is None if why is None else found is not None and why in found

@@ -8,11 +8,10 @@ from campaign import damper_of
 
 from pzd.artefacts import Diagnosed, Rig
 from pzd.damper.effects import library
-from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.campaign import Campaign, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.data import prepare, split
-from pzd.diagnosis.fit.parameters import Problem
-from pzd.diagnosis.search.evidence import evidence_of
+from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.stage import diagnose
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.stage import identify

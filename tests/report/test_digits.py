@@ -11,7 +11,7 @@ import pytest
 from pzd.artefacts import Characteristics, Gap, GasAndFrictionRow, Identified, ParameterRow, PeakVelocityRow
 from pzd.cli.text_tables import characteristics_tables, diagnosis_lines, interval
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnosis.verdict import weak
+from pzd.diagnosis.verdict import hold_out_note
 from pzd.force_table.force import lost, not_monotone
 from pzd.quantities import Control
 from pzd.report import blocks
@@ -99,10 +99,10 @@ def test_a_static_force_has_the_digits_of_the_forces_that_it_was_read_from(
 
 
 def test_what_was_held_out_is_told_in_words() -> None:
-    assert weak("records") == ""
-    assert "held out were cycles of tests that were also fitted" in weak("cycles")
-    assert "mixed" not in weak("mixed")
-    assert "held out were some whole tests, and parts of tests" in weak("mixed")
+    assert hold_out_note("records") == ""
+    assert "held out were cycles of tests that were also fitted" in hold_out_note("cycles")
+    assert "mixed" not in hold_out_note("mixed")
+    assert "held out were some whole tests, and parts of tests" in hold_out_note("mixed")
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from pzd.damper.model import Damper
-from pzd.diagnosis.fit.forces import BlockSlopes, Left, left_at, moving
-from pzd.diagnosis.fit.parameters import Problem, Unknown
+from pzd.diagnosis.fit.problem import Problem, Unknown
+from pzd.diagnosis.fit.sensitivities import BlockJacobian, Linearisation, active_columns, linearise
 from pzd.record import Array
 
 # ----------------------------------------------------------------------------------------------------
@@ -28,30 +28,30 @@ PRECISION = 1e-5
 """Relative change of the sum of squares at which a search ends.
 
 Reason: of ten thousand squares of noise a tenth of one, far less than `adopt_bic` asks for."""
-STIFFER = 2.0
+STIFFNESS_MARGIN = 2.0
 """By this factor the search may exceed the fastest element.
 
 Reason: room for an optimum at the limit that identify found; a stiffer element cannot be told from a rigid one by
 these samples."""
-USUAL = 1.5
+PRIOR_DEVIATION = 1.5
 """Prior standard deviation of ln C and ln k about their starting values: holds a row still where the tests do not
 show it (C under an open relief valve, k of a soft drive), and nowhere else.
 
 Reason: a factor of e^1.5 = 4.5 either way is no surprise between what identify reads from loops and an optimum with an
 effect beside it."""
-WIDEST = 3.0
+LARGEST_LOG_RATIO = 3.0
 """C and k stay within e^3 = 20 times their starting values.
 
 Reason: two standard deviations of `USUAL`; what ends there is not shown by the tests."""
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FitResult:
     """An optimum: the damper, and what it leaves."""
 
     damper: Damper
     effects: tuple[str, ...]
-    searched: Array
+    optimum: Array
     """(3 b + e,) the optimum in the units of the search."""
     residuals: tuple[Array, ...]
     """(w,) an observation, in units of noise."""
@@ -60,23 +60,23 @@ class Fitted:
     unknowns: tuple[Unknown, ...]
     prior: Array
     """(2 b, 3 b + e) slopes of the prior on C and k."""
-    derive: Callable[[], BlockSlopes]
+    derive_jacobian: Callable[[], BlockJacobian]
     """Gives `slopes`, which of all candidates together would fill the memory."""
 
     @cached_property
-    def slopes(self) -> BlockSlopes:
+    def jacobian(self) -> BlockJacobian:
         """Of all residuals by the searched variables."""
-        return self.derive()
+        return self.derive_jacobian()
 
     @cached_property
-    def frame(self) -> Array:
+    def column_basis(self) -> Array:
         """(w, 3 b + e) orthonormal columns: what of a residual the searched variables can take up."""
-        return np.asarray(np.linalg.qr(self.slopes.dense()).Q)
+        return np.asarray(np.linalg.qr(self.jacobian.dense()).Q)
 
     @cached_property
     def covariance(self) -> Array:
         """(3 b + e, 3 b + e) of what was searched, noise alone; infinite for what no test shows."""
-        return _covariance(np.concatenate([self.slopes.dense(), self.prior]))
+        return _covariance(np.concatenate([self.jacobian.dense(), self.prior]))
 
     @property
     def misfit(self) -> float:
@@ -89,7 +89,7 @@ class Fitted:
         return sum(r.size for r in self.residuals)
 
 
-def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int = MOST_EVALUATIONS) -> Fitted:
+def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int = MOST_EVALUATIONS) -> FitResult:
     """The optimum reached from a starting point, by trust-region least squares within the limits.
 
     Parameters
@@ -102,7 +102,7 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
     unknowns = problem.unknowns(effects)
     found, left = _search(problem, unknowns, start, start.size, evaluations)
     limits = _bounds(problem, unknowns)
-    return Fitted(
+    return FitResult(
         problem.point(found, unknowns).damper,
         tuple(effects),
         found,
@@ -110,26 +110,26 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
         left.simulated,
         unknowns,
         _prior(problem, len(unknowns)),
-        lambda: left_at(problem, unknowns, found, limits).slopes,
+        lambda: linearise(problem, unknowns, found, limits).jacobian,
     )
 
 
-def not_taken_up(frame: Array, values: Array) -> Array:
-    """(w,) or (w, c) what of some values orthonormal columns (w, p), such as `Fitted.frame`, do not give."""
+def projected_out(frame: Array, values: Array) -> Array:
+    """(w,) or (w, c) what of some values orthonormal columns (w, p), such as `Fitted.column_basis`, do not give."""
     return values - frame @ (frame.T @ values)
 
 
-def misfit_of(problem: Problem, damper: Damper) -> float:
+def profiled_misfit(problem: Problem, damper: Damper) -> float:
     """Smallest misfit that T0, C and k alone reach while the effects stay as a damper has them."""
     unknowns = problem.unknowns(tuple(damper.effects))
     start = problem.start_with(damper)
     _, left = _search(problem, unknowns, start, 3 * len(problem.base), MOST_EVALUATIONS)
-    return float(left.whole @ left.whole)
+    return float(left.stacked @ left.stacked)
 
 
 def _search(
     problem: Problem, unknowns: Sequence[Unknown], start: Array, free: int, evaluations: int
-) -> tuple[Array, Left]:
+) -> tuple[Array, Linearisation]:
     """Where a search over the first `free` variables ends, (3 b + e,), and what is left there.
 
     Those that no observation moves with, such as T0 of a voltage that is left out, stay where they are: at large, one
@@ -140,7 +140,7 @@ def _search(
     low, high = _bounds(problem, unknowns)
     begin, limits = np.clip(start, low + 1e-9, high - 1e-9), (low[:free], high[:free])
     centre, prior = problem.start(), _prior(problem, len(unknowns))
-    moved = sorted({j for o in problem.observations for j in moving(problem, unknowns, o, free)})
+    moved = sorted({j for o in problem.observations for j in active_columns(problem, unknowns, o, free)})
 
     def whole(x: Array) -> Array:
         at = begin.copy()
@@ -148,15 +148,15 @@ def _search(
         return at
 
     @lru_cache(maxsize=2)  # where the search is, and where it tries to go
-    def left_by(x: bytes) -> Left:
-        return left_at(problem, unknowns, whole(np.frombuffer(x)), limits)
+    def left_by(x: bytes) -> Linearisation:
+        return linearise(problem, unknowns, whole(np.frombuffer(x)), limits)
 
     def residuals_at(x: Array) -> Array:
         away = whole(x)[: centre.size] - centre
-        return np.concatenate([left_by(x.tobytes()).whole, prior[:, : centre.size] @ away])
+        return np.concatenate([left_by(x.tobytes()).stacked, prior[:, : centre.size] @ away])
 
     def slopes_at(x: Array) -> Array:
-        return np.concatenate([left_by(x.tobytes()).slopes.dense(moved), prior[:, moved]])
+        return np.concatenate([left_by(x.tobytes()).jacobian.dense(moved), prior[:, moved]])
 
     found = least_squares(
         residuals_at,
@@ -176,15 +176,15 @@ def _prior(problem: Problem, effects: int) -> Array:
     """(2 b, 3 b + e) slopes of the prior on ln C and ln k of every base row, in its standard deviations."""
     rows = len(problem.base)
     columns = [3 * row + i for row in range(rows) for i in (1, 2)]
-    return np.eye(3 * rows + effects)[columns] / USUAL
+    return np.eye(3 * rows + effects)[columns] / PRIOR_DEVIATION
 
 
 def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
     """Base rows within a ratio of where they start: far from there lie only stiff or dead dampers."""
     start = problem.start().reshape(-1, 3)
-    low, high = start - WIDEST, start + WIDEST
+    low, high = start - LARGEST_LOG_RATIO, start + LARGEST_LOG_RATIO
     low[:, 0], high[:, 0] = 0.0, 2.0
-    high[:, 2] = np.minimum(high[:, 2], start[:, 1] + np.log(STIFFER * problem.fastest))
+    high[:, 2] = np.minimum(high[:, 2], start[:, 1] + np.log(STIFFNESS_MARGIN * problem.largest_rate))
     limits = [u.bounds for u in unknowns]
     return (
         np.array([*low.ravel(), *(lower for lower, _ in limits)]),
@@ -209,23 +209,23 @@ def _covariance(jacobian: Array) -> Array:
 
 LEVEL = 1.96
 """Standard errors in a 95 % interval."""
-SILENT = 1e-6
+UNINFORMATIVE = 1e-6
 """A test that leaves less than this share of its own pull on a parameter to chance says nothing of disagreement."""
 
 
-def standard_errors(fitted: Fitted) -> Array:
+def standard_errors(fitted: FitResult) -> Array:
     """(e,) of the effect parameters in their own units, wider where the fit leaves more than noise or tests disagree.
 
     Equation: s_j^2 = C_jj max(1, |r|^2 / (n - p), R_j)             Source: Birge 1932, Phys. Rev. 40, 207
     """
-    of_effects = slice(fitted.searched.size - len(fitted.unknowns), fitted.searched.size)
-    searched = fitted.searched[of_effects]
-    slopes = np.array([u.slope(float(x)) for u, x in zip(fitted.unknowns, searched, strict=True)])
-    errors: Array = np.abs(slopes) * _searched_errors(fitted, of_effects)
+    of_effects = slice(fitted.optimum.size - len(fitted.unknowns), fitted.optimum.size)
+    searched = fitted.optimum[of_effects]
+    slopes = np.array([u.derivative(float(x)) for u, x in zip(fitted.unknowns, searched, strict=True)])
+    errors: Array = np.abs(slopes) * _search_errors(fitted, of_effects)
     return errors
 
 
-def base_half_widths(fitted: Fitted, force: float) -> Array:
+def base_half_widths(fitted: FitResult, force: float) -> Array:
     """(b, 3) half widths of the 95 % intervals of T0, C and k of every base row, the effects free beside them.
 
     Equation: 1.96 s, s as in `standard_errors`; of C and k from that of their logarithm, to first order
@@ -235,21 +235,21 @@ def base_half_widths(fitted: Fitted, force: float) -> Array:
     fitted : the optimum
     force : unit of T0 in the search [N]
     """
-    of_base = slice(0, fitted.searched.size - len(fitted.unknowns))
+    of_base = slice(0, fitted.optimum.size - len(fitted.unknowns))
     units = np.array([(force, row.C_Ns_per_m, row.k_N_per_m) for row in fitted.damper.base])
-    widths: Array = LEVEL * _searched_errors(fitted, of_base).reshape(-1, 3) * units
+    widths: Array = LEVEL * _search_errors(fitted, of_base).reshape(-1, 3) * units
     return widths
 
 
-def _searched_errors(fitted: Fitted, of: slice) -> Array:
+def _search_errors(fitted: FitResult, of: slice) -> Array:
     """Standard errors of some of what was searched, in the units of the search."""
-    freedom = max(fitted.size - fitted.searched.size, 1)
+    freedom = max(fitted.size - fitted.optimum.size, 1)
     wider = np.maximum(disagreement(fitted, of), max(1.0, fitted.misfit / freedom))
     errors: Array = np.sqrt(np.diag(fitted.covariance)[of] * wider)
     return errors
 
 
-def disagreement(fitted: Fitted, of: slice) -> Array:
+def disagreement(fitted: FitResult, of: slice) -> Array:
     """How far the tests pull some of the parameters apart, over what noise alone lets them: about one.
 
     Equation: R = sum_t c_t^2 / sum_t var c_t, c_t = C J_t' r_t, var c_t = C J_t' (I - J_t C J_t') J_t C
@@ -258,11 +258,11 @@ def disagreement(fitted: Fitted, of: slice) -> Array:
     covariance = np.where(np.isfinite(fitted.covariance), fitted.covariance, 0.0)
     ends = np.cumsum([r.size for r in fitted.residuals])[:-1]
     pulled, allowed = np.zeros(of.stop - of.start), np.zeros(of.stop - of.start)
-    for slopes, residual in zip(np.split(fitted.slopes.dense(), ends), fitted.residuals, strict=True):
+    for slopes, residual in zip(np.split(fitted.jacobian.dense(), ends), fitted.residuals, strict=True):
         pull = slopes @ covariance[:, of]
         own, shared = np.sum(pull**2, axis=0), slopes.T @ pull
         chance = own - np.sum(shared * (covariance @ shared), axis=0)
-        counts = chance > SILENT * own
+        counts = chance > UNINFORMATIVE * own
         pulled += np.where(counts, (residual @ pull) ** 2, 0.0)
         allowed += np.where(counts, chance, 0.0)
     return np.where(allowed > 0.0, pulled / np.where(allowed > 0.0, allowed, 1.0), 1.0)

@@ -20,8 +20,8 @@ from pzd.damper.compose import respond, sampling_steps, sensors_of, shown_moment
 from pzd.damper.material import effective_voltage
 from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
-from pzd.diagnosis.data import Prepared
-from pzd.diagnosis.fit.prediction import Predicted, motion_of, warms
+from pzd.diagnosis.data import PreparedRecord
+from pzd.diagnosis.fit.prediction import PredictedForce, simulation_motion, temperature_moves
 from pzd.identification.prepared_record import in_motion
 from pzd.record import Array, Record, Rows
 from pzd.signals.jumps import jumps, jumps_in_samples, slope_within, unbroken
@@ -39,7 +39,7 @@ from pzd.signals.smoothing import reversals
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-HIDDEN = 1e-3
+NEGLIGIBLE_NUISANCE = 1e-3
 """A nuisance that moves all residuals together by less [standard deviations of one] is left out.
 
 Reason: it would change the misfit by a millionth."""
@@ -50,7 +50,7 @@ Reason: a column for a sample beside a jump has as many as the noise remembers; 
 
 
 @dataclass(frozen=True, eq=False)
-class IntegratedOut:
+class MarginalisedNuisances:
     """Nuisances of a test, and how much of what they could explain is taken out."""
 
     columns: Array | csr_array
@@ -61,13 +61,13 @@ class IntegratedOut:
     """(p, p) of the nuisances once the residuals are known: R diag(1/(1 + s^2)) R'."""
 
     @classmethod
-    def of(cls, columns: Array) -> IntegratedOut:
+    def from_columns(cls, columns: Array) -> MarginalisedNuisances:
         """Of some nuisances (w, p); what lies below `HIDDEN` is left in.
 
         By the eigenvalues of the (p, p) products, which lose nothing of what shows.
         """
         squares, right = np.linalg.eigh(columns.T @ columns)
-        shown = squares > HIDDEN**2
+        shown = squares > NEGLIGIBLE_NUISANCE**2
         squares, right = squares[shown], right[:, shown]
         return cls(
             _packed(columns),
@@ -76,17 +76,17 @@ class IntegratedOut:
         )
 
     @classmethod
-    def nothing(cls, residuals: int) -> IntegratedOut:
+    def none(cls, residuals: int) -> MarginalisedNuisances:
         """No nuisances of so many residuals."""
         return cls(np.zeros((residuals, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
 
-    def taken_out(self, values: Array) -> Array:
+    def marginalised(self, values: Array) -> Array:
         """(w,) or (w, k) values in units of noise, without what the nuisances may explain of them."""
         if not self.inner.size:
             return values
         return np.asarray(values - self.columns @ (self.inner @ (self.columns.T @ values)))
 
-    def likeliest(self, values: Array) -> Array:
+    def most_likely(self, values: Array) -> Array:
         """(p,) the likeliest nuisances [standard deviations], given residuals (w,) that they are not taken out of."""
         return np.asarray(self.covariance @ (self.columns.T @ values))
 
@@ -107,22 +107,22 @@ SIMULATION_TOLERANCE = 1e-7
 
 Reason: over a record the errors add up, and jump as the parameters move; a search must not take that for a way down.
 Looser, it would hardly be faster: most steps of a record lie in one piece."""
-REMEMBERED = 4
+CACHED_VOLTAGES = 4
 """Effective voltages kept: slopes by a parameter of the drive need three."""
 
 
 @dataclass(frozen=True, eq=False)
-class RecordLikelihood:
+class WeightedRecord:
     """What one record, or a part of it, says."""
 
     name: str
-    place: int
+    base_row: int
     """Which base row it belongs to; -1 where the voltage moves."""
     motion: Motion
     """(m,) what is simulated."""
-    begins_with: float
+    initial_force: float
     """Recorded force at the first sample of the motion [N]: that of the same phase where the motion repeats."""
-    places: Rows
+    sample_indices: Rows
     """(s,) samples of the motion at which it was recorded, from the first one compared to the last."""
     compared: NDArray[np.bool_]
     """(s,) which of them are compared: n of them, in one stretch or several."""
@@ -133,7 +133,7 @@ class RecordLikelihood:
     noise: PureError | Autoregression
     weights: Array
     """(H + 1,) of the harmonics of an average cycle; empty where samples are compared."""
-    nuisances: IntegratedOut
+    nuisances: MarginalisedNuisances
     """Offset, gain and delay of the test, and its jumps."""
 
     @cached_property
@@ -144,7 +144,7 @@ class RecordLikelihood:
     @cached_property
     def effective_voltage(self) -> Callable[[bytes], Array]:
         """(m,) effective voltage [V] by the row of the drive, (d,) as bytes; the same array for the same row."""
-        return lru_cache(REMEMBERED)(self._followed)
+        return lru_cache(CACHED_VOLTAGES)(self._followed)
 
     def _followed(self, row: bytes) -> Array:
         voltage = self.motion.voltage
@@ -154,28 +154,30 @@ class RecordLikelihood:
 
     def at_compared(self, simulated: Array) -> Array:
         """(n,) or (n, p) of what was simulated at the samples that are compared."""
-        return simulated[self._compared_places]
+        return simulated[self._compared_indices]
 
     @cached_property
-    def _compared_places(self) -> Rows:
-        return self.places[self.compared]
+    def _compared_indices(self) -> Rows:
+        return self.sample_indices[self.compared]
 
-    def shown(self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], late: float = 0.0) -> Array:
+    def through_sensors(
+        self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], delay: float = 0.0
+    ) -> Array:
         """(m,) or (m, p) what was simulated as a channel shows it, between the samples by a cubic.
 
         Parameters
         ----------
         simulated : (m,) force [N], or (m, p) of them
         sensors : effects of the sensor, see `pzd.damper.compose.sensors_of`
-        late : how much later yet the channel shows it [s]
+        delay : how much later yet the channel shows it [s]
         """
         from scipy.interpolate import CubicSpline
 
-        if not sensors and late == 0.0:
+        if not sensors and delay == 0.0:
             return simulated
-        begin = int(self.places[0]) if isinstance(self.noise, PureError) else 0
+        begin = int(self.sample_indices[0]) if isinstance(self.noise, PureError) else 0
         time = self.motion.time[begin:]
-        shown = shown_moments(sensors, time - late)
+        shown = shown_moments(sensors, time - delay)
         if np.array_equal(shown, time):
             return simulated
         if begin == 0:
@@ -185,9 +187,9 @@ class RecordLikelihood:
         cycle = CubicSpline(np.append(time, time[0] + period), whole, bc_type="periodic")
         return np.concatenate([simulated[:begin], cycle(shown)])
 
-    def in_noise(self, values: Array) -> Array:
+    def standardised(self, values: Array) -> Array:
         """(w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
-        return self.nuisances.taken_out(self._scaled(values))
+        return self.nuisances.marginalised(self._scaled(values))
 
     @cached_property
     def _unbroken(self) -> NDArray[np.bool_]:
@@ -202,17 +204,17 @@ class RecordLikelihood:
         return np.concatenate([harmonics.real, harmonics.imag[1:]])
 
 
-def response(observation: RecordLikelihood, damper: Damper) -> Array:
+def simulated_force(observation: WeightedRecord, damper: Damper) -> Array:
     """(n,) force that a damper gives at the compared samples [N]."""
-    return responses(observation, damper)(0.0)
+    return delayed_forces(observation, damper)(0.0)
 
 
-def responses(observation: RecordLikelihood, damper: Damper) -> Callable[[float], Array]:
+def delayed_forces(observation: WeightedRecord, damper: Damper) -> Callable[[float], Array]:
     """(n,) force that a damper gives at the compared samples [N], by how much later yet a channel shows it [s]."""
     o, sensors = observation, sensors_of(damper)
     prompt = damper.without_effects(*sensors)
-    force = respond(prompt, o.motion, o.begins_with, SIMULATION_TOLERANCE)
-    return lambda late: o.at_compared(o.shown(force, sensors, late))
+    force = respond(prompt, o.motion, o.initial_force, SIMULATION_TOLERANCE)
+    return lambda late: o.at_compared(o.through_sensors(force, sensors, late))
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -224,11 +226,11 @@ RESOLUTION = 3e-4
 
 Reason: a good load cell is right to 0.03 % of its range; without a floor a quiet record would decide
 alone. Not tuned."""
-INSTANT = 1e-6
+DELAY_STEP = 1e-6
 """Delay by which the slope of a force over time is taken [s].
 
 Reason: far below a sample, far above the rounding of a time stamp."""
-LATEST = 3.0
+LARGEST_DELAY = 3.0
 """At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope.
 
 Reason: the customary bound for what a normal prior still allows."""
@@ -243,7 +245,7 @@ MOST_HARMONICS = 80
 
 Reason: harmonics of a force whose slope jumps, as at yield, fall with their square: those beyond are below 2e-4 of
 the first, and `RESOLUTION` is no finer."""
-UNWEIGHTED = 0.05
+EQUAL_WEIGHT_DEVIATION = 0.05
 """What a plain element leaves [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k.
 
 Reason: what identify leaves of a damper that lacks a law is of this size; the priors hold only what no test
@@ -260,25 +262,25 @@ MOST_POINTS = 2048
 Reason: 25 points for each of the harmonics that are compared."""
 
 
-def record_likelihood(
-    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
-) -> RecordLikelihood | None:
+def weighted_record(
+    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
+) -> WeightedRecord | None:
     """The observation of some samples of a record; None where they are too few.
 
     Parameters
     ----------
     p : the record
     mask : (n,) which of its samples count
-    place : its base row; -1 where the voltage moves
+    base_row : its base row; -1 where the voltage moves
     given : what the damper makes of it, along which gain and delay act
     nuisance : priors of the test's own offset, gain and delay
     """
-    if not enough(p, mask):
+    if not enough_samples(p, mask):
         return None
-    return (_of_cycles if _averaged(p) else _of_samples)(p, mask, place, given, nuisance)
+    return (_from_cycles if _is_averaged(p) else _from_samples)(p, mask, base_row, given, nuisance)
 
 
-def enough(p: Prepared, mask: NDArray[np.bool_]) -> bool:
+def enough_samples(p: PreparedRecord, mask: NDArray[np.bool_]) -> bool:
     """Whether some samples (n,) of a record can be weighed: a whole cycle where it repeats, else a long enough stretch.
 
     Parameters
@@ -286,19 +288,19 @@ def enough(p: Prepared, mask: NDArray[np.bool_]) -> bool:
     p : the record
     mask : (n,) which of its samples count
     """
-    if p.cycles is not None and _averaged(p):
+    if p.cycles is not None and _is_averaged(p):
         return bool(p.cycles.whole(p.record.time, mask))
     return int(np.count_nonzero(mask & in_motion(p.record))) >= FEWEST_SAMPLES
 
 
-def _averaged(p: Prepared) -> bool:
+def _is_averaged(p: PreparedRecord) -> bool:
     """Whether a record counts as its average cycle; cycles differ where the damper warms, and it would hide that."""
-    return p.cycles is not None and not warms(p.record.temperature)
+    return p.cycles is not None and not temperature_moves(p.record.temperature)
 
 
-def _of_cycles(
-    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
-) -> RecordLikelihood | None:
+def _from_cycles(
+    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
+) -> WeightedRecord | None:
     run = p.cycles
     if run is None:
         return None
@@ -310,14 +312,14 @@ def _of_cycles(
     cycle = _resampled(whole[counted].mean(axis=0), points)
     peak = float(np.max(np.abs(cycle)))
     average = _resampled(simulated.mean(axis=0), points)
-    left = DISCREPANCY * _left_by(cycle, average, np.gradient(average), error.sample_variance / len(counted))
+    left = DISCREPANCY * _model_discrepancy(cycle, average, np.gradient(average), error.sample_variance / len(counted))
     floor = ((RESOLUTION * peak) ** 2 + left**2) / (MOST_HARMONICS + 1) + given.displacement_variance
     weights = np.sqrt(2.0 / (error.single / len(counted) + floor))[: MOST_HARMONICS + 1]
     weights[0] /= np.sqrt(2.0)
     motion, lead, factor = _cycle_motion(record, run.period, [_resampled(channel, points) for channel in p.mean_motion])
-    bare = RecordLikelihood(
+    bare = WeightedRecord(
         record.name,
-        place,
+        base_row,
         motion,
         float(cycle[-(lead // factor) % cycle.size]),
         lead + factor * np.arange(cycle.size),
@@ -326,12 +328,12 @@ def _of_cycles(
         peak,
         error,
         weights,
-        IntegratedOut.nothing(2 * weights.size - 1),
+        MarginalisedNuisances.none(2 * weights.size - 1),
     )
     return with_nuisances(bare, given.damper, nuisance)
 
 
-def _left_by(measured: Array, force: Array, slope: Array, variance: float) -> float:
+def _model_discrepancy(measured: Array, force: Array, slope: Array, variance: float) -> float:
     """R.m.s. of what a model leaves above the noise [N], offset, gain and delay of the test taken off."""
     columns = np.column_stack([np.ones(force.size), force, slope])
     residual = measured - force
@@ -368,9 +370,9 @@ def _resampled(cycle: Array, points: int) -> Array:
     return np.asarray(np.fft.irfft(np.fft.rfft(cycle), points) * (points / cycle.size), dtype=np.float64)
 
 
-def _of_samples(
-    p: Prepared, mask: NDArray[np.bool_], place: int, given: Predicted, nuisance: NuisanceConfig
-) -> RecordLikelihood:
+def _from_samples(
+    p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
+) -> WeightedRecord:
     record, force = p.record, given.force
     mask = mask & in_motion(record)
     first, *_, last = np.flatnonzero(mask)
@@ -379,16 +381,20 @@ def _of_samples(
     measured = record.force[mask]
     noise = fit_smooth_residual(measured - force[mask], record, force[mask], mask).noise
     peak = float(np.max(np.abs(measured)))
-    alike = _samples_alike(record)
-    left = alike * (DISCREPANCY * _left_by(measured, force[mask], slope_within(force[mask], mask), noise.variance)) ** 2
+    alike = _samples_per_harmonic(record)
+    left = (
+        alike
+        * (DISCREPANCY * _model_discrepancy(measured, force[mask], slope_within(force[mask], mask), noise.variance))
+        ** 2
+    )
     if left > noise.variance:
         noise = Autoregression(np.zeros(0), noise.variance + left)
     noise = Autoregression(noise.coefficients, max(noise.innovation, alike * (RESOLUTION * peak) ** 2))
-    motion, places = motion_of(record)
+    motion, places = simulation_motion(record)
     rows = int(np.count_nonzero(unbroken(compared, noise.coefficients.size)))
-    bare = RecordLikelihood(
+    bare = WeightedRecord(
         record.name,
-        place,
+        base_row,
         motion,
         float(record.force[0]),
         places[start:stop],
@@ -397,12 +403,12 @@ def _of_samples(
         peak,
         noise,
         np.zeros(0),
-        IntegratedOut.nothing(rows),
+        MarginalisedNuisances.none(rows),
     )
     return with_nuisances(bare, given.damper, nuisance, given.timing[mask])
 
 
-def _samples_alike(record: Record) -> float:
+def _samples_per_harmonic(record: Record) -> float:
     """Samples that say the same of what a model leaves: it fills as many harmonics of the motion as a cycle shows.
 
     So what counts as noise has the same density at every sampling rate.
@@ -412,8 +418,8 @@ def _samples_alike(record: Record) -> float:
 
 
 def with_nuisances(
-    bare: RecordLikelihood, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
-) -> RecordLikelihood:
+    bare: WeightedRecord, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
+) -> WeightedRecord:
     """The observation with the test's own offset, gain and delay, jumps and instants of the voltage integrated out.
 
     Equation: V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `IntegratedOut`
@@ -421,26 +427,26 @@ def with_nuisances(
     A delay shifts the force and does not merely add its slope: what the shift by the likeliest delay d is more than
     that, F(t - d) - F + d dF/dt, is taken off the measured force.
     """
-    shown = responses(bare, damper)
+    shown = delayed_forces(bare, damper)
     force, averaged = shown(0.0), isinstance(bare.noise, PureError)
-    late = (shown(INSTANT) - force) / INSTANT
+    late = (shown(DELAY_STEP) - force) / DELAY_STEP
     columns = np.column_stack(
         [
             nuisance.delay_s * late,
             np.full(force.size, nuisance.offset * bare.peak),
             nuisance.gain * force,
-            _neighbours_of(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
+            _jump_columns(jumps(bare.measured) if averaged else jumps_in_samples(bare.measured, force)),
             *([] if timing is None else [timing]),
         ]
     )
-    nuisances = IntegratedOut.of(bare.in_noise(columns))
-    likeliest = float(nuisances.likeliest(bare.in_noise(bare.measured - force))[0])
-    delay = nuisance.delay_s * float(np.clip(likeliest, -LATEST, LATEST))
+    nuisances = MarginalisedNuisances.from_columns(bare.standardised(columns))
+    likeliest = float(nuisances.most_likely(bare.standardised(bare.measured - force))[0])
+    delay = nuisance.delay_s * float(np.clip(likeliest, -LARGEST_DELAY, LARGEST_DELAY))
     measured = bare.measured - (shown(delay) - force - delay * late)
     return replace(bare, measured=measured, nuisances=nuisances)
 
 
-def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLikelihood:
+def equally_weighted(weighed: WeightedRecord, samples: int, peak: float) -> WeightedRecord:
     """The observation as criterion (4) takes it: every sample alike, and nothing left to the test's own nuisances.
 
     Equation: |r|^2 = n mean (F - F_sim)^2 / s^2, s alike in all tests of one condition
@@ -452,16 +458,16 @@ def unweighted(weighed: RecordLikelihood, samples: int, peak: float) -> RecordLi
     samples : that it counts for
     peak : largest force of its condition [N]
     """
-    scale = UNWEIGHTED * peak
+    scale = EQUAL_WEIGHT_DEVIATION * peak
     if isinstance(weighed.noise, Autoregression):
         white = Autoregression(np.zeros(0), scale**2)
-        return replace(weighed, noise=white, nuisances=IntegratedOut.nothing(weighed.measured.size))
+        return replace(weighed, noise=white, nuisances=MarginalisedNuisances.none(weighed.measured.size))
     weights = np.full(weighed.weights.size, np.sqrt(2.0 * samples) / scale)
     weights[0] /= np.sqrt(2.0)
-    return replace(weighed, weights=weights, nuisances=IntegratedOut.nothing(2 * weights.size - 1))
+    return replace(weighed, weights=weights, nuisances=MarginalisedNuisances.none(2 * weights.size - 1))
 
 
-def _neighbours_of(bends: Array) -> Array:
+def _jump_columns(bends: Array) -> Array:
     """(n, j) one column a sample beside a jump, as large as the force bends there [N]."""
     beside = np.flatnonzero(bends)
     columns = np.zeros((bends.size, beside.size))

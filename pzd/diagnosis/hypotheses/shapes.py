@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from pzd.diagnosis.data import Prepared
+from pzd.diagnosis.data import PreparedRecord
 from pzd.record import CONSTANT_SHARE, SAME_TEMPERATURE, Array
 
 # ----------------------------------------------------------------------------------------------------
@@ -124,7 +124,7 @@ def while_running(s: Signals) -> Iterator[tuple[float | None, Array]]:
         tau *= 2.0
 
 
-def signals_of(prepared: Prepared, force: Array, temperature: float | None, half_stroke: float) -> Signals:
+def signals_of(prepared: PreparedRecord, force: Array, temperature: float | None, half_stroke: float) -> Signals:
     """What a shape may be made of, along one test.
 
     Parameters

@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from pzd.diagnosis.data import Prepared
+from pzd.diagnosis.data import PreparedRecord
 from pzd.record import Array
 
 # ----------------------------------------------------------------------------------------------------
@@ -34,7 +34,7 @@ class StrokeMotion:
     """Samples at the beginning that are there for a state to settle, and are not asked for."""
 
     @classmethod
-    def of(cls, prepared: Prepared) -> StrokeMotion:
+    def of(cls, prepared: PreparedRecord) -> StrokeMotion:
         """The cleaned motion of a record, led in as that of the damper is."""
         record = prepared.lead or prepared.record
         x = record.displacement

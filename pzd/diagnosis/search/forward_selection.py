@@ -12,44 +12,45 @@ import numpy as np
 
 from pzd.damper.effects import library
 from pzd.damper.model import Damper, against_nature
-from pzd.diagnosis.campaign import Campaign
+from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.fit.least_squares import Fitted, fit, standard_errors
-from pzd.diagnosis.fit.parameters import Problem
+from pzd.diagnosis.fit.least_squares import FitResult, fit, standard_errors
+from pzd.diagnosis.fit.problem import Problem
 from pzd.diagnosis.search.acceptance import (
     MAY_BE_CHANCE,
-    MAY_BE_OF_THE_TESTS,
-    Competition,
+    MAY_BE_TEST_SCATTER,
+    ConfounderMatch,
     Detection,
-    Round,
     Selection,
-    closes,
+    SelectionStep,
+    closes_gap,
     detections,
+    insufficient_support,
     leaves_gap,
     rivals_of,
     spurious,
-    unsupported,
 )
 from pzd.diagnosis.search.candidates import (
     Candidate,
     as_candidate,
-    best_competing_form,
-    by_voltage,
+    best_confounder,
     candidate,
     candidates,
     converged,
     delta_bic,
-    moved_by,
+    force_change,
     nearly_as_good,
+    per_voltage_candidates,
 )
-from pzd.diagnosis.search.evidence import Evidence, evidence_of
 from pzd.diagnosis.thresholds import AT_REST, MOST_REWEIGHTINGS, WIDER
 
 # ----------------------------------------------------------------------------------------------------
 # Iteratively reweighted fits, until the parameters no longer depend on the damper that the weights came from.
 
 
-def reweighted(weighed: Callable[[Damper], Evidence], evidence: Evidence, current: Fitted) -> tuple[Evidence, Fitted]:
+def reweighted(
+    weighed: Callable[[Damper], Evidence], evidence: Evidence, current: FitResult
+) -> tuple[Evidence, FitResult]:
     """The evidence weighed by what an optimum leaves and the optimum by that evidence, in turn until neither moves.
 
     The delay of a test acts along the slope of the force that the damper gives, and shifts its corners.
@@ -63,7 +64,7 @@ def reweighted(weighed: Callable[[Damper], Evidence], evidence: Evidence, curren
     for _ in range(MOST_REWEIGHTINGS if current.effects else 0):
         before, evidence = current, weighed(current.damper)
         current = fit(evidence.whole, before.effects, evidence.whole.start_with(before.damper))
-        moved = [abs(u.of(current.damper) - u.of(before.damper)) for u in before.unknowns]
+        moved = [abs(u.value_in(current.damper) - u.value_in(before.damper)) for u in before.unknowns]
         if np.all(moved <= AT_REST * standard_errors(current)):
             break
     return evidence, current
@@ -73,15 +74,15 @@ def reweighted(weighed: Callable[[Damper], Evidence], evidence: Evidence, curren
 # Every other effect in the place of one adopted early, beside all that was adopted after it.
 
 
-def contest(
+def swap_step(
     problem: Problem,
-    without: Fitted,
+    without: FitResult,
     name: str,
-    current: Fitted,
+    current: FitResult,
     refused: Callable[[Candidate], str | None],
     config: DiagnoseConfig,
     jobs: int,
-) -> tuple[Round, Candidate]:
+) -> tuple[SelectionStep, Candidate]:
     """The step in which an effect was adopted, taken again; and what is adopted in it.
 
     What came first was chosen beside less than is adopted now, and may have stood in for what came later. It stays
@@ -103,11 +104,11 @@ def contest(
     close = [c for c in ended if c is not own and c.delta_bic - own.delta_bic < config.rival_bic]
     stand_ins = frozenset(c.effect for c in close if refused(c))
     alike = [c for c in close if c.effect not in stand_ins]
-    kept = next((c for c in alike if _better(c, own, config.rival_bic)), own)
-    return Round(tuple(ended), kept.effect, rivals_of(kept, (*alike, own), config), stand_ins), kept
+    kept = next((c for c in alike if _replaces(c, own, config.rival_bic)), own)
+    return SelectionStep(tuple(ended), kept.effect, rivals_of(kept, (*alike, own), config), stand_ins), kept
 
 
-def _better(other: Candidate, own: Candidate, rival_bic: float) -> bool:
+def _replaces(other: Candidate, own: Candidate, rival_bic: float) -> bool:
     """Whether a candidate takes the place of the effect adopted."""
     if against_nature(other.fitted.damper):
         return False
@@ -133,23 +134,31 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
     weighed = partial(evidence_of, campaign)
     first = weighed(damper)
     plain = fit(first.whole, (), first.whole.start())
-    search = _Search(config, weighed, jobs, damper, first, plain)
+    search = _ForwardSelection(config, weighed, jobs, damper, first, plain)
     search.choose_temperature_axis()
     first, plain = search.evidence, search.current
     search.force()
-    while len(search.rounds) < 2 * config.most_effects and campaign.work.may_go_on() and search.step():
+    while len(search.steps) < 2 * config.most_effects and campaign.budget.allows_more() and search.step():
         pass
     search.contest()
     search.rest()
-    undecided, competitions = search.undecided(), search.competitions()
-    rounds, reasons = tuple(search.rounds), search.reasons
+    undecided, competing_confounders = search.undecided(), search.competing_confounders()
+    rounds, reasons = tuple(search.steps), search.reasons
     return Selection(
-        plain, search.current, rounds, reasons, first, search.evidence, competitions, undecided, search.left_open
+        plain,
+        search.current,
+        rounds,
+        reasons,
+        first,
+        search.evidence,
+        competing_confounders,
+        undecided,
+        search.open_detections,
     )
 
 
 @dataclass(eq=False)
-class _Search:
+class _ForwardSelection:
     """State of the forward selection: the current fit, the rounds so far, and why each effect was adopted or not."""
 
     config: DiagnoseConfig
@@ -159,10 +168,10 @@ class _Search:
     """Plain, with the base rows of identify."""
     evidence: Evidence
     """Weighed by what the current damper leaves."""
-    current: Fitted
-    rounds: list[Round] = field(default_factory=list)
+    current: FitResult
+    steps: list[SelectionStep] = field(default_factory=list)
     reasons: dict[str, str] = field(default_factory=dict)
-    left_open: dict[str, tuple[Detection, ...]] = field(default_factory=dict)
+    open_detections: dict[str, tuple[Detection, ...]] = field(default_factory=dict)
 
     def force(self) -> None:
         """Adopt what the config asks for."""
@@ -182,7 +191,7 @@ class _Search:
                 update={"effects": self.current.damper.effects, "zero_m": self.current.damper.zero_m}
             )
         ).whole
-        few, effects, damper = whole.pooled(), self.current.effects, self.current.damper
+        few, effects, damper = whole.pooled_temperatures(), self.current.effects, self.current.damper
         rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, few))
         pays = delta_bic(one, rows)
         if pays <= self.config.adopt_bic and not effects:
@@ -197,12 +206,12 @@ class _Search:
     def step(self) -> bool:
         """Adopt one effect more, an adopted one by voltage, or two that are supported together; whether any was."""
         tried = self._tried(self.evidence, self.current)
-        steps = sorted((*tried, *by_voltage(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
+        steps = sorted((*tried, *per_voltage_candidates(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
         first = self._first_supported(steps)
         if first is None:
             return self._pair(tried)
         ended = converged(self.evidence.whole, self.current, self._natural(first, steps))
-        self._adopt(ended, nearly_as_good(self.evidence.whole, self.current, ended, tried), _before(first, steps))
+        self._adopt(ended, nearly_as_good(self.evidence.whole, self.current, ended, tried), _ranked_above(first, steps))
         return True
 
     def _natural(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
@@ -212,7 +221,7 @@ class _Search:
         alike = [c for c in steps if not c.varies and c.delta_bic - first.delta_bic < self.config.rival_bic]
         return self._first_supported([c for c in alike if not against_nature(c.fitted.damper)]) or first
 
-    def _tried(self, evidence: Evidence, current: Fitted) -> tuple[Candidate, ...]:
+    def _tried(self, evidence: Evidence, current: FitResult) -> tuple[Candidate, ...]:
         if len(current.effects) == self.config.most_effects:
             return ()
         silent = not evidence.something_missing(current, self.config)
@@ -230,10 +239,10 @@ class _Search:
                 break
         return None
 
-    def _too_little(self, evidence: Evidence, before: Fitted, each: Candidate) -> str | None:
-        return unsupported(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
+    def _too_little(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
+        return insufficient_support(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
 
-    def _leaves_gap(self, evidence: Evidence, before: Fitted, each: Candidate) -> str | None:
+    def _leaves_gap(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
         """Why a candidate is a stand-in by the gap that it leaves open, weighed by what is left without it or with it.
 
         What is left without it is slow: beside that the fit goes by what is quick, where the displacement is known
@@ -252,11 +261,11 @@ class _Search:
         lead = next((c for c in tried if missing and self._too_little(self.evidence, self.current, c) is None), None)
         found = None if lead is None else self._with_second(lead)
         if lead is None or found is None:
-            self.left_open = detections(self.evidence.whole, self.current, tried)
+            self.open_detections = detections(self.evidence.whole, self.current, tried)
             # Once noise explains what is left, the round that adopted something tells more of the others.
-            self.rounds += [Round(tried, None)] if tried and (missing or not self.rounds) else []
+            self.steps += [SelectionStep(tried, None)] if tried and (missing or not self.steps) else []
             return False
-        self.rounds.append(Round(tried, lead.effect, refused=_before(lead, tried)))
+        self.steps.append(SelectionStep(tried, lead.effect, rejected=_ranked_above(lead, tried)))
         self.reasons[lead.effect] = "adopted"
         self._adopt(*found)
         return True
@@ -270,24 +279,26 @@ class _Search:
         if best is None:
             return None
         both = converged(evidence.whole, at, best)
-        if not closes(self.evidence, self.config, self.current, both):
+        if not closes_gap(self.evidence, self.config, self.current, both):
             return None
         failed = spurious(self.evidence, self.weighed(both.fitted.damper), self.config, self.current, both)
-        return None if failed else (both, nearly_as_good(evidence.whole, at, both, seconds), _before(best, seconds))
+        return (
+            None if failed else (both, nearly_as_good(evidence.whole, at, both, seconds), _ranked_above(best, seconds))
+        )
 
     def _adopt(self, chosen: Candidate, tried: tuple[Candidate, ...], refused: frozenset[str]) -> None:
         self.reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
         if not chosen.varies:
             finished = tuple(chosen if c.effect == chosen.effect else c for c in tried)
-            step = Round(finished, chosen.effect, refused=refused)
-            self.rounds.append(replace(step, rivals=rivals_of(chosen, step.contenders, self.config)))
+            step = SelectionStep(finished, chosen.effect, rejected=refused)
+            self.steps.append(replace(step, rivals=rivals_of(chosen, step.contenders, self.config)))
         log.info("diagnose: %s %s, delta BIC %.0f", chosen.effect, self.reasons[chosen.effect], chosen.delta_bic)
         self._reweight(chosen.fitted)
         self.choose_temperature_axis()
         for name in self.current.effects[len(self.config.force) : -1]:
             self._drop_needless(name, chosen.effect)
 
-    def _reweight(self, found: Fitted) -> None:
+    def _reweight(self, found: FitResult) -> None:
         """Go on from an optimum, the evidence weighed by what it leaves, unless that bends it to a wider gap."""
         self.evidence = self.weighed(found.damper)
         whole = self.evidence.whole
@@ -299,14 +310,14 @@ class _Search:
     def contest(self) -> None:
         """Try the others again in the place of each effect adopted before the last, and keep what does better."""
         for name in self.current.effects[len(self.config.force) : -1]:
-            step = next((i for i, each in enumerate(self.rounds) if each.chosen == name), None)
-            fixed = name in self.evidence.whole.varying or library()[name].place == "material"
-            if step is None or fixed or not self.evidence.campaign.work.may_go_on():
+            step = next((i for i, each in enumerate(self.steps) if each.chosen == name), None)
+            fixed = name in self.evidence.whole.per_voltage or library()[name].place == "material"
+            if step is None or fixed or not self.evidence.campaign.budget.allows_more():
                 continue
             without = self._without(name)
             refused = partial(self._refused, self.config, before=without)
             whole = self.evidence.whole
-            self.rounds[step], best = contest(whole, without, name, self.current, refused, self.config, self.jobs)
+            self.steps[step], best = swap_step(whole, without, name, self.current, refused, self.config, self.jobs)
             if best.effect != name:
                 self.reasons[name] = f"stand-in: {best.effect} does better beside what was adopted later"
                 self.reasons[best.effect] = "adopted"
@@ -318,44 +329,44 @@ class _Search:
         if self._gap(current) <= max(WIDER * self._gap(self.current), self.config.negligible):
             self.evidence, self.current = evidence, current
 
-    def _gap(self, fitted: Fitted) -> float:
+    def _gap(self, fitted: FitResult) -> float:
         return self.evidence.gap(fitted)
 
-    def _without(self, effect: str) -> Fitted:
+    def _without(self, effect: str) -> FitResult:
         """The optimum with one of the adopted effects left out."""
         whole, damper = self.evidence.whole, self.current.damper
         effects = {name: values for name, values in damper.effects.items() if name != effect}
         return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
 
-    def competitions(self) -> tuple[Competition, ...]:
+    def competing_confounders(self) -> tuple[ConfounderMatch, ...]:
         """The competing forms that would do as well as an effect adopted, in its place."""
         found = []
         for name in self.current.effects[len(self.config.force) :]:
             without = self._without(name)
-            form = best_competing_form(self.evidence.whole, without)
+            form = best_confounder(self.evidence.whole, without)
             behind = form.delta_bic - delta_bic(without, self.current)
             if behind < self.config.rival_bic:
-                found.append(Competition(name, self.current.damper, form.effect, form.fitted.damper, behind))
+                found.append(ConfounderMatch(name, self.current.damper, form.effect, form.fitted.damper, behind))
         return tuple(found)
 
     def undecided(self) -> tuple[str, ...]:
         """Where nothing was adopted, the effects that are rivals of none, each with its reason."""
-        if self.current.effects or not self.rounds:
+        if self.current.effects or not self.steps:
             return ()
-        short = [c for c in self.rounds[-1].tried if c.delta_bic > self.config.adopt_bic]
+        short = [c for c in self.steps[-1].tried if c.delta_bic > self.config.adopt_bic]
         best = min((c.delta_bic for c in short), default=0.0)
         if best <= -self.config.rival_bic:
             lenient = self.config.model_copy(update={"adopt_bic": min(best + self.config.rival_bic, 0.0)})
             for each in short:
                 if each.delta_bic <= lenient.adopt_bic:
                     self.reasons[each.effect] = self._refused(lenient, each) or MAY_BE_CHANCE
-        return tuple(name for name, why in self.reasons.items() if why in (MAY_BE_OF_THE_TESTS, MAY_BE_CHANCE))
+        return tuple(name for name, why in self.reasons.items() if why in (MAY_BE_TEST_SCATTER, MAY_BE_CHANCE))
 
-    def _refused(self, config: DiagnoseConfig, each: Candidate, before: Fitted | None = None) -> str | None:
+    def _refused(self, config: DiagnoseConfig, each: Candidate, before: FitResult | None = None) -> str | None:
         """Why a candidate is too little, or a stand-in; None where the data support it by itself."""
         evidence, before = self.evidence, before or self.current
         return (
-            unsupported(evidence, config, each)
+            insufficient_support(evidence, config, each)
             or self._leaves_gap(evidence, before, each)
             or spurious(evidence, self.weighed(each.fitted.damper), config, before, each)
         )
@@ -367,10 +378,10 @@ class _Search:
             return
         without = self._without(effect)
         pays = delta_bic(without, current) <= self.config.adopt_bic
-        if not pays or moved_by(whole, without, current) < self.config.visible:
+        if not pays or force_change(whole, without, current) < self.config.visible:
             self.current, self.reasons[effect] = without, f"stand-in: not needed beside {newest}"
 
 
-def _before(chosen: Candidate, tried: Sequence[Candidate]) -> frozenset[str]:
+def _ranked_above(chosen: Candidate, tried: Sequence[Candidate]) -> frozenset[str]:
     """The effects that promised more than the one chosen: they were refused."""
     return frozenset(c.effect for c in itertools.takewhile(lambda c: c is not chosen, tried) if not c.varies)

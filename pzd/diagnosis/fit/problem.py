@@ -15,7 +15,7 @@ from pzd.damper.confounders import known
 from pzd.damper.effect import Effect, Parameter, Scales, Search
 from pzd.damper.material import by_voltage
 from pzd.damper.model import BaseRow, Damper
-from pzd.diagnosis.fit.likelihood import RecordLikelihood
+from pzd.diagnosis.fit.likelihood import WeightedRecord
 from pzd.record import Array
 
 # ----------------------------------------------------------------------------------------------------
@@ -23,18 +23,18 @@ from pzd.record import Array
 
 
 @dataclass(eq=False)
-class Work:
+class Budget:
     """What has been simulated so far, and how much may be.
 
     It is counted in forces at samples, whoever asks for them, and looked at only where every thread has come to rest:
     so the same input ends at the same place.
     """
 
-    most: float = float("inf")
+    limit: float = float("inf")
     """Forces that may be computed."""
     spent: int = 0
     """Forces computed."""
-    ended: bool = False
+    exhausted: bool = False
     """Whether the search has been kept from a further step."""
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
@@ -43,18 +43,18 @@ class Work:
         with self._lock:
             self.spent += samples
 
-    def may_go_on(self) -> bool:
+    def allows_more(self) -> bool:
         """Whether anything more is to be looked for; asked between one step of the search and the next."""
-        self.ended = self.ended or self.spent >= self.most
-        return not self.ended
+        self.exhausted = self.exhausted or self.spent >= self.limit
+        return not self.exhausted
 
     @property
-    def words(self) -> str:
+    def note(self) -> str:
         """What a verdict says of a search that has been ended; empty for one that came to its own end."""
-        if not self.ended:
+        if not self.exhausted:
             return ""
         return (
-            f"; the search was ended by diagnose.most_evaluations ({self.most:.3g} forces): a larger one, or shorter "
+            f"; the search was ended by diagnose.most_evaluations ({self.limit:.3g} forces): a larger one, or shorter "
             "records, may tell more"
         )
 
@@ -102,24 +102,24 @@ class Unknown:
         scaled = float(np.exp(searched)) if self.parameter.search.logarithmic else searched
         return float(np.clip(scaled * self.scale, self.parameter.low, self.parameter.high))
 
-    def searched(self, value: float) -> float:
+    def to_search(self, value: float) -> float:
         """The searched variable at a value of the parameter."""
         scaled = value / self.scale
         return float(np.log(max(scaled, 1.0 / BOUND))) if self.parameter.search.logarithmic else scaled
 
-    def fainter(self, searched: float, share: float) -> float:
+    def towards_neutral(self, searched: float, share: float) -> float:
         """The parameter [own unit] so much nearer to the value that switches its effect off."""
         value, neutral = self.value(searched), self.parameter.neutral
         return neutral + share * (value - neutral) if np.isfinite(neutral) else value / share
 
-    def of(self, damper: Damper) -> float:
+    def value_in(self, damper: Damper) -> float:
         """The value [own unit] that a damper has."""
         if self.parameter is ZERO:
             return damper.zero_m
         value = damper.effects[self.effect][self.parameter.name]
         return value if isinstance(value, float) else value[self.node or 0]
 
-    def slope(self, searched: float) -> float:
+    def derivative(self, searched: float) -> float:
         """Derivative of the parameter by the searched variable."""
         return self.scale * (float(np.exp(searched)) if self.parameter.search.logarithmic else 1.0)
 
@@ -128,17 +128,17 @@ class Unknown:
 class Problem:
     """What is fitted to what."""
 
-    observations: tuple[RecordLikelihood, ...]
+    observations: tuple[WeightedRecord, ...]
     base: tuple[BaseRow, ...]
     """Labels and starting values of the base rows."""
     scales: Scales
-    fastest: float
+    largest_rate: float
     """Largest k / C that is looked for [1/s]: an element that answers within a sample shows no spring."""
-    reference: float | None = None
+    reference_temperature: float | None = None
     """T_ref for temperature drift [degC]."""
-    varying: frozenset[str] = frozenset()
+    per_voltage: frozenset[str] = frozenset()
     """Effects whose parameters are numbers by voltage, one a voltage of the base rows."""
-    work: Work = field(default_factory=Work, repr=False)
+    budget: Budget = field(default_factory=Budget, repr=False)
     """Counts what is simulated."""
 
     @cached_property
@@ -152,21 +152,23 @@ class Problem:
         place = {id(row): i for i, (_, rows) in enumerate(by_voltage(self.base)) for row in rows}
         return tuple(place[id(row)] for row in self.base)
 
-    def pooled(self) -> Problem:
+    def pooled_temperatures(self) -> Problem:
         """The same with one base row a voltage, whatever the temperature: an effect stands for its axis then."""
         groups = [rows for _, rows in by_voltage(self.base)]
         if len(groups) == len(self.base):
             return self
         place = {id(row): i for i, rows in enumerate(groups) for row in rows}
-        moved = tuple(o if o.place < 0 else replace(o, place=place[id(self.base[o.place])]) for o in self.observations)
+        moved = tuple(
+            o if o.base_row < 0 else replace(o, base_row=place[id(self.base[o.base_row])]) for o in self.observations
+        )
         return replace(self, observations=moved, base=tuple(_mean_row(rows) for rows in groups))
 
-    def growing(self, effect: Effect) -> Problem:
+    def with_friction_scaling(self, effect: Effect) -> Problem:
         """The same with an effect by voltage where its parameters go with T0."""
         by_voltage = len(self.voltages) > 1 and any(parameter.with_friction for parameter in effect.parameters)
-        return replace(self, varying=self.varying | {effect.name}) if by_voltage else self
+        return replace(self, per_voltage=self.per_voltage | {effect.name}) if by_voltage else self
 
-    def friction_at(self, node: int) -> float:
+    def relative_friction(self, node: int) -> float:
         """Where T0 of the base rows starts at one of the voltages, as a share of the largest."""
         here = max(row.T0_N for row, at in zip(self.base, self.nodes, strict=True) if at == node)
         return here / (max(row.T0_N for row in self.base) or 1.0)
@@ -175,7 +177,7 @@ class Problem:
         """The parameters of some effects, in the order of the search, and the zero behind the first that needs it."""
         found: list[Unknown] = []
         for name in effects:
-            nodes = range(len(self.voltages)) if name in self.varying else (None,)
+            nodes = range(len(self.voltages)) if name in self.per_voltage else (None,)
             found += [self._unknown(name, parameter, node) for node in nodes for parameter in known()[name].parameters]
             if known()[name].about_zero and all(u.parameter is not ZERO for u in found):
                 found.append(self._unknown(name, ZERO, None))
@@ -188,14 +190,14 @@ class Problem:
         """(3 b,) the base rows in the units of the search."""
         softest = SOFTEST * self.scales.force / self.scales.speed
         damping = [max(r.C_Ns_per_m, softest) for r in self.base]
-        stiffness = [min(r.k_N_per_m, self.fastest * C) for r, C in zip(self.base, damping, strict=True)]
+        stiffness = [min(r.k_N_per_m, self.largest_rate * C) for r, C in zip(self.base, damping, strict=True)]
         rows = zip(self.base, damping, stiffness, strict=True)
         return np.concatenate([(r.T0_N / self.scales.force, np.log(C), np.log(k)) for r, C, k in rows])
 
     def start_with(self, damper: Damper) -> Array:
         """(3 b + e,) the base rows, and the effects that a damper has."""
         unknowns = self.unknowns(tuple(damper.effects))
-        return np.concatenate([self.start(), [u.searched(u.of(damper)) for u in unknowns]])
+        return np.concatenate([self.start(), [u.to_search(u.value_in(damper)) for u in unknowns]])
 
     def point(self, searched: Array, unknowns: Sequence[Unknown]) -> Point:
         """What a point of the search stands for."""
@@ -233,9 +235,9 @@ class Point:
     effects: Mapping[str, Mapping[str, float | tuple[float, ...]]]
     """Lists are by voltage."""
     problem: Problem
-    zero: float = 0.0
+    displacement_zero: float = 0.0
     """Of the displacement [m]."""
-    _laid_out: dict[float | None, Nodes] = field(default_factory=dict, repr=False)
+    _nodes_by_temperature: dict[float | None, Nodes] = field(default_factory=dict, repr=False)
 
     @cached_property
     def damper(self) -> Damper:
@@ -252,9 +254,9 @@ class Point:
         )
         return Damper(
             base=rows,
-            effects={name: {**values, **self._nodes(name)} for name, values in self.effects.items()},
-            reference_temperature_degC=self.problem.reference,
-            zero_m=self.zero,
+            effects={name: {**values, **self._node_voltages(name)} for name, values in self.effects.items()},
+            reference_temperature_degC=self.problem.reference_temperature,
+            zero_m=self.displacement_zero,
         )
 
     def nodes(self, temperature: float | None) -> Nodes:
@@ -262,16 +264,16 @@ class Point:
         problem = self.problem
         if len(problem.base) == len(problem.voltages) and all(known()[n].place != "material" for n in self.effects):
             temperature = None
-        if temperature not in self._laid_out:
-            self._laid_out[temperature] = nodes_of(self.damper, temperature)
-        return self._laid_out[temperature]
+        if temperature not in self._nodes_by_temperature:
+            self._nodes_by_temperature[temperature] = nodes_of(self.damper, temperature)
+        return self._nodes_by_temperature[temperature]
 
-    def _nodes(self, effect: str) -> dict[str, tuple[float, ...]]:
-        return {"at_voltage_V": self.problem.voltages} if effect in self.problem.varying else {}
+    def _node_voltages(self, effect: str) -> dict[str, tuple[float, ...]]:
+        return {"at_voltage_V": self.problem.voltages} if effect in self.problem.per_voltage else {}
 
-    def at(self, place: int) -> Mapping[str, Mapping[str, float]]:
+    def effects_at(self, base_row: int) -> Mapping[str, Mapping[str, float]]:
         """The effects at the voltage of one base row."""
-        node = self.problem.nodes[place]
+        node = self.problem.nodes[base_row]
         return {
             name: {key: value[node] if isinstance(value, tuple) else value for key, value in values.items()}
             for name, values in self.effects.items()

@@ -34,25 +34,25 @@ from pzd.signals.stretches import separate_tests
 Motion = tuple[Array, Array, Array]
 """Displacement, velocity and acceleration, each (n,)."""
 
-CLEAR = 4.0
+SIGNIFICANT_HARMONIC = 4.0
 """A harmonic of the displacement is kept from this many standard errors on, over a cycle or in parts of it."""
 DRAWS = 6
 """Displacements sent through the damper to see what their noise makes of the force."""
-FINER = 16
+POINTS_OF_CYCLE = 16
 """Points per sample on which the cleaned cycle is laid."""
-DRAWN = 4
+POINTS_OF_DRAW = 4
 """Points per sample on which a drawn cycle is laid: what it differs by is noise."""
-LINE = 16
+END_PARTS = 16
 """The first and last of so many parts of a record say what the temperature is at its ends.
 
 Reason: of a test of seconds half a second, in which no oil warms unevenly, and hundreds of samples of noise."""
-COVERS = 0.5
+REPEATING_SHARE = 0.5
 """The repeating run must hold this share of the way that the piston travels, else the record counts as not
 repeating; rest before and after does not count."""
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedRecord:
     """One record as the diagnosis sees it."""
 
     record: Record
@@ -86,7 +86,7 @@ class Prepared:
         return 0 if self.lead is None else self.lead.time.size - self.record.time.size
 
 
-def about(prepared: Sequence[Prepared], zero: float) -> tuple[Prepared, ...]:
+def centred_on(prepared: Sequence[PreparedRecord], zero: float) -> tuple[PreparedRecord, ...]:
     """The same with the displacement counted from another zero [m]."""
 
     def moved(record: Record) -> Record:
@@ -103,7 +103,7 @@ def about(prepared: Sequence[Prepared], zero: float) -> tuple[Prepared, ...]:
     )
 
 
-def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
+def prepare(records: Sequence[Record]) -> tuple[PreparedRecord, ...]:
     """Every record of one rig, cleaned; several tests in one record are as many, of its name."""
     scale = voltage_scale(records)
     still = [(record, is_constant(record, scale)) for record in records]
@@ -112,61 +112,61 @@ def prepare(records: Sequence[Record]) -> tuple[Prepared, ...]:
     )
 
 
-def _prepared(raw: Record, constant: bool) -> Prepared:
-    record = _even_temperature(_held_voltage(raw) if constant else _quiet_voltage(raw))
+def _prepared(raw: Record, constant: bool) -> PreparedRecord:
+    record = _smoothed_temperature(_fixed_voltage(raw) if constant else _denoised_voltage(raw))
     run = cycles(record.time, record.displacement)
     if run is None:
-        return Prepared(_smoothed(record), None, None, constant)
+        return PreparedRecord(_smoothed_displacement(record), None, None, constant)
     inside = run.inside(record.time)
     travel = np.abs(np.gradient(record.displacement))
-    if travel[inside].sum() < COVERS * travel.sum():
-        return Prepared(_smoothed(record), None, None, constant)
-    average = Average.of(record, run)
+    if travel[inside].sum() < REPEATING_SHARE * travel.sum():
+        return PreparedRecord(_smoothed_displacement(record), None, None, constant)
+    average = AverageCycle.of(record, run)
     motion = average.motion(average.clear_harmonics)
     if constant:
         run = settled(run, record.time, record.force)
     kept = sliced(record, run.inside(record.time))
-    cleaned = _moved(kept, motion(kept.time))
+    cleaned = _with_motion(kept, motion(kept.time))
     if not constant:
-        return Prepared(cleaned, None, None, constant)
+        return PreparedRecord(cleaned, None, None, constant)
     step = 1.0 / record.rate
     early = kept.time[0] - step * np.arange(run.points(record.time), 0, -1)
-    lead = _led_in(cleaned, early, motion(early))
-    return Prepared(cleaned, run, lead, constant, _drawn(lead, average))
+    lead = _with_lead(cleaned, early, motion(early))
+    return PreparedRecord(cleaned, run, lead, constant, _monte_carlo_motions(lead, average))
 
 
-def _held_voltage(record: Record) -> Record:
+def _fixed_voltage(record: Record) -> Record:
     """The record with its median voltage in place of what a noisy sensor makes of one that stands still."""
     voltage = record.median_voltage()
     return record if voltage is None else replace(record, voltage=np.full(record.time.size, voltage))
 
 
-def _quiet_voltage(record: Record) -> Record:
+def _denoised_voltage(record: Record) -> Record:
     """The record with the levels and ramps of its voltage in place of what a noisy sensor makes of them."""
     return record if record.voltage is None else replace(record, voltage=without_noise(record.voltage))
 
 
-def _even_temperature(record: Record) -> Record:
+def _smoothed_temperature(record: Record) -> Record:
     """The record with the temperature of the oil in place of what a noisy sensor of some resolution makes of it."""
     if record.temperature is None or np.ptp(record.temperature) == 0.0:
         return record
     values = record.temperature.copy()  # the smoothing goes through the ends, and would keep the noise of these two
-    values[0], values[-1] = _end(values), _end(values[::-1])
+    values[0], values[-1] = _end_value(values), _end_value(values[::-1])
     return replace(record, temperature=low_pass(values, HIGHEST))
 
 
-def _end(values: Array) -> float:
+def _end_value(values: Array) -> float:
     """Where a straight line through the first samples of a channel begins."""
-    first = values[: max(values.size // LINE, 2)]
+    first = values[: max(values.size // END_PARTS, 2)]
     return float(np.polynomial.Polynomial.fit(np.arange(first.size), first, 1)(0.0))
 
 
-def _moved(record: Record, motion: Motion) -> Record:
+def _with_motion(record: Record, motion: Motion) -> Record:
     """The record with another displacement and its derivatives."""
     return replace(record, displacement=motion[0], velocity=motion[1], acceleration=motion[2])
 
 
-def _led_in(cleaned: Record, early: Array, motion: Motion) -> Record:
+def _with_lead(cleaned: Record, early: Array, motion: Motion) -> Record:
     def longer(channel: Array | None) -> Array | None:
         return None if channel is None else np.concatenate([np.full(early.size, channel[0]), channel])
 
@@ -184,7 +184,7 @@ def _led_in(cleaned: Record, early: Array, motion: Motion) -> Record:
 
 
 @dataclass(frozen=True, eq=False)
-class Average:
+class AverageCycle:
     """The average cycle of a displacement, harmonic by harmonic."""
 
     run: Cycles
@@ -195,7 +195,7 @@ class Average:
     """(H + 1,) of them |.|^2, by noise and resolution [m^2]."""
 
     @classmethod
-    def of(cls, record: Record, run: Cycles) -> Average:
+    def of(cls, record: Record, run: Cycles) -> AverageCycle:
         """The average cycle of a record, and how well it is known."""
         folded = run.fold(record.time, record.displacement)
         creep = drift(folded)  # else a mean that walks would end every cycle with a step, which the oil spring feels
@@ -207,14 +207,14 @@ class Average:
     @cached_property
     def clear(self) -> NDArray[np.bool_]:
         """(H + 1,) whether a harmonic stands clear of its own uncertainty."""
-        clear: NDArray[np.bool_] = np.abs(self.harmonics) > CLEAR * np.sqrt(self.variance)
+        clear: NDArray[np.bool_] = np.abs(self.harmonics) > SIGNIFICANT_HARMONIC * np.sqrt(self.variance)
         clear[0] = True
         return clear
 
     @cached_property
     def _in_parts(self) -> tuple[ShortTimeMask, Array]:
         left = self._cycle(np.where(self.clear, 0.0, self.harmonics))
-        return ShortTimeMask.of(left, self.variance, CLEAR)
+        return ShortTimeMask.of(left, self.variance, SIGNIFICANT_HARMONIC)
 
     @cached_property
     def clear_harmonics(self) -> NDArray[np.complex128]:
@@ -259,7 +259,7 @@ class Average:
         spectrum: NDArray[np.complex128] = np.fft.rfft(cycle)[: self.harmonics.size] / self.points
         return spectrum
 
-    def motion(self, harmonics: NDArray[np.complex128], finer: int = FINER) -> Callable[[Array], Motion]:
+    def motion(self, harmonics: NDArray[np.complex128], finer: int = POINTS_OF_CYCLE) -> Callable[[Array], Motion]:
         """Displacement, velocity and acceleration of some harmonics (H + 1,) at any time."""
         from scipy.interpolate import CubicSpline
 
@@ -276,15 +276,15 @@ class Average:
         return at
 
 
-def _drawn(lead: Record, average: Average) -> tuple[Record, ...]:
+def _monte_carlo_motions(lead: Record, average: AverageCycle) -> tuple[Record, ...]:
     """Two cycles of the lead as they are, and with other displacements that are as likely."""
     draw = np.random.default_rng(DRAWS)
     two = sliced(lead, np.arange(lead.time.size) < 2 * average.points)
-    motions = [average.motion(average.clear_harmonics + average.error(draw), DRAWN) for _ in range(DRAWS)]
-    return (two, *(_moved(two, motion(two.time)) for motion in motions))
+    motions = [average.motion(average.clear_harmonics + average.error(draw), POINTS_OF_DRAW) for _ in range(DRAWS)]
+    return (two, *(_with_motion(two, motion(two.time)) for motion in motions))
 
 
-def _smoothed(record: Record) -> Record:
+def _smoothed_displacement(record: Record) -> Record:
     """The record with its displacement cut where the spectrum sinks into noise; derivatives by the spectrum."""
     n = record.time.size
     line = np.linspace(record.displacement[0], record.displacement[-1], n)
@@ -297,14 +297,14 @@ def _smoothed(record: Record) -> Record:
     def derivative(order: int) -> Array:
         return np.fft.irfft(spectrum * (2j * np.pi * frequency) ** order, 2 * n - 1)[:n]
 
-    return _moved(record, (derivative(0) + line, derivative(1) + slope, derivative(2)))
+    return _with_motion(record, (derivative(0) + line, derivative(1) + slope, derivative(2)))
 
 
 # ----------------------------------------------------------------------------------------------------
 # Which records the diagnosis uses: a load cell that was cut off hides what it should show.
 
 
-def whole_records(rig: Rig, setting: str | None) -> tuple[list[Record], tuple[str, ...]]:
+def unsaturated_records(rig: Rig, setting: str | None) -> tuple[list[Record], tuple[str, ...]]:
     """The records of a setting whose force is not cut off, and the names of the others; all where none is whole."""
     mine = [record for record in rig.records if record.setting == setting]
     cut_off = {entry.name for entry in rig.entries if any(_cuts_the_force(f.check, f.where) for f in entry.findings)}
@@ -316,7 +316,7 @@ def _cuts_the_force(check: str, where: str) -> bool:
     return check == "saturation" and where.startswith("force")
 
 
-def without(cut_off: Sequence[str]) -> str:
+def saturation_note(cut_off: Sequence[str]) -> str:
     """What to add to the reason where records were left out."""
     return f"; left out, for their force is cut off at the end of its range: {', '.join(cut_off)}" if cut_off else ""
 
@@ -329,20 +329,20 @@ def without(cut_off: Sequence[str]) -> str:
 # rig always splits the same way.
 
 
-TRAINING, VALIDATION, UNTOUCHED = 0, 1, 2
+TRAINING, VALIDATION, HELD_OUT = 0, 1, 2
 """Fitted to; looked at to choose; seen by nothing but the final figures."""
 Roles = NDArray[np.int64]
 HoldOut = Literal["records", "cycles", "segments", "mixed"]
 
-ALONE = (TRAINING, VALIDATION, TRAINING, UNTOUCHED, TRAINING, VALIDATION, TRAINING, UNTOUCHED)
+ROLES_OF_LONE_RECORD = (TRAINING, VALIDATION, TRAINING, HELD_OUT, TRAINING, VALIDATION, TRAINING, HELD_OUT)
 """Segments of a record that is alone in its condition and does not repeat."""
-WITH_UNTOUCHED = (TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION)
+ROLES_BESIDE_HELD_OUT = (TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION, TRAINING, TRAINING, VALIDATION)
 """Segments of such a record when another of its condition is untouched."""
-MANY = 4
+MOVING_RECORDS_IN_GROUP = 4
 """Fewer records with a moving voltage are each parted: a step and a ramp do not stand for one another."""
 SAME_EXTREME = 0.05
 """Records within this share of the rig's largest force, speed or displacement show the same as the one with it."""
-FEWEST = 50
+SHORTEST_STRETCH = 50
 """A stretch of fewer samples is not fitted."""
 
 
@@ -358,7 +358,7 @@ class Split:
     """What was held out."""
 
 
-def split(prepared: Sequence[Prepared], voltage_within: float | None, temperature_within: float) -> Split:
+def split(prepared: Sequence[PreparedRecord], voltage_within: float | None, temperature_within: float) -> Split:
     """The split of the records of one setting.
 
     Parameters
@@ -370,7 +370,7 @@ def split(prepared: Sequence[Prepared], voltage_within: float | None, temperatur
     place = {id(p.record): i for i, p in enumerate(prepared)}
     found, moving = conditions([p.record for p in prepared], voltage_within, temperature_within)
     groups = [condition.records for condition in found] + (
-        [moving] if len(moving) >= MANY else [(record,) for record in moving]
+        [moving] if len(moving) >= MOVING_RECORDS_IN_GROUP else [(record,) for record in moving]
     )
     extreme = {int(np.argmax(peaks)) for peaks in _peaks(prepared)}
     roles: dict[int, Roles] = {}
@@ -378,14 +378,14 @@ def split(prepared: Sequence[Prepared], voltage_within: float | None, temperatur
     for turn, group in enumerate(groups):
         members = sorted((place[id(record)] for record in group), key=lambda i: _order(prepared[i]))
         members = _rotated(members, turn, extreme)
-        shared, kind = _group(members, prepared)
+        shared, kind = _roles_in_condition(members, prepared)
         roles |= shared
         kinds.add(kind)
-    for i in _unfitted(prepared, roles):
-        roles[i] = _parted(prepared[i], alone=True)
-        kinds.add(_parts(prepared[i]))
+    for i in _extremes_not_fitted(prepared, roles):
+        roles[i] = _divided_record(prepared[i], alone=True)
+        kinds.add(_hold_out_kind(prepared[i]))
     ordered = tuple(roles[i] for i in range(len(prepared)))
-    names = (p.record.name for p, role in zip(prepared, ordered, strict=True) if np.any(role == UNTOUCHED))
+    names = (p.record.name for p, role in zip(prepared, ordered, strict=True) if np.any(role == HELD_OUT))
     return Split(ordered, tuple(dict.fromkeys(names)), kinds.pop() if len(kinds) == 1 else "mixed")
 
 
@@ -394,25 +394,25 @@ def stretches(record: Record, wanted: NDArray[np.bool_]) -> list[Record]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]]).astype(np.int8)))
     found = []
     for start, end in zip(edges[::2], edges[1::2], strict=True):
-        if end - start >= FEWEST:
+        if end - start >= SHORTEST_STRETCH:
             mask = np.zeros(wanted.size, dtype=np.bool_)
             mask[start:end] = True
             found.append(sliced(record, mask))
     return found
 
 
-def _order(prepared: Prepared) -> tuple[float, float, str]:
+def _order(prepared: PreparedRecord) -> tuple[float, float, str]:
     frequency = np.inf if prepared.cycles is None else round(prepared.cycles.frequency, 3)
     return frequency, float(np.max(np.abs(prepared.record.velocity))), prepared.record.name
 
 
-def _peaks(prepared: Sequence[Prepared]) -> list[Array]:
+def _peaks(prepared: Sequence[PreparedRecord]) -> list[Array]:
     """(r,) largest force, speed and displacement of every record: some effects show at the rig's largest alone."""
     channels = ("force", "velocity", "displacement")
     return [np.array([np.max(np.abs(getattr(p.record, channel))) for p in prepared]) for channel in channels]
 
 
-def _unfitted(prepared: Sequence[Prepared], roles: Mapping[int, Roles]) -> set[int]:
+def _extremes_not_fitted(prepared: Sequence[PreparedRecord], roles: Mapping[int, Roles]) -> set[int]:
     """Places of the records with the rig's largest force, speed or displacement, where nothing near it is fitted."""
     found = set()
     for peaks in _peaks(prepared):
@@ -422,7 +422,7 @@ def _unfitted(prepared: Sequence[Prepared], roles: Mapping[int, Roles]) -> set[i
     return found
 
 
-def _parts(prepared: Prepared) -> HoldOut:
+def _hold_out_kind(prepared: PreparedRecord) -> HoldOut:
     return "segments" if prepared.cycles is None else "cycles"
 
 
@@ -440,40 +440,43 @@ def _rotated(members: list[int], turn: int, extreme: set[int]) -> list[int]:
 def _roles(count: int) -> list[int]:
     """Roles of so many records of one condition, in their order."""
     role = [TRAINING] * count
-    role[1::4] = [UNTOUCHED] * len(role[1::4])
+    role[1::4] = [HELD_OUT] * len(role[1::4])
     chooses = slice(3, None, 4) if count > 3 else slice(2, 3)
     role[chooses] = [VALIDATION] * len(role[chooses])
     return role
 
 
-def _group(rotated: list[int], prepared: Sequence[Prepared]) -> tuple[dict[int, Roles], HoldOut]:
+def _roles_in_condition(rotated: list[int], prepared: Sequence[PreparedRecord]) -> tuple[dict[int, Roles], HoldOut]:
     """Roles in one condition, by the order of its members."""
     if len(rotated) == 1:
         only = prepared[rotated[0]]
-        return {rotated[0]: _parted(only, alone=True)}, _parts(only)
+        return {rotated[0]: _divided_record(only, alone=True)}, _hold_out_kind(only)
     if len(rotated) == 2:
         first, second = rotated
-        return {first: _parted(prepared[first], alone=False), second: _whole(prepared[second], UNTOUCHED)}, "records"
-    return {i: _whole(prepared[i], r) for i, r in zip(rotated, _roles(len(rotated)), strict=True)}, "records"
+        return {
+            first: _divided_record(prepared[first], alone=False),
+            second: _whole_record(prepared[second], HELD_OUT),
+        }, "records"
+    return {i: _whole_record(prepared[i], r) for i, r in zip(rotated, _roles(len(rotated)), strict=True)}, "records"
 
 
-def _whole(prepared: Prepared, role: int) -> Roles:
+def _whole_record(prepared: PreparedRecord, role: int) -> Roles:
     return np.full(prepared.record.time.size, role, dtype=np.int64)
 
 
-def _parted(prepared: Prepared, *, alone: bool) -> Roles:
+def _divided_record(prepared: PreparedRecord, *, alone: bool) -> Roles:
     time = prepared.record.time
     if prepared.cycles is None:
-        pattern = np.array(ALONE if alone else WITH_UNTOUCHED)
+        pattern = np.array(ROLES_OF_LONE_RECORD if alone else ROLES_BESIDE_HELD_OUT)
         return pattern[np.arange(time.size) * pattern.size // time.size]
-    return _by_cycle(prepared.cycles.count, alone=alone)[np.clip(prepared.cycles.number(time), 0, None)]
+    return _roles_of_cycles(prepared.cycles.count, alone=alone)[np.clip(prepared.cycles.number(time), 0, None)]
 
 
-def _by_cycle(count: int, *, alone: bool) -> Roles:
+def _roles_of_cycles(count: int, *, alone: bool) -> Roles:
     """Roles of `count` cycles: the last quarter is untouched, the one before chooses, the rest is fitted."""
     roles = np.full(count, TRAINING, dtype=np.int64)
     untouched = max(1, count // 4) if alone else 0
     chooses = max(1, count // 4) if count - untouched >= 2 else 0
-    roles[count - untouched :] = UNTOUCHED
+    roles[count - untouched :] = HELD_OUT
     roles[count - untouched - chooses : count - untouched] = VALIDATION
     return roles

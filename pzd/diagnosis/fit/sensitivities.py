@@ -23,99 +23,109 @@ from pzd.damper.compose import (
 )
 from pzd.damper.confounders import known
 from pzd.damper.material import material_factors
-from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, RecordLikelihood
-from pzd.diagnosis.fit.parameters import Point, Problem, Unknown, Work
+from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, WeightedRecord
+from pzd.diagnosis.fit.problem import Budget, Point, Problem, Unknown
 from pzd.record import Array
 
 # ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
-class LaidOut:
+class KernelInputs:
     """The numbers of a damper as the kernels take them, along the motion of one observation."""
 
     at_nodes: Array
     """(k, r) parameter rows of the element at the nodes; without nodes (1, r), or (m, r) along the motion."""
-    beside: Array | None
+    parallel: Array | None
     """(1, b) or (m, b) rows of the forces beside it; None without any."""
     sensors: Mapping[str, Mapping[str, float]]
     """Parameters of the effects of the sensor, by effect and name."""
-    zero: float
+    displacement_zero: float
     """Of the displacement [m]."""
     nodes: Array | None = None
     """(k,) voltages [V]; None without nodes."""
-    effective: Array | None = None
+    effective_voltage: Array | None = None
     """(m,) effective voltage [V], with which the rows go between the nodes."""
 
     @cached_property
     def rows(self) -> Array:
         """(1, r) or (m, r) parameter rows of the element."""
-        return self._in_time(self.at_nodes)
+        return self._interpolated(self.at_nodes)
 
-    def _in_time(self, at_nodes: Array) -> Array:
-        if self.nodes is None or self.effective is None:
+    def _interpolated(self, at_nodes: Array) -> Array:
+        if self.nodes is None or self.effective_voltage is None:
             return at_nodes
-        return rows_along(self.nodes, at_nodes, self.effective)
+        return rows_along(self.nodes, at_nodes, self.effective_voltage)
 
-    def change_to(self, other: LaidOut) -> Array:
+    def difference_to(self, other: KernelInputs) -> Array:
         """(1, r), (k, r) or (m, r) by how much the rows of another one are more, 0 where both are without limit."""
-        mine, others = (self.at_nodes, other.at_nodes) if self.effective is other.effective else (self.rows, other.rows)
+        mine, others = (
+            (self.at_nodes, other.at_nodes)
+            if self.effective_voltage is other.effective_voltage
+            else (self.rows, other.rows)
+        )
         shape = np.broadcast_shapes(mine.shape, others.shape)
         return np.subtract(others, mine, out=np.zeros(shape), where=others != mine)
 
-    def in_time(self, change: Array) -> Array:
+    def along_motion(self, change: Array) -> Array:
         """(1, c) or (m, c) of what is given at the nodes, or as it stands, along the motion."""
-        return self._in_time(change) if self.nodes is not None and len(change) == self.nodes.size else change
+        return self._interpolated(change) if self.nodes is not None and len(change) == self.nodes.size else change
 
-    def force_beside(self, o: RecordLikelihood) -> Array:
+    def parallel_force(self, o: WeightedRecord) -> Array:
         """(m,) force of what stands beside the element [N]; (1,) a zero without any."""
-        return np.zeros(1) if self.beside is None else forces_beside(o.motion.about(self.zero), self.beside)
+        return (
+            np.zeros(1)
+            if self.parallel is None
+            else forces_beside(o.motion.about(self.displacement_zero), self.parallel)
+        )
 
 
-def laid_out(point: Point, o: RecordLikelihood) -> LaidOut:
+def kernel_inputs(point: Point, o: WeightedRecord) -> KernelInputs:
     """The numbers of a point along the motion of an observation."""
-    return _at_constant_voltage(point, o) if o.place >= 0 else _at_moving_voltage(point, o)
+    return _at_constant_voltage(point, o) if o.base_row >= 0 else _at_moving_voltage(point, o)
 
 
-def _at_constant_voltage(point: Point, o: RecordLikelihood) -> LaidOut:
-    friction, damping, stiffness = point.base[o.place]
-    effects = point.at(o.place)
+def _at_constant_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
+    friction, damping, stiffness = point.base[o.base_row]
+    effects = point.effects_at(o.base_row)
     rows, beside = constant_rows(friction, damping, stiffness, effects)
     places = {name: known()[name].place for name in effects}
     acting = {name: values for name, values in effects.items() if places[name] == "material"}
     if acting:
         given = {name: {key: np.array([value]) for key, value in values.items()} for name, values in acting.items()}
-        factors = material_factors(given, constant_value(o.motion.temperature), point.problem.reference)
+        factors = material_factors(given, constant_value(o.motion.temperature), point.problem.reference_temperature)
         rows = np.repeat(rows, len(factors), axis=0)
         rows[:, : len(ELEMENT)] *= factors
     sensors = {name: values for name, values in effects.items() if places[name] == "sensor"}
-    return LaidOut(rows, beside, sensors, point.zero)
+    return KernelInputs(rows, beside, sensors, point.displacement_zero)
 
 
-def _at_moving_voltage(point: Point, o: RecordLikelihood) -> LaidOut:
+def _at_moving_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
     damper, temperature = point.damper, constant_value(o.motion.temperature)
     effective = o.effective_voltage(drive_row_of(damper).tobytes())
     beside, sensors = parallel_rows(damper, effective), sensors_of(damper)
     if temperature is not None and temperature.size > 1:
-        return LaidOut(element_rows(damper, effective, temperature), beside, sensors, point.zero)
+        return KernelInputs(element_rows(damper, effective, temperature), beside, sensors, point.displacement_zero)
     nodes = point.nodes(None if temperature is None else float(temperature[0]))
-    return LaidOut(nodes.rows, beside, sensors, point.zero, nodes.voltages, effective)
+    return KernelInputs(nodes.rows, beside, sensors, point.displacement_zero, nodes.voltages, effective)
 
 
 @dataclass(frozen=True, eq=False)
-class Directions:
+class SearchDirections:
     """Directions of the search from a point, as the kernels take them along the motion of one observation."""
 
-    here: LaidOut
-    pairs: Sequence[tuple[LaidOut, LaidOut, float]]
+    centre: KernelInputs
+    pairs: Sequence[tuple[KernelInputs, KernelInputs, float]]
     """On each direction a point before and one behind, and how far apart they are."""
-    moved: NDArray[np.int64]
+    changed: NDArray[np.int64]
     """(c,) columns of the rows that a direction changes."""
-    along: Array
+    derivatives: Array
     """(1, d, c) or (m, d, c) derivatives of these columns by each direction."""
 
 
-def directions(point: Point, beside: Sequence[tuple[Point, Point, float]], o: RecordLikelihood) -> Directions:
+def search_directions(
+    point: Point, beside: Sequence[tuple[Point, Point, float]], o: WeightedRecord
+) -> SearchDirections:
     """Some directions of the search along the motion of an observation.
 
     Parameters
@@ -124,19 +134,19 @@ def directions(point: Point, beside: Sequence[tuple[Point, Point, float]], o: Re
     beside : on each direction a point before and one behind it, and how far apart they are
     o : the observation
     """
-    here, pairs = laid_out(point, o), [(laid_out(a, o), laid_out(b, o), width) for a, b, width in beside]
-    changes = [before.change_to(after) / width for before, after, width in pairs]
+    here, pairs = kernel_inputs(point, o), [(kernel_inputs(a, o), kernel_inputs(b, o), width) for a, b, width in beside]
+    changes = [before.difference_to(after) / width for before, after, width in pairs]
     moved = np.flatnonzero(np.any([np.any(change != 0.0, axis=0) for change in changes], axis=0))
-    along = [here.in_time(change[:, moved]) for change in changes]
-    return Directions(here, pairs, moved, np.stack(np.broadcast_arrays(*along), axis=1))
+    along = [here.along_motion(change[:, moved]) for change in changes]
+    return SearchDirections(here, pairs, moved, np.stack(np.broadcast_arrays(*along), axis=1))
 
 
-def alike_at_one_voltage(point: Point) -> bool:
+def independent_of_temperature(point: Point) -> bool:
     """Whether a point is laid out alike in all observations of one base row: nothing goes by their temperature."""
     return all(known()[name].place != "material" for name in point.effects)
 
 
-def sensitivities(given: Directions, o: RecordLikelihood, work: Work) -> tuple[Array, Array]:
+def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) -> tuple[Array, Array]:
     """The force at the compared samples of an observation, and its slopes along some directions of the search.
 
     What the parameters make of the rows was differenced; from there on the path carries the derivatives along.
@@ -151,39 +161,41 @@ def sensitivities(given: Directions, o: RecordLikelihood, work: Work) -> tuple[A
     -------
     (n,) force [N], (n, d) slopes [N]
     """
-    work.add(o.motion.time.size * (1 + len(given.pairs)))
-    beside = given.here.force_beside(o)
-    changes = [_change_beside(pair, o) for pair in given.pairs]
+    budget.add(o.motion.time.size * (1 + len(given.pairs)))
+    beside = given.centre.parallel_force(o)
+    changes = [_parallel_force_derivative(pair, o) for pair in given.pairs]
     initial_slopes = np.array([-change[0] for change in changes])
     force, slopes = integrated_sensitivities(
-        given.here.rows,
-        given.moved,
-        given.along,
+        given.centre.rows,
+        given.changed,
+        given.derivatives,
         o.motion,
         o.steps,
-        o.begins_with - float(beside[0]),
+        o.initial_force - float(beside[0]),
         initial_slopes,
         SIMULATION_TOLERANCE,
     )
     force = force + beside
     for j, change in enumerate(changes):
         slopes[:, j] += change
-    if not given.here.sensors:
+    if not given.centre.sensors:
         return o.at_compared(force), o.at_compared(slopes)
-    shown = o.shown(np.column_stack([force, slopes]), given.here.sensors)
+    shown = o.through_sensors(np.column_stack([force, slopes]), given.centre.sensors)
     for j, (before, after, width) in enumerate(given.pairs):
         if before.sensors != after.sensors:
-            shown[:, 1 + j] += (o.shown(force, after.sensors) - o.shown(force, before.sensors)) / width
+            shown[:, 1 + j] += (
+                o.through_sensors(force, after.sensors) - o.through_sensors(force, before.sensors)
+            ) / width
     compared = o.at_compared(shown)
     return compared[:, 0], compared[:, 1:]
 
 
-def _change_beside(pair: tuple[LaidOut, LaidOut, float], o: RecordLikelihood) -> Array:
+def _parallel_force_derivative(pair: tuple[KernelInputs, KernelInputs, float], o: WeightedRecord) -> Array:
     """(m,) or (1,) derivative of the force of what stands beside the element along a direction [N]."""
     before, after, width = pair
-    if before.zero == after.zero and _same(before.beside, after.beside):
+    if before.displacement_zero == after.displacement_zero and _same(before.parallel, after.parallel):
         return np.zeros(1)
-    return (after.force_beside(o) - before.force_beside(o)) / width
+    return (after.parallel_force(o) - before.parallel_force(o)) / width
 
 
 def _same(one: Array | None, other: Array | None) -> bool:
@@ -203,7 +215,7 @@ oil, whose own errors a longer step would have to drown, is not differenced."""
 
 
 @dataclass(frozen=True, eq=False)
-class BlockSlopes:
+class BlockJacobian:
     """Slopes of the residuals of observations, each by the variables that move it: a test has one voltage of many."""
 
     free: int
@@ -225,29 +237,29 @@ class BlockSlopes:
 
 
 @dataclass(frozen=True, eq=False)
-class Left:
+class Linearisation:
     """What a point of the search leaves, and how that goes with the searched variables."""
 
     residuals: tuple[Array, ...]
     """(w_o,) an observation, in units of noise."""
     simulated: tuple[Array, ...]
     """(n,) an observation, force at the compared samples [N]."""
-    slopes: BlockSlopes
+    jacobian: BlockJacobian
     """Of all residuals by the searched variables."""
 
     @property
-    def whole(self) -> Array:
+    def stacked(self) -> Array:
         """(w,) all residuals."""
         return np.concatenate(self.residuals)
 
 
-def left_at(
+def linearise(
     problem: Problem,
     unknowns: Sequence[Unknown],
     x: Array,
     limits: tuple[Array, Array],
     wanted: Sequence[int] | None = None,
-) -> Left:
+) -> Linearisation:
     """Residuals and slopes at a point: together they cost little more than the residuals alone.
 
     Parameters
@@ -260,23 +272,23 @@ def left_at(
     """
     residuals, forces, blocks = [], [], []
     for o, columns, force, slopes in _sensitivities_at(problem, unknowns, x, limits, wanted):
-        counted = o.in_noise(np.column_stack([o.measured - force, -slopes]))
+        counted = o.standardised(np.column_stack([o.measured - force, -slopes]))
         residuals.append(counted[:, 0].copy())
         forces.append(force)
         blocks.append((columns, counted[:, 1:].copy()))
-    return Left(tuple(residuals), tuple(forces), BlockSlopes(limits[0].size, tuple(blocks)))
+    return Linearisation(tuple(residuals), tuple(forces), BlockJacobian(limits[0].size, tuple(blocks)))
 
 
-def force_slopes(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> BlockSlopes:
+def force_jacobian(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> BlockJacobian:
     """Slopes of the force at the compared samples [N] by all searched variables; parameters as in `left_at`."""
     limits = np.full(x.size, -np.inf), np.full(x.size, np.inf)
     found = _sensitivities_at(problem, unknowns, x, limits, None)
-    return BlockSlopes(x.size, tuple((columns, slopes) for _, columns, _, slopes in found))
+    return BlockJacobian(x.size, tuple((columns, slopes) for _, columns, _, slopes in found))
 
 
 def _sensitivities_at(
     problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array], wanted: Sequence[int] | None
-) -> Iterator[tuple[RecordLikelihood, tuple[int, ...], Array, Array]]:
+) -> Iterator[tuple[WeightedRecord, tuple[int, ...], Array, Array]]:
     """Each observation with the variables that move it, the force (n,) and its slopes (n, columns); see `left_at`."""
     low, high = limits
     free = low.size
@@ -288,21 +300,21 @@ def _sensitivities_at(
     asked = range(free) if wanted is None else wanted
     beside = {
         j: (
-            problem.point(_with(x, j, below[j]), unknowns),
-            problem.point(_with(x, j, above[j]), unknowns),
+            problem.point(_with_variable(x, j, below[j]), unknowns),
+            problem.point(_with_variable(x, j, above[j]), unknowns),
             float(above[j] - below[j]),
         )
         for j in asked
     }
-    alike, known = alike_at_one_voltage(point), dict[int, Directions]()
+    alike, known = independent_of_temperature(point), dict[int, SearchDirections]()
     for o in problem.observations:
-        columns = tuple(j for j in moving(problem, unknowns, o, free) if j in beside)
-        if o.place not in known or o.place < 0 or not alike:
-            known[o.place] = directions(point, [beside[j] for j in columns], o)
-        yield o, columns, *sensitivities(known[o.place], o, problem.work)
+        columns = tuple(j for j in active_columns(problem, unknowns, o, free) if j in beside)
+        if o.base_row not in known or o.base_row < 0 or not alike:
+            known[o.base_row] = search_directions(point, [beside[j] for j in columns], o)
+        yield o, columns, *sensitivities(known[o.base_row], o, problem.budget)
 
 
-def moving(problem: Problem, unknowns: Sequence[Unknown], o: RecordLikelihood, free: int) -> list[int]:
+def active_columns(problem: Problem, unknowns: Sequence[Unknown], o: WeightedRecord, free: int) -> list[int]:
     """Which of the first `free` variables move the force of an observation: a test moves with its own voltage alone.
 
     Parameters
@@ -313,12 +325,14 @@ def moving(problem: Problem, unknowns: Sequence[Unknown], o: RecordLikelihood, f
     free : how many variables the search moves
     """
     rows = 3 * len(problem.base)
-    own = range(3 * o.place, 3 * o.place + 3) if o.place >= 0 else range(rows)
-    effects = [j for j, u in enumerate(unknowns) if u.node is None or o.place < 0 or u.node == problem.nodes[o.place]]
+    own = range(3 * o.base_row, 3 * o.base_row + 3) if o.base_row >= 0 else range(rows)
+    effects = [
+        j for j, u in enumerate(unknowns) if u.node is None or o.base_row < 0 or u.node == problem.nodes[o.base_row]
+    ]
     return [*own, *(rows + j for j in effects if rows + j < free)]
 
 
-def _with(x: Array, j: int, value: float) -> Array:
+def _with_variable(x: Array, j: int, value: float) -> Array:
     moved = x.copy()
     moved[j] = value
     return moved
