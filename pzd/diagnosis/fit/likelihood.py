@@ -1,9 +1,8 @@
-"""One record as the evidence weighs it: what is simulated, what it is held against, and in which units of noise.
+"""Weighted records: simulated motion, measured force and the units of noise in which residuals count.
 
-A periodic record under constant conditions is its average cycle, harmonic by harmonic, each in
-units of its own noise; any other is its samples, whitened. What offset, gain and delay of the test
-may explain within their priors is taken out of both sides once and for all, so that a residual
-that is left counts as it should: |r|^2 is minus twice the logarithm of the likelihood.
+A periodic record under constant conditions is its average cycle, harmonic by harmonic, each in units of its own noise;
+any other is its samples, whitened by an autoregression. What offset, gain and delay of the test may explain within
+their priors is integrated out, so that |r|^2 of the residual r is minus twice the logarithm of the likelihood.
 """
 
 from __future__ import annotations
@@ -29,11 +28,7 @@ from pzd.signals.noise import Autoregression, PureError, fit_smooth_residual, pu
 from pzd.signals.nuisance import NuisanceConfig
 from pzd.signals.smoothing import reversals
 
-# ----------------------------------------------------------------------------------------------------
-# What the nuisances of a test may explain within their priors, taken out of residuals once and for all.
-#
-# Equation: r' = (I + V V')^(-1/2) r = r - V M V' r,  M = R diag((1 - 1/sqrt(1 + s^2))/s^2) R',  V' V = R diag(s^2) R'
-# Source: Gaussian prior, marginal likelihood
+# --- Nuisances
 
 
 if TYPE_CHECKING:
@@ -44,25 +39,29 @@ NEGLIGIBLE_NUISANCE = 1e-3
 
 Reason: it would change the misfit by a millionth."""
 SPARSE = 0.2
-"""Share of numbers other than zero up to which the columns are kept as these alone.
+"""Share of nonzero numbers up to which the columns are stored sparse.
 
 Reason: a column for a sample beside a jump has as many as the noise remembers; not tuned."""
 
 
 @dataclass(frozen=True, eq=False)
 class MarginalisedNuisances:
-    """Nuisances of a test, and how much of what they could explain is taken out."""
+    """Nuisances of a test with Gaussian priors, integrated out of the residuals.
+
+    Equation: r' = (I + V V')^(-1/2) r = r - V M V' r,  M = R diag((1 - 1/sqrt(1 + s^2))/s^2) R',  V' V = R diag(s^2) R'
+                                                                            Source: Gaussian prior, marginal likelihood
+    """
 
     columns: Array | csr_array
-    """(w, p) what each does to the residuals at one standard deviation, in units of noise."""
+    """(w, p) change V of the residuals by one standard deviation of each nuisance, in units of noise."""
     inner: Array
     """(p, p) M."""
     covariance: Array
-    """(p, p) of the nuisances once the residuals are known: R diag(1/(1 + s^2)) R'."""
+    """(p, p) posterior covariance of the nuisances: R diag(1/(1 + s^2)) R'."""
 
     @classmethod
     def from_columns(cls, columns: Array) -> MarginalisedNuisances:
-        """Of some nuisances (w, p); what lies below `HIDDEN` is left in.
+        """Prepare some nuisances (w, p), without those below `NEGLIGIBLE_NUISANCE`.
 
         By the eigenvalues of the (p, p) products, which lose nothing of what shows.
         """
@@ -77,17 +76,17 @@ class MarginalisedNuisances:
 
     @classmethod
     def none(cls, residuals: int) -> MarginalisedNuisances:
-        """No nuisances of so many residuals."""
+        """Prepare no nuisances for so many residuals."""
         return cls(np.zeros((residuals, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
 
     def marginalised(self, values: Array) -> Array:
-        """(w,) or (w, k) values in units of noise, without what the nuisances may explain of them."""
+        """Return values (w,) or (w, k) in units of noise with the nuisances integrated out."""
         if not self.inner.size:
             return values
         return np.asarray(values - self.columns @ (self.inner @ (self.columns.T @ values)))
 
     def most_likely(self, values: Array) -> Array:
-        """(p,) the likeliest nuisances [standard deviations], given residuals (w,) that they are not taken out of."""
+        """Return the (p,) most likely nuisances [standard deviations], given residuals (w,) before marginalisation."""
         return np.asarray(self.covariance @ (self.columns.T @ values))
 
 
@@ -99,31 +98,31 @@ def _packed(columns: Array) -> Array | csr_array:
     return csr_array(columns)
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Weighted records
 
 
 SIMULATION_TOLERANCE = 1e-7
-"""Of the damper's path, as a share of the force, in every step by itself.
+"""Tolerance of the path of the element, as a share of the force, in every step by itself.
 
-Reason: over a record the errors add up, and jump as the parameters move; a search must not take that for a way down.
+Reason: over a record the errors add up, and jump as the parameters move; a search must not take that for a descent.
 Looser, it would hardly be faster: most steps of a record lie in one piece."""
 CACHED_VOLTAGES = 4
-"""Effective voltages kept: slopes by a parameter of the drive need three."""
+"""Effective voltages kept in the cache: derivatives by a parameter of the drive need three."""
 
 
 @dataclass(frozen=True, eq=False)
 class WeightedRecord:
-    """What one record, or a part of it, says."""
+    """One record, or part of one, with its weights: an observation of the least-squares problem."""
 
     name: str
     base_row: int
-    """Which base row it belongs to; -1 where the voltage moves."""
+    """Index of its base row; -1 where the voltage moves."""
     motion: Motion
-    """(m,) what is simulated."""
+    """(m,) simulated motion."""
     initial_force: float
     """Recorded force at the first sample of the motion [N]: that of the same phase where the motion repeats."""
     sample_indices: Rows
-    """(s,) samples of the motion at which it was recorded, from the first one compared to the last."""
+    """(s,) recorded samples among those of the motion, from the first one compared to the last."""
     compared: NDArray[np.bool_]
     """(s,) which of them are compared: n of them, in one stretch or several."""
     measured: Array
@@ -143,7 +142,7 @@ class WeightedRecord:
 
     @cached_property
     def effective_voltage(self) -> Callable[[bytes], Array]:
-        """(m,) effective voltage [V] by the row of the drive, (d,) as bytes; the same array for the same row."""
+        """Function from the row of the drive, (d,) as bytes, to the (m,) effective voltage [V]; cached."""
         return lru_cache(CACHED_VOLTAGES)(self._followed)
 
     def _followed(self, row: bytes) -> Array:
@@ -153,7 +152,7 @@ class WeightedRecord:
         return effective_voltage(voltage, self.steps, np.frombuffer(row).copy())
 
     def at_compared(self, simulated: Array) -> Array:
-        """(n,) or (n, p) of what was simulated at the samples that are compared."""
+        """Select the (n,) or (n, p) simulated values at the compared samples."""
         return simulated[self._compared_indices]
 
     @cached_property
@@ -163,13 +162,14 @@ class WeightedRecord:
     def through_sensors(
         self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], delay: float = 0.0
     ) -> Array:
-        """(m,) or (m, p) what was simulated as a channel shows it, between the samples by a cubic.
+        """Return simulated values, (m,) or (m, p), as a channel shows them, interpolated between the samples by a cubic
+        spline.
 
         Parameters
         ----------
         simulated : (m,) force [N], or (m, p) of them
         sensors : effects of the sensor, see `pzd.damper.compose.sensors_of`
-        delay : how much later yet the channel shows it [s]
+        delay : further delay of the channel [s]
         """
         from scipy.interpolate import CubicSpline
 
@@ -188,7 +188,7 @@ class WeightedRecord:
         return np.concatenate([simulated[:begin], cycle(shown)])
 
     def standardised(self, values: Array) -> Array:
-        """(w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
+        """Return (w,) or (w, p) of a force or its derivatives at the compared samples, in units of noise."""
         return self.nuisances.marginalised(self._scaled(values))
 
     @cached_property
@@ -205,59 +205,60 @@ class WeightedRecord:
 
 
 def simulated_force(observation: WeightedRecord, damper: Damper) -> Array:
-    """(n,) force that a damper gives at the compared samples [N]."""
+    """Simulate the (n,) force of a damper at the compared samples [N]."""
     return delayed_forces(observation, damper)(0.0)
 
 
 def delayed_forces(observation: WeightedRecord, damper: Damper) -> Callable[[float], Array]:
-    """(n,) force that a damper gives at the compared samples [N], by how much later yet a channel shows it [s]."""
+    """Simulate the (n,) force of a damper at the compared samples [N], as a function of a further delay [s]."""
     o, sensors = observation, sensors_of(damper)
     prompt = damper.without_effects(*sensors)
     force = respond(prompt, o.motion, o.initial_force, SIMULATION_TOLERANCE)
     return lambda late: o.at_compared(o.through_sensors(force, sensors, late))
 
 
-# ----------------------------------------------------------------------------------------------------
-# How the evidence weighs every record: average cycles or samples, the noise in each, and what is no evidence.
+# --- Weights of a record
 
 
 RESOLUTION = 3e-4
-"""No force is believed to be known better than this share of the record's peak (r.m.s.).
+"""Resolution of the force as a share of the record's peak (r.m.s.): a floor of the noise.
 
-Reason: a good load cell is right to 0.03 % of its range; without a floor a quiet record would decide
-alone. Not tuned."""
+Reason: a good load cell is right to 0.03 % of its range; without a floor a quiet record would decide alone. Not tuned.
+"""
 DELAY_STEP = 1e-6
-"""Delay by which the slope of a force over time is taken [s].
+"""Delay by which the slope of a force over time is differenced [s].
 
 Reason: far below a sample, far above the rounding of a time stamp."""
 LARGEST_DELAY = 3.0
-"""At most so many standard deviations of a test's delay are believed, in what its shift is more than the slope.
+"""Standard deviations of a test's delay to which the part of the shift beyond its slope is limited.
 
 Reason: the customary bound for what a normal prior still allows."""
 DISCREPANCY = 0.3
-"""Of what a model leaves (r.m.s.), this share counts as noise of every harmonic alike while the model is being
-fitted: a model that still lacks something must not be bent to where the noise happens to be smallest.
+"""Share of what a model leaves (r.m.s.) that counts as noise of every harmonic alike while the model is being fitted: a
+model that still lacks something must not be bent to where the noise happens to be smallest.
 
 Reason: 0 believes the quietest harmonics whatever the model lacks, 1 leaves no evidence; about a tenth of the squares.
 Not tuned."""
 MOST_HARMONICS = 80
-"""Beyond this harmonic of the cycle nothing of a damper's force is left to tell effects apart.
+"""Highest harmonic of the cycle that is compared.
 
-Reason: harmonics of a force whose slope jumps, as at yield, fall with their square: those beyond are below 2e-4 of
-the first, and `RESOLUTION` is no finer."""
+Reason: harmonics of a force whose slope jumps, as at yield, fall with their square: those beyond are below 2e-4 of the
+first, and `RESOLUTION` is no finer."""
 EQUAL_WEIGHT_DEVIATION = 0.05
-"""What a plain element leaves [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k.
+"""Residual of a plain element [share of the peak, r.m.s.], to set criterion (4) against the wide priors of C and k.
 
-Reason: what identify leaves of a damper that lacks a law is of this size; the priors hold only what no test
-shows. Not tuned."""
+Reason: what identify leaves of a damper that lacks a law is of this size; the priors hold only what no test shows. Not
+tuned."""
 CYCLE_POINTS = 256
-"""A cycle is simulated on at least this many points.
+"""Least number of points on which a cycle is simulated.
 
 Reason: three points for each of the harmonics that are compared."""
 FEWEST_SAMPLES = 2 * CYCLE_POINTS
-"""Fewer samples of a motion that does not repeat do not show what colour their noise has."""
+"""Fewest samples of a motion that does not repeat.
+
+Reason: fewer do not show the spectrum of their noise."""
 MOST_POINTS = 2048
-"""And on no more: the harmonics that are compared need no finer grid, however slow the test.
+"""Largest number of points of a cycle: the compared harmonics need no finer grid, however slow the test.
 
 Reason: 25 points for each of the harmonics that are compared."""
 
@@ -265,14 +266,14 @@ Reason: 25 points for each of the harmonics that are compared."""
 def weighted_record(
     p: PreparedRecord, mask: NDArray[np.bool_], base_row: int, given: PredictedForce, nuisance: NuisanceConfig
 ) -> WeightedRecord | None:
-    """The observation of some samples of a record; None where they are too few.
+    """Weigh some samples of a record; None where they are too few.
 
     Parameters
     ----------
     p : the record
-    mask : (n,) which of its samples count
+    mask : (n,) samples to be compared
     base_row : its base row; -1 where the voltage moves
-    given : what the damper makes of it, along which gain and delay act
+    given : predicted force, along which gain and delay act
     nuisance : priors of the test's own offset, gain and delay
     """
     if not enough_samples(p, mask):
@@ -286,7 +287,7 @@ def enough_samples(p: PreparedRecord, mask: NDArray[np.bool_]) -> bool:
     Parameters
     ----------
     p : the record
-    mask : (n,) which of its samples count
+    mask : (n,) samples to be compared
     """
     if p.cycles is not None and _is_averaged(p):
         return bool(p.cycles.whole(p.record.time, mask))
@@ -334,7 +335,7 @@ def _from_cycles(
 
 
 def _model_discrepancy(measured: Array, force: Array, slope: Array, variance: float) -> float:
-    """R.m.s. of what a model leaves above the noise [N], offset, gain and delay of the test taken off."""
+    """Compute the r.m.s. residual of a model above the noise [N], offset, gain and delay of the test fitted."""
     columns = np.column_stack([np.ones(force.size), force, slope])
     residual = measured - force
     residual = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
@@ -342,7 +343,7 @@ def _model_discrepancy(measured: Array, force: Array, slope: Array, variance: fl
 
 
 def _cycle_motion(record: Record, period: float, channels: Sequence[Array]) -> tuple[Motion, int, int]:
-    """A cycle of the mean motion, half a cycle before it to settle in, on a grid fine enough to simulate."""
+    """Return a cycle of the mean motion, with half a cycle in front to settle, on a grid fine enough to simulate."""
     points = channels[0].size
     factor = int(np.ceil(CYCLE_POINTS / points))
     fine: Array = np.stack([_resampled(channel, points * factor) for channel in channels])
@@ -364,7 +365,7 @@ def _cycle_motion(record: Record, period: float, channels: Sequence[Array]) -> t
 
 
 def _resampled(cycle: Array, points: int) -> Array:
-    """A periodic channel on more points or fewer, by its own harmonics."""
+    """Resample a periodic channel to another number of points by its harmonics."""
     if points == cycle.size:
         return cycle
     return np.asarray(np.fft.irfft(np.fft.rfft(cycle), points) * (points / cycle.size), dtype=np.float64)
@@ -409,7 +410,7 @@ def _from_samples(
 
 
 def _samples_per_harmonic(record: Record) -> float:
-    """Samples that say the same of what a model leaves: it fills as many harmonics of the motion as a cycle shows.
+    """Compute how many samples carry the same model error: it fills as many harmonics of the motion as a cycle shows.
 
     So what counts as noise has the same density at every sampling rate.
     """
@@ -420,7 +421,9 @@ def _samples_per_harmonic(record: Record) -> float:
 def with_nuisances(
     bare: WeightedRecord, damper: Damper, nuisance: NuisanceConfig, timing: Array | None = None
 ) -> WeightedRecord:
-    """The observation with the test's own offset, gain and delay, jumps and instants of the voltage integrated out.
+    """Integrate out the test's own offset, gain and delay, jumps and instants of the voltage.
+
+    Equation: V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `MarginalisedNuisances`
 
     Equation: V = [-s_d dF/dt, s_o peak, s_g F, jumps, s_t dF/dt_U] in units of noise, see `IntegratedOut`
 
@@ -447,7 +450,7 @@ def with_nuisances(
 
 
 def equally_weighted(weighed: WeightedRecord, samples: int, peak: float) -> WeightedRecord:
-    """The observation as criterion (4) takes it: every sample alike, and nothing left to the test's own nuisances.
+    """Weigh an observation as criterion (4) does: every sample alike, and no nuisances.
 
     Equation: |r|^2 = n mean (F - F_sim)^2 / s^2, s alike in all tests of one condition
                                                     Source: Makowski and Knap 2021, eq. (4); Parseval
@@ -468,7 +471,7 @@ def equally_weighted(weighed: WeightedRecord, samples: int, peak: float) -> Weig
 
 
 def _jump_columns(bends: Array) -> Array:
-    """(n, j) one column a sample beside a jump, as large as the force bends there [N]."""
+    """Return (n, j) one column per sample beside a jump, as large as the force bends there [N]."""
     beside = np.flatnonzero(bends)
     columns = np.zeros((bends.size, beside.size))
     columns[beside, np.arange(beside.size)] = bends[beside]

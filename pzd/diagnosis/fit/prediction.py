@@ -1,4 +1,4 @@
-"""What a damper predicts for a record."""
+"""Force that a damper predicts for a record, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -16,53 +16,50 @@ from pzd.record import Array, Record, Rows
 from pzd.signals.noise import harmonics_of
 from pzd.signals.smoothing import reversals
 
-# ----------------------------------------------------------------------------------------------------
-
-
 FEWEST_IN_HALF_CYCLE = 25
-"""Samples of the fastest half cycle from which a parabola between them is exact enough: 1e-4 of the force."""
+"""Fewest samples of the fastest half cycle from which a parabola between them is exact enough: 1e-4 of the force."""
 PREDICTION_TOLERANCE = 1e-7
-"""Of the damper's path, as a share of the force.
+"""Tolerance of the path of the element, as a share of the force.
 
-Reason: far below `weights.RESOLUTION`; see `likelihood.SIMULATION_TOLERANCE`."""
+Reason: far below `likelihood.RESOLUTION`; see `likelihood.SIMULATION_TOLERANCE`."""
 
 MOVING_TEMPERATURE = 0.5
-"""A test over which the temperature moves by less [K] counts as its average cycle, at one temperature.
+"""Change of temperature over a test [K] up to which it counts as its average cycle, at one temperature.
 
 Reason: about the resolution of a thermocouple; not tuned."""
 FIXED_TEMPERATURE = 0.05
-"""A temperature that moves by less [K] over a test stands still there.
+"""Change of temperature over a test [K] up to which it is simulated at its median.
 
 Reason: of 5 % a kelvin, which is much for an oil, the force changes by 0.25 % of itself, which counts as nothing."""
 NEAR_STEP = 0.001
-"""Nothing is judged so shortly before and after a step of the voltage [s].
+"""Time before and after a step of the voltage that is not compared [s].
 
 Reason: two standard deviations of a test's own delay (`NuisanceConfig.delay_s`); a sample at least, over which a filter
 against aliasing spreads the step of the force."""
 END_SHARE = 0.02
-"""Share of a record at either end where its smoothed displacement rests on one side alone: not judged."""
+"""Share of a record at either end that is not compared: the smoothed displacement rests on one side alone there."""
 
 
 def predicted_force(damper: Damper, prepared: PreparedRecord) -> Array:
-    """(n,) force that the damper gives under the record's cleaned motion [N]."""
+    """Predict the (n,) force of a damper under the record's cleaned motion [N]."""
     record = prepared.lead or prepared.record
     return simulated_record(damper, record)[prepared.lead_samples :]
 
 
 def simulated_record(damper: Damper, record: Record) -> Array:
-    """(n,) force that the damper gives in the motion of a record, from the recorded force on [N]."""
+    """Simulate the (n,) force of a damper in the motion of a record, from its first recorded force on [N]."""
     motion, places = simulation_motion(record)
     return respond(damper, motion, float(record.force[0]), PREDICTION_TOLERANCE)[places]
 
 
 def simulation_motion(record: Record) -> tuple[Motion, Rows]:
-    """The record's motion, on a finer grid where its samples are too far apart.
+    """Return the record's motion, on a finer grid where its samples are too far apart.
 
     That is where no parabola goes from one to the next, and where the voltage steps between two.
 
     Parameters
     ----------
-    record : cleaned; a temperature that hardly moves counts as standing still, at its median
+    record : cleaned; a temperature that hardly moves is replaced by its median
 
     Returns
     -------
@@ -79,20 +76,21 @@ def simulation_motion(record: Record) -> tuple[Motion, Rows]:
 
 
 def temperature_moves(temperature: Array | None, by: float = MOVING_TEMPERATURE) -> bool:
-    """Whether a temperature (n,) moves by so much [K] from beginning to end; False where none was recorded."""
+    """Whether a temperature (n,) changes by so much [K] from beginning to end; False where none was recorded."""
     return temperature is not None and float(np.ptp(end_temperatures(temperature))) > by
 
 
 def end_temperatures(temperature: Array) -> tuple[float, float]:
-    """Temperature [degC] at the beginning and at the end of a test, the noise of (n,) samples averaged out."""
+    """Return the temperature [degC] at the beginning and at the end of a test, the noise of (n,) samples averaged out."""
     tenth = max(temperature.size // 10, 1)
     return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
 
 
 def comparable_samples(prepared: PreparedRecord) -> NDArray[np.bool_]:
-    """(n,) whether the prediction depends neither on how the record began nor on when exactly a voltage stepped.
+    """Return (n,) whether a prediction can be compared with a sample.
 
-    And whether something moves, or has just come to rest.
+    It depends neither on how the record began nor on when exactly a voltage stepped; and something moves, or has just
+    come to rest.
     """
     size = prepared.record.time.size
     if prepared.lead is not None:
@@ -104,7 +102,7 @@ def comparable_samples(prepared: PreparedRecord) -> NDArray[np.bool_]:
 
 
 def _stepping(record: Record) -> NDArray[np.bool_]:
-    """(n,) whether the voltage steps shortly before or after a sample."""
+    """Return (n,) whether the voltage steps shortly before or after a sample."""
     size = record.time.size
     steps = np.append(steps_of_voltage(record.voltage, size), False)
     if not steps.any():
@@ -115,13 +113,12 @@ def _stepping(record: Record) -> NDArray[np.bool_]:
     return beside
 
 
-# ----------------------------------------------------------------------------------------------------
-# What a damper makes of a record, and how uncertain that is because the channels are: errors in variables.
+# --- Predicted force with its uncertainty
 #
-# What noise and resolution leave in the cleaned displacement of an average cycle repeats in every
-# cycle of the prediction, and the oil spring makes force of it; the scatter of the force between
-# cycles does not show it. So a few displacements that are as likely are sent through the damper.
-# A voltage that moves is known at its samples alone: a step falls anywhere between two of them.
+# Errors in variables: what noise and resolution leave in the cleaned displacement of an average cycle repeats in every
+# cycle of the prediction, and the oil stiffness turns it into force; the scatter of the force between cycles does not
+# show it. So a few displacements that are as likely are simulated (Monte Carlo). A voltage that moves is known at its
+# samples alone: a step falls anywhere between two of them.
 
 
 BETWEEN_SAMPLES = 0.5
@@ -132,11 +129,11 @@ NEIGHBOURS = 2
 
 @dataclass(frozen=True, eq=False)
 class PredictedForce:
-    """The force that a damper gives in a record, and how uncertain it is."""
+    """Force that a damper predicts for a record, and its uncertainty."""
 
     damper: Damper
     force: Array
-    """(n,) that it gives [N]."""
+    """(n,) [N]."""
     displacement_variance: Array | float
     """(H + 1,) variance |.|^2 of the harmonics of its average cycle by the displacement [N^2]; 0 where none repeats."""
     timing: Array
@@ -144,7 +141,7 @@ class PredictedForce:
 
 
 def predict(damper: Damper, prepared: PreparedRecord, delay: float) -> PredictedForce:
-    """What a damper makes of a record.
+    """Predict the force of a damper in a record, with its uncertainty.
 
     Parameters
     ----------
@@ -168,7 +165,7 @@ def _timing(damper: Damper, prepared: PreparedRecord, force: Array, delay: float
 
 
 def displacement_variance(damper: Damper, prepared: PreparedRecord) -> Array | float:
-    """Variance of the harmonics of a predicted average cycle, because its displacement is not known better.
+    """Compute the variance of the harmonics of a predicted average cycle, by the uncertainty of its displacement.
 
     Equation: s_h^2 = mean_j |c_h(x + e_j) - c_h(x)|^2              Source: Monte Carlo, JCGM 101:2008
 

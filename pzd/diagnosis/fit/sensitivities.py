@@ -1,4 +1,4 @@
-"""The force of a point of the search in one observation, and its slopes by the searched variables."""
+"""Simulated forces, residuals and their Jacobian at a point of the search."""
 
 from __future__ import annotations
 
@@ -27,25 +27,25 @@ from pzd.diagnosis.fit.likelihood import SIMULATION_TOLERANCE, WeightedRecord
 from pzd.diagnosis.fit.problem import Budget, Point, Problem, Unknown
 from pzd.record import Array
 
-# ----------------------------------------------------------------------------------------------------
+# --- Parameters as the kernels take them
 
 
 @dataclass(frozen=True, eq=False)
 class KernelInputs:
-    """The numbers of a damper as the kernels take them, along the motion of one observation."""
+    """Parameters of a damper as the kernels take them, along the motion of one observation."""
 
     at_nodes: Array
     """(k, r) parameter rows of the element at the nodes; without nodes (1, r), or (m, r) along the motion."""
     parallel: Array | None
-    """(1, b) or (m, b) rows of the forces beside it; None without any."""
+    """(1, b) or (m, b) rows of the parallel forces; None without any."""
     sensors: Mapping[str, Mapping[str, float]]
     """Parameters of the effects of the sensor, by effect and name."""
     displacement_zero: float
-    """Of the displacement [m]."""
+    """Zero of the displacement [m]."""
     nodes: Array | None = None
     """(k,) voltages [V]; None without nodes."""
     effective_voltage: Array | None = None
-    """(m,) effective voltage [V], with which the rows go between the nodes."""
+    """(m,) effective voltage [V], at which the rows are interpolated between the nodes."""
 
     @cached_property
     def rows(self) -> Array:
@@ -58,7 +58,7 @@ class KernelInputs:
         return rows_along(self.nodes, at_nodes, self.effective_voltage)
 
     def difference_to(self, other: KernelInputs) -> Array:
-        """(1, r), (k, r) or (m, r) by how much the rows of another one are more, 0 where both are without limit."""
+        """Return (1, r), (k, r) or (m, r) rows of another damper less these, 0 where both are infinite."""
         mine, others = (
             (self.at_nodes, other.at_nodes)
             if self.effective_voltage is other.effective_voltage
@@ -68,11 +68,11 @@ class KernelInputs:
         return np.subtract(others, mine, out=np.zeros(shape), where=others != mine)
 
     def along_motion(self, change: Array) -> Array:
-        """(1, c) or (m, c) of what is given at the nodes, or as it stands, along the motion."""
+        """Interpolate values given at the nodes to (1, c) or (m, c) along the motion."""
         return self._interpolated(change) if self.nodes is not None and len(change) == self.nodes.size else change
 
     def parallel_force(self, o: WeightedRecord) -> Array:
-        """(m,) force of what stands beside the element [N]; (1,) a zero without any."""
+        """Compute the (m,) parallel force [N]; (1,) a zero without any."""
         return (
             np.zeros(1)
             if self.parallel is None
@@ -81,14 +81,14 @@ class KernelInputs:
 
 
 def kernel_inputs(point: Point, o: WeightedRecord) -> KernelInputs:
-    """The numbers of a point along the motion of an observation."""
+    """Evaluate the parameters of a point along the motion of an observation."""
     return _at_constant_voltage(point, o) if o.base_row >= 0 else _at_moving_voltage(point, o)
 
 
 def _at_constant_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
     friction, damping, stiffness = point.base[o.base_row]
     effects = point.effects_at(o.base_row)
-    rows, beside = constant_rows(friction, damping, stiffness, effects)
+    rows, parallel = constant_rows(friction, damping, stiffness, effects)
     places = {name: known()[name].place for name in effects}
     acting = {name: values for name, values in effects.items() if places[name] == "material"}
     if acting:
@@ -97,26 +97,26 @@ def _at_constant_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
         rows = np.repeat(rows, len(factors), axis=0)
         rows[:, : len(ELEMENT)] *= factors
     sensors = {name: values for name, values in effects.items() if places[name] == "sensor"}
-    return KernelInputs(rows, beside, sensors, point.displacement_zero)
+    return KernelInputs(rows, parallel, sensors, point.displacement_zero)
 
 
 def _at_moving_voltage(point: Point, o: WeightedRecord) -> KernelInputs:
     damper, temperature = point.damper, constant_value(o.motion.temperature)
     effective = o.effective_voltage(drive_row_of(damper).tobytes())
-    beside, sensors = parallel_rows(damper, effective), sensors_of(damper)
+    parallel, sensors = parallel_rows(damper, effective), sensors_of(damper)
     if temperature is not None and temperature.size > 1:
-        return KernelInputs(element_rows(damper, effective, temperature), beside, sensors, point.displacement_zero)
+        return KernelInputs(element_rows(damper, effective, temperature), parallel, sensors, point.displacement_zero)
     nodes = point.nodes(None if temperature is None else float(temperature[0]))
-    return KernelInputs(nodes.rows, beside, sensors, point.displacement_zero, nodes.voltages, effective)
+    return KernelInputs(nodes.rows, parallel, sensors, point.displacement_zero, nodes.voltages, effective)
 
 
 @dataclass(frozen=True, eq=False)
 class SearchDirections:
-    """Directions of the search from a point, as the kernels take them along the motion of one observation."""
+    """Derivatives of the kernel inputs along some directions of the search, for one observation."""
 
     centre: KernelInputs
     pairs: Sequence[tuple[KernelInputs, KernelInputs, float]]
-    """On each direction a point before and one behind, and how far apart they are."""
+    """On each direction a point before and one behind, and their distance."""
     changed: NDArray[np.int64]
     """(c,) columns of the rows that a direction changes."""
     derivatives: Array
@@ -124,17 +124,18 @@ class SearchDirections:
 
 
 def search_directions(
-    point: Point, beside: Sequence[tuple[Point, Point, float]], o: WeightedRecord
+    point: Point, neighbours: Sequence[tuple[Point, Point, float]], o: WeightedRecord
 ) -> SearchDirections:
-    """Some directions of the search along the motion of an observation.
+    """Difference the kernel inputs along some directions of the search.
 
     Parameters
     ----------
-    point : from which they lead
-    beside : on each direction a point before and one behind it, and how far apart they are
+    point : at which the derivatives are taken
+    neighbours : on each direction a point before and one behind, and their distance
     o : the observation
     """
-    here, pairs = kernel_inputs(point, o), [(kernel_inputs(a, o), kernel_inputs(b, o), width) for a, b, width in beside]
+    here = kernel_inputs(point, o)
+    pairs = [(kernel_inputs(a, o), kernel_inputs(b, o), width) for a, b, width in neighbours]
     changes = [before.difference_to(after) / width for before, after, width in pairs]
     moved = np.flatnonzero(np.any([np.any(change != 0.0, axis=0) for change in changes], axis=0))
     along = [here.along_motion(change[:, moved]) for change in changes]
@@ -142,27 +143,27 @@ def search_directions(
 
 
 def independent_of_temperature(point: Point) -> bool:
-    """Whether a point is laid out alike in all observations of one base row: nothing goes by their temperature."""
+    """Whether observations of one base row share their kernel inputs: nothing depends on the temperature of each."""
     return all(known()[name].place != "material" for name in point.effects)
 
 
 def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) -> tuple[Array, Array]:
-    """The force at the compared samples of an observation, and its slopes along some directions of the search.
+    """Compute the force at the compared samples of an observation and its derivatives along some directions.
 
-    What the parameters make of the rows was differenced; from there on the path carries the derivatives along.
+    The dependence of the kernel inputs on the parameters is differenced; the path integrates the derivatives exactly.
 
     Parameters
     ----------
-    given : the directions, laid out along the motion of this observation
+    given : directions along the motion of this observation
     o : the observation
-    work : counts what is simulated
+    budget : counts what is simulated
 
     Returns
     -------
     (n,) force [N], (n, d) slopes [N]
     """
     budget.add(o.motion.time.size * (1 + len(given.pairs)))
-    beside = given.centre.parallel_force(o)
+    parallel = given.centre.parallel_force(o)
     changes = [_parallel_force_derivative(pair, o) for pair in given.pairs]
     initial_slopes = np.array([-change[0] for change in changes])
     force, slopes = integrated_sensitivities(
@@ -171,11 +172,11 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
         given.derivatives,
         o.motion,
         o.steps,
-        o.initial_force - float(beside[0]),
+        o.initial_force - float(parallel[0]),
         initial_slopes,
         SIMULATION_TOLERANCE,
     )
-    force = force + beside
+    force = force + parallel
     for j, change in enumerate(changes):
         slopes[:, j] += change
     if not given.centre.sensors:
@@ -191,40 +192,39 @@ def sensitivities(given: SearchDirections, o: WeightedRecord, budget: Budget) ->
 
 
 def _parallel_force_derivative(pair: tuple[KernelInputs, KernelInputs, float], o: WeightedRecord) -> Array:
-    """(m,) or (1,) derivative of the force of what stands beside the element along a direction [N]."""
+    """Compute the (m,) or (1,) derivative of the parallel force along a direction [N]."""
     before, after, width = pair
-    if before.displacement_zero == after.displacement_zero and _same(before.parallel, after.parallel):
+    if before.displacement_zero == after.displacement_zero and _equal_rows(before.parallel, after.parallel):
         return np.zeros(1)
     return (after.parallel_force(o) - before.parallel_force(o)) / width
 
 
-def _same(one: Array | None, other: Array | None) -> bool:
+def _equal_rows(one: Array | None, other: Array | None) -> bool:
     return one is other is None or (one is not None and other is not None and np.array_equal(one, other))
 
 
-# ----------------------------------------------------------------------------------------------------
-# Residuals of observations at a point of the search, and their slopes by the searched variables.
+# --- Residuals and their Jacobian
 
 
 STEP = 1e-4
-"""Step of a searched variable to either side, over which its parameter, the effective voltage and what stands beside
-the element are differenced.
+"""Step of a search variable to either side, over which the kernel inputs and the parallel force are differenced.
 
 Reason: far above rounding, and so short that a branch begins to slip at the same sample on either side; the path of the
-oil, whose own errors a longer step would have to drown, is not differenced."""
+element, whose own errors a longer step would have to exceed, is not differenced."""
 
 
 @dataclass(frozen=True, eq=False)
 class BlockJacobian:
-    """Slopes of the residuals of observations, each by the variables that move it: a test has one voltage of many."""
+    """Jacobian by observations, each with the variables that move it alone: a test has one voltage of many."""
 
     free: int
-    """How many variables the search moves."""
+    """Number of variables that the search moves."""
     blocks: tuple[tuple[tuple[int, ...], Array], ...]
-    """Of every observation the columns of the variables, and (w_o, columns) the slopes."""
+    """Columns of the variables and (w_o, columns) derivatives of each observation."""
 
     def dense(self, columns: Sequence[int] | None = None) -> Array:
-        """(w, columns) slopes by some variables, or by all, zero where an observation does not move with one."""
+        """Return the (w, columns) derivatives by some variables, or by all, zero where an observation does not depend
+        on one."""
         wanted = range(self.free) if columns is None else columns
         place = {j: i for i, j in enumerate(wanted)}
         found = np.zeros((sum(len(block) for _, block in self.blocks), len(place)))
@@ -238,14 +238,14 @@ class BlockJacobian:
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """What a point of the search leaves, and how that goes with the searched variables."""
+    """Residuals at a point of the search, and their Jacobian."""
 
     residuals: tuple[Array, ...]
-    """(w_o,) an observation, in units of noise."""
+    """(w_o,) per observation, in units of noise."""
     simulated: tuple[Array, ...]
-    """(n,) an observation, force at the compared samples [N]."""
+    """(n,) per observation, force at the compared samples [N]."""
     jacobian: BlockJacobian
-    """Of all residuals by the searched variables."""
+    """Of all residuals by the search variables."""
 
     @property
     def stacked(self) -> Array:
@@ -260,27 +260,28 @@ def linearise(
     limits: tuple[Array, Array],
     wanted: Sequence[int] | None = None,
 ) -> Linearisation:
-    """Residuals and slopes at a point: together they cost little more than the residuals alone.
+    """Compute residuals and Jacobian at a point: together they cost little more than the residuals alone.
 
     Parameters
     ----------
-    problem : what is fitted to what
+    problem : observations and starting values
     unknowns : of the effects
-    x : (3 b + e,) where they are taken, in the units of the search
+    x : (3 b + e,) point in the units of the search
     limits : (free,) least and largest values of the variables that the search moves
-    wanted : the columns asked for, the others being zero; all where none are given
+    wanted : columns to compute, the others being zero; all where none are given
     """
     residuals, forces, blocks = [], [], []
     for o, columns, force, slopes in _sensitivities_at(problem, unknowns, x, limits, wanted):
-        counted = o.standardised(np.column_stack([o.measured - force, -slopes]))
-        residuals.append(counted[:, 0].copy())
+        standardised = o.standardised(np.column_stack([o.measured - force, -slopes]))
+        residuals.append(standardised[:, 0].copy())
         forces.append(force)
-        blocks.append((columns, counted[:, 1:].copy()))
+        blocks.append((columns, standardised[:, 1:].copy()))
     return Linearisation(tuple(residuals), tuple(forces), BlockJacobian(limits[0].size, tuple(blocks)))
 
 
 def force_jacobian(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> BlockJacobian:
-    """Slopes of the force at the compared samples [N] by all searched variables; parameters as in `left_at`."""
+    """Compute the Jacobian of the force at the compared samples [N] by all search variables; parameters as in
+    `linearise`."""
     limits = np.full(x.size, -np.inf), np.full(x.size, np.inf)
     found = _sensitivities_at(problem, unknowns, x, limits, None)
     return BlockJacobian(x.size, tuple((columns, slopes) for _, columns, _, slopes in found))
@@ -289,7 +290,7 @@ def force_jacobian(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> B
 def _sensitivities_at(
     problem: Problem, unknowns: Sequence[Unknown], x: Array, limits: tuple[Array, Array], wanted: Sequence[int] | None
 ) -> Iterator[tuple[WeightedRecord, tuple[int, ...], Array, Array]]:
-    """Each observation with the variables that move it, the force (n,) and its slopes (n, columns); see `left_at`."""
+    """Yield each observation with its active variables, the force (n,) and its derivatives (n, columns)."""
     low, high = limits
     free = low.size
     point, below, above = (
@@ -297,32 +298,30 @@ def _sensitivities_at(
         np.maximum(x[:free] - STEP, low),
         np.minimum(x[:free] + STEP, high),
     )
-    asked = range(free) if wanted is None else wanted
-    beside = {
-        j: (
-            problem.point(_with_variable(x, j, below[j]), unknowns),
-            problem.point(_with_variable(x, j, above[j]), unknowns),
-            float(above[j] - below[j]),
-        )
-        for j in asked
-    }
-    alike, known = independent_of_temperature(point), dict[int, SearchDirections]()
+
+    def moved(j: int, value: float) -> Point:
+        return problem.point(np.concatenate([x[:j], [value], x[j + 1 :]]), unknowns)
+
+    columns_wanted = range(free) if wanted is None else wanted
+    neighbours = {j: (moved(j, below[j]), moved(j, above[j]), float(above[j] - below[j])) for j in columns_wanted}
+    # Observations of one base row share their directions, unless a material effect goes by the temperature of each.
+    shared, cached = independent_of_temperature(point), dict[int, SearchDirections]()
     for o in problem.observations:
-        columns = tuple(j for j in active_columns(problem, unknowns, o, free) if j in beside)
-        if o.base_row not in known or o.base_row < 0 or not alike:
-            known[o.base_row] = search_directions(point, [beside[j] for j in columns], o)
-        yield o, columns, *sensitivities(known[o.base_row], o, problem.budget)
+        columns = tuple(j for j in active_columns(problem, unknowns, o, free) if j in neighbours)
+        if o.base_row not in cached or o.base_row < 0 or not shared:
+            cached[o.base_row] = search_directions(point, [neighbours[j] for j in columns], o)
+        yield o, columns, *sensitivities(cached[o.base_row], o, problem.budget)
 
 
 def active_columns(problem: Problem, unknowns: Sequence[Unknown], o: WeightedRecord, free: int) -> list[int]:
-    """Which of the first `free` variables move the force of an observation: a test moves with its own voltage alone.
+    """Return which of the first `free` variables move an observation: a test depends on its own voltage alone.
 
     Parameters
     ----------
-    problem : what is fitted to what
+    problem : observations and starting values
     unknowns : of the effects
     o : the observation
-    free : how many variables the search moves
+    free : number of variables that the search moves
     """
     rows = 3 * len(problem.base)
     own = range(3 * o.base_row, 3 * o.base_row + 3) if o.base_row >= 0 else range(rows)
@@ -330,9 +329,3 @@ def active_columns(problem: Problem, unknowns: Sequence[Unknown], o: WeightedRec
         j for j, u in enumerate(unknowns) if u.node is None or o.base_row < 0 or u.node == problem.nodes[o.base_row]
     ]
     return [*own, *(rows + j for j in effects if rows + j < free)]
-
-
-def _with_variable(x: Array, j: int, value: float) -> Array:
-    moved = x.copy()
-    moved[j] = value
-    return moved
