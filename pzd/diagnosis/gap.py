@@ -1,4 +1,5 @@
-"""The records of one setting, and how a damper compares with them; each damper is simulated once."""
+"""The gap between simulation and measurement: residual of a record, size, probability by noise alone, and where it
+lies."""
 
 from __future__ import annotations
 
@@ -25,21 +26,21 @@ from pzd.signals.smoothing import reversals
 
 @dataclass(frozen=True, eq=False)
 class ResidualCheck:
-    """What one record says about a damper, over the wanted samples."""
+    """Residual of one record against a damper, over the checked samples, with its noise."""
 
     prepared: PreparedRecord
     wanted: Mask
-    """(n,) the samples that were checked."""
+    """(n,) checked samples."""
     residual: Array
     """(n,) measured less predicted force [N]."""
     nuisances: Array
-    """(n,) the part of it that offset, gain, delay and mains of the test explain, and chance beside jumps [N]."""
+    """(n,) part of it explained by offset, gain, delay and mains of the test, and by chance near jumps [N]."""
     variance: float
     """Of one sample by noise [N^2]."""
     power: float
-    """Mean square of what repeats or is smooth above the noise [N^2]; about zero without a gap."""
+    """Mean square above the noise of what repeats or is smooth [N^2]; about zero without a gap."""
     probability: dict[str, Array]
-    """By kind of test (`harmonics`, `trend`, `smooth`), that noise alone looks so."""
+    """Probability by noise alone, by kind of test (`harmonics`, `trend`, `smooth`)."""
     error: PureError | None
     """Harmonics and noise of the average cycle, where cycles repeat."""
     folded: Array | None
@@ -47,7 +48,7 @@ class ResidualCheck:
     hum: float
     """Amplitude of the mains among the nuisances [N]; 0 where no line stands out."""
     explained: Array | None
-    """(n,) square of what the smooth model explains of it, noise's share taken off, where nothing repeats [N^2]."""
+    """(n,) squared smooth part of the residual less its share of noise, where nothing repeats [N^2]."""
 
     @property
     def cleared(self) -> Array:
@@ -68,60 +69,63 @@ class ResidualCheck:
 def check_residual(
     given: PredictedForce, prepared: PreparedRecord, wanted: Mask, config: NuisanceConfig
 ) -> ResidualCheck:
-    """The record against what a damper makes of it, over the wanted samples past the warm-up."""
+    """Compare a record with its predicted force, over the wanted samples past the warm-up."""
     record = prepared.record
     predicted, residual = given.force, record.force - given.force
     mask = wanted & comparable_samples(prepared)
     mains = _mains(prepared, residual, mask)
     without = residual - mains
-    rough = _difference_variance(prepared, without, mask)
+    variance = _difference_variance(prepared, without, mask)
     calm = jump_bend(prepared, predicted) == 0.0
-    slack = np.zeros(residual.size)
-    late = np.zeros(residual.size)
-    slack[mask], late[mask] = nuisance(
-        without[mask], predicted[mask], record.rate, rough, config, given.timing[mask], calm[mask], mask
+    size, timing = np.zeros(residual.size), np.zeros(residual.size)
+    size[mask], timing[mask] = nuisance(
+        without[mask], predicted[mask], record.rate, variance, config, given.timing[mask], calm[mask], mask
     )
-    slack = mains + np.where(
-        mask & ~calm, _nuisance_near_jumps(record.force - mains, predicted, slack, late), slack + late
-    )
-    folded = _folded(prepared, residual - slack, mask)
+    near_jumps = _nuisance_near_jumps(record.force - mains, predicted, size, timing)
+    explained = mains + np.where(mask & ~calm, near_jumps, size + timing)
+    folded = _folded(prepared, residual - explained, mask)
     if folded is not None:
-        found = _check_cycles(prepared, mask, residual, slack, folded, given.displacement_variance)
+        found = _check_cycles(prepared, mask, residual, explained, folded, given.displacement_variance)
     else:
-        found = _check_samples(prepared, mask, residual, slack, predicted)
+        found = _check_samples(prepared, mask, residual, explained, predicted)
     return replace(found, hum=float(np.max(np.abs(mains))))
 
 
 def _mains(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array:
-    """(n,) the wave that the mains make in the force of a test [N]; it nearly repeats from cycle to cycle, as a gap."""
+    """Estimate the (n,) mains hum in the force [N]; it nearly repeats from cycle to cycle, as a gap does."""
     record, run = prepared.record, prepared.cycles
     peak = float(np.max(np.abs(record.force)))
     return hum(record.time, residual, mask, run.frequency if run else 0.0, LEAST_HUM * peak)
 
 
 def jump_bend(prepared: PreparedRecord, predicted: Array) -> Array:
-    """(n,) how far the force bends beside a jump [N]; 0 elsewhere."""
+    """Compute (n,) how far the force bends near a jump [N]; 0 elsewhere."""
     record, run = prepared.record, prepared.cycles
     if run is None:
         return jumps_in_samples(record.force, predicted, len(reversals(record.displacement)))
     return jumps_in_cycles(run, record.time, record.force)
 
 
-def _nuisance_near_jumps(force: Array, predicted: Array, sized: Array, late: Array) -> Array:
-    """(n,) what a test and chance explain beside a jump [N]: the slope of the force counts where it makes less remain.
+def _nuisance_near_jumps(force: Array, predicted: Array, size: Array, timing: Array) -> Array:
+    """Compute the (n,) part explained by a test and chance near a jump [N]: with the timing where less remains with it.
 
     Parameters
     ----------
     force, predicted : (n,) [N]
-    sized, late : (n,) what the test's offset and gain explain, and what its delay does along the slope [N]
+    size, timing : (n,) part explained by offset and gain, and by the delay along the slope [N]
     """
-    found = [slack + within_a_sample(force - slack, predicted) for slack in (sized, sized + late)]
-    left = [np.abs(force - predicted - slack) for slack in found]
+    found = [part + within_a_sample(force - part, predicted) for part in (size, size + timing)]
+    left = [np.abs(force - predicted - part) for part in found]
     return np.where(left[0] <= left[1], *found)
 
 
 def _check_cycles(
-    prepared: PreparedRecord, mask: Mask, residual: Array, slack: Array, folded: Array, by_displacement: Array | float
+    prepared: PreparedRecord,
+    mask: Mask,
+    residual: Array,
+    nuisances: Array,
+    folded: Array,
+    by_displacement: Array | float,
 ) -> ResidualCheck:
     error = replace(pure_error(folded), shared=by_displacement)
     trend = by_trend(folded)
@@ -132,25 +136,25 @@ def _check_cycles(
     if trend is not None and trend < CYCLE_CHANGE_SIGNIFICANCE:
         power += _trend_power(folded, error)
     return ResidualCheck(
-        prepared, mask, residual, slack, error.sample_variance, power, probability, error, folded, 0.0, None
+        prepared, mask, residual, nuisances, error.sample_variance, power, probability, error, folded, 0.0, None
     )
 
 
 def _check_samples(
-    prepared: PreparedRecord, mask: Mask, residual: Array, slack: Array, predicted: Array
+    prepared: PreparedRecord, mask: Mask, residual: Array, nuisances: Array, predicted: Array
 ) -> ResidualCheck:
-    fit = fit_smooth_residual((residual - slack)[mask], prepared.record, predicted[mask], mask)
-    left = (residual - slack)[mask] - fit.explained
+    fit = fit_smooth_residual((residual - nuisances)[mask], prepared.record, predicted[mask], mask)
+    left = (residual - nuisances)[mask] - fit.explained
     variance = min(fit.noise.variance, float(np.mean(left**2)) + float(np.mean(fit.spread)))
     explained = np.zeros(residual.size)
     explained[mask] = fit.explained**2 - fit.spread
     power = float(np.mean(explained[mask]))
     probability = {"smooth": np.array([fit.probability])}
-    return ResidualCheck(prepared, mask, residual, slack, variance, power, probability, None, None, 0.0, explained)
+    return ResidualCheck(prepared, mask, residual, nuisances, variance, power, probability, None, None, 0.0, explained)
 
 
 def _folded(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array | None:
-    """The residual's wanted whole cycles, one row each; None with fewer than two."""
+    """Return the wanted whole cycles of the residual, one row each; None with fewer than two."""
     run = prepared.cycles
     if run is None:
         return None
@@ -160,7 +164,7 @@ def _folded(prepared: PreparedRecord, residual: Array, mask: Mask) -> Array | No
 
 
 def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask) -> float:
-    """Variance by noise, enough to weigh the priors of the nuisances."""
+    """Estimate the variance of the noise from differences, accurate enough for the priors of the nuisances."""
     folded = _folded(prepared, residual, mask)
     if folded is not None:
         return float(np.mean(np.diff(folded, axis=0) ** 2) / 2.0)
@@ -168,7 +172,7 @@ def _difference_variance(prepared: PreparedRecord, residual: Array, mask: Mask) 
 
 
 def _trend_power(folded: Array, error: PureError) -> float:
-    """Mean square of a steady change from cycle to cycle, noise's share taken off [N^2]."""
+    """Compute the mean square of a steady change from cycle to cycle, less its share of noise [N^2]."""
     count, points = folded.shape
     if count < TREND_CYCLES:
         return 0.0
@@ -183,13 +187,13 @@ def _trend_power(folded: Array, error: PureError) -> float:
 
 
 BLOCKS = 8
-"""Parts in which the scatter of the gap is read off a record that does not repeat."""
+"""Blocks over which the scatter of the gap is estimated in a record that does not repeat."""
 
 
 def held_out_criterion(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
-    """Criterion (4) pooled over the held-out samples; nothing is adopted, so after is before.
+    """Pool criterion (4) over the held-out samples, with noise floor and standard error; `after` equals `before`.
 
-    Equation: W_s = sum r^2 / sum F^2;  floor = sum_records (s^2 + nuisances) / sum F^2 as in `floor_of`;
+    Equation: W_s = sum r^2 / sum F^2;  floor = sum_records (s^2 + nuisances) / sum F^2 as in `noise_floor`;
     standard error of the ratio over cycles or blocks
                                            Source: Makowski and Knap 2021, eq. (4); Cochran 1977, eq. (6.9)
     """
@@ -202,7 +206,7 @@ def held_out_criterion(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
     return Gap(
         before=criterion,
         after=criterion,
-        noise_floor=min(sum(noise_floor(j) for j in held_out) / total, criterion),  # summed in another order,
+        noise_floor=min(sum(noise_floor(j) for j in held_out) / total, criterion),  # at most, but for rounding
         standard_error=float(np.sqrt(scatter)) / total,
         held_out=split.held_out,
         hold_out=split.hold_out,
@@ -210,11 +214,11 @@ def held_out_criterion(held_out: Sequence[ResidualCheck], split: Split) -> Gap:
 
 
 def noise_floor(check: ResidualCheck) -> float:
-    """What noise and the test's own nuisances leave of one record, summed over the checked samples [N^2].
+    """Compute what noise and the test's own nuisances leave of one record, summed over the checked samples [N^2].
 
-    The nuisances count with what they take away, at most: beside a jump they move the residual without
-    making it smaller. Noise is the scatter between cycles or about a smooth residual, at most what the
-    nuisances leave. So noise never exceeds the gap that it is part of.
+    The nuisances count with what they take away, at most: near a jump they move the residual without making it smaller.
+    Noise is the scatter between cycles or about a smooth residual, at most what the nuisances leave. So noise never
+    exceeds the gap that it is part of.
 
     Equation: sum min(s^2, mean c^2) + min(sum n^2, sum r^2 - sum c^2), c = r - n, n the nuisances
     """
@@ -226,7 +230,7 @@ def noise_floor(check: ResidualCheck) -> float:
 
 
 def _by_block(check: ResidualCheck, values: Array) -> Array:
-    """Sums of (n,) values over the checked samples of each cycle, or of each of a few blocks."""
+    """Sum (n,) values over the checked samples of each cycle, or of each block."""
     kept = values[check.wanted]
     run = check.prepared.cycles
     if run is None:
@@ -236,18 +240,18 @@ def _by_block(check: ResidualCheck, values: Array) -> Array:
 
 
 def probability_of_noise(checks: Sequence[ResidualCheck]) -> float:
-    """Probability that noise alone looks so in any kind of test (Bonferroni over the kinds)."""
+    """Compute the probability that noise alone looks so in any kind of test (Bonferroni over the kinds)."""
     kinds = {kind for c in checks for kind in c.probability}
     return min(1.0, *(len(kinds) * pooled([c.probability[k] for c in checks if k in c.probability]) for k in kinds))
 
 
 def visible_gap(checks: Sequence[ResidualCheck]) -> float:
-    """R.m.s. of the gap above the noise as a share of each record's peak force, pooled over the samples."""
+    """Compute the r.m.s. gap above the noise as a share of each record's peak force, pooled over the samples."""
     return _pooled(checks, [c.power / c.peak**2 for c in checks])
 
 
 def gap_in_force(checks: Sequence[ResidualCheck]) -> float:
-    """R.m.s. of the gap above the noise [N], pooled over the samples: the tests of large force count most."""
+    """Compute the r.m.s. gap above the noise [N], pooled over the samples: the tests of large force count most."""
     return _pooled(checks, [c.power for c in checks])
 
 
@@ -261,29 +265,17 @@ def _pooled(checks: Sequence[ResidualCheck], squares: Sequence[float]) -> float:
 Labels = NDArray[np.str_]
 
 DENSER = 1.25
-"""A region is reported when it holds so many times more of the gap than of the samples."""
+"""Ratio of the shares of gap and samples from which a region is reported."""
 LEAST_SHARE = 0.15
-"""A region is reported when it holds at least this share of the gap."""
+"""Share of the gap from which a region is reported."""
 LEAST_SHARE_OF_THIRD = 0.5
-"""A third of the run is reported from this share on: single cycles are noisy."""
+"""Share of the gap from which a third of the run is reported: single cycles are noisy."""
 MOST_REGIONS = 10
 """Regions reported, at most: what fits in one table of the report."""
 
 
-@dataclass(frozen=True, eq=False)
-class GapDensity:
-    """Every checked sample (or point of an average cycle) of all records, with its part of the gap."""
-
-    density: Array
-    """(n,) square of the residual less what noise gives; sums to the gap [N^2]."""
-    weight: Array
-    """(n,) samples that each point stands for."""
-    labels: dict[str, Labels]
-    """Axis -> (n,) the region in words that each point belongs to."""
-
-
 def regions(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> tuple[Region, ...]:
-    """The regions in which the gap is denser than elsewhere, most telling first.
+    """Find the regions in which the gap is denser than elsewhere, most telling first.
 
     Parameters
     ----------
@@ -295,60 +287,55 @@ def regions(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> tu
     -------
     regions in words with their share of the gap; empty where there is no gap above the noise
     """
-    gap = gap_map(checks, unit, zero)
-    total = float(gap.density.sum())
-    if total <= 0.0:
+    points = [_points(check) for check in checks]
+    density, weight = (np.concatenate([p[name] for p in points]) for name in ("density", "weight"))
+    if float(density.sum()) <= 0.0:
         return ()
+    speed = max(float(np.max(np.abs(p["velocity"]))) for p in points)
+    stroke = max(float(np.ptp(p["displacement"])) for p in points)
+    labels: dict[str, list[Labels]] = {}
+    for check, p in zip(checks, points, strict=True):
+        for axis, words in _labels(check, p, speed, stroke, unit, zero).items():
+            labels.setdefault(axis, []).append(words)
     found: list[tuple[float, Region]] = []
-    for labels in gap.labels.values():
-        found += _denser(labels, gap.density, gap.weight)
+    for parts in labels.values():
+        if len(parts) == len(checks):  # an axis that some test lacks, such as temperature, divides no whole gap
+            found += _denser(np.concatenate(parts), density, weight)
     found += _frequencies(checks)
     found += _thirds(checks)
     found.sort(key=lambda item: -item[0])
     return tuple(region for _, region in found[:MOST_REGIONS]) or (Region(region="everywhere alike", share_of_gap=1.0),)
 
 
-def gap_map(checks: Sequence[ResidualCheck], unit: str, zero: float = 0.0) -> GapDensity:
-    """The gap sample by sample, noise's share taken off; positions are as recorded."""
-    points = [_points(j) for j in checks]
-    speed = max(float(np.max(np.abs(p["velocity"]))) for p in points)
-    stroke = max(float(np.ptp(p["displacement"])) for p in points)
-    labels: dict[str, list[Labels]] = {}
-    for j, p in zip(checks, points, strict=True):
-        for axis, words in _labels(j, p, speed, stroke, unit, zero).items():
-            labels.setdefault(axis, []).append(words)
-    return GapDensity(
-        np.concatenate([p["density"] for p in points]),
-        np.concatenate([p["weight"] for p in points]),
-        {axis: np.concatenate(words) for axis, words in labels.items() if len(words) == len(checks)},
-    )
+def _points(check: ResidualCheck) -> dict[str, Array]:
+    """Return motion, density of the gap [N^2] and number of samples: along the average cycle, or at every sample.
 
-
-def _points(j: ResidualCheck) -> dict[str, Array]:
-    """Kinematics, density of the gap and weight: along the average cycle, or at every sample."""
-    record, run = j.prepared.record, j.prepared.cycles
-    if j.folded is None or run is None:
-        keep = j.wanted
+    The density is the squared residual less its share of noise; it sums to the gap.
+    """
+    record, run = check.prepared.record, check.prepared.cycles
+    if check.folded is None or run is None:
+        keep = check.wanted
         names = ("velocity", "displacement", "acceleration")
         motion = {name: getattr(record, name)[keep] for name in names}
-        density = (j.cleared**2 - j.variance if j.explained is None else j.explained)[keep]
+        density = (check.cleared**2 - check.variance if check.explained is None else check.explained)[keep]
         voltage = record.voltage[keep] if record.voltage is not None else np.full(density.size, np.nan)
         return {**motion, "density": density, "weight": np.ones(density.size), "voltage": voltage}
-    count = j.folded.shape[0]
-    mean = j.folded.mean(axis=0)
+    count = check.folded.shape[0]
+    mean = check.folded.mean(axis=0)
     motion = {
         "velocity": run.mean(record.time, record.velocity),
         "displacement": run.mean(record.time, record.displacement),
         "acceleration": run.mean(record.time, record.acceleration),
     }
     voltage = np.full(mean.size, record.median_voltage() if record.voltage is not None else np.nan)
-    density = count * (mean**2 - j.variance / count)
+    density = count * (mean**2 - check.variance / count)
     return {**motion, "density": density, "weight": np.full(mean.size, float(count)), "voltage": voltage}
 
 
 def _labels(
-    j: ResidualCheck, p: dict[str, Array], speed: float, stroke: float, unit: str, zero: float
+    check: ResidualCheck, p: dict[str, Array], speed: float, stroke: float, unit: str, zero: float
 ) -> dict[str, Labels]:
+    """Return by axis the (n,) region in words that each point belongs to; positions as recorded."""
     v, x, a = p["velocity"], p["displacement"], p["acceleration"]
     fast = _bands(np.abs(v), _rounded(np.array([0.1, 0.33, 0.67]) * speed), "abs(v)", "m/s")
     found = {
@@ -361,14 +348,14 @@ def _labels(
         words = _voltages(p["voltage"], unit)
         found["voltage"] = words
         found["velocity and voltage"] = np.char.add(np.char.add(fast, ", "), words)
-    temperature = j.prepared.record.median_temperature()
+    temperature = check.prepared.record.median_temperature()
     if temperature is not None:
         found["temperature"] = np.full(v.size, f"{temperature:.0f} degC")
     return found
 
 
 def _voltages(voltage: Array, unit: str) -> Labels:
-    """Voltages to three figures; a moving one in fifths of its range."""
+    """Label voltages to three figures; a moving one in fifths of its range."""
     span = float(np.ptp(voltage))
     if span <= 0.02 * float(np.max(np.abs(voltage))):
         return np.full(voltage.size, f"{float(np.median(voltage)):.3g} {unit}")
@@ -384,17 +371,17 @@ def _bands(values: Array, edges: Array, name: str, unit: str) -> Labels:
 
 
 def _edges_around(middle: float, distance: float) -> Array:
-    """The edges on either side of a middle, to two figures of their distance from it."""
+    """Return the edges on either side of a middle, to two figures of their distance from it."""
     return np.round([middle - distance, middle + distance], 1 - math.floor(math.log10(distance)))
 
 
 def _rounded(edges: Array) -> Array:
-    """Edges to two figures, so that the words say what was done."""
+    """Round edges to two figures, so that the labels state them exactly."""
     return np.array([float(f"{edge:.2g}") for edge in edges])
 
 
 def _denser(labels: Labels, density: Array, weight: Array) -> list[tuple[float, Region]]:
-    """The regions of one axis that hold more of the gap than of the samples, with by how much."""
+    """Return the regions of one axis that hold more of the gap than of the samples, with the difference."""
     names, index = np.unique(labels, return_inverse=True)
     if names.size < 2:
         return []
@@ -412,14 +399,14 @@ def _described(shares: Iterable[tuple[str, float, float]]) -> list[tuple[float, 
 
 
 def _frequencies(checks: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
-    """The octaves of frequency that hold most of the repeatable gap; an offset is one of its own."""
+    """Return the octaves of frequency that hold most of the repeatable gap; an offset is one of its own."""
     power: dict[str, float] = {}
-    for j in checks:
-        if j.error is None or j.prepared.cycles is None:
+    for check in checks:
+        if check.error is None or check.prepared.cycles is None:
             continue
-        words = [_octave(h * j.prepared.cycles.frequency) for h in range(j.error.mean.size)]
-        samples = float(np.count_nonzero(j.wanted))
-        for word, part in zip(words, repeatable_power(j.error), strict=True):
+        words = [_octave(h * check.prepared.cycles.frequency) for h in range(check.error.mean.size)]
+        samples = float(np.count_nonzero(check.wanted))
+        for word, part in zip(words, repeatable_power(check.error), strict=True):
             power[word] = power.get(word, 0.0) + samples * float(part)
     total = sum(power.values())
     if total <= 0.0 or len(power) < 2:
@@ -435,13 +422,13 @@ def _octave(frequency: float) -> str:
 
 
 def _thirds(checks: Sequence[ResidualCheck]) -> list[tuple[float, Region]]:
-    """The third of the run in which the gap is larger."""
+    """Return the third of the run in which the gap is larger."""
     names = ("first third of the run", "middle third of the run", "last third of the run")
     shares, samples = np.zeros(3), np.zeros(3)
-    for j in checks:
-        kept = np.flatnonzero(j.wanted)
+    for check in checks:
+        kept = np.flatnonzero(check.wanted)
         for third, part in enumerate(np.array_split(kept, 3)):
-            shares[third] += float(np.sum(j.cleared[part] ** 2)) - part.size * j.variance
+            shares[third] += float(np.sum(check.cleared[part] ** 2)) - part.size * check.variance
             samples[third] += part.size
     if shares.sum() <= 0.0:
         return []

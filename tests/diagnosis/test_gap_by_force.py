@@ -26,7 +26,7 @@ def checks(gaps: tuple[float, float]) -> list[Any]:
 
 def refused(left: tuple[float, float]) -> str | None:
     """What is said of a candidate that leaves such gaps."""
-    evidence = SimpleNamespace(something_missing=lambda *_: True, campaign=SimpleNamespace(checks=checks))
+    evidence = SimpleNamespace(gap_is_significant=lambda *_: True, campaign=SimpleNamespace(checks=checks))
     before, candidate = SimpleNamespace(damper=BEFORE), SimpleNamespace(fitted=SimpleNamespace(damper=left))
     return leaves_gap(cast("Any", evidence), DiagnoseConfig(), cast("Any", before), cast("Any", candidate))
 

@@ -69,7 +69,7 @@ def misplaced_end_stop(damper: Damper, stroke: float) -> str | None:
 
 def leaves_gap(evidence: Evidence, config: DiagnoseConfig, before: FitResult, candidate: Candidate) -> str | None:
     """Why a candidate is a stand-in by the gap that it leaves open, None where it closes enough or noise hides it."""
-    if not evidence.something_missing(before, config):
+    if not evidence.gap_is_significant(before, config):
         return None
     checks = [evidence.campaign.checks(fitted.damper) for fitted in (before, candidate.fitted)]
     gaps = [[size(each) for each in checks] for size in (visible_gap, gap_in_force)]
@@ -137,7 +137,7 @@ def spurious(
     without = fit(evidence.halves[0], before.effects, before.optimum)
     with_it, left = (
         profiled_misfit(halves[1], fits[0].damper),
-        profiled_misfit(evidence.choosing(weighed), without.damper),
+        profiled_misfit(evidence.validation_problem(weighed), without.damper),
     )
     if with_it > left + config.rival_bic:
         return "stand-in: widens the gap on tests it was not fitted to"

@@ -224,7 +224,7 @@ class _ForwardSelection:
     def _tried(self, evidence: Evidence, current: FitResult) -> tuple[Candidate, ...]:
         if len(current.effects) == self.config.most_effects:
             return ()
-        silent = not evidence.something_missing(current, self.config)
+        silent = not evidence.gap_is_significant(current, self.config)
         return candidates(evidence.whole, current, self.config.forbid, self.jobs, silent=silent)
 
     def _first_supported(self, tried: Sequence[Candidate]) -> Candidate | None:
@@ -257,7 +257,7 @@ class _ForwardSelection:
 
     def _pair(self, tried: tuple[Candidate, ...]) -> bool:
         """Adopt two effects at once: alone either takes on values that the other distorts."""
-        missing = self.evidence.something_missing(self.current, self.config)
+        missing = self.evidence.gap_is_significant(self.current, self.config)
         lead = next((c for c in tried if missing and self._too_little(self.evidence, self.current, c) is None), None)
         found = None if lead is None else self._with_second(lead)
         if lead is None or found is None:
