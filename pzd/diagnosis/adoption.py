@@ -3,8 +3,8 @@
 An effect stays if held-out tests are predicted no worse with it. Where a law is missing that no name accounts for,
 weights by noise mislead: each law is bent towards what is missing, and takes other values on other tests. There effects
 are also added for what they predict alone. An effect is added if held-out tests are predicted better with it, beyond
-chance, and at no voltage worse; if the interpolation error at left-out voltages is not larger; and if the force half-way
-between two voltages passes `interpolation_check`. The verdict stays `unexplained`: what is added is not named.
+chance, and at no voltage worse; if the interpolation error at left-out voltages is not larger; and if the force
+half-way between two voltages passes `interpolation_check`. The verdict stays `unexplained`: what is added has no name.
 
 What is added may say better what an earlier effect stood in for, as a polytropic gas does for a parallel spring. Then
 the data no longer determine the parameters of that effect, and it is removed if held-out tests are predicted as well.

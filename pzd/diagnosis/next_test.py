@@ -1,4 +1,7 @@
-"""The rig test that would separate rivals best, from the dampers fitted to them, within what the stand can do."""
+"""The next rig test: one that separates rivals, one more of the longest test, or one at a voltage between tested ones.
+
+Every test lies within the operating envelope: what the stand can do, by the config's limits or the records.
+"""
 
 from __future__ import annotations
 
@@ -21,31 +24,31 @@ from pzd.rig.config import Limits
 from pzd.signals.criterion import rms
 
 FREQUENCIES = (0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
-"""Frequencies that are weighed [Hz], and the largest."""
+"""Frequencies that are tried [Hz], beside the largest."""
 STROKES = (0.15, 0.3, 0.6, 1.0)
-"""Amplitudes that are weighed, as shares of the largest."""
+"""Amplitudes that are tried, as shares of the largest."""
 POINTS = 400
 """Samples of a cycle."""
 CYCLES = 2
-"""Simulated, the last compared."""
+"""Cycles that are simulated; the last is compared."""
 MANY_CYCLES = "ten"
-"""Of a test: noise is told from what repeats, and a quarter of the cycles chooses, another is held out."""
+"""Cycles of a test: noise is told from what repeats, and a quarter of the cycles chooses, another is held out."""
 STEPS_HZ = 4.0
-"""Changes of the voltage in the test that steps it, for each cycle."""
+"""Changes of the voltage per cycle in the test that steps it."""
 SMALLEST_AMPLITUDE = 0.02
-"""A test of less amplitude than this share of the largest is not weighed: the resolution of the stroke shows in it."""
+"""Share of the largest amplitude below which no test is tried: the resolution of the stroke shows in it."""
 ROUND_OFF = 1e-12
 """Relative error of a difference of two displacements in double precision, with room."""
 RECORDED_ERROR = 1e-3
-"""Relative error of a stroke or frequency as recorded: a sine of 10 mm sampled 100 times a cycle reaches 9.995 mm."""
+"""Relative error of a recorded stroke or frequency: a sine of 10 mm sampled 100 times a cycle reaches 9.995 mm."""
 
 
 @dataclass(frozen=True)
 class OperatingEnvelope:
-    """What a test may envelope."""
+    """Limits of a test."""
 
     middle: float
-    """Where the motion has its middle, in the displacement as recorded [m]."""
+    """Middle of the motion, in the displacement as recorded [m]."""
     amplitude: float
     """Largest amplitude about it [m]."""
     speed: float
@@ -61,7 +64,7 @@ class OperatingEnvelope:
 def operating_envelope(
     limits: Limits, prepared: Sequence[PreparedRecord], voltages: Sequence[float]
 ) -> OperatingEnvelope:
-    """What a test may envelope: the config's limits, and where it gives none, what the records of this setting reached.
+    """Return the limits of the config, and where it gives none, what the records of this setting reached.
 
     Parameters
     ----------
@@ -91,12 +94,12 @@ def _range(channels: Sequence[Array]) -> tuple[float, float]:
 
 
 def _settable_middle(middle: float, amplitude: float) -> float:
-    """A middle that can be set: to a digit that is a hundredth of the amplitude's first digit or less."""
+    """Round a middle to a digit that is a hundredth of the amplitude's first digit or less."""
     return round(middle, 3 - math.floor(math.log10(amplitude))) + 0.0  # no minus before a zero
 
 
 def frequency_of(prepared: PreparedRecord) -> float:
-    """Frequency of a record [Hz]; where it does not repeat, that of a sine with its stroke and speed."""
+    """Return the frequency of a record [Hz]; where it does not repeat, that of a sine with its stroke and speed."""
     if prepared.cycles is not None:
         return 1.0 / prepared.cycles.period
     record = prepared.record
@@ -109,7 +112,7 @@ def _recorded_voltages(records: Sequence[Record]) -> tuple[float, float]:
 
 
 def _admissible_voltages(limits: tuple[float, float], voltages: Sequence[float]) -> tuple[float, ...]:
-    """The voltages inside the limits; the ends of the limits stand for those beyond."""
+    """Clip the voltages to the limits."""
     low, high = limits
     return tuple(sorted({min(max(v, low), high) for v in voltages}))
 
@@ -120,19 +123,19 @@ def separating_test(
     temperature: float | None,
     offsets: Sequence[float] = (),
 ) -> NextTest | None:
-    """The test on which the rivals differ most, an offset, a gain and a delay of the test taken off.
+    """Find the test on which the rivals differ most, offset, gain and delay of a test fitted.
 
     Parameters
     ----------
-    rivals : name and fitted damper, the best first; it is told apart from each of the others
-    envelope : what a test may envelope; a test in which any rival would envelope more is left out, for any may be the truth
+    rivals : name and fitted damper, the best first, which is separated from each of the others
+    envelope : limits of a test; one in which any rival would leave them is not tried, for any may be the truth
     temperature : at which the test is run [degC]
     offsets : by which the records lie above each rival's force [N]; none by default
 
     Returns
     -------
     the test, with the r.m.s. difference that it would show in % of peak, and the largest speed and force;
-    None without two rivals, or where each test would envelope too much
+    None without two rivals, or where each test would leave the limits
     """
     if len(rivals) < 2:
         return None
@@ -157,12 +160,13 @@ def separating_test(
 
 
 def repeated_longest_test(recorded: Sequence[PreparedRecord], envelope: OperatingEnvelope) -> NextTest:
-    """A sine of many cycles as fast as the stand can, with the stroke of the longest record: one more test to average.
+    """Propose a sine of many cycles as fast as the stand can, with the stroke of the longest record: one more to
+    average.
 
     Parameters
     ----------
-    recorded : the records, their displacement as recorded
-    envelope : what a test may envelope
+    recorded : records, their displacement as recorded
+    envelope : limits of a test
     """
     record = max(recorded, key=lambda p: float(np.ptp(p.record.time))).record
     amplitude = min(0.5 * float(np.ptp(record.displacement)), envelope.amplitude)
@@ -179,6 +183,7 @@ def repeated_longest_test(recorded: Sequence[PreparedRecord], envelope: Operatin
 
 
 def _candidate_tests(envelope: OperatingEnvelope, temperature: float | None) -> Iterator[tuple[NextTest, Motion]]:
+    """Yield the tests within the envelope, each with its motion."""
     shapes: tuple[tuple[str, Callable[[Array], Array], float], ...] = (
         ("sine", sine, 1.0),
         ("triangle", _triangle, 3.0),
@@ -205,7 +210,7 @@ def _candidate_tests(envelope: OperatingEnvelope, temperature: float | None) -> 
 
 
 def rounded_down(value: float, error: float = ROUND_OFF) -> float:
-    """A positive number to three digits, never above it by more than its relative error.
+    """Round a positive number down to three digits, never above it by more than its relative error.
 
     So 0.02 stays 0.02 though a difference gave 0.0199...9.
     """
@@ -221,7 +226,7 @@ def test_motion(
     voltage: float | tuple[float, ...] | None,
     temperature: float | None,
 ) -> Motion:
-    """Two cycles of a test about zero, the voltage constant, stepped between two, or none.
+    """Return two cycles of a test about zero, the voltage constant, stepped between two, or none.
 
     Parameters
     ----------
@@ -247,19 +252,20 @@ def test_motion(
 
 
 def sine(phase: Array) -> Array:
-    """A cycle of a sine of amplitude one over the phase (n,) in cycles."""
+    """Return a sine of amplitude one over the phase (n,) in cycles."""
     return np.asarray(np.sin(2.0 * np.pi * phase))
 
 
 def _triangle(phase: Array) -> Array:
-    """Constant speed, its corners rounded by leaving out harmonics beyond the ninth, as a servo-hydraulic does."""
+    """Return a triangle of amplitude one, corners rounded by leaving out harmonics beyond the ninth, as a
+    servo-hydraulic does."""
     orders = np.arange(1, 10, 2)
     terms = (-1.0) ** (orders // 2) / orders**2 * np.sin(2.0 * np.pi * np.outer(phase, orders))
     return np.asarray(8.0 / np.pi**2 * terms.sum(axis=1))
 
 
 def _distance(first: Array, second: Array) -> float:
-    """R.m.s. of what offset, gain and delay of a test cannot make of the difference, as a share of the peak."""
+    """Compute the r.m.s. difference that offset, gain and delay of a test cannot explain, as a share of the peak."""
     slack = np.column_stack([np.ones(first.size), first, np.gradient(first)])
     difference = second - first
     left = difference - slack @ np.linalg.lstsq(slack, difference, rcond=None)[0]

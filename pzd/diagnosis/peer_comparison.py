@@ -257,7 +257,7 @@ def compare_with_peers(rig: Rig, identified: Identified, diagnosed: Diagnosed, s
 def _comparison(
     tests: HeldOutTests, prediction: Prediction, setting: str | None, *, controlled: bool
 ) -> PeerComparison:
-    """Compare test by test, then by voltage, in total, and at left-out voltages; without a control signal no voltages."""
+    """Compare test by test, by voltage, in total, and at left-out voltages."""
     rows: list[PeerRow] = []
 
     def add(

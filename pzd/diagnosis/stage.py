@@ -286,9 +286,9 @@ def base_parameters(selection: Selection, verdict: Verdict, setting: str | None)
 
 
 def held_out_gap(selection: Selection, validation: CrossValidation | None = None) -> Gap:
-    """Compute criterion (4) on the held-out samples before and after, both dampers fitted to the training samples alone.
+    """Compute criterion (4) on the held-out samples before and after, with nuisances at their prior mean.
 
-    The nuisances of the tests are at their prior mean.
+    Both dampers are fitted to the training samples alone.
 
     Parameters
     ----------

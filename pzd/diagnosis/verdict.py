@@ -350,7 +350,7 @@ def nuisance_trend(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
 
 
 def _test_nuisances(checks: Sequence[ResidualCheck]) -> tuple[Array, Array]:
-    """Estimate (n, 3) offset, gain and delay of every test in `NUISANCE_UNITS`; and (3,) the force of one unit [peak]."""
+    """Estimate (n, 3) offset, gain, delay of every test in `NUISANCE_UNITS`, and (3,) force of one unit [peak]."""
     found, size = [], []
     for check in checks:
         force = check.predicted[check.wanted]

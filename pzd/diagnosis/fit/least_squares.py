@@ -171,7 +171,7 @@ def _search(
 
 
 def _prior(problem: Problem, effects: int) -> Array:
-    """Return the (2 b, 3 b + e) Jacobian of the prior on ln C and ln k of every base row, in its standard deviations."""
+    """Return the (2 b, 3 b + e) Jacobian of the prior on ln C and ln k, in its standard deviations."""
     rows = len(problem.base)
     columns = [3 * row + i for row in range(rows) for i in (1, 2)]
     return np.eye(3 * rows + effects)[columns] / PRIOR_DEVIATION

@@ -81,7 +81,7 @@ def temperature_moves(temperature: Array | None, by: float = MOVING_TEMPERATURE)
 
 
 def end_temperatures(temperature: Array) -> tuple[float, float]:
-    """Return the temperature [degC] at the beginning and at the end of a test, the noise of (n,) samples averaged out."""
+    """Return the temperature [degC] at the beginning and at the end of a test, with noise averaged out."""
     tenth = max(temperature.size // 10, 1)
     return float(np.median(temperature[:tenth])), float(np.median(temperature[-tenth:]))
 

@@ -1,4 +1,4 @@
-"""The least-squares problem: T0, C and k of every base row and the parameters of effects, in the units of the search."""
+"""The least-squares problem: T0, C, k of every base row and the parameters of effects in the units of the search."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class Unknown:
         return float(np.log(max(scaled, 1.0 / BOUND))) if self.parameter.search.logarithmic else scaled
 
     def towards_neutral(self, searched: float, share: float) -> float:
-        """Return the parameter [own unit] at a share of the way from its neutral value, which switches the effect off."""
+        """Return the parameter [own unit] at a share of the way from its neutral value, where the effect is off."""
         value, neutral = self.value(searched), self.parameter.neutral
         return neutral + share * (value - neutral) if np.isfinite(neutral) else value / share
 

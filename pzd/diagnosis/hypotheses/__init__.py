@@ -124,7 +124,7 @@ def _points(residuals: Residuals, best: PredictingShapes, control: Control) -> I
 def _partial_residual(
     residuals: Residuals, test: RecordResidual, shape: Shape, value: float | None, solution: Array
 ) -> tuple[Array, Array, Array]:
-    """Return (c,) argument of the shape, partial residual and component of the shape, at the samples of the regression."""
+    """Return (c,) argument, partial residual and component of a shape at the samples of the regression."""
     columns = next(found for tried, found in shape.columns(test.signals) if tried == value)
     q = len(residuals.keys)
     coefficients = solution[_places(residuals, shape, value)]

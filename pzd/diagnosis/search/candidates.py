@@ -1,4 +1,4 @@
-"""Every effect that can be named fitted to the data, one at a time, together with those already adopted."""
+"""Candidates: every effect that can be named, fitted one at a time together with those already adopted."""
 
 from __future__ import annotations
 
@@ -33,12 +33,11 @@ from pzd.diagnosis.thresholds import (
 )
 from pzd.record import Array
 
-# ----------------------------------------------------------------------------------------------------
-# Where the search for an effect starts: its starting values, and what a linearised step promises from each.
+# --- Starting values, and the drop in misfit that a linearised step promises from each
 
 
 def sorted_starts(problem: Problem, before: FitResult, effect: Effect) -> list[Array]:
-    """All starting values of an effect, first those from which one linearised step promises the smallest misfit.
+    """Return all starting values of an effect, sorted by the misfit that one linearised step promises from each.
 
     Equation: min_b,d |r_s - J_b b - J_s d|^2 at each start s, J_b of the base rows at `before`
                                                                 Source: Gauss-Newton step
@@ -51,7 +50,7 @@ def sorted_starts(problem: Problem, before: FitResult, effect: Effect) -> list[A
 
 
 def most_promising(problem: Problem, before: FitResult, effects: Sequence[Effect], count: int) -> list[Effect]:
-    """The effects from whose starting values one linearised step promises the smallest misfits, best first."""
+    """Return the effects from whose starting values one linearised step promises the smallest misfits, best first."""
     promised = []
     for effect in effects:
         own = problem.with_friction_scaling(effect)
@@ -61,47 +60,44 @@ def most_promising(problem: Problem, before: FitResult, effects: Sequence[Effect
 
 
 def promised_drop(problem: Problem, before: FitResult, effect: Effect) -> float:
-    """By how much a linearised step lowers the misfit at most, from an effect's starting values or from near none."""
+    """Compute the largest drop in misfit that a linearised step promises, from the starting values of an effect or near
+    zero."""
     starts = starts_of(problem, before, effect)
     faint = (*starts, *(towards_neutral(problem, before, effect, start, FAINT) for start in starts))
     return before.misfit - min(_promised_misfit(problem, before, effect, start) for start in faint)
 
 
 def starts_of(problem: Problem, before: FitResult, effect: Effect) -> list[Array]:
-    """All combinations of the starting values of an effect, each (unknowns,) in the units of the search.
+    """Return all combinations of the starting values of an effect, each (unknowns,) in the units of the search.
 
-    What is looked for by voltage starts at every one of them alike, or in proportion to T0.
+    A parameter with one value per voltage starts alike at all of them, or in proportion to T0.
     """
     unknowns = _new_unknowns(problem, before, effect)
-    own = {u.parameter.name: u.parameter for u in unknowns}
-    grid = itertools.product(*(parameter.search.starts for parameter in own.values()))
-    starts = [dict(zip(own, values, strict=True)) for values in grid]
-    return [np.array([_searched(u, s[u.parameter.name] * _start_share(problem, u)) for u in unknowns]) for s in starts]
+    parameters = {u.parameter.name: u.parameter for u in unknowns}
 
+    def searched(unknown: Unknown, start: float) -> float:
+        if unknown.node is not None and unknown.parameter.with_friction:
+            start *= problem.relative_friction(unknown.node)
+        return float(np.log(max(start, 1.0 / BOUND))) if unknown.parameter.search.logarithmic else start
 
-def _start_share(problem: Problem, unknown: Unknown) -> float:
-    """The share of its largest value at which an unknown starts at its voltage."""
-    scaled = unknown.node is not None and unknown.parameter.with_friction
-    return problem.relative_friction(unknown.node or 0) if scaled else 1.0
+    grid = itertools.product(*(parameter.search.starts for parameter in parameters.values()))
+    starts = [dict(zip(parameters, values, strict=True)) for values in grid]
+    return [np.array([searched(u, start[u.parameter.name]) for u in unknowns]) for start in starts]
 
 
 def towards_neutral(problem: Problem, before: FitResult, effect: Effect, start: Array, share: float) -> Array:
-    """Starting values that lie so much nearer to those that switch the effect off."""
+    """Return starting values at a share of the way from those that switch the effect off."""
     unknowns = _new_unknowns(problem, before, effect)
     return np.array([u.to_search(u.towards_neutral(float(x), share)) for u, x in zip(unknowns, start, strict=True)])
 
 
 def _new_unknowns(problem: Problem, before: FitResult, effect: Effect) -> tuple[Unknown, ...]:
-    """What is looked for with an effect beside those of `before`."""
+    """Return the unknowns of an effect beside those of `before`."""
     return problem.unknowns((*before.effects, effect.name))[len(before.unknowns) :]
 
 
-def _searched(unknown: Unknown, start: float) -> float:
-    return float(np.log(max(start, 1.0 / BOUND))) if unknown.parameter.search.logarithmic else start
-
-
 def _promised_misfit(problem: Problem, before: FitResult, effect: Effect, start: Array) -> float:
-    """Sum of squares after one linearised step from a start; infinite where the slopes there are not."""
+    """Return the sum of squares after one linearised step from a start; infinite where the derivatives are."""
     effects = (*before.effects, effect.name)
     unknowns = problem.unknowns(effects)
     here = np.concatenate([before.optimum, start])
@@ -117,7 +113,7 @@ def _promised_misfit(problem: Problem, before: FitResult, effect: Effect, start:
     return float(rest @ rest)
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Candidates
 
 
 PLACES_PER_VOLTAGE = ("stroke", "flow", "parallel", "branch")
@@ -131,39 +127,31 @@ class Candidate:
     effect: str
     fitted: FitResult
     delta_bic: float
-    """Change of the Bayesian criterion against the model without it; negative where it pays."""
+    """Change of the Bayesian criterion against the model without it; negative where it improves."""
     explained: float
     """R.m.s. by which it moves the simulated force, as a share of each record's peak."""
     residual_change: float
-    """Sum of squares of what it changes in the residuals, in units of noise."""
+    """Sum of squares of the change of the residuals, in units of noise."""
     misfit_drop: float
-    """How much lower the misfit is with it."""
+    """Decrease of the misfit."""
     varies: bool = False
-    """Whether its parameters are by voltage: an effect adopted before, or one that is only looked for so."""
+    """Whether its parameters have one value per voltage: an effect adopted before, or one that is only tried so."""
     searched: bool = True
-    """Whether its optimum was searched for; else it stands as faint as it is looked for."""
+    """Whether its optimum was searched for; else it stands for the faintest values tried."""
 
 
 def testable(problem: Problem, effect: Effect) -> bool:
     """Whether the voltage or temperature moves in some test, for an effect that shows only where it does."""
     if effect.needs == "voltage":
-        return any(
-            o.motion.voltage is not None
-            and float(np.ptp(o.motion.voltage)) > MOVING_VOLTAGE * (problem.scales.voltage or np.inf)
-            for o in problem.observations
-        )
+        span = MOVING_VOLTAGE * (problem.scales.voltage or np.inf)
+        return any(o.motion.voltage is not None and np.ptp(o.motion.voltage) > span for o in problem.observations)
     if effect.needs == "temperature":
-        return any(np.ptp(warmth) > MOVING_TEMPERATURE for warmth in _temperatures_by_row(problem).values())
+        by_row: dict[int, list[float]] = {}
+        for o in problem.observations:
+            if o.motion.temperature is not None:
+                by_row.setdefault(o.base_row, []).extend(end_temperatures(o.motion.temperature))
+        return any(np.ptp(temperatures) > MOVING_TEMPERATURE for temperatures in by_row.values())
     return True
-
-
-def _temperatures_by_row(problem: Problem) -> dict[int, list[float]]:
-    """Temperatures at the beginning and end of every test [degC], by base row."""
-    found: dict[int, list[float]] = {}
-    for o in problem.observations:
-        if o.motion.temperature is not None:
-            found.setdefault(o.base_row, []).extend(end_temperatures(o.motion.temperature))
-    return found
 
 
 def candidates(
@@ -174,12 +162,12 @@ def candidates(
     *,
     silent: bool = False,
 ) -> tuple[Candidate, ...]:
-    """Every effect with a name that the tests could show, fitted beside those of `before`, best first.
+    """Fit every effect with a name that the tests could show beside those of `before`, best first.
 
     Parameters
     ----------
-    problem : what is fitted to what
-    before : the optimum with the effects adopted so far
+    problem : observations and starting values
+    before : optimum with the effects adopted so far
     forbidden : effects that are not tried
     jobs : how many are fitted at the same time
     silent : noise explains what is left, so that only a faint effect can be missing
@@ -190,7 +178,7 @@ def candidates(
         if effect.name not in (*before.effects, *forbidden) and testable(problem, effect)
     ]
 
-    _ = before.column_basis  # asked of by every candidate: computed once, before they go to threads of their own
+    _ = before.column_basis  # every candidate needs it: computed once, before they go to threads of their own
 
     def promised(effect: Effect) -> float:
         return promised_drop(problem, before, effect) if _problem_for(problem, effect) is problem else np.inf
@@ -210,43 +198,37 @@ def candidates(
 
 
 def resumed(problem: Problem, before: FitResult, found: Candidate) -> Candidate:
-    """A candidate whose search was broken off early, searched on from there."""
+    """Continue the search for a candidate that was broken off early."""
     return _fitted_from(_problem_for(problem, known()[found.effect]), before, found.effect, found.fitted.optimum)
 
 
 def candidate(problem: Problem, before: FitResult, effect: Effect) -> Candidate:
-    """One effect fitted beside those of `before`, from its most promising starting values.
+    """Fit one effect beside those of `before`, from its most promising starting values.
 
-    Others, then ever fainter ones, are tried only while what is reached is worse than without the effect: a search
-    that got stuck, for without the effect is one of its own values.
+    Others, then ever fainter ones, are tried only while the fit is worse than without the effect: such a search got
+    stuck, for being switched off is one of the effect's own values.
     """
-    problem, reached = _problem_for(problem, effect), []
+    problem, reached = _problem_for(problem, effect), list[Candidate]()
     starts = sorted_starts(problem, before, effect)
-    for start in (
-        *starts[:STARTS_TRIED],
-        *(towards_neutral(problem, before, effect, starts[0], share) for share in FAINTER_STARTS),
-    ):
-        reached.append(
-            _fitted_from(
-                problem, before, effect.name, np.concatenate([_search_start(problem, before), start]), FIRST_EVALUATIONS
-            )
-        )
-        if reached[-1].fitted.misfit <= before.misfit + WORSE_THAN_CONTAINED or _switched_off(
-            effect, reached[-1].fitted
-        ):
+    faint = (towards_neutral(problem, before, effect, starts[0], share) for share in FAINTER_STARTS)
+    for start in itertools.chain(starts[:STARTS_TRIED], faint):
+        whole_start = np.concatenate([_search_start(problem, before), start])
+        reached.append(_fitted_from(problem, before, effect.name, whole_start, FIRST_EVALUATIONS))
+        fitted = reached[-1].fitted
+        if fitted.misfit <= before.misfit + WORSE_THAN_CONTAINED or _switched_off(effect, fitted):
             break
     return min(reached, key=lambda c: c.fitted.misfit)
 
 
 def _switched_off(effect: Effect, fitted: FitResult) -> bool:
-    """Whether the search of an effect's only parameter went to the limit below which lies zero, its absence."""
+    """Whether the search for an effect's only parameter ended at the limit next to zero, its absence."""
     (only, *more), nearest = effect.parameters, fitted.unknowns[-1].bounds[0]
     vanishes = only.search.logarithmic and only.neutral == 0.0 and not more
     return vanishes and bool(fitted.optimum[-1] - nearest < AT_EDGE)
 
 
 def _unsearched(problem: Problem, before: FitResult, effect: Effect) -> Candidate:
-    """An effect as faint as it is looked for."""
+    """Return an effect at the faintest values tried, without a search."""
     start = towards_neutral(problem, before, effect, starts_of(problem, before, effect)[0], FAINTER_STARTS[-1])
     return replace(
         _fitted_from(problem, before, effect.name, np.concatenate([before.optimum, start]), 1), searched=False
@@ -254,17 +236,17 @@ def _unsearched(problem: Problem, before: FitResult, effect: Effect) -> Candidat
 
 
 def best_confounder(problem: Problem, before: FitResult) -> Candidate:
-    """The competing form (a law outside the library) that explains most, fitted as a candidate is."""
+    """Fit the confounders (laws outside the library) as candidates, and return the best."""
     tried = (converged(problem, before, candidate(problem, before, form)) for form in confounders().values())
     return min(tried, key=lambda c: c.delta_bic)
 
 
 def per_voltage_candidates(problem: Problem, before: FitResult) -> list[Candidate]:
-    """Every effect of `before` whose parameters may differ by voltage, fitted so."""
+    """Fit every effect of `before` whose parameters may differ by voltage with one value per voltage."""
     if len(problem.voltages) == 1:
         return []
-    fixed = [library()[name] for name in before.effects if name not in problem.per_voltage]
-    free = [e.name for e in fixed if e.place in PLACES_PER_VOLTAGE and not e.same_at_every_voltage]
+    shared = [library()[name] for name in before.effects if name not in problem.per_voltage]
+    free = [e.name for e in shared if e.place in PLACES_PER_VOLTAGE and not e.same_at_every_voltage]
     return [_fitted_per_voltage(problem, before, name) for name in free]
 
 
@@ -276,13 +258,23 @@ def _fitted_per_voltage(
     return replace(as_candidate(problem, before, effect, fitted), varies=True)
 
 
-def as_candidate(problem: Problem, before: FitResult, effect: str, fitted: FitResult) -> Candidate:
-    """An optimum with an effect more than `before` has, as what was tried in that step."""
-    return Candidate(effect, fitted, delta_bic(before, fitted), *_changes(problem, before, fitted))
+def as_candidate(
+    problem: Problem, before: FitResult, effect: str, fitted: FitResult, pays: float | None = None
+) -> Candidate:
+    """Describe an optimum with one more effect than `before` as a candidate; `pays` where its criterion is known."""
+    pairs = zip(before.residuals, fitted.residuals, strict=True)
+    return Candidate(
+        effect,
+        fitted,
+        delta_bic(before, fitted) if pays is None else pays,
+        force_change(problem, before, fitted),
+        sum(float((after - old) @ (after - old)) for old, after in pairs),
+        before.misfit - fitted.misfit,
+    )
 
 
 def converged(problem: Problem, before: FitResult, found: Candidate) -> Candidate:
-    """A candidate with its optimum searched to the end, from all its starting values."""
+    """Search a candidate to its optimum, from all its starting values."""
     if found.varies:
         return _fitted_per_voltage(problem, before, found.effect, MOST_EVALUATIONS_OF_BEST)
     effect = known()[found.effect]
@@ -296,7 +288,7 @@ def converged(problem: Problem, before: FitResult, found: Candidate) -> Candidat
 def nearly_as_good(
     problem: Problem, before: FitResult, chosen: Candidate, tried: Sequence[Candidate]
 ) -> tuple[Candidate, ...]:
-    """The candidates of a step, those nearly as good as the one chosen searched to the end as it was."""
+    """Return the candidates of a step, those nearly as good as the chosen one searched to their optimum as well."""
     near = NEARLY_AS_GOOD * chosen.delta_bic
     return tuple(
         converged(problem, before, c) if c.effect != chosen.effect and c.delta_bic < near else c for c in tried
@@ -304,12 +296,12 @@ def nearly_as_good(
 
 
 def _problem_for(problem: Problem, effect: Effect) -> Problem:
-    """The problem that an effect is tried on: what changes the base with heat stands for its temperature axis."""
+    """Return the problem on which an effect is tried: a material effect replaces the temperature axis."""
     return problem.pooled_temperatures() if effect.place == "material" else problem
 
 
 def _search_start(problem: Problem, before: FitResult) -> Array:
-    """(3 b + e,) where the search starts in the base rows and the effects of `before`."""
+    """Return (3 b + e,) starting values of the base rows and the effects of `before`."""
     rows = before.optimum.size - len(before.unknowns)
     return before.optimum if rows == 3 * len(problem.base) else problem.start_with(before.damper)
 
@@ -317,7 +309,7 @@ def _search_start(problem: Problem, before: FitResult) -> Array:
 def _fitted_from(
     problem: Problem, before: FitResult, effect: str, start: Array, evaluations: int = MOST_EVALUATIONS
 ) -> Candidate:
-    """An effect fitted from a start."""
+    """Fit an effect from a start."""
     fitted = fit(problem, (*before.effects, effect), start, evaluations)
     pays = delta_bic(before, fitted)
     if len(problem.base) < len(before.damper.base):
@@ -326,13 +318,7 @@ def _fitted_from(
         own = len(fitted.unknowns) - len(before.unknowns)
         alone = fitted.misfit - before.misfit + own * float(np.log(fitted.size))
         pays = max(pays, alone, delta_bic(pooled, fitted))
-    return Candidate(effect, fitted, pays, *_changes(problem, before, fitted))
-
-
-def _changes(problem: Problem, before: FitResult, after: FitResult) -> tuple[float, float, float]:
-    """What a candidate changes: the force, the residuals, the misfit."""
-    changed = sum(float((b - a) @ (b - a)) for b, a in zip(before.residuals, after.residuals, strict=True))
-    return force_change(problem, before, after), changed, before.misfit - after.misfit
+    return as_candidate(problem, before, effect, fitted, pays)
 
 
 def delta_bic(before: FitResult, after: FitResult) -> float:
@@ -345,7 +331,7 @@ def delta_bic(before: FitResult, after: FitResult) -> float:
 
 
 def force_change(problem: Problem, before: FitResult, after: FitResult) -> float:
-    """R.m.s. difference of two simulated forces, each record in units of its peak."""
+    """Compute the r.m.s. difference of two simulated forces, each record in units of its peak."""
     squares = [
         np.mean((a - b) ** 2) / o.peak**2
         for o, a, b in zip(problem.observations, after.simulated, before.simulated, strict=True)

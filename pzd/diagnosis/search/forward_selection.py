@@ -1,4 +1,4 @@
-"""From candidates to adopted effects: one after another, as long as the data support the next by themselves."""
+"""Forward selection: effects are adopted one after another, as long as the data support the next by themselves."""
 
 from __future__ import annotations
 
@@ -44,25 +44,22 @@ from pzd.diagnosis.search.candidates import (
 )
 from pzd.diagnosis.thresholds import AT_REST, MOST_REWEIGHTINGS, WIDER
 
-# ----------------------------------------------------------------------------------------------------
-# Iteratively reweighted fits, until the parameters no longer depend on the damper that the weights came from.
-
 
 def reweighted(
-    weighed: Callable[[Damper], Evidence], evidence: Evidence, current: FitResult
+    weigh: Callable[[Damper], Evidence], evidence: Evidence, current: FitResult
 ) -> tuple[Evidence, FitResult]:
-    """The evidence weighed by what an optimum leaves and the optimum by that evidence, in turn until neither moves.
+    """Iterate fit and weights until the parameters no longer depend on the damper that the weights came from.
 
     The delay of a test acts along the slope of the force that the damper gives, and shifts its corners.
 
     Parameters
     ----------
-    weighed : the evidence by what a damper leaves
-    evidence : by which the optimum was found
-    current : the optimum with the effects adopted
+    weigh : gives the evidence weighed by what a damper leaves
+    evidence : of the present optimum
+    current : optimum with the adopted effects
     """
     for _ in range(MOST_REWEIGHTINGS if current.effects else 0):
-        before, evidence = current, weighed(current.damper)
+        before, evidence = current, weigh(current.damper)
         current = fit(evidence.whole, before.effects, evidence.whole.start_with(before.damper))
         moved = [abs(u.value_in(current.damper) - u.value_in(before.damper)) for u in before.unknowns]
         if np.all(moved <= AT_REST * standard_errors(current)):
@@ -70,8 +67,7 @@ def reweighted(
     return evidence, current
 
 
-# ----------------------------------------------------------------------------------------------------
-# Every other effect in the place of one adopted early, beside all that was adopted after it.
+# --- Swap step (exchange): other effects in the place of one adopted early
 
 
 def swap_step(
@@ -83,18 +79,18 @@ def swap_step(
     config: DiagnoseConfig,
     jobs: int,
 ) -> tuple[SelectionStep, Candidate]:
-    """The step in which an effect was adopted, taken again; and what is adopted in it.
+    """Repeat the step in which an effect was adopted, with all effects adopted since; return what it adopts now.
 
     What came first was chosen beside less than is adopted now, and may have stood in for what came later. It stays
-    where nothing that the data support is better by more than rivals differ, and nature has its values.
+    unless something that the data support is better by more than rivals differ, or its own values are impossible.
 
     Parameters
     ----------
-    problem : what is fitted to what
-    without : the optimum with all that was adopted but this effect
+    problem : observations and starting values
+    without : optimum with all adopted effects but this one
     name : of the effect
-    current : the optimum with it
-    refused : why the data do not support a candidate beside `without`, None where they do
+    current : optimum with it
+    refused : gives why the data do not support a candidate beside `without`, None where they do
     config : how near a rival comes
     jobs : candidates fitted at the same time
     """
@@ -102,56 +98,54 @@ def swap_step(
     tried = [c for c in candidates(problem, without, config.forbid, jobs) if c.effect != name]
     ended = sorted((own, *nearly_as_good(problem, without, own, tried)), key=lambda c: c.delta_bic)
     close = [c for c in ended if c is not own and c.delta_bic - own.delta_bic < config.rival_bic]
-    stand_ins = frozenset(c.effect for c in close if refused(c))
-    alike = [c for c in close if c.effect not in stand_ins]
+    spurious_effects = frozenset(c.effect for c in close if refused(c))
+    alike = [c for c in close if c.effect not in spurious_effects]
     kept = next((c for c in alike if _replaces(c, own, config.rival_bic)), own)
-    return SelectionStep(tuple(ended), kept.effect, rivals_of(kept, (*alike, own), config), stand_ins), kept
+    return SelectionStep(tuple(ended), kept.effect, rivals_of(kept, (*alike, own), config), spurious_effects), kept
 
 
 def _replaces(other: Candidate, own: Candidate, rival_bic: float) -> bool:
-    """Whether a candidate takes the place of the effect adopted."""
+    """Whether a candidate replaces the adopted effect."""
     if against_nature(other.fitted.damper):
         return False
     return other.delta_bic < own.delta_bic - rival_bic or bool(against_nature(own.fitted.damper))
 
 
-# ----------------------------------------------------------------------------------------------------
+# --- Forward selection
 
 
 log = logging.getLogger(__name__)
 
 
 def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, jobs: int = 1) -> Selection:
-    """Adopt effects one after another while the next one pays, is supported by itself, and something is missing.
+    """Adopt effects one after another while the next improves the fit, is supported by itself, and a gap is left.
 
     Parameters
     ----------
     campaign : the records of one setting
-    damper : plain, where the fits start
+    damper : baseline, at which the fits start
     config : thresholds, forced and forbidden effects
     jobs : candidates fitted at the same time
     """
-    weighed = partial(evidence_of, campaign)
-    first = weighed(damper)
-    plain = fit(first.whole, (), first.whole.start())
-    search = _ForwardSelection(config, weighed, jobs, damper, first, plain)
+    weigh = partial(evidence_of, campaign)
+    evidence = weigh(damper)
+    search = _ForwardSelection(config, weigh, jobs, damper, evidence, fit(evidence.whole, (), evidence.whole.start()))
     search.choose_temperature_axis()
-    first, plain = search.evidence, search.current
-    search.force()
+    initial_evidence, baseline = search.evidence, search.current
+    search.adopt_forced()
     while len(search.steps) < 2 * config.most_effects and campaign.budget.allows_more() and search.step():
         pass
-    search.contest()
-    search.rest()
-    undecided, competing_confounders = search.undecided(), search.competing_confounders()
-    rounds, reasons = tuple(search.steps), search.reasons
+    search.swap()
+    search.reweight_until_stable()
+    undecided = search.undecided()  # gives reasons as well
     return Selection(
-        plain,
+        baseline,
         search.current,
-        rounds,
-        reasons,
-        first,
+        tuple(search.steps),
+        search.reasons,
+        initial_evidence,
         search.evidence,
-        competing_confounders,
+        search.competing_confounders(),
         undecided,
         search.open_detections,
     )
@@ -159,13 +153,13 @@ def select_effects(campaign: Campaign, damper: Damper, config: DiagnoseConfig, j
 
 @dataclass(eq=False)
 class _ForwardSelection:
-    """State of the forward selection: the current fit, the rounds so far, and why each effect was adopted or not."""
+    """State of the forward selection: current fit, steps so far, and why each effect was adopted or not."""
 
     config: DiagnoseConfig
-    weighed: Callable[[Damper], Evidence]
+    weigh: Callable[[Damper], Evidence]
     jobs: int
     identified: Damper
-    """Plain, with the base rows of identify."""
+    """Baseline with the base rows of identify."""
     evidence: Evidence
     """Weighed by what the current damper leaves."""
     current: FitResult
@@ -173,30 +167,29 @@ class _ForwardSelection:
     reasons: dict[str, str] = field(default_factory=dict)
     open_detections: dict[str, tuple[Detection, ...]] = field(default_factory=dict)
 
-    def force(self) -> None:
+    def adopt_forced(self) -> None:
         """Adopt what the config asks for."""
         for name in self.config.force:
             self.current = candidate(self.evidence.whole, self.current, library()[name]).fitted
             self.reasons[name] = "adopted because the config asks for it"
 
     def choose_temperature_axis(self) -> None:
-        """Keep T0, C, k by temperature where that pays, and more than an effect would; else one row a voltage.
+        """Keep T0, C, k by temperature where that improves the criterion more than an effect would; else one row per
+        voltage.
 
         Rows by temperature follow each test's own gain, and bend between the tests what is missing.
         """
         if len(self.identified.base) == len(self.evidence.whole.voltages) or self._drifts():
             return
-        whole = self.weighed(
-            self.identified.model_copy(
-                update={"effects": self.current.damper.effects, "zero_m": self.current.damper.zero_m}
-            )
-        ).whole
-        few, effects, damper = whole.pooled_temperatures(), self.current.effects, self.current.damper
-        rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, few))
+        effects, damper = self.current.effects, self.current.damper
+        kept = {"effects": damper.effects, "zero_m": damper.zero_m}
+        whole = self.weigh(self.identified.model_copy(update=kept)).whole
+        pooled = whole.pooled_temperatures()
+        rows, one = (fit(problem, effects, problem.start_with(damper)) for problem in (whole, pooled))
         pays = delta_bic(one, rows)
         if pays <= self.config.adopt_bic and not effects:
             drifts = tuple(name for name, effect in library().items() if effect.place == "material")
-            tried = candidates(few, one, (*self.config.forbid, *drifts), self.jobs)
+            tried = candidates(pooled, one, (*self.config.forbid, *drifts), self.jobs)
             pays -= min((c.delta_bic for c in tried), default=0.0)
         self._reweight(rows if pays <= self.config.adopt_bic else one)
 
@@ -204,31 +197,33 @@ class _ForwardSelection:
         return any(library()[name].place == "material" for name in self.current.effects)
 
     def step(self) -> bool:
-        """Adopt one effect more, an adopted one by voltage, or two that are supported together; whether any was."""
-        tried = self._tried(self.evidence, self.current)
+        """Adopt one more effect, an adopted one per voltage, or two that are supported together; return whether any
+        was."""
+        tried = self._candidates(self.evidence, self.current)
         steps = sorted((*tried, *per_voltage_candidates(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
-        first = self._first_supported(steps)
+        first = self._best_supported(steps)
         if first is None:
             return self._pair(tried)
-        ended = converged(self.evidence.whole, self.current, self._natural(first, steps))
+        ended = converged(self.evidence.whole, self.current, self._physically_possible(first, steps))
         self._adopt(ended, nearly_as_good(self.evidence.whole, self.current, ended, tried), _ranked_above(first, steps))
         return True
 
-    def _natural(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
-        """Of the candidates that pay as much as the first and are supported, one with values that nature has."""
+    def _physically_possible(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
+        """Return the best supported candidate with possible values, of those that are as good as the first; else the
+        first."""
         if not against_nature(first.fitted.damper):
             return first
         alike = [c for c in steps if not c.varies and c.delta_bic - first.delta_bic < self.config.rival_bic]
-        return self._first_supported([c for c in alike if not against_nature(c.fitted.damper)]) or first
+        return self._best_supported([c for c in alike if not against_nature(c.fitted.damper)]) or first
 
-    def _tried(self, evidence: Evidence, current: FitResult) -> tuple[Candidate, ...]:
+    def _candidates(self, evidence: Evidence, current: FitResult) -> tuple[Candidate, ...]:
         if len(current.effects) == self.config.most_effects:
             return ()
         silent = not evidence.gap_is_significant(current, self.config)
         return candidates(evidence.whole, current, self.config.forbid, self.jobs, silent=silent)
 
-    def _first_supported(self, tried: Sequence[Candidate]) -> Candidate | None:
-        """The best candidate that pays and that the data support by itself; a better one that fails is a stand-in."""
+    def _best_supported(self, tried: Sequence[Candidate]) -> Candidate | None:
+        """Return the best candidate that the data support by itself; a better one that fails is spurious."""
         for each in tried:
             reason = self._refused(self.config, each)
             if reason is None:
@@ -239,26 +234,28 @@ class _ForwardSelection:
                 break
         return None
 
-    def _too_little(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
+    def _reason_against(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
         return insufficient_support(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
 
     def _leaves_gap(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
-        """Why a candidate is a stand-in by the gap that it leaves open, weighed by what is left without it or with it.
+        """Say why a candidate is spurious by the gap that it leaves, with weights by what is left without it and with
+        it.
 
-        What is left without it is slow: beside that the fit goes by what is quick, where the displacement is known
-        worst, and T0, C and k are bent.
+        What is left without it is slow: with these weights the fit follows what is quick, where the displacement is
+        known worst, and T0, C and k are bent.
         """
         reason = leaves_gap(evidence, self.config, before, each)
         if reason is None or each.varies:
             return reason
-        whole = self.weighed(each.fitted.damper).whole
+        whole = self.weigh(each.fitted.damper).whole
         again = fit(whole, each.fitted.effects, whole.start_with(each.fitted.damper))
         return leaves_gap(evidence, self.config, before, replace(each, fitted=again))
 
     def _pair(self, tried: tuple[Candidate, ...]) -> bool:
         """Adopt two effects at once: alone either takes on values that the other distorts."""
         missing = self.evidence.gap_is_significant(self.current, self.config)
-        lead = next((c for c in tried if missing and self._too_little(self.evidence, self.current, c) is None), None)
+        leads = (c for c in tried if missing and self._reason_against(self.evidence, self.current, c) is None)
+        lead = next(leads, None)
         found = None if lead is None else self._with_second(lead)
         if lead is None or found is None:
             self.open_detections = detections(self.evidence.whole, self.current, tried)
@@ -271,20 +268,20 @@ class _ForwardSelection:
         return True
 
     def _with_second(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...], frozenset[str]] | None:
-        """The effect that is supported together with another one, what else was tried beside that, and was refused."""
-        evidence = self.weighed(lead.fitted.damper)
+        """Return the effect that is supported together with another, what else was tried beside that, and what was
+        refused."""
+        evidence = self.weigh(lead.fitted.damper)
         at = fit(evidence.whole, lead.fitted.effects, evidence.whole.start_with(lead.fitted.damper))
-        seconds = self._tried(evidence, at)
-        best = next((c for c in seconds if self._too_little(evidence, at, c) is None), None)
+        seconds = self._candidates(evidence, at)
+        best = next((c for c in seconds if self._reason_against(evidence, at, c) is None), None)
         if best is None:
             return None
         both = converged(evidence.whole, at, best)
         if not closes_gap(self.evidence, self.config, self.current, both):
             return None
-        failed = spurious(self.evidence, self.weighed(both.fitted.damper), self.config, self.current, both)
-        return (
-            None if failed else (both, nearly_as_good(evidence.whole, at, both, seconds), _ranked_above(best, seconds))
-        )
+        if spurious(self.evidence, self.weigh(both.fitted.damper), self.config, self.current, both):
+            return None
+        return both, nearly_as_good(evidence.whole, at, both, seconds), _ranked_above(best, seconds)
 
     def _adopt(self, chosen: Candidate, tried: tuple[Candidate, ...], refused: frozenset[str]) -> None:
         self.reasons[chosen.effect] = "adopted, its parameters by voltage" if chosen.varies else "adopted"
@@ -299,16 +296,16 @@ class _ForwardSelection:
             self._drop_needless(name, chosen.effect)
 
     def _reweight(self, found: FitResult) -> None:
-        """Go on from an optimum, the evidence weighed by what it leaves, unless that bends it to a wider gap."""
-        self.evidence = self.weighed(found.damper)
+        """Continue from an optimum with weights by what it leaves, unless these bend it to a wider gap."""
+        self.evidence = self.weigh(found.damper)
         whole = self.evidence.whole
         start = whole.start_with(found.damper)
         self.current = fit(whole, found.effects, start)
         if self._gap(self.current) > max(WIDER * self._gap(found), self.config.negligible):
             self.current = fit(whole, found.effects, start, evaluations=1)
 
-    def contest(self) -> None:
-        """Try the others again in the place of each effect adopted before the last, and keep what does better."""
+    def swap(self) -> None:
+        """Repeat the step of each effect adopted before the last, and keep what does better."""
         for name in self.current.effects[len(self.config.force) : -1]:
             step = next((i for i, each in enumerate(self.steps) if each.chosen == name), None)
             fixed = name in self.evidence.whole.per_voltage or library()[name].place == "material"
@@ -323,9 +320,9 @@ class _ForwardSelection:
                 self.reasons[best.effect] = "adopted"
                 self._reweight(best.fitted)
 
-    def rest(self) -> None:
-        """Weigh and fit in turn until no parameter moves, unless that widens the gap."""
-        evidence, current = reweighted(self.weighed, self.evidence, self.current)
+    def reweight_until_stable(self) -> None:
+        """Iterate fit and weights until no parameter moves, unless that widens the gap."""
+        evidence, current = reweighted(self.weigh, self.evidence, self.current)
         if self._gap(current) <= max(WIDER * self._gap(self.current), self.config.negligible):
             self.evidence, self.current = evidence, current
 
@@ -333,24 +330,24 @@ class _ForwardSelection:
         return self.evidence.gap(fitted)
 
     def _without(self, effect: str) -> FitResult:
-        """The optimum with one of the adopted effects left out."""
+        """Fit without one of the adopted effects."""
         whole, damper = self.evidence.whole, self.current.damper
         effects = {name: values for name, values in damper.effects.items() if name != effect}
         return fit(whole, tuple(effects), whole.start_with(damper.model_copy(update={"effects": effects})))
 
     def competing_confounders(self) -> tuple[ConfounderMatch, ...]:
-        """The competing forms that would do as well as an effect adopted, in its place."""
+        """Return the confounders that would do as well as an adopted effect, in its place."""
         found = []
         for name in self.current.effects[len(self.config.force) :]:
             without = self._without(name)
-            form = best_confounder(self.evidence.whole, without)
-            behind = form.delta_bic - delta_bic(without, self.current)
-            if behind < self.config.rival_bic:
-                found.append(ConfounderMatch(name, self.current.damper, form.effect, form.fitted.damper, behind))
+            other = best_confounder(self.evidence.whole, without)
+            difference = other.delta_bic - delta_bic(without, self.current)
+            if difference < self.config.rival_bic:
+                found.append(ConfounderMatch(name, self.current.damper, other.effect, other.fitted.damper, difference))
         return tuple(found)
 
     def undecided(self) -> tuple[str, ...]:
-        """Where nothing was adopted, the effects that are rivals of none, each with its reason."""
+        """Return the effects that fit better where nothing was adopted but are rivals of none, each with its reason."""
         if self.current.effects or not self.steps:
             return ()
         short = [c for c in self.steps[-1].tried if c.delta_bic > self.config.adopt_bic]
@@ -363,16 +360,16 @@ class _ForwardSelection:
         return tuple(name for name, why in self.reasons.items() if why in (MAY_BE_TEST_SCATTER, MAY_BE_CHANCE))
 
     def _refused(self, config: DiagnoseConfig, each: Candidate, before: FitResult | None = None) -> str | None:
-        """Why a candidate is too little, or a stand-in; None where the data support it by itself."""
+        """Say why a candidate is too little, or spurious; None where the data support it by itself."""
         evidence, before = self.evidence, before or self.current
         return (
             insufficient_support(evidence, config, each)
             or self._leaves_gap(evidence, before, each)
-            or spurious(evidence, self.weighed(each.fitted.damper), config, before, each)
+            or spurious(evidence, self.weigh(each.fitted.damper), config, before, each)
         )
 
     def _drop_needless(self, effect: str, newest: str) -> None:
-        """Take back an effect adopted earlier that no longer pays or no longer moves the force."""
+        """Remove an earlier effect that no longer improves the criterion or no longer moves the force."""
         whole, current = self.evidence.whole, self.current
         if library()[effect].place == "material":
             return
@@ -383,5 +380,5 @@ class _ForwardSelection:
 
 
 def _ranked_above(chosen: Candidate, tried: Sequence[Candidate]) -> frozenset[str]:
-    """The effects that promised more than the one chosen: they were refused."""
+    """Return the effects that ranked above the chosen one: they were refused."""
     return frozenset(c.effect for c in itertools.takewhile(lambda c: c is not chosen, tried) if not c.varies)
