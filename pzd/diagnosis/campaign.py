@@ -123,8 +123,7 @@ class Evidence:
         return criterion(measured - np.concatenate(fitted.simulated), measured)
 
     def validation_problem(self, weights: Evidence) -> Problem:
-        """Return the problem of the samples that choose, with the base rows of this evidence and the weights of
-        another."""
+        """Return the problem of the samples that choose, with these base rows and the weights of other evidence."""
         mine = self.halves[1]
         pairs = zip(weights.halves[1].observations, mine.observations, strict=True)
         return replace(mine, observations=tuple(replace(other, base_row=o.base_row) for other, o in pairs))

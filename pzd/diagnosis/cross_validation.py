@@ -23,7 +23,7 @@ from pzd.diagnosis.fit.least_squares import MOST_EVALUATIONS, FitResult, fit
 from pzd.diagnosis.fit.likelihood import equally_weighted, weighted_record
 from pzd.diagnosis.fit.prediction import comparable_samples, predicted_force
 from pzd.diagnosis.fit.problem import Problem
-from pzd.diagnosis.thresholds import PREDICTS_WORSE, WORSE_BETWEEN
+from pzd.diagnosis.thresholds import INTERPOLATION_ERROR_RATIO, PREDICTION_STANDARD_ERRORS
 from pzd.record import Array, Mask
 from pzd.signals.nuisance import NuisanceConfig, columns_of
 
@@ -164,7 +164,9 @@ def predicts_worse(one: PredictionError, other: PredictionError) -> bool:
     from scipy.special import ndtr, stdtrit
 
     tests = len(one.records)
-    return _error_is_larger(one, other, float(stdtrit(tests - 1, ndtr(PREDICTS_WORSE))) if tests > 1 else 0.0)
+    return _error_is_larger(
+        one, other, float(stdtrit(tests - 1, ndtr(PREDICTION_STANDARD_ERRORS))) if tests > 1 else 0.0
+    )
 
 
 def predicts_better(one: PredictionError, other: PredictionError) -> bool:
@@ -173,7 +175,7 @@ def predicts_better(one: PredictionError, other: PredictionError) -> bool:
     Of few tests that is less than `predicts_worse` asks for: an effect added for its prediction is not named by the
     verdict, and nothing speaks against it.
     """
-    return _error_is_larger(other, one, PREDICTS_WORSE)
+    return _error_is_larger(other, one, PREDICTION_STANDARD_ERRORS)
 
 
 def _error_is_larger(one: PredictionError, other: PredictionError, errors: float) -> bool:
@@ -196,7 +198,7 @@ def standard_error(differences: Array) -> float:
 
 def interpolates_much_worse(one: PredictionError, other: PredictionError) -> bool:
     """Whether one damper predicts the tests of a left-out voltage visibly worse than another, and by half or more."""
-    return other.visibly_below(one) and (one.criterion or 0.0) > WORSE_BETWEEN * (other.criterion or 0.0)
+    return other.visibly_below(one) and (one.criterion or 0.0) > INTERPOLATION_ERROR_RATIO * (other.criterion or 0.0)
 
 
 # --- Cross-validation of a damper

@@ -389,8 +389,7 @@ def _order(prepared: PreparedRecord) -> tuple[float, float, str]:
 
 
 def _peaks(prepared: Sequence[PreparedRecord]) -> list[Array]:
-    """Compute the (r,) largest force, speed and displacement of every record: some effects show at the rig's largest
-    alone."""
+    """Return the (r,) largest force, speed and displacement of every record: some effects show only there."""
     channels = ("force", "velocity", "displacement")
     return [np.array([np.max(np.abs(getattr(p.record, channel))) for p in prepared]) for channel in channels]
 

@@ -1,5 +1,4 @@
-"""The gap between simulation and measurement: residual of a record, size, probability by noise alone, and where it
-lies."""
+"""The gap between simulation and measurement: residual of a record, size, probability by noise, and where it lies."""
 
 from __future__ import annotations
 

@@ -160,8 +160,7 @@ def separating_test(
 
 
 def repeated_longest_test(recorded: Sequence[PreparedRecord], envelope: OperatingEnvelope) -> NextTest:
-    """Propose a sine of many cycles as fast as the stand can, with the stroke of the longest record: one more to
-    average.
+    """Propose one more test: a sine of many cycles as fast as the stand can, with the stroke of the longest record.
 
     Parameters
     ----------
@@ -257,8 +256,7 @@ def sine(phase: Array) -> Array:
 
 
 def _triangle(phase: Array) -> Array:
-    """Return a triangle of amplitude one, corners rounded by leaving out harmonics beyond the ninth, as a
-    servo-hydraulic does."""
+    """Return a triangle of amplitude one, without harmonics beyond the ninth, as a servo-hydraulic rounds it."""
     orders = np.arange(1, 10, 2)
     terms = (-1.0) ** (orders // 2) / orders**2 * np.sin(2.0 * np.pi * np.outer(phase, orders))
     return np.asarray(8.0 / np.pi**2 * terms.sum(axis=1))

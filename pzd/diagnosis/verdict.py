@@ -27,13 +27,13 @@ from pzd.diagnosis.next_test import MANY_CYCLES, OperatingEnvelope, repeated_lon
 from pzd.diagnosis.search.acceptance import Detection, Selection, detection_from_fit
 from pzd.diagnosis.search.candidates import force_change
 from pzd.diagnosis.thresholds import (
-    CONTRADICTS,
     DOUBTFUL_BELOW,
     FEWEST_FOR_A_TREND,
+    LARGE_REMAINDER,
     LARGEST_GAP,
     LIKELIER_THAN_NOT,
     NOT_EXCLUDED,
-    OF_EACH_TEST,
+    NUISANCE_EFFECTS,
     OUTSIDE_LIBRARY,
     SMALLEST_GAP,
 )
@@ -154,7 +154,7 @@ def _gap_change(selection: Selection, sizes: tuple[float, float], config: Diagno
 def _gap_remains(sizes: tuple[float, float], config: DiagnoseConfig) -> bool:
     """Whether too much of the gap is left (r.m.s. above the noise): as a share of it, or beyond what is visible."""
     share = sizes[1] > config.unexplained_share * sizes[0] and sizes[1] >= config.negligible
-    return share or sizes[1] >= CONTRADICTS * config.visible
+    return share or sizes[1] >= LARGE_REMAINDER * config.visible
 
 
 def _nothing_adopted(size: float, chance: float, selection: Selection, config: DiagnoseConfig) -> Decision:
@@ -236,9 +236,9 @@ def _likelier_alternatives(selection: Selection, config: DiagnoseConfig) -> tupl
 
     An offset, a delay or a lag may be each test's own: whether these are open depends on their size, see `trivial`.
     """
-    if verdict_confidence(selection, config, OF_EACH_TEST) >= LIKELIER_THAN_NOT:
+    if verdict_confidence(selection, config, NUISANCE_EFFECTS) >= LIKELIER_THAN_NOT:
         return ()
-    return tuple(name for name in not_excluded(selection, config) if name not in OF_EACH_TEST)
+    return tuple(name for name in not_excluded(selection, config) if name not in NUISANCE_EFFECTS)
 
 
 def _not_excluded_note(selection: Selection, config: DiagnoseConfig) -> str:
@@ -345,7 +345,9 @@ def nuisance_trend(campaign: Campaign, damper: Damper, config: DiagnoseConfig) -
         for name, follows, trend, size in pairs
         if trend is not None
     ]
-    significant = [t for t in found if t.probability < config.significance and t.size >= CONTRADICTS * config.visible]
+    significant = [
+        t for t in found if t.probability < config.significance and t.size >= LARGE_REMAINDER * config.visible
+    ]
     return min(significant, key=lambda t: t.probability, default=None)
 
 

@@ -43,7 +43,9 @@ def extended(records: tuple[Record, ...], config: DiagnoseConfig) -> tuple[Exten
     selection, validation = plain_selection(records, config)
     missed = validation.baseline_error()
     assert missed.criterion is not None
-    return with_predictive_effects(selection, missed, validation.baseline_interpolation_error, validation, config), missed.criterion
+    return with_predictive_effects(
+        selection, missed, validation.baseline_interpolation_error, validation, config
+    ), missed.criterion
 
 
 def test_what_is_missing_is_added_one_effect_after_another(rng: np.random.Generator) -> None:

@@ -22,9 +22,9 @@ from pzd.diagnosis.campaign import evidence_of
 from pzd.diagnosis.config import DiagnoseConfig
 from pzd.diagnosis.cross_validation import CrossValidation, cross_validation_of
 from pzd.diagnosis.fit.least_squares import fit
+from pzd.diagnosis.hypotheses import hypotheses, proposal_of
 from pzd.diagnosis.hypotheses.regression import residuals_of
 from pzd.diagnosis.hypotheses.shapes import IN_ONE_UNIT, SHAPES, play
-from pzd.diagnosis.hypotheses import hypotheses, proposal_of
 from pzd.quantities import Control
 from pzd.record import Array, Record
 from pzd.schema.errors import ConfigError

@@ -123,7 +123,10 @@ def test_a_test_alone_at_its_voltage_keeps_back_its_cycles(
 def test_too_little_to_keep_a_test_back_is_told(rng: np.random.Generator) -> None:
     damper = damper_of((0.0,))
     asked = validation((sine(damper, 0.0, 1.0, 0.03, rng, cycles=1, rate=1000.0),), damper)
-    assert asked.prediction(asked.baseline_error(), asked.held_out_error(damper), asked.baseline_interpolation_error) is None
+    assert (
+        asked.prediction(asked.baseline_error(), asked.held_out_error(damper), asked.baseline_interpolation_error)
+        is None
+    )
     assert "too little to keep a test back" in unpredicted(None)
 
 

@@ -18,7 +18,7 @@ from pzd.damper.motion import Motion
 from pzd.diagnosis.search.acceptance import misplaced_end_stop
 from pzd.quantities import Control
 from pzd.record import Record
-from pzd.rig.stand.column_basis import force_in_frame
+from pzd.rig.stand.frame import force_in_frame
 
 TWO = (0.0, 150.0)
 STOPS = {"k_e": 1.5e6, "x_e": 0.018}

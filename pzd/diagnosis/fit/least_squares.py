@@ -112,8 +112,7 @@ def fit(problem: Problem, effects: Sequence[str], start: Array, evaluations: int
 
 
 def projected_out(frame: Array, values: Array) -> Array:
-    """Project some values, (w,) or (w, c), onto the complement of orthonormal columns (w, p), e.g.
-    `FitResult.column_basis`."""
+    """Project values (w,) or (w, c) onto the complement of orthonormal columns (w, p)."""
     return values - frame @ (frame.T @ values)
 
 
@@ -178,8 +177,7 @@ def _prior(problem: Problem, effects: int) -> Array:
 
 
 def _bounds(problem: Problem, unknowns: Sequence[Unknown]) -> tuple[Array, Array]:
-    """Return the limits of the search: base rows within a ratio of their start, beyond which lie only stiff or dead
-    dampers."""
+    """Return the limits of the search: rows within a ratio of their start, beyond which dampers are rigid or dead."""
     start = problem.start().reshape(-1, 3)
     low, high = start - LARGEST_LOG_RATIO, start + LARGEST_LOG_RATIO
     low[:, 0], high[:, 0] = 0.0, 2.0

@@ -162,8 +162,7 @@ class WeightedRecord:
     def through_sensors(
         self, simulated: Array, sensors: Mapping[str, Mapping[str, float]], delay: float = 0.0
     ) -> Array:
-        """Return simulated values, (m,) or (m, p), as a channel shows them, interpolated between the samples by a cubic
-        spline.
+        """Return simulated values, (m,) or (m, p), as a channel shows them, by a cubic between the samples.
 
         Parameters
         ----------

@@ -174,8 +174,7 @@ class Problem:
         return here / (max(row.T0_N for row in self.base) or 1.0)
 
     def unknowns(self, effects: Sequence[str]) -> tuple[Unknown, ...]:
-        """List the parameters of some effects in the order of the search, the zero behind the first effect that needs
-        it."""
+        """List the parameters of some effects in search order, the zero behind the first effect that needs it."""
         found: list[Unknown] = []
         for name in effects:
             nodes = range(len(self.voltages)) if name in self.per_voltage else (None,)
@@ -261,8 +260,7 @@ class Point:
         )
 
     def nodes(self, temperature: float | None) -> Nodes:
-        """Return the parameter rows at the nodes of voltage, at one temperature [degC]; cached, as often nothing
-        depends on it."""
+        """Return the rows at the nodes of voltage, at one temperature [degC]; cached."""
         problem = self.problem
         if len(problem.base) == len(problem.voltages) and all(known()[n].place != "material" for n in self.effects):
             temperature = None

@@ -223,8 +223,7 @@ class BlockJacobian:
     """Columns of the variables and (w_o, columns) derivatives of each observation."""
 
     def dense(self, columns: Sequence[int] | None = None) -> Array:
-        """Return the (w, columns) derivatives by some variables, or by all, zero where an observation does not depend
-        on one."""
+        """Return the (w, columns) derivatives by some variables, or by all; zero where there is no dependence."""
         wanted = range(self.free) if columns is None else columns
         place = {j: i for i, j in enumerate(wanted)}
         found = np.zeros((sum(len(block) for _, block in self.blocks), len(place)))
@@ -280,8 +279,7 @@ def linearise(
 
 
 def force_jacobian(problem: Problem, unknowns: Sequence[Unknown], x: Array) -> BlockJacobian:
-    """Compute the Jacobian of the force at the compared samples [N] by all search variables; parameters as in
-    `linearise`."""
+    """Compute the Jacobian of the force at the compared samples [N] by all variables; see `linearise`."""
     limits = np.full(x.size, -np.inf), np.full(x.size, np.inf)
     found = _sensitivities_at(problem, unknowns, x, limits, None)
     return BlockJacobian(x.size, tuple((columns, slopes) for _, columns, _, slopes in found))

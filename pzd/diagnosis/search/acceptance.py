@@ -19,16 +19,16 @@ from pzd.diagnosis.fit.sensitivities import force_jacobian
 from pzd.diagnosis.gap import gap_in_force, visible_gap
 from pzd.diagnosis.search.candidates import Candidate, starts_of, towards_neutral
 from pzd.diagnosis.thresholds import (
-    FAINT,
-    FAINTEST,
+    END_STOP_BEGINS,
+    END_STOP_OTHER_SIDE,
     HALVES_ALIKE,
-    HALVES_LOSE,
+    HALVES_LOSS,
     HALVES_SIGNIFICANCE,
     LEAST_CLOSED,
-    OF_EACH_TEST,
+    LINEARISED_FROM_ZERO,
+    LINEARISED_SHARE,
+    NUISANCE_EFFECTS,
     SIZES_AVERAGED,
-    STOP_BEGINS,
-    STOP_OTHER_SIDE,
     TRIVIAL_SIZE,
 )
 from pzd.record import Array
@@ -57,9 +57,9 @@ def misplaced_end_stop(damper: Damper, stroke: float) -> str | None:
     """Say why an end stop is none by where it begins; None where that is near both ends of the half stroke [m]."""
     begins = np.atleast_1d(damper.effects["end_stop"]["x_e"])
     further, nearer = (stroke - float(np.max(begins)) + side * abs(damper.zero_m) for side in (1.0, -1.0))
-    if nearer <= 0.0 or nearer**2 < STOP_OTHER_SIDE * further**2:
+    if nearer <= 0.0 or nearer**2 < END_STOP_OTHER_SIDE * further**2:
         return "stand-in: acts at one end of the stroke alone"
-    if float(np.min(begins)) - abs(damper.zero_m) < STOP_BEGINS * stroke:
+    if float(np.min(begins)) - abs(damper.zero_m) < END_STOP_BEGINS * stroke:
         return "stand-in: begins in the middle of the stroke, where no end stop does"
     return None
 
@@ -95,7 +95,7 @@ def trivial_size(effect: str, parameter: Parameter, force: float) -> float | Non
 
 
 def trivial(fitted: FitResult, effect: str, force: float) -> str | None:
-    """Say why a common offset or delay is no effect: it, or its 95 % interval, reaches below the size that counts.
+    """Say why a common offset or delay is no effect: it or its 95 % interval reaches below the size that counts.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def trivial(fitted: FitResult, effect: str, force: float) -> str | None:
     effect : its name; there is no reason where it is none of `OF_EACH_TEST`
     force : the lowest peak of the tests [N]
     """
-    if effect not in OF_EACH_TEST:
+    if effect not in NUISANCE_EFFECTS:
         return None
     sizes = []
     for unknown, error in zip(fitted.unknowns, standard_errors(fitted), strict=True):
@@ -117,8 +117,7 @@ def trivial(fitted: FitResult, effect: str, force: float) -> str | None:
 def spurious(
     evidence: Evidence, weighed: Evidence, config: DiagnoseConfig, before: FitResult, candidate: Candidate
 ) -> str | None:
-    """Say why an effect is spurious: it fails on tests that it was not fitted to, or differs between halves of the
-    tests.
+    """Say why an effect is spurious: it fails on tests not fitted, or differs between halves of the tests.
 
     Parameters
     ----------
@@ -140,7 +139,7 @@ def spurious(
     if with_it > left + config.rival_bic:
         return "stand-in: widens the gap on tests it was not fitted to"
     fresh = tuple(e for e in candidate.fitted.effects if e not in before.effects) or (candidate.effect,)
-    if not _halves_agree(halves, (fits[0], fits[1]), fresh, HALVES_LOSE * -candidate.delta_bic):
+    if not _halves_agree(halves, (fits[0], fits[1]), fresh, HALVES_LOSS * -candidate.delta_bic):
         return "stand-in: takes other values on either half of the tests"
     return None
 
@@ -148,8 +147,7 @@ def spurious(
 def _halves_agree(
     halves: tuple[Problem, Problem], fits: tuple[FitResult, FitResult], effects: Sequence[str], negligible: float
 ) -> bool:
-    """Whether one half problems of either half of the tests does nearly as well with the values that the other half
-    gives to some effects.
+    """Whether either half of the tests does nearly as well with the values that the other gives to some effects.
 
     Equation: min_ij (|r_j(p_i)|^2 - |r_j(p_j)|^2) < max(2 chi2_e, L)   Source: likelihood ratio, a half for granted
 
@@ -325,8 +323,8 @@ class _TangentSpace:
 def _traces(problem: Problem, before: FitResult, effect: Effect) -> Iterator[Array]:
     """Yield small values of an effect in the units of the search, to either side where it starts from zero."""
     for start in starts_of(problem, before, effect):
-        faint = towards_neutral(problem, before, effect, start, FAINT)
-        yield from (faint,) if np.any(faint) else (faint + FAINTEST, faint - FAINTEST)
+        faint = towards_neutral(problem, before, effect, start, LINEARISED_SHARE)
+        yield from (faint,) if np.any(faint) else (faint + LINEARISED_FROM_ZERO, faint - LINEARISED_FROM_ZERO)
 
 
 # --- Outcome of the search
@@ -415,8 +413,7 @@ class Selection:
         return [r for r in self.steps if r.chosen in self.adopted and not set(r.rivals) <= set(self.adopted)]
 
     def deciding(self, effect: str) -> tuple[Candidate, ...]:
-        """Return the candidates of the step that decided on an effect, the last in which it was tried; empty for a
-        forced one."""
+        """Return the candidates of the last step in which an effect was tried; empty for a forced one."""
         return next((r.tried for r in reversed(self.steps) if any(c.effect == effect for c in r.tried)), ())
 
     @property

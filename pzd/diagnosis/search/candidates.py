@@ -17,19 +17,19 @@ from pzd.diagnosis.fit.prediction import MOVING_TEMPERATURE, end_temperatures
 from pzd.diagnosis.fit.problem import BOUND, Problem, Unknown
 from pzd.diagnosis.fit.sensitivities import linearise
 from pzd.diagnosis.thresholds import (
-    AT_EDGE,
-    FAINT,
-    FAINTER_STARTS,
     FIRST_EVALUATIONS,
-    LEAST_PROMISE,
+    LEAST_DROP_IN_GAP,
+    LEAST_DROP_IN_NOISE,
+    LINEARISED_SHARE,
     MOST_EVALUATIONS_OF_BEST,
     MOVING_VOLTAGE,
     NEARLY_AS_GOOD,
-    SLIGHT_PROMISE,
+    SEARCH_LIMIT_MARGIN,
+    SHARE_WORTH_FITTING,
+    SHARE_WORTH_SEARCHING,
+    SMALLER_STARTS,
     STARTS_TRIED,
-    WORSE_THAN_CONTAINED,
-    WORTH_FITTING,
-    WORTH_SEARCHING,
+    STUCK_MISFIT,
 )
 from pzd.record import Array
 
@@ -60,10 +60,9 @@ def most_promising(problem: Problem, before: FitResult, effects: Sequence[Effect
 
 
 def promised_drop(problem: Problem, before: FitResult, effect: Effect) -> float:
-    """Compute the largest drop in misfit that a linearised step promises, from the starting values of an effect or near
-    zero."""
+    """Compute the largest drop in misfit that a linearised step promises, from the starts or from near zero."""
     starts = starts_of(problem, before, effect)
-    faint = (*starts, *(towards_neutral(problem, before, effect, start, FAINT) for start in starts))
+    faint = (*starts, *(towards_neutral(problem, before, effect, start, LINEARISED_SHARE) for start in starts))
     return before.misfit - min(_promised_misfit(problem, before, effect, start) for start in faint)
 
 
@@ -186,13 +185,13 @@ def candidates(
     with ThreadPoolExecutor(max(jobs, 1)) as pool:
         gains = list(pool.map(promised, tried))
         best = max((gain for gain in gains if np.isfinite(gain)), default=0.0)
-        least = max(LEAST_PROMISE if silent else SLIGHT_PROMISE, WORTH_FITTING * best)
+        least = max(LEAST_DROP_IN_NOISE if silent else LEAST_DROP_IN_GAP, SHARE_WORTH_FITTING * best)
 
         def one(effect: Effect, gain: float) -> Candidate:
             return (candidate if gain >= least else _unsearched)(problem, before, effect)
 
         found = list(pool.map(one, tried, gains))
-        worth = WORTH_SEARCHING * min((c.delta_bic for c in found), default=0.0)
+        worth = SHARE_WORTH_SEARCHING * min((c.delta_bic for c in found), default=0.0)
         found = list(pool.map(lambda c: resumed(problem, before, c) if c.delta_bic < worth else c, found))
     return tuple(sorted(found, key=lambda c: c.delta_bic))
 
@@ -210,12 +209,12 @@ def candidate(problem: Problem, before: FitResult, effect: Effect) -> Candidate:
     """
     problem, reached = _problem_for(problem, effect), list[Candidate]()
     starts = sorted_starts(problem, before, effect)
-    faint = (towards_neutral(problem, before, effect, starts[0], share) for share in FAINTER_STARTS)
+    faint = (towards_neutral(problem, before, effect, starts[0], share) for share in SMALLER_STARTS)
     for start in itertools.chain(starts[:STARTS_TRIED], faint):
         whole_start = np.concatenate([_search_start(problem, before), start])
         reached.append(_fitted_from(problem, before, effect.name, whole_start, FIRST_EVALUATIONS))
         fitted = reached[-1].fitted
-        if fitted.misfit <= before.misfit + WORSE_THAN_CONTAINED or _switched_off(effect, fitted):
+        if fitted.misfit <= before.misfit + STUCK_MISFIT or _switched_off(effect, fitted):
             break
     return min(reached, key=lambda c: c.fitted.misfit)
 
@@ -224,12 +223,12 @@ def _switched_off(effect: Effect, fitted: FitResult) -> bool:
     """Whether the search for an effect's only parameter ended at the limit next to zero, its absence."""
     (only, *more), nearest = effect.parameters, fitted.unknowns[-1].bounds[0]
     vanishes = only.search.logarithmic and only.neutral == 0.0 and not more
-    return vanishes and bool(fitted.optimum[-1] - nearest < AT_EDGE)
+    return vanishes and bool(fitted.optimum[-1] - nearest < SEARCH_LIMIT_MARGIN)
 
 
 def _unsearched(problem: Problem, before: FitResult, effect: Effect) -> Candidate:
     """Return an effect at the faintest values tried, without a search."""
-    start = towards_neutral(problem, before, effect, starts_of(problem, before, effect)[0], FAINTER_STARTS[-1])
+    start = towards_neutral(problem, before, effect, starts_of(problem, before, effect)[0], SMALLER_STARTS[-1])
     return replace(
         _fitted_from(problem, before, effect.name, np.concatenate([before.optimum, start]), 1), searched=False
     )

@@ -42,7 +42,7 @@ from pzd.diagnosis.search.candidates import (
     nearly_as_good,
     per_voltage_candidates,
 )
-from pzd.diagnosis.thresholds import AT_REST, MOST_REWEIGHTINGS, WIDER
+from pzd.diagnosis.thresholds import CONVERGED_CHANGE, LARGEST_GAP_GROWTH, MOST_REWEIGHTINGS
 
 
 def reweighted(
@@ -62,7 +62,7 @@ def reweighted(
         before, evidence = current, weigh(current.damper)
         current = fit(evidence.whole, before.effects, evidence.whole.start_with(before.damper))
         moved = [abs(u.value_in(current.damper) - u.value_in(before.damper)) for u in before.unknowns]
-        if np.all(moved <= AT_REST * standard_errors(current)):
+        if np.all(moved <= CONVERGED_CHANGE * standard_errors(current)):
             break
     return evidence, current
 
@@ -174,8 +174,7 @@ class _ForwardSelection:
             self.reasons[name] = "adopted because the config asks for it"
 
     def choose_temperature_axis(self) -> None:
-        """Keep T0, C, k by temperature where that improves the criterion more than an effect would; else one row per
-        voltage.
+        """Keep rows by temperature where they improve the criterion more than an effect; else one per voltage.
 
         Rows by temperature follow each test's own gain, and bend between the tests what is missing.
         """
@@ -197,8 +196,7 @@ class _ForwardSelection:
         return any(library()[name].place == "material" for name in self.current.effects)
 
     def step(self) -> bool:
-        """Adopt one more effect, an adopted one per voltage, or two that are supported together; return whether any
-        was."""
+        """Adopt one more effect, an adopted one per voltage, or a supported pair; return whether any was."""
         tried = self._candidates(self.evidence, self.current)
         steps = sorted((*tried, *per_voltage_candidates(self.evidence.whole, self.current)), key=lambda c: c.delta_bic)
         first = self._best_supported(steps)
@@ -209,8 +207,7 @@ class _ForwardSelection:
         return True
 
     def _physically_possible(self, first: Candidate, steps: Sequence[Candidate]) -> Candidate:
-        """Return the best supported candidate with possible values, of those that are as good as the first; else the
-        first."""
+        """Return the best supported candidate with possible values of those as good as the first; else the first."""
         if not against_nature(first.fitted.damper):
             return first
         alike = [c for c in steps if not c.varies and c.delta_bic - first.delta_bic < self.config.rival_bic]
@@ -238,8 +235,7 @@ class _ForwardSelection:
         return insufficient_support(evidence, self.config, each) or self._leaves_gap(evidence, before, each)
 
     def _leaves_gap(self, evidence: Evidence, before: FitResult, each: Candidate) -> str | None:
-        """Say why a candidate is spurious by the gap that it leaves, with weights by what is left without it and with
-        it.
+        """Say why a candidate is spurious by the gap that it leaves, weighed by the residual without it and with it.
 
         What is left without it is slow: with these weights the fit follows what is quick, where the displacement is
         known worst, and T0, C and k are bent.
@@ -268,8 +264,7 @@ class _ForwardSelection:
         return True
 
     def _with_second(self, lead: Candidate) -> tuple[Candidate, tuple[Candidate, ...], frozenset[str]] | None:
-        """Return the effect that is supported together with another, what else was tried beside that, and what was
-        refused."""
+        """Return the effect that is supported together with another, what else was tried, and what was refused."""
         evidence = self.weigh(lead.fitted.damper)
         at = fit(evidence.whole, lead.fitted.effects, evidence.whole.start_with(lead.fitted.damper))
         seconds = self._candidates(evidence, at)
@@ -301,7 +296,7 @@ class _ForwardSelection:
         whole = self.evidence.whole
         start = whole.start_with(found.damper)
         self.current = fit(whole, found.effects, start)
-        if self._gap(self.current) > max(WIDER * self._gap(found), self.config.negligible):
+        if self._gap(self.current) > max(LARGEST_GAP_GROWTH * self._gap(found), self.config.negligible):
             self.current = fit(whole, found.effects, start, evaluations=1)
 
     def swap(self) -> None:
@@ -323,7 +318,7 @@ class _ForwardSelection:
     def reweight_until_stable(self) -> None:
         """Iterate fit and weights until no parameter moves, unless that widens the gap."""
         evidence, current = reweighted(self.weigh, self.evidence, self.current)
-        if self._gap(current) <= max(WIDER * self._gap(self.current), self.config.negligible):
+        if self._gap(current) <= max(LARGEST_GAP_GROWTH * self._gap(self.current), self.config.negligible):
             self.evidence, self.current = evidence, current
 
     def _gap(self, fitted: FitResult) -> float:
