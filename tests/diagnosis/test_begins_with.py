@@ -32,6 +32,6 @@ def test_a_part_that_begins_later_is_simulated_from_the_force_at_its_motions_fir
     found = evidence((within_the_stick(150.0, rng),), damper_of((0.0,)))
     truth = damper_of((0.0,), preload_offset={"F_0": 150.0})
     parts = [o for half in found.halves for o in half.observations]
-    assert any(o.places[0] > 0 for o in parts)
+    assert any(o.sample_indices[0] > 0 for o in parts)
     for o in parts:
-        assert np.max(np.abs(o.measured - simulated_force(o, truth))) < 2.0, o.places[0]
+        assert np.max(np.abs(o.measured - simulated_force(o, truth))) < 2.0, o.sample_indices[0]

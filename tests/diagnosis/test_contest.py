@@ -65,5 +65,5 @@ def test_what_the_data_do_not_support_takes_no_place(rng: np.random.Generator) -
 
     step, kept = swap_step(problem, without, "stribeck_friction", current, refused, SMALL, 1)
     assert kept.effect != "orifice_quadratic"
-    assert "orifice_quadratic" in step.refused
+    assert "orifice_quadratic" in step.rejected
     assert "orifice_quadratic" not in step.rivals

@@ -18,7 +18,7 @@ from pzd.diagnosis.cross_validation import CrossValidation, PredictionError, cro
 from pzd.diagnosis.data import prepare, split
 from pzd.diagnosis.fit.least_squares import fit
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.verdict import unpredicted
+from pzd.diagnosis.verdict import no_prediction_note
 from pzd.record import Record
 from pzd.signals.nuisance import NuisanceConfig
 
@@ -98,11 +98,11 @@ def test_a_voltage_is_known_by_its_rows_at_any_temperature(rng: np.random.Genera
     plain = damper_of(TWO)
     asked = validation(sines(plain, rng, TWO, tests=TESTS, cycles=3), plain)
     warm = tuple(row.model_copy(update={"voltage_V": (row.voltage_V or 0.0) + 2e-3}) for row in plain.base)
-    known = asked._known(plain.model_copy(update={"base": warm}), asked.folds[0])
+    known = asked._predictable(plain.model_copy(update={"base": warm}), asked.folds[0])
     assert [mask.any() for mask in known] == [mask.any() for mask in asked.folds[0]]
     cold = plain.model_copy(update={"base": plain.base[:1]})
     lost = [p.record.voltage is not None and p.record.voltage[0] > 75.0 for p in asked.campaign.prepared]
-    known = asked._known(cold, asked.folds[0])
+    known = asked._predictable(cold, asked.folds[0])
     assert [mask.any() for mask in known] == [
         m.any() and not gone for m, gone in zip(asked.folds[0], lost, strict=True)
     ]
@@ -127,7 +127,7 @@ def test_too_little_to_keep_a_test_back_is_told(rng: np.random.Generator) -> Non
         asked.prediction(asked.baseline_error(), asked.held_out_error(damper), asked.baseline_interpolation_error)
         is None
     )
-    assert "too little to keep a test back" in unpredicted(None)
+    assert "too little to keep a test back" in no_prediction_note(None)
 
 
 # ---------------------------------------------------------------- what does harm is not handed on
@@ -205,20 +205,20 @@ class FixedPredictions:
     def baseline_error(self) -> float:
         return self.plain
 
-    def missed(self, damper: Damper) -> float:
+    def held_out_error(self, damper: Damper) -> float:
         return self.by_effects[frozenset(damper.effects)]
 
     def error_by_criterion(self, damper: Damper) -> float:
         return self.by_effects[frozenset(damper.effects)]
 
-    def worse(self, one: float, other: float) -> tuple[float | None, ...]:
+    def worse_at(self, one: float, other: float) -> tuple[float | None, ...]:
         return (150.0,) if one > other else ()
 
 
 class _Figure(float):
     """What is missed, alike at every voltage."""
 
-    def of(self, _: object) -> _Figure:
+    def of_records(self, _: object) -> _Figure:
         return self
 
     def visibly_below(self, other: float) -> bool:
@@ -255,13 +255,13 @@ def test_effects_that_harm_the_prediction_are_taken_back(
     named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
     found = adopt_effects(named, cast("CrossValidation", fixed), (), "V")
     assert found.selection.adopted == kept
-    assert cast("float", found.missed) == (both if kept == (A, B) else only_a if kept else 1.0)
+    assert cast("float", found.error) == (both if kept == (A, B) else only_a if kept else 1.0)
     assert all("worse" in found.selection.reasons[name] for name in {A, B} - set(kept))
     if kept:
-        assert found.refused is None
+        assert found.rejection is None
     else:
-        assert found.refused is not None
-        assert "W_s 1.2 against 1 at 150 V" in found.refused
+        assert found.rejection is not None
+        assert "W_s 1.2 against 1 at 150 V" in found.rejection
 
 
 @pytest.mark.parametrize(("only_a", "kept"), [(1.1, (A,)), (1.7, ())], ids=["the second harms", "both harm"])
@@ -277,18 +277,18 @@ def test_effects_that_harm_the_prediction_of_voltages_between_are_taken_back(
     named = selection(rng, preload_offset={"F_0": 120.0}, asymmetry={"alpha": 0.1})
     found = adopt_effects(named, cast("CrossValidation", fixed), (), "V")
     assert found.selection.adopted == kept
-    assert cast("float", found.between) == (only_a if kept else 1.0)
-    assert (found.refused is None) == bool(kept)
-    if found.refused is not None:
-        assert "those of a voltage left out are predicted worse" in found.refused
-        assert "W_s 1.7 against 1 at 150 V" in found.refused
+    assert cast("float", found.interpolation_error) == (only_a if kept else 1.0)
+    assert (found.rejection is None) == bool(kept)
+    if found.rejection is not None:
+        assert "those of a voltage left out are predicted worse" in found.rejection
+        assert "W_s 1.7 against 1 at 150 V" in found.rejection
 
 
 def test_what_the_config_asks_for_is_handed_on_whatever_it_does(rng: np.random.Generator) -> None:
     fixed = FixedPredictions({frozenset((A,)): _Figure(2.0)}, plain=_Figure(1.0))
     found = adopt_effects(selection(rng, preload_offset={"F_0": 120.0}), cast("CrossValidation", fixed), (A,), "V")
     assert found.selection.adopted == (A,)
-    assert found.refused is None
+    assert found.rejection is None
 
 
 def bent(rng: np.random.Generator, *, offset: float) -> tuple[Record, ...]:

@@ -48,7 +48,7 @@ def narrow(t: Array) -> Array:
     return np.asarray(0.01 * np.sqrt(2.0 / 40.0) * np.sum(tones, axis=0))
 
 
-def with_friction_scaling(t: Array) -> Array:
+def growing(t: Array) -> Array:
     """1 Hz, from 5 to 20 mm."""
     return np.asarray((0.005 + 0.015 * t / DURATION) * np.sin(2.0 * np.pi * t))
 

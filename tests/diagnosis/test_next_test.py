@@ -41,9 +41,9 @@ def peak_acceleration(waveform: str, frequency: float, amplitude: float) -> floa
     return share * amplitude * (2.0 * np.pi * frequency) ** 2
 
 
-def proposed(reach: OperatingEnvelope) -> tuple[NextTest, float, float, float] | None:
+def proposed(envelope: OperatingEnvelope) -> tuple[NextTest, float, float, float] | None:
     """The test, and its frequency, amplitude and middle."""
-    found = separating_test(RIVALS, reach, None)
+    found = separating_test(RIVALS, envelope, None)
     if found is None:
         return None
     assert found.frequency_Hz is not None
@@ -55,17 +55,17 @@ def proposed(reach: OperatingEnvelope) -> tuple[NextTest, float, float, float] |
 def test_the_test_is_within_stroke_speed_frequency_and_force(rng: np.random.Generator) -> None:
     for draw in rng.spawn(12):
         force = 10.0 ** draw.uniform(2, 5)
-        reach = OperatingEnvelope(
+        envelope = OperatingEnvelope(
             0.0, draw.uniform(0.01, 0.06), draw.uniform(0.1, 1.0), draw.uniform(2.5, 30.0), (-force, force)
         )
-        found = proposed(reach)
+        found = proposed(envelope)
         if found is None:
             continue  # nothing that the stand can do stays below its force
         told, f, amplitude, _ = found
-        assert amplitude <= reach.amplitude
-        assert 2.0 * np.pi * f * amplitude <= reach.speed
-        assert f <= reach.frequency
-        friction = 1.0 + 10.0 * reach.speed
+        assert amplitude <= envelope.amplitude
+        assert 2.0 * np.pi * f * amplitude <= envelope.speed
+        assert f <= envelope.frequency
+        friction = 1.0 + 10.0 * envelope.speed
         assert MASS * peak_acceleration(told.waveform, f, amplitude) <= 1.02 * force + friction
         assert ALIKE_AT_1_HZ * amplitude <= 1.02 * force + friction
 
@@ -122,12 +122,12 @@ def moved(told: NextTest) -> Motion:
 def test_a_damper_measured_off_zero_is_moved_within_its_stroke() -> None:
     """12.7 to 50 mm were recorded: 37.3 mm of stroke, not 100."""
     prepared = prepare((sine(2.0, 0.01865, 0.03135), sine(1.0, 0.01, 0.03135)))
-    reach = operating_envelope(Limits(), prepared, ())
-    assert reach.middle == pytest.approx(0.03135, abs=2e-5)
-    assert reach.amplitude == pytest.approx(0.01865, abs=2e-5)
-    assert reach.frequency == pytest.approx(2.0, rel=1e-3)
-    assert reach.voltages == ()
-    found = proposed(reach)
+    envelope = operating_envelope(Limits(), prepared, ())
+    assert envelope.middle == pytest.approx(0.03135, abs=2e-5)
+    assert envelope.amplitude == pytest.approx(0.01865, abs=2e-5)
+    assert envelope.frequency == pytest.approx(2.0, rel=1e-3)
+    assert envelope.voltages == ()
+    found = proposed(envelope)
     assert found is not None
     assert found[3] - found[2] >= 0.0127 - 1e-5
     assert found[3] + found[2] <= 0.05 + 1e-5
@@ -183,9 +183,9 @@ def test_limits_rule_where_they_are_given_a_stroke_about_the_recorded_middle() -
     prepared = prepare((sine(2.0, 0.01, 0.03, voltage=0.0), sine(2.0, 0.01, 0.03, voltage=100.0)))
     assert operating_envelope(Limits(), prepared, (0.0, 100.0, 150.0)).voltages == pytest.approx((0.0, 100.0))
     wide = Limits(stroke_m=0.1, speed_m_per_s=3.0, force_N=5e4, frequency_Hz=20.0, voltage_V=(-10.0, 200.0))
-    reach = operating_envelope(wide, prepared, (0.0, 150.0))
-    assert replace(reach, middle=0.0) == OperatingEnvelope(0.0, 0.05, 3.0, 20.0, (-5e4, 5e4), (0.0, 150.0))
-    assert reach.middle == pytest.approx(0.03, abs=1e-4)
+    envelope = operating_envelope(wide, prepared, (0.0, 150.0))
+    assert replace(envelope, middle=0.0) == OperatingEnvelope(0.0, 0.05, 3.0, 20.0, (-5e4, 5e4), (0.0, 150.0))
+    assert envelope.middle == pytest.approx(0.03, abs=1e-4)
     assert operating_envelope(Limits(stroke_m=0.004), prepared, ()).amplitude == pytest.approx(0.002)
 
 
@@ -212,8 +212,8 @@ def test_a_recorded_sine_of_round_stroke_and_frequency_is_proposed_as_it_is(samp
     v = 0.01 * 4.0 * np.pi * np.cos(4.0 * np.pi * time)
     record = Record("r", None, time, x, v, -((4.0 * np.pi) ** 2) * x, 900.0 * v)
     assert 0.5 * np.ptp(x) < 0.01
-    reach = operating_envelope(Limits(), prepare([record]), ())
-    assert (rounded_down(reach.amplitude), rounded_down(reach.frequency)) == (0.01, 2.0)
-    assert 0.01 * 4.0 * np.pi <= reach.speed <= 0.01 * 4.0 * np.pi * 1.005
+    envelope = operating_envelope(Limits(), prepare([record]), ())
+    assert (rounded_down(envelope.amplitude), rounded_down(envelope.frequency)) == (0.01, 2.0)
+    assert 0.01 * 4.0 * np.pi <= envelope.speed <= 0.01 * 4.0 * np.pi * 1.005
     limited = operating_envelope(Limits(stroke_m=0.01998, speed_m_per_s=0.1, frequency_Hz=1.999), prepare([record]), ())
     assert (limited.amplitude, limited.speed, limited.frequency) == (0.00999, 0.1, 1.999)

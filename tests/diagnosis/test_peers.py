@@ -131,13 +131,13 @@ def test_nothing_of_a_test_that_is_kept_back_is_fitted(rng: np.random.Generator)
     records = [sine(damper_of(TWO), U, f, x, rng, cycles=3, rate=200.0) for U in TWO for f, x in TESTS]
     other = [replace(records[0], force=-3.0 * records[0].force), *records[1:]]
     before, after = kept_back_tests(records), kept_back_tests(other)
-    (fold,) = (fold for fold in before.dealt.folds if fold[0].any())
+    (fold,) = (fold for fold in before.folds.folds if fold[0].any())
     form = KWOK.forms[0]
     for group in range(len(TWO)):
         same = before.fitted(KWOK, form, group, fold).parameters
         assert after.fitted(KWOK, form, group, fold).parameters == pytest.approx(same, rel=1e-12)
-    seen = before.fitted(KWOK, form, 0, before.nothing).parameters
-    assert after.fitted(KWOK, form, 0, after.nothing).parameters != pytest.approx(seen, rel=0.1)
+    seen = before.fitted(KWOK, form, 0, before.no_samples).parameters
+    assert after.fitted(KWOK, form, 0, after.no_samples).parameters != pytest.approx(seen, rel=0.1)
 
 
 def peer_records(form: PeerForm, at: dict[float, Array], rng: np.random.Generator) -> list[Record]:
@@ -157,9 +157,9 @@ def test_a_voltage_left_out_is_predicted_by_the_line_between_its_neighbours(rng:
     at = {U: low + U / 100.0 * (high - low) for U in THREE}
     tests = kept_back_tests(peer_records(BOUC_WEN.forms[1], at, rng), THREE)
     left_out = tests.interpolation_error(BOUC_WEN, 1)
-    form, _ = tests.by_form(BOUC_WEN, tests.nothing, range(3))
+    form, _ = tests.best_form(BOUC_WEN, tests.no_samples, range(3))
     assert form.label == "n = 2"
-    assert left_out.record == tests.groups[1][1]
+    assert left_out.records == tests.groups[1][1]
     assert left_out.criterion == pytest.approx(0.0, abs=1e-5)
     assert left_out.determination == pytest.approx(1.0, abs=1e-5)
 
@@ -188,9 +188,9 @@ def test_the_samples_compared_are_those_of_the_diagnosis(rng: np.random.Generato
     R2 = {each.record: each.R2_plain for each in prediction.by}
     tests = HeldOutTests(prepared, assign_folds(prepared, plain))
     assert any(p.lead is None for p in prepared)
-    known = tests.known({i: W_s[p.record.name] for i, p in enumerate(prepared)})
+    known = tests.known_error({i: W_s[p.record.name] for i, p in enumerate(prepared)})
     assert known.criterion == pytest.approx(prediction.W_s_plain, rel=1e-9)
-    assert [known.of([i]).determination for i in range(len(prepared))] == pytest.approx(
+    assert [known.of_records([i]).determination for i in range(len(prepared))] == pytest.approx(
         [R2[p.record.name] for p in prepared], rel=1e-9
     )
 

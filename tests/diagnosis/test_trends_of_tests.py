@@ -49,7 +49,7 @@ def trend(records: tuple[Record, ...]) -> NuisanceTrend | None:
 def test_gains_that_follow_the_frequency_are_a_trend(rng: np.random.Generator) -> None:
     found = trend(frequency_dependent(rng, 0.05))
     assert found is not None
-    assert (found.own, found.follows) == ("gain", "frequency")
+    assert (found.nuisance, found.follows) == ("gain", "frequency")
     # The force of a sine is 0.7 to 1 of its peak in r.m.s.
     assert 0.7 * 0.05 < found.size < 0.05
 
@@ -72,7 +72,7 @@ def test_voltages_as_a_rig_records_them_are_one_condition(rng: np.random.Generat
     ]
     found = trend(tuple(records))
     assert found is not None
-    assert (found.own, found.follows) == ("gain", "frequency")
+    assert (found.nuisance, found.follows) == ("gain", "frequency")
 
 
 @pytest.mark.parametrize(

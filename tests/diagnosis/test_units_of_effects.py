@@ -13,7 +13,7 @@ from campaign import damper_of
 from pzd.artefacts import Diagnosed, Value
 from pzd.damper.effects import library
 from pzd.diagnosis.search.acceptance import Selection
-from pzd.diagnosis.verdict import parameters_of
+from pzd.diagnosis.stage import parameters_of
 from pzd.quantities import Control
 
 CONTROLS = [(Control(), "V"), (Control("current", "A"), "A")]

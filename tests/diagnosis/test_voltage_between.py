@@ -10,7 +10,7 @@ from test_kept_back import campaign_of
 from pzd.artefacts import NextTest
 from pzd.damper.model import Damper
 from pzd.diagnosis.cross_validation import cross_validation_of
-from pzd.diagnosis.next_test import PredictingDamper, intermediate_voltage_test, operating_envelope
+from pzd.diagnosis.next_test import intermediate_voltage_test, operating_envelope
 from pzd.rig.config import Limits
 
 THREE = (0.0, 50.0, 150.0)
@@ -35,9 +35,9 @@ def asked(damper: Damper, rng: np.random.Generator, limits: Limits = LIMITS) -> 
     records = sines(damper, rng, [row.voltage_V or 0.0 for row in damper.base], tests=TESTS, cycles=4)
     campaign = campaign_of(records)
     validation = cross_validation_of(campaign, damper, 0.0025)
-    predicting = PredictingDamper(damper, 0.0, validation.baseline_error(), validation.baseline_interpolation_error)
-    reach = operating_envelope(limits, campaign.prepared, [row.voltage_V or 0.0 for row in damper.base])
-    return intermediate_voltage_test(predicting, validation, campaign.prepared, reach, None)
+    errors = validation.baseline_error(), validation.baseline_interpolation_error
+    envelope = operating_envelope(limits, campaign.prepared, [row.voltage_V or 0.0 for row in damper.base])
+    return intermediate_voltage_test(damper, 0.0, errors, validation, campaign.prepared, envelope, None)
 
 
 @pytest.mark.parametrize("T0", [0.6 * ON_THE_LINE, 1.5 * ON_THE_LINE])

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.diagnose.campaign import coloured, damper_of, sines
+from tests.diagnosis.campaign import coloured, damper_of, sines
 from whole_diagnosis import all_but, diagnosed
 
 from pzd.artefacts import Diagnosed, Value

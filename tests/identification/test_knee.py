@@ -24,7 +24,7 @@ from pzd.damper.compose import respond, static_force, steady_force
 from pzd.damper.model import BaseRow, Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.config import DiagnoseConfig
-from pzd.diagnosis.stage import knee_verdict
+from pzd.diagnosis.verdict import knee_verdict
 from pzd.identification.config import IdentifyConfig
 from pzd.identification.knee import TRADE_SPEEDS, clicks, knees, law_row, per_unit
 from pzd.identification.stage import identify
