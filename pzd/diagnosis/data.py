@@ -110,7 +110,7 @@ def prepare(records: Sequence[Record]) -> tuple[PreparedRecord, ...]:
 
 
 def _prepared(raw: Record, constant: bool) -> PreparedRecord:
-    record = _smoothed_temperature(_fixed_voltage(raw) if constant else _denoised_voltage(raw))
+    record = _denoised(raw, constant=constant)
     run = cycles(record.time, record.displacement)
     if run is None:
         return PreparedRecord(_smoothed_displacement(record), None, None, constant)
@@ -132,24 +132,17 @@ def _prepared(raw: Record, constant: bool) -> PreparedRecord:
     return PreparedRecord(cleaned, run, lead, constant, _monte_carlo_motions(lead, average))
 
 
-def _fixed_voltage(record: Record) -> Record:
-    """Replace the voltage by its median, where it is constant but for noise."""
-    voltage = record.median_voltage()
-    return record if voltage is None else replace(record, voltage=np.full(record.time.size, voltage))
-
-
-def _denoised_voltage(record: Record) -> Record:
-    """Replace the voltage by its levels and ramps, without noise."""
-    return record if record.voltage is None else replace(record, voltage=without_noise(record.voltage))
-
-
-def _smoothed_temperature(record: Record) -> Record:
-    """Smooth the temperature, for the fluid does not follow the noise and resolution of its sensor."""
-    if record.temperature is None or np.ptp(record.temperature) == 0.0:
-        return record
-    values = record.temperature.copy()  # the smoothing goes through the ends, and would keep the noise of these two
-    values[0], values[-1] = _end_value(values), _end_value(values[::-1])
-    return replace(record, temperature=low_pass(values, HIGHEST))
+def _denoised(record: Record, *, constant: bool) -> Record:
+    """Remove sensor noise: a constant voltage is its median, a moving one levels and ramps; smooth temperature."""
+    voltage, temperature = record.voltage, record.temperature
+    if voltage is not None:
+        voltage = np.full(voltage.size, np.median(voltage)) if constant else without_noise(voltage)
+    if temperature is not None and np.ptp(temperature) > 0.0:
+        ends = _end_value(temperature), _end_value(temperature[::-1])
+        temperature = temperature.copy()
+        temperature[0], temperature[-1] = ends  # the filter goes through these two, and would keep their noise
+        temperature = low_pass(temperature, HIGHEST)
+    return replace(record, voltage=voltage, temperature=temperature)
 
 
 def _end_value(values: Array) -> float:

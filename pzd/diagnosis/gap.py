@@ -336,10 +336,12 @@ def _labels(
 ) -> dict[str, Labels]:
     """Return by axis the (n,) region in words that each point belongs to; positions as recorded."""
     v, x, a = p["velocity"], p["displacement"], p["acceleration"]
+    distance = 0.25 * stroke  # edges to two figures of it
+    sides = np.round([zero - distance, zero + distance], 1 - math.floor(math.log10(distance)))
     fast = _bands(np.abs(v), _rounded(np.array([0.1, 0.33, 0.67]) * speed), "abs(v)", "m/s")
     found = {
         "velocity": fast,
-        "position": _bands(x + zero, _edges_around(zero, 0.25 * stroke), "x", "m"),
+        "position": _bands(x + zero, sides, "x", "m"),
         "direction": np.where(v >= 0.0, "rebound (v > 0)", "compression (v < 0)"),
         "phase": np.where(v * a >= 0.0, "speeding up", "slowing down"),
     }
@@ -367,11 +369,6 @@ def _bands(values: Array, edges: Array, name: str, unit: str) -> Labels:
     words += [f"{low} < {name} < {high} {unit}" for low, high in pairwise(numbers)]
     words.append(f"{name} > {numbers[-1]} {unit}")
     return np.array(words)[np.searchsorted(edges, values)]
-
-
-def _edges_around(middle: float, distance: float) -> Array:
-    """Return the edges on either side of a middle, to two figures of their distance from it."""
-    return np.round([middle - distance, middle + distance], 1 - math.floor(math.log10(distance)))
 
 
 def _rounded(edges: Array) -> Array:

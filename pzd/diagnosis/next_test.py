@@ -19,7 +19,7 @@ from pzd.damper.model import Damper
 from pzd.damper.motion import Motion
 from pzd.diagnosis.cross_validation import CrossValidation, PredictionError
 from pzd.diagnosis.data import PreparedRecord
-from pzd.record import Array, Record
+from pzd.record import Array
 from pzd.rig.config import Limits
 from pzd.signals.criterion import rms
 
@@ -74,28 +74,25 @@ def operating_envelope(
     """
     records = [p.record for p in prepared]
     lowest, highest = _range([r.displacement for r in records])
-    force = _range([r.force for r in records])
-    amplitude = 0.5 * (highest - lowest) if limits.stroke_m is None else 0.5 * limits.stroke_m
-    middle = _settable_middle(0.5 * (lowest + highest), amplitude)
+    amplitude = 0.5 * (highest - lowest if limits.stroke_m is None else limits.stroke_m)
+    # To a digit that can be set, a hundredth of the amplitude's first digit or less; + 0.0 leaves no minus before zero.
+    middle = round(0.5 * (lowest + highest), 3 - math.floor(math.log10(amplitude))) + 0.0
     if limits.stroke_m is None:
         amplitude = (1.0 + RECORDED_ERROR) * min(highest - middle, middle - lowest)
+    recorded = [r.voltage for r in records if r.voltage is not None]
+    low, high = limits.voltage_V or (_range(recorded) if recorded else (-np.inf, np.inf))
     return OperatingEnvelope(
         middle,
         amplitude,
         limits.speed_m_per_s or (1.0 + RECORDED_ERROR) * max(float(np.max(np.abs(r.velocity))) for r in records),
         limits.frequency_Hz or (1.0 + RECORDED_ERROR) * max(frequency_of(p) for p in prepared),
-        force if limits.force_N is None else (-limits.force_N, limits.force_N),
-        _admissible_voltages(limits.voltage_V or _recorded_voltages(records), voltages),
+        _range([r.force for r in records]) if limits.force_N is None else (-limits.force_N, limits.force_N),
+        tuple(sorted({min(max(v, low), high) for v in voltages})),
     )
 
 
 def _range(channels: Sequence[Array]) -> tuple[float, float]:
     return min(float(np.min(c)) for c in channels), max(float(np.max(c)) for c in channels)
-
-
-def _settable_middle(middle: float, amplitude: float) -> float:
-    """Round a middle to a digit that is a hundredth of the amplitude's first digit or less."""
-    return round(middle, 3 - math.floor(math.log10(amplitude))) + 0.0  # no minus before a zero
 
 
 def frequency_of(prepared: PreparedRecord) -> float:
@@ -104,17 +101,6 @@ def frequency_of(prepared: PreparedRecord) -> float:
         return 1.0 / prepared.cycles.period
     record = prepared.record
     return float(np.max(np.abs(record.velocity)) / (np.pi * np.ptp(record.displacement)))
-
-
-def _recorded_voltages(records: Sequence[Record]) -> tuple[float, float]:
-    channels = [r.voltage for r in records if r.voltage is not None]
-    return _range(channels) if channels else (-np.inf, np.inf)
-
-
-def _admissible_voltages(limits: tuple[float, float], voltages: Sequence[float]) -> tuple[float, ...]:
-    """Clip the voltages to the limits."""
-    low, high = limits
-    return tuple(sorted({min(max(v, low), high) for v in voltages}))
 
 
 def separating_test(
@@ -246,8 +232,8 @@ def test_motion(
         signal = np.where((STEPS_HZ * phase) % 2.0 < 1.0, voltage[0], voltage[1])
     elif voltage is not None:
         signal = np.full(time.size, voltage)
-    warmth = None if temperature is None else np.full(time.size, temperature)
-    return Motion(time, channels[0], channels[1], channels[2], signal, warmth)
+    warm = None if temperature is None else np.full(time.size, temperature)
+    return Motion(time, channels[0], channels[1], channels[2], signal, warm)
 
 
 def sine(phase: Array) -> Array:

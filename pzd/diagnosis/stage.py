@@ -15,7 +15,6 @@ from pzd.artefacts import (
     Identified,
     NextTest,
     ParameterRow,
-    Prediction,
     Ranked,
     Rig,
     Value,
@@ -119,10 +118,11 @@ def diagnose(
     selection, prediction = adoption.selection, adoption.prediction(validation)
     before = campaign.checks(selection.baseline.damper)
     log.info("diagnose: %s, %s; %.2g forces computed", decision.verdict, decision.reason, campaign.budget.spent)
+    limits = hold_out_note(roles.hold_out), no_prediction_note(prediction), saturation_note(saturated), _hum(before)
     final = selection.fitted.damper.moved(zero) if selection.adopted else baseline
     diagnosis = Diagnosis(
         verdict=decision.verdict,
-        reason=decision.reason + _limitations(campaign, prediction) + saturation_note(saturated) + _hum(before),
+        reason="".join((decision.reason, campaign.budget.note, *limits)),
         effects=selection.adopted,
         confidence=decision.confidence,
         gap=held_out_gap(selection, validation if adoption.by_criterion else None),
@@ -138,11 +138,6 @@ def diagnose(
         rows = base_parameters(selection, decision.verdict, setting)
     shapes = hypotheses(validation, final.moved(-zero), control, decision.verdict)
     return Diagnosed(diagnosis, final, baseline, rows, shapes)
-
-
-def _limitations(campaign: Campaign, prediction: Prediction | None) -> str:
-    """Say what limits the verdict: a search that was ended, parts of tests held out, or none."""
-    return campaign.budget.note + hold_out_note(campaign.split.hold_out) + no_prediction_note(prediction)
 
 
 def _hum(checks: Sequence[ResidualCheck]) -> str:

@@ -71,7 +71,7 @@ def _row(found: PredictingShapes, place: int, residuals: Residuals, control: Con
         coefficient=float(values[0]),
         coefficient_low95=float(values[0] - LEVEL * errors[0]),
         coefficient_high95=float(values[0] + LEVEL * errors[0]),
-        unit=_unit(shape, control),
+        unit=f"{shape.unit.removesuffix('/V')}/{control.unit}" if shape.per_control else shape.unit,
         second_coefficient=float(values[1]) if values.size > 1 else None,
         parameter=shape.parameter,
         parameter_value=choice.value,
@@ -85,10 +85,6 @@ def _row(found: PredictingShapes, place: int, residuals: Residuals, control: Con
         library=" or ".join(shape.library) or None,
         source=shape.source,
     )
-
-
-def _unit(shape: Shape, control: Control) -> str:
-    return f"{shape.unit.removesuffix('/V')}/{control.unit}" if shape.per_control else shape.unit
 
 
 def _points(residuals: Residuals, best: PredictingShapes, control: Control) -> Iterator[HypothesisPoint]:
@@ -127,18 +123,13 @@ def _partial_residual(
     """Return (c,) argument, partial residual and component of a shape at the samples of the regression."""
     columns = next(found for tried, found in shape.columns(test.signals) if tried == value)
     q = len(residuals.keys)
-    coefficients = solution[_places(residuals, shape, value)]
-    component = columns @ coefficients
+    candidate = next(c for c in residuals.regression.candidates if c.shape.name == shape.name)
+    choice = next(choice for choice in candidate.choices if choice.value == value)
+    component = columns @ solution[list(choice.columns)]
     beside = test.check.residual - residuals.tangents(test) @ solution[1 : 1 + q]
     left = beside - test.nuisance_part(beside - component, test.counts)
     argument = test.signals.x if columns.shape[1] > 1 else columns[:, 0]
     return argument[test.counts], left[test.counts], component[test.counts]
-
-
-def _places(residuals: Residuals, shape: Shape, value: float | None) -> Sequence[int]:
-    """Return the columns of a shape among the products, at one value of the searched parameter."""
-    candidate = next(c for c in residuals.regression.candidates if c.shape.name == shape.name)
-    return list(next(choice for choice in candidate.choices if choice.value == value).columns)
 
 
 # --- Effect file of a hypothesis: a parallel force that the next diagnosis can be told to adopt
@@ -175,107 +166,79 @@ def proposal_of(rows: Sequence[HypothesisRow], run: str, largest_control: float)
     """
     passed_over: list[str] = []
     for row in rows:
-        if why := _why_not_writable(row):
+        base_name = row.shape.removeprefix(OF_THE_CONTROL)
+        by_control = base_name != row.shape
+        shape = next((shape for shape in SHAPES if shape.name == base_name), None)
+        if row.library and not by_control:
+            passed_over.append(f"{row.shape}: is {row.library} of the library, which diagnose.force takes")
+        elif shape is None or shape.law is None:
+            why = "is no function of x, v and a, as the force beside the element in an effect file is"
             passed_over.append(f"{row.shape}: {why}")
-            continue
-        name = _name(row.shape)
-        return Proposal(name, _text(row, name, run, largest_control), row, tuple(passed_over))
+        else:
+            name = _identifier(base_name)
+            text = _effect_file(row, shape, name, run, largest_control if by_control else None)
+            return Proposal(name, text, row, tuple(passed_over))
     listed = "; ".join(passed_over) or "diagnose told none"
     raise ConfigError(f"{run}: there is no hypothesis that an effect file can hold ({listed})")
 
 
-def _shape(row: HypothesisRow) -> Shape | None:
-    name = row.shape.removeprefix(OF_THE_CONTROL)
-    return next((shape for shape in SHAPES if shape.name == name), None)
-
-
-def _why_not_writable(row: HypothesisRow) -> str | None:
-    shape = _shape(row)
-    if row.library and not row.shape.startswith(OF_THE_CONTROL):
-        return f"is {row.library} of the library, which diagnose.force takes"
-    if shape is None or shape.law is None:
-        return "is no function of x, v and a, as the force beside the element in an effect file is"
-    return None
-
-
-def _name(shape: str) -> str:
+def _identifier(shape: str) -> str:
     """Turn a shape into an identifier: |x| v becomes abs_x_v."""
-    plain = shape.removeprefix(OF_THE_CONTROL).split("/")[0]
+    words = shape.partition("/")[0]
     for symbol, word in (("2 pi ", ""), ("|x|", "abs_x"), ("|v|", "abs_v"), ("|a|", "abs_a"), ("^", "")):
-        plain = plain.replace(symbol, word)
-    name = "_".join(plain.split())
+        words = words.replace(symbol, word)
+    name = "_".join(words.split())
     return name if name.isidentifier() else f"hypothesis_{name}"
 
 
-def _text(row: HypothesisRow, name: str, run: str, largest_control: float) -> str:
-    shape = next(shape for shape in SHAPES if shape.name == row.shape.removeprefix(OF_THE_CONTROL))
-    by_control = row.shape.startswith(OF_THE_CONTROL)
+def _effect_file(row: HypothesisRow, shape: Shape, name: str, run: str, largest_control: float | None) -> str:
+    """Return the text of an effect file; coefficients that scale with the control signal are at its largest."""
+    import ast
+
+    scale, more = (1.0, "") if largest_control is None else (largest_control, ", with_friction=True")
+    values = [scale * value for value in (row.coefficient, row.second_coefficient) if value is not None]
+    # Not C, which the element has; and no two effects of a place share columns.
+    symbols = ("c",) if len(values) == 1 else ("c_sin", "c_cos")
+    printed = f"{symbols[0]} {shape.name}"
+    if len(values) > 1:
+        printed = f"c_sin sin(2 pi x/lambda) + c_cos cos(2 pi x/lambda), lambda = {row.parameter_value:.4g} m"
     laws = (shape.law or "").format(parameter=row.parameter_value, width=row.width_m).split(";")
-    values = [row.coefficient, *([row.second_coefficient] if row.second_coefficient is not None else [])]
-    values = [value * (largest_control if by_control else 1.0) for value in values]
-    symbols = _symbols(len(values))
-    printed = (
-        f"{symbols[0]} {shape.name}"
-        if len(values) == 1
-        else (
-            f"{symbols[0]} sin(2 pi x/lambda) + {symbols[1]} cos(2 pi x/lambda), lambda = {row.parameter_value:.4g} m"
-        )
-    )
     body = " + ".join(f"{symbol} * {law}" for symbol, law in zip(symbols, laws, strict=True))
-    taken = [letter for letter in AT if letter in _letters(body)]
+    letters = {node.id for node in ast.walk(ast.parse(body)) if isinstance(node, ast.Name)}
+    taken = [letter for letter in AT if letter in letters]
     arguments = ", ".join(f"{letter}: float" for letter in (*taken, *symbols))
     given = {letter: AT[letter] for letter in taken} | dict(zip(symbols, values, strict=True))
     expected = float(eval(body, {"math": math, **given}))  # noqa: S307  # a law of `SHAPES`, with numbers
-    lines = [_parameter(name, value, shape, by_control=by_control) for name, value in zip(symbols, values, strict=True)]
-    return "\n".join(
-        [
-            f'"""A hypothesis on what the diagnosis of {run} left: {row.physics}.',
-            "",
-            f"Law: {printed}. On tests kept back it would close {row.closes:.0%} of what is left there.",
-            "It is no name: that the shape fits does not say that the physics is this one.",
-            '"""',
-            "",
-            "from __future__ import annotations",
-            "",
-            *(["import math", ""] if "math" in _letters(body) else []),
-            "from pzd.damper.effect import Effect, Parameter, Search",
-            "",
-            "EFFECT = Effect(",
-            f'    name="{name}",',
-            '    place="parallel",',
-            f'    law="{printed}",',
-            "    parameters=(",
-            *lines,
-            "    ),",
-            f'    source="hypothesis of pzd diagnose; {row.source}",',
-            f"    tests=(({given!r}, {expected!r}),),",
-            '    never_named="a hypothesis that no benchmark has tried",',
-            ")",
-            "",
-            "",
-            f"def law({arguments}) -> float:",
-            '    """Force [N] beside the element; x [m], v [m/s] and a [m/s2] of the rod."""',
-            f"    return {body}",
-            "",
-        ]
+    imports = "import math\n\n" if "math" in letters else ""
+    parameters = "\n".join(
+        f'        Parameter("{symbol}", "{shape.unit}", 0.0, -1.0e12, 1.0e12, "coefficient", '
+        f"Search(lambda s: {abs(value)!r}, ({math.copysign(1.0, value)!r},)){more}),"
+        for symbol, value in zip(symbols, values, strict=True)
     )
+    return f'''"""A hypothesis on what the diagnosis of {run} left: {row.physics}.
+
+Law: {printed}. On tests kept back it would close {row.closes:.0%} of what is left there.
+It is no name: that the shape fits does not say that the physics is this one.
+"""
+
+from __future__ import annotations
+
+{imports}from pzd.damper.effect import Effect, Parameter, Search
+
+EFFECT = Effect(
+    name="{name}",
+    place="parallel",
+    law="{printed}",
+    parameters=(
+{parameters}
+    ),
+    source="hypothesis of pzd diagnose; {row.source}",
+    tests=(({given!r}, {expected!r}),),
+    never_named="a hypothesis that no benchmark has tried",
+)
 
 
-def _letters(body: str) -> set[str]:
-    import ast
-
-    return {node.id for node in ast.walk(ast.parse(body)) if isinstance(node, ast.Name)}
-
-
-def _symbols(count: int) -> tuple[str, ...]:
-    """Return names of the coefficients.
-
-    The element has C, and no effect of a place shares columns with another.
-    """
-    return ("c",) if count == 1 else ("c_sin", "c_cos")
-
-
-def _parameter(symbol: str, value: float, shape: Shape, *, by_control: bool) -> str:
-    size = f"Search(lambda s: {abs(value)!r}, ({math.copysign(1.0, value)!r},))"
-    more = ", with_friction=True" if by_control else ""
-    return f'        Parameter("{symbol}", "{shape.unit}", 0.0, -1.0e12, 1.0e12, "coefficient", {size}{more}),'
+def law({arguments}) -> float:
+    """Force [N] beside the element; x [m], v [m/s] and a [m/s2] of the rod."""
+    return {body}
+'''
