@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign import damper_of, sine
+from synthetic import damper_of, sine
 
 from pzd.damper.effects import library
 from pzd.diagnosis.campaign import Campaign, Evidence, evidence_of

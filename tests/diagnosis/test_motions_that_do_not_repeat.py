@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.random import Generator
-from whole_diagnosis import diagnosed
+from synthetic import diagnosed
 
 from pzd.damper.compose import respond
 from pzd.damper.model import BaseRow, Damper

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign import damper_of, sine, waveform
 from scipy.integrate import solve_ivp
+from synthetic import TWO, damper_of, sine, waveform
 
 from pzd.damper.compose import respond
 from pzd.damper.model import Damper
@@ -28,7 +28,7 @@ FORMS = [(peer, form) for peer in peers().values() for form in peer.forms]
 TRUE = {"kwok": (1500.0, 800.0, 500.0, 40.0, 90.0, 0.6), "bouc_wen": (1500.0, 800.0, 500.0, 40.0, 900.0, 3.0)}
 """Of a small magneto-rheological damper."""
 TESTS = ((0.5, 0.02), (1.0, 0.008), (2.0, 0.02))
-TWO, THREE = (0.0, 150.0), (0.0, 50.0, 100.0)
+THREE = (0.0, 50.0, 100.0)
 
 each_form = pytest.mark.parametrize(
     ("peer", "form"), FORMS, ids=[f"{peer.name} {form.label}".strip() for peer, form in FORMS]
@@ -113,7 +113,7 @@ def test_a_closed_loop_of_the_hysteresis_takes_up_energy(form: PeerForm, sigma: 
     assert 0.0 < work <= 4.0 * 0.01  # that of a dry friction of 1 N
 
 
-def test_a_parameter_is_on_the_line_between_voltages_and_held_beyond() -> None:
+def test_parameters_are_linear_between_voltages_and_constant_beyond() -> None:
     fits = {U: PeerFit(np.array([U, 10.0 - U]), 0.0, "converged") for U in (1.0, 3.0)}
     assert between_voltages(fits, 2.5) == pytest.approx([2.5, 7.5])
     assert between_voltages(fits, 9.0) == pytest.approx([3.0, 7.0])
@@ -127,7 +127,7 @@ def kept_back_tests(records: Sequence[Record], voltages: Sequence[float] = TWO) 
     return HeldOutTests(prepared, assign_folds(prepared, damper_of(voltages)))
 
 
-def test_nothing_of_a_test_that_is_kept_back_is_fitted(rng: np.random.Generator) -> None:
+def test_no_peer_is_fitted_to_a_held_out_test(rng: np.random.Generator) -> None:
     records = [sine(damper_of(TWO), U, f, x, rng, cycles=3, rate=200.0) for U in TWO for f, x in TESTS]
     other = [replace(records[0], force=-3.0 * records[0].force), *records[1:]]
     before, after = kept_back_tests(records), kept_back_tests(other)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from campaign import damper_of
 from numpy.random import Generator
+from synthetic import damper_of
 
 from pzd.damper.compose import respond, sensors_of
 from pzd.damper.model import BaseRow, Damper
@@ -74,7 +74,7 @@ def whole(effects: dict[str, dict[str, float]], rng: Generator, *, moving: bool)
 
 @pytest.mark.parametrize("moving", [False, True], ids=["one voltage", "moving"])
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_they_are_those_of_the_whole_damper(effect: str, moving: bool, rng: Generator) -> None:
+def test_residuals_and_jacobian_are_those_of_the_whole_damper(effect: str, moving: bool, rng: Generator) -> None:
     """As the stand computes it from the config, and differenced with an exact path, by every searched variable."""
     problem, damper = whole({effect: EFFECTS[effect]}, rng, moving=moving)
     (o,), unknowns, x = problem.observations, problem.unknowns((effect,)), problem.start_with(damper)
